@@ -74,7 +74,7 @@ pub fn run(arguments: &SurveyArguments) -> Result<(), (String, u8)> {
         rows.push(Row {
             passes,
             samples: raws.iter().map(|raw| raw.time_s.len()).sum(),
-            line_m: surveyed.ways.growing.length_m(),
+            line_m: surveyed.alignments.growing.length_m(),
             total_s,
             pass_ms: 1e3 * total_s / passes as f64,
         });

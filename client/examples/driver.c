@@ -1,7 +1,7 @@
 /* A driver on a simulated train: put your own controller in its place, and see what it gains.
  *
- * driver [train id] [ways]
- * drives that many ways of 6 km by the timetable, many times faster than real time, and says after each
+ * driver [train id] [legs]
+ * drives that many legs of 6 km by the timetable, many times faster than real time, and says after each
  * how late it came, how far beyond the stopping point it stands, and by which parameters it drove. With
  * "dynocar run --config config/daemon.toml" beside it, it drives by what the daemon learns.
  * README.md beside this folder says how to build it. */
@@ -14,7 +14,7 @@
 
 #define CYCLE_S 0.2
 #define PATIENCE_NS 50000000
-#define WAY_M 6000.0
+#define LEG_M 6000.0
 #define DUE_S 450.0
 #define CRUISE_MPS 19.0
 #define COASTING_MIN_MPS 15.0
@@ -72,9 +72,9 @@ static void step(train *it, double wanted_n, const parameters *known)
 /* Your controller: the force in N, braking negative, at a place with a speed, by what is known. */
 static double controller_n(const train *it, double coast_from_m, const parameters *known)
 {
-    double left_m = WAY_M > it->at_m ? WAY_M - it->at_m : 0.0;
+    double left_m = LEG_M > it->at_m ? LEG_M - it->at_m : 0.0;
     double curve_mps = sqrt(2.0 * BRAKING_MPS2 * left_m);
-    int brakes = it->speed_mps + 0.5 >= curve_mps && it->at_m > 0.5 * WAY_M;
+    int brakes = it->speed_mps + 0.5 >= curve_mps && it->at_m > 0.5 * LEG_M;
     int coasts = it->at_m >= coast_from_m;
     if (!brakes && coasts && it->speed_mps > COASTING_MIN_MPS) {
         return 0.0;
@@ -100,8 +100,8 @@ static double predicted_s(double coast_from_m, const parameters *known)
 /* The first place in m from which coasting still keeps the timetable, by what is known. */
 static double coasting_place_m(const parameters *known)
 {
-    double early_m = 0.1 * WAY_M;
-    double late_m = WAY_M;
+    double early_m = 0.1 * LEG_M;
+    double late_m = LEG_M;
     for (int halving = 0; halving < 20; halving++) {
         double middle_m = 0.5 * (early_m + late_m);
         if (predicted_s(middle_m, known) <= DUE_S) {
@@ -138,7 +138,7 @@ static parameters learned(dynocar_reader *reader)
     return known;
 }
 
-static void drive(dynocar_publisher *publisher, dynocar_reader *reader, int way, int64_t *time_ns)
+static void drive(dynocar_publisher *publisher, dynocar_reader *reader, int leg, int64_t *time_ns)
 {
     train it = {0.0, 0.0, 0.0};
     (void)dynocar_publisher_start_run(publisher);
@@ -169,8 +169,8 @@ static void drive(dynocar_publisher *publisher, dynocar_reader *reader, int way,
         cycles++;
     }
     known = learned(reader);
-    printf("way %d: %+.1f s off the timetable, %+.2f m off the stopping point, by %s (%.0f t)\n", way,
-           (double)cycles * CYCLE_S - DUE_S, it.at_m - WAY_M,
+    printf("leg %d: %+.1f s off the timetable, %+.2f m off the stopping point, by %s (%.0f t)\n", leg,
+           (double)cycles * CYCLE_S - DUE_S, it.at_m - LEG_M,
            known.is_learned ? "the daemon" : "the built-in parameters", 1e-3 * known.mass_kg);
     fflush(stdout);
 }
@@ -178,7 +178,7 @@ static void drive(dynocar_publisher *publisher, dynocar_reader *reader, int way,
 int main(int count, char **arguments)
 {
     uint64_t id = count > 1 ? strtoull(arguments[1], NULL, 10) : 1;
-    int ways = count > 2 ? atoi(arguments[2]) : 6;
+    int legs = count > 2 ? atoi(arguments[2]) : 6;
     dynocar_publisher *publisher = NULL;
     dynocar_reader *reader = NULL;
     char message[DYNOCAR_MESSAGE_BYTES];
@@ -189,8 +189,8 @@ int main(int count, char **arguments)
         return 1;
     }
     int64_t time_ns = dynocar_monotonic_now_ns();
-    for (int way = 1; way <= ways; way++) {
-        drive(publisher, reader, way, &time_ns);
+    for (int leg = 1; leg <= legs; leg++) {
+        drive(publisher, reader, leg, &time_ns);
     }
     dynocar_reader_close(reader);
     dynocar_publisher_close(publisher);

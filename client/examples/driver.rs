@@ -1,7 +1,7 @@
 //! A driver on a simulated train: put your own controller in its place, and see what it gains.
 //!
-//! `cargo run --release -p dynocar-client --example driver -- [train id] [ways]`
-//! drives that many ways of 6 km by the timetable, many times faster than real time, and says after each
+//! `cargo run --release -p dynocar-client --example driver -- [train id] [legs]`
+//! drives that many legs of 6 km by the timetable, many times faster than real time, and says after each
 //! how late it came, how far beyond the stopping point it stands, and by which parameters it drove. With
 //! `dynocar run --config config/daemon.toml` beside it, it drives by what the daemon learns.
 
@@ -13,7 +13,7 @@ use dynocar_shared::{Parameter, SampleField, TrainId, TrainSample};
 
 const CYCLE_S: f64 = 0.2;
 const PATIENCE: Duration = Duration::from_millis(50);
-const WAY_M: f64 = 6000.0;
+const LEG_M: f64 = 6000.0;
 const DUE_S: f64 = 450.0;
 const CRUISE_MPS: f64 = 19.0;
 const COASTING_MIN_MPS: f64 = 15.0;
@@ -76,9 +76,9 @@ impl Train {
 
 /// Your controller: the force in N, braking negative, at a place with a speed, by what is known.
 fn controller_n(train: &Train, coast_from_m: f64, known: &Parameters) -> f64 {
-    let curve_mps = (2.0 * BRAKING_MPS2 * (WAY_M - train.at_m).max(0.0)).sqrt();
+    let curve_mps = (2.0 * BRAKING_MPS2 * (LEG_M - train.at_m).max(0.0)).sqrt();
     let speed_mps = train.speed_mps;
-    let brakes = speed_mps + 0.5 >= curve_mps && train.at_m > 0.5 * WAY_M;
+    let brakes = speed_mps + 0.5 >= curve_mps && train.at_m > 0.5 * LEG_M;
     let coasts = train.at_m >= coast_from_m;
     if !brakes && coasts && speed_mps > COASTING_MIN_MPS {
         return 0.0;
@@ -103,7 +103,7 @@ fn predicted_s(coast_from_m: f64, known: &Parameters) -> f64 {
 
 /// The first place in m from which coasting still keeps the timetable, by what is known.
 fn coasting_place_m(known: &Parameters) -> f64 {
-    let (mut early_m, mut late_m) = (0.1 * WAY_M, WAY_M);
+    let (mut early_m, mut late_m) = (0.1 * LEG_M, LEG_M);
     for _ in 0..20 {
         let middle_m = 0.5 * (early_m + late_m);
         match predicted_s(middle_m, known) <= DUE_S {
@@ -136,12 +136,12 @@ fn known(reader: &SnapshotReader) -> Parameters {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let id = TrainId(arguments.next().map_or(Ok(1), |text| text.parse())?);
-    let ways: u32 = arguments.next().map_or(Ok(6), |text| text.parse())?;
+    let legs: u32 = arguments.next().map_or(Ok(6), |text| text.parse())?;
     let host = Host::from_environment()?;
     let mut publisher = SamplePublisher::open(&host, id)?;
     let mut reader = SnapshotReader::open(&host, id)?;
     let mut time_ns = monotonic_now_ns();
-    for way in 1..=ways {
+    for leg in 1..=legs {
         let mut train = Train::default();
         publisher.start_run();
         reader.poll();
@@ -169,9 +169,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let known = known(&reader);
         println!(
-            "way {way}: {:+.1} s off the timetable, {:+.2} m off the stopping point, by {} ({:.0} t)",
+            "leg {leg}: {:+.1} s off the timetable, {:+.2} m off the stopping point, by {} ({:.0} t)",
             f64::from(cycles) * CYCLE_S - DUE_S,
-            train.at_m - WAY_M,
+            train.at_m - LEG_M,
             if known.is_learned { "the daemon" } else { "the built-in parameters" },
             1e-3 * known.mass_kg,
         );

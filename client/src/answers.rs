@@ -30,7 +30,7 @@ pub(crate) struct Answers {
     /// Bits of the quantities that any pipeline answers; `None` before the first snapshot.
     provided: Option<u32>,
     /// Number of the pipeline that answers, by quantity.
-    places: [Option<usize>; Quantity::ALL.len()],
+    indices: [Option<usize>; Quantity::ALL.len()],
 }
 
 impl Answers {
@@ -45,15 +45,15 @@ impl Answers {
         self.provided = Some(snapshot.train_quantities);
         for &quantity in Quantity::ALL {
             if snapshot.answers(quantity) {
-                self.places[quantity as usize] = Some(snapshot.pipeline_index as usize);
+                self.indices[quantity as usize] = Some(snapshot.pipeline_index as usize);
             }
         }
     }
 
     /// The number of the pipeline that answers a quantity.
-    pub(crate) fn place(&self, quantity: Quantity) -> Result<usize, NoAnswer> {
+    pub(crate) fn index(&self, quantity: Quantity) -> Result<usize, NoAnswer> {
         let is_provided = self.provided.is_none_or(|bits| bits & quantity.bit() != 0);
         let why = if is_provided { NoAnswer::NoSnapshot } else { NoAnswer::NotProvided };
-        self.places[quantity as usize].ok_or(why)
+        self.indices[quantity as usize].ok_or(why)
     }
 }

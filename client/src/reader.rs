@@ -128,8 +128,8 @@ impl SnapshotReader {
     ///
     /// No search, no system call, no allocation; so are the methods named after a quantity.
     pub fn quantity(&self, quantity: Quantity, now_ns: i64) -> Result<Reading<'_>, NoAnswer> {
-        let place = self.answers.place(quantity)?;
-        let snapshot = self.latest[place].as_ref().ok_or(NoAnswer::NoSnapshot)?;
+        let index = self.answers.index(quantity)?;
+        let snapshot = self.latest[index].as_ref().ok_or(NoAnswer::NoSnapshot)?;
         Ok(self.reading(snapshot, Some(quantity), now_ns))
     }
 
@@ -243,13 +243,13 @@ impl SnapshotReader {
             self.refused += 1;
             return false;
         }
-        let place = &mut self.latest[snapshot.pipeline_index as usize];
+        let index = &mut self.latest[snapshot.pipeline_index as usize];
         let order = |it: &ParameterSnapshot| (it.epoch, it.sequence, it.vouched_ns);
-        let before = place.as_ref().map(order);
+        let before = index.as_ref().map(order);
         if before.is_some_and(|before| order(snapshot) <= before) {
             return false;
         }
-        *place = Some(*snapshot);
+        *index = Some(*snapshot);
         self.answers.learn(snapshot);
         before.is_none_or(|(epoch, sequence, _)| {
             (snapshot.epoch, snapshot.sequence) > (epoch, sequence)

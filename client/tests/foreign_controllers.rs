@@ -26,8 +26,8 @@ fn assert_sample_came_through(sample: &TrainSample) {
     let cycle = (sample.sequence - 1) as f64;
     assert_eq!((sample.time_ns, sample.train_id), (1000 + cycle as i64, TRAIN.0));
     assert_eq!((sample.direction, sample.flags), (-1, 1));
-    for (place, field) in SampleField::ALL.into_iter().enumerate() {
-        assert_eq!(sample.get(field), Some(cycle + place as f64 + 0.5), "{field:?}");
+    for (index, field) in SampleField::ALL.into_iter().enumerate() {
+        assert_eq!(sample.get(field), Some(cycle + index as f64 + 0.5), "{field:?}");
     }
 }
 
@@ -229,8 +229,8 @@ fn the_driver_examples_in_c_and_rust_drive_the_same() {
     assert_eq!(said[0], said[1]);
     let lines: Vec<&str> = said[0].lines().collect();
     assert_eq!(lines.len(), 2, "{}", said[0]);
-    for (line, way) in lines.iter().zip(1..) {
-        let late = line.strip_prefix(&format!("way {way}: +")).unwrap_or_else(|| panic!("{line}"));
+    for (line, leg) in lines.iter().zip(1..) {
+        let late = line.strip_prefix(&format!("leg {leg}: +")).unwrap_or_else(|| panic!("{line}"));
         let late_s: f64 = late.split(' ').next().unwrap().parse().unwrap();
         assert!(late_s > 10.0 && line.ends_with("by the built-in parameters (1799 t)"), "{line}");
     }

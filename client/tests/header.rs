@@ -16,8 +16,8 @@ fn header_text() -> String {
 fn header_words() -> Vec<String> {
     let text = header_text();
     let mut code = String::new();
-    for (place, part) in text.split("/*").enumerate() {
-        code += if place == 0 { part } else { part.split_once("*/").unwrap().1 };
+    for (index, part) in text.split("/*").enumerate() {
+        code += if index == 0 { part } else { part.split_once("*/").unwrap().1 };
     }
     let is_word = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     // A word keeps what follows it, so that functions and enumerators can be distinguished.

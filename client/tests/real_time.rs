@@ -35,9 +35,9 @@ unsafe impl GlobalAlloc for Counting {
         unsafe { System.alloc(layout) }
     }
 
-    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+    unsafe fn dealloc(&self, index: *mut u8, layout: Layout) {
         // SAFETY: promised by the caller.
-        unsafe { System.dealloc(place, layout) }
+        unsafe { System.dealloc(index, layout) }
     }
 }
 

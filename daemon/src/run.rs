@@ -138,7 +138,9 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
 /// One line for each train: which pipeline answers which question.
 fn report_who_answers(config: &DaemonConfig) {
     for train in &config.trains {
-        let name = |it| train.answers.place(it).map_or("-", |place| &config.pipelines[place].name);
+        let name = |it| {
+            train.answers.pipeline_index(it).map_or("-", |index| &config.pipelines[index].name)
+        };
         info!(
             train = train.id.0,
             resistance = name(Quantity::Resistance),
@@ -175,13 +177,18 @@ fn plan_workers(
         .collect();
     let mut watched = Vec::new();
     for (index, settings) in config.pipelines.iter().enumerate() {
-        for (place, train) in config.trains.iter().enumerate() {
+        for (train_index, train) in config.trains.iter().enumerate() {
             if !settings.trains.contains(&train.id) {
                 continue;
             }
             let mut pipeline = build_pipeline(settings, index as u32, train)?;
             let kept = state.and_then(|it| {
-                state::warm_start_of(it.config, &it.stored[place], settings, state::unix_now_s())
+                state::warm_start_of(
+                    it.config,
+                    &it.stored[train_index],
+                    settings,
+                    state::unix_now_s(),
+                )
             });
             if let Some(kept) = kept {
                 pipeline.warm_start(&kept);
@@ -193,9 +200,10 @@ fn plan_workers(
             match channels.iter_mut().find(|channel| channel.train == train.id) {
                 Some(channel) => channel.pipelines.push((pipeline, tally)),
                 None => {
-                    let (count, pipelines) = (Arc::clone(&counts[place]), vec![(pipeline, tally)]);
-                    let (train, place, exchange) = (train.id, 0, None);
-                    channels.push(ChannelPlan { train, count, place, pipelines, exchange });
+                    let (count, pipelines) =
+                        (Arc::clone(&counts[train_index]), vec![(pipeline, tally)]);
+                    let (train, index, exchange) = (train.id, 0, None);
+                    channels.push(ChannelPlan { train, count, index, pipelines, exchange });
                 }
             }
         }
@@ -218,7 +226,7 @@ fn plan_shadow(
         let channels = plans.iter_mut().flat_map(|plan| &mut plan.channels);
         let mut channels: Vec<&mut ChannelPlan> =
             channels.filter(|it| it.train == train.id).collect();
-        channels.sort_by_key(|channel| channel.place);
+        channels.sort_by_key(|channel| channel.index);
         let exchange = Arc::new(Exchange::new(channels.len()));
         let mut placed = Vec::new();
         for channel in channels {
@@ -227,7 +235,7 @@ fn plan_shadow(
             placed.extend(indices.map(|index| Placed {
                 settings: config.pipelines[index as usize].clone(),
                 index,
-                seat: channel.place,
+                seat: channel.index,
             }));
         }
         let own = store.train(train.id);
@@ -242,7 +250,7 @@ fn number_channels(plans: &mut [WorkerPlan], train: TrainId, count: &SampleCount
     for channel in
         plans.iter_mut().flat_map(|plan| &mut plan.channels).filter(|it| it.train == train)
     {
-        channel.place = threads;
+        channel.index = threads;
         threads += 1;
         pipelines += channel.pipelines.len();
     }

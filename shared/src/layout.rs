@@ -29,13 +29,13 @@ pub trait Words {
     /// # Panics
     ///
     /// When there is none.
-    fn word(&self, place: usize) -> u64;
+    fn word(&self, index: usize) -> u64;
     /// Sets a word by its place; an integer keeps the bits that it has room for.
     ///
     /// # Panics
     ///
     /// When there is none.
-    fn set_word(&mut self, place: usize, word: u64);
+    fn set_word(&mut self, index: usize, word: u64);
 }
 
 macro_rules! words {
@@ -69,11 +69,11 @@ impl<T: Words, const N: usize> Words for [T; N] {
     fn count(&self) -> usize {
         N
     }
-    fn word(&self, place: usize) -> u64 {
-        self[place].word(0)
+    fn word(&self, index: usize) -> u64 {
+        self[index].word(0)
     }
-    fn set_word(&mut self, place: usize, word: u64) {
-        self[place].set_word(0, word);
+    fn set_word(&mut self, index: usize, word: u64) {
+        self[index].set_word(0, word);
     }
 }
 
@@ -191,21 +191,21 @@ macro_rules! wire_struct {
             fn count(&self) -> usize {
                 self.fields().iter().map(|field| field.count()).sum()
             }
-            fn word(&self, mut place: usize) -> u64 {
+            fn word(&self, mut index: usize) -> u64 {
                 for field in self.fields() {
-                    if place < field.count() {
-                        return field.word(place);
+                    if index < field.count() {
+                        return field.word(index);
                     }
-                    place -= field.count();
+                    index -= field.count();
                 }
                 panic!("no such word")
             }
-            fn set_word(&mut self, mut place: usize, word: u64) {
+            fn set_word(&mut self, mut index: usize, word: u64) {
                 for field in self.fields_mut() {
-                    if place < field.count() {
-                        return field.set_word(place, word);
+                    if index < field.count() {
+                        return field.set_word(index, word);
                     }
-                    place -= field.count();
+                    index -= field.count();
                 }
                 panic!("no such word")
             }

@@ -22,8 +22,8 @@ pub enum Missing {
 /// A field of a sample or a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
-    /// Its place in the struct's layout.
-    pub place: usize,
+    /// Its index in the struct's layout.
+    pub index: usize,
     /// Name, type, offset and size.
     pub layout: &'static FieldLayout,
     /// What it is.
@@ -82,14 +82,14 @@ fn table(
     layout: &'static [FieldLayout],
     meanings: &'static [&'static str],
 ) -> impl Iterator<Item = Field> {
-    layout.iter().zip(meanings).enumerate().map(|(place, (layout, meaning))| {
+    layout.iter().zip(meanings).enumerate().map(|(index, (layout, meaning))| {
         let measured = SampleField::ALL.into_iter().find(|it| it.name() == layout.name);
         let missing = match (measured, layout.name) {
             (Some(field), _) => Missing::Unless(field),
             (None, "valid") => Missing::SaidByOthers,
             (None, _) => Missing::Never,
         };
-        Field { place, layout, meaning: meaning.trim(), missing }
+        Field { index, layout, meaning: meaning.trim(), missing }
     })
 }
 

@@ -201,7 +201,7 @@ impl ParameterSnapshot {
         self.rejected_by_reason[reason as usize]
     }
 
-    /// The place of a parameter among this snapshot's values.
+    /// The index of a parameter among this snapshot's values.
     pub fn index_of(&self, parameter: Parameter) -> Option<usize> {
         let count = (self.parameter_count as usize).min(PARAMETERS_MAX);
         self.parameters[..count].iter().position(|&number| number == parameter as u32)

@@ -15,8 +15,8 @@ fn bad_samples_are_refused_or_survived_counted_and_never_trusted() {
     let cases: Vec<(usize, SensorFailure, f64)> = (0..scenes.len())
         .flat_map(|scene| {
             // Half of all samples in the first scene, one of three smaller rates in the second.
-            SensorFailure::ALL.into_iter().enumerate().map(move |(place, failure)| {
-                let rate = if scene == 0 { 0.5 } else { [0.001, 0.02, 0.1][place % 3] };
+            SensorFailure::ALL.into_iter().enumerate().map(move |(index, failure)| {
+                let rate = if scene == 0 { 0.5 } else { [0.001, 0.02, 0.1][index % 3] };
                 (scene, failure, rate)
             })
         })

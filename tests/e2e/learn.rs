@@ -133,12 +133,12 @@ fn learned(models: &TrainModels) -> Vec<dynocar::models::Stored> {
 
 #[test]
 fn an_undeclared_tunnel_becomes_a_candidate_once_and_is_adopted_and_taken_back_by_name() {
-    let place = Workplace::of(&[EffectKind::TunnelDrag]);
-    assert!(place.learn(&[]).contains("too few runs"));
-    place.record("first", 0..7);
-    let said = place.learn(&[]);
+    let work = Workplace::of(&[EffectKind::TunnelDrag]);
+    assert!(work.learn(&[]).contains("too few runs"));
+    work.record("first", 0..7);
+    let said = work.learn(&[]);
     assert!(said.contains("new candidate"), "{said}");
-    let models = place.models();
+    let models = work.models();
     let [candidate] = &learned(&models)[..] else { panic!("one candidate: {said}") };
     assert_eq!(candidate.origin.effects[0].kind, "tunnel_drag");
     let error = candidate.origin.error.expect("an error on runs held out");
@@ -150,41 +150,41 @@ fn an_undeclared_tunnel_becomes_a_candidate_once_and_is_adopted_and_taken_back_b
         assert!(candidate.folder.join(name).is_file(), "{name}");
     }
 
-    assert!(place.learn(&[]).contains("nothing new"), "the same runs");
-    place.record("second", 7..8);
-    let said = place.learn(&[]);
+    assert!(work.learn(&[]).contains("nothing new"), "the same runs");
+    work.record("second", 7..8);
+    let said = work.learn(&[]);
     assert!(said.contains(&format!("model {} says so already", candidate.hash)), "{said}");
     assert_eq!(learned(&models).len(), 1, "reported once");
 
     let hash = candidate.hash.to_string();
-    let (status, shown, _) = place.say(&["show", &hash[..5]]);
+    let (status, shown, _) = work.say(&["show", &hash[..5]]);
     assert!(status == Some(0) && shown.contains("tunnel drag") && shown.contains(" ± "), "{shown}");
-    let (_, differing, _) = place.say(&["diff", "declared", &hash]);
+    let (_, differing, _) = work.say(&["diff", "declared", &hash]);
     assert!(
         differing.contains("resistance.c") && differing.contains("N/kN per (m/s)²"),
         "{differing}"
     );
-    let (status, _, refused) = place.say(&["adopt", "ffff", "--by", "Anna"]);
+    let (status, _, refused) = work.say(&["adopt", "ffff", "--by", "Anna"]);
     assert!(status == Some(2) && refused.contains("no such model"), "{refused}");
-    assert_eq!(place.say(&["adopt", &hash]).0, Some(2), "nobody signed");
-    let (_, decided, _) = place.say(&["adopt", &hash[..6], "--by", "Anna", "--reason", "summer"]);
+    assert_eq!(work.say(&["adopt", &hash]).0, Some(2), "nobody signed");
+    let (_, decided, _) = work.say(&["adopt", &hash[..6], "--by", "Anna", "--reason", "summer"]);
     assert!(decided.contains(&format!("model {hash} is in force")), "{decided}");
     assert_eq!(models.in_force().unwrap(), Some(candidate.hash));
-    assert!(place.say(&["list"]).1.lines().any(|it| it.contains(&hash) && it.contains("in force")));
-    assert!(place.learn(&[]).contains("too few runs"), "none since it came in force");
-    let (_, back, _) = place.say(&["rollback", "--by", "Bert"]);
+    assert!(work.say(&["list"]).1.lines().any(|it| it.contains(&hash) && it.contains("in force")));
+    assert!(work.learn(&[]).contains("too few runs"), "none since it came in force");
+    let (_, back, _) = work.say(&["rollback", "--by", "Bert"]);
     assert!(back.contains("what the configuration declares is in force"), "{back}");
-    let (status, _, refused) = place.say(&["rollback", "--by", "Bert"]);
+    let (status, _, refused) = work.say(&["rollback", "--by", "Bert"]);
     assert!(status == Some(2) && refused.contains("nothing to roll back"), "{refused}");
 }
 
 #[test]
 fn a_dragging_brake_is_an_event_with_its_runs_and_no_model() {
-    let place = Workplace::of(&[EffectKind::DraggingBrake]);
-    place.record("runs", 0..8);
-    let said = place.learn(&[]);
+    let work = Workplace::of(&[EffectKind::DraggingBrake]);
+    work.record("runs", 0..8);
+    let said = work.learn(&[]);
     assert!(said.contains("new maintenance events: 1"), "{said}");
-    let models = place.models();
+    let models = work.models();
     assert!(learned(&models).is_empty(), "{said}");
     let events = models.events().unwrap();
     let [(1, event)] = &events[..] else { panic!("one event: {events:?}") };
@@ -195,36 +195,36 @@ fn a_dragging_brake_is_an_event_with_its_runs_and_no_model() {
     );
     assert!(event.acted.is_some() && said.contains(&event.sentence), "{said}");
     // What is learned from the same runs again is no other event.
-    std::fs::remove_file(place.path("models/learn/learn.state")).unwrap();
-    place.learn(&[]);
+    std::fs::remove_file(work.path("models/learn/learn.state")).unwrap();
+    work.learn(&[]);
     assert_eq!(models.events().unwrap(), events);
 }
 
 #[test]
 fn where_nothing_acts_nothing_is_put_into_the_store() {
-    let place = Workplace::of(&[]);
-    place.record("runs", 0..8);
-    let said = place.learn(&[]);
-    let models = place.models();
+    let work = Workplace::of(&[]);
+    work.record("runs", 0..8);
+    let said = work.learn(&[]);
+    let models = work.models();
     assert!(learned(&models).is_empty() && models.events().unwrap().is_empty(), "{said}");
 }
 
 #[test]
 fn a_learner_killed_at_any_moment_leaves_nothing_half_done_and_the_next_one_goes_on() {
-    let place = Workplace::of(&[EffectKind::TunnelDrag]);
-    place.record("runs", 0..8);
-    let models = place.models();
+    let work = Workplace::of(&[EffectKind::TunnelDrag]);
+    work.record("runs", 0..8);
+    let models = work.models();
     for delay_ms in [0, 100, 400, 1200, 2500, 4000] {
-        let learner = place.start(&["--once"]);
+        let learner = work.start(&["--once"]);
         std::thread::sleep(Duration::from_millis(delay_ms));
         learner.kill();
         assert!(learned(&models).iter().all(|it| models.load(it.hash).is_ok()));
     }
     // One that stands just before the end: the candidate is there, the memory not yet.
-    let said = place.learn(&[]);
+    let said = work.learn(&[]);
     assert_eq!(learned(&models).len(), 1, "{said}");
-    std::fs::write(place.path("models/learn/learn.state"), "dynocar-state 1 99 0\nhalf").unwrap();
-    let said = place.learn(&[]);
+    std::fs::write(work.path("models/learn/learn.state"), "dynocar-state 1 99 0\nhalf").unwrap();
+    let said = work.learn(&[]);
     assert!(said.contains("every run is looked at anew"), "{said}");
     assert!(said.contains("says so already"), "{said}");
     assert_eq!(learned(&models).len(), 1);
@@ -235,21 +235,21 @@ fn a_learner_killed_at_any_moment_leaves_nothing_half_done_and_the_next_one_goes
 
 #[test]
 fn a_new_suspicion_starts_a_round_and_a_signal_ends_the_learner() {
-    let place = Workplace::of(&[EffectKind::TunnelDrag]);
-    let host = place.site.host();
+    let work = Workplace::of(&[EffectKind::TunnelDrag]);
+    let host = work.site.host();
     let _role = RoleLock::claim(&host, TRAIN, Role::Daemon).unwrap();
     let transport = Transport::open(&host, "played-daemon").unwrap();
     let sender = transport.sender::<ParameterSnapshot>(TRAIN).unwrap();
-    let page = place.path("history.html");
-    let mut learner = place.start(&["--at", "00:00", "--report", page.to_str().unwrap()]);
+    let page = work.path("history.html");
+    let mut learner = work.start(&["--at", "00:00", "--report", page.to_str().unwrap()]);
     await_long(|| learner.errors().contains("too few runs"), || learner.errors());
-    place.record("runs", 0..8);
+    work.record("runs", 0..8);
     let mut snapshot = ParameterSnapshot::empty();
     (snapshot.epoch, snapshot.train_id) = (1, TRAIN.0);
     snapshot.pipeline_kind = PipelineKind::ResidualMonitor as u32;
     snapshot.status = Status::Estimated as u32;
     snapshot.suspected_effect = EffectKind::TunnelDrag as u32;
-    let models = place.models();
+    let models = work.models();
     let mut send = || {
         snapshot.sequence += 1;
         snapshot.published_ns = monotonic_now_ns();
@@ -270,58 +270,58 @@ fn a_new_suspicion_starts_a_round_and_a_signal_ends_the_learner() {
 
 #[test]
 fn a_signal_ends_a_learner_in_the_middle_of_an_explanation_and_nothing_is_concluded() {
-    let place = Workplace::of(&[EffectKind::TunnelDrag]);
-    place.record("runs", 0..8);
-    let mut learner = place.start(&["--once"]);
+    let work = Workplace::of(&[EffectKind::TunnelDrag]);
+    work.record("runs", 0..8);
+    let mut learner = work.start(&["--once"]);
     // The runs are known: they are being read and explained.
-    let state = place.path("models/learn/learn.state");
+    let state = work.path("models/learn/learn.state");
     await_long(|| state.exists(), || learner.errors());
     let status = learner.end(Signal::TERM);
     let said = learner.output();
     assert!(status.success(), "{}", learner.errors());
     let is_concluded = said.contains("new candidate");
-    assert_eq!(!learned(&place.models()).is_empty(), is_concluded, "{said}");
+    assert_eq!(!learned(&work.models()).is_empty(), is_concluded, "{said}");
     assert!(is_concluded || said.contains("stopped before the end"), "{said}");
 }
 
 #[test]
 fn a_store_has_one_learner() {
-    let place = Workplace::of(&[]);
+    let work = Workplace::of(&[]);
     let settings = || LearnerSettings {
-        store: Store::at(&place.path("models")),
-        runs: place.path("runs"),
+        store: Store::at(&work.path("models")),
+        runs: work.path("runs"),
         trains: vec![(TRAIN, ModelText { train: "a".into(), track: None })],
         bounds: Bounds::default(),
         command: String::new(),
     };
     let learner = Learner::open(settings()).unwrap();
     assert!(matches!(Learner::open(settings()), Err(LearnError::Taken { .. })));
-    let output = place.learn_once(&[]);
+    let output = work.learn_once(&[]);
     let errors = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{errors}");
     assert!(errors.contains("another learner works on this store"), "{errors}");
     drop(learner);
-    place.learn(&[]);
+    work.learn(&[]);
 }
 
 #[test]
 fn runs_and_names_that_cannot_be_are_refused_or_left_out_in_words() {
-    let place = Workplace::of(&[]);
+    let work = Workplace::of(&[]);
     let refused = |words: &[&str]| {
-        let output = place.learn_once(words);
+        let output = work.learn_once(words);
         assert_eq!(output.status.code(), Some(2), "{words:?}");
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
-    let train = place.path("train.toml").display().to_string();
+    let train = work.path("train.toml").display().to_string();
     assert!(refused(&["--report", &train]).contains("none of this command's results"));
     assert!(refused(&["--at", "25:00"]).contains("expected a time of the day"));
-    std::fs::create_dir_all(place.path("runs/bad")).unwrap();
-    std::fs::write(place.path("runs/bad/dataset.toml"), "[dataset]\nname = 3\n").unwrap();
-    std::fs::write(place.path("runs/half.mcap"), b"\x89MCAP0\r\n and no end").unwrap();
-    let said = place.learn(&[]);
+    std::fs::create_dir_all(work.path("runs/bad")).unwrap();
+    std::fs::write(work.path("runs/bad/dataset.toml"), "[dataset]\nname = 3\n").unwrap();
+    std::fs::write(work.path("runs/half.mcap"), b"\x89MCAP0\r\n and no end").unwrap();
+    let said = work.learn(&[]);
     assert!(said.contains("left out: ") && said.contains("bad/dataset.toml"), "{said}");
-    assert!(!place.learn(&[]).contains("left out"), "reported once");
-    let (status, _, empty) = place.say(&["list", "--train", "7"]);
+    assert!(!work.learn(&[]).contains("left out"), "reported once");
+    let (status, _, empty) = work.say(&["list", "--train", "7"]);
     assert!(status == Some(2) && empty.contains("choose one by --train"), "{empty}");
     let nowhere = ["learn", "--once", "--config"];
     let learn = |config: PathBuf| {
@@ -329,17 +329,17 @@ fn runs_and_names_that_cannot_be_are_refused_or_left_out_in_words() {
             .args(nowhere)
             .arg(config)
             .arg("--runs")
-            .arg(place.path("runs"))
+            .arg(work.path("runs"))
             .output()
             .expect("the program");
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
-    let (status, errors) = learn(place.path("daemon.toml"));
+    let (status, errors) = learn(work.path("daemon.toml"));
     assert!(status == Some(2) && errors.contains("no store of models"), "{errors}");
-    let declared = std::fs::read_to_string(place.path("daemon.toml")).unwrap();
+    let declared = std::fs::read_to_string(work.path("daemon.toml")).unwrap();
     let named =
-        place.site.write("named.toml", &format!("[models]\ndirectory = \"models\"\n{declared}"));
+        work.site.write("named.toml", &format!("[models]\ndirectory = \"models\"\n{declared}"));
     assert_eq!(learn(named).0, Some(0), "the store of the configuration");
-    std::fs::remove_dir_all(place.path("runs")).unwrap();
+    std::fs::remove_dir_all(work.path("runs")).unwrap();
     assert!(refused(&[]).contains("expected the folder of recorded runs"));
 }

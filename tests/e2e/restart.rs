@@ -23,7 +23,7 @@ struct ClientLine {
 
 fn parse(line: &str) -> Option<ClientLine> {
     let words: Vec<&str> = line.split(' ').collect();
-    let number = |place: usize| words.get(place)?.parse().ok();
+    let number = |index: usize| words.get(index)?.parse().ok();
     Some(ClientLine {
         epoch: number(0)?,
         sequence: number(1)?,

@@ -76,10 +76,10 @@ fn the_driver_example_keeps_the_timetable_once_the_shipped_daemon_has_learned() 
     command.env(ROOT_VARIABLE, site.host().root()).args(["1", "4"]);
     let said = support::must_succeed(&mut command);
     let late_s = |line: &str| -> f64 {
-        let words = line.split_once(": ").expect("a way").1;
+        let words = line.split_once(": ").expect("a leg").1;
         words.split(' ').next().expect("a time").parse().expect("a number")
     };
-    assert!(late_s(said.lines().next().expect("a way")) > 10.0, "{said}");
+    assert!(late_s(said.lines().next().expect("a leg")) > 10.0, "{said}");
     let is_learned = |line: &str| line.contains("by the daemon") && late_s(line).abs() < 5.0;
     assert!(said.lines().any(is_learned), "{said}; the daemon said:\n{}", daemon.errors());
 }

@@ -143,24 +143,24 @@ impl Source {
         }
     }
 
-    /// Where the bracket closes that opens just before a place, and one further.
-    fn end_of(&self, place: usize) -> usize {
+    /// Where the bracket closes that opens just before an index, and one further.
+    fn end_of(&self, index: usize) -> usize {
         let mut depth = 1;
-        for (at, char) in self.code[place..].char_indices() {
+        for (at, char) in self.code[index..].char_indices() {
             depth += match char {
                 '(' | '[' | '{' => 1,
                 ')' | ']' | '}' => -1,
                 _ => 0,
             };
             if depth == 0 {
-                return place + at + 1;
+                return index + at + 1;
             }
         }
         panic!("{}: a bracket without its end", self.path)
     }
 
-    fn literals_before(&self, place: usize) -> usize {
-        self.code[..place].matches('"').count()
+    fn literals_before(&self, index: usize) -> usize {
+        self.code[..index].matches('"').count()
     }
 
     /// The constant texts of the file by their names.

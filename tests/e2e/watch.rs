@@ -244,10 +244,10 @@ fn in_a_terminal_it_shows_all_resizes_and_leaves_the_terminal_as_it_was() {
 fn signals_and_control_c_leave_the_terminal_as_it_was() {
     let site = Site::new();
     let screen = Screen::open(&site, 100, 30);
-    for (place, end) in ["C-c", "TERM", "HUP"].into_iter().enumerate() {
-        let file = site.path().join(format!("pid{place}"));
+    for (index, end) in ["C-c", "TERM", "HUP"].into_iter().enumerate() {
+        let file = site.path().join(format!("pid{index}"));
         let command =
-            format!("sh -c 'echo $$ > {}; exec {WATCH}'; echo ended {place} $?", file.display());
+            format!("sh -c 'echo $$ > {}; exec {WATCH}'; echo ended {index} $?", file.display());
         screen.keys(&[&command, "Enter"]);
         screen.shows(&["No daemon serves any train"]);
         match end {
@@ -258,7 +258,7 @@ fn signals_and_control_c_leave_the_terminal_as_it_was() {
                 assert!(killed.unwrap().success());
             }
         }
-        screen.shows(&[&format!("ended {place} 0")]);
+        screen.shows(&[&format!("ended {index} 0")]);
     }
     screen.keys(&["echo typed", "Enter"]);
     await_true(|| screen.text().matches("typed").count() == 2, || screen.text());

@@ -172,12 +172,12 @@ fn the_interval_of_the_resistance_after_a_manoeuvre_is_the_one_predicted() {
     let train = declared();
     let (mut ratios, mut shares, mut counts) = (Vec::new(), Vec::new(), [0; 3]);
     for seed in 0..SEEDS {
-        let place = |k: usize| 4 * k + seed as usize;
+        let index = |k: usize| 4 * k + seed as usize;
         for k in 0..5 {
             let mut trial = Trial::new(seed);
             trial.drive_about();
             let drives = trial.scene(&train).catalogue(180.0);
-            let drive = drives[place(k) % drives.len()];
+            let drive = drives[index(k) % drives.len()];
             trial.begin_at(drive.from_mps);
             let noise = trial.noise.noise(trial.snapshot(), &train).unwrap();
             let expected_by_advice =

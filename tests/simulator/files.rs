@@ -73,10 +73,10 @@ fn assert_column(
     let run = &dataset.runs[1];
     let csv = text_of(dataset, &run.plan.file());
     let mut lines = csv.lines();
-    let place = lines.next().unwrap().split(delimiter).position(|name| name == column.0).unwrap();
+    let index = lines.next().unwrap().split(delimiter).position(|name| name == column.0).unwrap();
     assert_eq!(csv.lines().count(), run.samples.len() + 1);
     for (line, sample) in lines.zip(&run.samples) {
-        let cell = line.split(delimiter).nth(place).unwrap();
+        let cell = line.split(delimiter).nth(index).unwrap();
         match (si(cell, &column), expected(sample)) {
             (Some(read), Some(value)) => {
                 let seed = dataset.settings.seed;

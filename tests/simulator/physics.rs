@@ -40,9 +40,9 @@ fn kinetic_energy_changes_by_the_work_of_all_forces() {
                 // Forces of the actuators hold over a step, resistance changes along it.
                 let resisted_n = 0.5 * (here.resistance.total_n() + next.resistance.total_n());
                 let acting_n = here.acting.traction_force_n - here.acting.brake_force_n;
-                let way_m = next.distance_m - here.distance_m;
-                work_j += (acting_n - resisted_n) * way_m;
-                turnover_j += (acting_n - resisted_n).abs() * way_m;
+                let travelled_m = next.distance_m - here.distance_m;
+                work_j += (acting_n - resisted_n) * travelled_m;
+                turnover_j += (acting_n - resisted_n).abs() * travelled_m;
                 kinetic_j = 0.5 * next.inertial_mass_kg * next.speed_mps.powi(2);
             }
             let missing_j = (kinetic_j - work_j).abs();
@@ -174,9 +174,12 @@ fn couplings_move_the_leading_car_and_not_the_train() {
             };
             let away_mps: Vec<f64> = one.states.iter().zip(&other.states).map(moved).collect();
             let most_mps = away_mps.iter().fold(0.0_f64, |most, away| most.max(away.abs()));
-            let way_m = away_mps.iter().sum::<f64>() * TRUE_STEP_S;
+            let travelled_m = away_mps.iter().sum::<f64>() * TRUE_STEP_S;
             assert!((1e-3..1.0).contains(&most_mps), "{train_type:?}: {most_mps} m/s");
-            assert!(way_m.abs() < 2.0, "{train_type:?}: the leading car is {way_m} m ahead");
+            assert!(
+                travelled_m.abs() < 2.0,
+                "{train_type:?}: the leading car is {travelled_m} m ahead"
+            );
         }
     }
 }

@@ -24,9 +24,9 @@ fn two_places_felt_together_are_reported_with_their_ends_and_are_no_tunnels() {
     let written = serde_json::to_value(&answer).unwrap();
     assert_eq!(written["effects"][0]["kind"], "local_resistance", "{}", written["statement"]);
     assert_eq!(written["effects"].as_array().map(Vec::len), Some(1), "{}", written["statement"]);
-    for (place, &(from_m, to_m)) in truth.iter().enumerate() {
+    for (index, &(from_m, to_m)) in truth.iter().enumerate() {
         for (end, true_m) in [from_m, to_m].into_iter().enumerate() {
-            let found_m = &written["effects"][0]["where"]["intervals_m"][place][end];
+            let found_m = &written["effects"][0]["where"]["intervals_m"][index][end];
             let error_m = (found_m.as_f64().expect("an end") - true_m).abs();
             assert!(error_m < END_ERROR_MAX_M, "{found_m} for {true_m} m");
         }

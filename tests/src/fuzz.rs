@@ -311,33 +311,33 @@ fn mutate(input: &mut Vec<u8>, others: &[Vec<u8>], random: &mut ChaCha8Rng) {
             input.push(random.random());
             continue;
         }
-        let place = random.random_range(0..length);
-        let end = (place + random.random_range(0..40)).min(length);
+        let index = random.random_range(0..length);
+        let end = (index + random.random_range(0..40)).min(length);
         match random.random_range(0..8) {
-            0 => input[place] ^= 1 << random.random_range(0..8),
-            1 => input[place] = random.random(),
-            2 => drop(input.drain(place..end)),
+            0 => input[index] ^= 1 << random.random_range(0..8),
+            1 => input[index] = random.random(),
+            2 => drop(input.drain(index..end)),
             3 => {
-                let doubled = input[place..end].to_vec();
-                input.splice(place..place, doubled);
+                let doubled = input[index..end].to_vec();
+                input.splice(index..index, doubled);
             }
-            4 => input.truncate(place),
+            4 => input.truncate(index),
             5 => {
                 let other = &others[random.random_range(0..others.len())];
                 let start = random.random_range(0..=other.len());
                 let stop = (start + random.random_range(0..80)).min(other.len());
-                input.splice(place..end, other[start..stop].iter().copied());
+                input.splice(index..end, other[start..stop].iter().copied());
             }
             6 => {
                 // A whole number or word becomes something else.
                 let is_word = |byte: &u8| byte.is_ascii_alphanumeric() || b"._-+".contains(byte);
-                let word = input[place..].iter().take_while(|byte| is_word(byte)).count();
+                let word = input[index..].iter().take_while(|byte| is_word(byte)).count();
                 let token = TOKENS[random.random_range(0..TOKENS.len())];
-                input.splice(place..place + word, token.bytes());
+                input.splice(index..index + word, token.bytes());
             }
             _ => {
                 let token = TOKENS[random.random_range(0..TOKENS.len())];
-                input.splice(place..place, token.bytes());
+                input.splice(index..index, token.bytes());
             }
         }
     }

@@ -175,9 +175,9 @@ pub fn count(
         [scale.value, scale.std, 1.0, train.brake_scale()],
         [adhesion.value, adhesion.std, f64::INFINITY, train.adhesion(speed_mps)],
     ];
-    for (place, answer) in answers.into_iter().enumerate() {
-        if place < 2 || is_braking {
-            uses[place].push(is_usable[place].then_some(answer));
+    for (index, answer) in answers.into_iter().enumerate() {
+        if index < 2 || is_braking {
+            uses[index].push(is_usable[index].then_some(answer));
         }
     }
 }

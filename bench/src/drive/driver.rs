@@ -17,7 +17,7 @@ const OBSERVER_RAD_PER_S: f64 = 0.8;
 const PLACE_PER_S: f64 = 1.0;
 /// Share of the inverse of the lag that corrects an error of the speed, per s.
 const SPEED_GAIN: f64 = 0.4;
-/// Plans on a way, and the shortest time in s between two.
+/// Plans on a leg, and the shortest time in s between two.
 const PLANS: f64 = 12.0;
 const REPLAN_MIN_S: f64 = 5.0;
 /// Lateness in s from which a coasting train is pulled again, and as a share of the running time.
@@ -49,7 +49,7 @@ pub struct Measured {
     pub force_n: f64,
 }
 
-/// A driver on one way from stop to stop.
+/// A driver on one leg from stop to stop.
 #[derive(Clone, Debug)]
 pub struct Driver {
     leg: Leg,
@@ -71,7 +71,7 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// A driver whose train stands at the start of the way.
+    /// A driver whose train stands at the start of the leg.
     pub fn new(leg: Leg, ability: Ability, cycle_s: f64, knowledge: Knowledge) -> Self {
         let planner = Planner { leg: &leg, knowledge: &knowledge, ability: &ability };
         let plan = planner.plan((0.0, 0.0), leg.due_s);
@@ -103,7 +103,7 @@ impl Driver {
         (self.at_m, self.speed_mps)
     }
 
-    /// The way.
+    /// The leg.
     pub fn leg(&self) -> &Leg {
         &self.leg
     }

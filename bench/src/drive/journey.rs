@@ -1,4 +1,4 @@
-//! A train and its driver from stop to stop, and what each way was worth.
+//! A train and its driver from stop to stop, and what each leg was worth.
 
 use dynocar_core::simulate::STANDING_MPS;
 use dynocar_core::train::Davis;
@@ -38,9 +38,9 @@ pub struct Look {
     pub true_m: f64,
 }
 
-/// What a way was worth.
+/// What a leg was worth.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Way {
+pub struct DrivenLeg {
     /// Place of the standing train beyond the stopping point in m.
     pub beyond_m: f64,
     /// Later than the timetable in s.
@@ -68,8 +68,8 @@ pub struct Journey {
     running_s: f64,
     braking_s: f64,
     accelerations: Vec<f64>,
-    /// The ways so far; the one that is under way is the last.
-    pub ways: Vec<Way>,
+    /// The legs so far; the one that is under way is the last.
+    pub legs: Vec<DrivenLeg>,
     looks: Vec<Look>,
     /// Work in J that a second more of running time saves.
     saved_w: f64,
@@ -86,7 +86,7 @@ impl Journey {
             running_s: 0.0,
             braking_s: 0.0,
             accelerations: Vec::new(),
-            ways: Vec::new(),
+            legs: Vec::new(),
             looks: Vec::new(),
             saved_w: 0.0,
         }
@@ -225,7 +225,7 @@ impl Journey {
         let jerk = |pair: (&f64, &f64)| (pair.1 - pair.0).abs() / (felt as f64 * cycle_s);
         let later = self.accelerations.iter().skip(felt);
         let jerk_mps3 = self.accelerations.iter().zip(later).map(jerk).fold(0.0, f64::max);
-        self.ways.push(Way {
+        self.legs.push(DrivenLeg {
             beyond_m: -self.train.left_m(),
             late_s,
             energy_j: self.train.energy_j + late_s * self.saved_w,
@@ -255,37 +255,37 @@ mod tests {
     use super::*;
     use crate::scenarios::world::Traffic;
 
-    fn drive(traffic: Traffic, condition: Condition, knows: bool, stops: usize) -> Vec<Way> {
+    fn drive(traffic: Traffic, condition: Condition, knows: bool, stops: usize) -> Vec<DrivenLeg> {
         let service = Service { traffic, condition, cycle_ms: 50 };
         let mut journey = Journey::new(Train::new(service, 7));
-        while journey.ways.len() < stops {
+        while journey.legs.len() < stops {
             let sample = journey.train.sample();
             let knowledge = if knows { journey.train.truth() } else { journey.declared(&sample) };
             journey.proceed(&sample, &knowledge, &knowledge);
         }
-        journey.ways
+        journey.legs
     }
 
     #[test]
     fn a_driver_that_knows_its_train_stops_at_the_platform_and_in_time() {
         for traffic in [Traffic::Metro, Traffic::Emu, Traffic::HighSpeed] {
-            for way in drive(traffic, Condition::Ordinary, true, 5) {
-                println!("{traffic:?} {way:?}");
-                assert!(way.beyond_m.abs() < 0.5, "{way:?}");
-                assert!(way.late_s.abs() < 6.0, "{way:?}");
-                assert!(way.jerk_mps3 < 1.2, "{way:?}");
-                let looks = way.looks.iter();
+            for leg in drive(traffic, Condition::Ordinary, true, 5) {
+                println!("{traffic:?} {leg:?}");
+                assert!(leg.beyond_m.abs() < 0.5, "{leg:?}");
+                assert!(leg.late_s.abs() < 6.0, "{leg:?}");
+                assert!(leg.jerk_mps3 < 1.2, "{leg:?}");
+                let looks = leg.looks.iter();
                 assert!(looks.clone().count() > 0);
-                assert!(looks.clone().all(|look| look.bound_m.unwrap() < look.fixed_m), "{way:?}");
+                assert!(looks.clone().all(|look| look.bound_m.unwrap() < look.fixed_m), "{leg:?}");
             }
         }
     }
 
     #[test]
     fn declared_parameters_cost_time_energy_or_place_but_the_train_arrives() {
-        for way in drive(Traffic::Metro, Condition::StrongBrakes, false, 5) {
-            println!("{way:?}");
-            assert!(way.beyond_m.abs() < 3.0 && way.late_s.abs() < 15.0, "{way:?}");
+        for leg in drive(Traffic::Metro, Condition::StrongBrakes, false, 5) {
+            println!("{leg:?}");
+            assert!(leg.beyond_m.abs() < 3.0 && leg.late_s.abs() < 15.0, "{leg:?}");
         }
     }
 }

@@ -21,7 +21,7 @@ pub enum Condition {
     StrongBrakes,
     /// The rail is wet, and mostly more slippery than the law says.
     WetRail,
-    /// The daemon is killed in the middle of a way, and another one comes.
+    /// The daemon is killed in the middle of a leg, and another one comes.
     DaemonDies,
 }
 

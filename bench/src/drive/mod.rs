@@ -2,7 +2,7 @@
 //! with the true ones.
 //!
 //! - [`knowledge`]: what a driver holds for true of its train, and what the train can do
-//! - [`leg`]: the way from stop to stop as the map has it
+//! - [`leg`]: the line from stop to stop as the map has it
 //! - [`answers`]: from the daemon's answers to what the driver drives by, and whether they were right
 //! - [`braking`]: the braking curve to the stopping point
 //! - [`plan`]: the speed profile for the timetable with the least energy

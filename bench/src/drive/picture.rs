@@ -76,10 +76,10 @@ fn panel(
         chart.draw_series([Text::new(name, (left, -0.03 * most), ("sans-serif", 14))])?;
     }
     if has_legend {
-        for (place, name) in NAMES.into_iter().enumerate() {
-            let at = (0.03 * right, (1.22 - 0.08 * place as f64) * most);
-            let to = (0.06 * right, (1.18 - 0.08 * place as f64) * most);
-            chart.draw_series([Rectangle::new([at, to], COLORS[place].filled())])?;
+        for (index, name) in NAMES.into_iter().enumerate() {
+            let at = (0.03 * right, (1.22 - 0.08 * index as f64) * most);
+            let to = (0.06 * right, (1.18 - 0.08 * index as f64) * most);
+            chart.draw_series([Rectangle::new([at, to], COLORS[index].filled())])?;
             let beside = (0.075 * right, at.1);
             chart.draw_series([Text::new(name, beside, ("sans-serif", 13))])?;
         }

@@ -5,7 +5,7 @@ use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};
 use super::leg::Leg;
 
-/// Steps of the way in a reckoned run.
+/// Steps of the leg in a computed run.
 const STEPS: usize = 200;
 /// Slowest coasting as a share of the cruising speed; below it the train is pulled again.
 pub const COASTING_MIN_SHARE: f64 = 0.5;
@@ -34,7 +34,7 @@ pub struct Plan {
 /// Everything that a plan follows from.
 #[derive(Clone, Copy, Debug)]
 pub struct Planner<'a> {
-    /// The way.
+    /// The leg.
     pub leg: &'a Leg,
     /// The train.
     pub knowledge: &'a Knowledge,
@@ -116,23 +116,24 @@ impl Planner<'_> {
         let curve = BrakingCurve::of(self.knowledge, self.ability, cruise_mps.max(speed_mps));
         let step_m = (self.leg.length_m - at_m).max(1.0) / STEPS as f64;
         let (mut time_s, mut energy_j) = (0.0, 0.0);
-        // Beyond all need: a step is a share of the way.
+        // Beyond all need: a step is a share of the leg.
         for _ in 0..2 * STEPS {
-            let mut way_m = step_m;
+            let mut piece_m = step_m;
             if (at_m + 1e-6..at_m + step_m).contains(&coast_from_m) {
-                way_m = coast_from_m - at_m;
+                piece_m = coast_from_m - at_m;
             }
             let spare_m = self.leg.length_m - at_m - curve.distance_m(speed_mps);
-            let (force_n, next_mps) = self.step((at_m, speed_mps), way_m, cruise_mps, coast_from_m);
-            let next_spare_m = self.leg.length_m - at_m - way_m - curve.distance_m(next_mps);
+            let (force_n, next_mps) =
+                self.step((at_m, speed_mps), piece_m, cruise_mps, coast_from_m);
+            let next_spare_m = self.leg.length_m - at_m - piece_m - curve.distance_m(next_mps);
             let share = match next_spare_m < 0.0 {
                 true => (spare_m / (spare_m - next_spare_m)).clamp(0.0, 1.0),
                 false => 1.0,
             };
             let passed_mps = speed_mps + share * (next_mps - speed_mps);
-            time_s += 2.0 * share * way_m / (speed_mps + passed_mps).max(0.01);
-            energy_j += share * way_m * force_n.max(0.0);
-            (at_m, speed_mps) = (at_m + share * way_m, passed_mps);
+            time_s += 2.0 * share * piece_m / (speed_mps + passed_mps).max(0.01);
+            energy_j += share * piece_m * force_n.max(0.0);
+            (at_m, speed_mps) = (at_m + share * piece_m, passed_mps);
             if next_spare_m < 0.0 {
                 break;
             }
@@ -141,15 +142,15 @@ impl Planner<'_> {
         Plan { cruise_mps, coast_from_m, time_s, energy_j }
     }
 
-    /// Force in N over a piece of the way, and the speed in m/s at its end.
+    /// Force in N over a piece of the leg, and the speed in m/s at its end.
     fn step(
         &self,
         (at_m, speed_mps): (f64, f64),
-        way_m: f64,
+        piece_m: f64,
         cruise_mps: f64,
         coast_from_m: f64,
     ) -> (f64, f64) {
-        let slope = self.leg.slope_permille(at_m + 0.5 * way_m);
+        let slope = self.leg.slope_permille(at_m + 0.5 * piece_m);
         let share = if at_m >= coast_from_m { COASTING_MIN_SHARE } else { 1.0 };
         let target_mps = share * cruise_mps;
         let most_n = self.ability.traction.force_n(speed_mps);
@@ -161,7 +162,7 @@ impl Planner<'_> {
         };
         let force_n = if is_pulled { most_n } else { held_n };
         let acceleration = self.knowledge.acceleration_mps2(force_n, speed_mps, slope);
-        let free_mps = (speed_mps * speed_mps + 2.0 * way_m * acceleration).max(1e-4).sqrt();
+        let free_mps = (speed_mps * speed_mps + 2.0 * piece_m * acceleration).max(1e-4).sqrt();
         let next_mps = free_mps.min(limit_mps.max(speed_mps));
         // The last piece of an acceleration takes as much as it needs.
         let used = match free_mps > next_mps && free_mps > speed_mps {

@@ -3,7 +3,7 @@
 use dynocar_shared::TrainSample;
 
 use super::answers::{self, ASKED, Memory, Use};
-use super::journey::{Journey, Way};
+use super::journey::{DrivenLeg, Journey};
 use super::line::{Condition, Service};
 use super::link::Link;
 use super::train::Train;
@@ -48,8 +48,8 @@ pub struct Extent {
 /// What a train did.
 #[derive(Clone, Debug)]
 pub struct Driven {
-    /// Its ways.
-    pub ways: Vec<Way>,
+    /// Its legs.
+    pub legs: Vec<DrivenLeg>,
     /// What the daemon's answers were worth.
     pub uses: [Use; 4],
 }
@@ -94,7 +94,7 @@ pub fn drive(
     }
     let alone = |train| {
         let mut journey = Journey::new(train);
-        while journey.ways.len() < extent.stops {
+        while journey.legs.len() < extent.stops {
             let sample = journey.train.sample();
             let known = match informant {
                 Informant::Truth => journey.train.truth(),
@@ -102,7 +102,7 @@ pub fn drive(
             };
             journey.proceed(&sample, &known, &known);
         }
-        Driven { ways: journey.ways, uses: [Use::default(); 4] }
+        Driven { legs: journey.legs, uses: [Use::default(); 4] }
     };
     Ok(trains.map(alone).collect())
 }
@@ -131,8 +131,8 @@ fn with_daemon(
         let mut samples: Vec<(usize, TrainSample)> = asking
             .iter_mut()
             .enumerate()
-            .filter(|(_, it)| it.journey.ways.len() < stops)
-            .map(|(place, it)| (place, it.journey.train.sample()))
+            .filter(|(_, it)| it.journey.legs.len() < stops)
+            .map(|(index, it)| (index, it.journey.train.sample()))
             .collect();
         if samples.is_empty() {
             break;
@@ -152,18 +152,18 @@ fn with_daemon(
             }
         }
         link.exchange(&mut samples)?;
-        for (place, sample) in &samples {
-            asking[*place].proceed(*place, sample, &link);
+        for (index, sample) in &samples {
+            asking[*index].proceed(*index, sample, &link);
         }
     }
     let lost = link.lost();
     if lost > 0 && service.condition != Condition::DaemonDies {
         return Err(RigError::Daemon(format!("{lost} samples were lost in lock-step")));
     }
-    Ok(asking.into_iter().map(|it| Driven { ways: it.journey.ways, uses: it.uses }).collect())
+    Ok(asking.into_iter().map(|it| Driven { legs: it.journey.legs, uses: it.uses }).collect())
 }
 
-/// When the daemon dies and another comes, by the first train's way and time on it.
+/// When the daemon dies and another comes, by the first train's leg and time on it.
 #[derive(Clone, Copy, Debug)]
 struct Death {
     kill_at: (usize, f64),
@@ -172,17 +172,17 @@ struct Death {
 }
 
 impl Death {
-    /// In the middle of the way after a third of the stops; another comes in the middle of the next.
+    /// In the middle of the leg after a third of the stops; another comes in the middle of the next.
     fn of(first: &Asking, stops: usize) -> Option<Self> {
-        let (way, time_s) = (stops / 3, 40.0);
+        let (leg, time_s) = (stops / 3, 40.0);
         first.journey.train.loses_daemon().then_some(Death {
-            kill_at: (way, time_s),
-            return_at: (way + 1, time_s),
+            kill_at: (leg, time_s),
+            return_at: (leg + 1, time_s),
             is_dead: false,
         })
     }
 
-    fn is_reached(&self, first: &Journey, (way, time_s): (usize, f64)) -> bool {
-        first.ways.len() > way || (first.ways.len() == way && first.running_s() >= time_s)
+    fn is_reached(&self, first: &Journey, (leg, time_s): (usize, f64)) -> bool {
+        first.legs.len() > leg || (first.legs.len() == leg && first.running_s() >= time_s)
     }
 }

@@ -1,17 +1,17 @@
-//! What the ways of all trains come to, with intervals.
+//! What the legs of all trains come to, with intervals.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::answers::{ASKED, Use};
-use super::journey::Way;
+use super::journey::DrivenLeg;
 use super::line::Service;
 use super::run::{Driven, Informant};
 
 /// Draws of the trains behind an interval.
 const DRAWS: usize = 400;
-/// A way counts for the energy where every driver stops so near in m: else it is not the same service.
+/// A leg counts for the energy where every driver stops so near in m: else it is not the same service.
 const SAME_STOP_M: f64 = 1.0;
 /// What is no difference that anybody would notice: stop in m, energy in %, lateness in s, jerk in m/s³.
 const UNNOTICED: [f64; 4] = [0.03, 0.3, 0.5, 0.05];
@@ -72,7 +72,7 @@ pub struct ReportRow {
     pub energy_percent: Figure,
     /// Mean size of the deviation from the timetable in s.
     pub late_s: Figure,
-    /// Mean of the ways' greatest jerk in m/s³.
+    /// Mean of the legs' greatest jerk in m/s³.
     pub jerk_mps3: Figure,
     /// Bounds looked at.
     pub bounds: usize,
@@ -153,27 +153,27 @@ pub struct Scored {
     pub comparison: Comparison,
 }
 
-/// The ways of one kind of parameters beside all kinds, for the energy of the same stops.
+/// The legs of one kind of parameters beside all kinds, for the energy of the same stops.
 struct Drives<'a> {
     own: &'a [Driven],
     all: &'a [Vec<Driven>; 3],
 }
 
 impl Drives<'_> {
-    fn mean(&self, trains: &[usize], of: impl Fn(&Way) -> f64) -> f64 {
-        let ways = || trains.iter().flat_map(|&train| &self.own[train].ways);
-        ways().map(of).sum::<f64>() / ways().count().max(1) as f64
+    fn mean(&self, trains: &[usize], of: impl Fn(&DrivenLeg) -> f64) -> f64 {
+        let legs = || trains.iter().flat_map(|&train| &self.own[train].legs);
+        legs().map(of).sum::<f64>() / legs().count().max(1) as f64
     }
 
     fn energy_percent(&self, trains: &[usize]) -> f64 {
         let (mut own_j, mut true_j) = (0.0, 0.0);
         for &train in trains {
-            for (place, way) in self.own[train].ways.iter().enumerate() {
+            for (index, leg) in self.own[train].legs.iter().enumerate() {
                 let is_same =
-                    self.all.iter().all(|it| it[train].ways[place].beyond_m.abs() <= SAME_STOP_M);
+                    self.all.iter().all(|it| it[train].legs[index].beyond_m.abs() <= SAME_STOP_M);
                 if is_same {
-                    own_j += way.energy_j;
-                    true_j += self.all[2][train].ways[place].energy_j;
+                    own_j += leg.energy_j;
+                    true_j += self.all[2][train].legs[index].energy_j;
                 }
             }
         }
@@ -181,7 +181,7 @@ impl Drives<'_> {
     }
 
     fn error_m(&self, trains: &[usize]) -> f64 {
-        self.mean(trains, |way| way.beyond_m.powi(2)).sqrt()
+        self.mean(trains, |leg| leg.beyond_m.powi(2)).sqrt()
     }
 
     /// Stop, energy, lateness and jerk: less is better.
@@ -189,8 +189,8 @@ impl Drives<'_> {
         [
             self.error_m(trains),
             self.energy_percent(trains),
-            self.mean(trains, |way| way.late_s.abs()),
-            self.mean(trains, |way| way.jerk_mps3),
+            self.mean(trains, |leg| leg.late_s.abs()),
+            self.mean(trains, |leg| leg.jerk_mps3),
         ]
     }
 }
@@ -202,8 +202,8 @@ pub fn score(service: Service, all: &[Vec<Driven>; 3]) -> Scored {
         .zip(all)
         .map(|(informant, own)| line(service, informant, &Drives { own, all }))
         .collect();
-    let stops: usize = all[1].iter().map(|driven| driven.ways.len()).sum();
-    let answers = (0..ASKED.len()).map(|place| answered(service, place, &all[1], stops)).collect();
+    let stops: usize = all[1].iter().map(|driven| driven.legs.len()).sum();
+    let answers = (0..ASKED.len()).map(|index| answered(service, index, &all[1], stops)).collect();
     let comparison = comparison(service, all, &lines);
     Scored { lines, answers, comparison }
 }
@@ -212,12 +212,12 @@ fn line(service: Service, informant: Informant, drives: &Drives<'_>) -> ReportRo
     let trains = drives.own.len();
     let share = |within_m: f64| {
         Figure::of(trains, |it| {
-            100.0 * drives.mean(it, |way| f64::from(u8::from(way.beyond_m.abs() <= within_m)))
+            100.0 * drives.mean(it, |leg| f64::from(u8::from(leg.beyond_m.abs() <= within_m)))
         })
     };
-    let beyond_m = |it: &[usize]| drives.mean(it, |way| way.beyond_m);
+    let beyond_m = |it: &[usize]| drives.mean(it, |leg| leg.beyond_m);
     let looks: Vec<_> =
-        drives.own.iter().flat_map(|driven| &driven.ways).flat_map(|way| &way.looks).collect();
+        drives.own.iter().flat_map(|driven| &driven.legs).flat_map(|leg| &leg.looks).collect();
     let count = looks.len().max(1) as f64;
     let is_exceeded = |bound_m: Option<f64>, true_m| bound_m.is_none_or(|it| true_m > it);
     let exceeded = looks.iter().filter(|look| is_exceeded(look.bound_m, look.true_m)).count();
@@ -227,18 +227,18 @@ fn line(service: Service, informant: Informant, drives: &Drives<'_>) -> ReportRo
     ReportRow {
         scenario: service.name(),
         driver: informant.name(),
-        stops: drives.own.iter().map(|driven| driven.ways.len()).sum(),
+        stops: drives.own.iter().map(|driven| driven.legs.len()).sum(),
         beyond_m: Figure::of(trains, beyond_m),
         spread_m: Figure::of(trains, |it| {
             let mean = beyond_m(it);
-            drives.mean(it, |way| (way.beyond_m - mean).powi(2)).sqrt()
+            drives.mean(it, |leg| (leg.beyond_m - mean).powi(2)).sqrt()
         }),
         error_m: Figure::of(trains, |it| drives.error_m(it)),
         within_03_percent: share(0.3),
         within_05_percent: share(0.5),
         energy_percent: Figure::of(trains, |it| drives.energy_percent(it)),
-        late_s: Figure::of(trains, |it| drives.mean(it, |way| way.late_s.abs())),
-        jerk_mps3: Figure::of(trains, |it| drives.mean(it, |way| way.jerk_mps3)),
+        late_s: Figure::of(trains, |it| drives.mean(it, |leg| leg.late_s.abs())),
+        jerk_mps3: Figure::of(trains, |it| drives.mean(it, |leg| leg.jerk_mps3)),
         bounds: looks.len(),
         exceeded: (!is_true).then_some(exceeded),
         bound_percent: (!is_true).then_some(100.0 * given.sum::<f64>() / given_count),
@@ -246,11 +246,11 @@ fn line(service: Service, informant: Informant, drives: &Drives<'_>) -> ReportRo
     }
 }
 
-fn answered(service: Service, place: usize, driven: &[Driven], stops: usize) -> Answered {
+fn answered(service: Service, index: usize, driven: &[Driven], stops: usize) -> Answered {
     let mut total = Use::default();
-    driven.iter().for_each(|it| total.join(&it.uses[place]));
+    driven.iter().for_each(|it| total.join(&it.uses[index]));
     let mut firsts: Vec<u64> =
-        driven.iter().map(|it| it.uses[place].first.unwrap_or(u64::MAX)).collect();
+        driven.iter().map(|it| it.uses[index].first.unwrap_or(u64::MAX)).collect();
     firsts.sort_unstable();
     let first = firsts[firsts.len() / 2];
     let usable = total.usable.max(1) as f64;
@@ -260,7 +260,7 @@ fn answered(service: Service, place: usize, driven: &[Driven], stops: usize) -> 
     };
     Answered {
         scenario: service.name(),
-        quantity: ASKED[place].name(),
+        quantity: ASKED[index].name(),
         usable_percent: 100.0 * total.usable as f64 / total.cycles.max(1) as f64,
         wrong_percent: percent(total.wrong),
         worse_percent: percent(total.worse),
@@ -272,12 +272,12 @@ fn answered(service: Service, place: usize, driven: &[Driven], stops: usize) -> 
 
 fn comparison(service: Service, all: &[Vec<Driven>; 3], lines: &[ReportRow]) -> Comparison {
     let [declared, learned] = [0, 1].map(|which| Drives { own: &all[which], all });
-    let difference = |place: usize| {
+    let difference = |index: usize| {
         let figure = Figure::of(all[0].len(), |it| {
-            learned.compared(it)[place] - declared.compared(it)[place]
+            learned.compared(it)[index] - declared.compared(it)[index]
         });
-        let (is_worse, is_better) = (figure.low > UNNOTICED[place], figure.high < 0.0);
-        let measure = MEASURES[place];
+        let (is_worse, is_better) = (figure.low > UNNOTICED[index], figure.high < 0.0);
+        let measure = MEASURES[index];
         (is_worse || is_better).then_some(Difference { measure, figure, is_better })
     };
     let differences: Vec<Difference> = (0..MEASURES.len()).filter_map(difference).collect();

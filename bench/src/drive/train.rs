@@ -85,7 +85,7 @@ impl Train {
         train
     }
 
-    /// Passengers or goods come and go; every way has its own chance, whoever drives.
+    /// Passengers or goods come and go; every leg has its own chance, whoever drives.
     fn load(&mut self) {
         self.legs += 1;
         let of_leg = self.seed ^ self.legs.wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -107,7 +107,7 @@ impl Train {
         self.energy_j = 0.0;
     }
 
-    /// The train stands at a stop: what lies ahead is the next way.
+    /// The train stands at a stop: what lies ahead is the next leg.
     pub fn turn_to_next(&mut self) {
         self.start_m = self.chainage_m();
         self.motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
@@ -121,7 +121,7 @@ impl Train {
         self.load();
     }
 
-    /// The way ahead by the map, without a time.
+    /// The leg ahead by the map, without a time.
     pub fn leg(&self) -> Leg {
         let length_m = self.direction * (self.world.stops_m[self.next_stop] - self.start_m);
         let pieces = (length_m / PIECE_M) as usize + 2;
@@ -170,7 +170,7 @@ impl Train {
         self.mass_kg
     }
 
-    /// Exerted over reported brake force on this way.
+    /// Exerted over reported brake force on this leg.
     pub fn brake_scale(&self) -> f64 {
         self.brake_scale / self.world.force_scale[1]
     }
@@ -241,8 +241,8 @@ impl Train {
             let before = self.motion;
             self.motion = advance(before, step_s, |_, at| self.acceleration_mps2(acting_n, at));
             acceleration = (self.motion.speed_mps - before.speed_mps) / step_s;
-            let way_m = self.motion.distance_m - before.distance_m;
-            self.energy_j += way_m * (acting_n / self.world.force_scale[0]).max(0.0);
+            let piece_m = self.motion.distance_m - before.distance_m;
+            self.energy_j += piece_m * (acting_n / self.world.force_scale[0]).max(0.0);
         }
         self.cycles += 1;
         acceleration
@@ -294,7 +294,7 @@ impl Train {
         self.direction * (sample.position_m - self.start_m)
     }
 
-    /// True where the daemon is to be killed on some way.
+    /// True where the daemon is to be killed on some leg.
     pub fn loses_daemon(&self) -> bool {
         self.service.condition == Condition::DaemonDies
     }

@@ -265,9 +265,9 @@ mod tests {
     #[test]
     fn no_case_is_measured_twice() {
         let cases = [cases(false), cases_with_readers(), cases_in_shadow()].concat();
-        for (place, case) in cases.iter().enumerate() {
+        for (index, case) in cases.iter().enumerate() {
             let same = |it: &Case| (&it.name, it.idle) == (&case.name, case.idle);
-            assert_eq!(cases.iter().position(same), Some(place));
+            assert_eq!(cases.iter().position(same), Some(index));
         }
     }
 }

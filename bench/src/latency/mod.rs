@@ -164,9 +164,9 @@ pub fn run(arguments: &LatencyArguments) -> Result<Measured, LatencyError> {
         dynocar::output::report_line(&format!("round {round} of {rounds}"));
         let mut order: Vec<usize> = (0..cases.len()).collect();
         order.shuffle(&mut random);
-        for place in order {
-            let outcome = in_thread(|| case::measure(&cases[place].0, cores, &schedule))?;
-            cases[place].1.push(outcome);
+        for index in order {
+            let outcome = in_thread(|| case::measure(&cases[index].0, cores, &schedule))?;
+            cases[index].1.push(outcome);
         }
     }
     let seconds = if arguments.quick { 0.5 } else { 5.0 };

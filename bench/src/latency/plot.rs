@@ -48,8 +48,8 @@ fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Box<dyn std::e
         .y_label_formatter(&|us| format!("{us}"))
         .draw()?;
     let shown = measured.cases.iter().filter(|(case, _)| is_shown(case));
-    for (place, (case, outcomes)) in shown.enumerate() {
-        let color = Palette99::pick(place).to_rgba();
+    for (index, (case, outcomes)) in shown.enumerate() {
+        let color = Palette99::pick(index).to_rgba();
         let label = format!("{} ({})", case.name, case.idle);
         chart
             .draw_series(LineSeries::new(points(&pooled(outcomes)), color.stroke_width(2)))?

@@ -266,9 +266,9 @@ impl Train {
             let newest = reading.snapshot.sample_sequence;
             let oldest = (self.seen[index] + 1).max(newest.saturating_sub(IN_FLIGHT as u64 - 1));
             for sequence in oldest..=newest {
-                let place = sequence as usize % IN_FLIGHT;
-                record(&mut outcome.latency, now_ns - self.appointed[place]);
-                record(&mut outcome.since_leaving, now_ns - self.left[place]);
+                let slot = sequence as usize % IN_FLIGHT;
+                record(&mut outcome.latency, now_ns - self.appointed[slot]);
+                record(&mut outcome.since_leaving, now_ns - self.left[slot]);
             }
             self.seen[index] = self.seen[index].max(newest);
         }

@@ -101,8 +101,8 @@ fn driven_s(last_ns: &mut Option<i64>, sample: &TrainSample) -> f64 {
 
 fn acts_at(data: &SimulatedDataset, run: &SimulatedRun, sample: &TrainSample) -> bool {
     let start_ns = run.samples[0].time_ns;
-    let place = ((sample.time_ns - start_ns) as f64 * 1e-9 / TRUE_STEP_S).max(0.0) as usize;
-    acts(data, run, &run.states[place.min(run.states.len() - 1)])
+    let index = ((sample.time_ns - start_ns) as f64 * 1e-9 / TRUE_STEP_S).max(0.0) as usize;
+    acts(data, run, &run.states[index.min(run.states.len() - 1)])
 }
 
 impl Watched {

@@ -73,8 +73,8 @@ impl ParticleModel<2> for UniformWindow<'_> {
     ) {
         let speed_by_adhesion = -STEP_S * self.inputs.gain_mps2;
         let count = advanced[0].len();
-        for (place, density) in densities.iter_mut().enumerate() {
-            let (from, to) = (place / count, place % count);
+        for (index, density) in densities.iter_mut().enumerate() {
+            let (from, to) = (index / count, index % count);
             let off_m = successors[0][to] - advanced[0][from];
             let off_mps = successors[1][to] - advanced[1][from];
             let is_possible = off_m.abs() <= POSITION_NOISE_M && off_mps.abs() <= SPEED_NOISE_MPS;

@@ -81,9 +81,9 @@ pub fn for_terminal(rows: &[Row]) -> String {
     let mut text = String::new();
     let headings = HEADINGS.map(str::to_owned);
     for line in std::iter::once(&headings).chain(&body) {
-        for (place, (cell, width)) in line.iter().zip(widths).enumerate() {
+        for (index, (cell, width)) in line.iter().zip(widths).enumerate() {
             // Writing into a String cannot fail.
-            let _ = match place {
+            let _ = match index {
                 0..4 => write!(text, "{cell:<width$}  "),
                 _ => write!(text, "{cell:>width$}  "),
             };

@@ -66,8 +66,8 @@ fn run_time_ns(task: &Path) -> Option<u64> {
 }
 
 /// A figure of `/proc/…/schedstat`: time on a processor, or ready and waiting for one, in ns.
-fn schedule_figure(task: &Path, place: usize) -> Option<u64> {
-    std::fs::read_to_string(task.join("schedstat")).ok()?.split(' ').nth(place)?.parse().ok()
+fn schedule_figure(task: &Path, index: usize) -> Option<u64> {
+    std::fs::read_to_string(task.join("schedstat")).ok()?.split(' ').nth(index)?.parse().ok()
 }
 
 /// For how long the calling thread was ready but had no processor, in s.

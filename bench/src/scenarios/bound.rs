@@ -14,7 +14,7 @@ use super::world::{
     ROTATING_MASS_STD, WEIGHING_STD, World, knot_std_permille,
 };
 
-/// Places of the unknowns that every run shares; loads, brakes of each way and knots follow.
+/// Indices of the unknowns that every run shares; loads, brakes of each leg and knots follow.
 const TRACTION_SCALE: usize = 3;
 const BRAKE_SCALE: usize = 4;
 const DELAY: usize = 5;
@@ -45,8 +45,8 @@ pub struct Bound {
     opens_at_stops: bool,
     was_standing: bool,
     brakes_from: usize,
-    ways: usize,
-    way: usize,
+    legs: usize,
+    leg: usize,
     gusts_from: usize,
     knots_from: usize,
     map_variance: f64,
@@ -67,17 +67,17 @@ impl Bound {
             LoadSource::Changing => WEIGHING_STD,
         };
         // No train here stops more than once a minute.
-        let ways = (60.0 * hours) as usize + 2;
-        let loads = if opens_at_stops { ways } else { 1 };
+        let legs = (60.0 * hours) as usize + 2;
+        let loads = if opens_at_stops { legs } else { 1 };
         let brakes_from = SHARED + loads;
-        let gusts_from = brakes_from + ways;
+        let gusts_from = brakes_from + legs;
         let knots_from = gusts_from + (3600.0 * hours / GUST_S) as usize + 3;
         let end_m = world.stops_m[world.stops_m.len() - 1] + 1000.0;
         let count = knots_from + (end_m / KNOT_M) as usize + 3;
         let declared = world.declared.resistance;
         let mut prior = vec![EXACT; count];
-        for (place, value) in [declared.a, declared.b, declared.c].into_iter().enumerate() {
-            prior[place] = (COEFFICIENT_SHARE * value).powi(2);
+        for (index, value) in [declared.a, declared.b, declared.c].into_iter().enumerate() {
+            prior[index] = (COEFFICIENT_SHARE * value).powi(2);
         }
         let usual = Deviations::ROUGH;
         prior[TRACTION_SCALE] = usual.force_share.powi(2);
@@ -103,8 +103,8 @@ impl Bound {
             opens_at_stops,
             was_standing: true,
             brakes_from,
-            ways,
-            way: 0,
+            legs,
+            leg: 0,
             gusts_from,
             knots_from,
             map_variance,
@@ -118,13 +118,13 @@ impl Bound {
     pub fn see(&mut self, world: &World, truth: &Truth, cycle_s: f64) {
         let last = self.last.replace(*truth);
         if truth.is_standing {
-            for place in self.met.drain(..) {
-                self.sensitivity[place] = 0.0;
-                self.is_met[place] = false;
+            for index in self.met.drain(..) {
+                self.sensitivity[index] = 0.0;
+                self.is_met[index] = false;
             }
             self.block_s = 0.0;
             if !self.was_standing {
-                self.way = (self.way + 1).min(self.ways - 1);
+                self.leg = (self.leg + 1).min(self.legs - 1);
             }
             if self.opens_at_stops && !self.was_standing && self.load + 1 < SHARED + self.loads {
                 self.load += 1;
@@ -140,11 +140,11 @@ impl Bound {
         self.was_standing = truth.is_standing;
     }
 
-    fn meet(&mut self, place: usize, change_mps: f64) {
-        if !std::mem::replace(&mut self.is_met[place], true) {
-            self.met.push(place);
+    fn meet(&mut self, index: usize, change_mps: f64) {
+        if !std::mem::replace(&mut self.is_met[index], true) {
+            self.met.push(index);
         }
-        self.sensitivity[place] += change_mps;
+        self.sensitivity[index] += change_mps;
     }
 
     /// What a step does to the speed by each unknown.
@@ -155,16 +155,16 @@ impl Bound {
         let by_wind = 2.0 * resistance.c * (speed_mps + truth.headwind_mps);
         let slope = resistance.b + by_wind;
         let kept = 1.0 - step_s * gain * slope;
-        self.met.iter().for_each(|place| self.sensitivity[*place] *= kept);
+        self.met.iter().for_each(|index| self.sensitivity[*index] *= kept);
         let push_mps2 = 0.5 * (last.push_mps2 + truth.push_mps2);
         let acceleration_mps2 = (truth.speed_mps - last.speed_mps) / step_s;
         let powers = [1.0, speed_mps, speed_mps * speed_mps];
-        for (place, power) in powers.into_iter().enumerate() {
-            self.meet(place, -step_s * gain * power);
+        for (index, power) in powers.into_iter().enumerate() {
+            self.meet(index, -step_s * gain * power);
         }
         self.meet(TRACTION_SCALE, -step_s * push_mps2.max(0.0));
         self.meet(BRAKE_SCALE, -step_s * push_mps2.min(0.0));
-        self.meet(self.brakes_from + self.way, -step_s * push_mps2.min(0.0));
+        self.meet(self.brakes_from + self.leg, -step_s * push_mps2.min(0.0));
         self.meet(WIND, truth.direction * step_s * gain * by_wind);
         let (knot, share) = truth.gust;
         self.meet(self.gusts_from + knot, -step_s * gain * by_wind * (1.0 - share));

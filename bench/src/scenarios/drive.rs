@@ -53,7 +53,7 @@ pub struct Truth {
     pub gust: (usize, f64),
 }
 
-/// A train on its way.
+/// A train on its leg.
 pub struct Drive {
     world: World,
     habits: Habits,
@@ -73,9 +73,9 @@ pub struct Drive {
     on_its_way: VecDeque<f64>,
     /// Step within a cycle at which a command acts.
     acts_at: u32,
-    /// Exerted brake force over what the brake is taken to exert, on this way.
+    /// Exerted brake force over what the brake is taken to exert, on this leg.
     brake_scale: f64,
-    /// Gusts in m/s at the knots before and behind, how many knots there were, and the share on the way.
+    /// Gusts in m/s at the knots before and behind, how many knots there were, and the share on the leg.
     gusts_mps: [f64; 2],
     gust: (usize, f64),
     cycle: u64,

@@ -80,20 +80,20 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Metr
     let age_s = 1e-9 * now_ns.saturating_sub(it.sample_published_ns).max(0) as f64;
     let age_s = (it.sample_sequence > 0).then_some(age_s);
     put("", "age_s", "Age of the newest sample behind the estimate", Value::Number(age_s));
-    for (place, &number) in it.parameters.iter().take(it.parameter_count as usize).enumerate() {
+    for (index, &number) in it.parameters.iter().take(it.parameter_count as usize).enumerate() {
         let Some(parameter) = Parameter::from_number(number) else { continue };
         // A field of this name says it, and another its standard deviation.
         if parameter == Parameter::UnexplainedForce {
             continue;
         }
         let (name, meaning) = (parameter.full_name(), parameter.meaning().trim());
-        let std = it.covariance_at(place, place).max(0.0).sqrt();
-        put("", name, meaning, Value::Number(Some(it.values[place])));
+        let std = it.covariance_at(index, index).max(0.0).sqrt();
+        put("", name, meaning, Value::Number(Some(it.values[index])));
         put("std", name, "Standard deviation of the value of this name", Value::Number(Some(std)));
     }
     let words = it.fields();
     for field in NUMBERS.iter() {
-        let word = words[field.place].word(0);
+        let word = words[field.index].word(0);
         let value = match field.entry_type() {
             "f64" => Value::Number(Some(f64::from_bits(word))),
             _ => Value::Count(Some(word)),
@@ -115,9 +115,9 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Metr
     let usable = usable.map(|quantity| quantity.name()).collect::<Vec<_>>().join(",");
     let meaning = "Quantities whose values a controller may use, with commas between";
     put("", "usable", meaning, Value::words(usable));
-    let is_excited = |place: &usize| it.excited & (1 << place) != 0;
+    let is_excited = |index: &usize| it.excited & (1 << index) != 0;
     let excited = (0..it.parameter_count as usize).filter(is_excited);
-    let excited = excited.filter_map(|place| Parameter::from_number(it.parameters[place]));
+    let excited = excited.filter_map(|index| Parameter::from_number(it.parameters[index]));
     let excited = excited.map(Parameter::full_name).collect::<Vec<_>>().join(",");
     let meaning = "Parameters that the data excited, with commas between";
     put("", "excited", meaning, Value::words(excited));

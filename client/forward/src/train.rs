@@ -155,9 +155,9 @@ impl Train {
         self.publications += 1;
         self.set_number(now_ms);
         let mut metrics = Vec::new();
-        for (place, slot) in self.slots.iter_mut().enumerate() {
+        for (index, slot) in self.slots.iter_mut().enumerate() {
             if std::mem::take(&mut slot.is_changed) || must_publish_all {
-                let alias = self.first_alias + place as u64;
+                let alias = self.first_alias + index as u64;
                 metrics.push(slot.value.changed(alias, slot.taken_ms));
             }
         }
@@ -190,9 +190,9 @@ impl Train {
 
     /// Every metric as it is now, with its name, type, unit and meaning.
     pub fn born(&self) -> Vec<Metric> {
-        let metric = |(place, slot): (usize, &Slot)| {
+        let metric = |(index, slot): (usize, &Slot)| {
             let (unit, meaning) = (slot.meta.unit(), slot.meta.meaning);
-            let alias = Some(self.first_alias + place as u64);
+            let alias = Some(self.first_alias + index as u64);
             slot.value.born(&slot.name, alias, unit, meaning, slot.taken_ms)
         };
         self.slots.iter().enumerate().map(metric).collect()

@@ -19,12 +19,12 @@ const NOW_NS: i64 = 5_000_000_000;
 /// A snapshot in which every number differs from every other.
 fn snapshot() -> ParameterSnapshot {
     let mut it = ParameterSnapshot::empty();
-    for (place, field) in it.fields_mut().into_iter().enumerate() {
+    for (index, field) in it.fields_mut().into_iter().enumerate() {
         for entry in 0..field.count() {
-            let number = 1000 * (place as u64 + 1) + entry as u64;
+            let number = 1000 * (index as u64 + 1) + entry as u64;
             // An integer takes the bits it has room for, a float the bits of a number.
             field.set_word(entry, number);
-            if ParameterSnapshot::LAYOUT[place].type_name.contains("f64") {
+            if ParameterSnapshot::LAYOUT[index].type_name.contains("f64") {
                 field.set_word(entry, (number as f64 + 0.5).to_bits());
             }
         }
@@ -97,7 +97,7 @@ fn every_field_of_a_snapshot_is_born_with_name_unit_meaning_and_value() {
         metrics.get(&format!("2_trajectory_kalman/{name}")).unwrap_or_else(|| panic!("{name}"))
     };
     for field in NUMBERS.iter() {
-        let (metric, word) = (metric(field.layout.name), it.fields()[field.place].word(0));
+        let (metric, word) = (metric(field.layout.name), it.fields()[field.index].word(0));
         let value = match field.entry_type() {
             "f64" => (MetricValue::Double(f64::from_bits(word)), DataType::Double),
             _ => (MetricValue::Long(word), DataType::UInt64),

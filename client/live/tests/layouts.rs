@@ -24,8 +24,8 @@ fn text(name: &str) -> String {
 fn topics() -> Vec<Topic> {
     let shipped = DaemonConfig::load(&config("daemon.toml")).expect("the shipped configuration");
     let snapshots = shipped.pipelines.iter().enumerate();
-    let snapshots = snapshots.map(|(place, it)| {
-        Topic::of_snapshots(TrainId(1), place as u32, Some(it.estimator.kind()))
+    let snapshots = snapshots.map(|(index, it)| {
+        Topic::of_snapshots(TrainId(1), index as u32, Some(it.estimator.kind()))
     });
     snapshots.chain([Topic::of_samples(TrainId(1)), Topic::of_events()]).collect()
 }
@@ -46,7 +46,7 @@ fn has_field(file: &FileDescriptorProto, message: &str, path: &[&str]) -> bool {
     }
 }
 
-/// The place of a path among the topics, and the rest of it.
+/// The index of a path among the topics, and the rest of it.
 fn split<'a>(topics: &'a [Topic], path: &'a str) -> Option<(&'a Topic, &'a str)> {
     topics.iter().find_map(|it| Some((it, path.strip_prefix(it.name.as_str())?)))
 }

@@ -133,11 +133,11 @@ fn read_file(
             texts.filter_map(|it| Some((it.key.clone(), 0, it.value.clone()?.into_bytes())));
         content.attached.extend(texts);
     }
-    let places = places(path, columns, &schema)?;
+    let indices = indices(path, columns, &schema)?;
     let mut rows_before = 0;
     for batch in batches {
         let batch = batch?;
-        take_rows(path, columns, &places, &batch, rows_before, &mut content.messages)?;
+        take_rows(path, columns, &indices, &batch, rows_before, &mut content.messages)?;
         rows_before += batch.num_rows();
     }
     Ok(())
@@ -150,9 +150,9 @@ fn require_same(
     found: &Schema,
 ) -> Result<(), TableError> {
     let ours = ours.map_err(|it| TableError::not_parquet(path, it))?;
-    for (place, field) in ours.fields().iter().enumerate() {
+    for (index, field) in ours.fields().iter().enumerate() {
         let expected = field.data_type();
-        match found.fields().get(place).filter(|it| it.name() == field.name()) {
+        match found.fields().get(index).filter(|it| it.name() == field.name()) {
             None => return Err(no_column(path, field.name(), expected)),
             Some(it) if it.data_type() != expected => {
                 return Err(other_type(path, field.name(), expected, it.data_type()));
@@ -181,31 +181,31 @@ fn other_type(path: &Path, column: &str, expected: &DataType, found: &DataType) 
 }
 
 /// Where the columns stand in a file; `None` for one that only repeats others.
-fn places(
+fn indices(
     path: &Path,
     columns: &[Column],
     schema: &Schema,
 ) -> Result<Vec<Option<usize>>, TableError> {
-    let place = |column: &Column| {
+    let index = |column: &Column| {
         if column.is_repetition() {
             return Ok(None);
         }
         let expected = data_type(column);
-        let place =
+        let index =
             schema.index_of(&column.name).map_err(|_| no_column(path, &column.name, &expected))?;
-        let found = schema.field(place).data_type();
+        let found = schema.field(index).data_type();
         if *found != expected {
             return Err(other_type(path, &column.name, &expected, found));
         }
-        Ok(Some(place))
+        Ok(Some(index))
     };
-    columns.iter().map(place).collect()
+    columns.iter().map(index).collect()
 }
 
 fn take_rows(
     path: &Path,
     columns: &[Column],
-    places: &[Option<usize>],
+    indices: &[Option<usize>],
     batch: &RecordBatch,
     rows_before: usize,
     messages: &mut Vec<Logged>,
@@ -218,9 +218,9 @@ fn take_rows(
     let first = messages.len();
     let none = Logged { number: 0, log_time: 0, row };
     messages.resize(first + batch.num_rows(), none);
-    for (column, place) in columns.iter().zip(places) {
-        let Some(place) = place else { continue };
-        let array = batch.column(*place);
+    for (column, index) in columns.iter().zip(indices) {
+        let Some(index) = index else { continue };
+        let array = batch.column(*index);
         if !column.is_nullable && array.null_count() > 0 {
             let row = (0..array.len()).find(|&row| array.is_null(row)).unwrap_or(0);
             let (path, column, row) = (path.into(), column.name.clone(), rows_before + row + 1);

@@ -71,7 +71,7 @@ fn rows(path: &Path, wanted: &[Wanted], output: impl Write) -> Result<(), RowsEr
     }
     let readers =
         wanted.iter().map(|it| reader(path, &schema, it)).collect::<Result<Vec<_>, _>>()?;
-    let roots: Vec<usize> = readers.iter().map(|it| it.place).collect();
+    let roots: Vec<usize> = readers.iter().map(|it| it.index).collect();
     let mask = ProjectionMask::roots(builder.parquet_schema(), roots.iter().copied());
     let batches =
         builder.with_projection(mask).build().map_err(|it| TableError::not_parquet(path, it))?;
@@ -83,7 +83,7 @@ fn rows(path: &Path, wanted: &[Wanted], output: impl Write) -> Result<(), RowsEr
         for row in 0..batch.num_rows() {
             for (reader, column) in readers.iter().zip(&columns) {
                 let array = batch.column(*column);
-                let cell = &mut cells[reader.place];
+                let cell = &mut cells[reader.index];
                 cell.clear();
                 if array.is_valid(row) {
                     (reader.read)(array.as_ref(), row, cell);
@@ -109,13 +109,13 @@ fn columns_of(batch: &RecordBatch, roots: &[usize]) -> Vec<usize> {
 type Read = Box<dyn Fn(&dyn Array, usize, &mut String)>;
 
 struct Reader {
-    place: usize,
+    index: usize,
     read: Read,
 }
 
 fn reader(path: &Path, schema: &Schema, wanted: &Wanted) -> Result<Reader, TableError> {
-    let place = schema.fields().iter().position(|it| *it.name() == wanted.column).unwrap_or(0);
-    let found = schema.field(place).data_type();
+    let index = schema.fields().iter().position(|it| *it.name() == wanted.column).unwrap_or(0);
+    let found = schema.field(index).data_type();
     let refuse = |expected: String| TableError::OtherType {
         path: PathBuf::from(path),
         column: wanted.column.clone(),
@@ -139,10 +139,10 @@ fn reader(path: &Path, schema: &Schema, wanted: &Wanted) -> Result<Reader, Table
                 cell.push_str(&seconds.convert(time_s, &unit).to_string());
             }
         });
-        return Ok(Reader { place, read });
+        return Ok(Reader { index, read });
     }
     let read = numbers(found).ok_or_else(|| refuse("numbers, true and false, or times".into()))?;
-    Ok(Reader { place, read })
+    Ok(Reader { index, read })
 }
 
 fn number<T: ArrowPrimitiveType>() -> Read

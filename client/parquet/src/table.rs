@@ -52,10 +52,10 @@ pub fn attachments_batch(attached: &[Attached]) -> Result<RecordBatch, ArrowErro
 ///
 /// None that a caller could cause.
 pub fn metadata_batch(metadata: &[Metadata]) -> Result<RecordBatch, ArrowError> {
-    let rows = metadata.iter().enumerate().flat_map(|(place, it)| {
+    let rows = metadata.iter().enumerate().flat_map(|(index, it)| {
         let pairs = it.metadata.iter().map(|(key, value)| Some((key.as_str(), value.as_str())));
         let none = it.metadata.is_empty().then_some(None);
-        pairs.chain(none).map(move |pair| (place as u64, it.name.as_str(), pair))
+        pairs.chain(none).map(move |pair| (index as u64, it.name.as_str(), pair))
     });
     let rows: Vec<_> = rows.collect();
     let numbers: UInt64Array = rows.iter().map(|it| Some(it.0)).collect();

@@ -67,8 +67,8 @@ impl ParameterSnapshot {
         let field = snapshot_fields().find(|it| it.layout.name == name).ok_or_else(|| {
             PyAttributeError::new_err(format!("'ParameterSnapshot' has no field '{name}'"))
         })?;
-        let entries = self.0.fields()[field.place];
-        let mut numbers = (0..entries.count()).map(|place| number(py, &field, entries.word(place)));
+        let entries = self.0.fields()[field.index];
+        let mut numbers = (0..entries.count()).map(|index| number(py, &field, entries.word(index)));
         if field.is_array() {
             return Ok(PyList::new(py, numbers.collect::<PyResult<Vec<_>>>()?)?.into_any());
         }
@@ -84,9 +84,9 @@ impl ParameterSnapshot {
         let mut bytes = Vec::with_capacity(size_of_val(&self.0));
         for field in snapshot_fields() {
             let (entries, size) =
-                (self.0.fields()[field.place], field.layout.size / field.entries());
-            for place in 0..entries.count() {
-                let word = entries.word(place);
+                (self.0.fields()[field.index], field.layout.size / field.entries());
+            for index in 0..entries.count() {
+                let word = entries.word(index);
                 match cfg!(target_endian = "little") {
                     true => bytes.extend(&word.to_le_bytes()[..size]),
                     false => bytes.extend(&word.to_be_bytes()[8 - size..]),

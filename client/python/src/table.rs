@@ -84,8 +84,8 @@ impl Table {
     /// quantities of which any run has a value.
     pub(crate) fn of_runs(runs: &[Run]) -> PyResult<(Vec<Self>, Self)> {
         let mut read: Vec<Columns> = runs.iter().map(quantities).collect();
-        let is_there = |place: usize| {
-            read.iter().any(|columns| columns[place].1.iter().any(|value| !value.is_nan()))
+        let is_there = |index: usize| {
+            read.iter().any(|columns| columns[index].1.iter().any(|value| !value.is_nan()))
         };
         let kept: Vec<bool> = (0..read.first().map_or(0, Vec::len)).map(is_there).collect();
         for columns in &mut read {
@@ -96,8 +96,8 @@ impl Table {
         let all = runs.iter().zip(read).map(numbered).collect::<PyResult<Vec<_>>>()?;
         // The columns after the run's number, in the same memory.
         let alone = |whole: &RecordBatch| -> PyResult<Self> {
-            let places: Vec<usize> = (1..whole.num_columns()).collect();
-            Ok(Table(vec![whole.project(&places).map_err(unexpected)?]))
+            let indices: Vec<usize> = (1..whole.num_columns()).collect();
+            Ok(Table(vec![whole.project(&indices).map_err(unexpected)?]))
         };
         Ok((all.iter().map(alone).collect::<PyResult<_>>()?, Table(all)))
     }

@@ -73,11 +73,11 @@ pub fn encode_snapshot(snapshot: &ParameterSnapshot, out: &mut Vec<u8>) {
     }
     put_nested(ESTIMATE, out, |out| {
         let count = (snapshot.parameter_count as usize).min(PARAMETERS_MAX);
-        for place in 0..count {
-            let known = Parameter::from_number(snapshot.parameters[place]);
+        for index in 0..count {
+            let known = Parameter::from_number(snapshot.parameters[index]);
             let Some(parameter) = known else { continue };
-            let (number, value) = (parameter_number(parameter), snapshot.values[place]);
-            let std = snapshot.covariance_at(place, place).max(0.0).sqrt();
+            let (number, value) = (parameter_number(parameter), snapshot.values[index]);
+            let std = snapshot.covariance_at(index, index).max(0.0).sqrt();
             put_double(number, value, out);
             put_double(number + STD_OFFSET, std, out);
             put_double(number + LOW_OFFSET, value - HALF_95 * std, out);
@@ -166,12 +166,12 @@ fn put(field: &Field, word: u64, number: u32, out: &mut Vec<u8>) {
 
 /// A number unless it is 0, or the entries of an array up to the last that is not.
 fn put_field(field: &Field, words: &dyn Words, out: &mut Vec<u8>) {
-    let Some(last) = (0..words.count()).rev().find(|&place| words.word(place) != 0) else { return };
+    let Some(last) = (0..words.count()).rev().find(|&index| words.word(index) != 0) else { return };
     if !field.is_array() {
         return put(field, words.word(0), number(field), out);
     }
     put_nested(number(field), out, |out| {
-        (0..=last).for_each(|place| put_word(field, words.word(place), out));
+        (0..=last).for_each(|index| put_word(field, words.word(index), out));
     });
 }
 
@@ -188,20 +188,20 @@ fn decode(
             continue;
         };
         seen(field);
-        let words = &mut *words[field.place];
+        let words = &mut *words[field.index];
         if field.is_array() && wire_type == WireType::LengthDelimited {
             let length = decode_varint(&mut message)? as usize;
             let (mut entries, rest) = message.split_at_checked(length).ok_or(cut_off(field))?;
             message = rest;
-            let mut place = 0;
+            let mut index = 0;
             while !entries.is_empty() {
                 let word = take(field, &mut entries)?;
-                if place == words.count() {
+                if index == words.count() {
                     let (field, most) = (field.layout.name, words.count());
                     return Err(CodecError::TooMany { field, most });
                 }
-                words.set_word(place, word);
-                place += 1;
+                words.set_word(index, word);
+                index += 1;
             }
         } else if !field.is_array() && is_of(field, wire_type) {
             words.set_word(0, take(field, &mut message)?);

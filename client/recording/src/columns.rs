@@ -17,7 +17,7 @@ use crate::schema::{
 /// Where a column's values come from.
 #[derive(Clone, Copy, Debug)]
 pub enum Source {
-    /// The message's place in the recording.
+    /// The message's number in the recording.
     Number,
     /// Its `log_time`.
     LogTime,
@@ -25,11 +25,11 @@ pub enum Source {
     Field(&'static Field),
     /// A parameter's value: repeats what arrays hold.
     Value(Parameter),
-    /// What [`SUFFIXES`] adds to it, by the place there: repeats what arrays hold.
+    /// What [`SUFFIXES`] adds to it, by the index there: repeats what arrays hold.
     OfEstimate(Parameter, usize),
     /// How many samples were refused for a reason: repeats what an array holds.
     Rejected(RejectionReason),
-    /// A field of an event, by its place.
+    /// A field of an event, by its index.
     Event(usize),
 }
 
@@ -75,9 +75,9 @@ pub static SNAPSHOTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     let parameters = Parameter::ALL.iter().flat_map(|&it| {
         let name = format!("estimate_{}", it.full_name());
         let value = plain(name, "f64", it.meaning(), Source::Value(it));
-        let suffixed = SUFFIXES.into_iter().enumerate().map(move |(place, (_, word, meaning))| {
+        let suffixed = SUFFIXES.into_iter().enumerate().map(move |(index, (_, word, meaning))| {
             let name = format!("estimate_{}", suffixed_name(it, word));
-            plain(name, "f64", meaning, Source::OfEstimate(it, place))
+            plain(name, "f64", meaning, Source::OfEstimate(it, index))
         });
         std::iter::once(value).chain(suffixed).map(nullable)
     });
@@ -89,11 +89,11 @@ pub static SNAPSHOTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
 
 /// The columns of events.
 pub static EVENTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
-    let fields = EVENT_FIELDS.iter().enumerate().map(|(place, it)| {
+    let fields = EVENT_FIELDS.iter().enumerate().map(|(index, it)| {
         let vocabulary = vocabulary_of_type(it.type_name);
         let type_name = if vocabulary.is_some() { "i32" } else { it.type_name };
         let EventField { name, meaning, is_optional, .. } = it;
-        let column = plain((*name).to_owned(), type_name, meaning, Source::Event(place));
+        let column = plain((*name).to_owned(), type_name, meaning, Source::Event(index));
         Column { is_nullable: *is_optional, vocabulary, ..column }
     });
     stamps().chain(fields).collect()
@@ -193,16 +193,16 @@ impl Row {
                     Missing::Unless(quantity) => it.valid & quantity.bit() != 0,
                     _ => true,
                 };
-                one(words, is_there.then(|| it.fields()[field.place].word(0)))
+                one(words, is_there.then(|| it.fields()[field.index].word(0)))
             }
             (Row::Snapshot(it), Source::Field(field)) => {
-                let entries = it.fields()[field.place];
-                words.extend((0..entries.count()).map(|place| entries.word(place)));
+                let entries = it.fields()[field.index];
+                words.extend((0..entries.count()).map(|index| entries.word(index)));
                 true
             }
             (Row::Snapshot(it), Source::Value(of)) => one(words, it.value(of).map(f64::to_bits)),
-            (Row::Snapshot(it), Source::OfEstimate(of, place)) => {
-                let estimate = it.value(of).zip(it.std(of)).map(|(value, std)| match place {
+            (Row::Snapshot(it), Source::OfEstimate(of, index)) => {
+                let estimate = it.value(of).zip(it.std(of)).map(|(value, std)| match index {
                     0 => std,
                     1 => value - HALF_95 * std,
                     _ => value + HALF_95 * std,
@@ -210,7 +210,7 @@ impl Row {
                 one(words, estimate.map(f64::to_bits))
             }
             (Row::Snapshot(it), Source::Rejected(of)) => one(words, Some(it.rejected(of).into())),
-            (Row::Event(it), Source::Event(place)) => one(words, it.word(place)),
+            (Row::Event(it), Source::Event(index)) => one(words, it.word(index)),
             _ => one(words, None),
         }
     }
@@ -219,19 +219,19 @@ impl Row {
     pub fn set_words(&mut self, column: &Column, words: Option<&[u64]>) {
         match (self, column.source, words) {
             (Row::Sample(it), Source::Field(field), Some(words)) => {
-                it.fields_mut()[field.place].set_word(0, words[0]);
+                it.fields_mut()[field.index].set_word(0, words[0]);
                 if let Missing::Unless(quantity) = field.missing {
                     it.valid |= quantity.bit();
                 }
             }
             (Row::Snapshot(it), Source::Field(field), Some(words)) => {
                 let mut fields = it.fields_mut();
-                words.iter().enumerate().for_each(|(place, &word)| {
-                    fields[field.place].set_word(place, word);
+                words.iter().enumerate().for_each(|(index, &word)| {
+                    fields[field.index].set_word(index, word);
                 });
             }
-            (Row::Event(it), Source::Event(place), words) => {
-                it.set_word(place, words.map(|it| it[0]));
+            (Row::Event(it), Source::Event(index), words) => {
+                it.set_word(index, words.map(|it| it[0]));
             }
             _ => {}
         }

@@ -91,8 +91,8 @@ pub struct Event {
 impl Event {
     /// The number in a field by its place in [`EVENT_FIELDS`], in two's complement; `None` where it is
     /// missing, and for the text.
-    pub fn word(&self, place: usize) -> Option<u64> {
-        match place {
+    pub fn word(&self, index: usize) -> Option<u64> {
+        match index {
             0 => Some(self.monotonic_ns as u64),
             1 => Some(self.train_id),
             2 => Some(self.kind as u64),
@@ -105,9 +105,9 @@ impl Event {
     }
 
     /// Sets the number in a field by its place; one that is never missing becomes 0 without.
-    pub fn set_word(&mut self, place: usize, word: Option<u64>) {
+    pub fn set_word(&mut self, index: usize, word: Option<u64>) {
         let number = word.unwrap_or(0);
-        match place {
+        match index {
             0 => self.monotonic_ns = number as i64,
             1 => self.train_id = number,
             2 => self.kind = number as i32,

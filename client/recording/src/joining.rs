@@ -20,11 +20,11 @@ pub fn read_all(paths: &[PathBuf], visitor: &mut impl Visitor) -> Result<Vec<End
         Joined { visitor, attached: HashMap::new(), seen: vec![], begins: None, other: None };
     let mut endings = Vec::new();
     let mut newest: Option<(&PathBuf, u64)> = None;
-    for (place, path) in paths.iter().enumerate() {
+    for (index, path) in paths.iter().enumerate() {
         (joined.begins, joined.other) = (None, None);
         endings.push(read_among(paths.len(), path, &mut joined)?);
         if let Some(name) = joined.other.take() {
-            let (path, before) = (path.clone(), paths[place - 1].clone());
+            let (path, before) = (path.clone(), paths[index - 1].clone());
             return Err(ReadError::OtherRecording { path, before, name });
         }
         let Some(begins) = joined.begins else { continue };

@@ -60,8 +60,8 @@ pub fn page() -> String {
     for column in SNAPSHOTS.iter() {
         let (name, number) = match column.source {
             Source::Value(it) => (it.full_name().to_owned(), parameter_number(it)),
-            Source::OfEstimate(it, place) => {
-                let (offset, word, _) = SUFFIXES[place];
+            Source::OfEstimate(it, index) => {
+                let (offset, word, _) = SUFFIXES[index];
                 (suffixed_name(it, word), parameter_number(it) + offset)
             }
             _ => continue,
@@ -99,10 +99,10 @@ fn table(page: &mut String, name: &str, what: &str, has_layout: bool) {
 /// A message by the table of its fields, and the columns that they are where they are any.
 fn listed(page: &mut String, name: &str, what: &str, fields: &[EventField], columns: &[&Column]) {
     table(page, &format!("dynocar.{name}"), &plain(what), false);
-    for (place, it) in fields.iter().enumerate() {
+    for (index, it) in fields.iter().enumerate() {
         let of_type = vocabulary_of_type(it.type_name).unwrap_or_else(|| protobuf(it.type_name));
         let (number, unit) = (it.number as u32, unit_of(it.name));
-        let row = match columns.get(place) {
+        let row = match columns.get(index) {
             Some(column) => Row::of(column, number, of_type),
             None => Row { name: it.name, number: Some(number), of_type, unit, ..Row::default() },
         };

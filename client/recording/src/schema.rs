@@ -46,7 +46,7 @@ pub static DESCRIPTORS: LazyLock<Vec<u8>> = LazyLock::new(|| descriptors().encod
 
 /// The protobuf number of a layout's field.
 pub fn number(field: &Field) -> u32 {
-    field.place as u32 + 1
+    field.index as u32 + 1
 }
 
 /// The number of a parameter's value in `estimate`; those of its standard deviation and of the ends
@@ -238,8 +238,8 @@ fn enumeration(name: &str, members: &[(i32, &str)]) -> EnumDescriptorProto {
     let prefix: String = name
         .chars()
         .enumerate()
-        .flat_map(|(place, letter)| {
-            let gap = (place > 0 && letter.is_uppercase()).then_some('_');
+        .flat_map(|(index, letter)| {
+            let gap = (index > 0 && letter.is_uppercase()).then_some('_');
             gap.into_iter().chain(letter.to_uppercase())
         })
         .collect();

@@ -21,19 +21,19 @@ use support_site::{Controller, TRAIN, TestSite, await_true};
 const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-recording");
 
 /// Starts the recorder and waits until its channels are open.
-fn recorder(place: &TestSite) -> Child {
-    started(place, &["record", "-o"], "run.mcap")
+fn recorder(site: &TestSite) -> Child {
+    started(site, &["record", "-o"], "run.mcap")
 }
 
 /// Starts a recorder that writes to a place, and waits until its channels are open.
-fn started(place: &TestSite, command: &[&str], to: &str) -> Child {
+fn started(site: &TestSite, command: &[&str], to: &str) -> Child {
     let mut recorder = Command::new(PROGRAM)
         .args(command)
-        .arg(place.at(to))
+        .arg(site.at(to))
         .args(["--train", "1", "--snapshots-ms", "20", "--root"])
-        .arg(place.at("root"))
+        .arg(site.at("root"))
         .arg("--config")
-        .arg(place.at("daemon.toml"))
+        .arg(site.at("daemon.toml"))
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
@@ -44,19 +44,19 @@ fn started(place: &TestSite, command: &[&str], to: &str) -> Child {
 }
 
 /// What can be read by now.
-fn recording(place: &TestSite) -> Recording {
+fn recording(site: &TestSite) -> Recording {
     let mut recording = Recording::default();
-    read(&place.at("run.mcap"), &mut recording).unwrap();
+    read(&site.at("run.mcap"), &mut recording).unwrap();
     recording
 }
 
-fn await_recorded(place: &TestSite, sequence: u64) {
-    let newest = || recording(place).samples.last().map_or(0, |it| it.sequence);
+fn await_recorded(site: &TestSite, sequence: u64) {
+    let newest = || recording(site).samples.last().map_or(0, |it| it.sequence);
     await_true("a sample in the file", || newest() >= sequence);
 }
 
-fn count(place: &TestSite, kind: EventKind) -> usize {
-    recording(place).events.iter().filter(|it| it.kind == kind as i32).count()
+fn count(site: &TestSite, kind: EventKind) -> usize {
+    recording(site).events.iter().filter(|it| it.kind == kind as i32).count()
 }
 
 /// Waits until so many samples more are published, and gives the newest number.
@@ -81,93 +81,93 @@ fn signal(process: u32, signal: Signal) {
 
 #[test]
 fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() {
-    let place = TestSite::new(&["mass_kalman", "v_mils"]);
-    let mut recorder = recorder(&place);
+    let site = TestSite::new(&["mass_kalman", "v_mils"]);
+    let mut recorder = recorder(&site);
     for round in 1..=2 {
-        let daemon = place.daemon();
-        await_true("its coming in the file", || count(&place, EventKind::DaemonCame) == round);
-        let controller = Controller::start(&place, 1);
+        let daemon = site.daemon();
+        await_true("its coming in the file", || count(&site, EventKind::DaemonCame) == round);
+        let controller = Controller::start(&site, 1);
         let published = await_more(&controller, 300);
-        await_recorded(&place, published);
+        await_recorded(&site, published);
         drop(controller);
         // Daemons of this process end when it is asked to.
         signal(std::process::id(), Signal::TERM);
         daemon.join().unwrap();
-        await_true("its going in the file", || count(&place, EventKind::DaemonGone) == round);
+        await_true("its going in the file", || count(&site, EventKind::DaemonGone) == round);
     }
-    let newest = recording(&place).samples.len();
+    let newest = recording(&site).samples.len();
     recorder.kill().unwrap();
     recorder.wait().unwrap();
 
-    let left = Recording::load(&place.at("run.mcap")).unwrap();
+    let left = Recording::load(&site.at("run.mcap")).unwrap();
     assert!(left.broken.is_some(), "it has no end");
     assert!(left.samples.len() >= newest);
     let attached: Vec<&str> = left.attachments.iter().map(|it| it.0.as_str()).collect();
     assert_eq!(attached, ["configuration-1/daemon.toml", "configuration-1/train-1.toml"]);
-    let whole = place.at("whole.mcap");
-    let recovered = run(&["recover", "-o"], &[&whole, &place.at("run.mcap")]);
+    let whole = site.at("whole.mcap");
+    let recovered = run(&["recover", "-o"], &[&whole, &site.at("run.mcap")]);
     assert!(recovered.status.success() && words(&recovered).contains("lost of "));
     let mut again = Recording::default();
     assert_eq!(read(&whole, &mut again).unwrap(), Ending::Whole);
     assert_eq!((&again.samples, &again.snapshots), (&left.samples, &left.snapshots));
 
-    let verified = run(&["verify", "--with"], &[&place.at("daemon.toml"), &whole]);
+    let verified = run(&["verify", "--with"], &[&site.at("daemon.toml"), &whole]);
     let printed = words(&verified);
     assert_eq!(printed.matches("daemon of epoch").count(), 2, "{printed}");
     assert!(printed.contains("recorded configuration"), "{printed}");
     // On a machine so busy that samples are lost, daemon and recorder did not take the same.
     let lost = left.snapshots.iter().any(|it| it.samples_lost > 0)
-        || count(&place, EventKind::SamplesLost) > 0;
+        || count(&site, EventKind::SamplesLost) > 0;
     assert!(lost || verified.status.success(), "{printed}");
     assert!(lost || !printed.contains("cannot"), "{printed}");
 }
 
 #[test]
 fn a_recorder_that_is_asked_to_ends_whole() {
-    let place = TestSite::new(&["mass_kalman", "v_mils"]);
-    let controller = Controller::start(&place, 1);
-    let mut recorder = recorder(&place);
+    let site = TestSite::new(&["mass_kalman", "v_mils"]);
+    let controller = Controller::start(&site, 1);
+    let mut recorder = recorder(&site);
     await_more(&controller, 1);
     let published = await_more(&controller, 200);
-    await_recorded(&place, published);
+    await_recorded(&site, published);
     signal(recorder.id(), Signal::INT);
     assert!(recorder.wait().unwrap().success());
     let mut recording = Recording::default();
-    assert_eq!(read(&place.at("run.mcap"), &mut recording).unwrap(), Ending::Whole);
+    assert_eq!(read(&site.at("run.mcap"), &mut recording).unwrap(), Ending::Whole);
     let kinds: Vec<i32> = recording.events.iter().map(|it| it.kind).collect();
     assert_eq!(kinds.first(), Some(&(EventKind::RecordingBegan as i32)));
     assert_eq!(kinds.last(), Some(&(EventKind::RecordingEnded as i32)));
     assert!(kinds.contains(&(EventKind::ControllerCame as i32)));
-    let again = run(&["record", "-o"], &[&place.at("run.mcap")]);
+    let again = run(&["record", "-o"], &[&site.at("run.mcap")]);
     assert_eq!(again.status.code(), Some(2), "{}", words(&again));
 }
 
 #[test]
 fn a_full_disk_ends_only_the_recorder_and_what_was_written_can_be_read() {
-    let place = TestSite::new(&["mass_kalman", "v_mils"]);
-    let controller = Controller::start(&place, 1);
+    let site = TestSite::new(&["mass_kalman", "v_mils"]);
+    let controller = Controller::start(&site, 1);
     // A file may grow to 64 KiB, and writing on fails instead of killing: as on a full disk.
     let line = "trap '' XFSZ; ulimit -f 128; exec \"$0\" record --train 1 --root \"$1\" -o \"$2\"";
     let recorder = Command::new("sh")
         .args(["-c", line, PROGRAM])
-        .args([place.at("root"), place.at("run.mcap")])
+        .args([site.at("root"), site.at("run.mcap")])
         .output()
         .unwrap();
     let printed = words(&recorder);
     assert_eq!(recorder.status.code(), Some(1), "{printed}");
     assert!(printed.contains("run.mcap: cannot be written: File too large"), "{printed}");
-    assert!(recording(&place).samples.len() > 50, "{printed}");
+    assert!(recording(&site).samples.len() > 50, "{printed}");
     await_more(&controller, 100);
 }
 
 #[test]
 fn a_flight_recorder_keeps_what_it_is_asked_to_whatever_ends_it() {
-    let place = TestSite::new(&["mass_kalman", "v_mils"]);
-    let controller = Controller::start(&place, 1);
-    let ring = place.at("ring");
+    let site = TestSite::new(&["mass_kalman", "v_mils"]);
+    let controller = Controller::start(&site, 1);
+    let ring = site.at("ring");
     let asked = || run(&["keep", "--reason", "a jerk"], &[&ring]);
     assert_eq!(asked().status.code(), Some(2), "no such folder");
-    let mut recorder = started(&place, &["flight-recorder"], "ring");
+    let mut recorder = started(&site, &["flight-recorder"], "ring");
     await_more(&controller, 1);
     let begun = await_more(&controller, 100);
     let again = run(&["flight-recorder"], &[&ring]);
@@ -193,7 +193,7 @@ fn a_flight_recorder_keeps_what_it_is_asked_to_whatever_ends_it() {
     recorder.wait().unwrap();
     // The ring goes round, or is cleared by hand.
     std::fs::remove_file(ring.join("ring-000001.mcap")).unwrap();
-    let whole = place.at("whole.mcap");
+    let whole = site.at("whole.mcap");
     assert!(run(&["recover", "-o"], &[&whole, &kept]).status.success());
     let recording = Recording::load(&whole).unwrap();
     assert!(recording.samples.iter().any(|it| it.sequence <= begun), "from before it was asked");
@@ -225,17 +225,17 @@ fn a_closed_pipe_is_no_failure_and_a_full_disk_is_reported_by_the_name_that_was_
 
 #[test]
 fn a_flight_recorder_keeps_what_lies_around_a_suspicion() {
-    let place = TestSite::new(&["mass_kalman", "v_mils"]);
-    let controller = Controller::start(&place, 1);
+    let site = TestSite::new(&["mass_kalman", "v_mils"]);
+    let controller = Controller::start(&site, 1);
     // A daemon's end of the channel, with nothing but what is suspected behind it.
-    let transport = Transport::open(&place.host(), "monitor").unwrap();
+    let transport = Transport::open(&site.host(), "monitor").unwrap();
     let snapshots = transport.sender::<ParameterSnapshot>(TRAIN).unwrap();
     let mut snapshot = ParameterSnapshot::empty();
     (snapshot.train_id, snapshot.epoch) = (TRAIN.0, monotonic_now_ns() as u64);
     snapshot.pipeline_kind = PipelineKind::ResidualMonitor as u32;
-    let mut recorder = started(&place, &["flight-recorder"], "ring");
+    let mut recorder = started(&site, &["flight-recorder"], "ring");
     await_more(&controller, 100);
-    let ring = place.at("ring");
+    let ring = site.at("ring");
     let accounts = || {
         let folders = std::fs::read_dir(ring.join("kept")).into_iter().flatten().flatten();
         let texts = folders.map(|it| std::fs::read_to_string(it.path().join("stretch.toml")));

@@ -157,9 +157,9 @@ impl Waker {
         };
         let older =
             |entry: &Option<SleeperState>| entry.is_none_or(|known| known.epoch < state.epoch);
-        let place = self.known.iter().position(same).or(self.known.iter().position(older));
-        if let Some(place) = place {
-            self.known[place] = Some(state);
+        let index = self.known.iter().position(same).or(self.known.iter().position(older));
+        if let Some(index) = index {
+            self.known[index] = Some(state);
         }
     }
 

@@ -45,8 +45,8 @@ macro_rules! export_names {
                 names
             };
             let number_of: fn($vocabulary) -> u32 = $number;
-            let place = $vocabulary::ALL.iter().position(|member| number_of(*member) == number);
-            place.map_or(UNKNOWN.as_ptr(), |place| NAMES[place].as_ptr().cast())
+            let index = $vocabulary::ALL.iter().position(|member| number_of(*member) == number);
+            index.map_or(UNKNOWN.as_ptr(), |index| NAMES[index].as_ptr().cast())
         }
     )* };
 }

@@ -191,9 +191,9 @@ fn constant(vocabulary: &Vocabulary, member: &str) -> String {
 fn enumeration(vocabulary: &Vocabulary) -> String {
     let mut text = comment("", format!("{} {}", vocabulary.about, vocabulary.in_c).trim());
     text += "enum {\n";
-    for (place, Member { name, number, meaning }) in vocabulary.members.iter().enumerate() {
+    for (index, Member { name, number, meaning }) in vocabulary.members.iter().enumerate() {
         let value = if vocabulary.is_bits { format!("1 << {number}") } else { number.to_string() };
-        let comma = if place + 1 < vocabulary.members.len() { "," } else { "" };
+        let comma = if index + 1 < vocabulary.members.len() { "," } else { "" };
         let line = format!("    {} = {value}{comma}", constant(vocabulary, name));
         if line.len() + meaning.len() + 7 > WIDTH {
             let _ = writeln!(text, "{}{line}", comment("    ", meaning));

@@ -38,8 +38,8 @@ pub struct Vocabulary {
 /// `WeakExcitation` as `WEAK_EXCITATION`.
 pub fn upper_snake(member: impl Debug) -> String {
     let mut name = String::new();
-    for (place, letter) in format!("{member:?}").char_indices() {
-        if place > 0 && letter.is_uppercase() {
+    for (index, letter) in format!("{member:?}").char_indices() {
+        if index > 0 && letter.is_uppercase() {
             name.push('_');
         }
         name.push(letter.to_ascii_uppercase());

@@ -191,12 +191,12 @@ pub fn snapshot_for(sample: &TrainSample) -> ParameterSnapshot {
     snapshot.missing_manoeuvres = 0b1001;
     let parameters = [Parameter::Mass, Parameter::DavisC, Parameter::DavisA, Parameter::DavisB];
     snapshot.parameter_count = parameters.len() as u32;
-    for (place, parameter) in parameters.into_iter().enumerate() {
-        snapshot.parameters[place] = parameter as u32;
-        snapshot.values[place] = [114.5, 0.0013, 1.7, 0.021][place];
-        for other in 0..=place {
-            let entry = if place == other { 0.25 } else { 0.01 };
-            snapshot.covariance[packed_index(place, other)] = entry / (1 + place + other) as f64;
+    for (index, parameter) in parameters.into_iter().enumerate() {
+        snapshot.parameters[index] = parameter as u32;
+        snapshot.values[index] = [114.5, 0.0013, 1.7, 0.021][index];
+        for other in 0..=index {
+            let entry = if index == other { 0.25 } else { 0.01 };
+            snapshot.covariance[packed_index(index, other)] = entry / (1 + index + other) as f64;
         }
     }
     (snapshot.speed_min_mps, snapshot.speed_max_mps) = (5.0, 30.0);

@@ -72,9 +72,9 @@ pub fn diagnostics<'r>(
                             && unit == read_as
                             && (*low < 1.0) == (detected.factor < 1.0)
                     });
-                    known.map(|(place, .., range)| {
+                    known.map(|(index, .., range)| {
                         *range = (range.0.min(detected.factor), range.1.max(detected.factor));
-                        *place
+                        *index
                     })
                 }
                 new => diagnostics
@@ -82,7 +82,7 @@ pub fn diagnostics<'r>(
                     .position(|other| same(other) && other.text == new.to_string()),
             };
             match known {
-                Some(place) => diagnostics[place].runs.push(run.file.clone()),
+                Some(index) => diagnostics[index].runs.push(run.file.clone()),
                 None => {
                     if let Diagnostic::InputFault { detected, read_as } = diagnostic {
                         let range = (detected.factor, detected.factor);
@@ -95,8 +95,8 @@ pub fn diagnostics<'r>(
             }
         }
     }
-    for (place, detected, read_as, range) in faults {
-        diagnostics[place].text = detected.words_for(range, &unit_of(detected, read_as));
+    for (index, detected, read_as, range) in faults {
+        diagnostics[index].text = detected.words_for(range, &unit_of(detected, read_as));
     }
     diagnostics.sort_by_key(|diagnostic| std::cmp::Reverse(diagnostic.severity));
     diagnostics

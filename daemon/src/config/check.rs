@@ -189,9 +189,9 @@ fn check_pipelines(
                     threads.len() - 1
                 }
                 Some(thread) => {
-                    let place = threads[..named_threads].iter().position(|it| it.name == thread);
-                    match place {
-                        Some(place) => place,
+                    let index = threads[..named_threads].iter().position(|it| it.name == thread);
+                    match index {
+                        Some(index) => index,
                         None => {
                             let key = format!("pipelines.{name}.thread");
                             return checker.refuse(key, &thread, apart::names_one(&thread));

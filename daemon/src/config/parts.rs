@@ -86,7 +86,7 @@ pub struct PipelineConfig {
     pub name: String,
     /// Kind and settings of the estimator.
     pub estimator: EstimatorSettings,
-    /// Place of its thread in [`DaemonConfig::threads`](super::DaemonConfig::threads).
+    /// Index of its thread in [`DaemonConfig::threads`](super::DaemonConfig::threads).
     pub thread: usize,
     /// The trains it serves.
     pub trains: Vec<TrainId>,

@@ -10,7 +10,7 @@ use super::{ConfigError, PipelineConfig};
 /// The pipelines that answer a train's controller, each by its number in the configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Answers {
-    places: [Option<usize>; Quantity::ALL.len()],
+    pipeline_indices: [Option<usize>; Quantity::ALL.len()],
 }
 
 impl Answers {
@@ -44,31 +44,31 @@ impl Answers {
             let named = tables.iter().find_map(|(named, table)| {
                 Some((named.get(quantity.name())?, format!("{table}.{quantity}")))
             });
-            let place = &mut answers.places[quantity as usize];
+            let pipeline_index = &mut answers.pipeline_indices[quantity as usize];
             if let Some((name, key)) = named {
                 let is_named = |it: &PipelineConfig| it.name == *name && can_answer(it);
-                *place = pipelines.iter().position(is_named);
-                if place.is_none() {
+                *pipeline_index = pipelines.iter().position(is_named);
+                if pipeline_index.is_none() {
                     return checker.refuse(key, name, allowed(quantity, train, pipelines));
                 }
             } else {
                 let of_kind = |kind| {
                     pipelines.iter().position(|it| it.estimator.kind() == kind && can_answer(it))
                 };
-                *place = candidates(quantity).iter().copied().find_map(of_kind);
+                *pipeline_index = candidates(quantity).iter().copied().find_map(of_kind);
             }
         }
         Ok(answers)
     }
 
     /// The number of the pipeline that answers a quantity.
-    pub const fn place(&self, quantity: Quantity) -> Option<usize> {
-        self.places[quantity as usize]
+    pub const fn pipeline_index(&self, quantity: Quantity) -> Option<usize> {
+        self.pipeline_indices[quantity as usize]
     }
 
     /// One bit for each quantity that a pipeline answers.
     pub fn bits_of(&self, pipeline: usize) -> u32 {
-        self.bits(|place| place == pipeline)
+        self.bits(|pipeline_index| pipeline_index == pipeline)
     }
 
     /// One bit for each quantity that any pipeline answers.
@@ -77,7 +77,7 @@ impl Answers {
     }
 
     fn bits(&self, is_wanted: impl Fn(usize) -> bool) -> u32 {
-        let is_set = |it: &&Quantity| self.place(**it).is_some_and(&is_wanted);
+        let is_set = |it: &&Quantity| self.pipeline_index(**it).is_some_and(&is_wanted);
         Quantity::ALL.iter().filter(is_set).fold(0, |bits, it| bits | it.bit())
     }
 }
@@ -116,16 +116,16 @@ mod tests {
         DaemonConfig::from_text(&folder.path().join("daemon.toml"), &text)
     }
 
-    fn places(config: &DaemonConfig, quantity: Quantity) -> [Option<usize>; 2] {
-        [0, 1].map(|train| config.trains[train].answers.place(quantity))
+    fn pipeline_indices(config: &DaemonConfig, quantity: Quantity) -> [Option<usize>; 2] {
+        [0, 1].map(|train| config.trains[train].answers.pipeline_index(quantity))
     }
 
     #[test]
     fn the_best_measured_pipeline_that_serves_a_train_answers_by_default() {
         let config = load("", "").unwrap();
-        assert_eq!(places(&config, Quantity::Resistance), [Some(2), Some(0)]);
-        assert_eq!(places(&config, Quantity::Mass), [Some(3); 2]);
-        assert_eq!(places(&config, Quantity::Adhesion), [None; 2]);
+        assert_eq!(pipeline_indices(&config, Quantity::Resistance), [Some(2), Some(0)]);
+        assert_eq!(pipeline_indices(&config, Quantity::Mass), [Some(3); 2]);
+        assert_eq!(pipeline_indices(&config, Quantity::Adhesion), [None; 2]);
         let first = config.trains[0].answers;
         assert_eq!(first.all_bits(), Quantity::Resistance.bit() | Quantity::Mass.bit());
         assert_eq!([2, 3].map(|it| first.bits_of(it)), [0b01, 0b10]);
@@ -135,7 +135,7 @@ mod tests {
     fn the_configuration_may_name_another_for_all_trains_and_for_one() {
         let config =
             load("resistance = \"rls\"", "quantities = { resistance = \"v_mils\" }").unwrap();
-        assert_eq!(places(&config, Quantity::Resistance), [Some(1), Some(0)]);
+        assert_eq!(pipeline_indices(&config, Quantity::Resistance), [Some(1), Some(0)]);
     }
 
     #[test]

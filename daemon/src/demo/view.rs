@@ -94,10 +94,10 @@ fn describe_estimate(snapshot: &ParameterSnapshot) -> String {
     }
     let count = (snapshot.parameter_count as usize).min(snapshot.values.len());
     (0..count)
-        .filter_map(|place| {
-            let parameter = dynocar_shared::Parameter::from_number(snapshot.parameters[place])?;
+        .filter_map(|index| {
+            let parameter = dynocar_shared::Parameter::from_number(snapshot.parameters[index])?;
             let half_width = HALF_95 * snapshot.std(parameter)?;
-            Some(format!("{} {:.3} ± {half_width:.3}", parameter.name(), snapshot.values[place]))
+            Some(format!("{} {:.3} ± {half_width:.3}", parameter.name(), snapshot.values[index]))
         })
         .collect::<Vec<_>>()
         .join("   ")

@@ -32,7 +32,7 @@ impl RefusalLog {
         if self.last.is_some_and(|last| now.duration_since(last) < GATHER) {
             return Vec::new();
         }
-        let new = std::array::from_fn(|place| counts[place].saturating_sub(self.named[place]));
+        let new = std::array::from_fn(|index| counts[index].saturating_sub(self.named[index]));
         let mut all = refusals(&new);
         all.retain(|(reason, _)| of_refusal(*reason).is_some());
         if !all.is_empty() {

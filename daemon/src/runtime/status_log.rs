@@ -54,15 +54,15 @@ impl StatusLog {
             self.changes += 1;
         }
         self.reported.retain(|it| now.duration_since(it.1) < STAY_MAX);
-        let Some(place) = self.reported.iter().position(|it| it.0 == state) else {
+        let Some(index) = self.reported.iter().position(|it| it.0 == state) else {
             self.stay = STAY_MIN;
             return self.report(now);
         };
-        self.reported[place].1 = now;
-        if place + 1 == self.reported.len() || now.duration_since(self.since) < self.stay {
+        self.reported[index].1 = now;
+        if index + 1 == self.reported.len() || now.duration_since(self.since) < self.stay {
             return None;
         }
-        self.reported.remove(place);
+        self.reported.remove(index);
         self.stay = (2 * self.stay).min(STAY_MAX);
         self.report(now)
     }

@@ -107,7 +107,7 @@ impl Tally {
             beats: self.counters.beats.load(Relaxed),
             status: halves(status),
             implausible: unpacked(self.counters.implausible.load(Relaxed)),
-            refused: std::array::from_fn(|place| self.counters.refused[place].load(Relaxed)),
+            refused: std::array::from_fn(|index| self.counters.refused[index].load(Relaxed)),
             suspicion: self.counters.suspect.read(),
             position_m: f64::from_bits(self.counters.suspect.position_m.load(Relaxed)),
         }

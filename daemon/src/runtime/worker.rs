@@ -46,7 +46,7 @@ pub struct ChannelPlan {
     /// How far the train's samples have been counted.
     pub count: Arc<SampleCount>,
     /// The thread's number among those that serve the train.
-    pub place: usize,
+    pub index: usize,
     /// The pipelines, each with the tally it writes.
     pub pipelines: Vec<(Pipeline, Arc<Tally>)>,
     /// By which pipelines of another model come, when any may come; the thread's seat is its place.
@@ -63,7 +63,7 @@ struct Slot {
 struct TrainChannel {
     receiver: Receiver<TrainSample>,
     count: Arc<SampleCount>,
-    place: usize,
+    index: usize,
     /// A sample taken while falling asleep, to be processed before the channel's next.
     found: Option<TrainSample>,
     slots: Vec<Slot>,
@@ -156,7 +156,7 @@ impl Worker {
                 for slot in &mut channel.slots {
                     slot.process(&sample, self.epoch);
                 }
-                channel.count.note_taken(channel.place, sample.sequence);
+                channel.count.note_taken(channel.index, sample.sequence);
                 (channel.newest, channel.newest_speed_mps) = (sample.sequence, sample.speed_mps);
                 processed = true;
             }
@@ -201,7 +201,7 @@ impl TrainChannel {
                 slot.publish(epoch, now_ns);
             }
         }
-        self.count.note_taken(self.place, ended);
+        self.count.note_taken(self.index, ended);
         self.newest_speed_mps = 0.0;
     }
 
@@ -210,14 +210,14 @@ impl TrainChannel {
         let Some(exchange) = &self.exchange else { return };
         // A speed that is no number is none at which to change.
         let stands = self.newest_speed_mps.abs() <= STANDING_MPS;
-        let Some(mut set) = exchange.take(self.place, self.newest, stands) else { return };
+        let Some(mut set) = exchange.take(self.index, self.newest, stands) else { return };
         for (slot, new) in self.slots.iter_mut().zip(&mut set) {
             new.take_over(&mut slot.pipeline);
             std::mem::swap(new, &mut slot.pipeline);
             slot.pipeline.snapshot_mut().sequence += 1;
             slot.publish(epoch, now_ns);
         }
-        exchange.give_back(self.place, set);
+        exchange.give_back(self.index, set);
     }
 }
 
@@ -257,7 +257,7 @@ fn open_channel_of(
     let receiver = transport.receiver::<TrainSample>(plan.train)?;
     // After the port is open: what is published from now on can be received, and is counted.
     let counted_from = plan.count.sent();
-    plan.count.note_taken(plan.place, counted_from);
+    plan.count.note_taken(plan.index, counted_from);
     let slots = plan
         .pipelines
         .into_iter()
@@ -272,7 +272,7 @@ fn open_channel_of(
     Ok(TrainChannel {
         receiver,
         count: plan.count,
-        place: plan.place,
+        index: plan.index,
         found: None,
         slots,
         exchange: plan.exchange,

@@ -38,10 +38,10 @@ impl Estimate {
     /// What a snapshot of a pipeline says.
     pub fn of(pipeline: &str, snapshot: &ParameterSnapshot) -> Self {
         let count = snapshot.parameter_count as usize;
-        let values = snapshot.parameters.iter().take(count).enumerate().map(|(place, &number)| {
+        let values = snapshot.parameters.iter().take(count).enumerate().map(|(index, &number)| {
             let name = Parameter::from_number(number).map_or("unknown", Parameter::name);
-            let std = snapshot.covariance_at(place, place).max(0.0).sqrt();
-            (name.to_owned(), snapshot.values[place], std)
+            let std = snapshot.covariance_at(index, index).max(0.0).sqrt();
+            (name.to_owned(), snapshot.values[index], std)
         });
         let suspect = EffectKind::from_number(snapshot.suspected_effect);
         let suspect = suspect.filter(|&kind| kind != EffectKind::None);

@@ -324,9 +324,9 @@ impl ShadowTrain {
     fn complete(&mut self, sets: Vec<Set>) {
         let (Some(changing), from) = (self.changing.take(), self.in_force()) else { return };
         let found = self.trials.rivals.iter().position(|it| it.model == changing.to.0);
-        let Some(place) = found else { return };
-        self.trials.change(place);
-        self.trials.rivals[place].pipelines = sets.into_iter().flatten().collect();
+        let Some(index) = found else { return };
+        self.trials.change(index);
+        self.trials.rivals[index].pipelines = sets.into_iter().flatten().collect();
         info!(train = self.id(), model = %changing.to, before = %from, "in force from now on");
         self.reported.clear();
         // Other candidates grew from the model that is in force now.

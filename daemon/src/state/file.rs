@@ -145,13 +145,13 @@ mod tests {
     fn a_file_with_any_bit_flipped_is_refused() {
         let whole = bytes_of("schema content\nof two lines\n");
         let original = content_of(Path::new("x"), &whole).unwrap();
-        for place in 0..whole.len() {
+        for index in 0..whole.len() {
             for bit in 0..8 {
                 let mut rotten = whole.clone();
-                rotten[place] ^= 1 << bit;
+                rotten[index] ^= 1 << bit;
                 // A digit of the checksum may change its case, which changes nothing.
                 let read = content_of(Path::new("x"), &rotten);
-                assert!(read.is_err() || read.unwrap() == original, "byte {place}, bit {bit}");
+                assert!(read.is_err() || read.unwrap() == original, "byte {index}, bit {bit}");
             }
         }
     }

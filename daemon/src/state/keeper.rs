@@ -35,7 +35,7 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// A keeper that writes into the directory so often; `stored` is what the trains' states held at the start, by place of the train.
+    /// A keeper that writes into the directory so often; `stored` is what the trains' states held at the start, by index of the train.
     ///
     /// # Errors
     ///
@@ -89,13 +89,13 @@ impl Keeper {
         for train in &mut self.trains {
             train.reader.poll();
             for reading in train.reader.readings(now_ns) {
-                let place = reading.snapshot.pipeline_index as usize;
+                let index = reading.snapshot.pipeline_index as usize;
                 if reading.snapshot.model_hash != train.content.key.model {
                     // Another model is in force: what was kept of the one before holds no more.
                     train.content.key.model = reading.snapshot.model_hash;
                     train.content.estimates.clear();
                 }
-                if let Some((name, settings)) = self.pipelines.get(place) {
+                if let Some((name, settings)) = self.pipelines.get(index) {
                     let is_news =
                         keep(&mut train.content, name, *settings, reading.snapshot, now_s);
                     train.is_changed |= is_news;

@@ -100,7 +100,7 @@ pub struct Taken<'a> {
     pub config: &'a StateConfig,
     /// Where the states lie.
     pub directory: PathBuf,
-    /// Stored estimates by place of the train in the configuration.
+    /// Stored estimates by index of the train in the configuration.
     pub stored: Vec<Vec<StoredEstimate>>,
 }
 

@@ -155,11 +155,11 @@ impl Families {
         let is_wanted = Verdict::of(reading.status(), reading.reason()) != Verdict::Ok;
         let labels = with("reason", reading.reason().map_or("unknown", Reason::name));
         self.attention.get_or_create(&labels).set(f64::from(u8::from(is_wanted)));
-        for (place, number) in it.parameters.iter().enumerate().take(it.parameter_count as usize) {
+        for (index, number) in it.parameters.iter().enumerate().take(it.parameter_count as usize) {
             let name = Parameter::from_number(*number).map_or("unknown", Parameter::name);
             let labels = with("parameter", name);
-            self.value.get_or_create(&labels).set(it.values[place]);
-            let deviation = it.covariance_at(place, place).max(0.0).sqrt();
+            self.value.get_or_create(&labels).set(it.values[index]);
+            let deviation = it.covariance_at(index, index).max(0.0).sqrt();
             self.deviation.get_or_create(&labels).set(deviation);
         }
     }
@@ -177,8 +177,8 @@ pub fn text(readers: &mut [SnapshotReader], names: &[String], pinned: &Pinned) -
     for reader in readers {
         reader.poll();
         for reading in reader.readings(monotonic_now_ns()) {
-            let place = reading.snapshot.pipeline_index as usize;
-            families.take(&reading, names.get(place).map_or("unnamed", String::as_str));
+            let index = reading.snapshot.pipeline_index as usize;
+            families.take(&reading, names.get(index).map_or("unnamed", String::as_str));
         }
     }
     let mut registry = Registry::with_prefix("dynocar");

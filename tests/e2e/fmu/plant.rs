@@ -80,12 +80,12 @@ fn act(fmu: &Fmu, sample: &TrainSample, next: &TrainSample) {
 fn the_train_drives_recorded_runs_as_explain_predicts_them() {
     // A tail wind that is faster than the train turns the sign of its air resistance, at the
     // measured speed there and at the simulated one here: each direction has its head wind.
-    for (place, wind_plus_mps) in [(0, 2.5), (1, -2.5)] {
+    for (index, wind_plus_mps) in [(0, 2.5), (1, -2.5)] {
         let site = Site::new();
         corrected_demo(&site, wind_plus_mps);
         let dataset = dataset::load(&site.path().join("grown")).unwrap();
         let davis = dataset.train.resistance;
-        let (run, data) = (&dataset.runs[place], &prepare(&dataset).unwrap()[place]);
+        let (run, data) = (&dataset.runs[index], &prepare(&dataset).unwrap()[index]);
         assert_eq!((data.rejected, data.replaced), (0, 0), "so that the samples are the recorded");
         let expected = predicted(data, [davis.a, davis.b, davis.c]);
         let fmu = of_updated(&site, "grown");

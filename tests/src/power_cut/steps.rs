@@ -96,8 +96,8 @@ impl AfterSteps {
         for chosen in 0..1_u32 << open.len() {
             let mut names = self.lasting_names.clone();
             old.iter().for_each(|change| apply(change, &mut names));
-            for (place, change) in open.iter().enumerate() {
-                if chosen >> place & 1 == 1 {
+            for (index, change) in open.iter().enumerate() {
+                if chosen >> index & 1 == 1 {
                     apply(change, &mut names);
                 }
             }

@@ -178,10 +178,10 @@ mod tests {
             .windows(2)
             .map(|pair| {
                 let speed_mps = 0.5 * (pair[0].motion.speed_mps + pair[1].motion.speed_mps);
-                let way_m = pair[1].motion.distance_m - pair[0].motion.distance_m;
+                let travelled_m = pair[1].motion.distance_m - pair[0].motion.distance_m;
                 TrainModel::weight_kn(200e3)
                     * (train.resistance.w0_n_per_kn(speed_mps) + 8.0)
-                    * way_m
+                    * travelled_m
             })
             .sum();
         let kinetic_j = 0.5 * 216e3 * end.speed_mps * end.speed_mps;

@@ -12,7 +12,7 @@ use super::true_run::{TRUE_STEP_S, TrueState};
 const ORIGIN_DEG: (f64, f64) = (47.0, 9.0);
 /// Altitude in m of a line's start.
 const ORIGIN_M: f64 = 450.0;
-/// Step in m in which the way is laid.
+/// Step in m in which the alignment is laid.
 const STEP_M: f64 = 5.0;
 /// Error in m of an altitude, and the time constant in s with which it fades.
 const ALTITUDE_ERROR: (f64, f64) = (6.0, 60.0);
@@ -28,15 +28,15 @@ pub struct Position {
     pub altitude_m: f64,
 }
 
-/// The way of a line on a plane: east, north and height in m every 5 m. Curves turn left and right
+/// The alignment of a line on a plane: east, north and height in m every 5 m. Curves turn left and right
 /// in turns.
-pub fn way_m(line: &SimulatedLine) -> Vec<[f64; 3]> {
+pub fn alignment_m(line: &SimulatedLine) -> Vec<[f64; 3]> {
     let track = &line.track;
     let (mut heading, mut at) = (0.3f64, [0.0, 0.0, ORIGIN_M]);
-    let mut way = Vec::new();
+    let mut alignment = Vec::new();
     let mut chainage_m = 0.0;
     while chainage_m <= line.length_m + STEP_M {
-        way.push(at);
+        alignment.push(at);
         let middle_m = chainage_m + 0.5 * STEP_M;
         let turns = track
             .curves()
@@ -51,7 +51,7 @@ pub fn way_m(line: &SimulatedLine) -> Vec<[f64; 3]> {
         at[2] += 1e-3 * STEP_M * track.gradient_permille(middle_m, 0.0).unwrap_or(0.0);
         chainage_m += STEP_M;
     }
-    way
+    alignment
 }
 
 /// A position for each sample: late, with errors that fade, missing in gaps.
@@ -62,7 +62,7 @@ pub fn positions(
     (receiver, settings): (GnssReceiver, &SimulatorSettings),
     random: &mut Random,
 ) -> Vec<Option<Position>> {
-    let way = way_m(line);
+    let alignment = alignment_m(line);
     let plane = LocalPlane::around(ORIGIN_DEG.0, ORIGIN_DEG.1, ORIGIN_M);
     let mut errors = [0.0, 0.0, 0.0].map(|_: f64| random.gaussian());
     let stds = [receiver.std_m, receiver.std_m, ALTITUDE_ERROR.0];
@@ -86,11 +86,11 @@ pub fn positions(
             }
             let state = ((time_s - receiver.late_s) / TRUE_STEP_S).max(0.0) as usize;
             let place = states[state.min(states.len() - 1)].position_m / STEP_M;
-            let node = (place.max(0.0) as usize).min(way.len() - 2);
+            let node = (place.max(0.0) as usize).min(alignment.len() - 2);
             let share = place - node as f64;
             let at = |axis: usize| {
-                way[node][axis]
-                    + share * (way[node + 1][axis] - way[node][axis])
+                alignment[node][axis]
+                    + share * (alignment[node + 1][axis] - alignment[node][axis])
                     + stds[axis] * errors[axis]
             };
             let [latitude_deg, longitude_deg] = plane.unproject([at(0), at(1)]);

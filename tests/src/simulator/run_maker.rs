@@ -183,13 +183,13 @@ fn signals_m(train: &TrueTrain, line: &SimulatedLine, random: &mut Random) -> Ve
     }
 }
 
-/// Rough time in s for a way between two stops.
-fn leg_time_s(train: &TrueTrain, style: &DrivingStyle, way_m: f64) -> f64 {
+/// Rough time in s for a leg between two stops.
+fn leg_time_s(train: &TrueTrain, style: &DrivingStyle, leg_m: f64) -> f64 {
     let cruise_mps = 0.72 * style.speed_share * train.handling.speed_max_mps;
     let pull_mps2 = 0.55 * style.traction_share * train.traction_max_n(0.5 * cruise_mps)
         / train.declared.mass_kg;
     let braking_mps2 = style.braking_share * train.handling.braking_mps2;
     let lost_s = 0.5 * cruise_mps * (1.0 / pull_mps2 + 1.0 / braking_mps2);
-    let reached_mps = cruise_mps.min((2.0 * way_m / (1.0 / pull_mps2 + 1.0 / braking_mps2)).sqrt());
-    if reached_mps < cruise_mps { 2.0 * way_m / reached_mps } else { way_m / cruise_mps + lost_s }
+    let reached_mps = cruise_mps.min((2.0 * leg_m / (1.0 / pull_mps2 + 1.0 / braking_mps2)).sqrt());
+    if reached_mps < cruise_mps { 2.0 * leg_m / reached_mps } else { leg_m / cruise_mps + lost_s }
 }

@@ -56,7 +56,7 @@ struct ClientPoll {
 
 fn parse(line: &str) -> Option<ClientPoll> {
     let words: Vec<&str> = line.split(' ').collect();
-    let number = |place: usize| words.get(place)?.parse().ok();
+    let number = |index: usize| words.get(index)?.parse().ok();
     Some(ClientPoll {
         epoch: number(0)?,
         sequence: number(1)?,

@@ -94,10 +94,10 @@ pub fn vandalise(site: &Site, kind: SegmentKind, duration: Duration, seed: u64) 
     let start = Instant::now();
     while start.elapsed() < duration && !files.is_empty() {
         let (file, (from, to)) = &files[random.random_range(0..files.len())];
-        let place = random.random_range(*from..to.saturating_sub(8).max(from + 1));
+        let index = random.random_range(*from..to.saturating_sub(8).max(from + 1));
         let garbage: [u8; 8] = random.random();
         // A segment that was removed meanwhile can still be written.
-        done.writes += u64::from(file.write_at(&garbage, place).is_ok());
+        done.writes += u64::from(file.write_at(&garbage, index).is_ok());
         std::thread::sleep(Duration::from_micros(50));
     }
     done

@@ -46,8 +46,8 @@ impl Report {
         for (quarter, mut latencies_ns) in by_quarter.into_iter().enumerate() {
             latencies_ns.sort_unstable();
             let at = |share: f64| {
-                let place = (latencies_ns.len() as f64 * share) as usize;
-                latencies_ns.get(place).copied().unwrap_or(0)
+                let index = (latencies_ns.len() as f64 * share) as usize;
+                latencies_ns.get(index).copied().unwrap_or(0)
             };
             self.latency_p50_ns[quarter] = at(0.5);
             self.latency_p99_ns[quarter] = at(0.99);

@@ -98,20 +98,20 @@ pub fn covariance(condition: Condition, is_kept: impl Fn(usize, usize) -> bool) 
 /// Central differences of the speed in m/s by a, b, c and the start speed, at every sample.
 fn derivatives(start_mps: f64, count: usize) -> Vec<[f64; 4]> {
     let changes = [1e-4, 1e-5, 1e-6, 1e-4];
-    let moved = |place: usize, change: f64| {
+    let moved = |index: usize, change: f64| {
         let Davis { a, b, c } = truth();
         let mut values = [a, b, c, start_mps];
-        values[place] += change;
+        values[index] += change;
         let davis = Davis { a: values[0], b: values[1], c: values[2] };
         let mut speeds = true_speeds_kmh((values[3] * 3.6, 20.0), &davis);
         speeds.truncate(count);
         speeds
     };
     let mut rows = vec![[0.0; 4]; count];
-    for (place, change) in changes.into_iter().enumerate() {
-        let (up, down) = (moved(place, change), moved(place, -change));
+    for (index, change) in changes.into_iter().enumerate() {
+        let (up, down) = (moved(index, change), moved(index, -change));
         for (row, (up, down)) in rows.iter_mut().zip(up.iter().zip(&down)) {
-            row[place] = (up - down) / 3.6 / (2.0 * change);
+            row[index] = (up - down) / 3.6 / (2.0 * change);
         }
     }
     debug_assert!(rows.len() as f64 * STEP_S > 10.0);

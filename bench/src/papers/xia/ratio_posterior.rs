@@ -106,9 +106,9 @@ impl RatioPosterior {
         if self.count == NODES_MAX {
             return;
         }
-        let place = self.nodes[..self.count].partition_point(|node| node.exponent < tried.exponent);
-        self.nodes.copy_within(place..self.count, place + 1);
-        self.nodes[place] = tried;
+        let index = self.nodes[..self.count].partition_point(|node| node.exponent < tried.exponent);
+        self.nodes.copy_within(index..self.count, index + 1);
+        self.nodes[index] = tried;
         self.count += 1;
     }
 

@@ -196,16 +196,16 @@ struct Driver {
 impl Driver {
     fn force_kn(
         &mut self,
-        way_m: f64,
+        travelled_m: f64,
         speed_mps: f64,
         resisting_kn: f64,
         random: &mut ChaCha8Rng,
     ) -> f64 {
-        let phase = self.phases.iter().rev().find(|(from_m, _)| *from_m <= way_m);
+        let phase = self.phases.iter().rev().find(|(from_m, _)| *from_m <= travelled_m);
         let phase = phase.map_or(Phase::Hold { speed_mps: self.cruise_mps }, |phase| phase.1);
-        if self.phases.is_empty() && way_m >= self.next_change_m {
+        if self.phases.is_empty() && travelled_m >= self.next_change_m {
             self.cruise_mps = (272.0 + 32.0 * random.random::<f64>()) * KMH;
-            self.next_change_m = way_m + 3000.0 + 5000.0 * random.random::<f64>();
+            self.next_change_m = travelled_m + 3000.0 + 5000.0 * random.random::<f64>();
         }
         let traction_max_kn = f64::min(520.0, 18_240.0 / speed_mps);
         let inertia_t = MASS_T * (1.0 + ROTATING_MASS_FACTOR);

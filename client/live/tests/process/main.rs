@@ -20,9 +20,9 @@ const MASS: &str = "/train/1/0_mass_kalman";
 
 #[test]
 fn a_viewer_gets_what_was_published_bit_by_bit_in_order_and_at_wall_time() {
-    let place = TestSite::new(&["mass_kalman"]);
-    let live = Live::beside(&place, &["--samples-hz", "0"]);
-    let controller = Controller::start(&place, 1);
+    let site = TestSite::new(&["mass_kalman"]);
+    let live = Live::beside(&site, &["--samples-hz", "0"]);
+    let controller = Controller::start(&site, 1);
     let mut viewer = Viewer::connect(live.port);
     viewer.subscribe(SAMPLES);
     let mut newest = 0;
@@ -41,9 +41,9 @@ fn a_viewer_gets_what_was_published_bit_by_bit_in_order_and_at_wall_time() {
 
 #[test]
 fn of_five_hundred_samples_a_second_viewers_get_what_was_asked_for() {
-    let place = TestSite::new(&["mass_kalman"]);
-    let live = Live::beside(&place, &["--samples-hz", "20"]);
-    let _controller = Controller::start(&place, 1);
+    let site = TestSite::new(&["mass_kalman"]);
+    let live = Live::beside(&site, &["--samples-hz", "20"]);
+    let _controller = Controller::start(&site, 1);
     let mut viewer = Viewer::connect(live.port);
     viewer.subscribe(SAMPLES);
     let published: Vec<i64> = (0..40)
@@ -56,12 +56,12 @@ fn of_five_hundred_samples_a_second_viewers_get_what_was_asked_for() {
 
 #[test]
 fn channels_come_and_go_with_those_who_write_them() {
-    let place = TestSite::new(&["mass_kalman"]);
-    let live = Live::beside(&place, &[]);
+    let site = TestSite::new(&["mass_kalman"]);
+    let live = Live::beside(&site, &[]);
     let mut viewer = Viewer::connect(live.port);
     viewer.await_topics(&["/events"]);
     for _ in 0..2 {
-        let controller = Controller::start(&place, 1);
+        let controller = Controller::start(&site, 1);
         viewer.await_topics(&["/events", SAMPLES]);
         drop(controller);
         viewer.await_topics(&["/events"]);
@@ -70,11 +70,11 @@ fn channels_come_and_go_with_those_who_write_them() {
 
 #[test]
 fn a_viewer_that_comes_late_gets_the_newest_snapshot() {
-    let place = TestSite::new(&["mass_kalman"]);
-    let live = Live::beside(&place, &["--train", "1"]);
-    place.daemon();
+    let site = TestSite::new(&["mass_kalman"]);
+    let live = Live::beside(&site, &["--train", "1"]);
+    site.daemon();
     let mut first = Viewer::connect(live.port);
-    let controller = Controller::start(&place, 1);
+    let controller = Controller::start(&site, 1);
     first.subscribe(MASS);
     // The daemon's first one comes before any sample.
     let is_of_samples =
@@ -92,9 +92,9 @@ fn a_viewer_that_comes_late_gets_the_newest_snapshot() {
 
 #[test]
 fn a_viewer_that_reads_nothing_is_reported_of_and_holds_nobody_up() {
-    let place = TestSite::new(&["mass_kalman"]);
-    let mut live = Live::beside(&place, &["--samples-hz", "0"]);
-    let controller = Controller::start(&place, 40);
+    let site = TestSite::new(&["mass_kalman"]);
+    let mut live = Live::beside(&site, &["--samples-hz", "0"]);
+    let controller = Controller::start(&site, 40);
     let mut stalled = Viewer::connect(live.port);
     stalled.subscribe(SAMPLES);
     live.await_reported("does not keep up: its oldest messages are dropped");
@@ -113,19 +113,19 @@ fn a_viewer_that_reads_nothing_is_reported_of_and_holds_nobody_up() {
 
 #[test]
 fn a_viewer_of_the_older_protocol_is_refused_in_words() {
-    let place = TestSite::new(&["mass_kalman"]);
-    let live = Live::beside(&place, &[]);
+    let site = TestSite::new(&["mass_kalman"]);
+    let live = Live::beside(&site, &[]);
     assert!(Viewer::offer(live.port, "foxglove.websocket.v1").is_none());
     live.await_reported("is refused: it does not offer foxglove.sdk.v1");
 }
 
 #[test]
 fn a_taken_port_and_a_wrong_address_are_reported() {
-    let place = TestSite::new(&["mass_kalman"]);
-    let live = Live::beside(&place, &[]);
+    let site = TestSite::new(&["mass_kalman"]);
+    let live = Live::beside(&site, &[]);
     let port = live.port.to_string();
     let run = |options: &[&str]| {
-        let root = place.at("root");
+        let root = site.at("root");
         Command::new(PROGRAM).arg("--root").arg(root).args(options).output().unwrap()
     };
     let taken = run(&["--port", &port]);

@@ -20,10 +20,10 @@ pub struct Live {
 
 impl Live {
     /// Starts a live view on a free port, and waits until it serves.
-    pub fn beside(place: &TestSite, options: &[&str]) -> Self {
+    pub fn beside(site: &TestSite, options: &[&str]) -> Self {
         let mut process = Command::new(PROGRAM)
             .args(["--port", "0", "--root"])
-            .arg(place.at("root"))
+            .arg(site.at("root"))
             .args(options)
             .stderr(Stdio::piped())
             .spawn()

@@ -56,9 +56,9 @@ impl Viewer {
                 assert_eq!(opcode, 1, "message data");
                 let (subscription, rest) = rest.split_first_chunk::<4>().unwrap();
                 let (log_time, message) = rest.split_first_chunk::<8>().unwrap();
-                let place = u32::from_le_bytes(*subscription) as usize;
+                let index = u32::from_le_bytes(*subscription) as usize;
                 return Some(ReceivedMessage {
-                    topic: self.subscribed[place].clone(),
+                    topic: self.subscribed[index].clone(),
                     log_time_ns: u64::from_le_bytes(*log_time),
                     message: message.to_vec(),
                 });

@@ -209,9 +209,9 @@ fn a_file_whose_end_is_damaged_anywhere_is_refused_or_read_and_nothing_panics() 
     let path = folder.path().join("damaged.parquet");
     let mut refused = 0;
     // The account of what lies where, of which numbers are taken for granted.
-    for place in whole.len().saturating_sub(3000)..whole.len() {
+    for index in whole.len().saturating_sub(3000)..whole.len() {
         let mut bytes = whole.clone();
-        bytes[place] ^= 0x95;
+        bytes[index] ^= 0x95;
         std::fs::write(&path, &bytes).unwrap();
         refused += usize::from(read(&path).is_err());
     }

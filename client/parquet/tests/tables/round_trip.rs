@@ -29,14 +29,14 @@ fn word() -> impl Strategy<Value = u64> {
 fn row() -> impl Strategy<Value = Row> {
     let sample = prop::collection::vec(word(), 19).prop_map(|words| {
         let mut sample = TrainSample::empty(TrainId(1));
-        words.iter().enumerate().for_each(|(place, &it)| sample.set_word(place, it));
+        words.iter().enumerate().for_each(|(index, &it)| sample.set_word(index, it));
         sample.train_id = 1 + words[0] % 2;
         Row::Sample(sample)
     });
     let snapshot = prop::collection::vec(word(), 100).prop_map(|words| {
         let mut snapshot = ParameterSnapshot::empty();
-        for place in 0..snapshot.count() {
-            snapshot.set_word(place, words[place % words.len()]);
+        for index in 0..snapshot.count() {
+            snapshot.set_word(index, words[index % words.len()]);
         }
         (snapshot.train_id, snapshot.pipeline_index) = (1 + words[0] % 2, words[1] as u32 % 3);
         snapshot.pipeline_kind = words[2] as u32 % 30;
@@ -45,8 +45,8 @@ fn row() -> impl Strategy<Value = Row> {
     let event = (prop::collection::vec(word(), 7), any::<u8>(), ".{0,20}").prop_map(
         |(words, is_there, text)| {
             let mut event = Event { text, ..Event::default() };
-            for (place, &word) in words.iter().enumerate() {
-                event.set_word(place, (place < 3 || is_there >> place & 1 == 1).then_some(word));
+            for (index, &word) in words.iter().enumerate() {
+                event.set_word(index, (index < 3 || is_there >> index & 1 == 1).then_some(word));
             }
             Row::Event(event)
         },

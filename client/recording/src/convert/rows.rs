@@ -47,7 +47,7 @@ pub fn to_rows<'a>(samples: impl IntoIterator<Item = &'a TrainSample>) -> String
     for sample in samples {
         let fields = sample.fields();
         for field in columns() {
-            text += &cell(field, sample, fields[field.place]);
+            text += &cell(field, sample, fields[field.index]);
             text.push(',');
         }
         let is_sliding = sample.flags & dynocar_shared::sample::FLAG_WHEEL_SLIDE != 0;
@@ -99,7 +99,7 @@ pub fn from_rows(file: &str, text: &str) -> Result<Vec<TrainSample>, RowError> {
                 cell: cell.into(),
                 expected: field.layout.type_name,
             })?;
-            fields[field.place].set_word(0, word);
+            fields[field.index].set_word(0, word);
         }
         sample.valid = valid;
         samples.push(sample);

@@ -152,8 +152,8 @@ pub fn unpack(
         .collect();
     let manifest = manifest(path, &runs, &samples, track_text.is_some());
     write(folder, MANIFEST_FILE, manifest.as_bytes())?;
-    for (place, run) in runs.iter().enumerate() {
-        write(folder, &run_file(place), to_rows(*run).as_bytes())?;
+    for (index, run) in runs.iter().enumerate() {
+        write(folder, &run_file(index), to_rows(*run).as_bytes())?;
     }
     (unpacked.runs, unpacked.samples) = (runs.len(), samples.len());
     Ok(unpacked)
@@ -217,8 +217,8 @@ fn is_below(name: &str) -> bool {
     !name.is_empty() && Path::new(name).components().all(|it| matches!(it, Component::Normal(_)))
 }
 
-fn run_file(place: usize) -> String {
-    format!("runs/{:03}.csv", place + 1)
+fn run_file(index: usize) -> String {
+    format!("runs/{:03}.csv", index + 1)
 }
 
 /// The quantity of a dataset that a field of a sample is.
@@ -262,13 +262,13 @@ fn manifest(
     if samples.iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0) {
         column(Quantity::WheelSlide, WHEEL_SLIDE);
     }
-    for (place, run) in runs.iter().enumerate() {
-        let is_held_out = runs.len() > 1 && place + 1 == runs.len();
+    for (index, run) in runs.iter().enumerate() {
+        let is_held_out = runs.len() > 1 && index + 1 == runs.len();
         let role = if is_held_out { "holdout" } else { "fit" };
         let direction = if run[0].direction < 0 { -1 } else { 1 };
         text += &format!(
             "\n[[runs]]\nfile = \"{}\"\nrole = \"{role}\"\ndirection = {direction}\n",
-            run_file(place)
+            run_file(index)
         );
     }
     text

@@ -69,13 +69,13 @@ impl Configurations {
         let mut seen: Vec<SeenConfiguration> = Vec::new();
         for metadata in recording.metadata.iter().filter(|it| it.name == CONFIGURATION) {
             let number = |key| metadata.metadata.get(key).and_then(|it| it.parse::<i64>().ok());
-            let (Some(place), Some(monotonic_ns)) = (number("number"), number("seen_monotonic_ns"))
+            let (Some(index), Some(monotonic_ns)) = (number("number"), number("seen_monotonic_ns"))
             else {
                 continue;
             };
             // Every file of a rotating recording has the same one once more.
             if seen.iter().all(|it| it.monotonic_ns != monotonic_ns) {
-                let folder = folder_of_configuration(place as u32);
+                let folder = folder_of_configuration(index as u32);
                 let (config, keeps_state) = load(path, recording, folder)?;
                 seen.push(SeenConfiguration { monotonic_ns, config, keeps_state });
             }

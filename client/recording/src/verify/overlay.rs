@@ -26,9 +26,9 @@ pub fn overlay(config: &DaemonConfig, samples: &[TrainSample]) -> Vec<QuantityAn
             continue;
         }
         for &quantity in Quantity::ALL {
-            let Some(place) = train.answers.place(quantity) else { continue };
-            let settings = &config.pipelines[place];
-            let Ok(mut pipeline) = build_pipeline(settings, place as u32, train) else { continue };
+            let Some(index) = train.answers.pipeline_index(quantity) else { continue };
+            let settings = &config.pipelines[index];
+            let Ok(mut pipeline) = build_pipeline(settings, index as u32, train) else { continue };
             for sample in samples.iter().filter(|it| it.train_id == id) {
                 pipeline.process(sample);
             }

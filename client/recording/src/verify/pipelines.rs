@@ -161,7 +161,7 @@ fn compare(
     (recorded.len(), Outcome::Same)
 }
 
-/// The place of the first sample that the pipeline took: a snapshot's `sequence` says how many it had
+/// The index of the first sample that the pipeline took: a snapshot's `sequence` says how many it had
 /// taken by the newest.
 fn start_of(samples: &[&TrainSample], first: &ParameterSnapshot) -> Result<usize, Outcome> {
     let is_behind = |it: &&TrainSample| {
@@ -172,8 +172,8 @@ fn start_of(samples: &[&TrainSample], first: &ParameterSnapshot) -> Result<usize
             agree_up_to: 0,
             why: "the sample behind its first snapshot is not recorded",
         }),
-        Some(place) => {
-            let taken = place as u64 + 1;
+        Some(index) => {
+            let taken = index as u64 + 1;
             match first.sequence.checked_sub(taken) {
                 None => Ok((taken - first.sequence) as usize),
                 Some(0) => Ok(0),
@@ -205,15 +205,15 @@ fn lost_before(
 fn difference(recorded: &ParameterSnapshot, computed: &ParameterSnapshot) -> Option<Difference> {
     let (one, other) = (recorded.fields(), computed.fields());
     for field in SNAPSHOT_FIELDS.iter().filter(|it| !STAMPS.contains(&it.layout.name)) {
-        let (one, other) = (one[field.place], other[field.place]);
-        let differs = |&place: &usize| one.word(place) != other.word(place);
-        let Some(place) = (0..one.count()).find(differs) else { continue };
+        let (one, other) = (one[field.index], other[field.index]);
+        let differs = |&index: &usize| one.word(index) != other.word(index);
+        let Some(index) = (0..one.count()).find(differs) else { continue };
         let shown = |word: u64| match field.entry_type() {
             "f64" => f64::from_bits(word).to_string(),
             "i64" => (word as i64).to_string(),
             _ => word.to_string(),
         };
-        let (recorded_word, computed_word) = (one.word(place), other.word(place));
+        let (recorded_word, computed_word) = (one.word(index), other.word(index));
         return Some(Difference {
             sample: recorded.sample_sequence,
             field: field.layout.name,

@@ -53,12 +53,12 @@ fn timeline(runs: &[&[TrainSample]]) -> Timeline {
         error_reduction: 0.5,
         p_value: 0.001,
     };
-    let of_run = |(place, run): (usize, &&[TrainSample])| RunTimeline {
-        file: format!("runs/{place}.csv"),
-        number: place as u32 + 1,
+    let of_run = |(index, run): (usize, &&[TrainSample])| RunTimeline {
+        file: format!("runs/{index}.csv"),
+        number: index as u32 + 1,
         speeds: run.iter().map(speed).collect(),
         residuals: vec![residual(run)],
-        effects: if place == 1 { vec![effect(run)] } else { Vec::new() },
+        effects: if index == 1 { vec![effect(run)] } else { Vec::new() },
     };
     Timeline {
         verdict: Verdict::Effect,

@@ -11,12 +11,12 @@ use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 
 /// A struct with any bits in every field.
 fn filled<T: Words>(mut it: T, words: &[u64]) -> T {
-    (0..it.count()).for_each(|place| it.set_word(place, words[place % words.len()]));
+    (0..it.count()).for_each(|index| it.set_word(index, words[index % words.len()]));
     it
 }
 
 fn same_bits(one: &impl Words, other: &impl Words) -> bool {
-    (0..one.count()).all(|place| one.word(place) == other.word(place))
+    (0..one.count()).all(|index| one.word(index) == other.word(index))
 }
 
 proptest! {

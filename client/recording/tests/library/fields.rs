@@ -32,8 +32,8 @@ fn the_table_of_fields_is_that_of_the_message() {
         numbers.push(number as i32);
     }
     assert_eq!(numbers, EVENT_FIELDS.map(|it| it.number));
-    for (place, kind) in EventKind::ALL.iter().enumerate() {
-        assert_eq!(*kind as usize, place);
+    for (index, kind) in EventKind::ALL.iter().enumerate() {
+        assert_eq!(*kind as usize, index);
     }
     let shown = format!("{event:?}");
     assert!(EVENT_FIELDS.iter().all(|it| shown.contains(&format!("{}:", it.name))), "{shown}");
@@ -113,12 +113,12 @@ fn columns_are_the_fields_of_the_messages_with_their_numbers_names_and_types() {
 fn numbers_of_an_event_are_set_as_they_are_read() {
     let mut event =
         Event { kind: EventKind::DaemonGone as i32, text: "x".into(), ..Event::default() };
-    for place in 0..EVENT_FIELDS.len() - 1 {
-        event.set_word(place, Some(place as u64 + 1));
-        assert_eq!(event.word(place), Some(place as u64 + 1), "{}", EVENT_FIELDS[place].name);
-        if EVENT_FIELDS[place].is_optional {
-            event.set_word(place, None);
-            assert_eq!(event.word(place), None);
+    for index in 0..EVENT_FIELDS.len() - 1 {
+        event.set_word(index, Some(index as u64 + 1));
+        assert_eq!(event.word(index), Some(index as u64 + 1), "{}", EVENT_FIELDS[index].name);
+        if EVENT_FIELDS[index].is_optional {
+            event.set_word(index, None);
+            assert_eq!(event.word(index), None);
         }
     }
     let shown = format!("{event:?}");

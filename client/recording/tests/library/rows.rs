@@ -16,7 +16,7 @@ proptest! {
             .iter()
             .map(|words| {
                 let mut sample = TrainSample::empty(TrainId(1));
-                words.iter().enumerate().for_each(|(place, &it)| sample.set_word(place, it));
+                words.iter().enumerate().for_each(|(index, &it)| sample.set_word(index, it));
                 let kept = sample.valid;
                 for field in SampleField::ALL {
                     match sample.get(field) {
@@ -34,8 +34,8 @@ proptest! {
         let back = from_rows("run.csv", &text).unwrap();
         prop_assert_eq!(back.len(), samples.len());
         for (one, other) in back.iter().zip(&samples) {
-            for place in 0..one.count() {
-                prop_assert_eq!(one.word(place), other.word(place), "word {}", place);
+            for index in 0..one.count() {
+                prop_assert_eq!(one.word(index), other.word(index), "word {}", index);
             }
         }
     }

@@ -63,9 +63,9 @@ pub fn write(path: &Path, samples: &[TrainSample], snapshots: &[ParameterSnapsho
     }
     let pairs = [("number", "1".to_owned()), ("seen_monotonic_ns", "2000".to_owned())];
     writer.metadata(CONFIGURATION, &pairs).expect("written");
-    for (place, sample) in samples.iter().enumerate() {
+    for (index, sample) in samples.iter().enumerate() {
         writer.sample(sample, sample.time_ns).expect("written");
-        if place % 200 == 0 {
+        if index % 200 == 0 {
             writer.flush().expect("flushed");
         }
     }

@@ -36,8 +36,8 @@ fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_o
     let files: Vec<PathBuf> =
         (1..=3).map(|it| folder.path().join(format!("run-00000{it}.mcap"))).collect();
     // Each file has the configuration attached, and its share of the messages.
-    for (place, file) in files.iter().enumerate() {
-        let share = &samples[place * samples.len() / 3..(place + 1) * samples.len() / 3];
+    for (index, file) in files.iter().enumerate() {
+        let share = &samples[index * samples.len() / 3..(index + 1) * samples.len() / 3];
         let newest = |it: &&ParameterSnapshot| {
             share.iter().any(|sample| sample.sequence == it.sample_sequence)
         };
@@ -78,8 +78,8 @@ fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_o
 fn one_bit_that_is_another_is_found_with_field_and_sample() {
     let samples = samples();
     let mut answers = snapshots(&samples, 40);
-    let place = answers.iter().position(|it| it.pipeline_index == 1 && it.sequence > 400).unwrap();
-    let tampered = &mut answers[place];
+    let index = answers.iter().position(|it| it.pipeline_index == 1 && it.sequence > 400).unwrap();
+    let tampered = &mut answers[index];
     tampered.covariance[2] = f64::from_bits(tampered.covariance[2].to_bits() ^ 1);
     let sample = tampered.sample_sequence;
     let verified = verified(&samples, &answers);
@@ -90,8 +90,8 @@ fn one_bit_that_is_another_is_found_with_field_and_sample() {
         }
         other => panic!("expected a difference, found {other:?}"),
     }
-    for place in [0, 2] {
-        assert_eq!(verified[place].outcome, Outcome::Same);
+    for index in [0, 2] {
+        assert_eq!(verified[index].outcome, Outcome::Same);
     }
 }
 

@@ -34,15 +34,15 @@ impl TestSite {
     pub fn new(kinds: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("train.toml"), TRAIN_FILE).unwrap();
-        let place = TestSite { folder };
+        let site = TestSite { folder };
         let pipelines = kinds.iter().map(|kind| format!("[[pipelines]]\nkind = \"{kind}\"\n"));
         let config = format!(
             "[daemon]\nroot = {:?}\nidle = \"event\"\n[state]\nkeep = false\n[[trains]]\nid = 1\nfile = \"train.toml\"\n{}",
-            place.at("root"),
+            site.at("root"),
             pipelines.collect::<String>()
         );
-        std::fs::write(place.at("daemon.toml"), config).unwrap();
-        place
+        std::fs::write(site.at("daemon.toml"), config).unwrap();
+        site
     }
 
     pub fn at(&self, name: &str) -> PathBuf {
@@ -74,10 +74,10 @@ pub struct Controller {
 
 impl Controller {
     /// Publishes so many samples every 2 ms.
-    pub fn start(place: &TestSite, at_once: usize) -> Self {
+    pub fn start(site: &TestSite, at_once: usize) -> Self {
         let published = Arc::new(Mutex::new(Vec::new()));
         let stop = Arc::new(AtomicBool::new(false));
-        let (done, ends, host) = (Arc::clone(&published), Arc::clone(&stop), place.host());
+        let (done, ends, host) = (Arc::clone(&published), Arc::clone(&stop), site.host());
         let thread = std::thread::spawn(move || {
             let mut publisher = SamplePublisher::open(&host, TRAIN).unwrap();
             while !ends.load(Ordering::Relaxed) {

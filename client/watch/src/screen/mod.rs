@@ -87,13 +87,13 @@ fn title(
     frame: &mut Frame<'_>,
     area: Rect,
     train: &TrainState,
-    (place, count): (usize, usize),
+    (index, count): (usize, usize),
     palette: Palette,
 ) {
     let mut first = vec![Span::styled(format!("Dynocar  train {}", train.id), palette.strong())];
     first.extend(train.name.as_ref().map(|name| Span::raw(format!("  {name}"))));
     if count > 1 {
-        first.push(Span::styled(format!("  ({} of {count})", place + 1), palette.faint()));
+        first.push(Span::styled(format!("  ({} of {count})", index + 1), palette.faint()));
     }
     let second = daemon(&train.daemon, train.up_s);
     let third = if train.pipelines.is_empty() { String::new() } else { samples(train) };

@@ -38,11 +38,11 @@ fn chart(
     palette: Palette,
 ) {
     let count = history.newest(usize::MAX).count();
-    let ago = |place: usize| place as f64 + 1.0 - count as f64;
+    let ago = |index: usize| index as f64 + 1.0 - count as f64;
     let points: Vec<(f64, f64)> = history
         .newest(usize::MAX)
         .enumerate()
-        .map(|(place, point)| (ago(place), of(point)))
+        .map(|(index, point)| (ago(index), of(point)))
         .collect();
     let (low, high) = range(points.iter().map(|point| point.1));
     let first_s = points.first().map_or(-1.0, |point| point.0.min(-1.0));

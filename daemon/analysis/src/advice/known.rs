@@ -14,7 +14,7 @@ pub fn davis_of(snapshot: &ParameterSnapshot) -> Option<(Davis, Matrix3<f64>)> {
     let [davis @ .., _] = ANSWERED;
     let [Some(a), Some(b), Some(c)] = davis.map(|it| snapshot.index_of(it)) else { return None };
     let places = [a, b, c];
-    let [a, b, c] = places.map(|place| snapshot.values[place]);
+    let [a, b, c] = places.map(|index| snapshot.values[index]);
     let covariance = Matrix3::from_fn(|i, j| snapshot.covariance_at(places[i], places[j]));
     Some((Davis { a, b, c }, covariance))
 }

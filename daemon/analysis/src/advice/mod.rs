@@ -132,12 +132,12 @@ pub fn for_mass(
     Some(advice(&chosen, MASS, std_t))
 }
 
-fn advice(chosen: &Forecast, place: usize, std_now: f64) -> Advice {
+fn advice(chosen: &Forecast, index: usize, std_now: f64) -> Advice {
     Advice {
-        parameter: ANSWERED[place],
+        parameter: ANSWERED[index],
         drive: chosen.drive.in_words(chosen.lasts_s, chosen.end_mps),
         std_now,
-        std_after: chosen.std[place],
+        std_after: chosen.std[index],
     }
 }
 

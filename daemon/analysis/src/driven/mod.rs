@@ -170,8 +170,8 @@ impl DrivenTrain {
     fn balanced(&mut self, acting: &TrainSample, motion: Motion) -> (Balance, bool) {
         let mut sample = *acting;
         if sample.get(SampleField::Position).is_none() {
-            let way_m = f64::from(sample.direction) * motion.distance_m;
-            sample.set(SampleField::Position, self.position_m + way_m);
+            let travelled_m = f64::from(sample.direction) * motion.distance_m;
+            sample.set(SampleField::Position, self.position_m + travelled_m);
         }
         for force in [SampleField::TractionForce, SampleField::BrakeForce] {
             sample.set(force, sample.get(force).unwrap_or(0.0));

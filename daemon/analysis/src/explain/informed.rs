@@ -34,7 +34,7 @@ pub fn undetermined(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> Strin
     let at = |share: f64| speeds[((speeds.len() - 1) as f64 * share) as usize];
     let (slow_mps, usual_mps, fast_mps) = (at(0.05), at(0.5), at(0.95));
     let usual = fit.theta[0] + usual_mps * (fit.theta[1] + usual_mps * fit.theta[2]);
-    let way = if fast_mps - slow_mps < VARIED_MIN * fast_mps {
+    let advice = if fast_mps - slow_mps < VARIED_MIN * fast_mps {
         "Other speeds would determine them, best by coasting"
     } else {
         "More runs would, or quieter ones"
@@ -42,7 +42,7 @@ pub fn undetermined(problem: &FitProblem, fit: &Fit, deviation: &[f64]) -> Strin
     format!(
         " These data hardly determine {}: nine tenths of the motion lie between {slow_mps:.1} and \
          {fast_mps:.1} m/s, and what is known of {} is mostly the declared tolerance. Their sum at \
-         {usual_mps:.1} m/s is {usual:.2} N/kN. {way}.",
+         {usual_mps:.1} m/s is {usual:.2} N/kN. {advice}.",
         names.join(", "),
         if names.len() == 1 { "it" } else { "them" },
     )

@@ -34,7 +34,7 @@ fn moved(search: &Search, fit: &Fit, joint: &Fit) -> Fit {
 /// there is no map or no measured position.
 fn joint(search: &Search, fit: &Fit) -> Option<Fit> {
     let is_fitted = fit.model.effects.iter().any(|effect| effect.is_gradient());
-    if is_fitted || search.track.is_none() || search.problem.way_ratio.is_none() {
+    if is_fitted || search.track.is_none() || search.problem.distance_ratio.is_none() {
         return None;
     }
     let span_m = span_m(&search.scan(fit)?).filter(|[low, high]| high > low)?;

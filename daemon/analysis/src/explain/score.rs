@@ -78,8 +78,8 @@ pub struct FitErrors {
     /// Root mean squares in m/s as fitted and left out, each over whole runs and with restarts
     /// every 60 s.
     speed_mps: [[f64; 2]; 2],
-    /// Share by which the integrated speed misses the measured way, with what that is known to.
-    way: f64,
+    /// Share by which the integrated speed misses the measured distance, with what that is known to.
+    distance: f64,
     /// Whether the model looks for the scale of the speeds: nothing else is judged by the way.
     has_speed_scale: bool,
 }
@@ -101,22 +101,26 @@ impl FitErrors {
         let missed =
             |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
         let has_speed_scale = fit.model.effects.iter().any(|it| it.changes_speed_scale());
-        FitErrors { speed_mps, way: problem.way_ratio.map_or(0.0, missed), has_speed_scale }
+        FitErrors {
+            speed_mps,
+            distance: problem.distance_ratio.map_or(0.0, missed),
+            has_speed_scale,
+        }
     }
 
     /// Share of the error that a model with these errors takes away from another: over whole runs,
-    /// with restarts or, for the scale of the speeds, of the way, whichever is most; of runs that were
+    /// with restarts or, for the scale of the speeds, of the distance, whichever is most; of runs that were
     /// fitted or of runs left out, whichever is less.
     pub fn reduction_from(&self, before: &Self) -> f64 {
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
-        let of_way = if self.has_speed_scale == before.has_speed_scale {
+        let of_distance = if self.has_speed_scale == before.has_speed_scale {
             f64::NEG_INFINITY
         } else {
-            share(before.way, self.way)
+            share(before.distance, self.distance)
         };
         let most = |before: &[f64; 2], after: &[f64; 2]| {
             let of_speed = before.iter().zip(after).map(|(before, after)| share(*before, *after));
-            of_speed.fold(of_way, f64::max)
+            of_speed.fold(of_distance, f64::max)
         };
         let each = before.speed_mps.iter().zip(&self.speed_mps);
         each.map(|(before, after)| most(before, after)).fold(f64::INFINITY, f64::min)

@@ -1,174 +1,167 @@
-//! The way itself from the fixes of many passes.
+//! An alignment on the plane: points of equal spacing, looked up by chainage and by place.
 
-use super::banded::Banded;
-use super::recording::Recording;
-use super::silence::GAP_MAX_M;
-use super::tracking::{Placed, follow};
-use super::way::Way;
+use std::collections::HashMap;
 
-/// Standard deviation in m of a fix, which fades slowly.
-pub const FIX_STD_M: f64 = 4.0;
-/// Time constant in s with which the error of fixes fades.
-pub const FIX_FADING_S: f64 = 12.0;
-/// Part of a fix's error in m that is new in each of them.
-const FIX_WHITE_M: f64 = 0.3;
-/// Typical second difference in m of a way's nodes: a curve of 5 km. Its distribution has long
-/// tails, so that a street corner is one too.
-const BEND_M: f64 = 0.02;
-/// Rounds of placing the fixes and moving the way.
-const ROUNDS: usize = 4;
+use super::recording_parts::distance_squared;
 
-/// Rows of a recording that run along a way in its direction.
+/// Distance in m between the nodes of an alignment.
+pub const NODE_STEP_M: f64 = 10.0;
+/// Size in m of the cells in which places are looked up.
+const CELL_M: f64 = 50.0;
+
+/// An alignment as a line through nodes about 10 m apart.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PassRows {
-    /// Number of the recording.
-    pub recording: usize,
-    /// The rows.
-    pub rows: std::ops::Range<usize>,
+pub struct Alignment {
+    nodes_m: Vec<[f64; 2]>,
+    step_m: f64,
+    cells: HashMap<(i64, i64), Vec<u32>>,
 }
 
-/// Moves a first way into the middle of the passes, each with its direction along it: 1 or -1.
-pub fn align(first: Way, passes: &[(PassRows, i8)], recordings: &[Recording]) -> Way {
-    let mut way = first;
-    for _ in 0..ROUNDS {
-        let Some(back) = way.reversed() else { return way };
-        let place = |(pass, direction): &(PassRows, i8)| {
-            let recording = &recordings[pass.recording];
-            if *direction > 0 {
-                return follow(recording, pass.rows.clone(), &way);
-            }
-            let mut placed = follow(recording, pass.rows.clone(), &back);
-            placed.reverse();
-            for fix in &mut placed {
-                fix.chainage_m = way.length_m() - fix.chainage_m;
-                fix.left_m = -fix.left_m;
-            }
-            placed
-        };
-        let placed: Vec<Vec<Placed>> = passes.iter().map(place).collect();
-        let speed_mps = mean_speed(passes, recordings);
-        let Some(moved) = moved(&way, &placed, speed_mps) else { return way };
-        way = moved;
-    }
-    way
+/// Where a point lies beside an alignment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beside {
+    /// Chainage in m of the nearest point of the alignment.
+    pub chainage_m: f64,
+    /// Distance in m from it, positive to the left.
+    pub left_m: f64,
 }
 
-/// Mean speed in m/s while moving.
-fn mean_speed(passes: &[(PassRows, i8)], recordings: &[Recording]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (pass, _) in passes {
-        let speeds = &recordings[pass.recording].raw.speed_mps[pass.rows.clone()];
-        for &speed in speeds.iter().filter(|speed| **speed > 1.0) {
-            sum += speed;
-            count += 1.0;
+impl Alignment {
+    /// An alignment through points; `None` when they are not two places apart.
+    pub fn through(points_m: &[[f64; 2]]) -> Option<Alignment> {
+        let mut sums = vec![0.0];
+        for pair in points_m.windows(2) {
+            sums.push(sums[sums.len() - 1] + distance_squared(pair[0], pair[1]).sqrt());
         }
+        let length_m = sums[sums.len() - 1];
+        if points_m.len() < 2 || !(length_m > NODE_STEP_M) {
+            return None;
+        }
+        let count = (length_m / NODE_STEP_M).round().max(1.0) as usize;
+        let step_m = length_m / count as f64;
+        let mut segment = 0;
+        let nodes_m: Vec<[f64; 2]> = (0..=count)
+            .map(|k| {
+                let at_m = k as f64 * step_m;
+                while segment + 2 < sums.len() && sums[segment + 1] <= at_m {
+                    segment += 1;
+                }
+                let span_m = (sums[segment + 1] - sums[segment]).max(1e-9);
+                between(points_m[segment], points_m[segment + 1], (at_m - sums[segment]) / span_m)
+            })
+            .collect();
+        let mut cells: HashMap<(i64, i64), Vec<u32>> = HashMap::new();
+        for (k, node) in nodes_m.iter().enumerate() {
+            cells.entry(cell(*node)).or_default().push(k as u32);
+        }
+        Some(Alignment { nodes_m, step_m, cells })
     }
-    if count > 0.0 { sum / count } else { 10.0 }
-}
 
-/// The way moved sideways to the middle of the passes, and smoothed.
-fn moved(way: &Way, placed: &[Vec<Placed>], speed_mps: f64) -> Option<Way> {
-    let count = way.nodes_m().len();
-    let mut left_m: Vec<Vec<f64>> = vec![Vec::new(); count];
-    for pass in placed {
-        for pair in pass.windows(2) {
-            let (from, to) = (pair[0], pair[1]);
-            let span_m = to.chainage_m - from.chainage_m;
-            if !(span_m > 0.0 && span_m < GAP_MAX_M) {
-                continue;
-            }
-            let nodes = (from.chainage_m / way.step_m()).ceil().max(0.0) as usize
-                ..((to.chainage_m / way.step_m()).ceil().max(0.0) as usize).min(count);
-            for node in nodes {
-                let share = (node as f64 * way.step_m() - from.chainage_m) / span_m;
-                left_m[node].push(from.left_m + share * (to.left_m - from.left_m));
+    /// The same alignment driven the other way round.
+    pub fn reversed(&self) -> Option<Alignment> {
+        Alignment::through(&self.nodes_m.iter().rev().copied().collect::<Vec<_>>())
+    }
+
+    /// Its nodes, east and north in m.
+    pub fn nodes_m(&self) -> &[[f64; 2]] {
+        &self.nodes_m
+    }
+
+    /// Distance in m between its nodes.
+    pub fn step_m(&self) -> f64 {
+        self.step_m
+    }
+
+    /// Its length in m.
+    pub fn length_m(&self) -> f64 {
+        self.step_m * (self.nodes_m.len() - 1) as f64
+    }
+
+    /// The point at a chainage in m, straight on beyond the ends.
+    pub fn at(&self, chainage_m: f64) -> [f64; 2] {
+        let segment = self.segment(chainage_m);
+        let share = chainage_m / self.step_m - segment as f64;
+        between(self.nodes_m[segment], self.nodes_m[segment + 1], share)
+    }
+
+    /// The direction at a chainage, as a unit vector.
+    pub fn direction(&self, chainage_m: f64) -> [f64; 2] {
+        let segment = self.segment(chainage_m);
+        let (from, to) = (self.nodes_m[segment], self.nodes_m[segment + 1]);
+        let length = distance_squared(from, to).sqrt().max(1e-9);
+        [(to[0] - from[0]) / length, (to[1] - from[1]) / length]
+    }
+
+    /// The nearest point within a window of chainages in m.
+    pub fn beside(&self, point_m: [f64; 2], from_m: f64, to_m: f64) -> Beside {
+        let (first, last) = (self.segment(from_m), self.segment(to_m));
+        let mut nearest = (f64::INFINITY, Beside { chainage_m: from_m, left_m: f64::INFINITY });
+        for segment in first..=last {
+            let (from, to) = (self.nodes_m[segment], self.nodes_m[segment + 1]);
+            let along = [to[0] - from[0], to[1] - from[1]];
+            let offset = [point_m[0] - from[0], point_m[1] - from[1]];
+            let squared = (along[0] * along[0] + along[1] * along[1]).max(1e-9);
+            let share = (offset[0] * along[0] + offset[1] * along[1]) / squared;
+            // The ends of the alignment go straight on.
+            let low = if segment == 0 { f64::NEG_INFINITY } else { 0.0 };
+            let high = if segment + 2 == self.nodes_m.len() { f64::INFINITY } else { 1.0 };
+            let share = share.clamp(low, high);
+            let distance = distance_squared(point_m, between(from, to, share));
+            if distance < nearest.0 {
+                let chainage_m = (segment as f64 + share) * self.step_m;
+                let left = along[0] * offset[1] - along[1] * offset[0];
+                nearest = (distance, Beside { chainage_m, left_m: distance.sqrt().copysign(left) });
             }
         }
+        nearest.1
     }
-    let targets: Vec<Option<([f64; 2], f64)>> = left_m
-        .iter_mut()
-        .enumerate()
-        .map(|(node, lefts)| {
-            let [x, y] = way.direction(node as f64 * way.step_m());
-            let middle_m = middle(lefts)?;
-            let at = way.nodes_m()[node];
-            Some(([at[0] - middle_m * y, at[1] + middle_m * x], lefts.len() as f64))
+
+    /// Nodes within `radius_m` (at most 50) of a point: their number and distance in m.
+    pub fn nodes_near(
+        &self,
+        point_m: [f64; 2],
+        radius_m: f64,
+    ) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (column, row) = cell(point_m);
+        let around = (-1..=1).flat_map(move |x| (-1..=1).map(move |y| (column + x, row + y)));
+        around.filter_map(|key| self.cells.get(&key)).flatten().filter_map(move |&node| {
+            let distance = distance_squared(self.nodes_m[node as usize], point_m).sqrt();
+            (distance < radius_m).then_some((node as usize, distance))
         })
-        .collect();
-    let kept_share = (-way.step_m() / (FIX_FADING_S * speed_mps)).exp();
-    Way::through(&smoothed(&targets, way.nodes_m(), kept_share)?)
-}
+    }
 
-/// Median of three or more, mean of fewer.
-fn middle(values: &mut [f64]) -> Option<f64> {
-    match values.len() {
-        0 => None,
-        1 | 2 => Some(values.iter().sum::<f64>() / values.len() as f64),
-        count => {
-            values.sort_unstable_by(f64::total_cmp);
-            let (low, high) = (values[(count - 1) / 2], values[count / 2]);
-            Some(0.5 * (low + high))
-        }
+    fn segment(&self, chainage_m: f64) -> usize {
+        ((chainage_m / self.step_m).max(0.0) as usize).min(self.nodes_m.len() - 2)
     }
 }
 
-/// Nodes that bend little and differ from their targets by an error that fades along the way by
-/// `kept_share` from node to node.
-fn smoothed(
-    targets: &[Option<([f64; 2], f64)>],
-    nodes: &[[f64; 2]],
-    kept_share: f64,
-) -> Option<Vec<[f64; 2]>> {
-    let count = nodes.len();
-    let mut smooth = nodes.to_vec();
-    let mut bend_weights = vec![1.0 / (BEND_M * BEND_M); count];
-    for _ in 0..8 {
-        let mut matrix = Banded::zeros(count, 2);
-        let mut right = [vec![0.0; count], vec![0.0; count]];
-        for node in 0..count {
-            matrix.add_row(&[(node, 1.0)], 1e-9);
-            for axis in 0..2 {
-                right[axis][node] += 1e-9 * nodes[node][axis];
-            }
-            let Some((target, passes)) = targets[node] else { continue };
-            let new_share = 1.0 - kept_share * kept_share;
-            let variance = (FIX_STD_M * FIX_STD_M * new_share + FIX_WHITE_M * FIX_WHITE_M) / passes;
-            // The error is compared with what is left of the one before.
-            match node.checked_sub(1).and_then(|before| targets[before]) {
-                Some((last, _)) => {
-                    matrix.add_row(&[(node - 1, -kept_share), (node, 1.0)], 1.0 / variance);
-                    for axis in 0..2 {
-                        let seen = (target[axis] - kept_share * last[axis]) / variance;
-                        right[axis][node] += seen;
-                        right[axis][node - 1] -= kept_share * seen;
-                    }
-                }
-                None => {
-                    let weight = passes / (FIX_STD_M * FIX_STD_M);
-                    matrix.add_row(&[(node, 1.0)], weight);
-                    for axis in 0..2 {
-                        right[axis][node] += weight * target[axis];
-                    }
-                }
-            }
-        }
-        for node in 1..count - 1 {
-            matrix.add_row(&[(node - 1, 1.0), (node, -2.0), (node + 1, 1.0)], bend_weights[node]);
-        }
-        let factor = matrix.factor().ok()?;
-        for axis in 0..2 {
-            factor.solve(&mut right[axis]);
-            for node in 0..count {
-                smooth[node][axis] = right[axis][node];
-            }
-        }
-        for node in 1..count - 1 {
-            let bend = |axis: usize| {
-                smooth[node - 1][axis] - 2.0 * smooth[node][axis] + smooth[node + 1][axis]
-            };
-            let squared = bend(0) * bend(0) + bend(1) * bend(1);
-            bend_weights[node] = 1.0 / (BEND_M * BEND_M + squared);
-        }
+fn between(from: [f64; 2], to: [f64; 2], share: f64) -> [f64; 2] {
+    [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])]
+}
+
+fn cell(point_m: [f64; 2]) -> (i64, i64) {
+    ((point_m[0] / CELL_M).floor() as i64, (point_m[1] / CELL_M).floor() as i64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_next_to_a_way_is_found_with_its_side() {
+        let alignment = Alignment::through(&[[0.0, 0.0], [100.0, 0.0], [100.0, 80.0]]).unwrap();
+        assert!((alignment.length_m() - 180.0).abs() < 1e-9);
+        let beside = alignment.beside([42.0, 3.0], 0.0, 180.0);
+        assert!((beside.chainage_m - 42.0).abs() < 1e-9 && (beside.left_m - 3.0).abs() < 1e-9);
+        let beside = alignment.beside([105.0, 55.0], 0.0, 180.0);
+        assert!((beside.chainage_m - 155.0).abs() < 1e-9 && (beside.left_m + 5.0).abs() < 1e-9);
+        assert_eq!(alignment.at(190.0), [100.0, 90.0]);
+        let near: Vec<_> = alignment.nodes_near([0.0, 0.0], 15.0).map(|(node, _)| node).collect();
+        assert_eq!(near, [0, 1]);
     }
-    Some(smooth)
+
+    #[test]
+    fn one_place_is_no_way() {
+        assert_eq!(Alignment::through(&[[1.0, 1.0], [1.0, 1.5]]), None);
+    }
 }

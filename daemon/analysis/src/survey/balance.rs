@@ -20,7 +20,7 @@ const STEP_MAX_S: f64 = 2.5;
 pub struct Observation {
     /// Number of the pass.
     pub pass: u32,
-    /// Place in m along the way, and how far the window reaches to either side.
+    /// Place in m along the alignment, and how far the window reaches to either side.
     pub along_m: f64,
     /// Half the distance in m between the centres of the blocks, 0 for single rows.
     pub reach_m: f64,

@@ -1,13 +1,13 @@
 //! Whether both directions take one track, and which.
 
-use super::recording_parts::SAME_WAY_M;
-use super::way::Way;
+use super::alignment::Alignment;
+use super::recording_parts::SAME_ALIGNMENT_M;
 
 /// Both directions take the same way when so much of what both drive lies within `SAME_TRACK_M`.
 const SAME_TRACK_SHARE: f64 = 0.97;
 /// Distance in m of two tracks of the same way.
 const SAME_TRACK_M: f64 = 25.0;
-/// Difference in m between the chainages of two ways at the same places, up to which they are one.
+/// Difference in m between the chainages of two alignments at the same places, up to which they are one.
 const SAME_CHAINAGE_M: f64 = 15.0;
 /// Lengths of one track as two directions measure them differ by less than this share.
 const DRIFT_SHARE: f64 = 0.005;
@@ -18,19 +18,19 @@ const CROSSING_MIN_M: f64 = 300.0;
 /// Where each goes on alone for so many m at the same end, they fork there.
 const FORK_M: f64 = 100.0;
 
-/// Two ways, each in its direction of travel, beside one another.
+/// Two alignments, each in its direction of travel, beside one another.
 pub struct Compared {
-    /// Chainage in m along the growing way where the falling one starts.
+    /// Chainage in m along the growing alignment where the falling one starts.
     pub start_chainage_m: f64,
     /// The track of both, for growing chainage, as far as either drives it; `None` where they are
     /// two.
-    pub joined: Option<Way>,
+    pub joined: Option<Alignment>,
 }
 
-/// Compares the ways of growing and of falling chainage; `None` when they never meet.
-pub fn compare(growing: &Way, falling: &Way) -> Option<Compared> {
+/// Compares the alignments of growing and of falling chainage; `None` when they never meet.
+pub fn compare(growing: &Alignment, falling: &Alignment) -> Option<Compared> {
     let twin = |at: &[f64; 2]| {
-        growing.nodes_near(*at, SAME_WAY_M).min_by(|one, other| one.1.total_cmp(&other.1))
+        growing.nodes_near(*at, SAME_ALIGNMENT_M).min_by(|one, other| one.1.total_cmp(&other.1))
     };
     let mut twins: Vec<Option<(usize, f64)>> = falling.nodes_m().iter().map(twin).collect();
     forget_crossings(&mut twins, growing, falling);
@@ -52,7 +52,7 @@ pub fn compare(growing: &Way, falling: &Way) -> Option<Compared> {
     for (node, sum_m) in sums_m.iter_mut().enumerate() {
         *sum_m -= drift_m * node as f64 / count;
     }
-    // The growing way starts where the falling one ends.
+    // The growing alignment starts where the falling one ends.
     let (start, end) = (twins[last]?.0, twins[first]?.0);
     let forks = |one: usize, other: usize| {
         one.min(other) as f64 * growing.step_m().min(falling.step_m()) > FORK_M
@@ -71,20 +71,20 @@ pub fn compare(growing: &Way, falling: &Way) -> Option<Compared> {
         let mut nodes: Vec<[f64; 2]> = back[last + 1..].iter().rev().copied().collect();
         nodes.extend_from_slice(&ahead[from..=to]);
         nodes.extend(back[..first].iter().rev());
-        Way::through(&nodes)
+        Alignment::through(&nodes)
     };
     let joined = is_same.then(joined).flatten();
     Some(Compared { start_chainage_m, joined })
 }
 
-/// Way in m along the growing way to a node and on along the falling one from its node to its start: the
+/// Distance in m along the growing alignment to a node and on along the falling one from its node to its start: the
 /// same wherever both take one track.
-fn there_and_back_m(growing: &Way, ahead: usize, falling: &Way, back: usize) -> f64 {
+fn there_and_back_m(growing: &Alignment, ahead: usize, falling: &Alignment, back: usize) -> f64 {
     ahead as f64 * growing.step_m() + back as f64 * falling.step_m()
 }
 
-/// Forgets twins where a line only crosses itself: there and back is another way there.
-fn forget_crossings(twins: &mut [Option<(usize, f64)>], growing: &Way, falling: &Way) {
+/// Forgets twins where a line only crosses itself: there and back is another alignment there.
+fn forget_crossings(twins: &mut [Option<(usize, f64)>], growing: &Alignment, falling: &Alignment) {
     let sum_m = |(back, twin): (usize, &Option<(usize, f64)>)| {
         twin.map(|(ahead, _)| there_and_back_m(growing, ahead, falling, back))
     };
@@ -110,16 +110,16 @@ fn share_of(values: &[f64], share: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn way(from_m: i32, to_m: i32, left_m: f64) -> Way {
+    fn alignment(from_m: i32, to_m: i32, left_m: f64) -> Alignment {
         let step = if to_m > from_m { 10 } else { -10 };
         let count = (to_m - from_m) / step;
         let point = |k: i32| [f64::from(from_m + k * step), left_m];
-        Way::through(&(0..=count).map(point).collect::<Vec<_>>()).unwrap()
+        Alignment::through(&(0..=count).map(point).collect::<Vec<_>>()).unwrap()
     }
 
     #[test]
     fn directions_that_begin_and_end_elsewhere_on_one_track_are_joined() {
-        let compared = compare(&way(0, 3000, 0.0), &way(3600, -500, 4.0)).unwrap();
+        let compared = compare(&alignment(0, 3000, 0.0), &alignment(3600, -500, 4.0)).unwrap();
         let joined = compared.joined.unwrap();
         assert!((joined.length_m() - 4100.0).abs() < 1.0, "{}", joined.length_m());
         assert!((joined.nodes_m()[0][0] + 500.0).abs() < 1.0);
@@ -135,27 +135,27 @@ mod tests {
             points.push([2000.0 + 500.0 * angle.sin(), 500.0 - 500.0 * angle.cos()]);
         }
         points.extend((1..200).map(|k| [1500.0, 500.0 - 10.0 * f64::from(k)]));
-        let whole = Way::through(&points).unwrap();
+        let whole = Alignment::through(&points).unwrap();
         let upper: Vec<[f64; 2]> =
             points.iter().skip(220).rev().map(|it| [it[0] + 3.0, it[1]]).collect();
-        let compared = compare(&whole, &Way::through(&upper).unwrap()).unwrap();
+        let compared = compare(&whole, &Alignment::through(&upper).unwrap()).unwrap();
         let joined = compared.joined.expect("one track");
         assert!((joined.length_m() - whole.length_m()).abs() < 15.0, "{}", joined.length_m());
     }
 
     #[test]
     fn lengths_that_drift_apart_are_one_track_and_a_detour_makes_two() {
-        let growing = way(0, 20_000, 0.0);
+        let growing = alignment(0, 20_000, 0.0);
         let wavy = |k: i32| [20_000.0 - 10.0 * f64::from(k), 0.6 * f64::from(k % 2)];
         let drifting: Vec<[f64; 2]> = (0..=2000).map(wavy).collect();
-        let falling = Way::through(&drifting).unwrap();
+        let falling = Alignment::through(&drifting).unwrap();
         assert!(falling.length_m() > 20_030.0, "{}", falling.length_m());
         assert!(compare(&growing, &falling).unwrap().joined.is_some());
         let mut detour = drifting[..1000].to_vec();
         detour.extend((0..=12).map(|k| [10_010.0, 5.0 * f64::from(k)]));
         detour.extend((0..=12).map(|k| [10_000.0, 60.0 - 5.0 * f64::from(k)]));
         detour.extend_from_slice(&drifting[1000..]);
-        assert!(compare(&growing, &Way::through(&detour).unwrap()).unwrap().joined.is_none());
+        assert!(compare(&growing, &Alignment::through(&detour).unwrap()).unwrap().joined.is_none());
     }
 
     #[test]
@@ -163,9 +163,9 @@ mod tests {
         let mut points: Vec<[f64; 2]> = (0..60).map(|k| [10.0 * f64::from(k), 200.0]).collect();
         points.reverse();
         points.extend((0..200).map(|k| [-10.0 - 10.0 * f64::from(k), 0.0]));
-        let growing = way(-2000, 600, 0.0);
-        assert!(compare(&growing, &Way::through(&points).unwrap()).unwrap().joined.is_none());
-        assert!(compare(&growing, &way(600, -2000, 30.0)).unwrap().joined.is_none());
-        assert!(compare(&growing, &way(600, -2000, 300.0)).is_none());
+        let growing = alignment(-2000, 600, 0.0);
+        assert!(compare(&growing, &Alignment::through(&points).unwrap()).unwrap().joined.is_none());
+        assert!(compare(&growing, &alignment(600, -2000, 30.0)).unwrap().joined.is_none());
+        assert!(compare(&growing, &alignment(600, -2000, 300.0)).is_none());
     }
 }

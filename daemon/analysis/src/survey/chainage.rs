@@ -7,7 +7,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::alignment::{FIX_FADING_S, FIX_STD_M};
+use super::centring::{FIX_FADING_S, FIX_STD_M};
 use super::recording::Recording;
 use super::tracking::Placed;
 
@@ -69,7 +69,7 @@ impl WheelsAndLag {
 pub struct Chained {
     /// First row of the recording.
     pub first_row: usize,
-    /// Chainage in m of each row along the way.
+    /// Chainage in m of each row along the alignment.
     pub chainage_m: Vec<f64>,
     /// What the pass shows of wheels and lag.
     pub learned: WheelsAndLag,
@@ -86,16 +86,17 @@ pub fn chain(
     if placed.len() < 20 {
         return None;
     }
-    let start_m = recording.way_m[placed[0].row];
+    let start_m = recording.travelled_m[placed[0].row];
     let mut weights = vec![1.0; placed.len()];
     let mut smoothed = Vec::new();
     for _ in 0..ROUNDS {
         smoothed = smooth(recording, placed, start_m, known, &weights)?;
         for ((weight, fix), (state, _)) in weights.iter_mut().zip(placed).zip(&smoothed) {
             let row = fix.row;
-            let way_m = recording.way_m[row] - start_m;
+            let travelled_m = recording.travelled_m[row] - start_m;
             let speed_mps = speed(recording, row);
-            let expected = way_m * (1.0 + state[1]) + state[0] + state[2] - state[3] * speed_mps;
+            let expected =
+                travelled_m * (1.0 + state[1]) + state[0] + state[2] - state[3] * speed_mps;
             let off = (fix.chainage_m - expected) / HALF_WEIGHT_M;
             *weight = 1.0 / (1.0 + off * off);
         }
@@ -113,17 +114,17 @@ pub fn chain(
             next += 1;
         }
         let (before, after) = (next.saturating_sub(1), next.min(placed.len() - 1));
-        let way_m = recording.way_m[row];
+        let travelled_m = recording.travelled_m[row];
         let (one_m, other_m) =
-            (recording.way_m[placed[before].row], recording.way_m[placed[after].row]);
+            (recording.travelled_m[placed[before].row], recording.travelled_m[placed[after].row]);
         let share = if other_m > one_m {
-            ((way_m - one_m) / (other_m - one_m)).clamp(0.0, 1.0)
+            ((travelled_m - one_m) / (other_m - one_m)).clamp(0.0, 1.0)
         } else {
             0.0
         };
         let (one, other) = (smoothed[before].0[0], smoothed[after].0[0]);
         let offset_m = one + share * (other - one);
-        chainage_m.push((way_m - start_m) * (1.0 + last[1]) + offset_m);
+        chainage_m.push((travelled_m - start_m) * (1.0 + last[1]) + offset_m);
     }
     Some(Chained { first_row: rows.start, chainage_m, learned })
 }
@@ -149,7 +150,7 @@ fn smooth(
     for (k, fix) in placed.iter().enumerate() {
         let before = placed[k.saturating_sub(1)].row;
         let step_s = recording.raw.time_s[fix.row] - recording.raw.time_s[before];
-        let step_m = recording.way_m[fix.row] - recording.way_m[before];
+        let step_m = recording.travelled_m[fix.row] - recording.travelled_m[before];
         let fade = (-step_s / FIX_FADING_S).exp();
         state[2] *= fade;
         for index in 0..4 {
@@ -159,10 +160,10 @@ fn smooth(
         covariance[(0, 0)] += SLIP_M * SLIP_M * step_m;
         covariance[(2, 2)] += FIX_STD_M * FIX_STD_M * (1.0 - fade * fade);
         ahead.push((state, covariance, fade));
-        let way_m = recording.way_m[fix.row] - start_m;
+        let travelled_m = recording.travelled_m[fix.row] - start_m;
         let speed_mps = speed(recording, fix.row);
-        let row = State::new(1.0, way_m, 1.0, -speed_mps);
-        let expected = way_m + row.dot(&state);
+        let row = State::new(1.0, travelled_m, 1.0, -speed_mps);
+        let expected = travelled_m + row.dot(&state);
         let spread = covariance * row;
         let gain = spread / (row.dot(&spread) + FIX_WHITE_M * FIX_WHITE_M / weights[k]);
         state += gain * (fix.chainage_m - expected);

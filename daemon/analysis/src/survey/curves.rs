@@ -1,6 +1,6 @@
-//! The curves of a way.
+//! The curves of an alignment.
 
-use super::way::Way;
+use super::alignment::Alignment;
 
 /// Half the length in m over which a change of direction is measured.
 const REACH_M: f64 = 40.0;
@@ -8,13 +8,13 @@ const REACH_M: f64 = 40.0;
 const RADIUS_MAX_M: f64 = 2500.0;
 /// A shorter curve in m is none.
 const LENGTH_MIN_M: f64 = 30.0;
-/// A curve that reaches an end of a way goes on beyond it for so many m: under half a train.
+/// A curve that reaches an end of an alignment goes on beyond it for so many m: under half a train.
 const BEYOND_M: f64 = 110.0;
 
-/// A curve of a way.
+/// A curve of an alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundCurve {
-    /// Along the way in m from where.
+    /// Along the alignment in m from where.
     pub from_m: f64,
     /// To where.
     pub to_m: f64,
@@ -22,12 +22,12 @@ pub struct FoundCurve {
     pub radius_m: f64,
 }
 
-/// The curves of a way, one after the other.
-pub fn curves(way: &Way) -> Vec<FoundCurve> {
-    let step_m = way.step_m();
-    let count = way.nodes_m().len();
+/// The curves of an alignment, one after the other.
+pub fn curves(alignment: &Alignment) -> Vec<FoundCurve> {
+    let step_m = alignment.step_m();
+    let count = alignment.nodes_m().len();
     let reach = (REACH_M / step_m).round().max(1.0) as usize;
-    let direction = |segment: usize| way.direction((segment as f64 + 0.5) * step_m);
+    let direction = |segment: usize| alignment.direction((segment as f64 + 0.5) * step_m);
     let curvature: Vec<f64> = (0..count)
         .map(|node| {
             // Near an end the turning is that of the part that is there.
@@ -57,7 +57,7 @@ pub fn curves(way: &Way) -> Vec<FoundCurve> {
                 from_m = -BEYOND_M;
             }
             if end == count {
-                to_m = way.length_m() + BEYOND_M;
+                to_m = alignment.length_m() + BEYOND_M;
             }
             found.push(FoundCurve { from_m, to_m, radius_m });
         }
@@ -66,10 +66,10 @@ pub fn curves(way: &Way) -> Vec<FoundCurve> {
     found
 }
 
-/// All the turning of a way in rad.
-pub fn turning_rad(way: &Way) -> f64 {
-    let nodes = way.nodes_m().len();
-    let at = |node: usize| way.direction((node as f64 + 0.5) * way.step_m());
+/// All the turning of an alignment in rad.
+pub fn turning_rad(alignment: &Alignment) -> f64 {
+    let nodes = alignment.nodes_m().len();
+    let at = |node: usize| alignment.direction((node as f64 + 0.5) * alignment.step_m());
     (1..nodes.saturating_sub(1))
         .map(|node| {
             let (from, to) = (at(node - 1), at(node));
@@ -92,10 +92,10 @@ mod tests {
         }
         let (last, angle) = (points[points.len() - 1], 1.0f64);
         for k in 1..50 {
-            let way = 10.0 * f64::from(k);
-            points.push([last[0] + way * angle.cos(), last[1] + way * angle.sin()]);
+            let alignment = 10.0 * f64::from(k);
+            points.push([last[0] + alignment * angle.cos(), last[1] + alignment * angle.sin()]);
         }
-        let found = curves(&Way::through(&points).unwrap());
+        let found = curves(&Alignment::through(&points).unwrap());
         assert_eq!(found.len(), 1, "{found:?}");
         assert!((found[0].radius_m - 800.0).abs() < 60.0, "{found:?}");
         assert!((found[0].to_m - found[0].from_m - 800.0).abs() < 80.0);
@@ -107,7 +107,7 @@ mod tests {
             [400.0 * angle.sin(), 400.0 * (1.0 - angle.cos())]
         };
         let points: Vec<[f64; 2]> = (0..30).map(arc).collect();
-        let found = curves(&Way::through(&points).unwrap());
+        let found = curves(&Alignment::through(&points).unwrap());
         assert_eq!(found.len(), 1, "{found:?}");
         assert!((found[0].radius_m - 400.0).abs() < 20.0, "{found:?}");
         assert!(found[0].from_m < -100.0 && found[0].to_m > 390.0, "{found:?}");

@@ -1,4 +1,4 @@
-//! Where the unknown heights of a line's ways lie, and what a gradient under a vehicle is of them.
+//! Where the unknown heights of a line's alignments lie, and what a gradient under a vehicle is of them.
 
 use super::banded::Factor;
 use super::bordered::{Columns, CommonCovariance};
@@ -6,7 +6,7 @@ use super::common::Common;
 
 /// Distance in m between heights.
 pub const HEIGHT_STEP_M: f64 = 10.0;
-/// Heights reach beyond a way by half a vehicle and so many m.
+/// Heights reach beyond an alignment by half a vehicle and so many m.
 const MARGIN_M: f64 = 60.0;
 
 /// Steps between heights over which the uncertainty of a gradient is stated: 100 m.
@@ -15,20 +15,20 @@ const STATED_STEPS: usize = 10;
 /// Where heights lie in the system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// For the two ways: number of the first height, and number of heights.
+    /// For the two alignments: number of the first height, and number of heights.
     pub blocks: Vec<(usize, usize)>,
-    /// Chainage in m of a block's first height along its way.
+    /// Chainage in m of a block's first height along its alignment.
     pub start_m: f64,
     /// Length in m of the vehicle.
     vehicle_m: f64,
 }
 
-/// A pass's way in the system: which block, and +1 along it, -1 against it from an end.
+/// A pass's alignment in the system: which block, and +1 along it, -1 against it from an end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Course {
     /// Number of the block of heights.
     pub block: usize,
-    /// For a pass against the block's sense: length of the way in m.
+    /// For a pass against the block's sense: length of the alignment in m.
     pub against_from_m: Option<f64>,
 }
 
@@ -40,7 +40,7 @@ impl Course {
 }
 
 impl Layout {
-    /// Heights for ways of some lengths in m.
+    /// Heights for alignments of some lengths in m.
     pub fn new(lengths_m: &[f64], vehicle_m: f64) -> Self {
         let start_m = -(MARGIN_M + 0.5 * vehicle_m);
         let mut next = 0;

@@ -82,7 +82,7 @@ pub fn learn(evidence: &mut Evidence, acting_from_pa: f64) -> Result<Learned, No
     Ok(Learned { profile, walk_per_m, left_out_n, brake })
 }
 
-/// True when every way has two passes, so that one can be left out.
+/// True when every alignment has two passes, so that one can be left out.
 fn can_leave_out(evidence: &Evidence) -> bool {
     let mut passes = std::collections::BTreeMap::<usize, usize>::new();
     for course in &evidence.courses {

@@ -1,16 +1,16 @@
 //! The line that is driven repeatedly, and which parts are passes of it.
 
-use super::alignment::{PassRows, align};
+use super::alignment::Alignment;
 use super::both_directions::{Compared, compare};
+use super::centring::{PassRows, align};
 use super::recording::Recording;
-use super::recording_parts::{RecordingPart, SAME_WAY_M, distance_squared};
+use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M, distance_squared};
 use super::silence::{TracePoint, filled, trace};
 use super::tracking::follow;
-use super::way::Way;
 
 /// Parts that are tried as the line, and parts that each is compared with, at most.
 const TRIED_MAX: usize = 12;
-/// Passes that the way is laid through, at most: more make it no better than GNSS itself.
+/// Passes that the alignment is laid through, at most: more make it no better than GNSS itself.
 const ALIGNED_MAX: usize = 60;
 /// Distance in m between the points of a part.
 const POINT_STEP_M: f64 = 20.0;
@@ -19,38 +19,38 @@ const PASS_SHARE_MIN: f64 = 0.25;
 /// A pass of this many m is worth having however long the line is.
 const PASS_MIN_M: f64 = 1000.0;
 
-/// The ways of a line, each in its direction of travel.
+/// The alignments of a line, each in its direction of travel.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ways {
-    /// For growing chainage; chainage and way in m are the same.
-    pub growing: Way,
+pub struct Alignments {
+    /// For growing chainage; chainage and distance in m are the same.
+    pub growing: Alignment,
     /// For falling chainage, where it is driven.
-    pub falling: Option<FallingWay>,
+    pub falling: Option<FallingAlignment>,
     /// Metres of chainage for each metre on the plane: 1, unless the wheels are the better measure.
     pub chainage_per_m: f64,
 }
 
-/// The way for falling chainage.
+/// The alignment for falling chainage.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FallingWay {
-    /// The way from its own start.
-    pub way: Way,
+pub struct FallingAlignment {
+    /// The alignment from its own start.
+    pub alignment: Alignment,
     /// Chainage in m on the plane at its start.
     pub start_chainage_m: f64,
-    /// True when it is the growing way the other way round: the same track.
+    /// True when it is the growing alignment the other way round: the same track.
     pub is_same: bool,
 }
 
-impl Ways {
-    /// The way of a direction.
-    pub fn of(&self, direction: i8) -> Option<&Way> {
+impl Alignments {
+    /// The alignment of a direction.
+    pub fn of(&self, direction: i8) -> Option<&Alignment> {
         match direction {
             1 => Some(&self.growing),
-            _ => self.falling.as_ref().map(|falling| &falling.way),
+            _ => self.falling.as_ref().map(|falling| &falling.alignment),
         }
     }
 
-    /// Chainage in m of a place along the way of a direction.
+    /// Chainage in m of a place along the alignment of a direction.
     pub fn chainage_m(&self, direction: i8, along_m: f64) -> f64 {
         let on_plane_m = match (&self.falling, direction) {
             (Some(falling), -1) => falling.start_chainage_m - along_m,
@@ -59,7 +59,7 @@ impl Ways {
         self.chainage_per_m * on_plane_m
     }
 
-    /// Place in m along the way of a direction of a chainage in m: [`Ways::chainage_m`] turned round.
+    /// Place in m along the alignment of a direction of a chainage in m: [`Alignments::chainage_m`] turned round.
     pub fn along_m(&self, direction: i8, chainage_m: f64) -> f64 {
         let on_plane_m = chainage_m / self.chainage_per_m;
         match (&self.falling, direction) {
@@ -84,7 +84,7 @@ pub struct Pass {
 }
 
 /// Finds the line among the parts of the fit runs; `None` when there is none.
-pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Ways> {
+pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Alignments> {
     let fit: Vec<RecordingPart> =
         recording_parts.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
     let template = template(&fit, recordings)?;
@@ -103,36 +103,41 @@ pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
         true => [(back, falling), (template, growing)],
         false => [(template, growing), (back, falling)],
     };
-    let growing = way_of(&template, &ahead, recordings);
+    let growing = alignment_of(&template, &ahead, recordings);
     let chainage_per_m = 1.0;
     if back.is_empty() {
-        return Some(Ways { growing, falling: None, chainage_per_m });
+        return Some(Alignments { growing, falling: None, chainage_per_m });
     }
-    let way = way_of(&reversed_template, &back, recordings);
-    let Some(Compared { start_chainage_m, joined }) = compare(&growing, &way) else {
-        return Some(Ways { growing, falling: None, chainage_per_m });
+    let alignment = alignment_of(&reversed_template, &back, recordings);
+    let Some(Compared { start_chainage_m, joined }) = compare(&growing, &alignment) else {
+        return Some(Alignments { growing, falling: None, chainage_per_m });
     };
     let Some(joined) = joined else {
-        let falling = Some(FallingWay { way, start_chainage_m, is_same: false });
-        return Some(Ways { growing, falling, chainage_per_m });
+        let falling = Some(FallingAlignment { alignment, start_chainage_m, is_same: false });
+        return Some(Alignments { growing, falling, chainage_per_m });
     };
-    // One track has one way and one chainage, and the passes of both directions show it.
-    let passes =
-        [(joined.clone(), 1), (joined.reversed()?, -1)].into_iter().flat_map(|(way, direction)| {
-            let along = self::along(&way, &fit, recordings);
+    // One track has one alignment and one chainage, and the passes of both directions show it.
+    let passes = [(joined.clone(), 1), (joined.reversed()?, -1)].into_iter().flat_map(
+        |(alignment, direction)| {
+            let along = self::along(&alignment, &fit, recordings);
             let passes: Vec<PassRows> = along.into_iter().map(|(_, pass)| pass).collect();
             thinned(&passes).into_iter().map(move |pass| (pass, direction))
-        });
+        },
+    );
     let growing = align(joined, &passes.collect::<Vec<_>>(), recordings);
-    let way = growing.reversed()?;
-    let start_chainage_m = way.length_m();
-    let falling = Some(FallingWay { way, start_chainage_m, is_same: true });
-    Some(Ways { growing, falling, chainage_per_m })
+    let alignment = growing.reversed()?;
+    let start_chainage_m = alignment.length_m();
+    let falling = Some(FallingAlignment { alignment, start_chainage_m, is_same: true });
+    Some(Alignments { growing, falling, chainage_per_m })
 }
 
-/// The way of a direction from its own parts: where they differ from the other direction's,
+/// The alignment of a direction from its own parts: where they differ from the other direction's,
 /// they know better. A single part cannot say what of it is the line.
-fn way_of(template: &Way, along: &[(RecordingPart, PassRows)], recordings: &[Recording]) -> Way {
+fn alignment_of(
+    template: &Alignment,
+    along: &[(RecordingPart, PassRows)],
+    recordings: &[Recording],
+) -> Alignment {
     let own: Vec<RecordingPart> = along.iter().map(|(part, _)| *part).collect();
     let first = match own.len() {
         0 | 1 => template.clone(),
@@ -151,13 +156,13 @@ fn thinned(passes: &[PassRows]) -> Vec<PassRows> {
 
 fn rows_of(part: &RecordingPart, recordings: &[Recording]) -> std::ops::Range<usize> {
     let recording = &recordings[part.recording];
-    let first = recording.way_m.partition_point(|&way| way < part.from_m);
-    let end = recording.way_m.partition_point(|&way| way <= part.to_m);
+    let first = recording.travelled_m.partition_point(|&alignment| alignment < part.from_m);
+    let end = recording.travelled_m.partition_point(|&alignment| alignment <= part.to_m);
     first..end
 }
 
 /// The part that the others follow furthest, cut to what at least one other drives too.
-fn template(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Way> {
+fn template(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Alignment> {
     let thinned: Vec<&RecordingPart> = {
         let mut long: Vec<&RecordingPart> = recording_parts.iter().collect();
         long.retain(|part| part.to_m - part.from_m > 100.0);
@@ -168,33 +173,33 @@ fn template(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
         thinned.iter().map(|part| trace(part, recordings, POINT_STEP_M)).collect();
     let points: Vec<Vec<[f64; 2]>> = (0..traces.len()).map(|one| filled(one, &traces)).collect();
     let tried = points.iter().enumerate().filter_map(|(one, nodes)| {
-        let way = Way::through(nodes)?;
-        let counts = covered(&way, one, &points);
+        let alignment = Alignment::through(nodes)?;
+        let counts = covered(&alignment, one, &points);
         let score: usize = counts.iter().sum();
         // Of two that the others follow as far, the shorter one holds less that is not the line.
-        Some((score, std::cmp::Reverse(nodes.len()), way, counts))
+        Some((score, std::cmp::Reverse(nodes.len()), alignment, counts))
     });
-    let (_, _, way, counts) = tried.max_by_key(|it| (it.0, it.1))?;
+    let (_, _, alignment, counts) = tried.max_by_key(|it| (it.0, it.1))?;
     if thinned.len() < 2 {
-        return Some(way);
+        return Some(alignment);
     }
     let first = counts.iter().position(|&count| count > 0)?;
     let last = counts.iter().rposition(|&count| count > 0)?;
-    Way::through(&way.nodes_m()[first..=last])
+    Alignment::through(&alignment.nodes_m()[first..=last])
 }
 
-/// For each node of a way how many other parts drive it, each counted in the direction in
+/// For each node of an alignment how many other parts drive it, each counted in the direction in
 /// which it drives most of it.
-fn covered(way: &Way, own: usize, recording_parts: &[Vec<[f64; 2]>]) -> Vec<usize> {
-    let count = way.nodes_m().len();
+fn covered(alignment: &Alignment, own: usize, recording_parts: &[Vec<[f64; 2]>]) -> Vec<usize> {
+    let count = alignment.nodes_m().len();
     let mut counts = vec![0; count];
     for (_, points) in recording_parts.iter().enumerate().filter(|(other, _)| *other != own) {
         let mut marks = [vec![false; count], vec![false; count]];
         for pair in points.windows(2) {
             let step = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
             let length = distance_squared(pair[0], pair[1]).sqrt().max(1e-9);
-            for (node, _) in way.nodes_near(pair[0], SAME_WAY_M) {
-                let [x, y] = way.direction(node as f64 * way.step_m());
+            for (node, _) in alignment.nodes_near(pair[0], SAME_ALIGNMENT_M) {
+                let [x, y] = alignment.direction(node as f64 * alignment.step_m());
                 let cosine = (x * step[0] + y * step[1]) / length;
                 if cosine.abs() > 0.6 {
                     marks[usize::from(cosine < 0.0)][node] = true;
@@ -210,30 +215,38 @@ fn covered(way: &Way, own: usize, recording_parts: &[Vec<[f64; 2]>]) -> Vec<usiz
     counts
 }
 
-/// The parts that run along a way in its direction, with their rows on it.
+/// The parts that run along an alignment in its direction, with their rows on it.
 fn along(
-    way: &Way,
+    alignment: &Alignment,
     recording_parts: &[RecordingPart],
     recordings: &[Recording],
 ) -> Vec<(RecordingPart, PassRows)> {
-    let pass = |part: &RecordingPart| Some((*part, pass_along(way, part, recordings)?));
+    let pass = |part: &RecordingPart| Some((*part, pass_along(alignment, part, recordings)?));
     recording_parts.iter().filter_map(pass).collect()
 }
 
-fn pass_along(way: &Way, part: &RecordingPart, recordings: &[Recording]) -> Option<PassRows> {
+fn pass_along(
+    alignment: &Alignment,
+    part: &RecordingPart,
+    recordings: &[Recording],
+) -> Option<PassRows> {
     let rows = rows_of(part, recordings);
-    let placed = follow(&recordings[part.recording], rows.clone(), way);
+    let placed = follow(&recordings[part.recording], rows.clone(), alignment);
     let (first, last) = (placed.first()?, placed.last()?);
     let covered_m = last.chainage_m - first.chainage_m;
-    let least_m = (PASS_SHARE_MIN * way.length_m()).min(PASS_MIN_M);
+    let least_m = (PASS_SHARE_MIN * alignment.length_m()).min(PASS_MIN_M);
     let on_line = PassRows { recording: part.recording, rows: first.row..last.row + 1 };
     (covered_m >= least_m).then_some(on_line)
 }
 
 /// The pass that a part of any role is, if it is one.
-pub fn pass_of(ways: &Ways, part: &RecordingPart, recordings: &[Recording]) -> Option<Pass> {
+pub fn pass_of(
+    alignments: &Alignments,
+    part: &RecordingPart,
+    recordings: &[Recording],
+) -> Option<Pass> {
     let along = |direction: i8| {
-        let rows = pass_along(ways.of(direction)?, part, recordings)?;
+        let rows = pass_along(alignments.of(direction)?, part, recordings)?;
         Some(Pass { rows, direction })
     };
     let length = |pass: &Pass| pass.rows.rows.len();

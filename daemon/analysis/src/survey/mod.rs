@@ -8,7 +8,7 @@
 //! # Layout, in the order of reading
 //!
 //! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
-//! - `recording_parts`, [`way`], `silence`, `tracking`, `alignment`, `both_directions`, [`mod@line`]: the line that
+//! - `recording_parts`, [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`mod@line`]: the line that
 //!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
 //! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
@@ -16,11 +16,12 @@
 //!   [`banded`], `bordered`: its solver
 //! - [`survey()`]: all of it in turn
 
-mod alignment;
+pub mod alignment;
 pub mod balance;
 pub mod banded;
 mod bordered;
 mod both_directions;
+mod centring;
 pub mod chainage;
 pub mod common;
 pub mod curves;
@@ -37,8 +38,7 @@ pub mod stops;
 mod surveying;
 mod tracking;
 pub mod trips;
-pub mod way;
 
-pub use alignment::PassRows;
+pub use centring::PassRows;
 pub use surveying::{KnownLine, Survey, SurveyError, SurveyedProfile, Vehicle, survey};
 pub use trips::{NotUsed, Trip};

@@ -27,7 +27,7 @@ const GRAVITY_MPS2: f64 = 9.81;
 /// An altitude that GNSS gave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Altitude {
-    /// The way.
+    /// The alignment.
     pub course: Course,
     /// Place in m along it.
     pub along_m: f64,
@@ -40,7 +40,7 @@ pub struct Altitude {
 pub struct Evidence {
     /// Where heights lie.
     pub layout: Layout,
-    /// The way of each pass.
+    /// The alignment of each pass.
     pub courses: Vec<Course>,
     /// What the forces say.
     pub observations: Vec<Observation>,

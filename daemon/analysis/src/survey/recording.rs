@@ -50,7 +50,7 @@ pub struct Recording<'r> {
     /// What was recorded.
     pub raw: &'r RawRecording,
     /// Distance in m by integrating the speed, from 0 at the first row.
-    pub way_m: Vec<f64>,
+    pub travelled_m: Vec<f64>,
     /// Its fixes, thinned to one a second.
     pub fixes: Vec<Fix>,
 }
@@ -58,17 +58,17 @@ pub struct Recording<'r> {
 impl<'r> Recording<'r> {
     /// Integrates the speed and projects the fixes.
     pub fn of(raw: &'r RawRecording, plane: &LocalPlane) -> Self {
-        let mut way_m = Vec::with_capacity(raw.time_s.len());
-        let (mut way, mut last) = (0.0, None);
+        let mut travelled_m = Vec::with_capacity(raw.time_s.len());
+        let (mut travelled, mut last) = (0.0, None);
         for (&time_s, &speed_mps) in raw.time_s.iter().zip(&raw.speed_mps) {
             if !speed_mps.is_nan() {
                 if let Some((before_s, before_mps)) = last {
                     let step: f64 = time_s - before_s;
-                    way += 0.5 * step * (speed_mps + before_mps);
+                    travelled += 0.5 * step * (speed_mps + before_mps);
                 }
                 last = Some((time_s, speed_mps));
             }
-            way_m.push(way);
+            travelled_m.push(travelled);
         }
         let mut fixes: Vec<Fix> = Vec::new();
         for row in 0..raw.time_s.len() {
@@ -82,25 +82,27 @@ impl<'r> Recording<'r> {
                 fixes.push(Fix { row, at_m: plane.project(latitude, longitude) });
             }
         }
-        Recording { raw, way_m, fixes }
+        Recording { raw, travelled_m, fixes }
     }
 
     /// The first row at or past a distance in m.
-    pub fn row_at(&self, way_m: f64) -> usize {
-        self.way_m.partition_point(|&way| way < way_m).min(self.way_m.len().saturating_sub(1))
+    pub fn row_at(&self, travelled_m: f64) -> usize {
+        self.travelled_m
+            .partition_point(|&travelled| travelled < travelled_m)
+            .min(self.travelled_m.len().saturating_sub(1))
     }
 
     /// Length in m of the whole distance.
     pub fn length_m(&self) -> f64 {
-        self.way_m.last().copied().unwrap_or(0.0)
+        self.travelled_m.last().copied().unwrap_or(0.0)
     }
 
     /// Points every `step_m` of the distance: (distance in m, east and north in m), straight between fixes.
     pub fn points(&self, step_m: f64) -> Vec<(f64, [f64; 2])> {
         let mut points = Vec::new();
-        let mut next_m = self.fixes.first().map_or(0.0, |fix| self.way_m[fix.row]);
+        let mut next_m = self.fixes.first().map_or(0.0, |fix| self.travelled_m[fix.row]);
         for pair in self.fixes.windows(2) {
-            let (from_m, to_m) = (self.way_m[pair[0].row], self.way_m[pair[1].row]);
+            let (from_m, to_m) = (self.travelled_m[pair[0].row], self.travelled_m[pair[1].row]);
             while next_m < to_m {
                 let share = (next_m - from_m) / (to_m - from_m);
                 let between = |axis: usize| {

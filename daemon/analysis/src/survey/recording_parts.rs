@@ -1,4 +1,4 @@
-//! Cutting a recording where it turns back on its own way.
+//! Cutting a recording where it turns back on its own path.
 
 use std::collections::HashMap;
 
@@ -9,10 +9,10 @@ use super::recording::Recording;
 /// Distance in m between the points that are looked at.
 pub const POINT_STEP_M: f64 = 20.0;
 /// Two passes nearer than this many m are on the same way.
-pub const SAME_WAY_M: f64 = 40.0;
-/// Points nearer than this many m along the way do not count as a return.
+pub const SAME_ALIGNMENT_M: f64 = 40.0;
+/// Points nearer than this many m along the path do not count as a return.
 const RETURN_MIN_M: f64 = 200.0;
-/// A return counts once this many points follow an earlier way.
+/// A return counts once this many points follow an earlier path.
 const RETURN_POINTS: usize = 15;
 /// Around a loop at the end of a line, its stand is looked for so many m further.
 const TERMINAL_MARGIN_M: f64 = 100.0;
@@ -28,7 +28,7 @@ pub struct RecordingPart {
     pub to_m: f64,
 }
 
-/// Cuts a recording into parts: where its way follows, for 300 m, a way that it took before
+/// Cuts a recording into parts: where its path follows, for 300 m, a path that it took before
 /// in the same part, it has turned. The cut is where it stood longest in between.
 pub fn recording_parts(number: usize, recording: &Recording) -> Vec<RecordingPart> {
     let points = recording.points(POINT_STEP_M);
@@ -58,7 +58,7 @@ pub fn recording_parts(number: usize, recording: &Recording) -> Vec<RecordingPar
 
 /// Where a part comes back on itself.
 struct Return {
-    /// The earlier point, where the repeated way was left.
+    /// The earlier point, where the repeated path was left.
     left: usize,
     /// The later point, from which on it is followed.
     back: usize,
@@ -67,17 +67,18 @@ struct Return {
 
 fn first_return(points: &[(f64, [f64; 2])], from: usize) -> Option<Return> {
     let mut cells: HashMap<(i64, i64), Vec<usize>> = HashMap::new();
-    let cell =
-        |at: [f64; 2]| ((at[0] / SAME_WAY_M).floor() as i64, (at[1] / SAME_WAY_M).floor() as i64);
+    let cell = |at: [f64; 2]| {
+        ((at[0] / SAME_ALIGNMENT_M).floor() as i64, (at[1] / SAME_ALIGNMENT_M).floor() as i64)
+    };
     let mut twins: Vec<Option<usize>> = Vec::new();
-    for (i, &(way_m, at)) in points.iter().enumerate().skip(from) {
+    for (i, &(travelled_m, at)) in points.iter().enumerate().skip(from) {
         let (column, row) = cell(at);
         let around = (-1..=1).flat_map(|x| (-1..=1).map(move |y| (column + x, row + y)));
         let candidates = around.filter_map(|key| cells.get(&key)).flatten().copied();
         let twin = candidates
-            .filter(|&j| way_m - points[j].0 > RETURN_MIN_M)
+            .filter(|&j| travelled_m - points[j].0 > RETURN_MIN_M)
             .map(|j| (distance_squared(at, points[j].1), j))
-            .filter(|(squared, _)| *squared < SAME_WAY_M * SAME_WAY_M)
+            .filter(|(squared, _)| *squared < SAME_ALIGNMENT_M * SAME_ALIGNMENT_M)
             .min_by(|one, other| one.0.total_cmp(&other.0));
         twins.push(twin.map(|(_, j)| j));
         cells.entry((column, row)).or_default().push(i);
@@ -88,7 +89,7 @@ fn first_return(points: &[(f64, [f64; 2])], from: usize) -> Option<Return> {
     None
 }
 
-/// A return is confirmed when the last points follow an earlier way at its pace.
+/// A return is confirmed when the last points follow an earlier path at its pace.
 fn confirmed(twins: &[Option<usize>], from: usize) -> Option<Return> {
     let recent = &twins[twins.len().checked_sub(RETURN_POINTS)?..];
     let (first, last) = (recent[0]?, recent[RETURN_POINTS - 1]?);
@@ -103,20 +104,20 @@ fn confirmed(twins: &[Option<usize>], from: usize) -> Option<Return> {
     Some(Return { left: twins[back]?, back: from + back, is_opposite: last < first })
 }
 
-/// Distance in m where a recording stood longest between two ways; `None` when it did not stand.
+/// Distance in m where a recording stood longest between two paths; `None` when it did not stand.
 fn longest_stand(recording: &Recording, from_m: f64, to_m: f64) -> Option<f64> {
     let raw = recording.raw;
     let rows = recording.row_at(from_m)..recording.row_at(to_m);
     let (mut longest, mut stand): ((f64, f64), Option<(f64, f64)>) = ((0.0, 0.0), None);
     for row in rows {
-        let (way_m, step_s) = (recording.way_m[row], step_after(&raw.time_s, row));
+        let (travelled_m, step_s) = (recording.travelled_m[row], step_after(&raw.time_s, row));
         // Moving up a little does not end a stand.
         stand = match stand {
-            Some((at_m, stood_s)) if way_m - at_m < 5.0 => Some((at_m, stood_s)),
+            Some((at_m, stood_s)) if travelled_m - at_m < 5.0 => Some((at_m, stood_s)),
             _ => None,
         };
         if raw.speed_mps[row] < STILL_MPS {
-            let (at_m, stood_s) = stand.unwrap_or((way_m, 0.0));
+            let (at_m, stood_s) = stand.unwrap_or((travelled_m, 0.0));
             stand = Some((at_m, stood_s + step_s));
             if stood_s + step_s > longest.0 {
                 longest = (stood_s + step_s, at_m);

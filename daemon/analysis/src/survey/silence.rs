@@ -1,14 +1,14 @@
-//! Where a receiver was silent, the way of one pass is that of another.
+//! Where a receiver was silent, the path of one pass is that of another.
 
 use super::recording::Recording;
-use super::recording_parts::{RecordingPart, SAME_WAY_M, distance_squared};
+use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M, distance_squared};
 
-/// Fixes further apart along the way than this many m leave it open in between.
+/// Fixes further apart along the path than this many m leave it open in between.
 pub const GAP_MAX_M: f64 = 150.0;
-/// A way around is at most so many times as long as the straight line between its ends.
+/// A path around is at most so many times as long as the straight line between its ends.
 const DETOUR_MAX: f64 = 3.0;
 
-/// A point on the way of a part.
+/// A point on the path of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TracePoint {
     /// East and north in m.
@@ -23,52 +23,52 @@ pub fn trace(part: &RecordingPart, recordings: &[Recording], step_m: f64) -> Vec
     let silences: Vec<(f64, f64)> = recording
         .fixes
         .windows(2)
-        .map(|pair| (recording.way_m[pair[0].row], recording.way_m[pair[1].row]))
+        .map(|pair| (recording.travelled_m[pair[0].row], recording.travelled_m[pair[1].row]))
         .filter(|(from_m, to_m)| to_m - from_m > GAP_MAX_M)
         .collect();
-    let is_open = |way_m: f64| {
-        let next = silences.partition_point(|silence| silence.1 <= way_m);
-        silences.get(next).is_some_and(|silence| silence.0 < way_m)
+    let is_open = |travelled_m: f64| {
+        let next = silences.partition_point(|silence| silence.1 <= travelled_m);
+        silences.get(next).is_some_and(|silence| silence.0 < travelled_m)
     };
     let points = recording.points(step_m).into_iter();
     let within = points.filter(|point| (part.from_m..=part.to_m).contains(&point.0));
-    within.map(|(way_m, at_m)| TracePoint { at_m, is_open: is_open(way_m) }).collect()
+    within.map(|(travelled_m, at_m)| TracePoint { at_m, is_open: is_open(travelled_m) }).collect()
 }
 
-/// The way of one trace, with what it leaves open taken from others, whichever is the shortest way
+/// The path of one trace, with what it leaves open taken from others, whichever is the shortest path
 /// between the ends of the silence. Where no other knows, the straight line stays.
 pub fn filled(one: usize, traces: &[Vec<TracePoint>]) -> Vec<[f64; 2]> {
     let own = &traces[one];
-    let mut way: Vec<[f64; 2]> = Vec::with_capacity(own.len());
+    let mut path: Vec<[f64; 2]> = Vec::with_capacity(own.len());
     let mut next = 0;
     while next < own.len() {
         let end = (next..own.len()).find(|&at| !own[at].is_open).unwrap_or(own.len());
         if end > next && next > 0 && end < own.len() {
             let ends = [own[next - 1].at_m, own[end].at_m];
             let others = traces.iter().enumerate().filter(|(other, _)| *other != one);
-            let ways = others.filter_map(|(_, trace)| between(ends, trace));
-            let shortest = ways.min_by(|one, other| one.0.total_cmp(&other.0));
+            let paths = others.filter_map(|(_, trace)| between(ends, trace));
+            let shortest = paths.min_by(|one, other| one.0.total_cmp(&other.0));
             match shortest {
-                Some((_, inside)) => way.extend(inside),
-                None => way.extend(own[next..end].iter().map(|point| point.at_m)),
+                Some((_, inside)) => path.extend(inside),
+                None => path.extend(own[next..end].iter().map(|point| point.at_m)),
             }
         } else {
-            way.extend(own[next..end].iter().map(|point| point.at_m));
+            path.extend(own[next..end].iter().map(|point| point.at_m));
         }
-        way.extend(own.get(end).map(|point| point.at_m));
+        path.extend(own.get(end).map(|point| point.at_m));
         next = end + 1;
     }
-    way
+    path
 }
 
-/// Length in m and points of the way of a trace between two places, in whichever direction it drives;
+/// Length in m and points of the path of a trace between two places, in whichever direction it drives;
 /// `None` where it does not know it itself.
 fn between(ends: [[f64; 2]; 2], trace: &[TracePoint]) -> Option<(f64, Vec<[f64; 2]>)> {
     let nearest = |place: [f64; 2]| {
         let distances =
             trace.iter().enumerate().map(|(at, it)| (at, distance_squared(it.at_m, place)));
         let (at, squared) = distances.min_by(|one, other| one.1.total_cmp(&other.1))?;
-        (squared < SAME_WAY_M * SAME_WAY_M).then_some(at)
+        (squared < SAME_ALIGNMENT_M * SAME_ALIGNMENT_M).then_some(at)
     };
     let (from, to) = (nearest(ends[0])?, nearest(ends[1])?);
     let inside = &trace[from.min(to)..=from.max(to)];
@@ -111,9 +111,9 @@ mod tests {
         trace
     }
 
-    fn farthest_from_circle_m(way: &[[f64; 2]]) -> f64 {
+    fn farthest_from_circle_m(path: &[[f64; 2]]) -> f64 {
         let off = |at: &[f64; 2]| (at[0].hypot(1000.0 - at[1]) - 1000.0).abs();
-        way.iter().map(off).fold(0.0, f64::max)
+        path.iter().map(off).fold(0.0, f64::max)
     }
 
     #[test]
@@ -122,9 +122,9 @@ mod tests {
         back.reverse();
         let traces = [silent(20..50), quarter(2.0, 40..45), back];
         assert!(farthest_from_circle_m(&silent(20..50).map_at()) > 40.0);
-        let way = filled(0, &traces);
-        assert!(farthest_from_circle_m(&way) < 5.0, "{}", farthest_from_circle_m(&way));
-        let steps = way.windows(2).map(|pair| distance_squared(pair[0], pair[1]).sqrt());
+        let path = filled(0, &traces);
+        assert!(farthest_from_circle_m(&path) < 5.0, "{}", farthest_from_circle_m(&path));
+        let steps = path.windows(2).map(|pair| distance_squared(pair[0], pair[1]).sqrt());
         assert!(steps.fold(0.0, f64::max) < 45.0, "no jump");
     }
 

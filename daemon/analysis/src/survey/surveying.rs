@@ -10,14 +10,14 @@ use super::curves::{FoundCurve, curves, turning_rad};
 use super::geodesy::LocalPlane;
 use super::layout::{Course, Layout};
 use super::learn::{Learned, acting_from_pa, learn};
-use super::line::{Ways, find, pass_of};
+use super::line::{Alignments, find, pass_of};
 use super::profile::{Altitude, Evidence};
 use super::recording::{RawRecording, Recording, plane_of};
 use super::recording_parts::{RecordingPart, recording_parts};
 use super::stops::{Stop, stands, stops};
 use super::trips::{NotUsed, Trip, not_used, trips};
 
-/// Lateral uncertainty in m of a way: what the wheels roll differs from it by so much times the
+/// Lateral uncertainty in m of an alignment: what the wheels roll differs from it by so much times the
 /// turning.
 const LATERAL_STD_M: f64 = 1.5;
 /// Trains that start or stop at an end of the line are seen so many m beyond it.
@@ -43,10 +43,10 @@ pub struct Vehicle {
 /// A line that was surveyed before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownLine {
-    /// The plane of its ways.
+    /// The plane of its alignments.
     pub plane: LocalPlane,
-    /// Its ways.
-    pub ways: Ways,
+    /// Its alignments.
+    pub alignments: Alignments,
 }
 
 /// Why nothing can be surveyed.
@@ -74,7 +74,7 @@ pub enum SurveyError {
 pub struct SurveyedProfile {
     /// The profile and what belongs to it.
     pub learned: Learned,
-    /// Curves of the growing way.
+    /// Curves of the growing alignment.
     pub curves: Vec<FoundCurve>,
     /// Numbers of the trips that took part, in the order of the passes.
     pub trips: Vec<usize>,
@@ -87,10 +87,10 @@ pub struct SurveyedProfile {
 /// A surveyed line.
 #[derive(Clone, Debug)]
 pub struct Survey {
-    /// The plane of the ways.
+    /// The plane of the alignments.
     pub plane: LocalPlane,
-    /// The ways.
-    pub ways: Ways,
+    /// The alignments.
+    pub alignments: Alignments,
     /// The trips, by recording and time.
     pub trips: Vec<Trip>,
     /// What is no trip.
@@ -99,7 +99,7 @@ pub struct Survey {
     pub stops: Vec<Stop>,
     /// What GNSS shows of the wheels' scale and its own lag.
     pub wheels: WheelsAndLag,
-    /// Standard deviation of the wheels' scale with the uncertainty of the way's length.
+    /// Standard deviation of the wheels' scale with the uncertainty of the alignment's length.
     pub scale_std: f64,
     /// The profile; `None` on a line that was known.
     pub profile: Option<SurveyedProfile>,
@@ -126,37 +126,42 @@ pub fn survey(
         .enumerate()
         .flat_map_iter(|(number, recording)| recording_parts(number, recording))
         .collect();
-    let mut ways = match known {
-        Some(known) => known.ways.clone(),
+    let mut alignments = match known {
+        Some(known) => known.alignments.clone(),
         None => find(&cut, &recordings)
             .ok_or(SurveyError::NoLine { what: "no two passes follow the same way" })?,
     };
     let passes: Vec<_> =
-        cut.par_iter().filter_map(|part| pass_of(&ways, part, &recordings)).collect();
-    let (trips, wheels) = trips(&passes, &ways, &recordings);
+        cut.par_iter().filter_map(|part| pass_of(&alignments, part, &recordings)).collect();
+    let (trips, wheels) = trips(&passes, &alignments, &recordings);
     if trips.is_empty() {
         return Err(SurveyError::NoLine { what: "no recording runs along it" });
     }
-    let scale_std = wheels.scale.std.hypot(way_std(&ways));
+    let scale_std = wheels.scale.std.hypot(length_std(&alignments));
     if known.is_none() && wheels.scale.value.abs() < 2.0 * scale_std {
         // As far as anybody can see the wheels are as declared, and a better measure of length.
-        ways.chainage_per_m = 1.0 / (1.0 + wheels.scale.value);
+        alignments.chainage_per_m = 1.0 / (1.0 + wheels.scale.value);
     }
     let profile = match known {
         Some(_) => None,
-        None => Some(profile(raws, &recordings, vehicle, &ways, &trips, &wheels)?),
+        None => Some(profile(raws, &recordings, vehicle, &alignments, &trips, &wheels)?),
     };
     let not_used = not_used(&trips, &recordings);
-    let stops = found_stops(raws, &ways, &trips, known.is_some());
-    Ok(Survey { plane, ways, trips, not_used, stops, wheels, scale_std, profile })
+    let stops = found_stops(raws, &alignments, &trips, known.is_some());
+    Ok(Survey { plane, alignments, trips, not_used, stops, wheels, scale_std, profile })
 }
 
-/// Standard deviation of a way's length as a share of it.
-fn way_std(ways: &Ways) -> f64 {
-    LATERAL_STD_M * turning_rad(&ways.growing) / ways.growing.length_m()
+/// Standard deviation of an alignment's length as a share of it.
+fn length_std(alignments: &Alignments) -> f64 {
+    LATERAL_STD_M * turning_rad(&alignments.growing) / alignments.growing.length_m()
 }
 
-fn found_stops(raws: &[RawRecording], ways: &Ways, trips: &[Trip], of_all: bool) -> Vec<Stop> {
+fn found_stops(
+    raws: &[RawRecording],
+    alignments: &Alignments,
+    trips: &[Trip],
+    of_all: bool,
+) -> Vec<Stop> {
     let mut found = Vec::new();
     for direction in [1, -1] {
         let own = trips.iter().filter(|it| it.direction == direction && (of_all || it.is_fit));
@@ -166,7 +171,7 @@ fn found_stops(raws: &[RawRecording], ways: &Ways, trips: &[Trip], of_all: bool)
                     .along
                     .chainage_m
                     .iter()
-                    .map(|&along_m| ways.chainage_m(direction, along_m))
+                    .map(|&along_m| alignments.chainage_m(direction, along_m))
                     .collect();
                 stands(&raws[trip.recording], trip.along.first_row, &chainage_m)
             })
@@ -181,7 +186,7 @@ fn profile(
     raws: &[RawRecording],
     recordings: &[Recording],
     vehicle: &Vehicle,
-    ways: &Ways,
+    alignments: &Alignments,
     trips: &[Trip],
     wheels: &WheelsAndLag,
 ) -> Result<SurveyedProfile, SurveyError> {
@@ -189,17 +194,18 @@ fn profile(
     if fit.is_empty() {
         return Err(SurveyError::NoLine { what: "the fit runs do not follow it" });
     }
-    let mut lengths_m = vec![ways.growing.length_m()];
-    if let Some(falling) = ways.falling.as_ref().filter(|it| !it.is_same) {
-        lengths_m.push(falling.way.length_m());
+    let mut lengths_m = vec![alignments.growing.length_m()];
+    if let Some(falling) = alignments.falling.as_ref().filter(|it| !it.is_same) {
+        lengths_m.push(falling.alignment.length_m());
     }
     let layout = Layout::new(&lengths_m, vehicle.length_m);
-    let course = |&number: &usize| course(trips[number].direction, ways);
+    let course = |&number: &usize| course(trips[number].direction, alignments);
     let courses: Vec<Course> = fit.iter().map(course).collect();
-    // Where each direction has a way of its own, its profile holds the curves' resistance too.
-    let curves = if ways.is_one_track() { curves(&ways.growing) } else { Vec::new() };
+    // Where each direction has an alignment of its own, its profile holds the curves' resistance too.
+    let curves = if alignments.is_one_track() { curves(&alignments.growing) } else { Vec::new() };
     // True over recorded speed, when the chainage is GNSS's; else the wheels are believed.
-    let speed_factor = if ways.chainage_per_m == 1.0 { 1.0 + wheels.scale.value } else { 1.0 };
+    let speed_factor =
+        if alignments.chainage_per_m == 1.0 { 1.0 + wheels.scale.value } else { 1.0 };
     let altitudes = fit.iter().zip(&courses).flat_map(|(&number, &course)| {
         altitudes(&trips[number], &recordings[trips[number].recording], course)
     });
@@ -217,7 +223,8 @@ fn profile(
             let trip = &trips[number];
             let raw = &raws[trip.recording];
             let seen = observations(raw, &trip.along, pass as u32, block_s, speed_factor);
-            let limit_m = ways.of(trip.direction).map_or(0.0, |way| way.length_m());
+            let limit_m =
+                alignments.of(trip.direction).map_or(0.0, |alignment| alignment.length_m());
             let on_line = |mut it: Observation| {
                 let at_m = match courses[pass].against_from_m {
                     Some(length_m) => length_m - it.along_m,
@@ -246,10 +253,10 @@ fn profile(
 }
 
 /// Where a direction lies in the profile.
-fn course(direction: i8, ways: &Ways) -> Course {
-    match (direction, ways.is_one_track()) {
+fn course(direction: i8, alignments: &Alignments) -> Course {
+    match (direction, alignments.is_one_track()) {
         (1, _) => Course { block: 0, against_from_m: None },
-        (_, true) => Course { block: 0, against_from_m: Some(ways.growing.length_m()) },
+        (_, true) => Course { block: 0, against_from_m: Some(alignments.growing.length_m()) },
         (_, false) => Course { block: 1, against_from_m: None },
     }
 }

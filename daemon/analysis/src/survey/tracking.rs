@@ -1,43 +1,47 @@
-//! Following a recording along a way: a chainage for each fix.
+//! Following a recording along an alignment: a chainage for each fix.
 
+use super::alignment::{Alignment, Beside};
 use super::recording::{Fix, Recording};
-use super::recording_parts::{SAME_WAY_M, distance_squared};
-use super::way::{Beside, Way};
+use super::recording_parts::{SAME_ALIGNMENT_M, distance_squared};
 
 /// Window in m around the expected chainage in which a fix is placed.
 const WINDOW_M: f64 = 60.0;
 /// Share of a difference by which the expectation follows the fixes.
 const FOLLOWING: f64 = 0.1;
-/// A recording that was not beside the way for so many m has left it.
+/// A recording that was not beside the alignment for so many m has left it.
 const LEFT_AFTER_M: f64 = 300.0;
-/// Way in m over which a recording is looked for on a way.
+/// Distance in m over which a recording is looked for on an alignment.
 const SEARCH_M: f64 = 400.0;
 /// Width in m of the bins in which offsets are counted.
 const BIN_M: f64 = 20.0;
-/// A recording that runs on past the end of a way by so many m has left it.
+/// A recording that runs on past the end of an alignment by so many m has left it.
 const BEYOND_M: f64 = 30.0;
 
-/// A fix placed on a way.
+/// A fix placed on an alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
     /// Row of the recording.
     pub row: usize,
     /// Chainage in m.
     pub chainage_m: f64,
-    /// Distance in m to the left of the way.
+    /// Distance in m to the left of the alignment.
     pub left_m: f64,
 }
 
-/// Places the fixes of some rows on a way that is driven in its own direction: the longest part
+/// Places the fixes of some rows on an alignment that is driven in its own direction: the longest part
 /// without leaving it.
-pub fn follow(recording: &Recording, rows: std::ops::Range<usize>, way: &Way) -> Vec<Placed> {
+pub fn follow(
+    recording: &Recording,
+    rows: std::ops::Range<usize>,
+    alignment: &Alignment,
+) -> Vec<Placed> {
     let fixes = &recording.fixes;
     let first = fixes.partition_point(|fix| fix.row < rows.start);
     let end = fixes.partition_point(|fix| fix.row < rows.end);
     let (mut longest, mut covered_m) = (Vec::new(), 0.0);
     let mut from = first;
-    while let Some((start, offset_m)) = found(recording, &fixes[..end], from, way) {
-        let (placed, next) = follow_from(recording, &fixes[..end], start, offset_m, way);
+    while let Some((start, offset_m)) = found(recording, &fixes[..end], from, alignment) {
+        let (placed, next) = follow_from(recording, &fixes[..end], start, offset_m, alignment);
         let length_m = match (placed.first(), placed.last()) {
             (Some(one), Some(other)) => other.chainage_m - one.chainage_m,
             _ => 0.0,
@@ -55,48 +59,53 @@ fn follow_from(
     fixes: &[Fix],
     start: usize,
     offset_m: f64,
-    way: &Way,
+    alignment: &Alignment,
 ) -> (Vec<Placed>, usize) {
     let mut placed: Vec<Placed> = Vec::new();
     let mut offset_m = offset_m;
-    let mut seen_at_m = recording.way_m[fixes[start].row];
+    let mut seen_at_m = recording.travelled_m[fixes[start].row];
     for (index, fix) in fixes.iter().enumerate().skip(start) {
-        let way_m = recording.way_m[fix.row];
-        let expected_m = way_m + offset_m;
-        if expected_m > way.length_m() + BEYOND_M {
+        let travelled_m = recording.travelled_m[fix.row];
+        let expected_m = travelled_m + offset_m;
+        if expected_m > alignment.length_m() + BEYOND_M {
             return (placed, index);
         }
         if expected_m < -BEYOND_M {
             continue;
         }
-        let beside = way.beside(fix.at_m, expected_m - WINDOW_M, expected_m + WINDOW_M);
-        if beside.left_m.abs() < SAME_WAY_M {
+        let beside = alignment.beside(fix.at_m, expected_m - WINDOW_M, expected_m + WINDOW_M);
+        if beside.left_m.abs() < SAME_ALIGNMENT_M {
             let difference_m = (beside.chainage_m - expected_m).clamp(-10.0, 10.0);
             offset_m += FOLLOWING * difference_m;
-            seen_at_m = way_m;
+            seen_at_m = travelled_m;
             let Beside { chainage_m, left_m } = beside;
             placed.push(Placed { row: fix.row, chainage_m, left_m });
-        } else if way_m - seen_at_m > LEFT_AFTER_M {
+        } else if travelled_m - seen_at_m > LEFT_AFTER_M {
             return (placed, index);
         }
     }
     (placed, fixes.len())
 }
 
-/// The first fix from which on a recording follows a way for a while, and what its way lacks of
+/// The first fix from which on a recording follows an alignment for a while, and what its alignment lacks of
 /// the chainage in m.
-fn found(recording: &Recording, fixes: &[Fix], from: usize, way: &Way) -> Option<(usize, f64)> {
+fn found(
+    recording: &Recording,
+    fixes: &[Fix],
+    from: usize,
+    alignment: &Alignment,
+) -> Option<(usize, f64)> {
     let offsets: Vec<Option<Vec<f64>>> =
-        (from..fixes.len()).map(|index| offsets(recording, fixes, index, way)).collect();
-    let way_m = |index: usize| recording.way_m[fixes[index].row];
+        (from..fixes.len()).map(|index| offsets(recording, fixes, index, alignment)).collect();
+    let travelled_m = |index: usize| recording.travelled_m[fixes[index].row];
     let mut start = from;
     while start < fixes.len() {
         if offsets[start - from].as_ref().is_none_or(Vec::is_empty) {
             start += 1;
             continue;
         }
-        let ahead =
-            (start..fixes.len()).take_while(|&index| way_m(index) - way_m(start) < SEARCH_M);
+        let ahead = (start..fixes.len())
+            .take_while(|&index| travelled_m(index) - travelled_m(start) < SEARCH_M);
         let heading: Vec<&Vec<f64>> =
             ahead.filter_map(|index| offsets[index - from].as_ref()).collect();
         let candidates = offsets[start - from].clone().unwrap_or_default();
@@ -112,21 +121,26 @@ fn found(recording: &Recording, fixes: &[Fix], from: usize, way: &Way) -> Option
         {
             return Some((start, offset));
         }
-        // Two points of the way further on, rather than every fix of a stand.
-        let here_m = way_m(start);
+        // Two points of the alignment further on, rather than every fix of a stand.
+        let here_m = travelled_m(start);
         start += 1;
-        while start < fixes.len() && way_m(start) - here_m < BIN_M {
+        while start < fixes.len() && travelled_m(start) - here_m < BIN_M {
             start += 1;
         }
     }
     None
 }
 
-/// What the way of a fix may lack of the chainage in m: for each place of the way beside which it
+/// What the alignment of a fix may lack of the chainage in m: for each place of the alignment beside which it
 /// is and in whose direction it moves; `None` while it stands.
-fn offsets(recording: &Recording, fixes: &[Fix], index: usize, way: &Way) -> Option<Vec<f64>> {
+fn offsets(
+    recording: &Recording,
+    fixes: &[Fix],
+    index: usize,
+    alignment: &Alignment,
+) -> Option<Vec<f64>> {
     let (one, other) = (index.saturating_sub(3), (index + 3).min(fixes.len() - 1));
-    let moved_m = recording.way_m[fixes[other].row] - recording.way_m[fixes[one].row];
+    let moved_m = recording.travelled_m[fixes[other].row] - recording.travelled_m[fixes[one].row];
     let (from, to) = (fixes[one].at_m, fixes[other].at_m);
     let length_m = distance_squared(from, to).sqrt();
     if moved_m < 10.0 || length_m < 10.0 {
@@ -134,17 +148,17 @@ fn offsets(recording: &Recording, fixes: &[Fix], index: usize, way: &Way) -> Opt
     }
     let along = [(to[0] - from[0]) / length_m, (to[1] - from[1]) / length_m];
     let fix = fixes[index];
-    let mut near: Vec<(usize, f64)> = way
-        .nodes_near(fix.at_m, SAME_WAY_M)
+    let mut near: Vec<(usize, f64)> = alignment
+        .nodes_near(fix.at_m, SAME_ALIGNMENT_M)
         .filter(|&(node, _)| {
-            let [x, y] = way.direction(node as f64 * way.step_m());
+            let [x, y] = alignment.direction(node as f64 * alignment.step_m());
             x * along[0] + y * along[1] > 0.6
         })
         .collect();
     near.sort_by(|one, other| one.1.total_cmp(&other.1));
     let mut offsets: Vec<f64> = Vec::new();
     for (node, _) in near {
-        let offset = node as f64 * way.step_m() - recording.way_m[fix.row];
+        let offset = node as f64 * alignment.step_m() - recording.travelled_m[fix.row];
         if offsets.iter().all(|known| (known - offset).abs() > 2.0 * WINDOW_M) {
             offsets.push(offset);
         }

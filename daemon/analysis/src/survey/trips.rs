@@ -1,7 +1,7 @@
 //! One-way trips along the line, and what of the recordings is none.
 
 use super::chainage::{Chained, Estimate, WheelsAndLag, chain};
-use super::line::{Pass, Ways};
+use super::line::{Alignments, Pass};
 use super::recording::Recording;
 use super::tracking::follow;
 
@@ -21,7 +21,7 @@ pub struct Trip {
     pub is_fit: bool,
     /// 1 while the chainage grows, -1 while it falls.
     pub direction: i8,
-    /// Place in m along the way of its direction, from its first row on.
+    /// Place in m along the alignment of its direction, from its first row on.
     pub along: Chained,
 }
 
@@ -52,13 +52,17 @@ pub struct NotUsed {
 }
 
 /// Gives every pass its chainage; what the fit runs show of wheels and lag comes with it.
-pub fn trips(passes: &[Pass], ways: &Ways, recordings: &[Recording]) -> (Vec<Trip>, WheelsAndLag) {
+pub fn trips(
+    passes: &[Pass],
+    alignments: &Alignments,
+    recordings: &[Recording],
+) -> (Vec<Trip>, WheelsAndLag) {
     let placed: Vec<_> = passes
         .iter()
         .map(|pass| {
             let recording = &recordings[pass.rows.recording];
-            let way = ways.of(pass.direction)?;
-            let placed = follow(recording, pass.rows.rows.clone(), way);
+            let alignment = alignments.of(pass.direction)?;
+            let placed = follow(recording, pass.rows.rows.clone(), alignment);
             let rows = with_stands(recording, pass.rows.rows.clone());
             let alone = chain(recording, rows.clone(), &placed, WheelsAndLag::UNKNOWN)?;
             Some((rows, placed, alone.learned))
@@ -106,14 +110,15 @@ pub fn trips(passes: &[Pass], ways: &Ways, recordings: &[Recording]) -> (Vec<Tri
 /// The rows with the stands before and after them.
 fn with_stands(recording: &Recording, rows: std::ops::Range<usize>) -> std::ops::Range<usize> {
     let near = |row: usize, from: usize| {
-        let (way_m, time_s) = (&recording.way_m, &recording.raw.time_s);
-        (way_m[row] - way_m[from]).abs() < REACH.0 && (time_s[row] - time_s[from]).abs() < REACH.1
+        let (travelled_m, time_s) = (&recording.travelled_m, &recording.raw.time_s);
+        (travelled_m[row] - travelled_m[from]).abs() < REACH.0
+            && (time_s[row] - time_s[from]).abs() < REACH.1
     };
     let (mut first, mut last) = (rows.start, rows.end - 1);
     while first > 0 && near(first - 1, rows.start) {
         first -= 1;
     }
-    while last + 1 < recording.way_m.len() && near(last + 1, rows.end - 1) {
+    while last + 1 < recording.travelled_m.len() && near(last + 1, rows.end - 1) {
         last += 1;
     }
     first..last + 1
@@ -142,7 +147,7 @@ pub fn not_used(trips: &[Trip], recordings: &[Recording]) -> Vec<NotUsed> {
 }
 
 fn reason(recording: &Recording, rows: std::ops::Range<usize>) -> &'static str {
-    let moved_m = recording.way_m[rows.end - 1] - recording.way_m[rows.start];
+    let moved_m = recording.travelled_m[rows.end - 1] - recording.travelled_m[rows.start];
     let fixes = recording.fixes.iter().filter(|fix| rows.contains(&fix.row)).count();
     match (moved_m < 50.0, fixes < 10) {
         (true, _) => "stands at an end of the line",

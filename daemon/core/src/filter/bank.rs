@@ -119,13 +119,13 @@ impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
 
     /// Its place.
     #[inline]
-    pub fn likeliest_place(&self) -> usize {
+    pub fn likeliest_index(&self) -> usize {
         self.likeliest
     }
 
     /// Takes a hypothesis for the likeliest until the bank settles, whatever its weight.
-    pub fn believe(&mut self, place: usize) {
-        self.likeliest = place;
+    pub fn believe(&mut self, index: usize) {
+        self.likeliest = index;
     }
 
     /// Finds the likeliest, gives it the weight [`Evidence::LIKELIEST`] and the others theirs in
@@ -147,9 +147,9 @@ impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
     pub fn shares(&self, counts: impl Fn(&H) -> bool) -> [f64; MAX] {
         let mut shares = [0.0; MAX];
         let mut sum = 0.0;
-        for (place, _) in self.hypotheses.iter().enumerate().filter(|(_, it)| counts(it)) {
-            shares[place] = E::probability(self.weights[place]);
-            sum += shares[place];
+        for (index, _) in self.hypotheses.iter().enumerate().filter(|(_, it)| counts(it)) {
+            shares[index] = E::probability(self.weights[index]);
+            sum += shares[index];
         }
         if sum > 0.0 {
             shares.iter_mut().for_each(|share| *share /= sum);
@@ -172,26 +172,26 @@ impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
     /// # Panics
     ///
     /// When there is none next.
-    pub fn unite(&mut self, place: usize, (both, weight): (H, f64)) {
-        self.drop(place + 1);
-        self.hypotheses[place] = both;
-        self.weights[place] = weight;
+    pub fn unite(&mut self, index: usize, (both, weight): (H, f64)) {
+        self.drop(index + 1);
+        self.hypotheses[index] = both;
+        self.weights[index] = weight;
         self.find_likeliest();
     }
 
     /// Drops every hypothesis whose weight is not above a bound, or not a number.
     #[inline]
     pub fn drop_up_to(&mut self, bound: f64) {
-        for place in (0..self.hypotheses.len()).rev() {
-            if !(self.weights[place] > bound) {
-                self.drop(place);
+        for index in (0..self.hypotheses.len()).rev() {
+            if !(self.weights[index] > bound) {
+                self.drop(index);
             }
         }
     }
 
-    fn drop(&mut self, place: usize) {
-        self.hypotheses.remove(place);
-        self.weights.copy_within(place + 1.., place);
+    fn drop(&mut self, index: usize) {
+        self.hypotheses.remove(index);
+        self.weights.copy_within(index + 1.., index);
         self.weights[MAX - 1] = E::NONE;
         self.find_likeliest();
     }

@@ -15,9 +15,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// Place of the level among the unknowns.
+/// Index of the level among the unknowns.
 pub const LEVEL: usize = 0;
-/// Place of the bias among the unknowns.
+/// Index of the bias among the unknowns.
 pub const BIAS: usize = 1;
 /// Place where the parameters begin.
 pub const PARAMETERS: usize = 2;

@@ -30,7 +30,7 @@ pub struct FixedLagSmoother<const N: usize, T> {
     /// Ring of at most `capacity` moments.
     moments: Vec<Lagged<N, T>>,
     capacity: usize,
-    /// Place of the oldest moment once the ring is full.
+    /// Index of the oldest moment once the ring is full.
     oldest: usize,
 }
 

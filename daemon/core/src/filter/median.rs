@@ -27,13 +27,13 @@ impl<const L: usize> RunningMedian<L> {
         }
         if self.count == L {
             let oldest = self.newest[self.next];
-            let place = self.sorted[..L].partition_point(|&held| held < oldest);
-            self.sorted.copy_within(place + 1..L, place);
+            let index = self.sorted[..L].partition_point(|&held| held < oldest);
+            self.sorted.copy_within(index + 1..L, index);
             self.count -= 1;
         }
-        let place = self.sorted[..self.count].partition_point(|&held| held < value);
-        self.sorted.copy_within(place..self.count, place + 1);
-        self.sorted[place] = value;
+        let index = self.sorted[..self.count].partition_point(|&held| held < value);
+        self.sorted.copy_within(index..self.count, index + 1);
+        self.sorted[index] = value;
         self.newest[self.next] = value;
         self.next = (self.next + 1) % L;
         self.count += 1;

@@ -119,7 +119,7 @@ impl<const N: usize, const L: usize> Mils<N, L> {
     pub fn remember(&mut self, features: &SVector<f64, N>, observed: f64) {
         self.features[self.next] = *features;
         self.observed[self.next] = observed;
-        self.next = self.place_after(self.next);
+        self.next = self.index_after(self.next);
         self.held = (self.held + 1).min(self.length);
     }
 
@@ -128,12 +128,12 @@ impl<const N: usize, const L: usize> Mils<N, L> {
         (self.next, self.held) = (0, 0);
     }
 
-    fn place_after(&self, place: usize) -> usize {
-        if place + 1 < self.length { place + 1 } else { 0 }
+    fn index_after(&self, index: usize) -> usize {
+        if index + 1 < self.length { index + 1 } else { 0 }
     }
 
-    fn place_before(&self, place: usize) -> usize {
-        place.checked_sub(1).unwrap_or(self.length - 1)
+    fn index_before(&self, index: usize) -> usize {
+        index.checked_sub(1).unwrap_or(self.length - 1)
     }
 
     /// Updates with the remembered rows; gives the newest row's innovation.
@@ -151,13 +151,13 @@ impl<const N: usize, const L: usize> Mils<N, L> {
             Some(weights) => drawn_to_zero(self.belief, &weights)?,
             None => self.belief,
         };
-        let newest = self.place_before(self.next);
+        let newest = self.index_before(self.next);
         let innovation =
             belief.measure_along(&self.features[newest], self.observed[newest], 1.0)?;
-        let mut place = newest;
+        let mut index = newest;
         for _ in 1..self.held {
-            place = self.place_before(place);
-            belief.measure_along(&self.features[place], self.observed[place], 1.0)?;
+            index = self.index_before(index);
+            belief.measure_along(&self.features[index], self.observed[index], 1.0)?;
         }
         self.belief = belief;
         self.updates += 1;

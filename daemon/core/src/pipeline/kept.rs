@@ -135,8 +135,8 @@ impl KeptEstimate {
         wanted: [Parameter; N],
     ) -> Option<(SVector<f64, N>, SMatrix<f64, N, N>)> {
         let mut places = [0; N];
-        for (place, parameter) in places.iter_mut().zip(wanted) {
-            *place = self.parameters().iter().position(|&it| it == parameter)?;
+        for (index, parameter) in places.iter_mut().zip(wanted) {
+            *index = self.parameters().iter().position(|&it| it == parameter)?;
         }
         let units = wanted.map(contract_unit);
         let mean = SVector::from_fn(|i, _| self.values[places[i]] / units[i]);

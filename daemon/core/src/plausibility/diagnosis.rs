@@ -16,7 +16,7 @@ use super::watch::Figures;
 /// Factors of forces within these bounds are effects that a train can have.
 const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
 /// Distance by position over distance by speed within these bounds is wear, gaps and drift.
-const WAY_RATIOS: (f64, f64) = (0.8, 1.25);
+const DISTANCE_RATIOS: (f64, f64) = (0.8, 1.25);
 /// Masses over the declared one within these bounds are loads, as in validation.
 const MASS_RATIOS: (f64, f64) = (0.2, 5.0);
 /// Factors of traction and brake that differ by less are one factor.
@@ -95,11 +95,11 @@ fn is_outside(value: f64, (low, high): (f64, f64)) -> bool {
 
 /// The input fault that explains how position and speed go together.
 fn kinematic(figures: &Figures) -> Option<DetectedFault> {
-    let ratio = figures.way_ratio?;
-    if (-WAY_RATIOS.1..-WAY_RATIOS.0).contains(&ratio) {
+    let ratio = figures.distance_ratio?;
+    if (-DISTANCE_RATIOS.1..-DISTANCE_RATIOS.0).contains(&ratio) {
         return Some(DetectedFault { fault: InputFault::DirectionReversed, factor: ratio });
     }
-    if !(ratio > 0.0) || !is_outside(ratio, WAY_RATIOS) {
+    if !(ratio > 0.0) || !is_outside(ratio, DISTANCE_RATIOS) {
         return None;
     }
     let candidates = [
@@ -183,7 +183,7 @@ fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
     let Some(slope) = figures.slopes.gradient else { return };
     let factor = slope.factor / by;
     if factor < 0.0 {
-        if !is_outside(-factor, WAY_RATIOS) {
+        if !is_outside(-factor, DISTANCE_RATIOS) {
             found.add(InputFault::GradientSign, factor);
         }
         return;

@@ -19,10 +19,10 @@ const MOVING_MPS: f64 = 1.0;
 /// Share of a window that is refused, when any of it is and it counts nevertheless.
 const REFUSED_SHARE_MIN: f64 = 0.9;
 /// Distance in m over which position and speed are compared.
-const WAY_M: f64 = 200.0;
+const COMPARED_M: f64 = 200.0;
 /// Comparisons of position and speed that the median looks back over, and that are enough.
-const WAYS: usize = 21;
-const WAYS_MIN: usize = 5;
+const RATIOS: usize = 21;
+const RATIOS_MIN: usize = 5;
 /// The greatest share of the effort curve loses this share with each window.
 const EFFORT_FADE: f64 = 1.0 / 400.0;
 /// Windows with a mass that are enough to judge it.
@@ -34,7 +34,7 @@ pub struct Figures {
     /// Acceleration over what the forces and the gradient would give.
     pub slopes: Slopes,
     /// Distance by position, counted in the direction of travel, over distance by speed.
-    pub way_ratio: Option<f64>,
+    pub distance_ratio: Option<f64>,
     /// Reported over declared mass.
     pub mass_ratio: Option<f64>,
     /// Greatest traction and brake force lately as shares of their effort curves.
@@ -56,12 +56,12 @@ struct Window {
     traction_mps: f64,
     brake_mps: f64,
     gradient_mps: f64,
-    way_m: f64,
+    travelled_m: f64,
 }
 
 /// Where position and speed are compared from.
 #[derive(Clone, Copy, Debug, Default)]
-struct Way {
+struct Distances {
     by_position_m: f64,
     by_speed_m: f64,
 }
@@ -75,9 +75,9 @@ pub struct Watch {
     usual_step_s: f64,
     gradient_permille: f64,
     window: Window,
-    way: Way,
+    distances: Distances,
     balance: Balance,
-    ways: RunningMedian<WAYS>,
+    distance_ratios: RunningMedian<RATIOS>,
     masses: f64,
     mass_ratio: f64,
     effort_shares: [f64; 2],
@@ -94,9 +94,9 @@ impl Watch {
             usual_step_s: 0.0,
             gradient_permille: 0.0,
             window: Window::default(),
-            way: Way::default(),
+            distances: Distances::default(),
             balance: Balance::default(),
-            ways: RunningMedian::default(),
+            distance_ratios: RunningMedian::default(),
             masses: 0.0,
             mass_ratio: 1.0,
             effort_shares: [0.0; 2],
@@ -143,7 +143,7 @@ impl Watch {
         } else {
             self.window.refused_s += step_s;
         }
-        let is_compared = self.compare_way(&last, sample, step_s);
+        let is_compared = self.compare_distances(&last, sample, step_s);
         self.extend_window(train, &last, sample, step_s) || is_compared
     }
 
@@ -152,7 +152,11 @@ impl Watch {
         let share = |share: f64| (share > 0.0).then_some(share);
         Figures {
             slopes: self.balance.slopes(),
-            way_ratio: if self.ways.count() >= WAYS_MIN { self.ways.median() } else { None },
+            distance_ratio: if self.distance_ratios.count() >= RATIOS_MIN {
+                self.distance_ratios.median()
+            } else {
+                None
+            },
             mass_ratio: (self.masses >= MASSES_MIN).then_some(self.mass_ratio),
             effort_shares: self.effort_shares.map(share),
             braking_pressure_pa: self.pressure.braking_pa(),
@@ -163,24 +167,24 @@ impl Watch {
 
     fn begin(&mut self) {
         self.window = Window::default();
-        self.way = Way::default();
+        self.distances = Distances::default();
     }
 
-    fn compare_way(&mut self, last: &TrainSample, now: &TrainSample, step_s: f64) -> bool {
+    fn compare_distances(&mut self, last: &TrainSample, now: &TrainSample, step_s: f64) -> bool {
         let (Some(from_m), Some(to_m)) =
             (last.get(SampleField::Position), now.get(SampleField::Position))
         else {
-            self.way = Way::default();
+            self.distances = Distances::default();
             return false;
         };
-        self.way.by_position_m += f64::from(now.direction) * (to_m - from_m);
-        self.way.by_speed_m += 0.5 * (last.speed_mps + now.speed_mps) * step_s;
-        let Way { by_position_m, by_speed_m } = self.way;
-        if by_speed_m.max(by_position_m.abs()) < WAY_M {
+        self.distances.by_position_m += f64::from(now.direction) * (to_m - from_m);
+        self.distances.by_speed_m += 0.5 * (last.speed_mps + now.speed_mps) * step_s;
+        let Distances { by_position_m, by_speed_m } = self.distances;
+        if by_speed_m.max(by_position_m.abs()) < COMPARED_M {
             return false;
         }
-        self.ways.push(by_position_m / by_speed_m);
-        self.way = Way::default();
+        self.distance_ratios.push(by_position_m / by_speed_m);
+        self.distances = Distances::default();
         true
     }
 
@@ -209,7 +213,7 @@ impl Watch {
         window.traction_mps += 0.5 * (before.0 + after.0) / mass_kg * step_s;
         window.brake_mps += 0.5 * (before.1 + after.1) / mass_kg * step_s;
         window.gradient_mps += 1e-3 * STANDARD_GRAVITY_MPS2 * self.gradient_permille * step_s;
-        window.way_m += 0.5 * (last.speed_mps + now.speed_mps) * step_s;
+        window.travelled_m += 0.5 * (last.speed_mps + now.speed_mps) * step_s;
         // The margin keeps rounded times from lengthening a window.
         if window.elapsed_s < WINDOW_S * (1.0 - 1e-6) {
             return false;
@@ -230,7 +234,7 @@ impl Watch {
             traction_mps2: window.traction_mps * per_s,
             brake_mps2: window.brake_mps * per_s,
             gradient_mps2: window.gradient_mps * per_s,
-            speed_mps: window.way_m * per_s,
+            speed_mps: window.travelled_m * per_s,
         };
         self.balance.push(&mean);
         self.masses += 1.0;

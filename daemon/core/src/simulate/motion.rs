@@ -53,7 +53,7 @@ pub fn advance(
     };
     let end = acceleration_mps2(step_s, predicted);
     let speed_mps = speed_after(motion.speed_mps, start, end, step_s);
-    let way_m = if speed_mps > 0.0 || motion.speed_mps == 0.0 {
+    let travelled_m = if speed_mps > 0.0 || motion.speed_mps == 0.0 {
         // Exact for an acceleration linear in time.
         let bend_m = step_s * step_s * (start - end) / 12.0;
         (0.5 * step_s * (motion.speed_mps + speed_mps) + bend_m).max(0.0)
@@ -61,7 +61,7 @@ pub fn advance(
         let braking = -0.5 * (start + end);
         (0.5 * motion.speed_mps * motion.speed_mps / braking).min(motion.speed_mps * step_s)
     };
-    Motion { distance_m: motion.distance_m + way_m, speed_mps }
+    Motion { distance_m: motion.distance_m + travelled_m, speed_mps }
 }
 
 #[cfg(test)]

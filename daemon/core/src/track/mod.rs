@@ -15,8 +15,8 @@ pub use profile::{GradientError, LinearProfile, ProfileError, StepProfile};
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
 
 /// Share of a surveyed gradient's error that is still there after a distance in m.
-pub fn gradient_error_kept(way_m: f64) -> f64 {
-    (-2.0 * way_m.abs() / GRADIENT_ERROR_FREE_M).exp()
+pub fn gradient_error_kept(distance_m: f64) -> f64 {
+    (-2.0 * distance_m.abs() / GRADIENT_ERROR_FREE_M).exp()
 }
 
 /// What is known of a line besides its profile: by a survey, or from another project's files.

@@ -20,7 +20,7 @@ pub struct WindowError {
     pub speed: SpeedError,
     /// Of the distance by the predicted speed against the distance by position, over the window's length, in
     /// m/s; what a wrong wheel diameter shows. 0 where no position is known.
-    pub way_mps: f64,
+    pub distance_error_mps: f64,
 }
 
 /// Predicts by one model what the samples of a window should show.
@@ -64,13 +64,14 @@ impl OpenLoop {
         self.prediction.simulate(&recording, &forces, Restart::FullRun);
         WindowError {
             speed: SpeedError::of(&recording, &self.prediction),
-            way_mps: way_error_mps(&recording, self.prediction.speed_mps()).unwrap_or(0.0),
+            distance_error_mps: distance_error_mps(&recording, self.prediction.speed_mps())
+                .unwrap_or(0.0),
         }
     }
 }
 
-/// The difference of the ways over the time that they took; `None` where they cannot be compared.
-fn way_error_mps(recording: &Recording, predicted_mps: &[f64]) -> Option<f64> {
+/// The difference of the distances over the time that they took; `None` where they cannot be compared.
+fn distance_error_mps(recording: &Recording, predicted_mps: &[f64]) -> Option<f64> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let (first, last) = (samples.first()?, samples.last()?);
     let driven_s = time_s.last().copied().filter(|&driven_s| driven_s > 0.0)?;

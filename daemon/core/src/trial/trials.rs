@@ -69,21 +69,21 @@ impl Rival {
 #[derive(Clone, Copy, Debug, Default)]
 struct TripError {
     speed: SpeedError,
-    way_squares: f64,
+    distance_squares: f64,
     windows: f64,
 }
 
 impl TripError {
     fn add(&mut self, window: WindowError) {
         self.speed = self.speed + window.speed;
-        self.way_squares += window.way_mps * window.way_mps;
+        self.distance_squares += window.distance_error_mps * window.distance_error_mps;
         self.windows += 1.0;
     }
 
     /// In (m/s)², of speed and distance together; `None` without a moving sample.
     fn mean_square(self) -> Option<f64> {
         let of_speed = self.speed.rmse_mps()?;
-        Some(of_speed * of_speed + self.way_squares / self.windows)
+        Some(of_speed * of_speed + self.distance_squares / self.windows)
     }
 }
 
@@ -156,8 +156,8 @@ impl Trials {
 
     /// A rival goes into force, and the model in force becomes a rival in its place. What was
     /// measured of both stays, what was compared begins anew.
-    pub fn change(&mut self, place: usize) {
-        std::mem::swap(&mut self.in_force, &mut self.rivals[place]);
+    pub fn change(&mut self, index: usize) {
+        std::mem::swap(&mut self.in_force, &mut self.rivals[index]);
         for model in self.models() {
             model.evidence = Evidence::new(model.evidence.least_gain());
         }

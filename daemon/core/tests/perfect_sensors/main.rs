@@ -81,9 +81,9 @@ fn other_estimators_are_hardly_ever_trusted_and_wrong_while_forces_are_those_of_
     // One in seven of the drives for each kind, others for each.
     let drives = drives(&[Forces::Jumping, Forces::Ramped]);
     let mut all = Found::default();
-    for (place, &kind) in PipelineKind::ALL.iter().enumerate() {
+    for (index, &kind) in PipelineKind::ALL.iter().enumerate() {
         if EstimatorSettings::default_of(kind).is_some() {
-            let own: Vec<Drive> = drives.iter().copied().skip(place % 7).step_by(7).collect();
+            let own: Vec<Drive> = drives.iter().copied().skip(index % 7).step_by(7).collect();
             let found = watch(kind, &own);
             assert!(200 * found.wrong <= found.trusted, "{kind} is trusted and wrong");
             all.trusted += found.trusted;

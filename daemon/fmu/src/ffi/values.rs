@@ -23,9 +23,9 @@ unsafe fn get<T>(
     let all = |model: &mut Model| {
         require(references, count, "the array of value references")?;
         require(values, count, "the array of values")?;
-        for place in 0..count {
+        for index in 0..count {
             // SAFETY: both arrays hold `count` elements, of which this is one.
-            unsafe { values.add(place).write(one(model, references.add(place).read())?) };
+            unsafe { values.add(index).write(one(model, references.add(index).read())?) };
         }
         Ok(())
     };
@@ -47,10 +47,10 @@ unsafe fn set<T: Copy>(
     let all = |model: &mut Model| {
         require(references, count, "the array of value references")?;
         require(values, count, "the array of values")?;
-        for place in 0..count {
+        for index in 0..count {
             // SAFETY: both arrays hold `count` elements, of which this is one.
             let (reference, value) =
-                unsafe { (references.add(place).read(), values.add(place).read()) };
+                unsafe { (references.add(index).read(), values.add(index).read()) };
             one(model, reference, value)?;
         }
         Ok(())
@@ -163,10 +163,10 @@ pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
         require(references, count, "the array of value references")?;
         require(orders, count, "the array of orders")?;
         require(values, count, "the array of values")?;
-        for place in 0..count {
+        for index in 0..count {
             // SAFETY: all arrays hold `count` elements, of which this is one.
             let (reference, order, value) = unsafe {
-                (references.add(place).read(), orders.add(place).read(), values.add(place).read())
+                (references.add(index).read(), orders.add(index).read(), values.add(index).read())
             };
             model.set_slope(reference, (order, value))?;
         }

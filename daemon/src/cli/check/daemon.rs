@@ -97,8 +97,8 @@ fn answers_of<'a>(
     train: &'a TrainConfig,
 ) -> impl Iterator<Item = (&'static str, &'a str)> {
     Quantity::ALL.iter().filter_map(|&quantity| {
-        let place = train.answers.place(quantity)?;
-        Some((quantity.name(), config.pipelines[place].name.as_str()))
+        let pipeline_index = train.answers.pipeline_index(quantity)?;
+        Some((quantity.name(), config.pipelines[pipeline_index].name.as_str()))
     })
 }
 

@@ -130,10 +130,10 @@ impl Pool {
             return None;
         }
         let held_out = ((HELD_OUT_SHARE * count as f64).ceil() as usize).min(count - 1);
-        for (place, (found, run)) in self.runs.iter().zip(&mut self.dataset.runs).enumerate() {
+        for (index, (found, run)) in self.runs.iter().zip(&mut self.dataset.runs).enumerate() {
             run.file.clone_from(&found.name);
-            run.role = if place + held_out < count { Role::Fit } else { Role::Holdout };
-            run.number = place as u32 + 1;
+            run.role = if index + held_out < count { Role::Fit } else { Role::Holdout };
+            run.number = index as u32 + 1;
             run.samples.iter_mut().for_each(|sample| sample.run = run.number);
         }
         Some(self)
@@ -141,9 +141,9 @@ impl Pool {
 
     /// The pool without a run; `None` where too few are left.
     pub fn without(mut self, name: &str) -> Option<Self> {
-        let place = self.runs.iter().position(|run| run.name == name)?;
-        self.runs.remove(place);
-        self.dataset.runs.remove(place);
+        let index = self.runs.iter().position(|run| run.name == name)?;
+        self.runs.remove(index);
+        self.dataset.runs.remove(index);
         self.in_order()
     }
 }
@@ -160,8 +160,8 @@ fn read_run<'m>(
     }
     match head {
         // The description may have changed since the runs were found.
-        Some((_, files, head)) if found.place < head.manifest.runs.len() => {
-            head.read_run(files, found.place).map_err(|error| error.to_string())
+        Some((_, files, head)) if found.index < head.manifest.runs.len() => {
+            head.read_run(files, found.index).map_err(|error| error.to_string())
         }
         _ => Err(format!("{}: no longer described", found.name)),
     }
@@ -183,7 +183,7 @@ mod tests {
         FoundRun {
             name: format!("{day}/{number}"),
             dataset: PathBuf::new(),
-            place: 0,
+            index: 0,
             path: PathBuf::new(),
             recorded: Moment { unix_s: 86_400 * (20_000 + day) + number as u64 },
             sha256: format!("{day}-{number}"),

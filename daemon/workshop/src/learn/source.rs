@@ -31,7 +31,7 @@ pub struct FoundRun {
     /// The folder of its dataset.
     pub dataset: PathBuf,
     /// Its place in the dataset, from 0.
-    pub place: usize,
+    pub index: usize,
     /// Its file.
     pub path: PathBuf,
     /// When it was recorded: by its file or its dataset, else by a day in its path, else when its file was
@@ -167,7 +167,7 @@ fn runs_in(
         }
     };
     let mut runs = Vec::new();
-    for (place, entry) in manifest.runs.iter().enumerate() {
+    for (index, entry) in manifest.runs.iter().enumerate() {
         let path = folder.join(&entry.file);
         // One that is not there yet is there in a later round.
         let Ok((sha256, modified)) = hash_of(&path, memory) else { continue };
@@ -177,7 +177,7 @@ fn runs_in(
             .or_else(|| by_file(&manifest, entry, &path))
             .unwrap_or_else(|| by_path(Path::new(&name), modified));
         let (dataset, described) = (folder.to_path_buf(), described.clone());
-        runs.push(FoundRun { name, dataset, place, path, recorded, sha256, described });
+        runs.push(FoundRun { name, dataset, index, path, recorded, sha256, described });
     }
     runs
 }

@@ -149,7 +149,7 @@ impl SurveyAnswer {
             direction: trip.direction,
             from_s: time_s(trip.recording, trip.rows().start),
             to_s: time_s(trip.recording, trip.rows().end - 1),
-            length_m: survey.ways.chainage_per_m * trip.length_m(),
+            length_m: survey.alignments.chainage_per_m * trip.length_m(),
             left_out_residual_n: left_out(number),
         });
         let not_used = survey.not_used.iter().map(|it| NotUsedAnswer {
@@ -184,11 +184,11 @@ impl SurveyedLine {
             *stds.select_nth_unstable_by(middle, f64::total_cmp).1
         });
         SurveyedLine {
-            length_m: survey.ways.chainage_per_m * survey.ways.growing.length_m(),
+            length_m: survey.alignments.chainage_per_m * survey.alignments.growing.length_m(),
             stops: stops.collect(),
             gradient_std_permille: median,
             passes: survey.profile.as_ref().map_or(0, |profile| profile.trips.len()),
-            is_one_way_for_both: survey.ways.is_one_track(),
+            is_one_way_for_both: survey.alignments.is_one_track(),
         }
     }
 }
@@ -236,7 +236,7 @@ fn cannot_tell(survey: &Survey) -> Vec<String> {
     let trips = |direction: i8| {
         profile.trips.iter().filter(|trip| survey.trips[**trip].direction == direction).count()
     };
-    if trips(1) == 0 || trips(-1) == 0 || !survey.ways.is_one_track() {
+    if trips(1) == 0 || trips(-1) == 0 || !survey.alignments.is_one_track() {
         open.push(
             "a mean gradient against a constant resistance: no place is driven in both \
              directions, so that only GNSS altitude and what is declared part them; curves and \

@@ -46,7 +46,7 @@ pub fn html(
     section("map", "The line", map(survey, answer));
     if let Some(profile) = &survey.profile {
         let mut body = profile_plots(&gradient_entries(survey, profile, 1), "growing chainage")?;
-        if !survey.ways.is_one_track() {
+        if !survey.alignments.is_one_track() {
             body += &profile_plots(&gradient_entries(survey, profile, -1), "falling chainage")?;
         }
         section("profile", "Gradient, with its 95 % band", body);
@@ -72,8 +72,11 @@ fn path(points: impl Iterator<Item = (f64, f64)>) -> String {
 }
 
 fn map(survey: &Survey, answer: &SurveyAnswer) -> String {
-    let ways = &survey.ways;
-    let nodes = [1, -1].into_iter().filter_map(|it| ways.of(it)).flat_map(|way| way.nodes_m());
+    let alignments = &survey.alignments;
+    let nodes = [1, -1]
+        .into_iter()
+        .filter_map(|it| alignments.of(it))
+        .flat_map(|alignment| alignment.nodes_m());
     let all: Vec<[f64; 2]> = nodes.copied().collect();
     let (west, east) = range(all.iter().map(|it| it[0]));
     let (south, north) = range(all.iter().map(|it| it[1]));
@@ -89,8 +92,8 @@ fn map(survey: &Survey, answer: &SurveyAnswer) -> String {
         SIZE.0, SIZE.1
     );
     for (direction, colour) in [(-1, "before"), (1, "after")] {
-        if let Some(way) = ways.of(direction) {
-            let line = path(way.nodes_m().iter().map(|&at| place(at)));
+        if let Some(alignment) = alignments.of(direction) {
+            let line = path(alignment.nodes_m().iter().map(|&at| place(at)));
             let _ = writeln!(
                 svg,
                 "<path d=\"{line}\" fill=\"none\" stroke=\"var(--{colour})\" stroke-width=\"2\"/>"
@@ -98,8 +101,8 @@ fn map(survey: &Survey, answer: &SurveyAnswer) -> String {
         }
     }
     for stop in &answer.line.stops {
-        let Some(way) = ways.of(stop.direction) else { continue };
-        let (x, y) = place(way.at(ways.along_m(stop.direction, stop.chainage_m)));
+        let Some(alignment) = alignments.of(stop.direction) else { continue };
+        let (x, y) = place(alignment.at(alignments.along_m(stop.direction, stop.chainage_m)));
         let _ = writeln!(
             svg,
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"var(--ink)\"><title>{:.0} m {}\
@@ -108,7 +111,7 @@ fn map(survey: &Survey, answer: &SurveyAnswer) -> String {
             escape(&stop.name)
         );
     }
-    let two = ways.falling.as_ref().is_some_and(|falling| !falling.is_same);
+    let two = alignments.falling.as_ref().is_some_and(|falling| !falling.is_same);
     svg + &scale_bar(span)
         + "</svg>\n<p class=\"note\">North is up. "
         + match two {

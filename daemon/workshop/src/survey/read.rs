@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use dynocar_analysis::dataset::{Dataset, ForceSource, Role, Run};
+use dynocar_analysis::survey::alignment::Alignment;
 use dynocar_analysis::survey::common::Prior;
 use dynocar_analysis::survey::geodesy::LocalPlane;
-use dynocar_analysis::survey::line::{FallingWay, Ways};
+use dynocar_analysis::survey::line::{Alignments, FallingAlignment};
 use dynocar_analysis::survey::recording::RawRecording;
-use dynocar_analysis::survey::way::Way;
 use dynocar_analysis::survey::{KnownLine, Vehicle};
 use dynocar_core::track::Track;
 use dynocar_shared::SampleField;
@@ -124,31 +124,35 @@ pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
     let growing = alignment_points(&file).map_err(|problem| wrong(&file, problem))?;
     let middle = growing[growing.len() / 2];
     let plane = LocalPlane::around(middle[1], middle[2], 0.0);
-    let way = |points: &[[f64; 3]]| {
+    let alignment = |points: &[[f64; 3]]| {
         let projected: Vec<_> = points.iter().map(|it| plane.project(it[1], it[2])).collect();
-        Way::through(&projected)
+        Alignment::through(&projected)
     };
     let short = || wrong(&file, "expected a way of some length, got one place".into());
-    let one = way(&growing).ok_or_else(short)?;
+    let one = alignment(&growing).ok_or_else(short)?;
     let chained_m = growing[growing.len() - 1][0] - growing[0][0];
     let chainage_per_m = chained_m / one.length_m();
     let falling = match &track.survey.alignment_falling {
         None => {
             let mut back = growing.clone();
             back.reverse();
-            let way = way(&back).ok_or_else(short)?;
-            let start_chainage_m = way.length_m();
-            FallingWay { way, start_chainage_m, is_same: true }
+            let alignment = alignment(&back).ok_or_else(short)?;
+            let start_chainage_m = alignment.length_m();
+            FallingAlignment { alignment, start_chainage_m, is_same: true }
         }
         Some(name) => {
             let file = folder.join(name);
             let points = alignment_points(&file).map_err(|problem| wrong(&file, problem))?;
-            let way = way(&points).ok_or_else(short)?;
-            FallingWay { way, start_chainage_m: points[0][0] / chainage_per_m, is_same: false }
+            let alignment = alignment(&points).ok_or_else(short)?;
+            FallingAlignment {
+                alignment,
+                start_chainage_m: points[0][0] / chainage_per_m,
+                is_same: false,
+            }
         }
     };
-    let ways = Ways { growing: one, falling: Some(falling), chainage_per_m };
-    Ok((KnownLine { plane, ways }, track))
+    let alignments = Alignments { growing: one, falling: Some(falling), chainage_per_m };
+    Ok((KnownLine { plane, alignments }, track))
 }
 
 /// Rows of chainage in m, latitude and longitude in degrees.

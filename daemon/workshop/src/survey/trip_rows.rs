@@ -79,7 +79,7 @@ pub fn run_csv(material: &Material, trip: &Trip) -> String {
         let sample = &run.samples[ordered[row]];
         let next = ordered.get(row + 1).map(|&next| &run.samples[next]);
         let along_m = trip.along.chainage_m[index];
-        let position_m = material.survey.ways.chainage_m(trip.direction, along_m);
+        let position_m = material.survey.alignments.chainage_m(trip.direction, along_m);
         for (k, column) in columns.iter().enumerate() {
             let value = match column.quantity {
                 Quantity::Position => Some(position_m),

@@ -19,7 +19,7 @@ use dynocar::output::{require_file, write_in_folder};
 const MARK_LENGTH: usize = 20;
 /// What a survey's TOML files begin with.
 const MARK: &str = "# By `dynocar survey`";
-/// A profile reaches beyond its way by so many m.
+/// A profile reaches beyond its alignment by so many m.
 const BEYOND_M: f64 = 60.0;
 
 /// The file of a trip, from its number from 0.
@@ -42,7 +42,7 @@ pub fn write(material: &Material, folder: &Path) -> Result<Vec<PathBuf>, SurveyF
         None => {
             files.push(("track.toml".into(), track_toml(material)));
             files.push(("alignment.csv".into(), alignment(material.survey, 1)));
-            if !material.survey.ways.is_one_track() {
+            if !material.survey.alignments.is_one_track() {
                 files.push(("alignment_falling.csv".into(), alignment(material.survey, -1)));
             }
         }
@@ -159,18 +159,18 @@ pub fn gradient_entries(
     profile: &SurveyedProfile,
     direction: i8,
 ) -> Vec<(f64, f64, f64)> {
-    let ways = &survey.ways;
+    let alignments = &survey.alignments;
     let block = usize::from(direction < 0);
-    let length_m = ways.of(direction).map_or(0.0, |way| way.length_m());
+    let length_m = alignments.of(direction).map_or(0.0, |alignment| alignment.length_m());
     let entries = profile.learned.profile.gradient_permille(block);
     let inside = entries
         .into_iter()
         .filter(|(at_m, ..)| (-BEYOND_M - HEIGHT_STEP_M..length_m + BEYOND_M).contains(at_m));
     let mut list: Vec<(f64, f64, f64)> = inside
         .map(|(at_m, gradient, std)| match direction {
-            1 => (ways.chainage_m(1, at_m), gradient, std),
-            // The cell's end along the way is its start by chainage.
-            _ => (ways.chainage_m(-1, at_m + HEIGHT_STEP_M), -gradient, std),
+            1 => (alignments.chainage_m(1, at_m), gradient, std),
+            // The cell's end along the alignment is its start by chainage.
+            _ => (alignments.chainage_m(-1, at_m + HEIGHT_STEP_M), -gradient, std),
         })
         .collect();
     list.sort_by(|one, other| one.0.total_cmp(&other.0));
@@ -180,8 +180,8 @@ pub fn gradient_entries(
 fn track_toml(material: &Material) -> String {
     let survey = material.survey;
     let Some(profile) = &survey.profile else { return String::new() };
-    let ways = &survey.ways;
-    let length_m = ways.chainage_per_m * ways.growing.length_m();
+    let alignments = &survey.alignments;
+    let length_m = alignments.chainage_per_m * alignments.growing.length_m();
     let name = Value::String(format!("{}, surveyed", material.dataset.name));
     let mut text = TrackText::new(&format!("{MARK} from {} passes.\n", profile.trips.len()));
     text.value("name", name);
@@ -193,12 +193,12 @@ fn track_toml(material: &Material) -> String {
     text.list("gradient", growing.iter().map(entry));
     let stds = growing.iter().step_by(5);
     text.list("gradient_std", stds.map(|it| format!("{:.2}, {:.3}", it.0, it.2.min(149.0))));
-    if !ways.is_one_track() {
+    if !alignments.is_one_track() {
         let falling = gradient_entries(survey, profile, -1);
         text.list("gradient_falling", falling.iter().map(entry));
     }
-    if ways.is_one_track() {
-        let per_m = ways.chainage_per_m;
+    if alignments.is_one_track() {
+        let per_m = alignments.chainage_per_m;
         let entry = |curve: &dynocar_analysis::survey::curves::FoundCurve| {
             let (from_m, to_m) = (per_m * curve.from_m, per_m * curve.to_m);
             format!("{from_m:.1}, {to_m:.1}, {:.1}", curve.radius_m)
@@ -210,7 +210,7 @@ fn track_toml(material: &Material) -> String {
         format!("{:.1}, {name}", stop.chainage_m.value)
     };
     text.list("stops", survey.stops.iter().map(stop));
-    if !ways.is_one_track() {
+    if !alignments.is_one_track() {
         text.value("alignment_falling", "\"alignment_falling.csv\"");
     }
     text.into_text()
@@ -218,9 +218,9 @@ fn track_toml(material: &Material) -> String {
 
 fn alignment(survey: &Survey, direction: i8) -> String {
     let mut text = String::from("chainage_m,latitude_deg,longitude_deg\n");
-    let Some(way) = survey.ways.of(direction) else { return text };
-    for (node, &at_m) in way.nodes_m().iter().enumerate() {
-        let chainage_m = survey.ways.chainage_m(direction, node as f64 * way.step_m());
+    let Some(alignment) = survey.alignments.of(direction) else { return text };
+    for (node, &at_m) in alignment.nodes_m().iter().enumerate() {
+        let chainage_m = survey.alignments.chainage_m(direction, node as f64 * alignment.step_m());
         let [latitude, longitude] = survey.plane.unproject(at_m);
         let _ = writeln!(text, "{chainage_m:.3},{latitude:.8},{longitude:.8}");
     }

@@ -54,8 +54,8 @@ pub fn check(report: &mut Report, folder: &Path) {
     );
     let climbs = outcome.as_ref().map_err(Clone::clone).and_then(|it| found_to_climb(&it.level));
     report.note("bus: its line declared level", climbs);
-    for (place, (label, ..)) in WAYS.iter().enumerate() {
-        let masses = outcome.as_ref().map_err(Clone::clone).map(|it| &it.masses[place]);
+    for (index, (label, ..)) in LEARNERS.iter().enumerate() {
+        let masses = outcome.as_ref().map_err(Clone::clone).map(|it| &it.masses[index]);
         report.note(label, masses.and_then(held));
     }
 }
@@ -64,7 +64,7 @@ pub fn check(report: &mut Report, folder: &Path) {
 type Learn = fn(&Dataset, PipelineKind) -> Masses;
 
 /// How the mass from stop to stop is learned on trips left out.
-const WAYS: [(&str, Learn, PipelineKind); 2] = [
+const LEARNERS: [(&str, Learn, PipelineKind); 2] = [
     ("bus: mass from stop to stop, live", stop_masses::live, PipelineKind::MassKalman),
     ("bus: mass of each section alone", stop_masses::alone, PipelineKind::JointLeastSquares),
 ];
@@ -80,7 +80,7 @@ struct LeftOut {
     errors_mps: Vec<f64>,
     /// From stop to stop, before and after effects, by trip.
     stop_errors_mps: Vec<Vec<[f64; 2]>>,
-    masses: [Masses; WAYS.len()],
+    masses: [Masses; LEARNERS.len()],
     /// The trips mapped as another day's, by pair.
     another_day: Vec<OtherDay>,
     /// Their force from power, by pair.
@@ -158,7 +158,7 @@ fn left_out(folder: &Path, whole: &SurveyAnswer) -> Result<LeftOut, String> {
             let explained = explain(&level, &|_, _| {}).map_err(|error| error.to_string())?;
             all.level = Some(explained.answer);
         }
-        for (masses, (_, learn, kind)) in all.masses.iter_mut().zip(WAYS) {
+        for (masses, (_, learn, kind)) in all.masses.iter_mut().zip(LEARNERS) {
             masses.extend(learn(&mapped, kind));
         }
     }

@@ -78,15 +78,15 @@ fn sections(run: &Run) -> Vec<std::ops::Range<usize>> {
     let samples = &run.samples;
     let mut cuts = vec![0];
     let mut standing_from = None;
-    for (place, sample) in samples.iter().enumerate() {
+    for (index, sample) in samples.iter().enumerate() {
         if sample.speed_mps < STANDING_MPS {
-            standing_from.get_or_insert(place);
+            standing_from.get_or_insert(index);
             continue;
         }
         if let Some(from) = standing_from.take() {
             let stood_s = (sample.time_ns - samples[from].time_ns) as f64 * 1e-9;
             if stood_s >= STOP_S && from > 0 {
-                cuts.push(place - 1);
+                cuts.push(index - 1);
             }
         }
     }
@@ -122,7 +122,7 @@ pub fn live(dataset: &Dataset, kind: PipelineKind) -> Masses {
     let (mut masses, mut sequence) = (Masses::default(), 0);
     for run in held_out(dataset) {
         let sections = sections(run);
-        for (place, sample) in run.samples.iter().enumerate() {
+        for (index, sample) in run.samples.iter().enumerate() {
             sequence += 1;
             let said = pipeline.process(&TrainSample {
                 sequence,
@@ -130,7 +130,7 @@ pub fn live(dataset: &Dataset, kind: PipelineKind) -> Masses {
                 run: run.number,
                 ..uncounted(sample)
             });
-            if let Some(section) = sections.iter().find(|range| range.end == place + 1) {
+            if let Some(section) = sections.iter().find(|range| range.end == index + 1) {
                 masses.take(said, counted_t(&run.samples[section.clone()]));
             }
         }

@@ -27,8 +27,8 @@ pub struct Hour {
 pub fn quantiles(mut values: Vec<u64>) -> (u64, u64) {
     values.sort_unstable();
     let at = |share: f64| {
-        let place = (values.len() as f64 * share) as usize;
-        values.get(place).copied().unwrap_or(0)
+        let index = (values.len() as f64 * share) as usize;
+        values.get(index).copied().unwrap_or(0)
     };
     (at(0.5), at(0.999))
 }

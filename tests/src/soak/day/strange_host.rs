@@ -60,7 +60,7 @@ impl StrangeHost {
         self.set(1, bytes.unwrap_or(-1));
     }
 
-    fn set(&self, place: u64, value: i64) {
-        self.control.write_all_at(&value.to_ne_bytes(), 8 * place).expect("the host's file");
+    fn set(&self, index: u64, value: i64) {
+        self.control.write_all_at(&value.to_ne_bytes(), 8 * index).expect("the host's file");
     }
 }

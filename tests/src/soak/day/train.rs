@@ -55,12 +55,12 @@ impl DayTrain {
     ///
     /// When the files cannot be written or the channels cannot be opened.
     pub fn new(host: &Host, number: u64, seed: u64, folder: &Path) -> Self {
-        let place = number as usize;
-        let kinds = vec![EFFECTS[place % EFFECTS.len()]];
-        let is_poor = place / EFFECTS.len() % 2 == 1;
+        let index = number as usize;
+        let kinds = vec![EFFECTS[index % EFFECTS.len()]];
+        let is_poor = index / EFFECTS.len() % 2 == 1;
         let poor = Defects { outliers: 0.02, ..Defects::ALL };
         let simulated = simulate(&SimulatorSettings {
-            train_type: Some(TrainType::ALL[place % TrainType::ALL.len()]),
+            train_type: Some(TrainType::ALL[index % TrainType::ALL.len()]),
             runs: RUNS,
             defects: if is_poor { poor } else { Defects::NONE },
             ..SimulatorSettings::new(seed + number, EffectRequest::Kinds(kinds))

@@ -1,5 +1,5 @@
 //! A declared gradient that is wrong by a function of the chainage: the same in every passage, with
-//! opposite forces in the two directions, or of each direction its own where they have ways of
+//! opposite forces in the two directions, or of each direction its own where they have alignments of
 //! their own.
 //!
 //! The function is linear between nodes. Before the data it is a Gaussian process whose
@@ -51,7 +51,7 @@ impl Effect for GradientError {
 
     fn propose(&self, scan: &Scan) -> Proposal {
         let runs = &scan.problem.runs;
-        let span_m = span_m(scan).filter(|_| scan.problem.way_ratio.is_some());
+        let span_m = span_m(scan).filter(|_| scan.problem.distance_ratio.is_some());
         let Some(span_m) = span_m.filter(|[low, high]| high > low) else {
             return Proposal::NotTestable("positions are not measured".into());
         };
@@ -64,10 +64,11 @@ impl Effect for GradientError {
         if is_level && leaves_a_force(scan) {
             let towards = |direction| runs.iter().filter(|run| run.direction == direction).count();
             let may_part = towards(1.0).min(towards(-1.0)) >= RUNS_MIN;
-            let ways = if may_part { 1..=2 } else { 1..=1 };
+            let directions = if may_part { 1..=2 } else { 1..=1 };
             for scale in UNSURVEYED {
-                let of = |ways| Profile::new(span_m, scale, ways, false);
-                profiles.extend(ways.clone().map(of).filter(|it| it.apart_m() <= scale.length_m));
+                let of = |directions| Profile::new(span_m, scale, directions, false);
+                profiles
+                    .extend(directions.clone().map(of).filter(|it| it.apart_m() <= scale.length_m));
             }
         }
         let choice_cost = 2.0 * (profiles.len() as f64).ln();
@@ -88,16 +89,16 @@ pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
 }
 
 /// Inverse covariance of an Ornstein-Uhlenbeck process at `count` equally distant nodes, for each
-/// of some ways.
+/// of one or two directions.
 fn prior_information(
     count: usize,
-    ways: usize,
+    directions: usize,
     apart_m: f64,
     ErrorScale { permille, length_m }: ErrorScale,
 ) -> DMatrix<f64> {
     let rho = (-apart_m / length_m).exp();
     let scale = (permille.powi(2) * (1.0 - rho * rho)).recip();
-    DMatrix::from_fn(ways * count, ways * count, |i, j| match i.abs_diff(j) {
+    DMatrix::from_fn(directions * count, directions * count, |i, j| match i.abs_diff(j) {
         _ if i / count != j / count => 0.0,
         0 if i % count == 0 || (i + 1) % count == 0 => scale,
         0 => scale * (1.0 + rho * rho),
@@ -112,14 +113,19 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 impl Profile {
-    fn new([low_m, high_m]: [f64; 2], scale: ErrorScale, ways: usize, is_one_way: bool) -> Self {
+    fn new(
+        [low_m, high_m]: [f64; 2],
+        scale: ErrorScale,
+        directions: usize,
+        is_one_way: bool,
+    ) -> Self {
         let nodes = (high_m - low_m) * NODES_A_LENGTH / scale.length_m + 1.0;
         let count = nodes.floor().clamp(NODES_MIN, NODES_MAX);
         let apart_m = (high_m - low_m) / (count - 1.0);
         let nodes_m: Vec<f64> = (0..count as usize).map(|k| low_m + apart_m * k as f64).collect();
         Profile {
-            parameters: vec![gradient::ERROR_PARAMETER; ways * nodes_m.len()],
-            information: prior_information(nodes_m.len(), ways, apart_m, scale),
+            parameters: vec![gradient::ERROR_PARAMETER; directions * nodes_m.len()],
+            information: prior_information(nodes_m.len(), directions, apart_m, scale),
             nodes_m,
             is_one_way,
             choice_cost: 0.0,
@@ -144,11 +150,11 @@ impl Profile {
     }
 
     fn error(&self, values: &[f64]) -> Option<track::GradientError> {
-        let mut ways = values.chunks(self.nodes_m.len()).map(|values| {
+        let mut directions = values.chunks(self.nodes_m.len()).map(|values| {
             LinearProfile::new(self.nodes_m.iter().copied().zip(values.iter().copied()).collect())
         });
-        let profile = ways.next()?.ok()?;
-        let falling = ways.next().transpose().ok()?;
+        let profile = directions.next()?.ok()?;
+        let falling = directions.next().transpose().ok()?;
         Some(track::GradientError { profile, falling })
     }
 }
@@ -214,7 +220,7 @@ impl Hypothesis for Profile {
 
     fn gradient_permille(&self, parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
         let nodes = self.nodes_m.len();
-        let (is_two_ways, is_growing) = (self.parameters.len() > nodes, parameter < nodes);
+        let (has_two_directions, is_growing) = (self.parameters.len() > nodes, parameter < nodes);
         let (at_m, last_m) = (self.nodes_m[parameter % nodes], self.nodes_m[nodes - 1]);
         let apart_m = self.apart_m();
         let share = |position_m: f64| {
@@ -224,7 +230,7 @@ impl Hypothesis for Profile {
         };
         permille.clear();
         permille.extend(run.samples().iter().map(|sample| match sample.position_m {
-            Some(_) if is_two_ways && is_growing != (sample.direction > 0.0) => 0.0,
+            Some(_) if has_two_directions && is_growing != (sample.direction > 0.0) => 0.0,
             Some(position_m) => sample.direction * share(position_m),
             None => 0.0,
         }));

@@ -60,7 +60,7 @@ impl Effect for LocalResistance {
     }
 
     fn propose(&self, scan: &Scan) -> Proposal {
-        if scan.problem.way_ratio.is_none() {
+        if scan.problem.distance_ratio.is_none() {
             return Proposal::NotTestable("positions are not measured".into());
         }
         let shape = |run: &RunData, i: usize| -scan.per_unit_resistance_mps2(&run.samples()[i]);

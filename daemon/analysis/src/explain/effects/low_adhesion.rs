@@ -112,7 +112,7 @@ fn places(
     if everywhere.gain > 0.0 {
         candidates.push(candidate(&everywhere, None));
     }
-    if scan.problem.way_ratio.is_some()
+    if scan.problem.distance_ratio.is_some()
         && let Some(found) = find(scan, shape, Inside::Centre, true)
     {
         candidates.push(candidate(&found, Some(found.sections())));

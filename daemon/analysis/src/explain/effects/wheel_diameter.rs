@@ -20,7 +20,7 @@ impl Effect for WheelDiameter {
     }
 
     fn propose(&self, scan: &Scan) -> Proposal {
-        if scan.problem.way_ratio.is_none() {
+        if scan.problem.distance_ratio.is_none() {
             return Proposal::NotTestable("no measured positions to compare the speed with".into());
         }
         Proposal::Candidates(vec![Candidate::new(Scale, vec![1.0])])

@@ -100,14 +100,16 @@ impl Hypothesis for ByRun {
     }
 
     fn contradiction(&self, parameters: &[f64]) -> Option<&'static str> {
-        let winds = || self.runs.iter().zip(parameters).map(|((_, way), wind)| (*way, *wind));
-        let mean = |way: f64| {
-            let own: Vec<f64> = winds().filter(|it| it.0 == way).map(|it| it.1).collect();
+        let winds =
+            || self.runs.iter().zip(parameters).map(|((_, direction), wind)| (*direction, *wind));
+        let mean = |direction: f64| {
+            let own: Vec<f64> = winds().filter(|it| it.0 == direction).map(|it| it.1).collect();
             (own.iter().sum::<f64>() / own.len() as f64, own.len() as f64)
         };
         let ((plus, plus_runs), (minus, minus_runs)) = (mean(1.0), mean(-1.0));
         let (along, ahead) = (0.5 * (plus + minus), 0.5 * (plus - minus));
-        let away = |(way, wind): (f64, f64)| wind - if way > 0.0 { plus } else { minus };
+        let away =
+            |(direction, wind): (f64, f64)| wind - if direction > 0.0 { plus } else { minus };
         let freedom = (plus_runs + minus_runs - 2.0).max(1.0);
         let scatter = (winds().map(|it| away(it).powi(2)).sum::<f64>() / freedom).sqrt();
         let may_be = along.abs().max(scatter).max(wind::LEAST_MPS);

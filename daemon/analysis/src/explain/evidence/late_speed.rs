@@ -1,6 +1,6 @@
 //! The position against the integrated speed, in time: what shows a speed that is late.
 //!
-//! Behind a speed that is late by some time, the way by position is ahead of the way by integrated
+//! Behind a speed that is late by some time, the distance by position is ahead of the distance by integrated
 //! speed by as much as the train drives in that time: more, the faster it is. An odometer that is late
 //! with the speed does not show it, so that only a position ahead says something.
 
@@ -39,7 +39,7 @@ pub(super) fn by_part_s(recording: &Recording) -> Vec<f64> {
     parts
 }
 
-/// By how many s the speed is late in a part: what of the way that it misses goes with the speed, and
+/// By how many s the speed is late in a part: what of the distance that it misses goes with the speed, and
 /// not with the way as a wheel's diameter does.
 fn late_s(recording: &Recording, from: usize, end: usize) -> Option<f64> {
     let (samples, time_s) = (&recording.samples()[from..end], &recording.time_s()[from..end]);
@@ -90,7 +90,7 @@ mod tests {
     use dynocar_core::force::ResolvedSample;
     use dynocar_core::simulate::BridgeLimits;
 
-    /// Speed and way of a train that goes from stand to stand in 120 s.
+    /// Speed and distance of a train that goes from stand to stand in 120 s.
     fn true_motion(time_s: f64) -> (f64, f64) {
         let angle = std::f64::consts::TAU * time_s.clamp(0.0, 120.0) / 120.0;
         (10.0 * (1.0 - angle.cos()), 10.0 * (time_s.clamp(0.0, 120.0) - angle.sin() * 19.098_593))

@@ -10,6 +10,7 @@
 mod bins;
 mod cleaning;
 mod criterion;
+mod distance_ratio;
 mod fade;
 mod fit;
 mod late_speed;
@@ -22,7 +23,6 @@ mod run_scatter;
 mod sample_forces;
 #[cfg(test)]
 mod test_runs;
-mod way;
 mod whitener;
 
 pub use bins::Bin;

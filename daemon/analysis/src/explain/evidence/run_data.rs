@@ -11,9 +11,9 @@ use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};
 
 use super::bins::{self, Bin};
 use super::cleaning;
+use super::distance_ratio::distance_ratio;
 use super::late_speed;
 use super::sample_forces::SampleForces;
-use super::way::way_ratio;
 
 /// A run, ready for fitting and for open-loop simulation.
 #[derive(Clone, Debug)]
@@ -36,9 +36,9 @@ pub struct RunData {
     covariates: Vec<Vec<f64>>,
     /// The bins of all segments of motion, in order of time.
     pub bins: Vec<Bin>,
-    /// Way by position over way by integrated speed, with its standard deviation, where
+    /// Distance by position over distance by integrated speed, with its standard deviation, where
     /// positions are measured.
-    pub way_ratio: Option<(f64, f64)>,
+    pub distance_ratio: Option<(f64, f64)>,
     /// Seconds by which the speed is late by the position, for each part from stand to stand; empty
     /// where no positions are measured.
     pub speed_late_s: Vec<f64>,
@@ -157,7 +157,7 @@ fn prepare_run(
     let covariates = Covariate::ALL.iter().map(of_samples).collect();
     let bins = bins::bins(&recording);
     let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
-    let way_ratio = if is_position_recorded { way_ratio(&recording) } else { None };
+    let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
     let speed_late_s = match is_position_recorded {
         true => late_speed::by_part_s(&recording),
         false => Vec::new(),
@@ -173,7 +173,7 @@ fn prepare_run(
         smooth_mps,
         covariates,
         bins,
-        way_ratio,
+        distance_ratio,
         speed_late_s,
         is_position_recorded,
         power,

@@ -28,7 +28,7 @@ pub enum Reach {
 pub struct End {
     /// What it is a value of.
     pub axis: Axis,
-    /// The interval or window, by its place in the list.
+    /// The interval or window, by its index in the list.
     pub part: usize,
     /// True for the upper or later end.
     pub is_upper: bool,

@@ -33,7 +33,7 @@ struct Cell {
 /// A shape: acceleration in m/s² per unit at a sample of a run, where the force acts in full.
 pub type Shape<'s> = &'s (dyn Fn(&RunData, usize) -> f64 + Sync);
 
-/// A shape at the bins of all fit runs, with the places of the bins.
+/// A shape at the bins of all fit runs, with the indices of the bins.
 struct Places<'s, 'a> {
     scan: &'s Scan<'a>,
     inside: Inside,

@@ -68,10 +68,11 @@ pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
     }
 }
 
-/// Twice the logarithm of the number of ways to take `taken` of `count` runs.
+/// Twice the logarithm of the number of choices of `taken` of `count` runs.
 pub fn subset_cost(count: usize, taken: usize) -> f64 {
-    let ways: f64 = (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
-    2.0 * (ways + (count.max(1) as f64).ln())
+    let ln_choices: f64 =
+        (0..taken).map(|k| ((count - k) as f64 / (k + 1) as f64).ln()).sum::<f64>();
+    2.0 * (ln_choices + (count.max(1) as f64).ln())
 }
 
 #[cfg(test)]

@@ -99,10 +99,10 @@ fn belief(end: &End, cost: &mut dyn FnMut(f64) -> Option<f64>) -> Option<Belief>
 
 /// The way towards a limit up to which an end is not out of the question, in doubling steps.
 fn reached(end: &End, limit: f64, least: f64, cost: &mut dyn FnMut(f64) -> Option<f64>) -> f64 {
-    let way = limit - end.at;
+    let span = limit - end.at;
     let mut step = end.fine;
-    while step < way.abs() {
-        let at = end.at + step * way.signum();
+    while step < span.abs() {
+        let at = end.at + step * span.signum();
         if cost(at).is_none_or(|cost| cost > least + FAR) {
             return at;
         }

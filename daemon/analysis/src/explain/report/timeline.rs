@@ -145,11 +145,11 @@ fn acting(run: &RunData, explanation: &Explanation) -> Vec<ActingEffect> {
         run.samples().get(i)?.position_m
     };
     let mut acting = Vec::new();
-    for (place, effect) in explanation.answer.effects.iter().enumerate() {
+    for (index, effect) in explanation.answer.effects.iter().enumerate() {
         for [from_s, to_s] in Zones::of(effect).acting_s(run) {
             acting.push(ActingEffect {
                 kind: effect.kind.into(),
-                number: place as u32 + 1,
+                number: index as u32 + 1,
                 text: described(effect),
                 from_s,
                 to_s,

@@ -114,7 +114,7 @@ impl<const D: usize> ParticleSmoother<D> {
         for step in 0..steps {
             if step > 0 {
                 self.advance(model, step - 1);
-                let weights = &self.filtered[self.places(step - 1)];
+                let weights = &self.filtered[self.indices(step - 1)];
                 find_ancestors(weights, random.uniform(), &mut self.ancestors);
                 self.move_on(model, step, random);
             } else {
@@ -123,7 +123,7 @@ impl<const D: usize> ParticleSmoother<D> {
                     self.set_state(particle, drawn);
                 }
             }
-            let here = self.places(step);
+            let here = self.indices(step);
             let states = at(&self.states, &here);
             let weights = &mut self.filtered[here];
             let log_likelihood = model.log_likelihood(step);
@@ -137,13 +137,13 @@ impl<const D: usize> ParticleSmoother<D> {
     }
 
     /// Where a step's particles lie in every array.
-    fn places(&self, step: usize) -> Range<usize> {
+    fn indices(&self, step: usize) -> Range<usize> {
         step * self.particles..(step + 1) * self.particles
     }
 
     /// Moves the particles of a step without noise.
     fn advance(&mut self, model: &impl ParticleModel<D>, step: usize) {
-        let here = self.places(step);
+        let here = self.indices(step);
         let states = at(&self.states, &here);
         let advanced = at_mut(&mut self.advanced, &here);
         let advance = model.advance(step);
@@ -157,7 +157,7 @@ impl<const D: usize> ParticleSmoother<D> {
 
     /// The particles of a step: the advanced ones that they come from, with noise.
     fn move_on(&mut self, model: &impl ParticleModel<D>, step: usize, random: &mut Random) {
-        let (before, here) = (self.places(step - 1), self.places(step));
+        let (before, here) = (self.indices(step - 1), self.indices(step));
         let advanced = at(&self.advanced, &before);
         let states = at_mut(&mut self.states, &here);
         let draw_noise = model.draw_noise(step - 1);
@@ -192,16 +192,16 @@ impl<const D: usize> ParticleSmoother<D> {
             self.fill_densities(model, step);
             self.fill_ratios(step)?;
             for (particle, row) in self.densities.chunks_exact(n).enumerate() {
-                let place = here + particle;
-                self.smoothed[place] = self.filtered[place] * lanes::dot(row, &self.ratios);
+                let index = here + particle;
+                self.smoothed[index] = self.filtered[index] * lanes::dot(row, &self.ratios);
             }
         }
         Ok(())
     }
 
     fn fill_densities(&mut self, model: &impl ParticleModel<D>, step: usize) {
-        let advanced = at(&self.advanced, &self.places(step));
-        let successors = at(&self.states, &self.places(step + 1));
+        let advanced = at(&self.advanced, &self.indices(step));
+        let successors = at(&self.states, &self.indices(step + 1));
         model.transition_densities(step, advanced, successors, &mut self.densities);
     }
 
@@ -236,7 +236,7 @@ impl<const D: usize> ParticleSmoother<D> {
     /// [`ParticleSmoother::smooth`], `None` unless the last run reached the step.
     #[cfg(test)]
     pub fn smoothed_moments(&self, step: usize) -> Option<([f64; D], [[f64; D]; D])> {
-        (step < self.steps).then(|| self.moments(step, |place| self.smoothed[place]))
+        (step < self.steps).then(|| self.moments(step, |index| self.smoothed[index]))
     }
 
     /// By how much the next step's state exceeds, on average given every measurement, where this
@@ -249,7 +249,7 @@ impl<const D: usize> ParticleSmoother<D> {
         if step + 1 >= self.steps {
             return None;
         }
-        let (here, next) = (self.places(step), self.places(step + 1));
+        let (here, next) = (self.indices(step), self.indices(step + 1));
         Some(std::array::from_fn(|component| {
             let after = &self.states[component][next.clone()];
             let moved = &self.advanced[component][here.clone()];
@@ -259,43 +259,43 @@ impl<const D: usize> ParticleSmoother<D> {
     }
 
     fn moments(&self, step: usize, weight: impl Fn(usize) -> f64) -> ([f64; D], [[f64; D]; D]) {
-        let places = self.places(step);
+        let indices = self.indices(step);
         let mut mean = [0.0; D];
-        for place in places.clone() {
+        for index in indices.clone() {
             for (mean, states) in mean.iter_mut().zip(&self.states) {
-                *mean += weight(place) * states[place];
+                *mean += weight(index) * states[index];
             }
         }
         let mut covariance = [[0.0; D]; D];
-        for place in places {
+        for index in indices {
             for (i, row) in covariance.iter_mut().enumerate() {
                 for (j, entry) in row.iter_mut().enumerate() {
-                    *entry += weight(place)
-                        * (self.states[i][place] - mean[i])
-                        * (self.states[j][place] - mean[j]);
+                    *entry += weight(index)
+                        * (self.states[i][index] - mean[i])
+                        * (self.states[j][index] - mean[j]);
                 }
             }
         }
         (mean, covariance)
     }
 
-    fn set_state(&mut self, place: usize, state: [f64; D]) {
+    fn set_state(&mut self, index: usize, state: [f64; D]) {
         for (component, value) in state.into_iter().enumerate() {
-            self.states[component][place] = value;
+            self.states[component][index] = value;
         }
     }
 }
 
 /// A step's part of each component.
-fn at<'a, const D: usize>(arrays: &'a [Vec<f64>; D], places: &Range<usize>) -> [&'a [f64]; D] {
-    arrays.each_ref().map(|array| &array[places.clone()])
+fn at<'a, const D: usize>(arrays: &'a [Vec<f64>; D], indices: &Range<usize>) -> [&'a [f64]; D] {
+    arrays.each_ref().map(|array| &array[indices.clone()])
 }
 
 fn at_mut<'a, const D: usize>(
     arrays: &'a mut [Vec<f64>; D],
-    places: &Range<usize>,
+    indices: &Range<usize>,
 ) -> [&'a mut [f64]; D] {
-    arrays.each_mut().map(|array| &mut array[places.clone()])
+    arrays.each_mut().map(|array| &mut array[indices.clone()])
 }
 
 /// Turns logarithms of weights into weights of sum 1; `None` when that cannot be done.

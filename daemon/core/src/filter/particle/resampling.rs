@@ -22,9 +22,9 @@ pub(super) fn find_ancestors(weights: &[f64], offset: f64, ancestors: &mut [usiz
     for (particle, weight) in weights[..last].iter().enumerate() {
         sum += weight;
         // The levels below `sum`: its place among them, rounded up.
-        let place = sum * scale - offset;
-        let whole = place as u32;
-        let below = whole + u32::from(f64::from(whole) < place);
+        let index = sum * scale - offset;
+        let whole = index as u32;
+        let below = whole + u32::from(f64::from(whole) < index);
         ancestors[(below as usize).min(last + 1)] = particle + 1;
     }
     let mut highest = 0;
@@ -44,8 +44,8 @@ mod tests {
         let spacing = weights.iter().sum::<f64>() / weights.len() as f64;
         let (mut ancestor, mut cumulated) = (0, weights[0]);
         (0..weights.len())
-            .map(|place| {
-                let level = (place as f64 + offset) * spacing;
+            .map(|index| {
+                let level = (index as f64 + offset) * spacing;
                 while ancestor + 1 < weights.len() && cumulated <= level {
                     ancestor += 1;
                     cumulated += weights[ancestor];

@@ -38,8 +38,8 @@ impl ParticleModel<2> for Drifting {
         densities: &mut [f64],
     ) {
         let count = advanced[0].len();
-        for (place, density) in densities.iter_mut().enumerate() {
-            let (from, to) = (place / count, place % count);
+        for (index, density) in densities.iter_mut().enumerate() {
+            let (from, to) = (index / count, index % count);
             let square = |c: usize| {
                 let off = (successors[c][to] - advanced[c][from]) / NOISE_STD[c];
                 off * off

@@ -84,22 +84,22 @@ impl Alternative {
 
 impl BaseSolution {
     /// A parameter of the base model: value and variance.
-    pub fn parameter(&self, place: usize) -> (f64, f64) {
-        let unit = BaseVector::from_fn(|i, _| if i == place { 1.0 } else { 0.0 });
+    pub fn parameter(&self, index: usize) -> (f64, f64) {
+        let unit = BaseVector::from_fn(|i, _| if i == index { 1.0 } else { 0.0 });
         let solved = self.forward(unit);
         (solved.dot(&self.reduced), solved.norm_squared())
     }
 
     /// Standard deviation of a parameter of the base model before the rows.
-    pub fn usual_std(&self, place: usize) -> f64 {
-        self.prior_variance[place].sqrt()
+    pub fn usual_std(&self, index: usize) -> f64 {
+        self.prior_variance[index].sqrt()
     }
 
     /// A parameter of the base model that may be unusual, by a standard deviation beyond the usual one: as
     /// it then is; and twice the log-likelihood ratio of that against a usual one, and what it costs.
-    pub fn unusual(&self, place: usize, more_std: f64) -> (Alternative, (f64, f64)) {
-        let (value, variance) = self.parameter(place);
-        let usual = self.prior_variance[place];
+    pub fn unusual(&self, index: usize, more_std: f64) -> (Alternative, (f64, f64)) {
+        let (value, variance) = self.parameter(index);
+        let usual = self.prior_variance[index];
         let own = (1.0 / variance - 1.0 / usual).max(0.0);
         let side = value / variance;
         let prior = usual + more_std * more_std;
@@ -135,8 +135,8 @@ impl BaseSolution {
 
     /// A suspect given the base model.
     pub fn alternative(&self, parameter: usize, prior_std: f64) -> Alternative {
-        let place = parameter - BASE;
-        Alternative::of(self.own[place], self.rest[place], prior_std)
+        let index = parameter - BASE;
+        Alternative::of(self.own[index], self.rest[index], prior_std)
     }
 
     /// What is believed with a suspect, of a prior standard deviation, or without one.
@@ -158,9 +158,9 @@ impl Believed<'_> {
     /// Variance of a sum of parameters by what the rows leave open.
     pub fn variance_of(&self, weights: &Parameters) -> f64 {
         let reduced = self.base.forward(weights.fixed_rows::<BASE>(0).into_owned());
-        let by_suspect = self.suspect.map_or(0.0, |(place, variance)| {
+        let by_suspect = self.suspect.map_or(0.0, |(index, variance)| {
             let weight =
-                weights[BASE + place] - self.base.columns.row(place).transpose().dot(&reduced);
+                weights[BASE + index] - self.base.columns.row(index).transpose().dot(&reduced);
             weight * weight * variance
         });
         reduced.norm_squared() + by_suspect

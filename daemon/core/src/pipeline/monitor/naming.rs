@@ -185,7 +185,7 @@ impl Naming {
         // A force by another law is constant for a while, too; and what leaves large innovations is
         // not all there is.
         let onset = candidate.checked_sub(FIRST_ONSET).filter(|_| is_a_brake);
-        let age = onset.and_then(|place| standing.onsets.age(place));
+        let age = onset.and_then(|index| standing.onsets.age(index));
         let is_short = age.is_some_and(|age| age < CONSTANT_BLOCKS);
         let is_more = standing.left_by_name > self.evidence_min;
         if is_short || is_more || self.unexplained(standing).is_some() {

@@ -19,8 +19,8 @@ impl Onsets {
     }
 
     /// Age of an onset in blocks.
-    pub fn age(&self, place: usize) -> Option<u32> {
-        self.ages[place]
+    pub fn age(&self, index: usize) -> Option<u32> {
+        self.ages[index]
     }
 
     /// The train starts from a stop: the next block opens an onset, which brakes may have dragged
@@ -45,26 +45,26 @@ impl Onsets {
         }
         self.since_newest = 0;
         let free = self.ages.iter().position(Option::is_none);
-        let place = free.unwrap_or_else(|| self.most_redundant(keep));
-        self.ages[place] = Some(0);
-        Some(place)
+        let index = free.unwrap_or_else(|| self.most_redundant(keep));
+        self.ages[index] = Some(0);
+        Some(index)
     }
 
     /// The onset between the two neighbours that lie closest together by the ratio of ages.
     fn most_redundant(&self, keep: Option<usize>) -> usize {
-        let ratio = |place: usize| {
-            let age = self.ages[place].unwrap_or(0);
+        let ratio = |index: usize| {
+            let age = self.ages[index].unwrap_or(0);
             let all = || self.ages.iter().flatten().copied();
             let younger = all().filter(|&other| other < age).max()?;
             let older = all().filter(|&other| other > age).min()?;
             Some(f64::from(younger + SPACING) / f64::from(older + SPACING))
         };
         let mut best = (f64::NEG_INFINITY, 0);
-        for place in (0..ONSETS).filter(|&place| Some(place) != keep) {
-            if let Some(ratio) = ratio(place)
+        for index in (0..ONSETS).filter(|&index| Some(index) != keep) {
+            if let Some(ratio) = ratio(index)
                 && ratio > best.0
             {
-                best = (ratio, place);
+                best = (ratio, index);
             }
         }
         best.1
@@ -86,7 +86,7 @@ mod tests {
             }
             onsets.advance();
         }
-        let mut ages: Vec<u32> = (0..ONSETS).filter_map(|place| onsets.age(place)).collect();
+        let mut ages: Vec<u32> = (0..ONSETS).filter_map(|index| onsets.age(index)).collect();
         ages.sort_unstable();
         assert_eq!(ages.len(), ONSETS);
         assert_eq!(*ages.last().unwrap(), 300);

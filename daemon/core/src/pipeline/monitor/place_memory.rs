@@ -59,8 +59,8 @@ impl PlaceMemory {
 
     /// What the passes before this one left at a place, for travel in a direction.
     pub fn earlier(&self, position_m: f64, direction: f64) -> Earlier {
-        let (place, index) = place(position_m);
-        let cell = &self.cells[place];
+        let (slot, index) = slot(position_m);
+        let cell = &self.cells[slot];
         match cell.index == index {
             true if cell.pass == self.pass => mean_of_both(&cell.earlier, direction),
             true => mean_of_both(&cell.with_pass_closed().earlier, direction),
@@ -74,9 +74,9 @@ impl PlaceMemory {
     ///
     /// Bounded work, no allocation.
     pub fn push(&mut self, position_m: f64, direction: f64, n_per_kn: f64) {
-        let (place, index) = place(position_m);
+        let (slot, index) = slot(position_m);
         let is_growing = direction > 0.0;
-        let cell = &mut self.cells[place];
+        let cell = &mut self.cells[slot];
         if cell.index != index {
             *cell = Cell { index, pass: self.pass, is_growing, ..Cell::default() };
         } else if cell.pass != self.pass || cell.is_growing != is_growing {
@@ -110,7 +110,7 @@ impl Cell {
     }
 }
 
-fn place(position_m: f64) -> (usize, i64) {
+fn slot(position_m: f64) -> (usize, i64) {
     let index = (position_m / CELL_M).floor() as i64;
     (index.rem_euclid(CELLS as i64) as usize, index)
 }

@@ -38,8 +38,8 @@ pub fn units(block: &MomentumBlock, covariates: &Covariates, onsets: &Onsets) ->
     let mut units = Parameters::zeros();
     units.fixed_rows_mut::<UNKNOWNS>(0).copy_from(&block.impulse.fixed_rows::<UNKNOWNS>(1));
     units.fixed_rows_mut::<COVARIATES>(UNKNOWNS).copy_from(covariates);
-    for place in (0..ONSETS).filter(|&place| onsets.age(place).is_some()) {
-        units[FIRST_ONSET + place] = block.impulse[1];
+    for index in (0..ONSETS).filter(|&index| onsets.age(index).is_some()) {
+        units[FIRST_ONSET + index] = block.impulse[1];
     }
     units
 }

@@ -13,9 +13,9 @@ use crate::terms::{SUSPECTS as TERMS, Suspect, USUAL, brake, traction};
 
 /// Columns of the base model: a, b, c, two force scales, the delay, and what else is never exact.
 pub const BASE: usize = UNKNOWNS + USUAL.len();
-/// Place of the load of a run: the true over the given mass less 1.
+/// Index of the load of a run: the true over the given mass less 1.
 pub const LOAD: usize = UNKNOWNS;
-/// Place of the headwind of a run in m/s.
+/// Index of the headwind of a run in m/s.
 pub const DAY_WIND: usize = UNKNOWNS + 1;
 /// Place of what the curve constant lacks, in 1000 N/kN m.
 pub const CURVE: usize = UNKNOWNS + 2;
@@ -28,20 +28,20 @@ pub const SUSPECTS: usize = TERMS.len() + BANDS.len();
 /// These: the terms, and laws of the speed that none of them follows.
 pub const BANK: [Suspect; SUSPECTS] = {
     let mut bank = [BANDS[0]; SUSPECTS];
-    let mut place = 0;
-    while place < SUSPECTS {
-        bank[place] = if place < TERMS.len() { TERMS[place] } else { BANDS[place - TERMS.len()] };
-        place += 1;
+    let mut index = 0;
+    while index < SUSPECTS {
+        bank[index] = if index < TERMS.len() { TERMS[index] } else { BANDS[index - TERMS.len()] };
+        index += 1;
     }
     bank
 };
 /// Columns that come from samples: of the base model what the regression does not hold, and the suspects.
 pub const COVARIATES: usize = USUAL.len() + SUSPECTS;
-/// Place of the first band of speed among the parameters.
+/// Index of the first band of speed among the parameters.
 pub const FIRST_BAND: usize = BASE + TERMS.len();
 /// Onsets of a dragging brake that are kept side by side.
 pub const ONSETS: usize = 12;
-/// Place of the first onset among the parameters.
+/// Index of the first onset among the parameters.
 pub const FIRST_ONSET: usize = BASE + SUSPECTS;
 /// All parameters of the regression.
 pub const PARAMETERS: usize = FIRST_ONSET + ONSETS;
@@ -53,8 +53,8 @@ pub const CANDIDATES: usize = PARAMETERS + 1;
 pub const SEARCHED: usize = UNUSUAL.len() + 1 + CANDIDATES - BASE;
 
 /// The suspect behind a column from samples.
-pub fn covariate(place: usize) -> &'static Suspect {
-    if place < USUAL.len() { &USUAL[place] } else { &BANK[place - USUAL.len()] }
+pub fn covariate(index: usize) -> &'static Suspect {
+    if index < USUAL.len() { &USUAL[index] } else { &BANK[index - USUAL.len()] }
 }
 
 /// The suspect behind a parameter; a, b, c and the brake's scale are none, and stand for the traction's.

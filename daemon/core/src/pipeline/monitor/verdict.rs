@@ -204,7 +204,7 @@ impl Verdict {
     /// Blocks for which a suspect could act; `None` for a brake that was not yet looked for.
     fn age(&self, parameter: usize, evidence: &Evidence) -> Option<u32> {
         match parameter.checked_sub(FIRST_ONSET) {
-            Some(place) => evidence.onsets.age(place),
+            Some(index) => evidence.onsets.age(index),
             None if suspect_of(parameter).changes_at_stops => Some(self.leg_blocks),
             None => Some(evidence.information.count() as u32),
         }

@@ -23,8 +23,8 @@ const PRIOR_STD: f64 = 0.02;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Row {
     count: f64,
-    way: f64,
-    way_square: f64,
+    distance: f64,
+    distance_square: f64,
     offset: f64,
     product: f64,
     last_offset_m: f64,
@@ -36,7 +36,7 @@ struct Going {
     segment: u32,
     direction: f64,
     /// Distance by speed in m since the row began.
-    way_m: f64,
+    travelled_m: f64,
     /// Time in ns and speed in m/s of the newest sample.
     last: (i64, f64),
     /// Chainage less distance where the row began.
@@ -73,9 +73,9 @@ impl WheelScale {
         let Some(going) = going else { return self.restart(sample, position_m) };
         let (last_ns, last_mps) = going.last;
         let step_s = sample.time_ns.saturating_sub(last_ns) as f64 * 1e-9;
-        going.way_m += 0.5 * (last_mps + sample.speed_mps) * step_s;
+        going.travelled_m += 0.5 * (last_mps + sample.speed_mps) * step_s;
         going.last = (sample.time_ns, sample.speed_mps);
-        let offset_m = going.direction * position_m - going.origin_m - going.way_m;
+        let offset_m = going.direction * position_m - going.origin_m - going.travelled_m;
         let expected_m = if going.samples > 0.0 { going.mean_m } else { going.row.last_offset_m };
         if (offset_m - expected_m).abs() > JUMP_M {
             going.strangers += 1;
@@ -87,8 +87,8 @@ impl WheelScale {
         going.strangers = 0;
         going.samples += 1.0;
         going.mean_m += (offset_m - going.mean_m) / going.samples;
-        if going.way_m >= going.next_m {
-            going.row.push(going.way_m - 0.5 * APART_M, going.mean_m);
+        if going.travelled_m >= going.next_m {
+            going.row.push(going.travelled_m - 0.5 * APART_M, going.mean_m);
             going.next_m += APART_M;
             (going.mean_m, going.samples) = (0.0, 0.0);
         }
@@ -103,7 +103,7 @@ impl WheelScale {
         self.going = Some(Going {
             segment: sample.segment,
             direction: sample.direction,
-            way_m: 0.0,
+            travelled_m: 0.0,
             last: (sample.time_ns, sample.speed_mps),
             origin_m: sample.direction * position_m,
             mean_m: 0.0,
@@ -133,12 +133,12 @@ impl WheelScale {
 }
 
 impl Row {
-    fn push(&mut self, way_m: f64, offset_m: f64) {
+    fn push(&mut self, travelled_m: f64, offset_m: f64) {
         self.count += 1.0;
-        self.way += way_m;
-        self.way_square += way_m * way_m;
+        self.distance += travelled_m;
+        self.distance_square += travelled_m * travelled_m;
         self.offset += offset_m;
-        self.product += way_m * offset_m;
+        self.product += travelled_m * offset_m;
         self.last_offset_m = offset_m;
     }
 
@@ -148,8 +148,8 @@ impl Row {
             return (0.0, 0.0);
         }
         let variance = POINT_STD_M * POINT_STD_M;
-        let spread = self.way_square - self.way * self.way / self.count;
-        let slope_side = self.product - self.way * self.offset / self.count;
+        let spread = self.distance_square - self.distance * self.distance / self.count;
+        let slope_side = self.product - self.distance * self.offset / self.count;
         // The measured distance is too long by the error: the offset falls as it grows.
         (spread / variance, -slope_side / variance)
     }
@@ -166,9 +166,10 @@ mod tests {
         let mut wheels = WheelScale::default();
         for (run, direction) in [1.0, -1.0].into_iter().enumerate() {
             for k in 0..2500 {
-                let true_way_m = 20.0 * 0.2 * k as f64;
-                let since_fix_m = if has_balises { true_way_m % 1000.0 } else { true_way_m };
-                let shown_m = true_way_m - since_fix_m + scale * since_fix_m;
+                let true_travelled_m = 20.0 * 0.2 * k as f64;
+                let since_fix_m =
+                    if has_balises { true_travelled_m % 1000.0 } else { true_travelled_m };
+                let shown_m = true_travelled_m - since_fix_m + scale * since_fix_m;
                 wheels.push(&ResolvedSample {
                     segment: run as u32,
                     time_ns: 200_000_000 * k as i64,

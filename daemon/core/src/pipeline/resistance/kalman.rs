@@ -215,15 +215,15 @@ impl ResistanceKalman {
         let change = (now.traction - now.brake) - (before.traction - before.brake);
         let faded = self.force_rate * (-step_s / FORCE_RATE_MEMORY_S).exp();
         self.force_rate = faded.max((change / step_s).abs());
-        let place = FIRST_UNKNOWN + FORCE_DELAY;
-        let delay = self.filter.mean[place];
-        let delay_square = delay * delay + self.filter.covariance[(place, place)];
+        let index = FIRST_UNKNOWN + FORCE_DELAY;
+        let delay = self.filter.mean[index];
+        let delay_square = delay * delay + self.filter.covariance[(index, index)];
         (0.5 * delay_square * self.force_rate / now.inertia).powi(2)
     }
 
     fn judge(&mut self) {
         let noise = self.least_squares.bank.likeliest_noise();
-        let is_other_model = noise.place != self.noise.place;
+        let is_other_model = noise.index != self.noise.index;
         self.noise = noise;
         // While rows are few, the filter's own tangent may lie far from the truth.
         if (is_other_model || !self.least_squares.is_warm())

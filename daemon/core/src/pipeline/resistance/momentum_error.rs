@@ -7,9 +7,9 @@ use crate::filter::{Propagation, Sighting};
 /// Hidden states of the error: accumulated momentum (or what the overlap brings over), and the
 /// disturbance.
 pub const STATES: usize = 2;
-/// Place of the accumulated momentum.
+/// Index of the accumulated momentum.
 pub const MOMENTUM: usize = 0;
-/// Place of the disturbance.
+/// Index of the disturbance.
 pub const DISTURBANCE: usize = 1;
 
 /// A slow force that the model does not know: an Ornstein-Uhlenbeck process.

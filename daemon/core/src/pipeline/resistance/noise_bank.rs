@@ -40,8 +40,8 @@ pub struct Disturbed {
 /// The likeliest noise model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LikeliestNoise {
-    /// Its place in the bank.
-    pub place: usize,
+    /// Its index in the bank.
+    pub index: usize,
     /// Its disturbance, scaled as the rows say.
     pub disturbance: Disturbance,
     /// Variance of its rows: 1 when all is as modelled.
@@ -68,13 +68,13 @@ impl NoiseBank {
     pub fn new(penalty: &Unknowns, forgetting: f64) -> Self {
         let disturbance = |index: usize| match index.checked_sub(1) {
             None => Disturbance { std_n_per_kn: 0.0, time_s: TIMES_S[0] },
-            Some(place) => Disturbance {
-                std_n_per_kn: STDS_N_PER_KN[place / TIMES_S.len()],
-                time_s: TIMES_S[place % TIMES_S.len()],
+            Some(index) => Disturbance {
+                std_n_per_kn: STDS_N_PER_KN[index / TIMES_S.len()],
+                time_s: TIMES_S[index % TIMES_S.len()],
             },
         };
-        let of_place = |place| NoiseModel::new(disturbance(place), penalty);
-        let mut models = Bank::even((0..MODELS).map(of_place));
+        let of_index = |index| NoiseModel::new(disturbance(index), penalty);
+        let mut models = Bank::even((0..MODELS).map(of_index));
         models.believe(LIKELIEST_AT_FIRST);
         NoiseBank {
             models,
@@ -138,12 +138,12 @@ impl NoiseBank {
             model.accept(&seen, self.forgetting);
         }
         self.renew_penalty();
-        let before = self.models.likeliest_place();
+        let before = self.models.likeliest_index();
         self.weigh();
-        let likeliest = self.models.likeliest_place();
-        for (place, model) in self.models.hypotheses().iter().enumerate() {
-            let matters = self.shares[place] > WEIGHT_MIN || place == likeliest;
-            self.solutions[place] = if matters { model.solution() } else { None };
+        let likeliest = self.models.likeliest_index();
+        for (index, model) in self.models.hypotheses().iter().enumerate() {
+            let matters = self.shares[index] > WEIGHT_MIN || index == likeliest;
+            self.solutions[index] = if matters { model.solution() } else { None };
         }
         self.mixture = self.mix(1.0, self.student_factor());
         before != likeliest
@@ -173,7 +173,7 @@ impl NoiseBank {
 
     /// The likeliest model's own solution; `None` while the rows do not determine it.
     pub fn likeliest_solution(&self) -> Option<Solution> {
-        let cached = self.solutions[self.models.likeliest_place()];
+        let cached = self.solutions[self.models.likeliest_index()];
         cached.or_else(|| self.models.likeliest().solution())
     }
 
@@ -188,7 +188,7 @@ impl NoiseBank {
         let scale = model.scale();
         let Disturbance { std_n_per_kn, time_s } = *model.disturbance();
         let disturbance = Disturbance { std_n_per_kn: std_n_per_kn * scale.sqrt(), time_s };
-        LikeliestNoise { place: self.models.likeliest_place(), disturbance, scale }
+        LikeliestNoise { index: self.models.likeliest_index(), disturbance, scale }
     }
 
     /// The disturbance now, in N/kN for given unknowns, with its standard deviation.
@@ -261,8 +261,8 @@ impl NoiseBank {
         if self.undisturbed().freedom() < 1.0 {
             return;
         }
-        for (place, (model, weight)) in self.models.weighed_mut().enumerate() {
-            *weight = model.log_likelihood() + log_prior(place);
+        for (index, (model, weight)) in self.models.weighed_mut().enumerate() {
+            *weight = model.log_likelihood() + log_prior(index);
         }
         self.models.settle();
         self.shares = self.models.shares(|_| true);

@@ -16,11 +16,11 @@ pub const PARAMETERS: usize = 3;
 /// All that a row depends on: Davis a, b, c, then what is not exactly known of the forces, in
 /// this order: the scale of traction, the scale of the brake, the delay in s of both.
 pub const UNKNOWNS: usize = 6;
-/// Place of the error of the traction force's scale among the unknowns.
+/// Index of the error of the traction force's scale among the unknowns.
 pub const TRACTION_SCALE: usize = 3;
-/// Place of the error of the brake force's scale among the unknowns.
+/// Index of the error of the brake force's scale among the unknowns.
 pub const BRAKE_SCALE: usize = 4;
-/// Place of the delay in s of a force behind its report among the unknowns.
+/// Index of the delay in s of a force behind its report among the unknowns.
 pub const FORCE_DELAY: usize = 5;
 /// Columns of a row: the known part, then what each unknown takes off it.
 pub const COLUMNS: usize = 1 + UNKNOWNS;

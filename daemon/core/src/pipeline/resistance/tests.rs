@@ -62,11 +62,11 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
         let disturbance_std = if seed % 2 == 0 { 0.0 } else { 0.08 };
         let scenario = Scenario { seed, disturbance_std, duration_s: 900.0, ..Scenario::default() };
         let samples = scenario.samples();
-        for (place, name) in KINDS.iter().enumerate() {
+        for (index, name) in KINDS.iter().enumerate() {
             let snapshot = scenario.identify_samples(&kind(name), &samples);
             for speed_mps in [10.0, 20.0] {
                 let error = scenario.normalised_error(&snapshot, speed_mps);
-                held[place] += u32::from(error.abs() < 1.96);
+                held[index] += u32::from(error.abs() < 1.96);
             }
         }
         total += 2;

@@ -118,9 +118,9 @@ impl MotionBank {
         step: &Step,
     ) -> Result<Measured, NotPositiveDefinite> {
         let forgetting = (-step.duration_s / EVIDENCE_MEMORY_S).exp();
-        let likeliest = self.rivals.likeliest_place();
+        let likeliest = self.rivals.likeliest_index();
         let mut measured = None;
-        for (place, (rival, weight)) in self.rivals.weighed_mut().enumerate() {
+        for (index, (rival, weight)) in self.rivals.weighed_mut().enumerate() {
             let Rival { filter, outliers } = rival;
             let noise_variance = noise_variance + filter.transient_variance(step);
             let innovation = filter.belief.innovation(SPEED, speed_mps, noise_variance)?;
@@ -137,7 +137,7 @@ impl MotionBank {
             let evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
             // What is forgotten is the evidence, not what is known beforehand.
             *weight = log_prior + forgetting * (*weight - log_prior) + evidence;
-            if place == likeliest {
+            if index == likeliest {
                 measured = Some(Measured {
                     trust,
                     innovation_mps: innovation.value,
@@ -169,7 +169,7 @@ impl MotionBank {
                 let belief = &filter.belief;
                 mixture.add(
                     share,
-                    &nalgebra::SVector::from(PLACES.map(|place| belief.mean[place])),
+                    &nalgebra::SVector::from(PLACES.map(|index| belief.mean[index])),
                     &nalgebra::SMatrix::from_fn(|i, j| belief.covariance[(PLACES[i], PLACES[j])]),
                 );
             }

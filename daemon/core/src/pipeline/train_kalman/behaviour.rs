@@ -2,15 +2,15 @@
 
 use crate::track::gradient_error_kept;
 
-/// A force of mean zero that fades with time and with the way, and is renewed (Ornstein, Uhlenbeck
+/// A force of mean zero that fades with time and with the distance, and is renewed (Ornstein, Uhlenbeck
 /// 1930), in N/kN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Behaviour {
     /// Standard deviation in N/kN.
     pub std_n_per_kn: f64,
-    /// Correlation time in s; infinite where only the way counts.
+    /// Correlation time in s; infinite where only the distance counts.
     pub time_s: f64,
-    /// True where it fades with the way as a map's error does: see [`gradient_error_kept`].
+    /// True where it fades with the distance as a map's error does: see [`gradient_error_kept`].
     pub is_of_line: bool,
     /// Logarithm of its probability before any sample.
     pub log_prior: f64,
@@ -47,10 +47,11 @@ impl Behaviour {
     ///
     /// Force and stated error are one process here: its variance is the sum of the two, its
     /// correlation over the step their mean weighted by the variances.
-    pub fn over(&self, time_s: f64, way_m: f64, map_std_permille: f64) -> (f64, f64) {
+    pub fn over(&self, time_s: f64, travelled_m: f64, map_std_permille: f64) -> (f64, f64) {
         let own = self.std_n_per_kn.powi(2);
         let map = map_std_permille.powi(2);
-        let on_line = if self.is_of_line || map > 0.0 { gradient_error_kept(way_m) } else { 1.0 };
+        let on_line =
+            if self.is_of_line || map > 0.0 { gradient_error_kept(travelled_m) } else { 1.0 };
         let own_kept = if self.is_of_line { on_line } else { (-time_s / self.time_s).exp() };
         let keep = (own * own_kept + map * on_line) / (own + map);
         (keep, (own + map) * (1.0 - keep * keep))

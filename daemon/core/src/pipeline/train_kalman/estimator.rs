@@ -171,7 +171,7 @@ impl TrainKalman {
         }
         self.learn(&measured, now.speed_mps);
         self.speeds.push(now.speed_mps);
-        self.systematic.see(step.way_m, sample.position_m, now.speed_mps);
+        self.systematic.see(step.travelled_m, sample.position_m, now.speed_mps);
         self.moved_s += step.duration_s;
         self.is_fresh_reset &= self.moved_s < self.moved_min_s;
         self.judge(step.by_wind);

@@ -8,21 +8,21 @@ use crate::pipeline::motion::jump_variance;
 use crate::pipeline::resistance::regression::regressors;
 use crate::pipeline::resistance::sample::UnitSample;
 
-/// Place of the speed in m/s.
+/// Index of the speed in m/s.
 pub const SPEED: usize = 0;
-/// Place of the force that no model knows, in N/kN, retarding.
+/// Index of the force that no model knows, in N/kN, retarding.
 pub const DISTURBANCE: usize = 1;
-/// Place of the declared mass over the true one.
+/// Index of the declared mass over the true one.
 pub const LOAD: usize = 2;
-/// First place of a, b and c, scaled as [`regressors`] are, in N/kN.
+/// First index of a, b and c, scaled as [`regressors`] are, in N/kN.
 pub const RESISTANCE: usize = 3;
-/// Place of the error of the traction force's scale.
+/// Index of the error of the traction force's scale.
 pub const TRACTION_SCALE: usize = 6;
-/// Place of the error of the brake force's scale.
+/// Index of the error of the brake force's scale.
 pub const BRAKE_SCALE: usize = 7;
-/// Place of the delay in s of a force behind its report.
+/// Index of the delay in s of a force behind its report.
 pub const FORCE_DELAY: usize = 8;
-/// Place of the wind along the line in m/s, a headwind where the chainage grows.
+/// Index of the wind along the line in m/s, a headwind where the chainage grows.
 pub const WIND: usize = 9;
 /// Number of states.
 pub const STATES: usize = 10;
@@ -54,7 +54,7 @@ pub struct Step {
     /// Duration in s.
     pub duration_s: f64,
     /// Distance in m.
-    pub way_m: f64,
+    pub travelled_m: f64,
     /// Momentum per weight and speed: s.
     pub inertia: f64,
     /// Impulse of the traction force in N/kN s.
@@ -93,7 +93,7 @@ impl Step {
         let half_s = 0.5 * duration_s;
         Step {
             duration_s,
-            way_m: half_s * (from.speed_mps + to.speed_mps),
+            travelled_m: half_s * (from.speed_mps + to.speed_mps),
             inertia: to.inertia,
             traction: half_s * (from.traction + to.traction),
             brake: half_s * (from.brake + to.brake),
@@ -174,7 +174,7 @@ impl MotionFilter {
         self.belief.rewrite(SPEED, next_mps, &gradient, variance);
 
         let (keep, renewed) =
-            self.behaviour.over(step.duration_s, step.way_m, step.map_std_permille);
+            self.behaviour.over(step.duration_s, step.travelled_m, step.map_std_permille);
         self.belief.fade(DISTURBANCE, keep, renewed);
         for i in 0..COEFFICIENTS {
             self.belief.disturb(RESISTANCE + i, step.drift_variance);
@@ -203,7 +203,7 @@ mod tests {
     fn step() -> Step {
         Step {
             duration_s: 0.2,
-            way_m: 4.0,
+            travelled_m: 4.0,
             inertia: 108.0,
             traction: 11.0,
             brake: 3.0,
@@ -237,21 +237,21 @@ mod tests {
 
     #[test]
     fn the_covariance_moves_by_the_derivatives_of_the_speed() {
-        for place in 0..STATES {
+        for index in 0..STATES {
             let mut certain = filter();
             certain.predict(&step());
             let mut uncertain = filter();
-            uncertain.belief.covariance[(place, place)] = 1.0;
+            uncertain.belief.covariance[(index, index)] = 1.0;
             uncertain.predict(&step());
             let gained = uncertain.belief.covariance[(SPEED, SPEED)]
                 - certain.belief.covariance[(SPEED, SPEED)];
             let mut ahead = filter().belief.mean;
             let mut behind = ahead;
-            ahead[place] += 1e-5;
-            behind[place] -= 1e-5;
+            ahead[index] += 1e-5;
+            behind[index] -= 1e-5;
             let slope = (speed_after(ahead) - speed_after(behind)) / 2e-5;
             // Heun's rule takes the resistance half way: its slope is off in the second order.
-            assert!((gained.sqrt() - slope.abs()).abs() < 1e-4 + 1e-3 * slope.abs(), "{place}");
+            assert!((gained.sqrt() - slope.abs()).abs() < 1e-4 + 1e-3 * slope.abs(), "{index}");
         }
     }
 

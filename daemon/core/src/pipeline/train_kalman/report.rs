@@ -10,7 +10,7 @@ use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::write_parameters;
 use crate::pipeline::resistance::regression::{regressors, unscaling};
 
-/// Place of the load factor among what is published.
+/// Index of the load factor among what is published.
 const LOAD: usize = COEFFICIENTS;
 
 /// A judgement with hysteresis: what is known becomes unknown only well beyond where it became known.

@@ -18,7 +18,7 @@ pub struct Systematic {
     top_mps: f64,
     /// Starts from a standstill, and the distance in m driven altogether.
     starts: f64,
-    way_m: f64,
+    travelled_m: f64,
 }
 
 impl Systematic {
@@ -30,13 +30,13 @@ impl Systematic {
             driven_m: None,
             top_mps: 0.0,
             starts: 0.0,
-            way_m: 0.0,
+            travelled_m: 0.0,
         }
     }
 
     /// Takes in a step of a way in m, where it ends, and the speed there.
-    pub fn see(&mut self, way_m: f64, position_m: Option<f64>, speed_mps: f64) {
-        self.way_m += way_m;
+    pub fn see(&mut self, travelled_m: f64, position_m: Option<f64>, speed_mps: f64) {
+        self.travelled_m += travelled_m;
         self.top_mps = self.top_mps.max(speed_mps);
         if let Some(position_m) = position_m {
             let (low, high) = self.driven_m.unwrap_or((position_m, position_m));
@@ -55,7 +55,7 @@ impl Systematic {
     fn map_variances(&self) -> (f64, f64) {
         let Some((low, high)) = self.driven_m else { return (0.0, 0.0) };
         let line_m = high - low;
-        let between_stops_m = self.way_m / self.starts.max(1.0);
+        let between_stops_m = self.travelled_m / self.starts.max(1.0);
         let pieces = (line_m / GRADIENT_ERROR_FREE_M).max(1.0);
         let stops = (line_m / between_stops_m.max(1.0)).clamp(1.0, self.starts.max(1.0));
         let variance = self.gradient_std_permille.powi(2);

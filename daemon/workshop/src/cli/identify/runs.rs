@@ -100,8 +100,8 @@ fn spread<'a>(estimates: impl Iterator<Item = &'a (f64, f64)> + Clone) -> Option
 }
 
 /// The parameters of an estimator by its place, and the resistance at a speed that all runs drove.
-fn quantities(runs: &[RunAnswer], place: usize) -> Vec<RunColumn> {
-    let answers: Vec<&EstimatorAnswer> = runs.iter().map(|run| &run.estimators[place]).collect();
+fn quantities(runs: &[RunAnswer], index: usize) -> Vec<RunColumn> {
+    let answers: Vec<&EstimatorAnswer> = runs.iter().map(|run| &run.estimators[index]).collect();
     let known = |value: &dyn Fn(&EstimatorAnswer) -> Option<(f64, f64)>| -> Vec<_> {
         answers
             .iter()
@@ -148,9 +148,9 @@ fn common_speed_mps(answers: &[&EstimatorAnswer]) -> Option<f64> {
 /// How much the runs differ, estimator by estimator.
 pub(super) fn spreads(runs: &[RunAnswer]) -> Vec<EstimatorSpread> {
     let Some(first) = runs.first() else { return Vec::new() };
-    let of = |(place, answer): (usize, &EstimatorAnswer)| EstimatorSpread {
+    let of = |(index, answer): (usize, &EstimatorAnswer)| EstimatorSpread {
         name: answer.name,
-        parameters: quantities(runs, place)
+        parameters: quantities(runs, index)
             .into_iter()
             .filter_map(|quantity| Some((quantity.title.clone(), quantity.spread()?)))
             .collect(),

@@ -137,8 +137,8 @@ pub fn stations(scan: &Scan) -> Vec<f64> {
     places.sort_unstable_by(f64::total_cmp);
     let mut stations = vec![low - STATION_M];
     let mut group: Vec<f64> = Vec::new();
-    for place in places.into_iter().chain([f64::INFINITY]) {
-        if group.last().is_some_and(|last| place - last > STATION_M) {
+    for index in places.into_iter().chain([f64::INFINITY]) {
+        if group.last().is_some_and(|last| index - last > STATION_M) {
             let station = group[group.len() / 2];
             // Beyond the last station nobody drives on.
             if station - low > STATION_M && high - station > STATION_M {
@@ -146,7 +146,7 @@ pub fn stations(scan: &Scan) -> Vec<f64> {
             }
             group.clear();
         }
-        group.push(place);
+        group.push(index);
     }
     stations.push(high + STATION_M);
     stations

@@ -26,7 +26,7 @@ fn shape(run: &RunData, index: usize) -> f64 {
 /// Every section between two stations in one direction, with its tuple; none where positions are not
 /// measured, for then the runs share no places.
 pub fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
-    if scan.problem.way_ratio.is_none() {
+    if scan.problem.distance_ratio.is_none() {
         return Vec::new();
     }
     let stations = stations(scan);

@@ -76,8 +76,8 @@ impl<'s> Ground<'s> {
         for step in REFINING_STEPS {
             for factor in 0..best.factors.len() {
                 for number in 0..best.factors[factor].form.numbers().len() {
-                    for way in [-step, step] {
-                        if let Some(other) = self.moved(&best, (factor, number), way)
+                    for change in [-step, step] {
+                        if let Some(other) = self.moved(&best, (factor, number), change)
                             && other.gain > best.gain
                         {
                             best = other;
@@ -90,7 +90,7 @@ impl<'s> Ground<'s> {
     }
 
     /// A shape with one number moved by a share of its range; `None` where that is no form.
-    fn moved(&self, one: &Tried, (factor, number): (usize, usize), way: f64) -> Option<Tried> {
+    fn moved(&self, one: &Tried, (factor, number): (usize, usize), change: f64) -> Option<Tried> {
         let range = self.covariate(one.factors[factor].of)?;
         let mut factors = one.factors.clone();
         let Factor { form, numbers, .. } = &mut factors[factor];
@@ -98,7 +98,7 @@ impl<'s> Ground<'s> {
         if is_exponent && one.holds_exponents {
             return None;
         }
-        numbers[number] += way * if is_exponent { 5.0 } else { range.high - range.low };
+        numbers[number] += change * if is_exponent { 5.0 } else { range.high - range.low };
         form.refusal(*numbers).is_none().then(|| self.tried(factors, one.holds_exponents))
     }
 }

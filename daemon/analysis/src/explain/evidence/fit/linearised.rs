@@ -57,7 +57,7 @@ impl FitProblem {
         theta: &[f64],
         (information, score, cost): (&mut DMatrix<f64>, &mut DVector<f64>, &mut f64),
     ) {
-        if let Some((ratio, deviation)) = self.way_ratio {
+        if let Some((ratio, deviation)) = self.distance_ratio {
             let mut scale = 1.0;
             let mut at = None;
             for (effect, range) in model.effects.iter().zip(model.ranges()) {

@@ -1,6 +1,6 @@
-//! What a model makes of one run, and by its parameters; what has not changed is not reckoned again.
+//! What a model makes of one run, and by its parameters; what has not changed is not computed again.
 //!
-//! Effects are of three ways. Resistances that only add to the others, and gradients, are integrated by
+//! Effects are handled in three ways. Resistances that only add to the others, and gradients, are integrated by
 //! themselves for a unit of what they are proportional to. All others act on the forces together; where that
 //! is one effect in which the forces are affine, two looks at the samples give it for all parameters.
 
@@ -13,9 +13,9 @@ use super::super::response::Response;
 use super::super::run_data::RunData;
 use crate::explain::hypothesis::SharedHypothesis;
 
-/// How an effect is reckoned.
+/// How an effect is handled.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Way {
+enum Handling {
     /// Together with the others.
     Together,
     /// As a resistance of its own.
@@ -24,14 +24,14 @@ enum Way {
     Gradient,
 }
 
-/// An effect with the places of its parameters, and the function of each in which the forces are affine.
+/// An effect with the ranges of its parameters, and the function of each in which the forces are affine.
 type Affine<'m> = (&'m SharedHypothesis, Range<usize>, fn(f64) -> f64);
 
-/// A model with the way in which each of its effects is reckoned.
+/// A model with how each of its effects is handled.
 pub(super) struct Plan<'m> {
     model: &'m UpdatedModel,
     ranges: Vec<Range<usize>>,
-    ways: Vec<Way>,
+    handlings: Vec<Handling>,
 }
 
 /// What is known of one run, for one model.
@@ -64,28 +64,36 @@ impl<'m> Plan<'m> {
     /// Of a model.
     pub fn of(model: &'m UpdatedModel) -> Self {
         let adds_up = model.adds_up();
-        let way = |effect: &SharedHypothesis| match (effect.is_gradient(), effect.only_resists()) {
-            (true, _) if adds_up => Way::Gradient,
-            (_, true) if adds_up => Way::Added,
-            _ => Way::Together,
-        };
-        Plan { model, ranges: model.ranges(), ways: model.effects.iter().map(way).collect() }
+        let handling =
+            |effect: &SharedHypothesis| match (effect.is_gradient(), effect.only_resists()) {
+                (true, _) if adds_up => Handling::Gradient,
+                (_, true) if adds_up => Handling::Added,
+                _ => Handling::Together,
+            };
+        Plan {
+            model,
+            ranges: model.ranges(),
+            handlings: model.effects.iter().map(handling).collect(),
+        }
     }
 
-    /// The effects of a way, by number, with the places of their parameters.
-    fn of_way(&self, way: Way) -> impl Iterator<Item = (usize, &SharedHypothesis, Range<usize>)> {
+    /// The effects handled so, by number, with the ranges of their parameters.
+    fn handled(
+        &self,
+        handling: Handling,
+    ) -> impl Iterator<Item = (usize, &SharedHypothesis, Range<usize>)> {
         let effects = self.model.effects.iter().zip(&self.ranges).enumerate();
-        let own = effects.filter(move |(number, _)| self.ways[*number] == way);
+        let own = effects.filter(move |(number, _)| self.handlings[*number] == handling);
         own.map(|(number, (effect, range))| (number, effect, range.clone()))
     }
 
     fn acts_together(&self) -> impl Fn(usize) -> bool {
-        |number| self.ways[number] == Way::Together
+        |number| self.handlings[number] == Handling::Together
     }
 
     /// The one effect that acts together, with the function in which it is affine.
     fn affine(&self) -> Option<Affine<'_>> {
-        let mut together = self.of_way(Way::Together);
+        let mut together = self.handled(Handling::Together);
         let (_, effect, range) = together.next()?;
         let affine_in = effect.affine_in()?;
         together.next().is_none().then_some((effect, range, affine_in))
@@ -119,12 +127,12 @@ impl RunMemory {
     pub fn predict(&mut self, at: At, bins: &mut Vec<f64>) {
         self.act_together(at);
         self.response(at.declared).bins(at.davis(), bins);
-        for (number, _, range) in at.plan.of_way(Way::Added) {
+        for (number, _, range) in at.plan.handled(Handling::Added) {
             let first = at.theta[range.start];
             let unit = self.added_bins(at, number);
             bins.iter_mut().zip(unit).for_each(|(bin, unit)| *bin += first * unit);
         }
-        for (number, _, range) in at.plan.of_way(Way::Gradient) {
+        for (number, _, range) in at.plan.handled(Handling::Gradient) {
             for (parameter, value) in at.theta[range].iter().enumerate() {
                 let unit = self.gradient_bins(at, number, parameter);
                 bins.iter_mut().zip(unit).for_each(|(bin, unit)| *bin += value * unit);
@@ -138,12 +146,12 @@ impl RunMemory {
         let mut columns = vec![Vec::new(); at.theta.len()];
         self.act_together(at);
         columns[..3].clone_from_slice(&self.response(at.declared).davis);
-        for (number, _, range) in at.plan.of_way(Way::Gradient) {
+        for (number, _, range) in at.plan.handled(Handling::Gradient) {
             for (parameter, i) in range.enumerate() {
                 columns[i].extend_from_slice(self.gradient_bins(at, number, parameter));
             }
         }
-        for (number, effect, range) in at.plan.of_way(Way::Added) {
+        for (number, effect, range) in at.plan.handled(Handling::Added) {
             let first = at.theta[range.start];
             let unit = self.added_bins(at, number).to_vec();
             let mut others = at.theta[range.start + 1..range.end].to_vec();
@@ -177,7 +185,7 @@ impl RunMemory {
             (0..range.len()).any(|parameter| effect.touches(parameter, run))
         };
         if matches!(self.together, Together::Unknown) {
-            if !plan.of_way(Way::Together).any(touches) {
+            if !plan.handled(Handling::Together).any(touches) {
                 self.together = Together::Nothing;
             } else if let Some((effect, range, _)) = plan.affine() {
                 self.together = affine(at, effect, range, &mut self.forces);
@@ -229,7 +237,8 @@ impl RunMemory {
             let (effect, start) = (effect.clone(), range.start);
             range.filter(move |i| effect.touches(i - start, run))
         };
-        let gradients = plan.of_way(Way::Together).filter(|(_, effect, _)| effect.is_gradient());
+        let gradients =
+            plan.handled(Handling::Together).filter(|(_, effect, _)| effect.is_gradient());
         for (_, effect, range) in gradients {
             let start = range.start;
             for i in touched(effect, range) {
@@ -239,7 +248,8 @@ impl RunMemory {
             }
         }
         let mut elsewhere = theta.to_vec();
-        let others = plan.of_way(Way::Together).filter(|(_, effect, _)| !effect.is_gradient());
+        let others =
+            plan.handled(Handling::Together).filter(|(_, effect, _)| !effect.is_gradient());
         for i in others.flat_map(|(_, effect, range)| touched(effect, range)) {
             let step = steps[i - 3];
             elsewhere[i] += step;
@@ -257,7 +267,7 @@ impl RunMemory {
     fn added_bins(&mut self, at: At, number: usize) -> &[f64] {
         let range = at.plan.ranges[number].clone();
         let others = &at.theta[range.start + 1..range.end];
-        self.added.resize_with(at.plan.ways.len(), || None);
+        self.added.resize_with(at.plan.handlings.len(), || None);
         if self.added[number].as_ref().is_none_or(|(known, _)| known != others) {
             let mut bins = self.added[number].take().map_or_else(Vec::new, |(_, bins)| bins);
             self.resist(at, &at.plan.model.effects[number], others, &mut bins);

@@ -41,8 +41,8 @@ pub struct FitProblem {
     scatter_columns: Vec<Columns>,
     /// What is declared makes of each run.
     declared_responses: Vec<Response>,
-    /// Measured way over way by integrated speed, with its standard deviation.
-    pub way_ratio: Option<(f64, f64)>,
+    /// Measured distance over distance by integrated speed, with its standard deviation.
+    pub distance_ratio: Option<(f64, f64)>,
     /// Seconds by which the speed is late by the position, with their standard deviation.
     speed_late_s: Option<(f64, f64)>,
 }
@@ -71,9 +71,9 @@ pub struct Fit {
     pub cost: f64,
     /// Normal equations by run.
     pub runs: Vec<RunNormal>,
-    /// Information of prior and way ratio.
+    /// Information of prior and distance ratio.
     pub prior_information: DMatrix<f64>,
-    /// Score of prior and way ratio.
+    /// Score of prior and distance ratio.
     pub prior_score: DVector<f64>,
     /// Information by which those of a, b, c are held that the data push against their bounds.
     held_information: [f64; 3],
@@ -142,7 +142,7 @@ impl FitProblem {
         let sizes = [declared.a, declared.b, declared.c];
         let prior_deviation =
             std::array::from_fn(|i| PRIOR_SHARE[i] * sizes[i].abs().max(least[i]));
-        let way_ratio = pooled_way_ratio(&runs);
+        let distance_ratio = pooled_distance_ratio(&runs);
         let parts: Vec<f64> =
             runs.iter().flat_map(|run| run.speed_late_s.iter().copied()).collect();
         let speed_late_s = late_speed::pooled_s(&parts);
@@ -154,7 +154,7 @@ impl FitProblem {
             prior_deviation,
             scatter_columns,
             declared_responses,
-            way_ratio,
+            distance_ratio,
             speed_late_s,
         }
     }
@@ -223,9 +223,9 @@ fn declared_response(run: &RunData) -> Response {
 
 /// The ratios of all runs together. Wheel creep, rounding and the places where a run starts are
 /// common to the runs: below `COMMON` nothing is seen.
-fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
+fn pooled_distance_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
     const COMMON: f64 = 0.001;
-    let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.way_ratio?.0)).collect();
+    let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.distance_ratio?.0)).collect();
     if ratios.is_empty() {
         return None;
     }
@@ -236,8 +236,9 @@ fn pooled_way_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
     } else {
         0.5 * (ratios[middle - 1] + ratios[middle])
     };
-    let mean_var: f64 = runs.iter().filter_map(|run| Some(run.way_ratio?.1.powi(2))).sum::<f64>()
-        / ratios.len() as f64;
+    let mean_var: f64 =
+        runs.iter().filter_map(|run| Some(run.distance_ratio?.1.powi(2))).sum::<f64>()
+            / ratios.len() as f64;
     let deviation = (mean_var / ratios.len() as f64 + COMMON * COMMON).sqrt();
     Some((median, deviation))
 }

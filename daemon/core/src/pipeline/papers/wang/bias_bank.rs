@@ -16,11 +16,11 @@ use crate::filter::mixture::Mixture;
 use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::pipeline::motion::{OutlierRow, Trust};
 
-/// Place of the speed in m/s in a filter's state.
+/// Index of the speed in m/s in a filter's state.
 pub const SPEED: usize = 0;
-/// Place of the reference mass over the mass.
+/// Index of the reference mass over the mass.
 pub const INVERSE_MASS: usize = 1;
-/// Place of the bias in m/s².
+/// Index of the bias in m/s².
 pub const BIAS: usize = 2;
 
 /// Number of behaviours.
@@ -200,7 +200,7 @@ impl BiasBank {
         for (_, weight) in self.behaviours.weighed_mut() {
             *weight = weight.max(LOG_WEIGHT_MIN);
         }
-        Ok(judged[self.behaviours.likeliest_place()])
+        Ok(judged[self.behaviours.likeliest_index()])
     }
 
     /// Inverse mass and bias, averaged over the behaviours by their evidence.

@@ -26,7 +26,7 @@ const TYPICAL_N_PER_KN: f64 = 5.0;
 
 /// Number of unknowns: level, bias, inverse mass, z1, z2, z3.
 pub const UNKNOWNS: usize = 12;
-/// Place of the reference mass over the mass.
+/// Index of the reference mass over the mass.
 pub const INVERSE_MASS: usize = PARAMETERS;
 /// Places where the coefficients of z1, z2 and z3 begin.
 pub const POLYNOMIALS: [usize; 3] = [PARAMETERS + 1, PARAMETERS + 4, PARAMETERS + 7];

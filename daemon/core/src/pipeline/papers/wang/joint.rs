@@ -181,7 +181,7 @@ impl JointLeastSquares {
         if Trust::of(expected.normalised).is_outlier() {
             // Impossible to one assumption, as a force that jumps to one that knows of none: it gives
             // way to one under which the speed is possible.
-            let mut place = self.bank.likeliest_place();
+            let mut place = self.bank.likeliest_index();
             for (index, hypothesis) in self.bank.hypotheses().iter().enumerate() {
                 let other = hypothesis.expect(&row, value, variance);
                 let is_possible = !Trust::of(other.normalised).is_outlier();

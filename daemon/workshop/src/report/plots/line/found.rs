@@ -5,7 +5,7 @@ use plotters::element::{PathElement, Rectangle, Text};
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::panel::{Content, Panel, rows, way};
+use super::panel::{Content, Panel, direction_label, rows};
 use crate::report::plots::axes::{Chart, letters, stroke};
 use crate::report::plots::{ACTING, AFTER, PlotError};
 
@@ -26,7 +26,7 @@ pub(super) fn panels(found: &AlongLine) -> Vec<Panel> {
         push("Error of the gradient, found".into(), "‰", Content::Line { points, halves });
     }
     for (direction, bins) in &found.residual {
-        let name = format!("Missing resistance, {}", way(*direction));
+        let name = format!("Missing resistance, {}", direction_label(*direction));
         push(name, "N/kN", Content::Means(*direction, bins.clone()));
     }
     panels

@@ -66,8 +66,8 @@ impl Panel {
                 let mut reading = reading("Chainage", "km", bins, has_effect);
                 // What is not drawn is not read.
                 reading.series.truncate(1 + usize::from(has_effect));
-                let way = way(*direction);
-                reading.series.iter_mut().for_each(|it| it.name += &format!(", {way}"));
+                let direction_label = direction_label(*direction);
+                reading.series.iter_mut().for_each(|it| it.name += &format!(", {direction_label}"));
                 reading
             }
             Content::Line { points, halves } => {
@@ -97,7 +97,7 @@ impl Panel {
 }
 
 /// A direction of travel, in words.
-pub(super) fn way(direction: f64) -> &'static str {
+pub(super) fn direction_label(direction: f64) -> &'static str {
     if direction > 0.0 { "growing chainage" } else { "falling chainage" }
 }
 

@@ -117,14 +117,14 @@ impl JumpBank {
         measured_mps: f64,
     ) -> Option<Innovation> {
         self.spawn(duration_s);
-        let likeliest = self.hypotheses.likeliest_place();
+        let likeliest = self.hypotheses.likeliest_index();
         let mut of_likeliest = None;
-        for (place, (hypothesis, weight)) in self.hypotheses.weighed_mut().enumerate() {
+        for (index, (hypothesis, weight)) in self.hypotheses.weighed_mut().enumerate() {
             hypothesis.predict(rule, step, duration_s, self.doubt.impulse_variance);
             hypothesis.noise.rounding_variance = self.doubt.rounding_variance;
             let innovation = hypothesis.measure(measured_mps, &self.noise, &self.outliers);
             *weight *= if hypothesis.is_sound() { innovation.likelihood } else { 0.0 };
-            if place == likeliest {
+            if index == likeliest {
                 of_likeliest = Some(innovation);
             }
         }
@@ -146,7 +146,7 @@ impl JumpBank {
         let probability = self.since_spawn_s * (-self.jumps.evidence).exp();
         self.since_spawn_s = 0.0;
         if child.jump(&variance) {
-            let likeliest = self.hypotheses.likeliest_place();
+            let likeliest = self.hypotheses.likeliest_index();
             let weight =
                 self.hypotheses.weights()[likeliest] * probability.min(JUMP_PROBABILITY_MAX);
             if self.hypotheses().len() == self.capacity {
@@ -158,11 +158,11 @@ impl JumpBank {
 
     /// Makes one of the two neighbours whose ages differ least in proportion.
     fn unite_closest(&mut self) {
-        let age_s = |place: usize| self.hypotheses()[place].age_s;
+        let age_s = |index: usize| self.hypotheses()[index].age_s;
         let gap = |i: usize| (age_s(i) - age_s(i + 1)) / age_s(i).max(f64::MIN_POSITIVE);
         let places = 0..self.hypotheses().len() - 1;
         let Some(older) = places.min_by(|&i, &j| gap(i).total_cmp(&gap(j))) else { return };
-        let of = |place: usize| (&self.hypotheses()[place], self.hypotheses.weights()[place]);
+        let of = |index: usize| (&self.hypotheses()[index], self.hypotheses.weights()[index]);
         let both = united(of(older), of(older + 1));
         self.hypotheses.unite(older, both);
     }

@@ -1,4 +1,4 @@
-//! Places of the coefficients and the speed in vectors and matrices.
+//! Indices of the coefficients and the speed in vectors and matrices.
 
 use dynocar_shared::Parameter;
 
