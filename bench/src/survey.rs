@@ -20,6 +20,9 @@ pub struct SurveyArguments {
     /// Numbers of passes
     #[arg(long, value_delimiter = ',', default_values_t = [1, 10, 100, 1000])]
     passes: Vec<usize>,
+    /// Write the simulated recordings into this folder
+    #[arg(long, value_name = "FOLDER")]
+    write: Option<PathBuf>,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -62,8 +65,9 @@ pub fn run(arguments: &SurveyArguments) -> Result<(), (String, u8)> {
         ..SimulatorSettings::new(1, EffectRequest::none())
     };
     let folder = tempfile::tempdir().map_err(|error| failed(&error))?;
-    write_dataset(&simulate(&settings), folder.path()).map_err(|error| failed(&error))?;
-    let dataset = dynocar::dataset::load(folder.path()).map_err(|error| failed(&error))?;
+    let raw = arguments.write.as_deref().unwrap_or(folder.path());
+    write_dataset(&simulate(&settings), raw).map_err(|error| failed(&error))?;
+    let dataset = dynocar::dataset::load(raw).map_err(|error| failed(&error))?;
     let (few, vehicle) = (recordings(&dataset), vehicle(&dataset));
     let mut rows = Vec::new();
     for &passes in &arguments.passes {

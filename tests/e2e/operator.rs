@@ -74,7 +74,7 @@ fn a_dragging_brake_is_named_with_its_force_its_place_and_what_to_do() {
         "near_km=\"",
         "dragging_brake for ",
         "evidence ",
-        "to do: look at the next stop whether every brake releases",
+        "to do: at the next stop check that every brake releases",
     ] {
         assert!(line.contains(words), "{words:?} in {line:?} of\n{log}");
     }

@@ -11,7 +11,7 @@ use crate::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
 use crate::event::{EVENT_FIELDS, EventField, EventKind};
 use crate::schema::{
     ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, number, parameter_number,
-    rejection_number, suffixed_name, vocabulary_of_type,
+    rejection_number, vocabulary_of_type,
 };
 
 const HEAD: &str = "# Fields of a recording
@@ -48,34 +48,31 @@ pub fn page() -> String {
     let nested = [("estimate", ESTIMATE, "Estimate"), ("rejected", REJECTED, "Rejected")];
     for (name, number, of_type) in nested {
         let row = Row { name, number: Some(number), of_type, ..Row::default() };
-        row.put(&mut page, true, &format!("By name, see `dynocar.{of_type}`."));
+        row.put(&mut page, Columns::ALL, &format!("By name, see `dynocar.{of_type}`."));
     }
     table(
         &mut page,
         "dynocar.Estimate",
-        "What a pipeline estimates, each missing unless the pipeline estimates it; columns of the snapshots, \
-         under `estimate_` and the name.",
-        false,
+        &format!(
+            "What a pipeline estimates, each missing unless the pipeline estimates it; columns of the \
+             snapshots, under `estimate_` and the name. Each has three more, with a word before the unit and \
+             their number higher by so much: {}.",
+            SUFFIXES.map(|(offset, word, _)| format!("`_{word}` {offset}")).join(", ")
+        ),
+        Columns::PARQUET,
     );
     for column in SNAPSHOTS.iter() {
-        let (name, number) = match column.source {
-            Source::Value(it) => (it.full_name().to_owned(), parameter_number(it)),
-            Source::OfEstimate(it, index) => {
-                let (offset, word, _) = SUFFIXES[index];
-                (suffixed_name(it, word), parameter_number(it) + offset)
-            }
-            _ => continue,
-        };
-        let row = Row::of(column, number, "double");
-        Row { name: &name, ..row }.put(&mut page, false, &column.meaning);
+        let Source::Value(it) = column.source else { continue };
+        let row = Row::of(column, parameter_number(it), "double");
+        Row { name: it.full_name(), ..row }.put(&mut page, Columns::PARQUET, &column.meaning);
     }
     let what = "How many samples a pipeline refused, by reason; columns of the snapshots, under `rejected_` and \
                 the name.";
-    table(&mut page, "dynocar.Rejected", what, false);
+    table(&mut page, "dynocar.Rejected", what, Columns::PARQUET);
     for column in SNAPSHOTS.iter() {
         let Source::Rejected(it) = column.source else { continue };
         let row = Row::of(column, rejection_number(it), "uint32");
-        Row { name: it.name(), ..row }.put(&mut page, false, &column.meaning);
+        Row { name: it.name(), ..row }.put(&mut page, Columns::PARQUET, &column.meaning);
     }
     let columns: Vec<&Column> = EVENTS.iter().collect();
     listed(&mut page, "Event", "What happened around them.", &EVENT_FIELDS, &columns[STAMPS..]);
@@ -87,18 +84,40 @@ pub fn page() -> String {
     page
 }
 
-fn table(page: &mut String, name: &str, what: &str, has_layout: bool) {
-    let (title, line) = if has_layout { (" NumPy |", " --- |") } else { ("", "") };
+/// The columns of a table that not every table has.
+#[derive(Clone, Copy)]
+struct Columns {
+    has_column: bool,
+    has_numpy: bool,
+}
+
+impl Columns {
+    const ALL: Self = Columns { has_column: true, has_numpy: true };
+    const PARQUET: Self = Columns { has_column: true, has_numpy: false };
+    const NONE: Self = Columns { has_column: false, has_numpy: false };
+
+    /// The cells of these columns.
+    fn cells(self, column: &str, numpy: &str) -> String {
+        let cell = |is_there: bool, text: &str| {
+            if is_there { format!(" {text} |") } else { String::new() }
+        };
+        cell(self.has_column, column) + &cell(self.has_numpy, numpy)
+    }
+}
+
+fn table(page: &mut String, name: &str, what: &str, columns: Columns) {
+    let (title, line) = (columns.cells("column", "NumPy"), columns.cells("---", "---"));
     let _ = write!(
         page,
-        "\n## `{name}`\n\n{what}\n\n| field | number | type | column |{title} unit | meaning |\n\
-         | --- | --- | --- | --- |{line} --- | --- |\n"
+        "\n## `{name}`\n\n{what}\n\n| field | number | type |{title} unit | meaning |\n\
+         | --- | --- | --- |{line} --- | --- |\n"
     );
 }
 
 /// A message by the table of its fields, and the columns that they are where they are any.
 fn listed(page: &mut String, name: &str, what: &str, fields: &[EventField], columns: &[&Column]) {
-    table(page, &format!("dynocar.{name}"), &plain(what), false);
+    let shown = if columns.is_empty() { Columns::NONE } else { Columns::PARQUET };
+    table(page, &format!("dynocar.{name}"), &plain(what), shown);
     for (index, it) in fields.iter().enumerate() {
         let of_type = vocabulary_of_type(it.type_name).unwrap_or_else(|| protobuf(it.type_name));
         let (number, unit) = (it.number as u32, unit_of(it.name));
@@ -106,7 +125,7 @@ fn listed(page: &mut String, name: &str, what: &str, fields: &[EventField], colu
             Some(column) => Row::of(column, number, of_type),
             None => Row { name: it.name, number: Some(number), of_type, unit, ..Row::default() },
         };
-        row.put(page, false, it.meaning);
+        row.put(page, shown, it.meaning);
     }
 }
 
@@ -134,15 +153,12 @@ impl<'a> Row<'a> {
         }
     }
 
-    fn put(&self, page: &mut String, has_layout: bool, meaning: &str) {
-        let Row { name, of_type, column, unit, .. } = self;
+    fn put(&self, page: &mut String, shown: Columns, meaning: &str) {
+        let Row { name, of_type, unit, .. } = self;
         let number = self.number.map_or("".to_owned(), |it| it.to_string());
-        let numpy = if has_layout { format!(" {} |", self.numpy) } else { String::new() };
+        let cells = shown.cells(&self.column, &self.numpy);
         let meaning = plain(meaning);
-        let _ = writeln!(
-            page,
-            "| `{name}` | {number} | {of_type} | {column} |{numpy} {unit} | {meaning} |"
-        );
+        let _ = writeln!(page, "| `{name}` | {number} | {of_type} |{cells} {unit} | {meaning} |");
     }
 }
 
@@ -168,13 +184,17 @@ fn protobuf(type_name: &str) -> &'static str {
 }
 
 fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field], &[Column])) {
-    table(page, name, what, true);
+    table(page, name, what, Columns::ALL);
     for field in fields {
         let shape = if field.is_array() { format!("({},)", field.entries()) } else { "".into() };
         let numpy = format!("`{shape}{}` at {}", field.numpy_type(), field.layout.offset);
         let Some(column) = columns.iter().find(|it| it.name == field.layout.name) else {
             let row = Row { name: field.layout.name, numpy, ..Row::default() };
-            row.put(page, true, &format!("{} Elsewhere a value is there or not.", field.meaning));
+            row.put(
+                page,
+                Columns::ALL,
+                &format!("{} Elsewhere a value is there or not.", field.meaning),
+            );
             continue;
         };
         let of_type = column.vocabulary.unwrap_or_else(|| protobuf(field.entry_type()));
@@ -182,23 +202,24 @@ fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field
             if field.is_array() { format!("repeated {of_type}") } else { of_type.to_owned() };
         let missing = if column.is_nullable { " Missing unless measured." } else { "" };
         let row = Row::of(column, number(field), &of_type);
-        Row { numpy, ..row }.put(page, true, &format!("{}{missing}", field.meaning));
+        Row { numpy, ..row }.put(page, Columns::ALL, &format!("{}{missing}", field.meaning));
     }
 }
 
 fn enumerations(page: &mut String) {
     macro_rules! members {
         ($name:ident) => {
+            let _ =
+                write!(page, "\n| {} | name | meaning |\n| --- | --- | --- |\n", stringify!($name));
             for it in $name::ALL {
                 let (number, name, meaning) = (*it as u32, it.name(), plain(it.meaning()));
-                let _ = writeln!(page, "| {} | {number} | {name} | {meaning} |", stringify!($name));
+                let _ = writeln!(page, "| {number} | {name} | {meaning} |");
             }
         };
     }
     page.push_str(
         "\n## Numbers and their names\n\nIn the messages the names are in capitals, after that of the \
-         vocabulary: `STATUS_ESTIMATED`.\n\n| vocabulary | number | name | meaning |\n\
-         | --- | --- | --- | --- |\n",
+         vocabulary: `STATUS_ESTIMATED`.\n",
     );
     members!(PipelineKind);
     members!(Status);

@@ -79,6 +79,9 @@ fn of_time(quality: &RunQuality, diagnostics: &mut Vec<Diagnostic>) {
     if step_s > 0.0 && !(USUAL_STEP_S.0..=USUAL_STEP_S.1).contains(&step_s) {
         diagnostics.push(Diagnostic::UnusualStep { step_s });
     }
+    if quality.lines.truncated {
+        diagnostics.push(Diagnostic::BreaksOff);
+    }
 }
 
 /// What a run lacks altogether.

@@ -132,6 +132,9 @@ pub enum Diagnostic {
          or altitude in the columns"
     )]
     GradientUnknown,
+    /// The file ends within a line.
+    #[error("the file breaks off within its last line, which is not used")]
+    BreaksOff,
     /// A step of time that no recording has.
     #[error("the median time step is {step_s} s: is the unit of time right?")]
     UnusualStep {
@@ -217,6 +220,7 @@ impl Diagnostic {
             Diagnostic::ForceNotRecorded { .. } => ("force_not_recorded", Info),
             Diagnostic::ForceByPower { .. } => ("force_by_power", Info),
             Diagnostic::GradientUnknown => ("gradient_unknown", Info),
+            Diagnostic::BreaksOff => ("breaks_off", Warning),
             Diagnostic::UnusualStep { .. } => ("unusual_step", Warning),
             Diagnostic::NoValues { .. } => ("no_values", Info),
             Diagnostic::NeverMoves { .. } => ("never_moves", Warning),

@@ -15,6 +15,7 @@ mod replay;
 pub mod run;
 pub mod text;
 
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -134,7 +135,7 @@ pub fn commands() -> clap::Command {
 
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse_by::<Arguments>(commands(), "dynocar") {
+    let arguments = match parse_by::<Arguments>(commands(), "dynocar", help_of_command()) {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
@@ -151,18 +152,31 @@ pub fn main() -> ExitCode {
 ///
 /// The exit status.
 pub fn parse<A: Parser>(program: &str) -> Result<A, ExitCode> {
-    parse_by(A::command(), program)
+    parse_by(A::command(), program, std::env::args_os().collect())
 }
 
-fn parse_by<A: Parser>(mut command: clap::Command, program: &str) -> Result<A, ExitCode> {
-    let matches = command.try_get_matches_from_mut(std::env::args_os());
+/// The command line, `help COMMAND` as `COMMAND --help`: so that another program's command answers too.
+fn help_of_command() -> Vec<OsString> {
+    let mut words: Vec<OsString> = std::env::args_os().collect();
+    if words.len() == 3 && words[1] == "help" {
+        words[1] = words.pop().unwrap_or_default();
+        words.push("--help".into());
+    }
+    words
+}
+
+fn parse_by<A: Parser>(
+    mut command: clap::Command,
+    program: &str,
+    words: Vec<OsString>,
+) -> Result<A, ExitCode> {
+    let matches = command.try_get_matches_from_mut(&words);
     let error = match matches.and_then(|mut it| A::from_arg_matches_mut(&mut it)) {
         Ok(arguments) => return Ok(arguments),
         Err(error) => error.format(&mut command),
     };
     let printed = error.print().and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
     if error.use_stderr() {
-        let words: Vec<_> = std::env::args_os().collect();
         let wants_json = words.iter().any(|word| word == "--json=-")
             || words.windows(2).any(|pair| pair[0] == "--json" && pair[1] == "-");
         let message = error.render().to_string();

@@ -3,6 +3,7 @@
 use arrow_schema::Schema;
 use dynocar_parquet::cells::schema;
 use dynocar_recording::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS};
+use dynocar_shared::schema::unit_end;
 
 fn page() -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording_fields.md");
@@ -21,6 +22,14 @@ fn rows(page: &str, message: &str) -> Vec<[String; 4]> {
         [name, cells[3].into(), cells[last - 1].into(), cells[last].into()]
     })
     .collect()
+}
+
+/// The columns of a parameter: as the page says, a word before the unit.
+fn of_estimate(name: &str) -> Vec<String> {
+    let (end, _) = unit_end(name);
+    let stem = name.strip_suffix(end).expect("it ends with its unit");
+    let words = ["", "_std", "_low", "_high"];
+    words.iter().map(|word| format!("estimate_{stem}{word}{end}")).collect()
 }
 
 fn in_words(schema: &Schema, columns: &[Column]) -> Vec<[String; 3]> {
@@ -45,14 +54,14 @@ fn the_page_shows_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
         let mut declared = Vec::new();
         for message in messages {
             for [name, column, unit, _] in rows(&page, message) {
-                let name = match *message {
-                    "Rejected" => format!("rejected_{name}"),
-                    "Estimate" => format!("estimate_{name}"),
-                    _ => name,
+                let names = match *message {
+                    "Rejected" => vec![format!("rejected_{name}")],
+                    "Estimate" => of_estimate(&name),
+                    _ => vec![name],
                 };
                 // `valid`, `estimate` and `rejected` are no columns.
                 if !column.is_empty() {
-                    declared.push([name, column, unit]);
+                    declared.extend(names.into_iter().map(|it| [it, column.clone(), unit.clone()]));
                 }
             }
         }

@@ -88,10 +88,7 @@ pub fn not_held(all: &[Identifiability]) -> Vec<String> {
         .collect();
     let mut caveats = Vec::new();
     if !hidden.is_empty() {
-        caveats.push(format!(
-            " An effect that matters could hide in these data: {}.",
-            hidden.join(", ")
-        ));
+        caveats.push(format!(" Not to be judged from these runs: {}.", hidden.join(", ")));
     }
     for (index, own) in all.iter().enumerate() {
         let pair = |other: &&Identifiability| own.alike.contains(&other.kind);

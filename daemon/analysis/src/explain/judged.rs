@@ -59,7 +59,7 @@ impl Judged {
         match (self.metric, self.count) {
             (Metric::FullRun, _) => String::new(),
             (Metric::StopToStop, 1) => ", from stop to stop".into(),
-            (Metric::StopToStop, count) => format!(", from stop to stop ({count} times)"),
+            (Metric::StopToStop, count) => format!(", from stop to stop ({count} sections)"),
         }
     }
 }

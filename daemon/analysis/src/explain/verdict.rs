@@ -152,9 +152,16 @@ fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
     if effects.is_empty() || after <= before || shown_after == shown_before {
         return String::new();
     }
+    let acts_in_runs = |it: &EffectAnswer| it.place.runs.is_some() || it.place.windows.is_some();
+    let why = if effects.iter().all(acts_in_runs) {
+        "it was found in single runs, and is not looked for in those held out. Where they err most, it may \
+         act too: fit them (role = \"fit\") to find out."
+    } else {
+        "it holds for the runs that were fitted, not for those."
+    };
     format!(
         " The runs held out are predicted worse with it{}, {shown_before} m/s before and \
-         {shown_after} after: it holds for the runs that were fitted, not for those.",
+         {shown_after} after: {why}",
         judged.predicted()
     )
 }

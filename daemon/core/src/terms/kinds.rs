@@ -23,7 +23,7 @@ const MORE_RUNS: &str = "more runs";
 const LET_EXPLAIN: &str = "record a run and let `dynocar explain` say which force the model lacks";
 const DECLARE_IT: &str =
     "declare it: `dynocar explain` on a recorded run writes it into the line's files";
-const WEATHER: &str = "nothing on the train: the weather passes; `dynocar explain` gives its size";
+const WEATHER: &str = "nothing on the train: the weather passes; keep it apart from a, b and c";
 const CHECK_PROFILE: &str = "check the line's gradient profile and where it begins";
 const HARDER: &str = "harder accelerating and braking";
 
@@ -70,7 +70,7 @@ pub const KINDS: [KindRow; 18] = [
     KindRow {
         kind: EffectKind::DraggingBrake,
         title: "a dragging brake",
-        to_do: "look at the next stop whether every brake releases and no disc is hot",
+        to_do: "at the next stop check that every brake releases, and feel every vehicle's wheels for heat",
         seen_over: Some("run"),
         determined_by: MORE_RUNS,
         separated_from: &[
@@ -91,7 +91,7 @@ pub const KINDS: [KindRow; 18] = [
     KindRow {
         kind: EffectKind::WheelDiameter,
         title: "a wrong wheel diameter",
-        to_do: "check the wheel diameter set in the speed sensor",
+        to_do: "measure the wheels, and set the diameter measured in the speed sensor",
         seen_over: Some("speed_mps"),
         determined_by: "positions over several kilometres",
         separated_from: &[],
@@ -180,7 +180,7 @@ pub const KINDS: [KindRow; 18] = [
     KindRow {
         kind: EffectKind::LocalResistance,
         title: "a local resistance",
-        to_do: "look at the track and the overhead line at that place",
+        to_do: "have the track and the overhead line looked at there; change nothing on the train",
         seen_over: Some("chainage_m"),
         determined_by: MORE_RUNS,
         separated_from: &[],

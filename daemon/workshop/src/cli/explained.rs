@@ -1,11 +1,12 @@
 //! The answer of `dynocar explain` for people: a verdict of at most two sentences, then a list of what was
 //! found, where, how large, what it removes from the error, and what to do.
 
-use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, RunnerUp, Verdict};
+use dynocar_analysis::explain::answer::{
+    Considered, EffectAnswer, ExplainAnswer, RunnerUp, Verdict,
+};
 use dynocar_analysis::explain::described::precision;
 use dynocar_analysis::explain::judged::Metric;
 use dynocar_analysis::explain::report::{sentence, words};
-use dynocar_core::terms::KindRow;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -23,12 +24,25 @@ pub fn text(answer: &ExplainAnswer) -> String {
     }
     text += "\n";
     text += &limits(answer);
+    if answer.impossibilities().next().is_some() {
+        return text;
+    }
     text += "\n";
     text += &figures(answer);
-    for considered in &answer.considered {
-        let evidence =
-            considered.evidence.map_or("     -".into(), |evidence| format!("{evidence:6.0}"));
-        text += &format!("  {evidence}  {:20} {}\n", considered.kind, considered.reason);
+    text + &others(answer)
+}
+
+/// What else was looked for, with what speaks against it; what is no more than chance is counted.
+fn others(answer: &ExplainAnswer) -> String {
+    let is_chance = |it: &&Considered| it.evidence.is_some_and(|evidence| evidence <= 0.0);
+    let chance = answer.considered.iter().filter(is_chance).count();
+    let mut text = String::from("\nevidence  not accepted\n");
+    for considered in answer.considered.iter().filter(|it| !is_chance(it)) {
+        let evidence = considered.evidence.map_or("-".into(), |evidence| format!("{evidence:.0}"));
+        text += &format!("{evidence:>8}  {:20} {}\n", considered.kind, considered.reason);
+    }
+    if chance > 0 {
+        text += &format!("  0 or less  {chance} other kinds: they explain no more than chance\n");
     }
     text
 }
@@ -55,7 +69,6 @@ fn verdict(answer: &ExplainAnswer) -> String {
 
 /// An effect, a row for each question.
 fn found(effect: &EffectAnswer) -> String {
-    let kind = EffectKind::from_name(effect.kind);
     let mut rows = row("what", &format!("{} ({})", words::kind_name(effect.kind), effect.kind));
     let place = sentence::placed(&effect.place);
     let ends = effect.place.uncertainty_95.as_ref().and_then(precision);
@@ -85,8 +98,9 @@ fn found(effect: &EffectAnswer) -> String {
     for RunnerUp { formula, evidence_less } in &effect.runners_up {
         rows += &row("or else", &format!("{formula} (evidence less by {evidence_less:.0})"));
     }
-    if let Some(kind) = kind.filter(|kind| *kind != EffectKind::Unknown) {
-        rows += &row("to do", KindRow::of(kind).to_do);
+    rows += &row("sure", &sentence::sureness(effect.p_value));
+    if let Some(to_do) = sentence::to_do(effect) {
+        rows += &row("to do", to_do);
     }
     rows
 }
@@ -107,7 +121,7 @@ fn figures(answer: &ExplainAnswer) -> String {
     let (base, std) = (&answer.base, &answer.base.std);
     let [a, b, c] = [std.a, std.b, std.c].map(|deviation| HALF_95 * deviation);
     let mut text = format!(
-        "a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)\n",
+        "refitted: a = {:.3} ± {a:.3} N/kN, b = {:.4} ± {b:.4}, c = {:.6} ± {c:.6} (95 %, v in m/s)\n",
         base.a, base.b, base.c
     );
     if let Some(judged) = answer.judged.filter(|it| it.metric == Metric::StopToStop) {

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
 use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_core::plausibility::Severity;
 use dynocar_core::units::Unit;
-use dynocar_shared::{HALF_95, TrainId};
+use dynocar_shared::{HALF_95, Parameter, TrainId, schema};
 use serde::Serialize;
 
 use self::answer::EstimatorAnswer;
@@ -213,6 +214,10 @@ fn others(estimators: &[EstimatorSettings]) -> Vec<&'static str> {
 /// The answer for people.
 pub fn text(answer: &IdentifyAnswer) -> String {
     let mut text = format!("{}\n{}", answer.dataset, diagnostics(&answer.diagnostics));
+    if answer.diagnostics.iter().any(|it| it.severity == Severity::Fundamental) {
+        return text
+            + "\nNo value is printed: the data cannot be true as described. Set right what is named above.\n";
+    }
     for it in &answer.estimators {
         let reason = if it.reason == "none" { String::new() } else { format!(", {}", it.reason) };
         let rejected: u32 = it.samples.rejected.values().sum();
@@ -225,7 +230,10 @@ pub fn text(answer: &IdentifyAnswer) -> String {
         }
         for (name, value) in &it.values {
             let std = it.std.get(name).copied().unwrap_or(f64::NAN);
-            text += &format!("    {name:<24} {value:>12.6} ± {:.6}\n", HALF_95 * std);
+            let (half, unit) = (HALF_95 * std, unit_of(name));
+            // Two digits of what is uncertain.
+            let decimals = (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize;
+            text += &format!("    {name:<24} {value:>12.decimals$} ± {half:.decimals$}{unit}\n");
         }
         for point in &it.resistance_shown {
             let at = answer.speed_unit.from_base(point.speed_mps);
@@ -240,5 +248,14 @@ pub fn text(answer: &IdentifyAnswer) -> String {
     if !answer.not_run.is_empty() {
         text += &format!("\nnot run: {}; --all runs them too\n", answer.not_run.join(", "));
     }
-    text + "\n± is the half width of the 95 % interval\n"
+    text + "\n± is the half width of the 95 % interval; a mass is that of the last run\n"
+}
+
+/// A parameter's unit, with a space before it; empty for a ratio.
+fn unit_of(name: &str) -> String {
+    let parameter = Parameter::ALL.iter().find(|it| it.name() == name);
+    match schema::unit_of(parameter.map_or(name, |it| it.full_name())) {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    }
 }

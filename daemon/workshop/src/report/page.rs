@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::answer::Verdict;
-use dynocar_analysis::explain::report::words;
+use dynocar_analysis::explain::report::{sentence, words};
 use dynocar_core::plausibility::Severity;
 
 use super::document::document;
@@ -116,6 +116,16 @@ fn verdict(subject: &Subject) -> String {
          <p class=\"sentence\">{}</p>\n",
         escape(&subject.data.sentence)
     );
+    for to_do in answer.effects.iter().filter_map(sentence::to_do) {
+        let _ = writeln!(
+            html,
+            "<p class=\"experiment\"><strong>To do.</strong> {}.</p>",
+            escape(to_do)
+        );
+    }
+    for caveat in &answer.caveats {
+        let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(caveat));
+    }
     if let Some(experiment) = &answer.experiment {
         let title = match answer.verdict {
             Verdict::Ambiguous => "What would separate them",

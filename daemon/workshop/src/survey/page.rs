@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::report::words::number;
 use dynocar_analysis::survey::Survey;
 use dynocar_shared::HALF_95;
 
@@ -31,7 +32,7 @@ pub fn html(
     let name = escape(&dataset.name);
     let header = format!(
         "<p class=\"kicker\">Dynocar · survey</p>\n<h1>{name}</h1>\n\
-         <p class=\"facts\">{:.1} m · {} stops · {} trips · {} passes learned from · {}</p>\n",
+         <p class=\"facts\">{:.0} m · {} stops · {} trips · {} passes learned from · {}</p>\n",
         answer.line.length_m,
         answer.line.stops.len(),
         answer.trips.len(),
@@ -49,7 +50,7 @@ pub fn html(
         if !survey.alignments.is_one_track() {
             body += &profile_plots(&gradient_entries(survey, profile, -1), "falling chainage")?;
         }
-        section("profile", "Gradient, with its 95 % band", body);
+        section("profile", "Gradient every 10 m, with the 95 % band of its mean over 100 m", body);
     }
     section("learned", "What was learned jointly with it", learned(answer));
     section("stops", "Stops, and how they repeat", stops(answer));
@@ -150,8 +151,8 @@ fn learned(answer: &SurveyAnswer) -> String {
     let head = [("quantity", Column::Words), ("value", Column::Numbers), ("±", Column::Numbers)];
     let mut table = Table::new("Learned, with 95 % intervals", &head);
     let mut row = |name: &str, it: &super::answer::Value| {
-        let half = format!("{:.4}", HALF_95 * it.std);
-        table.push(vec![name.into(), format!("{:.4}", it.value), half]);
+        let half = HALF_95 * it.std;
+        table.push(vec![name.into(), number(it.value, Some(half)), number(half, Some(half))]);
     };
     row("mass, t", &learned.mass_t);
     row("mass with rotating parts, t", &learned.inertial_mass_t);

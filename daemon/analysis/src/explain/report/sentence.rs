@@ -1,6 +1,8 @@
 //! The verdict in a plain sentence: kind, where, size with unit and interval, error reduction.
 
+use dynocar_core::terms::KindRow;
 use dynocar_shared::HALF_95;
+use dynocar_shared::vocabulary::EffectKind;
 
 use super::errors::Errors;
 use super::words::{self, joined, kind_name, number};
@@ -99,8 +101,10 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
         match value {
             ParameterValue::Number(value) => {
                 let half = HALF_95 * number_of(effect.std.get(name)).unwrap_or(0.0);
-                // What is a convention has no uncertainty.
-                if half > 0.0 {
+                if name == "speed_scale" {
+                    sizes.push(speed_error(*value, half));
+                } else if half > 0.0 {
+                    // What is a convention has no uncertainty.
                     let [low, high] = [value - half, value + half].map(|it| number(it, Some(half)));
                     let value = number(*value, Some(half));
                     sizes.push(format!("{words} {value}{unit} (95 % interval {low} to {high})"));
@@ -126,17 +130,64 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
             }
             ParameterValue::Formula(formula) => sizes.insert(0, formula.clone()),
             ParameterValue::Windows(windows) => {
-                let shown = windows.iter().take(PLACES_MAX);
-                sizes.extend(shown.map(|w| {
-                    let percent =
-                        format!("{:+.1} %", 100.0 * (w.mass_factor - 1.0)).replace('-', "−");
-                    format!("{percent} in {} from {:.0} to {:.0} s", w.run, w.t_start_s, w.t_end_s)
-                }));
+                sizes.extend(in_order(windows, |w| (&w.run, w.t_start_s)).take(PLACES_MAX).map(
+                    |w| {
+                        let percent =
+                            format!("{:+.1} %", 100.0 * (w.mass_factor - 1.0)).replace('-', "−");
+                        let is_one = windows.iter().filter(|it| it.run == w.run).count() == 1;
+                        let (from_s, to_s) = (w.t_start_s, w.t_end_s);
+                        let time = if is_one {
+                            String::new()
+                        } else {
+                            format!(" from {from_s:.0} to {to_s:.0} s")
+                        };
+                        format!("{percent} in {}{time}", w.run)
+                    },
+                ));
             }
             ParameterValue::List(_) | ParameterValue::Profile(_) => {}
         }
     }
     sizes
+}
+
+/// A wheel's wrong diameter by what the speed reads, with its 95 % interval.
+fn speed_error(scale: f64, half: f64) -> String {
+    let side = if scale > 1.0 { "high" } else { "low" };
+    let percent =
+        |scale: f64| number(100.0 * (scale - 1.0) * (scale - 1.0).signum(), Some(100.0 * half));
+    let mut ends =
+        [scale - half, scale + half].map(|it| 100.0 * (it - 1.0) * (scale - 1.0).signum());
+    ends.sort_unstable_by(f64::total_cmp);
+    let [low, high] = ends.map(|it| number(it, Some(100.0 * half)));
+    format!("speeds read {} % too {side} (95 % interval {low} to {high})", percent(scale))
+}
+
+/// Windows by run and time, however they were found.
+fn in_order<'a, W>(windows: &'a [W], key: fn(&W) -> (&String, f64)) -> std::vec::IntoIter<&'a W> {
+    let mut all: Vec<&W> = windows.iter().collect();
+    all.sort_by(|one, other| {
+        let ((run, from_s), (other_run, other_s)) = (key(one), key(other));
+        run.cmp(other_run).then(from_s.total_cmp(&other_s))
+    });
+    all.into_iter()
+}
+
+/// How sure it is that an effect acts, by the probability of finding as much where nothing does.
+pub fn sureness(p_value: f64) -> String {
+    let odds = 1.0 / p_value.max(1e-300);
+    let odds = match odds {
+        1e6.. => "less than 1 in a million".to_owned(),
+        10.0.. => format!("1 in {}", number(odds, Some(0.1 * odds))),
+        _ => format!("{} %", number(100.0 * p_value, Some(1.0))),
+    };
+    format!("chance of as much where nothing acts: {odds}")
+}
+
+/// What a person should do about an effect; `None` for one without a name.
+pub fn to_do(effect: &EffectAnswer) -> Option<&'static str> {
+    let kind = EffectKind::from_name(effect.kind).filter(|kind| *kind != EffectKind::Unknown)?;
+    Some(KindRow::of(kind).to_do)
 }
 
 /// Share of the traction's energy below which the work of an effect is not worth a word.
@@ -151,12 +202,12 @@ pub fn meaning(meaning: &Meaning) -> String {
         let kwh = meaning.energy_kwh_per_100_km.abs();
         let kwh = number(kwh, Some(0.1 * kwh));
         let more = if share > 0.0 { "more" } else { "less" };
-        format!("{kwh} kWh per 100 km {more} than without it, {}", percent(share.abs()))
+        format!("{kwh} kWh per 100 km {more}, {}", percent(share.abs()))
     });
     let ahead = meaning.distance_error_60_s_m.map(|[without, with]| {
         let [without, with] = [without, with].map(|m| number(m, Some(0.1 * without.max(with))));
         format!(
-            "a minute ahead the train is predicted {without} m off without it, {with} m with it"
+            "a minute ahead, the model errs by {without} m without this effect, {with} m with it"
         )
     });
     let parts: Vec<String> = work.into_iter().chain(ahead).collect();
@@ -178,8 +229,7 @@ pub fn placed(place: &Location) -> String {
         parts.push(sections(intervals));
     }
     if let Some(windows) = &place.windows {
-        let all = windows
-            .iter()
+        let all = in_order(windows, |w| (&w.run, w.t_start_s))
             .map(|w| format!("in {} from {:.0} to {:.0} s", w.run, w.t_start_s, w.t_end_s));
         parts.push(listed(all.collect()));
     }
@@ -233,18 +283,15 @@ mod tests {
         };
         assert_eq!(
             meaning(&costs),
-            "41.3 kWh per 100 km more than without it, 3.1 % of the traction's energy; a minute ahead the \
-             train is predicted 14.5 m off without it, 2.1 m with it"
+            "41.3 kWh per 100 km more, 3.1 % of the traction's energy; a minute ahead, the model errs by \
+             14.5 m without this effect, 2.1 m with it"
         );
         let helps = Meaning {
             energy_kwh_per_100_km: -2.0,
             share_of_traction_energy: Some(-0.01),
             distance_error_60_s_m: None,
         };
-        assert_eq!(
-            meaning(&helps),
-            "2.00 kWh per 100 km less than without it, 1.0 % of the traction's energy"
-        );
+        assert_eq!(meaning(&helps), "2.00 kWh per 100 km less, 1.0 % of the traction's energy");
         assert_eq!(meaning(&Meaning::default()), "");
     }
 

@@ -7,7 +7,7 @@ use super::search::Search;
 use crate::explain::effects::AtBound;
 
 /// A smaller share of the error is what an effect is refused for, a larger one its evidence.
-const LITTLE: f64 = 0.1;
+const LITTLE: f64 = 0.2;
 
 /// Why an effect is not accepted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +35,7 @@ impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Refusal::Chance => "explains no more than chance",
-            Refusal::Immaterial => "smaller than what declared figures are good for",
+            Refusal::Immaterial => "below the accuracy of declared figures",
             Refusal::AtBound(AtBound { name, bound }) => {
                 return write!(
                     f,

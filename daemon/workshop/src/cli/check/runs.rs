@@ -249,9 +249,6 @@ fn diagnostics_of(manifest: &Manifest, run: &Run) -> Vec<String> {
     if quality.lines.short > 0 {
         diagnostics.push(format!("rows with fewer cells than the header: {}", quality.lines.short));
     }
-    if quality.lines.truncated {
-        diagnostics.push("the file breaks off within its last line, which is not used".into());
-    }
     if !quality.order.is_regular {
         diagnostics.push("the time step varies, so that missing rows cannot be counted".into());
     }
