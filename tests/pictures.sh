@@ -2,7 +2,7 @@
 # Makes the pictures of the documentation anew from simulated datasets: the worked example of
 # docs/explain.md, screenshots of pages, and what commands print; and, in target/pictures, what a reader sees of
 # README and book. Look at them before you commit them. DYNOCAR_PROGRAMS names a folder of programs that were built
-# already.
+# already, DYNOCAR_PYTHON a Python that has dynocar[fleet]; without it the wheel is built and tested.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -15,8 +15,15 @@ if [ -z "${DYNOCAR_PROGRAMS:-}" ]; then
 fi
 programs=${DYNOCAR_PROGRAMS:-${CARGO_TARGET_DIR:-target}/release}
 place=$(mktemp -d)
-daemon=
-trap '[ -z "$daemon" ] || kill -INT "$daemon"; rm -rf "$place"' EXIT
+daemon= live=
+trap 'for job in $daemon $live; do kill -INT "$job" || true; done; rm -rf "$place"' EXIT
+python=${DYNOCAR_PYTHON:-$place/python/bin/python}
+if [ -z "${DYNOCAR_PYTHON:-}" ]; then
+  tests/python_wheel.sh "$place/wheels"
+  python3 -m venv "$place/python"
+  "$python" -m pip install --quiet --disable-pip-version-check "$(ls "$place"/wheels/dynocar-*.whl)[fleet]"
+fi
+. tests/await.sh
 export DYNOCAR_ROOT=$place/root XDG_STATE_HOME=$place/state
 mkdir "$DYNOCAR_ROOT" "$XDG_STATE_HOME"
 
@@ -53,9 +60,31 @@ mkdir "$place/models" "$place/runs"
 cp -r "$place/tunnel_drag-9001" "$place/runs/1"
 sed "s|demo/train.toml|$place/runs/1/train.toml|; s|demo/track.toml|$place/runs/1/track.toml|" \
   config/daemon.toml > "$place/daemon.toml"
-"$programs/dynocar" learn --config "$place/daemon.toml" --runs "$place/runs" --models "$place/models" \
-  --once --report "$place/history.html"
+programs=$(realpath "$programs")
+(cd "$place" && "$programs/dynocar" learn --config daemon.toml --runs runs --models models --once \
+  --report history.html)
 screenshot "$place/history.html" docs/images/learn.png 940 640
+
+"$programs/dynocar-bench" survey --passes 1 --write "$place/raw"
+"$programs/dynocar" survey "$place/raw" --out "$place/line" --report "$place/line.html"
+screenshot "$place/line.html" docs/images/survey.png 940 1190
+
+# Six trains on a line with an undeclared resistance; train 12 has one of its own, train 13 another mass.
+PYTHONPATH=client/python/tests "$python" -B - "$place/fleet" << 'END'
+import sys
+from pathlib import Path
+from fleet_simulator import Truth, write_description, write_parquet_train
+
+fleet, of_line, own = Path(sys.argv[1]), (5000.0, 6500.0, 1.2), (8500.0, 9900.0, 1.5)
+days = ["2026-05-03", "2026-05-12", "2026-05-21"]
+write_description(fleet)
+for number in range(10, 16):
+    places = (of_line, own) if number == 12 else (of_line,)
+    truth = Truth(places, mass_factor=1.08 if number == 13 else 1.0)
+    write_parquet_train(fleet, str(number), days, truth, number)
+END
+"$python" -m dynocar.fleet explain "$place/fleet" -o "$place/report"
+screenshot "$place/report/fleet.html" docs/images/fleet.png 940 796
 
 terminal terminal_help "dynocar --help" "$programs/dynocar" --help
 terminal terminal_check "dynocar check config/demo" "$programs/dynocar" check config/demo
@@ -74,6 +103,15 @@ kill -INT "$recorder" && wait "$recorder" || true
 # The recording program may outlive the one that called it by a moment.
 sleep 1
 terminal terminal_verify "dynocar replay --verify run.mcap" "$programs/dynocar" replay --verify "$place/run.mcap"
+
+# The browser is a viewer that comes and goes.
+"$programs/dynocar" live > "$place/live.txt" 2>&1 &
+live=$!
+await "$place/live.txt" serving
+echo "<script>new WebSocket('ws://127.0.0.1:8765', 'foxglove.sdk.v1')</script>" > "$place/viewer.html"
+screenshot "$place/viewer.html" "$place/viewer.png" 400 300
+await "$place/live.txt" "a viewer has gone"
+terminal terminal_live "dynocar live" cat "$place/live.txt"
 
 mkdir -p target/pictures
 tests/book.sh
