@@ -303,7 +303,9 @@ def test_the_command_ends_with_its_status(fleet: Path, done: Fleet, tmp_path: Pa
     folder = tmp_path / "fleet"
     keep = shutil.ignore_patterns("train=1[1-5]", "day=2026-04*")
     shutil.copytree(fleet, folder, ignore=keep)
-    report = command("explain", folder, "-o", tmp_path / "report", "--workers", 1, capture_output=True)
+    # As the guide does: folders as they are called from where one stands.
+    words = ("explain", "fleet", "-o", "report", "--workers", 1)
+    report = command(*words, capture_output=True, cwd=tmp_path)
     assert report.returncode == 0 and "10.2026-05: done (0 left)\n" in report.stderr, report
     assert report.stdout.startswith("1 trains explained, 2026-05, 0 failed\n")
     (folder / "train=10/day=2026-05-03/up.parquet").write_bytes(b"")

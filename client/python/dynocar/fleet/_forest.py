@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 from typing import NamedTuple
@@ -44,15 +45,26 @@ def forest(rows: Sequence[Row], band: tuple[float, float] | None, null: float) -
         parts.append(f'<text x="0" y="{middle + 4:.1f}">{escape(shortened(row.name))}</text>')
         parts.append(_line(kind, x(row.value - reach), middle, x(row.value + reach), middle))
         parts.append(_tag("circle", kind, cx=x(row.value), cy=middle, r=3))
-    for share in (0.05, 0.5, 0.95):
-        value = low + share * (high - low)
+    for value in _ticks(low, high):
         text = f'<text class="tick" text-anchor="middle" x="{x(value):.1f}" y="{height - 6}">'
-        parts.append(f"{text}{value:.3g}</text>")
+        shown = f"{value:.6g}".replace("-", "−")
+        parts.append(f"{text}{shown}</text>")
     words = f"{len(rows)} estimates with their 95 % intervals"
     return (
         f'<svg viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{words}">'
         f"{''.join(parts)}</svg>"
     )
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Three to seven round values between two."""
+    power = 10.0 ** math.floor(math.log10(high - low))
+    for share in (5.0, 2.0, 1.0, 0.5, 0.2):
+        step = share * power
+        ticks = [step * k for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
+        if len(ticks) >= 3:
+            break
+    return ticks
 
 
 def shortened(name: str) -> str:

@@ -14,7 +14,7 @@ OWNERS = {
     "fleet": "it belongs to all trains",
     "train": "it belongs to one train",
     "some_trains": "it belongs to some trains",
-    "undecided": "whether it belongs to one train or to more is not known",
+    "undecided": "whether the others have it their data do not show",
 }
 STATES = {
     "found": "found",
@@ -68,16 +68,17 @@ def _summary(report: Report) -> str:
     lines = []
     for it in report["differing"]:
         if it["is_found"]:
-            lines.append(f"{it['train']} differs from the others in {PARAMETERS[it['parameter']]}")
+            lines.append(f"train {it['train']} differs from the others in {PARAMETERS[it['parameter']]}")
     for it in report["common"]:
-        count = sum(part["state"] == "found" for part in it["trains"])
+        found = [part["train"] for part in it["trains"] if part["state"] == "found"]
+        by = f"train {found[0]}" if len(found) == 1 else f"{len(found)} trains"
         lines.append(
-            f"{_effect(it)}: found by {count} of {len(it['trains'])}; {OWNERS[it['belongs_to']]}"
+            f"{_effect(it)}: found by {by} of {len(it['trains'])}; {OWNERS[it['belongs_to']]}"
         )
     for it in report["changes"]:
         if it["is_found"]:
-            lines.append(f"{it['train']} has changed in {PARAMETERS[it['parameter']]}")
-    lines += [f"{it['train']} failed" for it in report["failed"]]
+            lines.append(f"train {it['train']} has changed in {PARAMETERS[it['parameter']]}")
+    lines += [f"train {it['train']} failed" for it in report["failed"]]
     if not lines:
         return '<div class="summary">No train stands out, and no effect was found.</div>\n'
     items = "".join(f"<li>{escape(line)}</li>" for line in lines)
