@@ -61,6 +61,11 @@ fn the_workshop_is_found_next_to_the_program_else_on_the_search_path() {
         let output = run(program, search_path, &["explain", "--help"]);
         assert!(output.status.success(), "{}", words(&output.stderr));
         assert!(words(&output.stdout).contains("Usage: dynocar explain"), "as it was called");
+        for command in ["explain", "run"] {
+            let [asked, option] = [["help", command], [command, "--help"]]
+                .map(|arguments| run(program, search_path, &arguments).stdout);
+            assert!(asked == option && !asked.is_empty(), "{command}: {}", words(&asked));
+        }
         // What the workshop finds wrong is said, and ends, as if there were one program.
         let output = run(program, search_path, &["explain", "no-such-dataset"]);
         assert_eq!(output.status.code(), Some(2));

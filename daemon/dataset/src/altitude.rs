@@ -1,4 +1,4 @@
-//! Gradient from the altitude along the way.
+//! Gradient from the altitude along the line.
 
 /// Altitudes are averaged over intervals of this many m, so that a standing train does not
 /// outweigh a fast one.

@@ -158,7 +158,7 @@ pub fn parse<A: Parser>(program: &str) -> Result<A, ExitCode> {
 /// The command line, `help COMMAND` as `COMMAND --help`: so that another program's command answers too.
 fn help_of_command() -> Vec<OsString> {
     let mut words: Vec<OsString> = std::env::args_os().collect();
-    if words.len() == 3 && words[1] == "help" {
+    if words.len() == 3 && words[1] == "help" && words[2] != "help" {
         words[1] = words.pop().unwrap_or_default();
         words.push("--help".into());
     }

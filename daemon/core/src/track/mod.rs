@@ -31,7 +31,7 @@ pub struct TrackSurvey {
     pub stops: Vec<(f64, String)>,
     /// Permitted speed in m/s; nothing but drawings uses it.
     pub permitted_speed_mps: Option<StepProfile>,
-    /// Path of the file that holds the way on the map.
+    /// Path of the file that holds the line on the map.
     pub alignment: Option<String>,
     /// The same for falling chainage, where it is another way.
     pub alignment_falling: Option<String>,

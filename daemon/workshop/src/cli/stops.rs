@@ -183,10 +183,10 @@ fn modulated(stops: &[RecordedStop]) -> String {
 
 fn stops(stops: &[RecordedStop]) -> String {
     let header =
-        ["run", "role", "from s", "m/s", "s", "m", "brake", "found by", "said m", "within m"];
+        ["run", "role", "from s", "m/s", "s", "m", "brake", "found by", "predicted m", "bound m"];
     let mut table = TextTable::new(&header, &[0, 1, 6, 7]);
     for stop in stops {
-        let said = |number: Option<f64>| number.map_or("-".into(), |it| format!("{it:.0}"));
+        let shown = |number: Option<f64>| number.map_or("-".into(), |it| format!("{it:.0}"));
         table.push(vec![
             stop.file.clone(),
             if stop.role == Role::Fit { "fit".into() } else { "holdout".into() },
@@ -196,8 +196,8 @@ fn stops(stops: &[RecordedStop]) -> String {
             format!("{:.0}", stop.distance_m),
             format!("{:?}", stop.manner).to_lowercase(),
             format!("{:?}", stop.found_by).to_lowercase(),
-            said(stop.predicted.map(|it| it.distance_m)),
-            said(stop.predicted.map(|it| it.distance_bound_m)),
+            shown(stop.predicted.map(|it| it.distance_m)),
+            shown(stop.predicted.map(|it| it.distance_bound_m)),
         ]);
     }
     table.to_string()

@@ -116,7 +116,7 @@ pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
     let wrong =
         |path: &Path, problem: String| SurveyFailure::SurveyedLine { path: path.into(), problem };
     let Some(alignment) = &track.survey.alignment else {
-        let problem = "expected alignment = \"…csv\", the way on the map, got none".into();
+        let problem = "expected alignment = \"…csv\", the line on the map, got none".into();
         return Err(wrong(path, problem));
     };
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -128,7 +128,7 @@ pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
         let projected: Vec<_> = points.iter().map(|it| plane.project(it[1], it[2])).collect();
         Alignment::through(&projected)
     };
-    let short = || wrong(&file, "expected a way of some length, got one place".into());
+    let short = || wrong(&file, "expected a line of some length, got one place".into());
     let one = alignment(&growing).ok_or_else(short)?;
     let chained_m = growing[growing.len() - 1][0] - growing[0][0];
     let chainage_per_m = chained_m / one.length_m();

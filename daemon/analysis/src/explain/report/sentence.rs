@@ -178,7 +178,10 @@ pub fn sureness(p_value: f64) -> String {
     let odds = 1.0 / p_value.max(1e-300);
     let odds = match odds {
         1e6.. => "less than 1 in a million".to_owned(),
-        10.0.. => format!("1 in {}", number(odds, Some(0.1 * odds))),
+        10.0.. => {
+            let digits = 10.0_f64.powf(odds.log10().floor() - 1.0);
+            format!("1 in {:.0}", (odds / digits).round() * digits)
+        }
         _ => format!("{} %", number(100.0 * p_value, Some(1.0))),
     };
     format!("chance of as much where nothing acts: {odds}")
@@ -432,7 +435,7 @@ mod tests {
         // Stops that were cut off leave an error over whole runs that says nothing of the forces.
         errors.holdout_stop_to_stop = StopToStop::from_errors(vec![vec![[0.5, 0.06]; 3]; 4]);
         let said = sentence(&ambiguous(), &errors);
-        let gained = "on the runs held out, from stop to stop (12 times) falls from 0.500 to \
+        let gained = "on the runs held out, from stop to stop (12 sections) falls from 0.500 to \
                       0.060 m/s, by 88 % (95 % interval 88 % to 88 %).";
         assert!(said.ends_with(gained), "{said}");
     }
