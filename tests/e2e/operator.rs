@@ -86,7 +86,7 @@ fn a_dragging_brake_is_named_with_its_force_its_place_and_what_to_do() {
     assert_eq!(code, Some(3), "{words}");
     assert!(words.contains("suspected: dragging_brake for "), "{words}");
     let last = words.lines().last().unwrap_or_default();
-    assert!(last.starts_with("  to do: look at the next stop"), "{words}");
+    assert!(last.starts_with("  to do: at the next stop check"), "{words}");
     assert!(daemon.end(Signal::TERM).success());
 }
 

@@ -31,7 +31,7 @@ pub const PARAMETERS: [Parameter; 2] =
     [Parameter::new("delay_s", (0.0, 4.0), 0.05), Parameter::new("lag_s", (0.0, 4.0), 0.05)];
 /// A shorter delay and lag together in s are not distinguishable from forces that act as late as they usually do, where
 /// the map is a little off.
-pub const LEAST_S: f64 = 0.25;
+pub const LEAST_S: f64 = 0.35;
 
 /// Numbers of a sample that act on the train without being a force of its own: gradient and the parts
 /// of the resistance.

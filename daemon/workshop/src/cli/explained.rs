@@ -6,7 +6,7 @@ use dynocar_analysis::explain::answer::{
 };
 use dynocar_analysis::explain::described::precision;
 use dynocar_analysis::explain::judged::Metric;
-use dynocar_analysis::explain::report::{sentence, words};
+use dynocar_analysis::explain::report::{effect as effect_words, words};
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -70,7 +70,7 @@ fn verdict(answer: &ExplainAnswer) -> String {
 /// An effect, a row for each question.
 fn found(effect: &EffectAnswer) -> String {
     let mut rows = row("what", &format!("{} ({})", words::kind_name(effect.kind), effect.kind));
-    let place = sentence::placed(&effect.place);
+    let place = effect_words::placed(&effect.place);
     let ends = effect.place.uncertainty_95.as_ref().and_then(precision);
     rows += &row(
         "where",
@@ -80,7 +80,7 @@ fn found(effect: &EffectAnswer) -> String {
             None => place,
         },
     );
-    for size in sentence::sizes(effect) {
+    for size in effect_words::sizes(effect) {
         rows += &row("size", &size);
     }
     let percent = 100.0 * effect.error_reduction;
@@ -91,15 +91,15 @@ fn found(effect: &EffectAnswer) -> String {
             _ => "none of the open-loop error of the fit runs".into(),
         },
     );
-    let means = sentence::meaning(&effect.meaning);
+    let means = effect_words::meaning(&effect.meaning);
     if !means.is_empty() {
         rows += &row("means", &means);
     }
     for RunnerUp { formula, evidence_less } in &effect.runners_up {
         rows += &row("or else", &format!("{formula} (evidence less by {evidence_less:.0})"));
     }
-    rows += &row("sure", &sentence::sureness(effect.p_value));
-    if let Some(to_do) = sentence::to_do(effect) {
+    rows += &row("sure", &effect_words::sureness(effect.p_value));
+    if let Some(to_do) = effect_words::to_do(effect) {
         rows += &row("to do", to_do);
     }
     rows

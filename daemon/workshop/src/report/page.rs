@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::answer::Verdict;
-use dynocar_analysis::explain::report::{sentence, words};
+use dynocar_analysis::explain::report::{effect, words};
 use dynocar_core::plausibility::Severity;
 
 use super::document::document;
@@ -116,7 +116,7 @@ fn verdict(subject: &Subject) -> String {
          <p class=\"sentence\">{}</p>\n",
         escape(&subject.data.sentence)
     );
-    for to_do in answer.effects.iter().filter_map(sentence::to_do) {
+    for to_do in answer.effects.iter().filter_map(effect::to_do) {
         let _ = writeln!(
             html,
             "<p class=\"experiment\"><strong>To do.</strong> {}.</p>",

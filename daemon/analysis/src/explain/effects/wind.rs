@@ -11,8 +11,10 @@ use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
-/// A headwind that both directions share is at most so many times what they do not share.
+/// A headwind that both directions share is at most so many times what they do not share, and so many
+/// standard deviations, by the scatter of the winds, away from none.
 const AHEAD_MAX: f64 = 3.0;
+const HEADWIND_STDS: f64 = 4.0;
 
 /// The kind.
 pub struct Wind;
@@ -56,6 +58,16 @@ impl Effect for Wind {
     fn whole(&self, scan: &Scan) -> Option<Candidate> {
         self.propose(scan).first()
     }
+}
+
+/// The wind to expect in a run that was not fitted: the mean of the others, as far as their scatter
+/// shows one (James and Stein 1961).
+fn of_another_run(winds_mps: &[f64]) -> f64 {
+    let count = winds_mps.len() as f64;
+    let mean = winds_mps.iter().sum::<f64>() / count;
+    let scatter = winds_mps.iter().map(|wind| (wind - mean).powi(2)).sum::<f64>();
+    let variance_of_mean = scatter / (count * (count - 1.0));
+    mean * (1.0 - variance_of_mean / (mean * mean).max(f64::MIN_POSITIVE)).max(0.0)
 }
 
 fn blow(wind_plus_mps: f64, samples: &[ResolvedSample], forces: &mut [SampleForces]) {
@@ -112,8 +124,9 @@ impl Hypothesis for ByRun {
             |(direction, wind): (f64, f64)| wind - if direction > 0.0 { plus } else { minus };
         let freedom = (plus_runs + minus_runs - 2.0).max(1.0);
         let scatter = (winds().map(|it| away(it).powi(2)).sum::<f64>() / freedom).sqrt();
-        let may_be = along.abs().max(scatter).max(wind::LEAST_MPS);
-        (ahead.abs() > AHEAD_MAX * may_be).then_some(
+        let by_chance = HEADWIND_STDS * scatter / (plus_runs + minus_runs).sqrt();
+        let may_be = (AHEAD_MAX * along.abs().max(wind::LEAST_MPS)).max(by_chance);
+        (ahead.abs() > may_be).then_some(
             "it would blow against every run alike, whichever way that goes: something of the train",
         )
     }
@@ -124,8 +137,9 @@ impl Hypothesis for ByRun {
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let own = self.runs.iter().position(|(file, _)| *file == run.file);
-        let mean = parameters.iter().sum::<f64>() / parameters.len() as f64;
-        blow(own.map_or(mean, |index| parameters[index]), &run.samples()[first..], forces);
+        let wind_plus_mps =
+            own.map_or_else(|| of_another_run(parameters), |index| parameters[index]);
+        blow(wind_plus_mps, &run.samples()[first..], forces);
     }
 
     fn report(&self, context: &ReportContext) -> Reported {
@@ -146,5 +160,41 @@ impl Hypothesis for ByRun {
         reported.values.insert("headwind_mps".into(), values);
         reported.deviations.insert("headwind_mps".into(), deviations);
         reported
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn by_run(winds: &[(f64, f64)]) -> (ByRun, Vec<f64>) {
+        let runs = winds.iter().map(|(direction, _)| (String::new(), *direction)).collect();
+        let parameters = vec![wind::PARAMETER; winds.len()];
+        (
+            ByRun { runs, parameters },
+            winds.iter().map(|(direction, ahead)| direction * ahead).collect(),
+        )
+    }
+
+    #[test]
+    fn a_headwind_whichever_way_a_train_goes_is_no_wind() {
+        // Headwinds in m/s of six runs, three in each direction.
+        let towards = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
+        let winds = |ahead: [f64; 6]| {
+            let (wind, parameters) =
+                by_run(&std::array::from_fn::<_, 6, _>(|k| (towards[k], ahead[k])));
+            wind.contradiction(&parameters).is_none()
+        };
+        assert!(!winds([-11.6, -11.6, -13.1, -10.3, -11.0, -9.7]));
+        assert!(!winds([4.3, 8.5, 4.9, 3.4, 3.4, 5.6]), "more than scatter makes");
+        assert!(winds([5.0, -5.2, 4.7, -5.1, 5.4, -4.9]), "one wind, ahead and behind");
+        assert!(winds([3.0, -1.0, 4.0, -2.0, 0.5, 2.5]), "another each day");
+    }
+
+    #[test]
+    fn a_run_that_was_not_fitted_has_the_wind_that_the_others_share() {
+        assert!((of_another_run(&[5.0, 5.2, 4.8]) - 5.0).abs() < 0.01);
+        assert_eq!(of_another_run(&[2.0, -2.1, 1.9, -1.8]), 0.0);
+        assert_eq!(of_another_run(&[0.0, 0.0, 0.0]), 0.0);
     }
 }

@@ -4,6 +4,7 @@
 //!
 //! - [`words`]: names and units of kinds, parameters and covariates
 //! - [`sentence`]: the verdict in a plain sentence
+//! - [`effect`]: an effect in words
 //! - [`errors`]: open-loop errors before and after, with bootstrap intervals
 //! - [`traces`]: measured and predicted speeds of runs
 //! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
@@ -19,6 +20,7 @@
 
 pub mod candidates;
 pub mod covariates;
+pub mod effect;
 pub mod errors;
 mod estimate;
 pub mod line;

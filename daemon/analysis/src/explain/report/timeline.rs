@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::described;
 use super::panels::Zones;
-use super::sentence::described;
 use super::traces::predicted;
 use super::windows::missing_resistance;
 use crate::dataset::Dataset;

@@ -5,6 +5,7 @@ use super::outcome::{Outcome, Trial};
 use super::price::at_bound;
 use super::search::Search;
 use crate::explain::effects::AtBound;
+use crate::explain::evidence::Fit;
 
 /// A smaller share of the error is what an effect is refused for, a larger one its evidence.
 const LITTLE: f64 = 0.2;
@@ -89,11 +90,20 @@ fn is_material(trial: &Trial) -> bool {
 
 /// Whether the last effect of a trial may be what its kind says.
 pub(super) fn is_possible(trial: &Trial) -> bool {
-    contradiction(trial).is_none() && at_bound(&trial.fit, trial.last()).is_none()
+    may_be(&trial.fit, trial.last())
 }
 
 /// Why the last effect of a trial is not what its kind says.
 fn contradiction(trial: &Trial) -> Option<&'static str> {
-    let last = trial.last();
-    trial.fit.model.effects[last].contradiction(trial.fit.effect_parameters(last))
+    contradiction_of(&trial.fit, trial.last())
+}
+
+/// Why an effect of a fitted model is not what its kind says.
+fn contradiction_of(fit: &Fit, index: usize) -> Option<&'static str> {
+    fit.model.effects[index].contradiction(fit.effect_parameters(index))
+}
+
+/// Whether an effect of a fitted model may be what its kind says.
+pub(super) fn may_be(fit: &Fit, index: usize) -> bool {
+    contradiction_of(fit, index).is_none() && at_bound(fit, index).is_none()
 }

@@ -37,7 +37,8 @@ fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
     let needs_the_score = match effect.kind() {
         LowAdhesion | MassChange | SpeedDelay | Unknown | Wind => true,
         LocalResistance => is_beside_a_gradient,
-        _ => effect.place().intervals_m.is_some(),
+        // What acts where the map has its tunnels and curves is one number of the line.
+        _ => !effect.ends().is_empty(),
     };
     let runs_agree = || {
         let std = deviations(fit).std[fit.model.ranges()[index].start];

@@ -7,9 +7,10 @@ use dynocar_core::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 
+use super::acceptance::may_be;
 use super::certainty::is_accepted;
 use super::outcome::{Outcome, Trial};
-use super::price::{at_bound, discounted, model_penalty, penalty};
+use super::price::{discounted, model_penalty, penalty};
 use super::steps::{Progress, Steps, round_share};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, Noise, RunData, UpdatedModel};
@@ -320,6 +321,7 @@ impl Search<'_> {
             let mut stands = fit.model.effects[index].kind();
             if let Some(best) = self.best(&trials)
                 && Self::total(&best.fit) < Self::total(fit) - EQUAL
+                && all_may_be(&best.fit)
             {
                 *fit = best.fit.clone();
                 stands = best.kind;
@@ -329,7 +331,8 @@ impl Search<'_> {
         tried
     }
 
-    /// Drops effects that the others have made needless.
+    /// Drops effects that the others have made needless, and that none of the others stands in for against
+    /// what its own kind says: winds that blow ahead of every train instead of a tunnel's drag.
     fn prune(&self, fit: &mut Fit, small: &[EffectKind]) {
         let mut index = 0;
         while index < fit.model.effects.len() && fit.model.effects.len() > 1 {
@@ -340,7 +343,8 @@ impl Search<'_> {
             let rest = self.without(fit, index);
             let evidence = Self::total(&rest) - Self::total(fit);
             let reduction = reduction(self.problem, &rest, fit);
-            if !is_accepted(fit, index, evidence, reduction) || at_bound(fit, index).is_some() {
+            let is_needless = !is_accepted(fit, index, evidence, reduction) && all_may_be(&rest);
+            if is_needless || !may_be(fit, index) {
                 *fit = rest;
             } else {
                 index += 1;
@@ -357,4 +361,9 @@ impl Search<'_> {
         let start = kept.map(|(_, value)| *value).collect();
         self.problem.fit_with_noise(&model, start, fit.noise)
     }
+}
+
+/// Whether every effect of a fitted model may be what its kind says.
+fn all_may_be(fit: &Fit) -> bool {
+    (0..fit.model.effects.len()).all(|index| may_be(fit, index))
 }

@@ -15,11 +15,12 @@ use super::search::Search;
 use crate::explain::score::reduction;
 
 /// Kinds by which clocks, wheels and force sensors are always a little off, the most usual first.
-const EVERYDAY: [EffectKind; 4] = [
+const EVERYDAY: [EffectKind; 5] = [
     EffectKind::ActuatorDelay,
     EffectKind::WheelDiameter,
     EffectKind::TractionGain,
     EffectKind::SpeedDelay,
+    EffectKind::Wind,
 ];
 
 /// Kinds by which something is late.
