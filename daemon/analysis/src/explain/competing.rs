@@ -1,6 +1,6 @@
 //! Kinds that could stand in the place of an accepted effect.
 
-use dynocar_core::terms;
+use dynocar_core::terms::{self, speed_delay};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::evidence::{EQUAL, Fit};
@@ -38,12 +38,21 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         CompetingHypotheses { accepted, kinds }
     };
     let named = effects.iter().filter(|effect| outcome.is_named(effect.kind()));
+    // A late speed of as little as these forces would be within usual errors itself.
+    let is_large = |accepted: EffectKind| {
+        let index = effects.iter().position(|effect| effect.kind() == accepted);
+        let late_s: f64 =
+            index.map_or(0.0, |index| outcome.fit.effect_parameters(index).iter().sum());
+        move |twin: &EffectKind| *twin != EffectKind::SpeedDelay || late_s > speed_delay::LEAST_S
+    };
     let each = named.map(|effect| {
         let kind = effect.kind();
         let instead =
             outcome.instead.iter().find(|(stands, _)| effects.len() > 1 && *stands == kind);
         let first = outcome.rounds.first().map_or(&[][..], |round| &round[..]);
-        of(kind, instead.map_or(first, |(_, tried)| tried), effect.twins())
+        let twins: Vec<EffectKind> =
+            effect.twins().iter().copied().filter(is_large(kind)).collect();
+        of(kind, instead.map_or(first, |(_, tried)| tried), &twins)
     });
     each.filter(|competing| !competing.kinds.is_empty()).collect()
 }
