@@ -78,7 +78,7 @@ fn a_german_loggers_file_that_passes_midnight_is_described_and_read() {
     assert!(checked.contains("km/h is the top speed"), "{checked}");
     assert!(checked.contains("'Zeit' as times like 07:13:20.2"), "{checked}");
     let identified = done(&site, &["identify", "zug", "--estimator", "v_mils"]);
-    assert!(identified.contains(" km/h ") && !identified.contains(" m/s"), "{identified}");
+    assert!(identified.contains(" km/h ") && !identified.contains(" m/s "), "{identified}");
 }
 
 #[test]
