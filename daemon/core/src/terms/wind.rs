@@ -16,6 +16,8 @@ pub const WIND_PLUS: Key = Key {
 };
 /// Faster wind stops the trains.
 pub const PARAMETER: Parameter = Parameter::new("wind_plus_mps", (-35.0, 35.0), 0.05);
+/// Root mean square in m/s of the winds along a line on ordinary days, at most.
+pub const EVERYDAY_MPS: f64 = 2.5;
 /// Less wind than this is in the noise of any day.
 pub const LEAST_MPS: f64 = 1.0;
 

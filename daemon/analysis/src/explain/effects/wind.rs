@@ -8,13 +8,12 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
 use crate::explain::answer::ParameterValue;
-use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::evidence::{CERTAIN_STDS, RunData, SampleForces};
 use crate::explain::scan::Scan;
 
-/// A headwind that both directions share is at most so many times what they do not share, and so many
-/// standard deviations, by the scatter of the winds, away from none.
+/// A headwind that both directions share is at most so many times what they do not share, or may come by
+/// the scatter of the winds.
 const AHEAD_MAX: f64 = 3.0;
-const HEADWIND_STDS: f64 = 4.0;
 
 /// The kind.
 pub struct Wind;
@@ -124,7 +123,7 @@ impl Hypothesis for ByRun {
             |(direction, wind): (f64, f64)| wind - if direction > 0.0 { plus } else { minus };
         let freedom = (plus_runs + minus_runs - 2.0).max(1.0);
         let scatter = (winds().map(|it| away(it).powi(2)).sum::<f64>() / freedom).sqrt();
-        let by_chance = HEADWIND_STDS * scatter / (plus_runs + minus_runs).sqrt();
+        let by_chance = CERTAIN_STDS * scatter / (plus_runs + minus_runs).sqrt();
         let may_be = (AHEAD_MAX * along.abs().max(wind::LEAST_MPS)).max(by_chance);
         (ahead.abs() > may_be).then_some(
             "it would blow against every run alike, whichever way that goes: something of the train",

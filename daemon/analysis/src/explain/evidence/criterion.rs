@@ -3,6 +3,8 @@
 /// Strength that an effect must have. Simulated data without any effect stay far below it
 /// ([`NULL_SCORE`]); recorded data, whose noise is not quite what the model of it says, come nearer.
 pub const SCORE_MIN: f64 = 3.0;
+/// Standard deviations by the scatter between the runs that a number on which they agree is away from none.
+pub const CERTAIN_STDS: f64 = 4.0;
 /// Evidence by which two explanations may differ and still explain the data equally well; what is added
 /// beside others explains this much more than its price.
 pub const EQUAL: f64 = 6.0;

@@ -26,7 +26,9 @@ mod test_runs;
 mod whitener;
 
 pub use bins::Bin;
-pub use criterion::{EQUAL, NULL_SCORE, NullScore, SCORE_MIN, acceptance_score, p_value};
+pub use criterion::{
+    CERTAIN_STDS, EQUAL, NULL_SCORE, NullScore, SCORE_MIN, acceptance_score, p_value,
+};
 pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{UpdatedForces, UpdatedModel};

@@ -1,11 +1,10 @@
 //! Whether what was tried is more than chance, large enough to matter, and seen in the runs.
 
-use super::certainty::is_accepted;
+use super::certainty::{contradiction_of, is_accepted, may_be};
 use super::outcome::{Outcome, Trial};
 use super::price::at_bound;
 use super::search::Search;
 use crate::explain::effects::AtBound;
-use crate::explain::evidence::Fit;
 
 /// A smaller share of the error is what an effect is refused for, a larger one its evidence.
 const LITTLE: f64 = 0.2;
@@ -96,14 +95,4 @@ pub(super) fn is_possible(trial: &Trial) -> bool {
 /// Why the last effect of a trial is not what its kind says.
 fn contradiction(trial: &Trial) -> Option<&'static str> {
     contradiction_of(&trial.fit, trial.last())
-}
-
-/// Why an effect of a fitted model is not what its kind says.
-fn contradiction_of(fit: &Fit, index: usize) -> Option<&'static str> {
-    fit.model.effects[index].contradiction(fit.effect_parameters(index))
-}
-
-/// Whether an effect of a fitted model may be what its kind says.
-pub(super) fn may_be(fit: &Fit, index: usize) -> bool {
-    contradiction_of(fit, index).is_none() && at_bound(fit, index).is_none()
 }

@@ -3,13 +3,12 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::deviations;
-use crate::explain::evidence::{Fit, SCORE_MIN, acceptance_score};
+use super::price::at_bound;
+use crate::explain::evidence::{CERTAIN_STDS, Fit, SCORE_MIN, acceptance_score};
 
 /// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
 /// where everything declared is a little off, at most 26 for what is not in that world.
 pub(super) const CERTAIN: f64 = 40.0;
-/// Standard deviations by the scatter between the runs that such a number is then away from none.
-const CERTAIN_STDS: f64 = 4.0;
 /// Evidence times the share that it takes from the error, with which it is certain too, and which is asked of what is
 /// chosen among many places or runs: at most 2.3 where nothing acts.
 const CERTAIN_WITH_SHARE: f64 = 6.0;
@@ -52,4 +51,14 @@ fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
         evidence > CERTAIN || takes_enough
     };
     is_sure && !needs_the_score && fit.runs.len() >= CERTAIN_RUNS_MIN && runs_agree()
+}
+
+/// Why an effect of a fitted model is not what its kind says.
+pub(super) fn contradiction_of(fit: &Fit, index: usize) -> Option<&'static str> {
+    fit.model.effects[index].contradiction(fit.effect_parameters(index))
+}
+
+/// Whether an effect of a fitted model may be what its kind says.
+pub(super) fn may_be(fit: &Fit, index: usize) -> bool {
+    contradiction_of(fit, index).is_none() && at_bound(fit, index).is_none()
 }

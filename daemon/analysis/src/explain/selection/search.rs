@@ -7,8 +7,7 @@ use dynocar_core::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 
-use super::acceptance::may_be;
-use super::certainty::is_accepted;
+use super::certainty::{is_accepted, may_be};
 use super::outcome::{Outcome, Trial};
 use super::price::{discounted, model_penalty, penalty};
 use super::steps::{Progress, Steps, round_share};

@@ -5,6 +5,7 @@
 //! them certain, and they take little from the open-loop error. Left out of the model they would stand in its
 //! noise and hide what matters.
 
+use dynocar_core::terms::wind;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::Refusal;
@@ -26,6 +27,13 @@ const EVERYDAY: [EffectKind; 5] = [
 /// Kinds by which something is late.
 const LATE: [EffectKind; 2] = [EffectKind::ActuatorDelay, EffectKind::SpeedDelay];
 
+/// Whether winds are such as blow on ordinary days.
+fn is_everyday_wind(trial: &Trial) -> bool {
+    let winds_mps = trial.fit.effect_parameters(trial.last());
+    let square = winds_mps.iter().map(|wind| wind * wind).sum::<f64>() / winds_mps.len() as f64;
+    square.sqrt() <= wind::EVERYDAY_MPS
+}
+
 impl Search<'_> {
     /// The trial of the most usual everyday kind that is certain, and only for its size no effect. Late forces and a
     /// late speed look alike: one of them is enough.
@@ -35,6 +43,7 @@ impl Search<'_> {
             let effects = &trial.fit.model.effects;
             let late = effects.iter().filter(|it| LATE.contains(&it.kind())).count();
             trial.evidence > CERTAIN
+                && (trial.kind != EffectKind::Wind || is_everyday_wind(trial))
                 && late < LATE.len()
                 && matches!(refusal, Some(Refusal::Immaterial | Refusal::Weak(_)))
         };
@@ -43,7 +52,7 @@ impl Search<'_> {
     }
 
     /// Names what has turned out to matter beside the effects that were found, and forgets what is small
-    /// where nothing was.
+    /// where nothing was found, and what is no more certain beside what was.
     pub(super) fn name_or_forget_small(&self, outcome: &mut Outcome) {
         let kinds: Vec<EffectKind> =
             outcome.fit.model.effects.iter().map(|effect| effect.kind()).collect();
@@ -52,18 +61,21 @@ impl Search<'_> {
             outcome.fit = outcome.base.clone();
             return;
         }
-        for (index, kind) in kinds.into_iter().enumerate() {
-            if outcome.is_named(kind) {
-                continue;
-            }
+        for kind in kinds {
             let fit = &outcome.fit;
+            let index = fit.model.effects.iter().position(|effect| effect.kind() == kind);
+            let Some(index) = index.filter(|_| !outcome.is_named(kind)) else { continue };
             let rest = self.without(fit, index);
             let evidence = rest.cost - fit.cost - penalty(fit, index);
             let effect = &fit.model.effects[index];
             let is_material = effect.is_material(fit.effect_parameters(index), fit.theta[2]);
             let reduction = reduction(self.problem, &rest, fit);
-            if is_material && is_accepted(fit, index, evidence, reduction) {
+            let is_effect = is_material && is_accepted(fit, index, evidence, reduction);
+            if is_effect || evidence <= CERTAIN {
                 outcome.small.retain(|small| *small != kind);
+            }
+            if !is_effect && evidence <= CERTAIN {
+                outcome.fit = rest;
             }
         }
     }
