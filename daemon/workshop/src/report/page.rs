@@ -119,7 +119,7 @@ fn verdict(subject: &Subject) -> String {
     for to_do in answer.effects.iter().filter_map(effect::to_do) {
         let _ = writeln!(
             html,
-            "<p class=\"experiment\"><strong>To do.</strong> {}.</p>",
+            "<p class=\"experiment\"><strong>To do:</strong> {}.</p>",
             escape(to_do)
         );
     }
