@@ -120,7 +120,7 @@ fn verdict(subject: &Subject) -> String {
         let _ = writeln!(
             html,
             "<p class=\"experiment\"><strong>To do:</strong> {}.</p>",
-            escape(to_do)
+            escape(&to_do.replace('`', ""))
         );
     }
     for caveat in &answer.caveats {
