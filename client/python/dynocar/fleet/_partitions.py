@@ -33,9 +33,9 @@ def write_dataset(unit: Unit, folder: Path) -> dict[str, Path]:
             sources[run["file"]] = partition
     dataset = manifest.get("dataset", {}) | {"delimiter": ",", "decimal": "."}
     tables = {"dataset": {"name": f"train {unit.train}"} | dataset}
-    tables["train"] = {"file": str(unit.train_file.resolve())}
-    if unit.track_file is not None:
-        tables["track"] = {"file": str(unit.track_file.resolve())}
+    for table, file in (("train", unit.train_file), ("track", unit.track_file)):
+        if file is not None:
+            tables[table] = {"file": str(file.resolve())}
     _toml.write(tables | {"columns": columns, "runs": list(runs.values())}, folder / "dataset.toml")
     return sources
 
