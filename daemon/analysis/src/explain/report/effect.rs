@@ -100,7 +100,7 @@ fn speed_error(scale: f64, half: f64) -> String {
 }
 
 /// Windows by run and time, however they were found.
-fn in_order<'a, W>(windows: &'a [W], key: fn(&W) -> (&String, f64)) -> std::vec::IntoIter<&'a W> {
+fn in_order<W>(windows: &[W], key: fn(&W) -> (&String, f64)) -> std::vec::IntoIter<&W> {
     let mut all: Vec<&W> = windows.iter().collect();
     all.sort_by(|one, other| {
         let ((run, from_s), (other_run, other_s)) = (key(one), key(other));
