@@ -102,7 +102,7 @@ terminal terminal_health "dynocar health" "$programs/dynocar" health
 kill -INT "$recorder" && wait "$recorder" || true
 # The recording program may outlive the one that called it by a moment.
 sleep 1
-terminal terminal_verify "dynocar replay --verify run.mcap" "$programs/dynocar" replay --verify "$place/run.mcap"
+terminal terminal_verify "dynocar replay --verify run.mcap" env -C "$place" "$programs/dynocar" replay --verify run.mcap
 
 # The browser is a viewer that comes and goes.
 "$programs/dynocar" live > "$place/live.txt" 2>&1 &
