@@ -243,13 +243,13 @@ impl SnapshotReader {
             self.refused += 1;
             return false;
         }
-        let index = &mut self.latest[snapshot.pipeline_index as usize];
+        let slot = &mut self.latest[snapshot.pipeline_index as usize];
         let order = |it: &ParameterSnapshot| (it.epoch, it.sequence, it.vouched_ns);
-        let before = index.as_ref().map(order);
+        let before = slot.as_ref().map(order);
         if before.is_some_and(|before| order(snapshot) <= before) {
             return false;
         }
-        *index = Some(*snapshot);
+        *slot = Some(*snapshot);
         self.answers.learn(snapshot);
         before.is_none_or(|(epoch, sequence, _)| {
             (snapshot.epoch, snapshot.sequence) > (epoch, sequence)

@@ -295,12 +295,12 @@ fn an_effect_that_predicts_the_runs_held_out_worse_is_reported_as_that() {
     let declared = simulate(&SimulatorSettings::new(SEED, EffectRequest::none()));
     let fitted = declared.runs.iter().filter(|run| !run.plan.is_holdout);
     // A brush that hangs into the line on the days of the fit runs, and on no other.
-    let index = Effect::LocalResistance {
+    let place = Effect::LocalResistance {
         extra_n_per_kn: 2.0,
         intervals_m: vec![(4000.0, 8000.0)],
         runs: fitted.map(|run| run.plan.number).collect(),
     };
-    let effects = EffectRequest::Exactly(vec![index]);
+    let effects = EffectRequest::Exactly(vec![place]);
     let simulated = simulate(&SimulatorSettings::new(SEED, effects));
     let explanation = explained(&simulated, folder.path());
     let answer = &explanation.answer;

@@ -274,6 +274,16 @@ fn likely_mistakes_are_diagnosed() {
 }
 
 #[test]
+fn a_file_that_breaks_off_within_a_line_is_diagnosed() {
+    let breaks_off = |csv: &str| {
+        let run = Example::new(&[], csv).run();
+        run.diagnostics.iter().any(|diagnostic| diagnostic.code() == "breaks_off")
+    };
+    assert!(breaks_off("t,v\n0,1\n0.1,1\n0.2,1\n0."));
+    assert!(!breaks_off("t,v\n0,1\n0.1,1\n0.2,1\n"));
+}
+
+#[test]
 fn a_recorder_that_hangs_while_the_train_moves_is_diagnosed() {
     let diagnostics = |hangs_at: &dyn Fn(u32) -> bool, stands: bool| -> Vec<String> {
         let mut csv = String::from("t,v,F,B\n");

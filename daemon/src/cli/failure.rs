@@ -49,9 +49,9 @@ pub struct ErrorDocument {
 impl Failure {
     /// The failure for machines; `None` when the result is reported already.
     pub fn answer(&self) -> Option<ErrorAnswer> {
-        let (message, index, exit_status) = match self {
+        let (message, position, exit_status) = match self {
             Failure::Input(message) => (message.clone(), None, 2),
-            Failure::At(index, message) => (message.clone(), Some(index), 2),
+            Failure::At(position, message) => (message.clone(), Some(position), 2),
             Failure::Work(message) => (message.clone(), None, 1),
             Failure::Output(error) => {
                 let is_name = matches!(error, OutputError::Name { .. });
@@ -59,7 +59,7 @@ impl Failure {
             }
             Failure::Verdict(_) => return None,
         };
-        let (file, line) = index.map_or((None, None), |it| (Some(it.file.clone()), it.line));
+        let (file, line) = position.map_or((None, None), |it| (Some(it.file.clone()), it.line));
         Some(ErrorAnswer { message, file, line, exit_status })
     }
 

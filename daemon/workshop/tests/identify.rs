@@ -122,6 +122,17 @@ fn the_recommended_estimators_run_that_the_train_and_the_recordings_permit() {
 }
 
 #[test]
+fn of_data_that_cannot_be_true_no_value_is_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    write_dataset(folder.path(), &MANIFEST.replace("\"kN\"", "\"N\""), TRAIN);
+    let text = String::from_utf8(asked(folder.path(), &[]).stdout).unwrap();
+    assert!(text.contains("No value is printed") && !text.contains('±'), "{text}");
+    write_dataset(folder.path(), MANIFEST, TRAIN);
+    let text = String::from_utf8(asked(folder.path(), &[]).stdout).unwrap();
+    assert!(text.contains('±') && text.contains(" t\n") && text.contains(" N/kN\n"), "{text}");
+}
+
+#[test]
 fn all_estimators_or_those_named_run_when_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     write_dataset(folder.path(), MANIFEST, TRAIN);

@@ -22,8 +22,8 @@ pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64
 }
 
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
-/// whole train or line, less of it where it takes more, which the runs agree on. What is looked for at many places or in some of the runs must
-/// take more from the error. Never certain so are loads, winds and slippery rails, which change from run to run, a late
+/// whole train or line, less of it where it takes more, which the runs agree on. What is looked for at many
+/// places or in some of the runs must take more from the error. Never certain so are loads, winds and slippery rails, which change from run to run, a late
 /// speed, which late forces look like, unmapped tunnels, forms without a name, and a local resistance beside a
 /// fitted gradient, whose straight pieces leave such.
 fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {

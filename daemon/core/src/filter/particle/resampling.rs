@@ -21,10 +21,10 @@ pub(super) fn find_ancestors(weights: &[f64], offset: f64, ancestors: &mut [usiz
     let mut sum = 0.0;
     for (particle, weight) in weights[..last].iter().enumerate() {
         sum += weight;
-        // The levels below `sum`: its place among them, rounded up.
-        let index = sum * scale - offset;
-        let whole = index as u32;
-        let below = whole + u32::from(f64::from(whole) < index);
+        // The levels below `sum`: their number, rounded up.
+        let level = sum * scale - offset;
+        let whole = level as u32;
+        let below = whole + u32::from(f64::from(whole) < level);
         ancestors[(below as usize).min(last + 1)] = particle + 1;
     }
     let mut highest = 0;
