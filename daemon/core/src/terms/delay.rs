@@ -27,6 +27,8 @@ pub const PARAMETERS: [Parameter; 2] = [
 ];
 /// A shorter delay and lag together in s are within a cycle of most controllers.
 pub const LEAST_S: f64 = 0.15;
+/// Standard deviation in s of what a force acts behind its report.
+pub const USUAL_STD_S: f64 = 0.2;
 /// Delay in s that the live monitor takes for a matter of stamps.
 pub const TOLERATED_S: f64 = 0.3;
 
@@ -47,6 +49,8 @@ pub struct DelayLine<const N: usize> {
     past: Vec<(f64, [f64; N])>,
     next: usize,
     count: usize,
+    /// How many are newer than what held last.
+    newer: usize,
     segment: u32,
     origin_ns: i64,
     /// Time in s, delayed and lagged numbers of the last sample.
@@ -62,6 +66,7 @@ impl<const N: usize> DelayLine<N> {
             past: vec![(0.0, [0.0; N]); CAPACITY],
             next: 0,
             count: 0,
+            newer: 0,
             segment: 0,
             origin_ns: 0,
             last: None,
@@ -87,7 +92,7 @@ impl<const N: usize> DelayLine<N> {
         held: impl FnOnce(&[f64; N]) -> bool,
     ) -> Option<[f64; N]> {
         if self.count == 0 || segment != self.segment {
-            (self.count, self.next, self.last) = (0, 0, None);
+            (self.count, self.next, self.newer, self.last) = (0, 0, 0, None);
             (self.segment, self.origin_ns) = (segment, time_ns);
         }
         let reported = reported?;
@@ -104,21 +109,21 @@ impl<const N: usize> DelayLine<N> {
     }
 
     /// The reported numbers at a time, linear between samples, the oldest before all of them.
-    fn at(&self, time_s: f64) -> [f64; N] {
+    fn at(&mut self, time_s: f64) -> [f64; N] {
         let entry = |back: usize| self.past[(self.next + CAPACITY - 1 - back) % CAPACITY];
-        let mut after = entry(0);
-        if after.0 <= time_s {
-            return after.1;
+        // Times grow: what held last has become one older, and what holds now is no older.
+        let mut back = (self.newer + 1).min(self.count - 1);
+        while back > 0 && entry(back - 1).0 <= time_s {
+            back -= 1;
         }
-        for back in 1..self.count {
-            let before = entry(back);
-            if before.0 <= time_s {
-                let share = (time_s - before.0) / (after.0 - before.0);
-                return std::array::from_fn(|k| before.1[k] + share * (after.1[k] - before.1[k]));
-            }
-            after = before;
+        self.newer = back;
+        let before = entry(back);
+        if back == 0 || before.0 > time_s {
+            return before.1;
         }
-        after.1
+        let after = entry(back - 1);
+        let share = (time_s - before.0) / (after.0 - before.0);
+        std::array::from_fn(|k| before.1[k] + share * (after.1[k] - before.1[k]))
     }
 
     /// Response of the lag to an input that is linear between samples.
