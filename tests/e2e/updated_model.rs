@@ -4,7 +4,7 @@ use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
 use dynocar_analysis::explain::effects::{Candidate, LIBRARY, Proposal, UNKNOWN};
 use dynocar_analysis::explain::evidence::prepare;
 use dynocar_analysis::explain::evidence::{
-    Fit, FitProblem, Noise, RunData, SampleForces, UpdatedModel,
+    Fit, FitProblem, Noise, RunData, SampleForces, UpdatedForces, UpdatedModel,
 };
 use dynocar_analysis::explain::scan::Scan;
 use dynocar_core::terms::wheel;
@@ -108,4 +108,46 @@ fn every_kind_written_as_an_updated_model_is_applied_to_the_bit() {
     let expected: Vec<EffectKind> =
         EffectKind::ALL.iter().copied().filter(|kind| !events.contains(kind)).collect();
     assert_eq!(applied, expected);
+}
+
+#[test]
+fn what_a_fit_remembers_is_what_all_effects_do_at_the_samples() {
+    let dataset = read_files(&dataset_files(&simulated()));
+    let runs = prepare(&dataset).expect("usable runs");
+    let problem = FitProblem::new(runs, dataset.train.resistance);
+    let base = problem.fit(&UpdatedModel::default(), problem.start(&[]), Noise::START);
+    let track = dataset.track.as_ref();
+    let scan = Scan::new(&problem, &[], &dataset.train, track, &base).expect("a sound fit");
+    let candidates = |kind: EffectKind| {
+        let mut effects = LIBRARY.into_iter().chain([UNKNOWN]);
+        let effect = effects.find(|effect| effect.kind() == kind).expect("a kind");
+        match effect.propose(&scan) {
+            Proposal::Candidates(candidates) => candidates,
+            Proposal::NotTestable(_) => Vec::new(),
+        }
+    };
+    let beside = [EffectKind::WheelDiameter, EffectKind::RotatingMass, EffectKind::ActuatorDelay];
+    let mut looked_at = 0;
+    for first in beside.into_iter().flat_map(candidates) {
+        let with = problem.grown(&base, [first.parts()]);
+        let others = EffectKind::ALL.iter().filter(|kind| !beside.contains(kind));
+        let others = others.filter(|kind| **kind != EffectKind::None);
+        for second in others.flat_map(|kind| candidates(*kind)) {
+            let fit = problem.grown(&with, [second.parts()]);
+            let (mut forces, mut bins) = (UpdatedForces::default(), Vec::new());
+            for (run, residuals) in problem.runs.iter().zip(&fit.residuals) {
+                fit.model.predict_bins(run, &fit.theta, &mut forces, &mut bins);
+                for ((bin, modelled), residual) in run.bins.iter().zip(&bins).zip(residuals) {
+                    let expected = bin.speed_mps - modelled;
+                    assert!(
+                        (residual - expected).abs() < 1e-7,
+                        "{:?} {residual}",
+                        fit.model.effects
+                    );
+                }
+            }
+            looked_at += 1;
+        }
+    }
+    assert!(looked_at > 30, "{looked_at}");
 }

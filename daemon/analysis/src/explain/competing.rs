@@ -21,7 +21,7 @@ pub struct CompetingHypotheses {
 /// For each accepted effect that has some, the kinds that could stand in its place.
 ///
 /// Beside those that the runs could not distinguish from it whatever they showed, a competing hypothesis explains the data as
-/// well, takes away about as much of the open-loop error, and has nothing left to explain once the effect
+/// well, more than chance would, takes away about as much of the open-loop error, and has nothing left to explain once the effect
 /// is in: what keeps its evidence acts beside the effect and not in its place.
 pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
     let effects = &outcome.fit.model.effects;
@@ -62,7 +62,7 @@ fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
     let last = outcome.rounds.last().into_iter().flatten();
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
     trial.kind != EffectKind::Unknown
-        && Search::refusal(trial) != Some(Refusal::Immaterial)
+        && !matches!(Search::refusal(trial), Some(Refusal::Immaterial | Refusal::Chance))
         && trial.bic_gain > accepted.bic_gain - EQUAL
         && trial.reduction > ERROR_REDUCTION_SHARE * accepted.reduction
         && left < 0.5 * trial.evidence

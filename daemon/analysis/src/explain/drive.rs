@@ -198,7 +198,7 @@ fn reported_by(
     let open = Arc::new(open);
     let model = UpdatedModel::default().with(open.clone());
     let first = problem.fit_with_noise(&model, start, Noise::START);
-    let fit = problem.fit_with_noise(&model, first.theta, first.noise);
+    let fit = problem.with_own_noise(&first);
     if fit.observations() < OBSERVATIONS_MIN {
         return None;
     }

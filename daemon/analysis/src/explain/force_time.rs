@@ -74,7 +74,7 @@ pub fn estimated(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
     let problem = FitProblem::new(runs, dataset.train.resistance);
     let model = UpdatedModel::default().with(Arc::new(LateStamps));
     let first = problem.fit_with_noise(&model, problem.start(&[0.0]), Noise::START);
-    let fit = problem.fit_with_noise(&model, first.theta, first.noise);
+    let fit = problem.with_own_noise(&first);
     if fit.observations() < OBSERVATIONS_MIN {
         return Ok(None);
     }

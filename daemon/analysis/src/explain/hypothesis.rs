@@ -58,6 +58,28 @@ pub struct ReportContext<'a> {
     pub few_runs_factor: f64,
 }
 
+/// What an effect does to others that only add a resistance or a gradient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OnOthers {
+    /// Nothing.
+    Nothing,
+    /// It scales what they do, all alike.
+    Scales,
+    /// It changes them in another way, or takes their place.
+    Changes,
+}
+
+/// When an effect acts among others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Turn {
+    /// Before the others: what is reported late, acts late.
+    First,
+    /// In the order in which they were found.
+    Usual,
+    /// After the others: how the record was made changes what all of them do.
+    Last,
+}
+
 /// A structure that a kind proposes: everything but the values of its parameters.
 pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// The kind it belongs to.
@@ -91,21 +113,31 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         permille.resize(run.samples().len(), 0.0);
     }
 
-    /// True where it changes what other effects do that only add a resistance or a gradient, or takes
-    /// their place.
-    fn changes_others(&self) -> bool {
-        false
+    /// What it does to other effects that only add a resistance or a gradient.
+    fn on_others(&self) -> OnOthers {
+        OnOthers::Nothing
     }
 
-    /// True when it adds a resistance in proportion to its first parameter, and nothing else.
+    /// The factor on what they do, where it [scales](OnOthers::Scales) them.
+    fn scale_of_others(&self, _parameters: &[f64]) -> f64 {
+        1.0
+    }
+
+    /// True when it adds a resistance in proportion to how far its first parameter is from none, and nothing
+    /// else.
     fn only_resists(&self) -> bool {
         false
     }
 
-    /// That resistance in N/kN at each sample of a run, for a first parameter of 1 and given others.
+    /// That resistance in N/kN at each sample of a run, for a first parameter of 1 above none and given others.
     fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
         n_per_kn.clear();
         n_per_kn.resize(run.samples().len(), 0.0);
+    }
+
+    /// True where what it only resists with follows the speed.
+    fn feels_speed(&self) -> bool {
+        false
     }
 
     /// A function of each parameter in which the declared forces with this effect are affine, each by
@@ -129,10 +161,9 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         None
     }
 
-    /// True when it changes what all other effects do: a matter of how the record was made, which comes
-    /// after them.
-    fn is_of_the_whole_record(&self) -> bool {
-        false
+    /// When it acts among others.
+    fn turn(&self) -> Turn {
+        Turn::Usual
     }
 
     /// Where it acts.

@@ -10,7 +10,7 @@
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run
-//! - [`gradient_prior`], [`map_error`]: how maps err; the finished model beside what the map's own error makes all runs err alike
+//! - [`gradient_prior`], [`usual_errors`]: how maps err; the finished model beside what is usually wrong
 //! - [`score`], `stop_runs`, [`stop_to_stop`], [`judged`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`meaning`], [`verdict`],
 //!   [`described`], [`answer`]: the statement
@@ -31,7 +31,6 @@ pub mod hypothesis;
 pub mod identifiability;
 pub mod informed;
 pub mod judged;
-pub mod map_error;
 pub mod meaning;
 pub mod places;
 pub mod report;
@@ -43,6 +42,7 @@ pub mod selection;
 mod stop_runs;
 pub mod stop_to_stop;
 pub mod unexplained;
+pub mod usual_errors;
 pub mod verdict;
 
 use dynocar_core::plausibility::Severity;
@@ -112,7 +112,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    let deviations = map_error::given_map_error(&search, &mut outcome);
+    let deviations = usual_errors::given_usual_errors(&search, &mut outcome);
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);

@@ -28,17 +28,15 @@ pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
     let found = fit.model.effects[index].formula(fit.effect_parameters(index)).map(form);
     let own = fit.cost + penalty(fit, index);
     let rest = search.without(fit, index);
-    let onto = search.problem.fit(&rest.model, rest.theta.clone(), fit.noise);
+    let onto = search.problem.again(&rest, fit.noise);
     let Some(scan) = search.scan(&onto) else { return Vec::new() };
     let Proposal::Candidates(candidates) = UNKNOWN.propose(&scan) else { return Vec::new() };
     let mut others: Vec<RunnerUp> = candidates
         .into_iter()
         .filter_map(|candidate| {
-            let model = onto.model.with(candidate.hypothesis.clone());
-            let start = onto.theta.iter().chain(&candidate.start).copied().collect();
-            let other = search.problem.fit(&model, start, fit.noise);
+            let other = search.problem.grown(&onto, [candidate.parts()]);
             let last = other.model.effects.len() - 1;
-            let formula = candidate.hypothesis.formula(other.effect_parameters(last))?;
+            let formula = other.model.effects[last].formula(other.effect_parameters(last))?;
             let evidence_less = other.cost + penalty(&other, last) - own;
             Some(RunnerUp { formula, evidence_less })
         })

@@ -196,7 +196,7 @@ fn effect_answers(
     search: &Search,
     outcome: &Outcome,
     known: &[Option<PlaceUncertainty>],
-    Deviations { std, covariance }: &Deviations,
+    Deviations { std, covariance, c }: &Deviations,
 ) -> Vec<EffectAnswer> {
     let fit = &outcome.fit;
     let mut answers: Vec<(f64, EffectAnswer)> = fit
@@ -216,7 +216,7 @@ fn effect_answers(
             let reported = effect.report(&ReportContext {
                 parameters: &fit.theta[range.clone()],
                 deviations: &std[range.clone()],
-                c: fit.theta[2],
+                c: *c,
                 c_deviation: std[2],
                 c_covariance: covariance[(2, range.start)],
                 weight_kn,

@@ -18,6 +18,9 @@ pub const PARAMETERS: [Parameter; 1] = [Parameter::new("k_n_per_kn_m", (0.0, 500
 /// A k that differs by less from the declared one is within what formulas differ by.
 pub const LEAST_N_PER_KN_M: f64 = 100.0;
 
+/// Standard deviation of a declared k, as a share of it: formulas differ.
+pub const USUAL_STD: f64 = 0.2;
+
 /// Curves of a mean 1/R along the train resist.
 #[inline]
 pub fn act(k_n_per_kn_m: f64, curvature_per_m: Option<f64>, resistance: &mut Resistance) {

@@ -18,6 +18,9 @@ pub const PARAMETERS: [Parameter; 1] = [Parameter::new("gain", (0.6, 1.6), 0.005
 /// Force sensors are good to this.
 pub const LEAST: f64 = 0.01;
 
+/// Standard deviation of the scale of a reported force.
+pub const USUAL_STD: f64 = 0.007;
+
 /// The true force in N behind a reported one.
 #[inline]
 pub fn true_force_n(reported_n: f64, gain: f64) -> f64 {

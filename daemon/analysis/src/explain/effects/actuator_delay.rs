@@ -4,7 +4,7 @@ use dynocar_core::terms::delay::{self, DelayLine};
 use dynocar_core::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal};
+use super::{Candidate, Effect, Hypothesis, Proposal, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::{Scan, Tuple};
 
@@ -68,6 +68,10 @@ impl Hypothesis for DelayAndLag {
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         parameters[0] + parameters[1] > delay::LEAST_S
+    }
+
+    fn turn(&self) -> Turn {
+        Turn::First
     }
 
     fn is_local(&self) -> bool {

@@ -1,5 +1,6 @@
 //! Curve resistance k/R in N/kN with another k than declared (Röckl, Schmidt; declared k = 600).
 
+use dynocar_core::force::ResolvedSample;
 use dynocar_core::terms::{Entry, Parameter, curve};
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -61,8 +62,14 @@ impl Hypothesis for Curves {
         (parameters[0] - self.declared_k).abs() > curve::LEAST_N_PER_KN_M
     }
 
-    fn affine_in(&self) -> Option<fn(f64) -> f64> {
-        Some(|value| value)
+    fn only_resists(&self) -> bool {
+        true
+    }
+
+    fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
+        n_per_kn.clear();
+        let of_one = |sample: &ResolvedSample| sample.curvature_per_m.unwrap_or(0.0);
+        n_per_kn.extend(run.samples().iter().map(of_one));
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {

@@ -6,7 +6,7 @@ use dynocar_core::terms::{Entry, Parameter, gradient};
 use dynocar_core::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal};
+use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -92,8 +92,8 @@ impl Hypothesis for Shift {
         parameters[0].abs() > gradient::SHIFT_LEAST_M
     }
 
-    fn changes_others(&self) -> bool {
-        true
+    fn on_others(&self) -> OnOthers {
+        OnOthers::Changes
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {

@@ -22,12 +22,16 @@ mod speed_delay;
 mod traction_gain;
 mod tunnel_drag;
 mod unknown;
+mod usual_errors;
 mod wheel_diameter;
 mod wind;
 
-pub use super::hypothesis::{AtBound, Hypothesis, ReportContext, Reported, SharedHypothesis};
+pub use super::hypothesis::{
+    AtBound, Hypothesis, OnOthers, ReportContext, Reported, SharedHypothesis, Turn,
+};
 pub use gradient_error::map_error;
 pub use proposal::{Candidate, Effect, Proposal};
+pub use usual_errors::usual_errors;
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.

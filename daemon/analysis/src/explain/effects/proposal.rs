@@ -21,6 +21,17 @@ impl Candidate {
     pub fn new(hypothesis: impl Hypothesis + 'static, start: Vec<f64>) -> Self {
         Candidate { hypothesis: Arc::new(hypothesis), start }
     }
+
+    /// Whether it has ends, runs or a course along the line, of which there are many.
+    pub fn is_chosen_among_many(&self) -> bool {
+        let of = &self.hypothesis;
+        !of.ends().is_empty() || of.is_event() || of.is_gradient()
+    }
+
+    /// The structure and the values.
+    pub fn parts(self) -> (SharedHypothesis, Vec<f64>) {
+        (self.hypothesis, self.start)
+    }
 }
 
 /// What a kind makes of the data.

@@ -4,7 +4,7 @@
 use dynocar_core::terms::{Entry, Parameter, rotating};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal};
+use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal};
 use crate::explain::evidence::{RunData, RunScatter, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -53,8 +53,12 @@ impl Hypothesis for Gamma {
         (parameters[0] - self.declared).abs() > rotating::LEAST
     }
 
-    fn changes_others(&self) -> bool {
-        true
+    fn on_others(&self) -> OnOthers {
+        OnOthers::Scales
+    }
+
+    fn scale_of_others(&self, parameters: &[f64]) -> f64 {
+        (1.0 + self.declared) / (1.0 + parameters[0])
     }
 
     fn affine_in(&self) -> Option<fn(f64) -> f64> {

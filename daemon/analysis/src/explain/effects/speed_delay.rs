@@ -6,7 +6,7 @@ use dynocar_core::terms::{Entry, Parameter};
 use dynocar_core::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal};
+use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::{Scan, Tuple};
 
@@ -74,8 +74,8 @@ impl Hypothesis for DelayAndLag {
         parameters[0] + parameters[1] > speed_delay::LEAST_S
     }
 
-    fn changes_others(&self) -> bool {
-        true
+    fn on_others(&self) -> OnOthers {
+        OnOthers::Changes
     }
 
     fn is_local(&self) -> bool {
@@ -99,8 +99,8 @@ impl Hypothesis for DelayAndLag {
         Some(parameters.iter().sum())
     }
 
-    fn is_of_the_whole_record(&self) -> bool {
-        true
+    fn turn(&self) -> Turn {
+        Turn::Last
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {

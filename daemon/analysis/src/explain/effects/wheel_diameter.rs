@@ -4,7 +4,7 @@
 use dynocar_core::terms::{Entry, Parameter, wheel};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal};
+use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -48,8 +48,12 @@ impl Hypothesis for Scale {
         (parameters[0] - 1.0).abs() > wheel::LEAST
     }
 
-    fn changes_others(&self) -> bool {
-        true
+    fn on_others(&self) -> OnOthers {
+        OnOthers::Scales
+    }
+
+    fn scale_of_others(&self, parameters: &[f64]) -> f64 {
+        parameters[0]
     }
 
     fn apply(

@@ -10,7 +10,7 @@ use super::bins::Bin;
 use super::response::Response;
 use super::run_data::RunData;
 use super::sample_forces::SampleForces;
-use crate::explain::hypothesis::SharedHypothesis;
+use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
 
 /// Samples that are looked at together.
 const BLOCK: usize = 256;
@@ -48,9 +48,20 @@ impl UpdatedModel {
             .collect()
     }
 
-    /// True where what each effect does is the same whatever the others do.
-    pub fn adds_up(&self) -> bool {
-        !self.effects.iter().any(|effect| effect.changes_others())
+    /// What its effects do to those among them that only add something, at most.
+    pub fn on_others(&self) -> OnOthers {
+        let all = |found: OnOthers| self.effects.iter().any(|effect| effect.on_others() == found);
+        match () {
+            () if all(OnOthers::Changes) => OnOthers::Changes,
+            () if all(OnOthers::Scales) => OnOthers::Scales,
+            () => OnOthers::Nothing,
+        }
+    }
+
+    /// The factor on what the effects do that only add something.
+    pub fn scale_of_added(&self, theta: &[f64]) -> f64 {
+        let effects = self.effects.iter().zip(self.ranges());
+        effects.map(|(effect, range)| effect.scale_of_others(&theta[range])).product()
     }
 
     /// Measured over true speed, by some of the effects.
@@ -71,13 +82,62 @@ impl UpdatedModel {
         let first = samples.start;
         forces.clear();
         forces.extend_from_slice(&run.declared[samples]);
-        for is_last in [false, true] {
-            let effects = self.effects.iter().zip(self.ranges()).enumerate();
-            let turn = |effect: &SharedHypothesis| effect.is_of_the_whole_record() == is_last;
-            for (_, (effect, range)) in effects.filter(|it| turn(it.1.0) && acts(it.0)) {
-                effect.apply(&theta[range], run, first, forces);
-            }
+        for (effect, range) in self.in_turn(acts) {
+            effect.apply(&theta[range], run, first, forces);
         }
+    }
+
+    /// What the bins change by for a step of each of some parameters of effects, over the step: `moves` are
+    /// numbers of parameters with their steps.
+    pub fn differences(
+        &self,
+        (run, theta): (&RunData, &[f64]),
+        acts: impl Fn(usize) -> bool,
+        moves: &[(usize, f64)],
+        forces: &mut [UpdatedForces; 2],
+        columns: &mut [Vec<f64>],
+    ) {
+        let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
+        let bins = |forces: &[SampleForces], scale: f64, bins: &mut Vec<f64>| {
+            let acceleration = |i: usize| {
+                let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
+                let [p0, p1, p2] = forces[i].polynomial(davis, speed_mps);
+                [scale * (p0 + speed_mps * (p1 + speed_mps * p2))]
+            };
+            integrate_bins(run, acceleration, [bins]);
+        };
+        let order = self.in_turn(&acts);
+        let [before, moved] = forces.each_mut().map(|forces| &mut forces.samples);
+        before.clone_from(&run.declared);
+        let mut elsewhere = theta.to_vec();
+        for (turn, (effect, range)) in order.iter().enumerate() {
+            for &(i, step) in moves.iter().filter(|(i, _)| range.contains(i)) {
+                elsewhere[i] = theta[i] + step;
+                moved.clone_from(before);
+                for (effect, range) in &order[turn..] {
+                    effect.apply(&elsewhere[range.clone()], run, 0, moved);
+                }
+                bins(moved, self.speed_scale(&elsewhere, &acts), &mut columns[i]);
+                elsewhere[i] = theta[i];
+            }
+            effect.apply(&theta[range.clone()], run, 0, before);
+        }
+        let mut base = Vec::new();
+        bins(before, self.speed_scale(theta, &acts), &mut base);
+        for &(i, step) in moves {
+            columns[i].iter_mut().zip(&base).for_each(|(own, base)| *own = (*own - base) / step);
+        }
+    }
+
+    /// Some of the effects with the ranges of their parameters, in the order in which they act.
+    fn in_turn(&self, acts: &impl Fn(usize) -> bool) -> Vec<(&SharedHypothesis, Range<usize>)> {
+        let acting = || {
+            let effects = self.effects.iter().zip(self.ranges()).enumerate();
+            effects.filter(|(number, _)| acts(*number)).map(|(_, own)| own)
+        };
+        let mut order: Vec<_> = acting().collect();
+        order.sort_by_key(|(effect, _)| effect.turn());
+        order
     }
 
     /// The samples from one on that are looked at together: few enough to stay near the processor, but all
@@ -117,23 +177,12 @@ impl UpdatedModel {
         forces: &mut UpdatedForces,
         bins: &mut Vec<f64>,
     ) {
-        self.predict_bins_of((run, theta), |_| true, forces, bins);
-    }
-
-    /// The same with some of the effects, by their number.
-    pub fn predict_bins_of(
-        &self,
-        at: (&RunData, &[f64]),
-        acts: impl Fn(usize) -> bool,
-        forces: &mut UpdatedForces,
-        bins: &mut Vec<f64>,
-    ) {
-        let davis = Davis { a: at.1[0], b: at.1[1], c: at.1[2] };
+        let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let accelerations = |state: &SampleForces, speed_mps: f64| {
             let [p0, p1, p2] = state.polynomial(davis, speed_mps);
             [p0 + speed_mps * (p1 + speed_mps * p2)]
         };
-        self.integrate(at, acts, accelerations, forces, [bins]);
+        self.integrate((run, theta), |_| true, accelerations, forces, [bins]);
     }
 
     /// What some of the effects make of the bins for every a, b and c.

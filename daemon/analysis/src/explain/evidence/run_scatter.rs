@@ -28,8 +28,9 @@ const DELAY_S: f64 = 0.02;
 /// What is known beforehand of the scatter between runs counts as so many of them.
 pub const PRIOR_RUNS: f64 = 4.0;
 /// Beyond these a factor is an effect and no scatter.
-const FORCE_MAX: f64 = 0.008;
-const RESISTANCE_MAX: f64 = 0.03;
+pub(super) const MOST: RunScatter = RunScatter { force: 0.008, resistance: 0.03 };
+/// What loads as they are weighed and winds of ordinary days do at most, once the effects are found.
+pub(super) const MOST_BESIDE: RunScatter = RunScatter { force: 0.05, resistance: 0.15 };
 
 impl RunScatter {
     fn precision(self) -> Matrix3<f64> {
@@ -38,8 +39,8 @@ impl RunScatter {
     }
 
     /// The scatter under which the factors of the runs are likeliest (one step of expectation
-    /// maximisation), shrunk towards the usual one.
-    pub fn updated(factors: &[(Vector3<f64>, Matrix3<f64>)]) -> Self {
+    /// maximisation), shrunk towards the usual one and no more than the most.
+    pub fn updated(factors: &[(Vector3<f64>, Matrix3<f64>)], most: RunScatter) -> Self {
         let usual = RunScatter::USUAL;
         let count = factors.len() as f64 + PRIOR_RUNS;
         let mean_square = |k: usize, usual: f64| {
@@ -47,8 +48,8 @@ impl RunScatter {
             ((seen + PRIOR_RUNS * usual * usual) / count).sqrt()
         };
         RunScatter {
-            force: mean_square(0, usual.force).min(FORCE_MAX),
-            resistance: mean_square(1, usual.resistance).min(RESISTANCE_MAX),
+            force: mean_square(0, usual.force).min(most.force),
+            resistance: mean_square(1, usual.resistance).min(most.resistance),
         }
     }
 }

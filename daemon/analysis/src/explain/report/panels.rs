@@ -240,7 +240,7 @@ fn unevenness(panel: &Panel) -> f64 {
 
 /// Covariance of the updated model's parameters, with the deviations that are reported.
 pub(super) fn covariance(explanation: &Explanation) -> DMatrix<f64> {
-    let Deviations { std: deviations, covariance } = &explanation.deviations;
+    let Deviations { std: deviations, covariance, .. } = &explanation.deviations;
     let count = deviations.len();
     DMatrix::from_fn(count, count, |i, j| {
         let scale = (covariance[(i, i)] * covariance[(j, j)]).sqrt();

@@ -11,15 +11,20 @@ const HELD_SHARE: f64 = 1e-4;
 /// Less runs than these say nothing of each other.
 const RUNS_MIN: usize = 2;
 
-/// By how much the parameters move when each run is left out, to second order; `None` for a run
-/// without which they are not determined.
-fn moves_without_each_run(fit: &Fit) -> Vec<Option<DVector<f64>>> {
+/// By how much the first so many parameters move when each run is left out, to second order, with all
+/// others held; `None` for a run without which they are not determined.
+fn moves_without_each_run(fit: &Fit, count: usize) -> Vec<Option<DVector<f64>>> {
     let information = fit.information();
     let moved = |run: &RunNormal| {
-        let rest = Cholesky::new(&information - &run.information)?;
-        Some(-rest.solve(&run.score))
+        let rest = Cholesky::new(first(&(&information - &run.information), count))?;
+        Some(-rest.solve(&run.score.rows(0, count)))
     };
     fit.runs.iter().map(moved).collect()
+}
+
+/// What a matrix says of the first so many parameters.
+fn first(matrix: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
+    matrix.view((0, 0), (count, count)).into_owned()
 }
 
 /// The parameters fitted without each run, to second order and within their bounds: what the other
@@ -91,14 +96,8 @@ pub struct Deviations {
     pub std: Vec<f64>,
     /// Covariance by likelihood and scatter, without what the form and the map add.
     pub covariance: DMatrix<f64>,
-}
-
-impl Deviations {
-    /// Those of the first so many parameters.
-    pub fn of_first(mut self, count: usize) -> Self {
-        self.std.truncate(count);
-        Deviations { std: self.std, covariance: self.covariance.resize(count, count, 0.0) }
-    }
+    /// c beside what else is in the fit: what is a share of it is a share of this.
+    pub c: f64,
 }
 
 /// Standard deviations of all parameters, and their covariance.
@@ -107,14 +106,41 @@ impl Deviations {
 /// single runs are left out) are averaged, the likelihood counting as `PRIOR_RUNS` runs and the scatter
 /// as those there are.
 pub fn deviations(fit: &Fit) -> Deviations {
-    let count = fit.theta.len();
-    let Some(factor) = Cholesky::new(fit.free_information()) else {
-        return Deviations { std: vec![f64::NAN; count], covariance: DMatrix::zeros(count, count) };
+    deviations_of_first(fit, fit.theta.len())
+}
+
+/// The same of the first so many parameters beside the last so many: errors that all runs share, of which
+/// the scatter between the runs shows nothing.
+pub fn deviations_beside(fit: &Fit, count: usize, shared: usize) -> Deviations {
+    let information = fit.free_information();
+    let variance_of = |parameters: usize| {
+        let factor = Cholesky::new(first(&information, parameters))?;
+        Some(first(&factor.inverse(), count))
+    };
+    let held = fit.theta.len() - shared;
+    let Deviations { mut std, covariance, c } = deviations_of_first(fit, held);
+    std.truncate(count);
+    let mut covariance = first(&covariance, count);
+    if let (Some(beside), Some(alone)) = (variance_of(fit.theta.len()), variance_of(held)) {
+        let added = beside - alone;
+        for (i, std) in std.iter_mut().enumerate() {
+            *std = std.hypot(added[(i, i)].max(0.0).sqrt());
+        }
+        covariance += added;
+    }
+    Deviations { std, covariance, c }
+}
+
+/// Those of the first so many parameters with all others held.
+fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
+    let Some(factor) = Cholesky::new(first(&fit.free_information(), count)) else {
+        let (std, covariance) = (vec![f64::NAN; count], DMatrix::zeros(count, count));
+        return Deviations { std, covariance, c: fit.theta[2] };
     };
     let covariance = factor.inverse();
     let runs = fit.runs.len() as f64;
     let mut scatter = DVector::zeros(count);
-    let moves = moves_without_each_run(fit);
+    let moves = moves_without_each_run(fit, count);
     for moved in moves.iter().flatten() {
         scatter += moved.component_mul(moved);
     }
@@ -131,7 +157,8 @@ pub fn deviations(fit: &Fit) -> Deviations {
     let scaled =
         DMatrix::from_fn(count, count, |i, j| covariance[(i, j)] * enlarged[i] * enlarged[j]);
     let mut std: Vec<f64> = (0..count).map(|i| scaled[(i, i)].sqrt()).collect();
-    for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
+    let effects = fit.model.effects.iter().zip(fit.model.ranges());
+    for (effect, range) in effects.filter(|(_, range)| range.end <= count) {
         for i in range.clone() {
             let form = FORM_SHARE * (fit.theta[i] - effect.none());
             std[i] = std[i].hypot(form);
@@ -142,5 +169,5 @@ pub fn deviations(fit: &Fit) -> Deviations {
             *std = std.hypot(effect.shared_error());
         }
     }
-    Deviations { std, covariance: scaled }
+    Deviations { std, covariance: scaled, c: fit.theta[2] }
 }

@@ -11,7 +11,7 @@ mod small;
 mod steps;
 
 pub use acceptance::Refusal;
-pub use by_run::{Deviations, deviations, few_runs_factor, without_each_run};
+pub use by_run::{Deviations, deviations, deviations_beside, few_runs_factor, without_each_run};
 pub use outcome::{Outcome, Trial};
 pub use price::{discounted, model_penalty, penalty};
 pub use search::{OBSERVATIONS_MIN, Search};

@@ -59,14 +59,14 @@ impl Search<'_> {
             return None;
         }
         let noise = base.noise.stiff(STIFF[0]);
-        let onto = self.problem.fit(&base.model, base.theta.clone(), noise);
+        let onto = self.problem.again(base, noise);
         let explained = best_possible(trials).map_or(0.0, |best| {
-            let with = self.problem.fit(&best.fit.model, best.fit.theta.clone(), noise);
+            let with = self.problem.again(&best.fit, noise);
             onto.cost - with.cost - penalty(&with, best.last())
         });
         let scan = self.scan(&onto)?;
         a_form_explains_more(&scan, (COARSE_SHARE * explained).max(SCORE_MIN))
-            .then(|| self.look_again(base, noise, UNKNOWN))
+            .then(|| self.look_again(base, noise, UNKNOWN).map(|it| it.0))
             .flatten()
     }
 
@@ -82,7 +82,7 @@ impl Search<'_> {
             let before = FitErrors::of(self.problem, base);
             for share in STIFF {
                 let noise = base.noise.stiff(share);
-                let Some(mut trial) = self.look_again(base, noise, UNKNOWN) else { continue };
+                let Some((mut trial, _)) = self.look_again(base, noise, UNKNOWN) else { continue };
                 trial.reduction = FitErrors::of(self.problem, &trial.fit).reduction_from(&before);
                 let is_better = Self::total(&trial.fit) < Self::total(&outcome.fit) - EQUAL;
                 if is_better && Self::refusal(&trial).is_none() {

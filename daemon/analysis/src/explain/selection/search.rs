@@ -80,7 +80,7 @@ impl Search<'_> {
         let declared = UpdatedModel::default();
         let start = self.problem.start(&[]);
         let first = self.problem.fit_with_noise(&declared, start, Noise::START);
-        let base = self.problem.fit_with_noise(&declared, first.theta, first.noise);
+        let base = self.problem.with_own_noise(&first);
         Outcome {
             base: base.clone(),
             fit: base,
@@ -239,13 +239,8 @@ impl Search<'_> {
     /// Fits a candidate on top of a fit; its evidence counts against `base`.
     fn attempt(&self, base: &Fit, onto: &Fit, candidate: Candidate, own_noise: bool) -> Trial {
         let kind = candidate.hypothesis.kind();
-        let model = onto.model.with(candidate.hypothesis);
-        let start = onto.theta.iter().chain(&candidate.start).copied().collect();
-        let fit = if own_noise {
-            self.problem.fit_with_noise(&model, start, onto.noise)
-        } else {
-            self.problem.fit(&model, start, onto.noise)
-        };
+        let fit = self.problem.grown(onto, [candidate.parts()]);
+        let fit = if own_noise { self.problem.with_own_noise(&fit) } else { fit };
         Self::trial(base, fit, kind)
     }
 
@@ -257,26 +252,21 @@ impl Search<'_> {
         Trial { kind, fit, bic_gain: decrease - price, evidence, reduction: 0.0 }
     }
 
-    /// Gives a trial the noise that remains under it and lets its kind look again for places and
-    /// windows under that noise: the noise of the smaller model holds the effect itself.
+    /// Gives a trial the noise that remains under it and lets its kind look again for places and windows
+    /// under that noise: the noise of the smaller model holds the effect itself. Where there are many to
+    /// choose from, it looks under stiff noises too.
     fn finalist(&self, base: &Fit, trial: Trial, effect: &dyn Effect) -> Trial {
-        let refit = |trial: &Trial| {
-            let fit = self.problem.fit_with_noise(
-                &trial.fit.model,
-                trial.fit.theta.clone(),
-                trial.fit.noise,
-            );
-            Self::trial(base, fit, trial.kind)
-        };
-        let mut best = refit(&trial);
+        let mut best = Self::trial(base, self.problem.with_own_noise(&trial.fit), trial.kind);
         for attempt in 0..3 {
             let own = best.fit.noise;
-            let noises = [own, own.stiff(STIFF[0]), own.stiff(STIFF[1])];
-            let looks = if attempt == 0 { &noises[..] } else { &noises[..1] };
+            let look = |noise: Noise| self.look_again(base, noise, effect);
+            let (again, many) =
+                look(own).map_or((None, false), |(trial, many)| (Some(trial), many));
+            let shares = if attempt == 0 && many { &STIFF[..] } else { &[] };
+            let stiff: Vec<_> =
+                shares.par_iter().filter_map(|share| look(own.stiff(*share))).collect();
             let mut is_better = false;
-            let found: Vec<Option<Trial>> =
-                looks.par_iter().map(|&noise| self.look_again(base, noise, effect)).collect();
-            for again in found.into_iter().flatten() {
+            for again in again.into_iter().chain(stiff.into_iter().map(|it| it.0)) {
                 if again.bic_gain > best.bic_gain + 1.0 {
                     best = again;
                     is_better = true;
@@ -289,17 +279,19 @@ impl Search<'_> {
         best
     }
 
-    /// The best candidate of a kind when it looks for places and windows under a given noise.
+    /// The best candidate of a kind when it looks for places and windows under a given noise, and whether
+    /// there are many to choose from.
     pub(super) fn look_again(
         &self,
         base: &Fit,
         noise: Noise,
         effect: &dyn Effect,
-    ) -> Option<Trial> {
-        let onto = self.problem.fit(&base.model, base.theta.clone(), noise);
+    ) -> Option<(Trial, bool)> {
+        let onto = self.problem.again(base, noise);
         let scan = self.scan(&onto)?;
         let Proposal::Candidates(candidates) = effect.propose(&scan) else { return None };
-        self.best_attempt(base, &onto, candidates, true)
+        let many = candidates.len() > 1 || candidates.iter().any(Candidate::is_chosen_among_many);
+        Some((self.best_attempt(base, &onto, candidates, true)?, many))
     }
 
     /// Total cost of a model: fit and price.

@@ -2,6 +2,7 @@
 
 use crate::pipeline::resistance::settings::DataSettings;
 use crate::pipeline::settings::settings;
+use crate::terms::curve;
 
 settings! {
     /// Settings of `residual_monitor`.
@@ -30,7 +31,7 @@ settings! {
         /// Standard deviation in permille of the map's gradient, smooth over some hundred metres.
         map_std_permille: f64 = 0.03 => (0 to 10 "permille");
         /// Standard deviation of the declared curve constant, as a share of it.
-        curve_constant_std: f64 = 0.2 => (0.001 to 1);
+        curve_constant_std: f64 = curve::USUAL_STD => (0.001 to 1);
         /// Standard deviation of what bearings that warm up add at the start of a run, as a share of the
         /// basic resistance.
         warming_std: f64 = 0.05 => (0.0001 to 1);

@@ -3,6 +3,7 @@
 use crate::pipeline::braking::DECLARED_BRAKE_STD;
 use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::settings;
+use crate::terms::{delay, traction};
 
 settings! {
     /// Settings of [`super::TrainKalman`].
@@ -22,7 +23,7 @@ settings! {
         /// Random walk of the resistance in N/kN over an hour of motion: weather, wear.
         drift_n_per_kn_per_sqrt_h: f64 = 0.01 => (0 to 10 "N/kN");
         /// Standard deviation of the scale of the traction force: 0.01 is 1 %.
-        force_scale_std: f64 = 0.007 => (0.000001 to 0.5);
+        force_scale_std: f64 = traction::USUAL_STD => (0.000001 to 0.5);
         /// Standard deviation of the scale of the brake force, which with friction is what pressure and
         /// disc should exert, rarely what they do.
         brake_scale_std: f64 = DECLARED_BRAKE_STD => (0.000001 to 0.5);
@@ -31,7 +32,7 @@ settings! {
         /// Standard deviation in m/s of the wind of the day along the line.
         wind_std_mps: f64 = 1.5 => (0 to 20 "m/s");
         /// Standard deviation in s of the delay of a force behind its report.
-        force_delay_std_s: f64 = 0.2 => (0.000001 to 5 "s");
+        force_delay_std_s: f64 = delay::USUAL_STD_S => (0.000001 to 5 "s");
         /// Standard deviation of the scale of accelerations, by wheel diameter and rotating mass,
         /// which nothing here can find: 0.003 is 0.3 %.
         acceleration_scale_std: f64 = 0.0025 => (0 to 0.1);

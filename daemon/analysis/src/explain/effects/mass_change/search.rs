@@ -10,6 +10,7 @@ use super::masses::Masses;
 use super::parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
 use crate::explain::effects::Candidate;
 use crate::explain::evidence::{EQUAL, RunData};
+use crate::explain::hypothesis::SharedHypothesis;
 use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
 
@@ -143,9 +144,8 @@ pub fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
     let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
     while masses.parts().len() < PARTS_MAX {
         let hypothesis = Arc::new(masses.clone());
-        let model = scan.fit.model.with(hypothesis);
-        let theta = scan.fit.theta.iter().chain(&start).copied().collect();
-        let fit = scan.problem.fit(&model, theta, scan.fit.noise);
+        let more: [(SharedHypothesis, Vec<f64>); 1] = [(hypothesis, start)];
+        let fit = scan.problem.grown(scan.fit, more);
         start = fit.theta[scan.fit.theta.len()..].to_vec();
         let Some(next) = Scan::new(scan.problem, scan.holdout, scan.train, scan.track, &fit) else {
             break;

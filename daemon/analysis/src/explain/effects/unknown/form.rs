@@ -150,6 +150,10 @@ impl Hypothesis for FormForce {
         true
     }
 
+    fn feels_speed(&self) -> bool {
+        self.factors.iter().any(|factor| factor.of == Covariate::Speed)
+    }
+
     fn unit_n_per_kn(&self, others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
         let factors = self.factors_at(others);
         let mut slopes = vec![0.0; run.samples().len()];

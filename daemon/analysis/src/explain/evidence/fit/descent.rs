@@ -5,41 +5,113 @@ use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::{Noise, RunScatter};
-use super::super::run_scatter::{ScatterFilter, remove};
+use super::super::run_scatter::{MOST, MOST_BESIDE, ScatterFilter, remove};
 use super::super::whitener::Whitener;
-use super::memory::{Plan, RunMemory};
+use super::memory::RunMemory;
+use super::plan::Plan;
 use super::robust::RunFilters;
 use super::{Fit, FitProblem};
+use crate::explain::hypothesis::SharedHypothesis;
 
 /// Gauss-Newton steps at most.
 const STEPS_MAX: usize = 8;
 /// A predicted decrease of the cost below this ends the search.
 const DECREASE_MIN: f64 = 0.02;
+/// Turns in which what sets the runs apart is found.
+const APART_TURNS: usize = 2;
 
 impl FitProblem {
     /// Fits a model from a start under a noise.
     pub fn fit(&self, model: &UpdatedModel, start: Vec<f64>, noise: Noise) -> Fit {
-        self.fit_remembering(model, start, noise, &mut self.memories())
+        self.fit_remembering(model, (start, noise), self.memories())
+    }
+
+    /// Fits a model, the noise that its residuals show, and the model again.
+    ///
+    /// One turn only: under an undeclared force further turns would take ever more of it for noise.
+    pub fn fit_with_noise(&self, model: &UpdatedModel, start: Vec<f64>, noise: Noise) -> Fit {
+        self.with_own_noise(&self.fit(model, start, noise))
+    }
+
+    /// The noise that a fit's residuals show, and its model fitted again.
+    pub fn with_own_noise(&self, fit: &Fit) -> Fit {
+        self.again(fit, self.noise_left_by(fit, MOST))
+    }
+
+    /// Fits the model of a fit again, under another noise.
+    pub fn again(&self, fit: &Fit, noise: Noise) -> Fit {
+        self.fit_remembering(&fit.model, (fit.theta.clone(), noise), fit.memories.to_vec())
+    }
+
+    /// Fits the model of a fit with some effects more, from starts of theirs.
+    pub fn grown(
+        &self,
+        fit: &Fit,
+        more: impl IntoIterator<Item = (SharedHypothesis, Vec<f64>)>,
+    ) -> Fit {
+        let (mut model, mut theta) = (fit.model.clone(), fit.theta.clone());
+        for (effect, start) in more {
+            model.effects.push(effect);
+            theta.extend(start);
+        }
+        let (plan, grown) = (Plan::of(&fit.model), Plan::of(&model));
+        let memories = RunMemory::of_grown(&fit.memories, &plan, &grown);
+        self.fit_remembering(&model, (theta, fit.noise), memories)
+    }
+
+    /// The model of a fit where loads and winds of ordinary days may set the runs apart, as far as they
+    /// show it.
+    pub fn with_runs_apart(&self, fit: &Fit) -> Fit {
+        let mut fit = self.again(fit, Noise { scatter: MOST_BESIDE, ..fit.noise });
+        for _ in 0..APART_TURNS {
+            fit = self.again(&fit, self.noise_left_by(&fit, MOST_BESIDE));
+        }
+        fit
+    }
+
+    /// A model at given parameters, not fitted.
+    pub fn at(&self, model: &UpdatedModel, theta: Vec<f64>, noise: Noise) -> Fit {
+        let (plan, filters) = (Plan::of(model), self.filters(noise));
+        self.first(&plan, model, (theta, noise), (&filters, &mut self.memories()))
+    }
+
+    /// A model with a, b and c fitted, in which they are linear, and all else at given parameters.
+    pub fn with_davis_fitted(
+        &self,
+        model: &UpdatedModel,
+        mut theta: Vec<f64>,
+        noise: Noise,
+    ) -> Fit {
+        let at = self.at(model, theta.clone(), noise);
+        let information = at.information().view((0, 0), (3, 3)).into_owned();
+        let Some(factor) = Cholesky::new(information) else { return at };
+        let step = factor.solve(&at.score().rows(0, 3));
+        for i in 0..3 {
+            let (lower, upper) = self.declared_bounds(i);
+            theta[i] = (theta[i] + step[i]).clamp(lower, upper);
+        }
+        self.at(model, theta, noise)
     }
 
     fn fit_remembering(
         &self,
         model: &UpdatedModel,
-        start: Vec<f64>,
-        noise: Noise,
-        memories: &mut [RunMemory],
+        at: (Vec<f64>, Noise),
+        mut memories: Vec<RunMemory>,
     ) -> Fit {
-        let (plan, filters) = (Plan::of(model), self.filters(noise));
-        let mut fit = self.first(&plan, model, (start, noise), (&filters, memories));
+        let (plan, filters) = (Plan::of(model), self.filters(at.1));
+        let mut fit = self.first(&plan, model, at, (&filters, &mut memories));
         for _ in 0..STEPS_MAX {
             let score = fit.score();
-            let Some(next) = self.descend(&plan, &fit, &score, (&filters, memories)) else { break };
+            let next = self.descend(&plan, &fit, &score, (&filters, &mut memories));
+            let Some(next) = next else { break };
             let gained = fit.cost - next.cost;
             fit = next;
             if gained < DECREASE_MIN {
                 break;
             }
         }
+        fit.memories = memories.into();
         fit
     }
 
@@ -54,19 +126,9 @@ impl FitProblem {
         self.linearised(plan, model, (theta, noise), left, (filters, memories))
     }
 
-    /// A model at given parameters, not fitted.
-    pub fn at(&self, model: &UpdatedModel, theta: Vec<f64>, noise: Noise) -> Fit {
-        let (plan, filters) = (Plan::of(model), self.filters(noise));
-        self.first(&plan, model, (theta, noise), (&filters, &mut self.memories()))
-    }
-
-    /// Fits a model, the noise that its residuals show, and the model again.
-    ///
-    /// One turn only: under an undeclared force further turns would take ever more of it for noise.
-    pub fn fit_with_noise(&self, model: &UpdatedModel, start: Vec<f64>, noise: Noise) -> Fit {
-        let mut memories = self.memories();
-        let fit = self.fit_remembering(model, start, noise, &mut memories);
-        let scatter = RunScatter::updated(&fit.factors);
+    /// The noise that the residuals of a fit show.
+    fn noise_left_by(&self, fit: &Fit, most: RunScatter) -> Noise {
+        let scatter = RunScatter::updated(&fit.factors, most);
         let residuals: Vec<Vec<f64>> = fit
             .residuals
             .iter()
@@ -74,8 +136,7 @@ impl FitProblem {
             .zip(&fit.factors)
             .map(|((residual, columns), (factors, _))| remove(columns, residual, factors))
             .collect();
-        let noise = Noise::estimate(&self.runs, &residuals, Noise { scatter, ..noise });
-        self.fit_remembering(model, fit.theta, noise, &mut memories)
+        Noise::estimate(&self.runs, &residuals, Noise { scatter, ..fit.noise })
     }
 
     pub(super) fn filters(&self, noise: Noise) -> Vec<RunFilters> {

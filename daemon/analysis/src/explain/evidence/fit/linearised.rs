@@ -1,12 +1,15 @@
 //! Cost, residuals, regressors and normal equations at given parameters.
 
+use std::sync::Arc;
+
 use dynocar_core::filter::lanes::dot;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::Noise;
-use super::memory::{At, Plan, RunMemory};
+use super::memory::RunMemory;
+use super::plan::{At, Plan};
 use super::robust::{RunFilters, Whitened};
 use super::{Fit, FitProblem, RunNormal};
 
@@ -144,6 +147,7 @@ impl FitProblem {
             whiteners: filters.iter().map(|filters| filters.whitener.clone()).collect(),
             filters: Vec::new(),
             factors: Vec::new(),
+            memories: Arc::default(),
             theta,
         };
         let theta = &fit.theta[..];

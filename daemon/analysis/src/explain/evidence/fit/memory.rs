@@ -1,54 +1,47 @@
 //! What a model makes of one run, and by its parameters; what has not changed is not computed again.
 //!
-//! Effects are handled in three ways. Resistances that only add to the others, and gradients, are integrated by
-//! themselves for a unit of what they are proportional to. All others act on the forces together; where that
-//! is one effect in which the forces are affine, two looks at the samples give it for all parameters.
+//! Of what acts together, one effect in which the forces are affine takes two looks at the samples for all
+//! parameters; where there are more, a slope serves as far as the step that it was taken over.
 
+use std::cell::RefCell;
 use std::ops::Range;
 
-use dynocar_core::force::balance::mps2_per_n_per_kn;
-
-use super::super::model::{UpdatedForces, UpdatedModel, integrate_bins};
+use super::super::model::{UpdatedForces, integrate_bins};
 use super::super::response::Response;
-use super::super::run_data::RunData;
-use crate::explain::hypothesis::SharedHypothesis;
+use super::plan::{At, Handling, Plan};
+use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
 
-/// How an effect is handled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Handling {
-    /// Together with the others.
-    Together,
-    /// As a resistance of its own.
-    Added,
-    /// As gradients in proportion to its parameters.
-    Gradient,
-}
-
-/// An effect with the ranges of its parameters, and the function of each in which the forces are affine.
-type Affine<'m> = (&'m SharedHypothesis, Range<usize>, fn(f64) -> f64);
-
-/// A model with how each of its effects is handled.
-pub(super) struct Plan<'m> {
-    model: &'m UpdatedModel,
-    ranges: Vec<Range<usize>>,
-    handlings: Vec<Handling>,
-}
+/// The speed in m/s at which a, b and c are compared, and the share of the resistance that changes no slope.
+const USUAL_MPS: f64 = 20.0;
+const NEAR_SHARE: f64 = 0.05;
 
 /// What is known of one run, for one model.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct RunMemory {
     together: Together,
-    /// By effect: parameters but the first, and the bins for a first one of 1.
+    /// a, b, c and the parameters of what acts together, and by the latter's number what a unit changes.
+    slopes: Option<(Vec<f64>, Vec<Vec<f64>>)>,
+    /// By effect: parameters but the first, and the bins for a first one of 1 above none.
     added: Vec<Option<(Vec<f64>, Vec<f64>)>>,
     /// By parameter of gradients: the bins for one of 1; empty where it does not touch the run.
     gradients: Vec<Option<Vec<f64>>>,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+/// Room to work in.
+#[derive(Default)]
+struct Scratch {
     forces: UpdatedForces,
+    moved: [UpdatedForces; 2],
     /// At each sample.
     samples: Vec<f64>,
 }
 
 /// What the effects make that act together.
-#[derive(Default)]
+#[derive(Clone, Default)]
 enum Together {
     #[default]
     Unknown,
@@ -56,86 +49,38 @@ enum Together {
     Nothing,
     /// That at none, and by how much it changes with each parameter's affine coordinate.
     Affine { at: Response, none: Response, slopes: Vec<Option<Response>> },
-    /// That at some parameters of the whole model.
+    /// That at some of their parameters.
     At(Vec<f64>, Response),
 }
 
-impl<'m> Plan<'m> {
-    /// Of a model.
-    pub fn of(model: &'m UpdatedModel) -> Self {
-        let adds_up = model.adds_up();
-        let handling =
-            |effect: &SharedHypothesis| match (effect.is_gradient(), effect.only_resists()) {
-                (true, _) if adds_up => Handling::Gradient,
-                (_, true) if adds_up => Handling::Added,
-                _ => Handling::Together,
-            };
-        Plan {
-            model,
-            ranges: model.ranges(),
-            handlings: model.effects.iter().map(handling).collect(),
+impl RunMemory {
+    /// What is known serves a model with more effects, as far as these change nothing of it.
+    pub fn of_grown(memories: &[RunMemory], plan: &Plan, grown: &Plan) -> Vec<RunMemory> {
+        if plan.serves(grown) {
+            memories.to_vec()
+        } else {
+            memories.iter().map(|_| RunMemory::default()).collect()
         }
     }
 
-    /// The effects handled so, by number, with the ranges of their parameters.
-    fn handled(
-        &self,
-        handling: Handling,
-    ) -> impl Iterator<Item = (usize, &SharedHypothesis, Range<usize>)> {
-        let effects = self.model.effects.iter().zip(&self.ranges).enumerate();
-        let own = effects.filter(move |(number, _)| self.handlings[*number] == handling);
-        own.map(|(number, (effect, range))| (number, effect, range.clone()))
-    }
-
-    fn acts_together(&self) -> impl Fn(usize) -> bool {
-        |number| self.handlings[number] == Handling::Together
-    }
-
-    /// The one effect that acts together, with the function in which it is affine.
-    fn affine(&self) -> Option<Affine<'_>> {
-        let mut together = self.handled(Handling::Together);
-        let (_, effect, range) = together.next()?;
-        let affine_in = effect.affine_in()?;
-        together.next().is_none().then_some((effect, range, affine_in))
-    }
-}
-
-/// What a run and the model that it is fitted with are to an evaluation.
-#[derive(Clone, Copy)]
-pub(super) struct At<'a> {
-    pub plan: &'a Plan<'a>,
-    pub run: &'a RunData,
-    /// What is declared makes of the run.
-    pub declared: &'a Response,
-    pub theta: &'a [f64],
-}
-
-impl At<'_> {
-    fn davis(&self) -> [f64; 3] {
-        [self.theta[0], self.theta[1], self.theta[2]]
-    }
-
-    /// Acceleration in m/s² that 1 N/kN takes away.
-    fn unit_mps2(&self) -> f64 {
-        let first = self.run.declared.first();
-        first.map_or(0.0, |first| mps2_per_n_per_kn(first.rotating_mass_factor))
-    }
-}
-
-impl RunMemory {
     /// The modelled speeds at the bins.
     pub fn predict(&mut self, at: At, bins: &mut Vec<f64>) {
         self.act_together(at);
         self.response(at.declared).bins(at.davis(), bins);
-        for (number, _, range) in at.plan.handled(Handling::Added) {
-            let first = at.theta[range.start];
+        self.add(at, at.plan.model.scale_of_added(at.theta), bins);
+    }
+
+    /// Adds what the effects do that only add something, by a factor.
+    fn add(&mut self, at: At, scale: f64, bins: &mut [f64]) {
+        for (number, effect, range) in at.plan.handled(Handling::Added) {
+            let first = scale * (at.theta[range.start] - effect.none());
             let unit = self.added_bins(at, number);
             bins.iter_mut().zip(unit).for_each(|(bin, unit)| *bin += first * unit);
         }
         for (number, _, range) in at.plan.handled(Handling::Gradient) {
             for (parameter, value) in at.theta[range].iter().enumerate() {
                 let unit = self.gradient_bins(at, number, parameter);
-                bins.iter_mut().zip(unit).for_each(|(bin, unit)| *bin += value * unit);
+                bins.iter_mut().zip(unit).for_each(|(bin, unit)| *bin += scale * value * unit);
             }
         }
     }
@@ -146,29 +91,49 @@ impl RunMemory {
         let mut columns = vec![Vec::new(); at.theta.len()];
         self.act_together(at);
         columns[..3].clone_from_slice(&self.response(at.declared).davis);
+        let scale = at.plan.model.scale_of_added(at.theta);
         for (number, _, range) in at.plan.handled(Handling::Gradient) {
             for (parameter, i) in range.enumerate() {
-                columns[i].extend_from_slice(self.gradient_bins(at, number, parameter));
+                let unit = self.gradient_bins(at, number, parameter);
+                columns[i].extend(unit.iter().map(|unit| scale * unit));
             }
         }
         for (number, effect, range) in at.plan.handled(Handling::Added) {
-            let first = at.theta[range.start];
+            let first = at.theta[range.start] - effect.none();
             let unit = self.added_bins(at, number).to_vec();
             let mut others = at.theta[range.start + 1..range.end].to_vec();
             for (k, i) in (range.start + 1..range.end).enumerate() {
                 let step = steps[i - 3];
                 others[k] += step;
                 let column = &mut columns[i];
-                self.resist(at, effect, &others, column);
+                Self::resist(at, effect, &others, column);
                 others[k] = at.theta[i];
                 for (moved, unit) in column.iter_mut().zip(&unit) {
-                    *moved = first * (*moved - unit) / step;
+                    *moved = scale * first * (*moved - unit) / step;
                 }
             }
-            columns[range.start] = unit;
+            columns[range.start] = unit.iter().map(|unit| scale * unit).collect();
         }
         self.columns_together(at, steps, &mut columns);
+        self.columns_of_scale(at, steps, &mut columns);
         columns
+    }
+
+    /// Adds to the columns of what scales the added effects what it changes of these.
+    fn columns_of_scale(&mut self, at: At, steps: &[f64], columns: &mut [Vec<f64>]) {
+        if at.plan.handlings.iter().all(|handling| *handling == Handling::Together) {
+            return;
+        }
+        let effects = at.plan.model.effects.iter().zip(&at.plan.ranges);
+        let scaling = effects.filter(|(effect, _)| effect.on_others() == OnOthers::Scales);
+        let mut elsewhere = at.theta.to_vec();
+        for i in scaling.flat_map(|(_, range)| range.clone()) {
+            elsewhere[i] += steps[i - 3];
+            let [before, after] =
+                [at.theta, &elsewhere].map(|theta| at.plan.model.scale_of_added(theta));
+            elsewhere[i] = at.theta[i];
+            self.add(at, (after - before) / steps[i - 3], &mut columns[i]);
+        }
     }
 
     fn response<'r>(&'r self, declared: &'r Response) -> &'r Response {
@@ -188,7 +153,7 @@ impl RunMemory {
             if !plan.handled(Handling::Together).any(touches) {
                 self.together = Together::Nothing;
             } else if let Some((effect, range, _)) = plan.affine() {
-                self.together = affine(at, effect, range, &mut self.forces);
+                self.together = with_scratch(|it| affine(at, effect, range, &mut it.forces));
             }
         }
         match &mut self.together {
@@ -202,23 +167,24 @@ impl RunMemory {
                     }
                 }
             }
-            Together::At(known, _) if known[3..] == theta[3..] => {}
+            Together::At(known, _)
+                if plan.together().map(|i| theta[i]).eq(known.iter().copied()) => {}
             Together::At(known, response) => {
-                known.copy_from_slice(theta);
-                let acts = plan.acts_together();
-                plan.model.response((run, theta), acts, &mut self.forces, response);
+                known.clear();
+                known.extend(plan.together().map(|i| theta[i]));
+                reckon(at, response);
             }
             Together::Unknown => {
                 let mut response = Response::default();
-                let acts = plan.acts_together();
-                plan.model.response((run, theta), acts, &mut self.forces, &mut response);
-                self.together = Together::At(theta.to_vec(), response);
+                reckon(at, &mut response);
+                let known = plan.together().map(|i| theta[i]).collect();
+                self.together = Together::At(known, response);
             }
         }
     }
 
     fn columns_together(&mut self, at: At, steps: &[f64], columns: &mut [Vec<f64>]) {
-        let At { plan, run, theta, .. } = at;
+        let At { plan, theta, .. } = at;
         let davis = at.davis();
         if let Together::Affine { slopes, .. } = &self.together {
             let Some((_, range, affine_in)) = plan.affine() else { return };
@@ -231,35 +197,43 @@ impl RunMemory {
             }
             return;
         }
-        let mut bins = Vec::new();
-        self.response(at.declared).bins(davis, &mut bins);
-        let touched = |effect: &SharedHypothesis, range: Range<usize>| {
+        let known: Vec<f64> = davis.into_iter().chain(plan.together().map(|i| theta[i])).collect();
+        let own_steps: Vec<f64> = plan.together().map(|i| steps[i - 3]).collect();
+        if self.slopes.as_ref().is_none_or(|(at, _)| !is_near(at, &known, &own_steps)) {
+            Self::differences(at, steps, columns);
+            let slopes = plan.together().map(|i| columns[i].clone()).collect();
+            self.slopes = Some((known, slopes));
+        } else if let Some((_, slopes)) = &self.slopes {
+            plan.together().zip(slopes).for_each(|(i, slope)| columns[i].clone_from(slope));
+        }
+    }
+
+    /// What a unit of each parameter changes of what acts together, by another look at the samples.
+    fn differences(at: At, steps: &[f64], columns: &mut [Vec<f64>]) {
+        let At { plan, run, theta, .. } = at;
+        let touched = |(_, effect, range): (usize, &SharedHypothesis, Range<usize>)| {
             let (effect, start) = (effect.clone(), range.start);
-            range.filter(move |i| effect.touches(i - start, run))
+            range.filter(move |i| effect.touches(i - start, run)).map(move |i| (i, i - start))
         };
-        let gradients =
-            plan.handled(Handling::Together).filter(|(_, effect, _)| effect.is_gradient());
-        for (_, effect, range) in gradients {
-            let start = range.start;
-            for i in touched(effect, range) {
-                effect.gradient_permille(i - start, run, &mut self.samples);
+        let (gradients, others): (Vec<_>, Vec<_>) =
+            plan.handled(Handling::Together).partition(|(_, effect, _)| effect.is_gradient());
+        for own in gradients {
+            let effect = own.1.clone();
+            for (i, parameter) in touched(own) {
                 let acts = plan.acts_together();
-                plan.model.gradient_slopes((run, theta), acts, &self.samples, &mut columns[i]);
+                with_scratch(|Scratch { samples, .. }| {
+                    effect.gradient_permille(parameter, run, samples);
+                    plan.model.gradient_slopes((run, theta), acts, samples, &mut columns[i]);
+                });
             }
         }
-        let mut elsewhere = theta.to_vec();
-        let others =
-            plan.handled(Handling::Together).filter(|(_, effect, _)| !effect.is_gradient());
-        for i in others.flat_map(|(_, effect, range)| touched(effect, range)) {
-            let step = steps[i - 3];
-            elsewhere[i] += step;
+        let moves: Vec<(usize, f64)> =
+            others.into_iter().flat_map(touched).map(|(i, _)| (i, steps[i - 3])).collect();
+        if !moves.is_empty() {
             let acts = plan.acts_together();
-            let at = (run, &elsewhere[..]);
-            plan.model.predict_bins_of(at, acts, &mut self.forces, &mut columns[i]);
-            elsewhere[i] = theta[i];
-            for (moved, base) in columns[i].iter_mut().zip(&bins) {
-                *moved = (*moved - base) / step;
-            }
+            with_scratch(|it| {
+                plan.model.differences((run, theta), acts, &moves, &mut it.moved, columns);
+            });
         }
     }
 
@@ -270,16 +244,18 @@ impl RunMemory {
         self.added.resize_with(at.plan.handlings.len(), || None);
         if self.added[number].as_ref().is_none_or(|(known, _)| known != others) {
             let mut bins = self.added[number].take().map_or_else(Vec::new, |(_, bins)| bins);
-            self.resist(at, &at.plan.model.effects[number], others, &mut bins);
+            Self::resist(at, &at.plan.model.effects[number], others, &mut bins);
             self.added[number] = Some((others.to_vec(), bins));
         }
         self.added[number].as_ref().map_or(&[], |(_, bins)| bins)
     }
 
-    fn resist(&mut self, at: At, effect: &SharedHypothesis, others: &[f64], bins: &mut Vec<f64>) {
-        effect.unit_n_per_kn(others, at.run, &mut self.samples);
-        let (unit_mps2, n_per_kn) = (at.unit_mps2(), &self.samples);
-        integrate_bins(at.run, |i| [-unit_mps2 * n_per_kn[i]], [bins]);
+    fn resist(at: At, effect: &SharedHypothesis, others: &[f64], bins: &mut Vec<f64>) {
+        with_scratch(|Scratch { samples, .. }| {
+            effect.unit_n_per_kn(others, at.run, samples);
+            let unit_mps2 = at.unit_mps2();
+            integrate_bins(at.run, |i| [-unit_mps2 * samples[i]], [bins]);
+        });
     }
 
     /// The bins for one of a gradient's parameters at 1; none where it does not touch the run.
@@ -290,14 +266,39 @@ impl RunMemory {
             let effect = &at.plan.model.effects[number];
             let mut bins = Vec::new();
             if effect.touches(parameter, at.run) {
-                effect.gradient_permille(parameter, at.run, &mut self.samples);
-                let (unit_mps2, permille) = (at.unit_mps2(), &self.samples);
-                integrate_bins(at.run, |i| [-unit_mps2 * permille[i]], [&mut bins]);
+                let unit_mps2 = at.unit_mps2();
+                with_scratch(|Scratch { samples, .. }| {
+                    effect.gradient_permille(parameter, at.run, samples);
+                    integrate_bins(at.run, |i| [-unit_mps2 * samples[i]], [&mut bins]);
+                });
             }
             self.gradients[i] = Some(bins);
         }
         self.gradients[i].as_deref().unwrap_or(&[])
     }
+}
+
+/// Works with this thread's room, which nothing else does meanwhile.
+fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
+    SCRATCH.with_borrow_mut(work)
+}
+
+/// What the effects make that act together.
+fn reckon(At { plan, run, theta, .. }: At, response: &mut Response) {
+    let acts = plan.acts_together();
+    with_scratch(|it| plan.model.response((run, theta), acts, &mut it.forces, response));
+}
+
+/// Whether parameters lie within a step of others, and a, b, c within a small share: a slope is a difference
+/// over a step, and no other so near.
+fn is_near(at: &[f64], known: &[f64], steps: &[f64]) -> bool {
+    let resistance =
+        |of: [f64; 3]| of[0].abs() + USUAL_MPS * (of[1].abs() + USUAL_MPS * of[2].abs());
+    let davis = |of: &[f64]| [of[0], of[1], of[2]];
+    let away = std::array::from_fn(|i| known[i] - at[i]);
+    let mut moved = at[3..].iter().zip(&known[3..]).zip(steps);
+    resistance(away) <= NEAR_SHARE * resistance(davis(at))
+        && moved.all(|((at, known), step)| (known - at).abs() <= step.abs())
 }
 
 /// The response of a run to one effect in which the forces are affine.

@@ -4,7 +4,10 @@ mod descent;
 mod linearised;
 mod memory;
 mod nearby;
+mod plan;
 mod robust;
+
+use std::sync::Arc;
 
 use dynocar_core::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
@@ -17,6 +20,7 @@ use super::response::Response;
 use super::run_data::RunData;
 use super::run_scatter::{Columns, WeightedFilter, scatter_columns};
 use super::whitener::Whitener;
+use memory::RunMemory;
 pub use nearby::Nearby;
 
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
@@ -90,6 +94,8 @@ pub struct Fit {
     pub filters: Vec<WeightedFilter>,
     /// The runs' own factors less 1 and delays, with their covariance.
     factors: Vec<(Vector3<f64>, Matrix3<f64>)>,
+    /// What is known of the runs for the model; nothing where it was not fitted.
+    memories: Arc<[RunMemory]>,
 }
 
 impl Fit {

@@ -1,0 +1,136 @@
+//! What is a little wrong in every train's figures: scales of the reported forces, how late they act, the
+//! curve constant. No effect, but what a finished model is fitted beside.
+
+use dynocar_core::terms::delay::DelayLine;
+use dynocar_core::terms::{Parameter, curve, delay, traction};
+use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::{DMatrix, DVector};
+
+use super::{Candidate, Hypothesis, Turn};
+use crate::explain::evidence::{RunData, SampleForces};
+
+/// A figure that is usually a little wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Figure {
+    /// By a share of the traction force.
+    Traction,
+    /// By a share of the brake force.
+    Brake,
+    /// By so many seconds between a report and its force.
+    Lateness,
+    /// By a share of the curve resistance.
+    Curves,
+}
+
+/// All of them with the standard deviations of their errors.
+const FIGURES: [(Figure, f64); 4] = [
+    (Figure::Traction, traction::USUAL_STD),
+    (Figure::Brake, traction::USUAL_STD),
+    (Figure::Lateness, delay::USUAL_STD_S),
+    (Figure::Curves, curve::USUAL_STD),
+];
+/// What is looked for, in standard deviations, and the step of differences.
+const BEYOND: f64 = 10.0;
+const STEP: f64 = 0.1;
+
+#[derive(Debug)]
+struct UsualErrors {
+    figures: Vec<Figure>,
+    parameters: Vec<Parameter>,
+    information: DMatrix<f64>,
+}
+
+/// The errors of the figures that none of some effects is about, at none.
+pub fn usual_errors(is_in: impl Fn(EffectKind) -> bool) -> Candidate {
+    let is_free = |figure: Figure| match figure {
+        Figure::Traction => !is_in(EffectKind::TractionGain),
+        Figure::Lateness => !is_in(EffectKind::ActuatorDelay),
+        Figure::Curves => !is_in(EffectKind::CurveResistance),
+        Figure::Brake => true,
+    };
+    let free: Vec<(Figure, f64)> = FIGURES.into_iter().filter(|it| is_free(it.0)).collect();
+    let parameter = |&(figure, std): &(Figure, f64)| {
+        // Nothing acts before it is reported.
+        let least = if figure == Figure::Lateness { 0.0 } else { -BEYOND * std };
+        Parameter::new("usual_error", (least, BEYOND * std), STEP * std)
+    };
+    let precisions = free.iter().map(|(_, std)| std.powi(-2));
+    let information = DMatrix::from_diagonal(&DVector::from_iterator(free.len(), precisions));
+    let errors = UsualErrors {
+        figures: free.iter().map(|it| it.0).collect(),
+        parameters: free.iter().map(parameter).collect(),
+        information,
+    };
+    let start = vec![0.0; free.len()];
+    Candidate::new(errors, start)
+}
+
+impl Hypothesis for UsualErrors {
+    fn kind(&self) -> EffectKind {
+        EffectKind::None
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn prior_information(&self) -> Option<&DMatrix<f64>> {
+        Some(&self.information)
+    }
+
+    fn turn(&self) -> Turn {
+        Turn::First
+    }
+
+    fn is_local(&self) -> bool {
+        !self.figures.contains(&Figure::Lateness)
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        for (figure, &error) in self.figures.iter().zip(parameters) {
+            match figure {
+                Figure::Traction => forces.iter_mut().for_each(|it| it.traction_n *= 1.0 + error),
+                Figure::Brake => forces.iter_mut().for_each(|it| it.brake_n *= 1.0 + error),
+                Figure::Curves => {
+                    forces.iter_mut().for_each(|it| it.resistance.curve_n_per_kn *= 1.0 + error);
+                }
+                Figure::Lateness => {
+                    let mut line = DelayLine::new(error, 0.0);
+                    for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
+                        let at = (sample.time_ns, sample.segment);
+                        let now = Some([force.traction_n, force.brake_n]);
+                        if let Some(late) = line.acting(at, now) {
+                            [force.traction_n, force.brake_n] = late;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_that_an_effect_is_about_has_no_usual_error_beside_it() {
+        let free = |kind: EffectKind| usual_errors(|own| own == kind).start.len();
+        assert_eq!(free(EffectKind::LocalResistance), FIGURES.len());
+        for kind in
+            [EffectKind::TractionGain, EffectKind::ActuatorDelay, EffectKind::CurveResistance]
+        {
+            assert_eq!(free(kind), FIGURES.len() - 1, "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_acts_before_it_is_reported_and_the_prior_is_what_is_usual() {
+        let errors = usual_errors(|_| false).hypothesis;
+        let prior = errors.prior_information().expect("a prior");
+        for (i, (figure, std)) in FIGURES.into_iter().enumerate() {
+            assert!((prior[(i, i)] * std * std - 1.0).abs() < 1e-12);
+            assert_eq!(errors.parameters()[i].lower >= 0.0, figure == Figure::Lateness);
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! How each effect of a model is handled in a fit.
+//!
+//! Resistances that only add to the others, and gradients, are integrated by themselves for a unit of what they
+//! are proportional to. All others act on the forces together.
+
+use std::ops::Range;
+
+use dynocar_core::force::balance::mps2_per_n_per_kn;
+
+use super::super::model::UpdatedModel;
+use super::super::response::Response;
+use super::super::run_data::RunData;
+use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
+
+/// How an effect is handled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Handling {
+    /// Together with the others.
+    Together,
+    /// As a resistance of its own.
+    Added,
+    /// As gradients in proportion to its parameters.
+    Gradient,
+}
+
+/// An effect with the ranges of its parameters, and the function of each in which the forces are affine.
+pub(super) type Affine<'m> = (&'m SharedHypothesis, Range<usize>, fn(f64) -> f64);
+
+/// A model with how each of its effects is handled.
+pub(super) struct Plan<'m> {
+    pub model: &'m UpdatedModel,
+    pub ranges: Vec<Range<usize>>,
+    pub handlings: Vec<Handling>,
+}
+
+impl<'m> Plan<'m> {
+    /// Of a model.
+    pub fn of(model: &'m UpdatedModel) -> Self {
+        let on_others = model.on_others();
+        let is_apart = |effect: &SharedHypothesis| match on_others {
+            OnOthers::Nothing => true,
+            OnOthers::Scales => !effect.feels_speed(),
+            OnOthers::Changes => false,
+        };
+        let handling = |effect: &SharedHypothesis| match () {
+            () if !is_apart(effect) => Handling::Together,
+            () if effect.is_gradient() => Handling::Gradient,
+            () if effect.only_resists() => Handling::Added,
+            () => Handling::Together,
+        };
+        Plan {
+            model,
+            ranges: model.ranges(),
+            handlings: model.effects.iter().map(handling).collect(),
+        }
+    }
+
+    /// The effects handled so, by number, with the ranges of their parameters.
+    pub fn handled(
+        &self,
+        handling: Handling,
+    ) -> impl Iterator<Item = (usize, &SharedHypothesis, Range<usize>)> {
+        let effects = self.model.effects.iter().zip(&self.ranges).enumerate();
+        let own = effects.filter(move |(number, _)| self.handlings[*number] == handling);
+        own.map(|(number, (effect, range))| (number, effect, range.clone()))
+    }
+
+    /// The parameters of what acts together, by their numbers.
+    pub fn together(&self) -> impl Iterator<Item = usize> {
+        self.handled(Handling::Together).flat_map(|(_, _, range)| range)
+    }
+
+    /// Whether what is known for a model serves another, which has its effects and some more.
+    pub fn serves(&self, grown: &Plan) -> bool {
+        let count = self.handlings.len();
+        let (own, more) = grown.handlings.split_at(count);
+        own == self.handlings && !more.contains(&Handling::Together)
+    }
+
+    pub fn acts_together(&self) -> impl Fn(usize) -> bool {
+        |number| self.handlings[number] == Handling::Together
+    }
+
+    /// The one effect that acts together, with the function in which it is affine.
+    pub fn affine(&self) -> Option<Affine<'_>> {
+        let mut together = self.handled(Handling::Together);
+        let (_, effect, range) = together.next()?;
+        let affine_in = effect.affine_in()?;
+        together.next().is_none().then_some((effect, range, affine_in))
+    }
+}
+
+/// What a run and the model that it is fitted with are to an evaluation.
+#[derive(Clone, Copy)]
+pub(super) struct At<'a> {
+    pub plan: &'a Plan<'a>,
+    pub run: &'a RunData,
+    /// What is declared makes of the run.
+    pub declared: &'a Response,
+    pub theta: &'a [f64],
+}
+
+impl At<'_> {
+    pub fn davis(&self) -> [f64; 3] {
+        [self.theta[0], self.theta[1], self.theta[2]]
+    }
+
+    /// Acceleration in m/s² that 1 N/kN takes away.
+    pub fn unit_mps2(&self) -> f64 {
+        let first = self.run.declared.first();
+        first.map_or(0.0, |first| mps2_per_n_per_kn(first.rotating_mass_factor))
+    }
+}
