@@ -17,7 +17,8 @@ use super::selection::{Deviations, Outcome, Search, deviations_beside};
 /// parameters are known then.
 pub fn given_usual_errors(search: &Search, outcome: &mut Outcome) -> Deviations {
     let (joint, shared) = joint(search, &outcome.fit);
-    let fit = &outcome.fit;
+    outcome.likeliest = outcome.fit.clone();
+    let fit = &outcome.likeliest;
     let count = fit.theta.len();
     if !fit.model.effects.is_empty() {
         let theta = joint.theta[..count].to_vec();

@@ -207,9 +207,11 @@ fn effect_answers(
         .enumerate()
         .filter(|(_, (effect, _))| outcome.is_named(effect.kind()))
         .map(|(index, (effect, range))| {
-            let rest = search.without(fit, index);
-            let decrease = discounted(fit, index, rest.cost - fit.cost);
-            let reduction = score::reduction(search.problem, &rest, fit);
+            let likeliest = &outcome.likeliest;
+            let rest = search.without(likeliest, index);
+            let decrease = discounted(likeliest, index, rest.cost - likeliest.cost);
+            let reduction = score::reduction(search.problem, &rest, likeliest);
+            let score = acceptance_score(decrease - penalty(likeliest, index), reduction);
             let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
             let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
                 / search.problem.runs.len().max(1) as f64;
@@ -227,7 +229,7 @@ fn effect_answers(
                 place: Location { uncertainty_95: known[index].clone(), ..effect.place() },
                 parameters: reported.values,
                 std: reported.deviations,
-                p_value: p_value(acceptance_score(decrease - penalty(fit, index), reduction)),
+                p_value: p_value(score),
                 error_reduction: reduction,
                 meaning: Meaning::of(search.problem, fit, index, &rest),
                 runners_up: if effect.kind() == EffectKind::Unknown {

@@ -39,6 +39,8 @@ pub struct Outcome {
     pub base: Fit,
     /// The model with all accepted effects.
     pub fit: Fit,
+    /// The same where it explains most, before usual errors beside it moved it: how sure effects are.
+    pub likeliest: Fit,
     /// The best trial of each kind in each round, the strongest first; the last round is the one
     /// in which nothing more was accepted.
     pub rounds: Vec<Vec<Trial>>,

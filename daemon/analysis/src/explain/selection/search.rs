@@ -83,6 +83,7 @@ impl Search<'_> {
         let base = self.problem.with_own_noise(&first);
         Outcome {
             base: base.clone(),
+            likeliest: base.clone(),
             fit: base,
             rounds: Vec::new(),
             instead: Vec::new(),
