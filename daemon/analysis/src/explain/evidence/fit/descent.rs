@@ -71,8 +71,10 @@ impl FitProblem {
 
     /// A model at given parameters, not fitted.
     pub fn at(&self, model: &UpdatedModel, theta: Vec<f64>, noise: Noise) -> Fit {
-        let (plan, filters) = (Plan::of(model), self.filters(noise));
-        self.first(&plan, model, (theta, noise), (&filters, &mut self.memories()))
+        let (plan, filters, mut memories) = (Plan::of(model), self.filters(noise), self.memories());
+        let mut fit = self.first(&plan, model, (theta, noise), (&filters, &mut memories));
+        fit.memories = memories.into();
+        fit
     }
 
     /// A model with a, b and c fitted, in which they are linear, and all else at given parameters.

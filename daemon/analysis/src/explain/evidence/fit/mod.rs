@@ -94,7 +94,7 @@ pub struct Fit {
     pub filters: Vec<WeightedFilter>,
     /// The runs' own factors less 1 and delays, with their covariance.
     factors: Vec<(Vector3<f64>, Matrix3<f64>)>,
-    /// What is known of the runs for the model; nothing where it was not fitted.
+    /// What is known of each run for the model.
     memories: Arc<[RunMemory]>,
 }
 
