@@ -54,23 +54,21 @@ def work_off(
 ) -> dict[str, dict[str, Any]]:
     """Every order's answer by its name; each is kept as a file as soon as it is there.
 
-    A worker that dies gives its train back to the others; a train on which four workers died is
-    reported as failed (`distributed.scheduler.allowed-failures`).
+    A worker that dies gives its train back to the others. A train on which four workers died
+    (`distributed.scheduler.allowed-failures`) may only have waited beside one that kills: it is
+    asked again, alone, before it is reported as failed.
     """
     of_name = {order.name: order for order in orders}
     answers = {name: read_answer(kept, name) for name in of_name}
-    asked = [
-        order._replace(known_key=known["key"] if known and "error" not in known else None)
-        for order, known in zip(of_name.values(), answers.values())
-    ]
-    # Whether an answer still holds is found out beside the data, so everything is asked for.
-    futures = client.map(work, asked, pure=False, retries=0)
-    names = dict(zip((future.key for future in futures), of_name))
-    left = len(names)
-    # Taken at once: what only a worker holds is computed again when that worker dies.
-    done = needed("distributed").as_completed(futures, with_results=True, raise_errors=False)
-    for future, answer in done:
-        name, left = names[future.key], left - 1
+    asked = {
+        name: order._replace(known_key=known["key"] if known and "error" not in known else None)
+        for (name, order), known in zip(of_name.items(), answers.values())
+    }
+    left = len(asked)
+
+    def take(name: str, future: Any, answer: dict[str, Any] | None) -> None:
+        nonlocal left
+        left -= 1
         if future.status != "finished":
             unit = of_name[name].unit
             answer = {"train": unit.train, "month": unit.month, "key": None}
@@ -82,14 +80,46 @@ def work_off(
             "kept" if answer is None else f"failed: {answer['error']}" if "error" in answer else "done"
         )
         report_line(f"{name}: {state} ({left} left)")
-        future.release()
+
+    suspected = []
+    for name, future, answer in _answered(client, work, asked):
+        if _has_killed(future):
+            suspected.append(name)
+        else:
+            take(name, future, answer)
+    for suspect in suspected:
+        for name, future, answer in _answered(client, work, {suspect: asked[suspect]}):
+            take(name, future, answer)
     return {name: answer for name, answer in answers.items() if answer is not None}
 
 
+def _answered(
+    client: Any, work: Work, asked: dict[str, Order]
+) -> Iterator[tuple[str, Any, dict[str, Any] | None]]:
+    """The names with their futures and answers, as they come; all are asked at once.
+
+    Whether an answer still holds is found out beside the data, so everything is asked for.
+    """
+    futures = client.map(work, list(asked.values()), pure=False, retries=0)
+    names = dict(zip((future.key for future in futures), asked))
+    # Taken at once: what only a worker holds is computed again when that worker dies.
+    done = needed("distributed").as_completed(futures, with_results=True, raise_errors=False)
+    for future, answer in done:
+        yield names[future.key], future, answer
+        future.release()
+
+
+def _has_killed(future: Any) -> bool:
+    """True of a train on which workers died."""
+    return future.status == "error" and isinstance(
+        future.exception(), needed("distributed").KilledWorker
+    )
+
+
 def _why(future: Any) -> str:
-    error = future.exception()
-    if isinstance(error, needed("distributed").KilledWorker):
+    if _has_killed(future):
         return "the workers that explained it died; want of memory is the usual cause"
+    error = future.exception()
     return f"{type(error).__name__}: {error}"
 
 
