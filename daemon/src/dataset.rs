@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
-use dynocar_core::units::Unit;
 use dynocar_dataset::encoding::decoded;
 use dynocar_dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest,
     Problem, SourcePosition, is_parquet, parse_track, parse_train, top_keys,
 };
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
+use dynocar_model::units::Unit;
 
 pub use crate::text_file::read_text;
 use crate::text_file::{read_bytes, require_regular};

@@ -2,8 +2,8 @@
 
 use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
-use dynocar_core::terms::Entry;
-use dynocar_core::terms::extra::{Covariate, Extra, Form};
+use dynocar_model::terms::Entry;
+use dynocar_model::terms::extra::{Covariate, Extra, Form};
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{

@@ -3,7 +3,7 @@
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::answer::{ParameterValue, Verdict};
 use dynocar_analysis::explain::explain;
-use dynocar_core::track::{LinearProfile, StepProfile};
+use dynocar_model::track::{LinearProfile, StepProfile};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, TrainType, simulate};

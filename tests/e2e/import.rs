@@ -4,8 +4,8 @@ use std::fs::{create_dir_all, read_to_string};
 use std::path::Path;
 
 use dynocar::dataset::{load_track, load_train};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_tests::browser::Browser;
 use dynocar_tests::process::Site;

@@ -11,9 +11,9 @@ use dynocar::models::{
     Origin, Store, TrainModels,
 };
 use dynocar::shadow::record::{Trials, Tried};
-use dynocar_core::simulate::SpeedError;
 use dynocar_core::trial::evidence::Evidence;
 use dynocar_core::trial::ledger::Ledger;
+use dynocar_model::simulate::SpeedError;
 use dynocar_shared::TrainId;
 use dynocar_tests::browser::Browser;
 use dynocar_tests::process::Site;

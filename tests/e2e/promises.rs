@@ -135,6 +135,7 @@ fn every_unsafe_block_is_counted_and_justified() {
         "daemon/src",
         "daemon/workshop/src",
         "daemon/dataset/src",
+        "daemon/model/src",
         "daemon/core/src",
         "daemon/analysis/src",
         "daemon/fmu/src",

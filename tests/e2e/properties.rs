@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_client::channel::Transport;
 use dynocar_client::{SnapshotReader, monotonic_now_ns};
 use dynocar_core::pipeline::{EstimatorSettings, KeptEstimate, Pipeline};
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,
 };

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
-const FOLDERS: [&str; 15] = [
+const FOLDERS: [&str; 16] = [
     "daemon/src",
     "daemon/workshop/src",
+    "daemon/model/src",
     "daemon/core/src",
     "daemon/dataset/src",
     "daemon/analysis/src",

@@ -7,7 +7,7 @@ use dynocar_analysis::explain::evidence::{
     Fit, FitProblem, Noise, RunData, SampleForces, UpdatedForces, UpdatedModel,
 };
 use dynocar_analysis::explain::scan::Scan;
-use dynocar_core::terms::wheel;
+use dynocar_model::terms::wheel;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{

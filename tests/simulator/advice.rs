@@ -12,8 +12,8 @@ use dynocar_analysis::advice::noise::NoiseSeen;
 use dynocar_analysis::advice::rehearsal::{Known, MASS, forecast};
 use dynocar_analysis::advice::{best, forecasts};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::simulate::motion::{Motion, advance};
-use dynocar_core::train::{Davis, EffortCurve, TrainModel};
+use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, TrainId, TrainSample,
 };

@@ -1,6 +1,6 @@
 //! The simulator's files: reproducible, complete, silent about the truth.
 
-use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{SampleField, TrainSample};
 use dynocar_tests::simulator::dataset_writer::{dataset_files, write_dataset, write_truth};

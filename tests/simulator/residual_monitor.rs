@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::monitor::{MonitorSettings, ResidualMonitor};
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;

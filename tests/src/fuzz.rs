@@ -15,7 +15,7 @@ use dynocar_analysis::dataset::guess::{Recording, guess};
 use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train};
 use dynocar_analysis::import::{Reading, Source, import};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

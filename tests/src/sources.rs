@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// The source folders of all packages.
-pub const FOLDERS: [&str; 16] = [
+pub const FOLDERS: [&str; 17] = [
     "shared/src",
     "client/src",
     "client/forward/src",
@@ -12,6 +12,7 @@ pub const FOLDERS: [&str; 16] = [
     "client/python/src",
     "client/recording/src",
     "client/watch/src",
+    "daemon/model/src",
     "daemon/core/src",
     "daemon/dataset/src",
     "daemon/analysis/src",

@@ -1,6 +1,6 @@
 //! From what the daemon says may be used to what the driver drives by, and whether that was right.
 
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, Uncertain};

@@ -1,7 +1,7 @@
 //! A train and its driver from stop to stop, and what each leg was worth.
 
-use dynocar_core::simulate::STANDING_MPS;
-use dynocar_core::train::Davis;
+use dynocar_model::simulate::STANDING_MPS;
+use dynocar_model::train::Davis;
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{RailCondition, SampleField, TrainSample, Uncertain};
 

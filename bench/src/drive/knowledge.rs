@@ -1,6 +1,6 @@
 //! What a driver holds for true of its train, and what the train can do.
 
-use dynocar_core::train::{Davis, EffortCurve};
+use dynocar_model::train::{Davis, EffortCurve};
 use dynocar_shared::Uncertain;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop, StoppingError};

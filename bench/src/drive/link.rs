@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use dynocar::config::IdleStrategy;
 use dynocar_client::{Reading, SamplePublisher, SnapshotReader, monotonic_now_ns};
-use dynocar_core::train::{EffortCurve, TrainModel};
+use dynocar_model::train::{EffortCurve, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, TrainId, TrainSample};
 
 use crate::rig::RigError;

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use dynocar_core::pipeline::braking::gear::DeclaredGear;
-use dynocar_core::simulate::motion::{Motion, advance};
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
 use rand::SeedableRng;

@@ -11,8 +11,8 @@ use dynocar_core::pipeline::papers::wang::bias_model::BiasModel;
 use dynocar_core::pipeline::papers::wang::inertia::Inertia;
 use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
 use dynocar_core::pipeline::papers::wang::motion::Motion;
-use dynocar_core::simulate::motion as simulate;
-use dynocar_core::train::TrainModel;
+use dynocar_model::simulate::motion as simulate;
+use dynocar_model::train::TrainModel;
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 use super::measure::{Agreement, Case, Contender};

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use dynocar_analysis::dataset::{DATASET_TRAIN, DatasetError, DatasetHead};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::track::Track;
-use dynocar_core::train::{BrakeGear, TrainModel};
+use dynocar_model::track::Track;
+use dynocar_model::train::{BrakeGear, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 
 use super::measure::{Agreement, Case, Contender};

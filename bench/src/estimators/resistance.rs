@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
-use dynocar_core::simulate::motion::{Motion, advance};
-use dynocar_core::train::Davis;
+use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::train::Davis;
 use nalgebra::{RowSVector, SMatrix, SVector};
 
 use super::measure::{Agreement, Case, Contender};

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use dynocar_core::filter::random::Random;
-use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::papers::xia::trajectory::fit::{
     DavisPrior, FitSettings, MotionSegment, TrajectoryFit, TrajectoryFitter,
 };
 use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
-use dynocar_core::train::Davis;
+use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::train::Davis;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::Vector3;
 use nalgebra_of_peer as peer;

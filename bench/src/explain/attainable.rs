@@ -7,8 +7,8 @@ use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::effects::Hypothesis;
 use dynocar_analysis::explain::evidence::{Noise, RunData, SampleForces, UpdatedModel};
 use dynocar_analysis::explain::score::run_error;
-use dynocar_core::simulate::{Restart, SpeedError};
-use dynocar_core::terms::Parameter;
+use dynocar_model::simulate::{Restart, SpeedError};
+use dynocar_model::terms::Parameter;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::{Around, Effect, Law, SimulatedDataset, Unlisted};
 

@@ -2,7 +2,7 @@
 
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::ExplainAnswer;
-use dynocar_core::track::LinearProfile;
+use dynocar_model::track::LinearProfile;
 use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};

@@ -96,7 +96,7 @@ fn spoil(sample: &mut TrainSample, kind: u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::validation::{ValidationLimits, Validator};
+    use dynocar_model::validation::{ValidationLimits, Validator};
 
     const TRAIN: TrainId = TrainId(2);
 

@@ -12,7 +12,7 @@ use super::braking::{
     Braking, Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, Sought, declared,
     disc_friction, train,
 };
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::RailCondition;
 
 /// What is known of the coefficient beforehand.

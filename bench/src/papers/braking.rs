@@ -6,7 +6,7 @@
 //! sampling time; those here reproduce their stopping distances.
 
 use dynocar_core::pipeline::braking::gear::DeclaredGear;
-use dynocar_core::train::{BrakeGear, Davis, TrainModel};
+use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::RailCondition;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

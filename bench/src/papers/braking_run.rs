@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::{EstimatorSettings, Outcome};
-use dynocar_core::terms::Resistance;
-use dynocar_core::train::TrainModel;
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::Resistance;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{Parameter, ParameterSnapshot};
 
 use super::braking::{Moment, PRESSURE_PA, STEP_S, train};

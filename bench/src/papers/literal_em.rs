@@ -12,7 +12,7 @@ use dynocar_core::filter::particle::{ParticleError, ParticleModel, ParticleSmoot
 use dynocar_core::filter::random::Random;
 use dynocar_core::pipeline::braking::law::Law;
 use dynocar_core::pipeline::braking::motion::{self, StepInputs};
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 
 use super::braking::{
     Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, WINDOW, train,

@@ -10,13 +10,13 @@ pub mod scenario;
 
 use std::sync::Arc;
 
-use dynocar_core::force::balance::mps2_per_n_per_kn;
 use dynocar_core::pipeline::papers::xia::trajectory::fit::{
     FitSettings, MotionSegment, TrajectoryFitter,
 };
 use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 use nalgebra::Matrix3;

@@ -1,6 +1,6 @@
 //! Errors of a method over the seeds, with what the method and the bound say of them.
 
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::row::Row;

@@ -1,7 +1,8 @@
 //! Xie 2019: wheel-rail adhesion of a braking train.
 
+use dynocar_core::pipeline::braking::gear::DeclaredGear;
 use dynocar_core::pipeline::braking::settings::{EStep, LawSettings};
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{EffortPoint, RailAdhesion, RailCondition, Stop, Uncertain};
 
 use super::braking::{MPS_PER_KMH, PRESSURE_PA, STEP_S, Sought, XIE_TABLE_2, XIE_TABLE_3, train};
@@ -11,7 +12,6 @@ use super::literal_em::finite_changes;
 use super::row::Row;
 use super::seeds::Seeds;
 use super::statistics::mean;
-use dynocar_core::pipeline::braking::gear::DeclaredGear;
 
 /// Initial values of both tables.
 const INITIALS: &[f64] = &[0.0, 0.03, 0.05, 0.09, 0.12];

@@ -75,7 +75,7 @@ impl Motion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::validation::{ValidationLimits, Validator};
+    use dynocar_model::validation::{ValidationLimits, Validator};
 
     #[test]
     fn every_sample_of_the_motion_is_valid() {

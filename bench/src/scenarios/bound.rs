@@ -4,7 +4,7 @@
 //! a, b, c, the loads, the scales and the delay of forces, brakes from stop to stop, wheels, rotating
 //! mass, the wind of the day, and gusts and the map's error at every knot. What measured speeds say of them follows from how the true motion would differ.
 
-use dynocar_core::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_tests::simulator::Deviations;
 use nalgebra::{DMatrix, DVector, Matrix4};
 

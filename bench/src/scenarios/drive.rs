@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::RngExt;
 

@@ -1,6 +1,6 @@
 //! A train, its line, and the ordinary mistakes in what is declared of them.
 
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_tests::simulator::Deviations;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -6,7 +6,7 @@ use dynocar_analysis::advice::known::davis_of;
 use dynocar_analysis::advice::noise::NoiseSeen;
 use dynocar_analysis::advice::remedy::{in_words, remedy};
 use dynocar_analysis::advice::{for_mass, for_resistance};
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{Manoeuvre, Parameter, Quantity, Status};
 
 use crate::state::{PipelineState, TrainState};

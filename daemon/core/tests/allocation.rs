@@ -5,8 +5,8 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::track::{Curve, Track, Tunnel};
-use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 
 thread_local! {

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::train::{BrakeGear, Davis, TrainModel};
+use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 
 thread_local! {

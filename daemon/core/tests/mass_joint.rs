@@ -2,11 +2,11 @@
 
 mod mass_common;
 
-use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::papers::wang::section::Section;
 use dynocar_core::pipeline::papers::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_core::pipeline::{Estimator, EstimatorSettings, Outcome};
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
 use mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 use std::sync::Arc;

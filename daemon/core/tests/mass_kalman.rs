@@ -2,9 +2,9 @@
 
 mod mass_common;
 
-use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::papers::wang::{MassKalman, MassKalmanSettings};
 use dynocar_core::pipeline::{Estimator, EstimatorSettings, Outcome};
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
 use mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 

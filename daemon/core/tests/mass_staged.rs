@@ -4,11 +4,11 @@ mod mass_common;
 
 use std::sync::Arc;
 
-use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
 use dynocar_core::pipeline::papers::wang::{MassRegression, StagedDescent, StagedDescentSettings};
 use dynocar_core::pipeline::{Estimator, EstimatorSettings};
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, PipelineKind, Reason, Status};
 use mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 

@@ -1,7 +1,7 @@
 //! `[corrections]` of a `train.toml`: what measured runs have added to the declared model.
 
-use dynocar_core::terms::CORRECTIONS;
-use dynocar_core::train::TrainModel;
+use dynocar_model::terms::CORRECTIONS;
+use dynocar_model::train::TrainModel;
 
 use super::document::Section;
 use super::error::DatasetError;
@@ -23,7 +23,7 @@ pub(super) fn read_corrections(
 #[cfg(test)]
 mod tests {
     use crate::parse_train;
-    use dynocar_core::train::Corrections;
+    use dynocar_model::train::Corrections;
 
     const TRAIN: &str = "[train]\nmass_t = 10\nlength_m = 1\nrotating_mass_factor = 0\n\
                          [resistance]\na = 1\nb = 0\nc = 0\n";

@@ -1,8 +1,8 @@
 //! What is to be known before results from a dataset are believed, each thing once.
 
 use dynocar_core::plausibility::{DetectedFault, Severity};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use serde::Serialize;
 
 use super::Dataset;

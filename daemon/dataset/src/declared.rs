@@ -1,8 +1,8 @@
 //! Whether what is declared of a train and a line can be true.
 
 use dynocar_core::plausibility::Severity;
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 
 /// Masses per metre of train in t/m: from a light rail car to a loaded ore train, with room.
 const MASS_PER_LENGTH_T_PER_M: (f64, f64) = (0.1, 20.0);
@@ -87,7 +87,7 @@ pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Misdeclared
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::train::{BrakeGear, Davis, EffortCurve};
+    use dynocar_model::train::{BrakeGear, Davis, EffortCurve};
 
     fn codes(change: impl Fn(&mut TrainModel)) -> Vec<&'static str> {
         let mut train = TrainModel {

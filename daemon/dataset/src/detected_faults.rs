@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use dynocar_core::force::ForceResolver;
 use dynocar_core::plausibility::{DetectedFaults, Plausibility};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
-use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_model::force::ForceResolver;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
+use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::resolved::DATASET_TRAIN;

@@ -1,7 +1,7 @@
 //! Looks for what may be diagnosed in a run.
 
 use dynocar_core::plausibility::{DetectedFaults, InputFault};
-use dynocar_core::train::Drive;
+use dynocar_model::train::Drive;
 
 use super::diagnostic::Diagnostic;
 use super::fault_unit::read_as;
@@ -211,7 +211,7 @@ fn of_force(
     }
 }
 
-/// The bounds beyond which [`dynocar_core::validation::Validator`] refuses a sample.
+/// The bounds beyond which [`dynocar_model::validation::Validator`] refuses a sample.
 const PLAUSIBLE: [(Quantity, f64, f64); 7] = [
     (Quantity::Acceleration, -20.0, 20.0),
     (Quantity::SpecificForce, -20.0, 20.0),

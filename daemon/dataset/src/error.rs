@@ -1,6 +1,6 @@
 //! What can be wrong with a dataset's files, and where.
 
-use dynocar_core::track::TrackError;
+use dynocar_model::track::TrackError;
 
 use super::names::Choices;
 use super::quantity::Quantity;

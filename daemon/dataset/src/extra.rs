@@ -1,6 +1,6 @@
 //! `[[extra]]` of a `train.toml`: resistances of forms of their own.
 
-use dynocar_core::terms::extra::{
+use dynocar_model::terms::extra::{
     Covariate, Extra, FACTORS, FACTORS_MAX, FORCE, FORCE_MAX_N_PER_KN, Factor, Form, TABLES,
 };
 
@@ -57,7 +57,7 @@ fn factor(section: &Section) -> Result<Factor, DatasetError> {
 #[cfg(test)]
 mod tests {
     use crate::parse_train;
-    use dynocar_core::terms::extra::{Covariate, Extra, Factor, Form};
+    use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
 
     const TRAIN: &str = "[train]\nmass_t = 10\nlength_m = 1\nrotating_mass_factor = 0\n\
                          [resistance]\na = 1\nb = 0\nc = 0\n[[extra]]\nn_per_kn = 0.8\n";

@@ -1,7 +1,7 @@
 //! The unit that a diagnostic is reported in.
 
 use dynocar_core::plausibility::{DetectedFault, InputFault};
-use dynocar_core::units::Unit;
+use dynocar_model::units::Unit;
 
 use super::manifest::Manifest;
 use super::quantity::Quantity;

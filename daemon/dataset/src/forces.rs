@@ -1,6 +1,6 @@
 //! Traction and brake force of a run's rows.
 
-use dynocar_core::train::{Drive, EffortCurve, TrainModel};
+use dynocar_model::train::{Drive, EffortCurve, TrainModel};
 use serde::Serialize;
 
 use super::order::{TimeOrder, quantile};

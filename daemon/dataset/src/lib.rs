@@ -12,7 +12,7 @@
 //!
 //! - `document`, `names`, [`error`]: TOML with the line of every key; mistakes with their choices
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
-//! - [`quantity`]: what a column may hold, in which [`units`](dynocar_core::units)
+//! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
@@ -81,8 +81,8 @@ use std::sync::Arc;
 
 use dynocar_shared::SampleField;
 
-use dynocar_core::track::Track;
-use dynocar_core::train::{Drive, TrainModel};
+use dynocar_model::track::Track;
+use dynocar_model::train::{Drive, TrainModel};
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use std::path::{Component, Path};
 
-use dynocar_core::named;
-use dynocar_core::units::Unit;
+use dynocar_model::named;
+use dynocar_model::units::Unit;
 
 use super::clock::{self, TimeFormat};
 use super::document::{Document, Section};

@@ -1,7 +1,7 @@
 //! What the data of a run are like: counts, ranges and what the train did.
 
-use dynocar_core::terms::wheel::STILL_MPS;
-use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_model::terms::wheel::STILL_MPS;
+use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};
 use serde::Serialize;
 

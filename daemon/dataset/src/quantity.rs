@@ -1,9 +1,8 @@
 //! The canonical quantities of a dataset.
 
+use dynocar_model::named;
+use dynocar_model::units::{Dimension, Unit};
 use serde::Serialize;
-
-use dynocar_core::named;
-use dynocar_core::units::{Dimension, Unit};
 
 /// Declares the quantities: what each is, its name in a dataset, what its units measure.
 macro_rules! quantities {

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use serde::Serialize;
@@ -28,7 +28,7 @@ pub enum GradientSource {
     /// The mapped `gradient` column.
     Column,
     /// `specific_force` minus dv/dt, formed when the forces are resolved (see
-    /// [`dynocar_core::force::ForceResolver`]): there dv/dt cancels against the change of speed.
+    /// [`dynocar_model::force::ForceResolver`]): there dv/dt cancels against the change of speed.
     SpecificForce,
     /// The slope of the mapped `altitude` over the distance.
     Altitude,

@@ -1,6 +1,6 @@
 //! One run, from its file to the samples that the pipelines take.
 
-use dynocar_core::train::Drive;
+use dynocar_model::train::Drive;
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::detected_faults;

@@ -1,7 +1,7 @@
 //! `track.toml`.
 
-use dynocar_core::terms::{gradient, masses, place};
-use dynocar_core::track::{
+use dynocar_model::terms::{gradient, masses, place};
+use dynocar_model::track::{
     Curve, GradientError, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackError,
     TrackSurvey, Tunnel,
 };

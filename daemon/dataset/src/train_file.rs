@@ -1,7 +1,7 @@
 //! `train.toml`.
 
-use dynocar_core::terms::{Key, curve, extra, rotating, tunnel};
-use dynocar_core::train::{
+use dynocar_model::terms::{Key, curve, extra, rotating, tunnel};
+use dynocar_model::train::{
     BrakeGear, Corrections, Davis, Drive, EffortCurve, FrictionBrake, TrainModel,
 };
 

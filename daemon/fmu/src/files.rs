@@ -8,8 +8,8 @@ use std::sync::Arc;
 use dynocar_analysis::dataset::{parse_track, parse_train};
 use dynocar_analysis::driven::{Beginning, DrivenTrain};
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId};
 
 use crate::error::ModelError;

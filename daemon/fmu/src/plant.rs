@@ -1,7 +1,7 @@
 //! The model that is driven: force in, speed out, with what was found; and every variable of it.
 
 use dynocar_analysis::driven::{Beginning, DrivenTrain, ForcePart};
-use dynocar_core::simulate::motion::SPEED_MAX_MPS;
+use dynocar_model::simulate::motion::SPEED_MAX_MPS;
 use dynocar_shared::SampleField;
 
 use crate::error::ModelError;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainId;
 
 use super::parts::{LogFormat, ModelsConfig, PipelineConfig, StateConfig, ThreadConfig};

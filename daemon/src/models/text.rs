@@ -4,9 +4,9 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
 use dynocar_dataset::{DatasetError, parse_track, parse_train};
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 

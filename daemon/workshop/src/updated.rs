@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
 use dynocar_analysis::explain::{Explanation, evidence::Fit};
-use dynocar_core::terms::extra::{self, Extra, Factor};
-use dynocar_core::terms::{Entry, Key};
+use dynocar_model::terms::extra::{self, Extra, Factor};
+use dynocar_model::terms::{Entry, Key};
 use toml::{Table, Value};
 
 use dynocar::dataset::open;
@@ -254,7 +254,7 @@ fn set(table: &mut Table, section: &str, key: &str, value: f64) {
 
 #[cfg(test)]
 mod tests {
-    use dynocar_core::terms::{gradient, place, traction, wind};
+    use dynocar_model::terms::{gradient, place, traction, wind};
 
     use super::*;
 

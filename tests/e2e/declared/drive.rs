@@ -1,7 +1,7 @@
 //! A drive whose every force is known, as samples that declare none of them beyond the gradient.
 
-use dynocar_core::track::Track;
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::track::Track;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,8 +1,8 @@
 //! Every term that can be declared, with the law that the test holds against the resolver's.
 
 use dynocar_analysis::dataset::{parse_track, parse_train};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{SampleField, TrainSample};
 

@@ -4,9 +4,9 @@ use std::fs::{read_to_string, write};
 
 use dynocar::dataset;
 use dynocar_analysis::explain::evidence::{RunData, UpdatedForces, UpdatedModel, prepare};
-use dynocar_core::simulate::{Prediction, Restart};
 use dynocar_fmu::ffi::Status;
 use dynocar_fmu::{MISSING, PLANT};
+use dynocar_model::simulate::{Prediction, Restart};
 use dynocar_shared::{SampleField, TrainSample};
 use dynocar_tests::process::Site;
 

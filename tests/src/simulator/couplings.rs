@@ -4,7 +4,7 @@
 //! couplings add is how its first car moves against the whole: a chain of masses on springs and dampers,
 //! with slack in a freight train, under the forces that act on each car.
 
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 
 use super::dynamics::TruePhysics;
 use super::settings::TrainType;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::{fs, io};
 
 use dynocar_analysis::dataset::Dataset;
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 
 use super::columns::{FileStyle, make_style, row_text};
 use super::random::{Random, Stream};

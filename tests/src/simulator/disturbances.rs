@@ -1,9 +1,9 @@
 //! How the effects change the physics and the sensors of one run.
 
-use dynocar_core::terms::{
+use dynocar_model::terms::{
     Resistance, adhesion, ambient, bearings, brake, curve, place, tunnel, wind,
 };
-use dynocar_core::track::{GradientError, LinearProfile, StepProfile};
+use dynocar_model::track::{GradientError, LinearProfile, StepProfile};
 
 use super::common_deviations::CommonDeviations;
 use super::effects::{Effect, MassSection, RunWindow};

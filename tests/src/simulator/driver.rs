@@ -1,6 +1,6 @@
 //! A driver who keeps to the limits, coasts and stops at the stations.
 
-use dynocar_core::simulate::motion::Motion;
+use dynocar_model::simulate::motion::Motion;
 
 use super::driving::{Controls, Driver, TrainOnLine};
 use super::line_maker::SimulatedLine;

@@ -1,8 +1,8 @@
 //! The declared train under a driver: the track is looked up at the simulated position.
 
-use dynocar_core::simulate::motion::{Motion, advance};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 
 /// Forces that a driver commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -108,8 +108,8 @@ pub fn drive(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::track::{Curve, Tunnel};
-    use dynocar_core::train::Davis;
+    use dynocar_model::track::{Curve, Tunnel};
+    use dynocar_model::train::Davis;
 
     fn train() -> TrainModel {
         let resistance = Davis { a: 1.6, b: 0.02, c: 0.003 };

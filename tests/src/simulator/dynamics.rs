@@ -1,6 +1,6 @@
 //! The true forces on a train of many cars.
 
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 
 use super::disturbances::{DisturbanceInput, Disturbances};
 use super::line_maker::SimulatedLine;

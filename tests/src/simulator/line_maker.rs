@@ -1,6 +1,6 @@
 //! Random lines: gradients, curves, tunnels, stations, speed limits, balises.
 
-use dynocar_core::track::{Curve, Track, Tunnel};
+use dynocar_model::track::{Curve, Track, Tunnel};
 
 use super::random::Random;
 use super::settings::{SimulatorSettings, TrainType};

@@ -47,8 +47,8 @@ pub mod true_run;
 pub mod truth;
 pub mod unlisted;
 
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainSample;
 
 pub use deviations::Deviations;

@@ -5,14 +5,14 @@
 
 use std::sync::Arc;
 
-use dynocar_core::force::{ForceResolver, ResolvedSample};
-use dynocar_core::simulate::{
+use dynocar_model::force::{ForceResolver, ResolvedSample};
+use dynocar_model::simulate::{
     BridgeLimits, ForceModel, Prediction, QuadraticForces, Recording, Restart, STANDING_MPS,
     SpeedError, declared_polynomial,
 };
-use dynocar_core::terms::delay::DelayLine;
-use dynocar_core::terms::{gradient, traction};
-use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_model::terms::delay::DelayLine;
+use dynocar_model::terms::{gradient, traction};
+use dynocar_model::validation::{ValidationLimits, Validator};
 
 use super::disturbances::{DisturbanceInput, Disturbances};
 use super::sensors::SIMULATED_TRAIN;

@@ -1,6 +1,6 @@
 //! Random trains of four types.
 
-use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 
 use super::random::Random;
 use super::settings::TrainType;

@@ -1,7 +1,7 @@
 //! One run as it truly happened.
 
-use dynocar_core::simulate::motion::{Motion, advance};
-use dynocar_core::train::TrainModel;
+use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::train::TrainModel;
 
 use super::actuators::{Actuators, LateForces};
 use super::driver::TrainDriver;

@@ -1,6 +1,6 @@
 //! What a perfect explainer would find.
 
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 use serde_json::{Value, json};
 

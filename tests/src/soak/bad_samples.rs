@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynocar_analysis::identify::default_estimators;
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainSample};
 
 use crate::sensor_failures::{SensorFailure, Spoiled};

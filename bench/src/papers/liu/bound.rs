@@ -4,7 +4,7 @@
 //! falls on. Its Fisher information about the true speed is the sum over steps of
 //! (dp/dspeed)² / p, averaged over where in a step the true speed lies.
 
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use nalgebra::{DMatrix, Matrix3};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 

@@ -1,7 +1,7 @@
 //! Liu's coasting runs, with what the paper leaves out.
 
-use dynocar_core::simulate::motion::{Motion, advance};
-use dynocar_core::train::Davis;
+use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::train::Davis;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

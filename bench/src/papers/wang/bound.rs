@@ -2,7 +2,7 @@
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::pipeline::papers::wang::speed_basis::SpeedBasis;
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector4};
 

@@ -1,6 +1,6 @@
 //! The synthetic line of 28 km.
 
-use dynocar_core::track::{Curve, Tunnel};
+use dynocar_model::track::{Curve, Tunnel};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

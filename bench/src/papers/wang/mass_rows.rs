@@ -1,9 +1,9 @@
 //! Table 3: the mass on one leg.
 
-use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::Estimator;
 use dynocar_core::pipeline::papers::wang::MassRegression;
 use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
+use dynocar_model::force::ResolvedSample;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

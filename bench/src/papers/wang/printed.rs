@@ -1,9 +1,9 @@
 //! The descent as Wang 2022 prints it: raw features, one step a sample, learning rate 1e-7.
 
-use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::papers::wang::motion::Motion;
 use dynocar_core::pipeline::papers::wang::section::Section;
-use dynocar_core::train::TrainModel;
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::Vector3;
 
@@ -95,7 +95,7 @@ impl PrintedDescent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::train::Davis;
+    use dynocar_model::train::Davis;
 
     /// Pulling away on the straight, with a target that the differentiated speed scatters by
     /// 10 N/kN either way.

@@ -5,7 +5,7 @@ use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
 use dynocar_core::pipeline::papers::wang::section::Section;
 use dynocar_core::pipeline::papers::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_core::pipeline::papers::wang::{StagedDescent, StagedDescentSettings};
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -1,7 +1,7 @@
 //! What the controller measures of a drive, and what the daemon makes of it.
 
-use dynocar_core::force::{ForceResolver, ResolvedSample};
-use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_model::force::{ForceResolver, ResolvedSample};
+use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand_chacha::ChaCha8Rng;
 

@@ -7,9 +7,9 @@
 use std::sync::Arc;
 
 use super::line::{CURVE_RADIUS_M, curves, gradients, tunnels};
-use dynocar_core::simulate::motion::{Motion, advance};
-use dynocar_core::track::Track;
-use dynocar_core::train::{Davis, EffortCurve, TrainModel};
+use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::track::Track;
+use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 /// Time in s between two samples: the controller's period of the paper.

@@ -1,8 +1,8 @@
 //! Figure 9: a change of mass at a stop.
 
-use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::papers::wang::MassRegression;
 use dynocar_core::pipeline::{Estimator, Outcome};
+use dynocar_model::force::ResolvedSample;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -1,7 +1,7 @@
 //! The Cramér-Rao bound of a run, from its own numerical Jacobian.
 
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::scenario::{DISTURBANCE_N_PER_KN, DISTURBANCE_S, Run, SPEED_NOISE_MPS, speeds_mps};

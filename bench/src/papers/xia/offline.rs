@@ -11,7 +11,7 @@ use dynocar_core::pipeline::papers::xia::trajectory::step::StepRule;
 use dynocar_core::pipeline::papers::xia::wolfe_newton::{
     NewtonResult, NewtonSettings, RestartSource, Restarts, wolfe_newton,
 };
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -9,7 +9,7 @@
 use dynocar_core::pipeline::papers::xia::trajectory::fit::{
     FitError, FitSettings, MotionSegment, TrajectoryFit, TrajectoryFitter,
 };
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 /// Decades searched: from a disturbance that no run shows to one that binds the trajectory to
@@ -175,8 +175,8 @@ impl RatioPosterior {
 #[cfg(test)]
 mod tests {
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-    use dynocar_core::force::balance::mps2_per_n_per_kn;
     use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
+    use dynocar_model::force::balance::mps2_per_n_per_kn;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 

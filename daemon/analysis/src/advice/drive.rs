@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::train::{Davis, TrainModel};
 
 /// Lowest speed in m/s that a manoeuvre begins at or ends above.
 const SPEED_LOW_MPS: f64 = 2.0;
@@ -179,7 +179,7 @@ impl fmt::Display for Speed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_core::train::EffortCurve;
+    use dynocar_model::train::EffortCurve;
 
     const DAVIS: Davis = Davis { a: 1.5, b: 0.01, c: 0.005 };
 

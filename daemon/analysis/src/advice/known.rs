@@ -1,9 +1,8 @@
 //! What a snapshot knows of the resistance.
 
+use dynocar_model::train::Davis;
 use dynocar_shared::{Parameter, ParameterSnapshot};
 use nalgebra::Matrix3;
-
-use dynocar_core::train::Davis;
 
 /// What the pipeline answers: a, b, c and the mass.
 pub const ANSWERED: [Parameter; 4] =

@@ -11,7 +11,7 @@ pub mod noise;
 pub mod rehearsal;
 pub mod remedy;
 
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Parameter, ParameterSnapshot};
 use nalgebra::{Matrix3, Vector3};
 

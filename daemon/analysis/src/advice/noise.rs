@@ -8,7 +8,7 @@
 //! the measured speed is the one that the pipeline begins with.
 
 use dynocar_core::pipeline::train_kalman::{TrainKalmanSettings, declared_a_std};
-use dynocar_core::train::TrainModel;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 
 use super::known::davis_of;
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
     use crate::advice::known::ANSWERED;
     use dynocar_core::pipeline::output::write_parameters;
-    use dynocar_core::train::Davis;
+    use dynocar_model::train::Davis;
     use nalgebra::{Matrix3, Vector3};
 
     const DISTURBANCE: f64 = 0.4;

@@ -1,6 +1,6 @@
 //! The forces of a moment, part by part.
 
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::train::{Davis, TrainModel};
 
 use crate::explain::evidence::SampleForces;
 

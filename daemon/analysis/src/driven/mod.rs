@@ -9,13 +9,13 @@ mod balance;
 use std::sync::Arc;
 
 pub use balance::{Balance, ForcePart};
-use dynocar_core::force::ForceResolver;
-use dynocar_core::simulate::is_pulled;
-use dynocar_core::simulate::motion::{Motion, STEP_MAX_S, advance};
-use dynocar_core::terms::delay::DelayLine;
-use dynocar_core::track::Track;
-use dynocar_core::train::{Corrections, TrainModel};
-use dynocar_core::validation::ValidSample;
+use dynocar_model::force::ForceResolver;
+use dynocar_model::simulate::is_pulled;
+use dynocar_model::simulate::motion::{Motion, STEP_MAX_S, advance};
+use dynocar_model::terms::delay::DelayLine;
+use dynocar_model::track::Track;
+use dynocar_model::train::{Corrections, TrainModel};
+use dynocar_model::validation::ValidSample;
 use dynocar_shared::{SampleField, TrainSample};
 
 use crate::explain::evidence::SampleForces;

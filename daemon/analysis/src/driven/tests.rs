@@ -1,8 +1,8 @@
 //! The driven train compared with the open-loop prediction, and where no recording goes.
 
-use dynocar_core::simulate::{BridgeLimits, Prediction, Recording, Restart};
-use dynocar_core::track::{Curve, Track};
-use dynocar_core::train::Davis;
+use dynocar_model::simulate::{BridgeLimits, Prediction, Recording, Restart};
+use dynocar_model::track::{Curve, Track};
+use dynocar_model::train::Davis;
 
 use super::*;
 use dynocar_shared::TrainId;

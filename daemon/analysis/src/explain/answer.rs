@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_core::named;
 use dynocar_core::plausibility::Severity;
+use dynocar_model::named;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! Kinds that could stand in the place of an accepted effect.
 
-use dynocar_core::terms::{self, speed_delay};
+use dynocar_model::terms::{self, speed_delay};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::evidence::{EQUAL, Fit};

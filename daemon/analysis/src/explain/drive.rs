@@ -6,8 +6,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::Parameter;
-use dynocar_core::train::Drive;
+use dynocar_model::terms::Parameter;
+use dynocar_model::train::Drive;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;

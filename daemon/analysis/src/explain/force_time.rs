@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::Parameter;
+use dynocar_model::terms::Parameter;
 
 use crate::dataset::stamps;
 use dynocar_shared::HALF_95;

@@ -1,7 +1,7 @@
 //! What an effect means to a railway: energy on the line, and metres after a minute.
 
-use dynocar_core::simulate::{ForceModel, MOVING_SPEED_MPS, Prediction, Restart};
-use dynocar_core::units::J_PER_KWH;
+use dynocar_model::simulate::{ForceModel, MOVING_SPEED_MPS, Prediction, Restart};
+use dynocar_model::units::J_PER_KWH;
 
 use super::answer::Meaning;
 use super::evidence::{Fit, FitProblem, RunData, UpdatedForces};

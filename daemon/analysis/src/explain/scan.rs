@@ -8,9 +8,9 @@
 use std::sync::Arc;
 
 use dynocar_core::filter::lanes::dot;
-use dynocar_core::force::ResolvedSample;
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{Fit, FitProblem, RunData};

@@ -1,6 +1,6 @@
 //! Open-loop prediction: the judge of a finished model.
 
-use dynocar_core::simulate::{Prediction, Restart, SpeedError};
+use dynocar_model::simulate::{Prediction, Restart, SpeedError};
 use rayon::prelude::*;
 
 use super::bootstrap::intervals_95;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use dynocar_core::simulate::{Recording, STANDING_MPS, departs};
+use dynocar_model::simulate::{Recording, STANDING_MPS, departs};
 
 /// A run that moves for less time in s is a shunt in a queue, and says little.
 const STOP_RUN_MOVING_MIN_S: f64 = 10.0;
@@ -37,9 +37,9 @@ pub fn stop_runs(recording: &Recording) -> Vec<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use dynocar_core::force::ResolvedSample;
-    use dynocar_core::simulate::{BridgeLimits, Prediction, QuadraticForces, Restart, SpeedError};
-    use dynocar_core::train::Davis;
+    use dynocar_model::force::ResolvedSample;
+    use dynocar_model::simulate::{BridgeLimits, Prediction, QuadraticForces, Restart, SpeedError};
+    use dynocar_model::train::Davis;
 
     use super::*;
     use crate::explain::evidence::coasting;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dynocar_core::plausibility::Severity;
-use dynocar_core::simulate::SpeedError;
+use dynocar_model::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{

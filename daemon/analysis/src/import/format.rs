@@ -1,6 +1,6 @@
 //! Which project's file a text is.
 
-use dynocar_core::named;
+use dynocar_model::named;
 
 use super::error::{ImportError, ImportProblem};
 use super::item::Item;

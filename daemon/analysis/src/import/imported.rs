@@ -1,7 +1,7 @@
 //! What an import gives: a train or a line as far as the file says, and an account of every field.
 
-use dynocar_core::track::Curve;
-use dynocar_core::train::Davis;
+use dynocar_model::track::Curve;
+use dynocar_model::train::Davis;
 
 use crate::dataset::SourcePosition;
 

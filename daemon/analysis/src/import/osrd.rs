@@ -3,7 +3,7 @@
 //! Some files state A, B and C in N, N/(m/s) and N/(m/s)² for the whole train, others the same for each
 //! kg, and none says which. The two differ by the mass in kg, so that the size distinguishes them.
 
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::train::{Davis, TrainModel};
 
 use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedTrain, Reading};

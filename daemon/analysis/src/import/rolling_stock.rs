@@ -1,7 +1,7 @@
 //! railtoolkit's rolling stock: vehicles, and trains as formations of them (schema 2022.05; the later
 //! main has the same).
 
-use dynocar_core::train::{Davis, EffortCurve};
+use dynocar_model::train::{Davis, EffortCurve};
 
 use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedTrain, Reading};

@@ -157,7 +157,7 @@ fn a_ttobench_track_keeps_its_lists_and_the_mean_curvature_of_transitions() {
     let tenths = [1.0, 3.0, 5.0, 7.0, 9.0].map(|tenth| 5000.0 / tenth);
     assert_close(&radii, &[&tenths[..], &[500.0]].concat());
     assert_eq!((curves[0].start_m, curves[5].start_m, curves[5].end_m), (400.0, 500.0, 800.0));
-    let turned = |it: &dynocar_core::track::Curve| (it.end_m - it.start_m) / it.radius_m;
+    let turned = |it: &dynocar_model::track::Curve| (it.end_m - it.start_m) / it.radius_m;
     assert_close(&[curves.iter().map(turned).sum()], &[100.0 / 1000.0 + 300.0 / 500.0]);
     let bare = TRACK.replace("curvatures", "curviness");
     let account = &read(&bare).lines[0].account;

@@ -1,6 +1,6 @@
 //! What the files of TTOBench have in common: values that state their unit.
 
-use dynocar_core::units::{Dimension, Unit};
+use dynocar_model::units::{Dimension, Unit};
 
 use super::error::ImportError;
 use super::item::Item;

@@ -1,7 +1,7 @@
 //! A track of TTOBench: stops, permitted speeds, gradients and curvatures along it.
 
-use dynocar_core::track::Curve;
-use dynocar_core::units::{Dimension, Unit};
+use dynocar_model::track::Curve;
+use dynocar_model::units::{Dimension, Unit};
 
 use super::error::ImportError;
 use super::imported::{Account, ImportedLine};

@@ -1,7 +1,7 @@
 //! A train of TTOBench: resistance in kN over km/h, and greatest force and power of its drive.
 
-use dynocar_core::train::{Davis, TrainModel};
-use dynocar_core::units::Dimension;
+use dynocar_model::train::{Davis, TrainModel};
+use dynocar_model::units::Dimension;
 
 use super::error::ImportError;
 use super::imported::{Account, ImportedTrain};

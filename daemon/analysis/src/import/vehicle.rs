@@ -8,7 +8,7 @@
 //! - freight wagons (Strahl): base + air (v / v0)²
 //! - passenger coaches (Sauthoff): base + rolling v / v0 + air ((v + w) / v0)²
 
-use dynocar_core::train::{Davis, EffortCurve};
+use dynocar_model::train::{Davis, EffortCurve};
 
 use super::error::ImportError;
 use super::item::Item;

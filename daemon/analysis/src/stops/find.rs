@@ -2,11 +2,10 @@
 
 use std::ops::RangeInclusive;
 
+use dynocar_model::terms::wheel::STANDING_MPS;
+use dynocar_model::train::EffortCurve;
 use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
-
-use dynocar_core::terms::wheel::STANDING_MPS;
-use dynocar_core::train::EffortCurve;
 
 /// Below this speed in m/s a driver may let the brake go, so that the stop is soft.
 const SOFT_MPS: f64 = 2.0;

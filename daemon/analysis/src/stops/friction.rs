@@ -8,8 +8,8 @@
 use std::sync::Arc;
 
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::track::Track;
-use dynocar_core::train::{BrakeGear, TrainModel};
+use dynocar_model::track::Track;
+use dynocar_model::train::{BrakeGear, TrainModel};
 use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, TrainSample};
 use serde::Serialize;
 

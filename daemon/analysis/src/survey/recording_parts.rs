@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use dynocar_core::terms::wheel::STILL_MPS;
+use dynocar_model::terms::wheel::STILL_MPS;
 
 use super::recording::Recording;
 

@@ -1,6 +1,6 @@
 //! Where the passes stand.
 
-use dynocar_core::terms::wheel::STILL_MPS;
+use dynocar_model::terms::wheel::STILL_MPS;
 
 use super::chainage::Estimate;
 use super::recording::RawRecording;

@@ -1,9 +1,9 @@
 //! An estimator that estimates nothing: the floor that latency is compared with.
 
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status};
 
 use super::{Estimator, Outcome};
-use crate::force::ResolvedSample;
 
 /// Counts the samples and leaves the snapshot without parameters.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,9 +1,9 @@
 //! The interface of every estimator.
 
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason, Status};
 
 use super::KeptEstimate;
-use crate::force::ResolvedSample;
 
 /// What an estimator did with a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

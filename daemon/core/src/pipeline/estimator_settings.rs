@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::PipelineKind;
 use serde::Deserialize;
 
@@ -23,7 +24,6 @@ use super::resistance;
 use super::resistance::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use super::settings::SettingError;
 use super::train_kalman::{TrainKalman, TrainKalmanSettings};
-use crate::train::TrainModel;
 
 /// The settings of a kind without settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]

@@ -30,14 +30,14 @@ pub use settings::SettingError;
 
 use std::sync::Arc;
 
+use dynocar_model::force::ForceResolver;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
+use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status, TrainId, TrainSample};
 
 use self::usable::Usable;
-use crate::force::ForceResolver;
 use crate::plausibility::{DetectedFault, Plausibility};
-use crate::track::Track;
-use crate::train::TrainModel;
-use crate::validation::{ValidationLimits, Validator};
 
 /// One estimator for one train, from [`TrainSample`] to [`ParameterSnapshot`].
 pub struct Pipeline {

@@ -13,10 +13,10 @@ mod gated;
 
 pub use gated::Gated;
 
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Reason, RejectionReason};
 
 use super::motion::{BRIDGED_MAX_S, MOVING_MPS};
-use crate::force::ResolvedSample;
 
 /// So many samples away from the old level make a new one.
 const AGREEING: usize = 3;

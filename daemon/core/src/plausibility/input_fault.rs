@@ -1,10 +1,9 @@
 //! What may have gone wrong with a quantity, by what factor, and which unit would explain it.
 
+use dynocar_model::named;
+use dynocar_model::units::{Dimension, Unit};
 use dynocar_shared::{PipelineKind, Reason};
 use serde::Serialize;
-
-use crate::named;
-use crate::units::{Dimension, Unit};
 
 /// A unit is named when its factor and the one found differ by no more than this share.
 const UNIT_TOLERANCE: f64 = 0.2;

@@ -18,12 +18,12 @@ pub mod words;
 
 use std::sync::Arc;
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{RejectionReason, TrainSample};
 
 pub use diagnosis::DetectedFaults;
 pub use input_fault::{DetectedFault, InputFault, Severity};
 
-use crate::train::TrainModel;
 use watch::Watch;
 
 /// Judges the samples of one train as they come.

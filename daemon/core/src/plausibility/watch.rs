@@ -1,12 +1,12 @@
 //! Sample by sample: from a stream of samples to what they say of units, signs and swaps.
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::balance::{Balance, Slopes, WindowMean};
 use super::pressure::PressureContrast;
 use crate::filter::RunningMedian;
-use crate::train::TrainModel;
 
 /// Time in s over which accelerations are averaged; one step where the steps are longer.
 const WINDOW_S: f64 = 5.0;

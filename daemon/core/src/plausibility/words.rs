@@ -2,8 +2,9 @@
 
 use std::fmt;
 
+use dynocar_model::units::{Dimension, Unit};
+
 use super::input_fault::{DetectedFault, InputFault};
-use crate::units::{Dimension, Unit};
 
 impl DetectedFault {
     /// The detected fault in words; `read_as` is the unit that the quantity was read in.

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use dynocar_model::simulate::SpeedError;
 use serde::{Deserialize, Serialize};
-
-use crate::simulate::SpeedError;
 
 /// Days that are kept, the newest.
 const DAYS_MAX: usize = 400;

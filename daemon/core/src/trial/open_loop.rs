@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::force::{ForceResolver, ResolvedSample};
-use crate::simulate::{BridgeLimits, Prediction, QuadraticForces, Recording, Restart, SpeedError};
-use crate::track::Track;
-use crate::train::TrainModel;
-use crate::validation::ValidSample;
+use dynocar_model::force::{ForceResolver, ResolvedSample};
+use dynocar_model::simulate::{
+    BridgeLimits, Prediction, QuadraticForces, Recording, Restart, SpeedError,
+};
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
+use dynocar_model::validation::ValidSample;
 
 /// Samples nearer in time, in s, to the last that was kept are not: 20 a second describe a motion.
 const STEP_MIN_S: f64 = 0.05;

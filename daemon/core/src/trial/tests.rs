@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
+use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::Evidence;
 use super::ledger::Ledger;
 use super::open_loop::OpenLoop;
 use super::{Rival, Trials};
-use crate::simulate::motion::{Motion, advance};
-use crate::train::{Davis, TrainModel};
 
 const TRAIN: TrainId = TrainId(1);
 const MASS_KG: f64 = 100e3;

@@ -1,5 +1,7 @@
 //! The model in force and its rivals on the same samples.
 
+use dynocar_model::simulate::{Restart, SpeedError};
+use dynocar_model::validation::{ValidSample, ValidationLimits, Validator};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::{Evidence, score};
@@ -7,8 +9,6 @@ use super::ledger::Ledger;
 use super::open_loop::{OpenLoop, WindowError};
 use crate::pipeline::Pipeline;
 use crate::pipeline::motion::MOVING_MPS;
-use crate::simulate::{Restart, SpeedError};
-use crate::validation::{ValidSample, ValidationLimits, Validator};
 
 /// Moving time in s of which a trip is made that compares models; shorter ones join the next.
 const TRIP_MIN_S: f64 = 120.0;

@@ -2,7 +2,7 @@ use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_core::pipeline::braking::settings::{
     BrakingSettings, EmSettings, LawSettings, SmootherSettings,
 };
-use dynocar_core::train::BrakeGear;
+use dynocar_model::train::BrakeGear;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{
     Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, SampleField, Status,

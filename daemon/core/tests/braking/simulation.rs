@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
-use dynocar_core::train::{BrakeGear, Davis, TrainModel};
+use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

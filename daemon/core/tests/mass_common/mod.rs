@@ -4,10 +4,10 @@
 
 use std::sync::Arc;
 
-use dynocar_core::force::ResolvedSample;
 use dynocar_core::pipeline::Estimator;
-use dynocar_core::terms::Resistance;
-use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::Resistance;
+use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::ParameterSnapshot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

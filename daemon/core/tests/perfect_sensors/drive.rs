@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,6 +1,6 @@
 //! What was guessed of recordings that nobody described.
 
-use dynocar_core::units::Unit;
+use dynocar_model::units::Unit;
 
 use super::name::Name;
 use super::plausible::UnitChoice;

@@ -1,6 +1,6 @@
 //! Which unit makes a column's values those of a train.
 
-use dynocar_core::units::Unit;
+use dynocar_model::units::Unit;
 
 use super::facts::Facts;
 use super::spelling::Spelled;

@@ -1,6 +1,6 @@
 //! How units are spelled in headers.
 
-use dynocar_core::units::{Dimension, Unit};
+use dynocar_model::units::{Dimension, Unit};
 
 /// A unit that a header names: one of the dataset's units, and the factor that leads to it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,7 @@ use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
 use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_core::plausibility::Severity;
-use dynocar_core::units::Unit;
+use dynocar_model::units::Unit;
 use dynocar_shared::{HALF_95, Parameter, TrainId, schema};
 use serde::Serialize;
 

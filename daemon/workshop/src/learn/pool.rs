@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use dynocar_analysis::dataset::{Dataset, DatasetHead, Role, Run};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 
 use super::memory::Memory;
 use super::overlay::Overlay;

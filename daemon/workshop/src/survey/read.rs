@@ -9,7 +9,7 @@ use dynocar_analysis::survey::geodesy::LocalPlane;
 use dynocar_analysis::survey::line::{Alignments, FallingAlignment};
 use dynocar_analysis::survey::recording::RawRecording;
 use dynocar_analysis::survey::{KnownLine, Vehicle};
-use dynocar_core::track::Track;
+use dynocar_model::track::Track;
 use dynocar_shared::SampleField;
 
 use super::failure::SurveyFailure;

@@ -7,7 +7,7 @@ use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::answer::WithStd;
 use dynocar_analysis::explain::{drive, explain};
-use dynocar_core::train::Drive;
+use dynocar_model::train::Drive;
 use dynocar_shared::SampleField;
 use dynocar_workshop::survey::survey_folder;
 

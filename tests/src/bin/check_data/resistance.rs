@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dynocar::dataset;
 use dynocar_analysis::identify::{default_estimators, identify, published_samples};
-use dynocar_core::train::{Davis, TrainModel};
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 use serde_json::Value;
 

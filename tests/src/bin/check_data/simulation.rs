@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role, Run};
-use dynocar_core::force::ForceResolver;
-use dynocar_core::simulate::{
+use dynocar_model::force::ForceResolver;
+use dynocar_model::simulate::{
     BridgeLimits, Prediction, QuadraticForces, Recording, Restart, SpeedError,
 };
-use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::TrainId;
 use serde_json::Value;
 

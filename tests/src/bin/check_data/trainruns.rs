@@ -7,9 +7,9 @@
 
 use std::path::Path;
 
-use dynocar_core::simulate::motion::Motion;
-use dynocar_core::track::Track;
-use dynocar_core::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use dynocar_model::simulate::motion::Motion;
+use dynocar_model::track::Track;
+use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_tests::simulator::driving::{Controls, TrainOnLine, drive};
 

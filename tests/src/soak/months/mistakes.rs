@@ -6,11 +6,11 @@
 
 use std::sync::Arc;
 
-use dynocar_core::train::TrainModel;
 use dynocar_core::trial::evidence::Evidence;
 use dynocar_core::trial::ledger::Ledger;
 use dynocar_core::trial::open_loop::OpenLoop;
 use dynocar_core::trial::{Rival, Trials};
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{TrainId, TrainSample};
 
 use crate::simulator::random::{Random, Stream};

@@ -1,7 +1,7 @@
 //! Forces that act later than reported: a dead time, then a first-order lag.
 
-use dynocar_core::terms::delay::{self, DelayLine};
-use dynocar_core::terms::{Entry, Parameter};
+use dynocar_model::terms::delay::{self, DelayLine};
+use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, Turn};

@@ -1,6 +1,6 @@
 //! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
 
-use dynocar_core::terms::{Entry, Parameter, ambient};
+use dynocar_model::terms::{Entry, Parameter, ambient};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};

@@ -1,6 +1,6 @@
 //! Cold bearings that warm up.
 
-use dynocar_core::terms::{Entry, Parameter, Resistance, bearings};
+use dynocar_model::terms::{Entry, Parameter, Resistance, bearings};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal};

@@ -1,7 +1,7 @@
 //! Curve resistance k/R in N/kN with another k than declared (Röckl, Schmidt; declared k = 600).
 
-use dynocar_core::force::ResolvedSample;
-use dynocar_core::terms::{Entry, Parameter, curve};
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::{Entry, Parameter, curve};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal};

@@ -5,8 +5,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::Parameter;
-use dynocar_core::terms::brake::{self, BUILD_UP_S, build_up};
+use dynocar_model::terms::Parameter;
+use dynocar_model::terms::brake::{self, BUILD_UP_S, build_up};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};

@@ -9,9 +9,9 @@
 //! of a map's errors or, where a level line is declared, of a line that nobody surveyed: their
 //! evidence decides.
 
-use dynocar_core::terms::gradient;
-use dynocar_core::terms::{Entry, Parameter};
-use dynocar_core::track::{self, LinearProfile};
+use dynocar_model::terms::gradient;
+use dynocar_model::terms::{Entry, Parameter};
+use dynocar_model::track::{self, LinearProfile};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::{Entry, Parameter, gradient};
-use dynocar_core::track::Track;
+use dynocar_model::terms::{Entry, Parameter, gradient};
+use dynocar_model::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::{Entry, Parameter, place};
+use dynocar_model::terms::{Entry, Parameter, place};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};

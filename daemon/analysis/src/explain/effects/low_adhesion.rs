@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::force::ResolvedSample;
-use dynocar_core::terms::{Parameter, adhesion};
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::{Parameter, adhesion};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};

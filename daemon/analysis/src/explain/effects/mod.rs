@@ -2,7 +2,7 @@
 //!
 //! A kind ([`Effect`]) proposes [`Hypothesis`] structures for the data at hand: which tunnels,
 //! which interval, which windows. A hypothesis changes the forces on the train for given
-//! parameters by the law of its term ([`dynocar_core::terms`]), and nothing else is needed: the same code
+//! parameters by the law of its term ([`dynocar_model::terms`]), and nothing else is needed: the same code
 //! fits it, simulates it and predicts with it, and the daemon applies the same law to what is
 //! written of it into the files. A new kind is one file and one line in [`LIBRARY`].
 

@@ -1,7 +1,7 @@
 //! Another rotating mass than declared: inertial mass = mass (1 + gamma). Unlike the mass it does
 //! not feel the gradient.
 
-use dynocar_core::terms::{Entry, Parameter, rotating};
+use dynocar_model::terms::{Entry, Parameter, rotating};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal};

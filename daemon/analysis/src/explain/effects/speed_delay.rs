@@ -1,9 +1,9 @@
 //! A measured speed that is late. Forces that act late leave the gradient on time, a late speed does
 //! not: what the line does distinguishes the two, and so does a position that runs ahead of the speed.
 
-use dynocar_core::terms::speed_delay::{self, LateSpeed};
-use dynocar_core::terms::{Entry, Parameter};
-use dynocar_core::train::Davis;
+use dynocar_model::terms::speed_delay::{self, LateSpeed};
+use dynocar_model::terms::{Entry, Parameter};
+use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal, Turn};

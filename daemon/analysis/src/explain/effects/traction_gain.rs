@@ -1,6 +1,6 @@
 //! A reported traction force that is not the true one: gain = reported over true.
 
-use dynocar_core::terms::{Entry, Parameter, traction};
+use dynocar_model::terms::{Entry, Parameter, traction};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal};

@@ -6,8 +6,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::{Entry, Parameter, place, tunnel};
-use dynocar_core::track::Track;
+use dynocar_model::terms::{Entry, Parameter, place, tunnel};
+use dynocar_model::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported, SharedHypothesis};

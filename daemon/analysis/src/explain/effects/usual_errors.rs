@@ -1,8 +1,8 @@
 //! What is a little wrong in every train's figures: scales of the reported forces, how late they act, the
 //! curve constant. No effect, but what a finished model is fitted beside.
 
-use dynocar_core::terms::delay::DelayLine;
-use dynocar_core::terms::{Parameter, curve, delay, traction};
+use dynocar_model::terms::delay::DelayLine;
+use dynocar_model::terms::{Parameter, curve, delay, traction};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 

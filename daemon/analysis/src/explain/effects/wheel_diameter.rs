@@ -1,7 +1,7 @@
 //! Wheels of another diameter than declared: measured speed = scale * true speed, and the odometer
 //! with it. Balises distinguish it from the rotating mass: they correct the position.
 
-use dynocar_core::terms::{Entry, Parameter, wheel};
+use dynocar_model::terms::{Entry, Parameter, wheel};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal};

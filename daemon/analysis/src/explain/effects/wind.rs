@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_core::force::ResolvedSample;
-use dynocar_core::terms::{Entry, Parameter, wind};
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::{Entry, Parameter, wind};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};

@@ -1,6 +1,6 @@
 //! Means over a few samples of motion: what is compared with a model.
 
-use dynocar_core::simulate::Recording;
+use dynocar_model::simulate::Recording;
 
 /// Width in s of a bin over which speeds are averaged.
 const BIN_S: f64 = 2.0;

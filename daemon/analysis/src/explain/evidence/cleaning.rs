@@ -1,6 +1,6 @@
 //! Replaces what sticks out from its neighbours before anything is fitted.
 
-use dynocar_core::force::ResolvedSample;
+use dynocar_model::force::ResolvedSample;
 
 /// Samples to each side that a value is compared with.
 const HALF_WINDOW: usize = 3;

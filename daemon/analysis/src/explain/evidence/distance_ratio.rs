@@ -1,6 +1,6 @@
 //! The distance by position against the distance by integrated speed: what shows a wheel's diameter.
 
-use dynocar_core::simulate::Recording;
+use dynocar_model::simulate::Recording;
 
 use super::bins::SEGMENT_GAP_MAX_S;
 
@@ -68,8 +68,8 @@ fn distances(recording: &Recording) -> Vec<Distances> {
 mod tests {
     use super::super::coasting;
     use super::*;
-    use dynocar_core::force::ResolvedSample;
-    use dynocar_core::simulate::BridgeLimits;
+    use dynocar_model::force::ResolvedSample;
+    use dynocar_model::simulate::BridgeLimits;
 
     const SCALE: f64 = 1.02;
 

@@ -4,8 +4,8 @@
 //! speed by as much as the train drives in that time: more, the faster it is. An odometer that is late
 //! with the speed does not show it, so that only a position ahead says something.
 
-use dynocar_core::simulate::{Recording, STANDING_MPS};
-use dynocar_core::terms::speed_delay;
+use dynocar_model::simulate::{Recording, STANDING_MPS};
+use dynocar_model::terms::speed_delay;
 use nalgebra::{Matrix3, Vector3};
 
 use super::bins::SEGMENT_GAP_MAX_S;
@@ -87,8 +87,8 @@ pub(super) fn pooled_s(parts: &[f64]) -> Option<(f64, f64)> {
 mod tests {
     use super::super::coasting;
     use super::*;
-    use dynocar_core::force::ResolvedSample;
-    use dynocar_core::simulate::BridgeLimits;
+    use dynocar_model::force::ResolvedSample;
+    use dynocar_model::simulate::BridgeLimits;
 
     /// Speed and distance of a train that goes from stand to stand in 120 s.
     fn true_motion(time_s: f64) -> (f64, f64) {

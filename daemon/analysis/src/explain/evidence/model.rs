@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use dynocar_core::simulate::{ForceModel, Polynomial, QuadraticForces};
-use dynocar_core::terms::wheel;
-use dynocar_core::train::Davis;
+use dynocar_model::simulate::{ForceModel, Polynomial, QuadraticForces};
+use dynocar_model::terms::wheel;
+use dynocar_model::train::Davis;
 
 use super::bins::Bin;
 use super::response::Response;

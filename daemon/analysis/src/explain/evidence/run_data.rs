@@ -1,10 +1,10 @@
 //! A run made ready for fitting: resolved, cleaned and binned.
 
-use dynocar_core::force::{ForceResolver, ResolvedSample};
-use dynocar_core::simulate::{BridgeLimits, Recording, SimulateError};
-use dynocar_core::terms::extra::Covariate;
-use dynocar_core::train::TrainModel;
-use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_model::force::{ForceResolver, ResolvedSample};
+use dynocar_model::simulate::{BridgeLimits, Recording, SimulateError};
+use dynocar_model::terms::extra::Covariate;
+use dynocar_model::train::TrainModel;
+use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::TrainSample;
 
 use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};

@@ -6,7 +6,7 @@
 //! integrated out of every fit, so that what is common to all runs is judged by the scatter
 //! between them, and a few hundredths of a second between force and speed bend no resistance.
 
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::model::integrate_bins;

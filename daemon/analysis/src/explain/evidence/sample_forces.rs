@@ -1,9 +1,9 @@
 //! What accelerates the train at one sample.
 
-use dynocar_core::force::ResolvedSample;
-use dynocar_core::force::balance::{ActingForces, mps2_per_n_per_kn};
-use dynocar_core::terms::Resistance;
-use dynocar_core::train::Davis;
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::force::balance::{ActingForces, mps2_per_n_per_kn};
+use dynocar_model::terms::Resistance;
+use dynocar_model::train::Davis;
 
 /// What accelerates the train at one sample; effects change these fields.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_core::force::{ForceResolver, ResolvedSample};
-use dynocar_core::train::{Davis, TrainModel};
-use dynocar_core::validation::{ValidationLimits, Validator};
+use dynocar_model::force::{ForceResolver, ResolvedSample};
+use dynocar_model::train::{Davis, TrainModel};
+use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::{SampleField, TrainSample};
 
 use crate::dataset::DATASET_TRAIN;

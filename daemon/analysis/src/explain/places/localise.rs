@@ -1,6 +1,6 @@
 //! Where along the line, and in which runs, a force of a given shape acts.
 
-use dynocar_core::track::Track;
+use dynocar_model::track::Track;
 use rayon::prelude::*;
 
 use super::found::Found;

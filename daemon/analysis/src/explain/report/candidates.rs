@@ -1,6 +1,6 @@
 //! What else was considered, and why it lost.
 
-use dynocar_core::terms::KindRow;
+use dynocar_model::terms::KindRow;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::words;

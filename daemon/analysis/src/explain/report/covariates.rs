@@ -1,7 +1,7 @@
 //! What the residual is plotted against.
 
-use dynocar_core::force::ResolvedSample;
-use dynocar_core::terms::KindRow;
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::KindRow;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::windows::Window;
@@ -176,7 +176,7 @@ impl Covariate {
 
 #[cfg(test)]
 mod tests {
-    use dynocar_core::terms::KINDS;
+    use dynocar_model::terms::KINDS;
 
     use super::*;
 

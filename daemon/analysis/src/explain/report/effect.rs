@@ -1,6 +1,6 @@
 //! An effect in words: kind, size, location, what it means, how sure it is, and what to do.
 
-use dynocar_core::terms::KindRow;
+use dynocar_model::terms::KindRow;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 

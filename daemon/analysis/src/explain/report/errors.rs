@@ -1,6 +1,6 @@
 //! Open-loop errors before and after, with intervals by bootstrap.
 
-use dynocar_core::simulate::{Prediction, Restart, SpeedError};
+use dynocar_model::simulate::{Prediction, Restart, SpeedError};
 
 use super::Estimate;
 use crate::dataset::Role;
@@ -160,7 +160,7 @@ fn blocks(run: &RunData, before: &Fit, after: &Fit, restart: Restart) -> Vec<[Sp
         fit.model.forces(run, &fit.theta, &mut forces);
         prediction.simulate(&run.recording, &forces, restart);
         for (i, sample) in samples.iter().enumerate() {
-            if sample.speed_mps > dynocar_core::simulate::MOVING_SPEED_MPS
+            if sample.speed_mps > dynocar_model::simulate::MOVING_SPEED_MPS
                 && run.recording.is_simulated(i)
             {
                 let away = prediction.speed_mps()[i] - sample.speed_mps;

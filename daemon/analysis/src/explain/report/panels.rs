@@ -1,6 +1,6 @@
 //! The residual force against one covariate each, in bins with their errors.
 
-use dynocar_core::force::ResolvedSample;
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};

@@ -1,6 +1,6 @@
 //! Measured and predicted speeds of runs, thinned for drawing.
 
-use dynocar_core::simulate::{Prediction, Restart};
+use dynocar_model::simulate::{Prediction, Restart};
 
 use crate::dataset::Role;
 use crate::explain::Explanation;

@@ -1,6 +1,6 @@
 //! Names and units for people.
 
-use dynocar_core::terms::KindRow;
+use dynocar_model::terms::KindRow;
 use dynocar_shared::vocabulary::EffectKind;
 
 /// Name of a kind as the answer writes it, for a running text.

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 

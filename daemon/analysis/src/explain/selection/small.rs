@@ -5,7 +5,7 @@
 //! them certain, and they take little from the open-loop error. Left out of the model they would stand in its
 //! noise and hide what matters.
 
-use dynocar_core::terms::wind;
+use dynocar_model::terms::wind;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::Refusal;

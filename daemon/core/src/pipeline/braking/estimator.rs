@@ -1,12 +1,12 @@
 //! The estimator behind every braking pipeline: intake, engine, report.
 
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 
 use super::engine::{Engine, Estimate, Observation, Step};
 use super::intake::{BrakingCoefficient, BrakingIntake, Intake};
 use super::motion::StepInputs;
 use super::report::{self, Circumstances, ReportSettings};
-use crate::force::ResolvedSample;
 use crate::pipeline::motion::{PositionNoise, SpeedRange};
 use crate::pipeline::output::write_innovations;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};

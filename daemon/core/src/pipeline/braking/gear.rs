@@ -1,6 +1,6 @@
 //! From cylinder pressure to brake force.
 
-use crate::train::BrakeGear;
+use dynocar_model::train::BrakeGear;
 
 /// The brake gear with every quantity declared.
 #[derive(Clone, Copy, Debug, PartialEq)]

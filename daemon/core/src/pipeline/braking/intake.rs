@@ -1,12 +1,12 @@
 //! From the train's samples to the observations and steps of a braking.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Reason, RejectionReason};
 
 use super::engine::Observation;
 use super::gear::DeclaredGear;
 use super::motion::StepInputs;
-use crate::force::ResolvedSample;
-use crate::train::{Davis, TrainModel};
 
 /// The coefficient that is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

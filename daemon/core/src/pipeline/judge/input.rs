@@ -1,8 +1,8 @@
 //! How well the samples serve an estimator.
 
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Reason, RejectionReason};
 
-use crate::force::ResolvedSample;
 use crate::pipeline::Outcome;
 
 /// Samples over which refusals are counted.

@@ -1,13 +1,13 @@
 //! What one unit of each column would retard the train at a sample, and its impulse by blocks.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::SuspectInput;
+use dynocar_model::train::Davis;
 use nalgebra::SVector;
 
 use super::place_memory::PlaceMemory;
 use super::suspects::{COVARIATES, covariate};
-use crate::force::ResolvedSample;
 use crate::pipeline::resistance::sample::UnitSample;
-use crate::terms::SuspectInput;
-use crate::train::Davis;
 
 /// One value for each column that comes from samples.
 pub type Covariates = SVector<f64, COVARIATES>;

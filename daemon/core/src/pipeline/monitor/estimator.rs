@@ -1,5 +1,7 @@
 //! The residual monitor as a pipeline.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Vector1, Vector3};
@@ -15,7 +17,6 @@ use super::suspects::{BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS,
 use super::usual::Usual;
 use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
-use crate::force::ResolvedSample;
 use crate::pipeline::judge::Case;
 use crate::pipeline::motion::{STANDING_MPS, SpeedRange, is_same_mass};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
@@ -26,7 +27,6 @@ use crate::pipeline::resistance::regression::{
 use crate::pipeline::resistance::sample::UnitSample;
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
-use crate::train::{Davis, TrainModel};
 
 /// Rows before anything is called estimated.
 const ROWS_MIN: f64 = 12.0;

@@ -1,6 +1,6 @@
 //! Brake-cylinder pressure that stays while no brake is reported.
 
-use crate::force::ResolvedSample;
+use dynocar_model::force::ResolvedSample;
 
 /// After the brake force is gone, the cylinders get this time in s to empty.
 const RELEASE_S: f64 = 6.0;

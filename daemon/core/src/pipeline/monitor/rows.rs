@@ -1,5 +1,6 @@
 //! Blocks of momentum to independent rows of unit variance, with a column for each suspect.
 
+use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
 
 use super::covariates::Covariates;
@@ -11,7 +12,6 @@ use crate::pipeline::resistance::momentum_error::{
     DISTURBANCE, Disturbance, STATES, momentum_seen,
 };
 use crate::pipeline::resistance::regression::{MomentumBlock, UNKNOWNS};
-use crate::train::Davis;
 
 const COLUMNS: usize = 1 + PARAMETERS;
 /// Innovations beyond so many standard deviations count for less (Huber).

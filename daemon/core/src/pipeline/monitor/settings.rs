@@ -1,8 +1,9 @@
 //! Settings of the residual monitor.
 
+use dynocar_model::terms::curve;
+
 use crate::pipeline::resistance::settings::DataSettings;
 use crate::pipeline::settings::settings;
-use crate::terms::curve;
 
 settings! {
     /// Settings of `residual_monitor`.

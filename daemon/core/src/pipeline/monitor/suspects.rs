@@ -5,11 +5,11 @@
 //! effect. All other suspects have a column each in addition to it; the wheels' diameter shows by positions,
 //! without any force.
 
+use dynocar_model::terms::speed_band::BANDS;
+use dynocar_model::terms::{SUSPECTS as TERMS, Suspect, USUAL, brake, traction};
 use dynocar_shared::vocabulary::EffectKind;
 
 use crate::pipeline::resistance::regression::{FORCE_DELAY, TRACTION_SCALE, UNKNOWNS};
-use crate::terms::speed_band::BANDS;
-use crate::terms::{SUSPECTS as TERMS, Suspect, USUAL, brake, traction};
 
 /// Columns of the base model: a, b, c, two force scales, the delay, and what else is never exact.
 pub const BASE: usize = UNKNOWNS + USUAL.len();

@@ -1,5 +1,7 @@
 //! What is declared, and how far from it everything usually is.
 
+use dynocar_model::train::TrainModel;
+
 use super::information::BaseVector;
 use super::settings::MonitorSettings;
 use super::suspects::{CURVE, DAY_WIND, LOAD, WARMING};
@@ -8,7 +10,6 @@ use crate::pipeline::resistance::regression::{
 };
 use crate::pipeline::resistance::settings::DataSettings;
 use crate::pipeline::settings::{SettingError, require};
-use crate::train::TrainModel;
 
 /// Standard deviation of a curve constant of which nothing is declared, in 1000 N/kN m.
 const CURVE_STD_MIN: f64 = 0.02;

@@ -1,5 +1,7 @@
 //! What speaks for each candidate.
 
+use dynocar_model::terms::{Least, delay};
+
 use super::information::{Alternative, BaseSolution, Information};
 use super::naming::{Naming, Standing};
 use super::onsets::Onsets;
@@ -11,7 +13,6 @@ use super::suspects::{
 };
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::resistance::regression::{FORCE_DELAY, UNKNOWNS};
-use crate::terms::{Least, delay};
 
 /// Blocks that a suspect which began at some moment must have acted.
 const AGE_MIN: u32 = 5;

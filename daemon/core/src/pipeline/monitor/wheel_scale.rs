@@ -5,7 +5,7 @@
 //! line over points some distance apart gives the error of the speed's scale. Each unbroken row of
 //! points has an offset of its own.
 
-use crate::force::ResolvedSample;
+use dynocar_model::force::ResolvedSample;
 
 /// Distance in m between points: fixes lie so far apart.
 const APART_M: f64 = 500.0;
@@ -158,7 +158,7 @@ impl Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terms::wheel::LEAST;
+    use dynocar_model::terms::wheel::LEAST;
 
     /// Two runs of 10 km to and fro at 20 m/s whose wheels measure `scale` times the true speed,
     /// with a position that a balise corrects every 1000 m.

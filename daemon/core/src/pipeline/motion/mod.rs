@@ -24,7 +24,7 @@ pub use speed_noise::SpeedNoise;
 pub use speed_range::SpeedRange;
 pub use stop_watch::{StopWatch, is_same_mass};
 
-pub use crate::terms::wheel::STANDING_MPS;
+pub use dynocar_model::terms::wheel::STANDING_MPS;
 
 /// Speed in m/s up to which nothing is learned of a train's motion: holding brakes, slack and starting
 /// resistance are no part of the model.

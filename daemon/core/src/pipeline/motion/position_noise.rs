@@ -1,7 +1,8 @@
 //! The noise of a measured position, learned from the positions themselves.
 
+use dynocar_model::force::ResolvedSample;
+
 use super::BRIDGED_MAX_S;
-use crate::force::ResolvedSample;
 
 /// Differences that are looked back over.
 const MEMORY: f64 = 500.0;

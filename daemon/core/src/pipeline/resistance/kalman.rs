@@ -5,6 +5,8 @@
 //! Student's t, lets the coefficients drift, and follows the disturbance as it comes. How noisy
 //! the data are it takes from a least-squares estimator that runs in parallel.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{SMatrix, SVector};
 
@@ -18,10 +20,8 @@ use super::report::Report;
 use super::sample::UnitSample;
 use super::settings::KalmanSettings;
 use crate::filter::Gaussian;
-use crate::force::ResolvedSample;
 use crate::pipeline::motion::jump_variance;
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
-use crate::train::TrainModel;
 
 const SPEED: usize = 0;
 const DISTURBANCE: usize = 1;

@@ -1,5 +1,7 @@
 //! The pipelines `ls`, `rls`, `regularised_rls`, `mils` and `v_mils`.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
@@ -11,12 +13,10 @@ use super::sample::UnitSample;
 use super::settings::DataSettings;
 use super::source::RowSource;
 use crate::filter::RunningMedian;
-use crate::force::ResolvedSample;
 use crate::pipeline::judge::missing;
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::papers::liu::solver::{Solver, bank_penalty};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
-use crate::train::{Davis, TrainModel};
 
 /// What this pipeline estimates.
 const DAVIS: [Parameter; PARAMETERS] = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];

@@ -29,12 +29,12 @@ mod tests;
 pub use kalman::ResistanceKalman;
 pub use least_squares::ResistanceLeastSquares;
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::PipelineKind;
 
 use self::settings::{KalmanSettings, LsSettings, MilsSettings, RlsSettings};
 use super::papers::liu::solver::Solver;
 use super::settings::SettingError;
-use crate::train::TrainModel;
 
 /// Regularised least squares over all rows (Liu 2018, eq. 7).
 ///

@@ -6,6 +6,7 @@
 //! share the mean of a block (their errors correlate by -1/2); the whitener that follows knows
 //! it, so that nothing is lost by short blocks.
 
+use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
 
 use super::regression::{
@@ -15,7 +16,6 @@ use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
 use super::settings::DataSettings;
 use crate::filter::FittedLine;
 use crate::pipeline::motion::{SpeedNoise, jump_variance};
-use crate::train::Davis;
 
 /// Fewest samples in a block: the scatter about a line needs three.
 const COUNT_MIN: f64 = 3.0;

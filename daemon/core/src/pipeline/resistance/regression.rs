@@ -5,11 +5,11 @@
 //! whose printed factor 100 lacks rotating mass and rounds 1000/g). It is linear in Davis a, b
 //! and c whatever window it is integrated over.
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
 use super::momentum_error::{DISTURBANCE, Disturbance, MOMENTUM, STATES, momentum_seen};
 use crate::filter::{Propagation, Sighting, Whitener};
-use crate::train::Davis;
 
 /// Davis a, b, c.
 pub const PARAMETERS: usize = 3;

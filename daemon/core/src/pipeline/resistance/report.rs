@@ -1,5 +1,6 @@
 //! What an estimate is worth: bounds, excitation, status.
 
+use dynocar_model::train::Davis;
 use dynocar_shared::{Manoeuvre, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,7 +10,6 @@ use crate::filter::bounded_minimum;
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::judge::Case;
 use crate::pipeline::motion::SpeedRange;
-use crate::train::Davis;
 
 /// Rows before anything is called estimated.
 const ROWS_MIN: f64 = 12.0;

@@ -1,12 +1,12 @@
 //! What the regression takes from a sample.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use super::regression::{PARAMETERS, regressors, scaled};
-use crate::force::ResolvedSample;
 use crate::pipeline::motion::{OutlierRow, SpeedNoise};
-use crate::train::Davis;
 
 /// A sample with its forces per weight.
 #[derive(Clone, Copy, Debug, PartialEq)]

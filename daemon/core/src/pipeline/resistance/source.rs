@@ -1,5 +1,6 @@
 //! Where the observations of the regression come from.
 
+use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
 
 use super::momentum::MomentumBlocks;
@@ -8,7 +9,6 @@ use super::sample::UnitSample;
 use super::settings::{DataSettings, DataSource};
 use crate::pipeline::motion::SpeedNoise;
 use crate::pipeline::papers::liu::coasting::CoastingSegments;
-use crate::train::Davis;
 
 #[derive(Clone, Debug)]
 enum Builder {

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use dynocar_model::track::Track;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::pipeline::{EstimatorSettings, Pipeline};
-use crate::track::Track;
-use crate::train::{Davis, TrainModel};
 
 pub const TRAIN: TrainId = TrainId(1);
 const TICK_S: f64 = 0.05;

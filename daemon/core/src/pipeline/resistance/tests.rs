@@ -1,12 +1,12 @@
 //! The pipelines over simulated runs.
 
+use dynocar_model::train::Davis;
 use dynocar_shared::{
     Manoeuvre, ParameterSnapshot, Reason, RejectionReason, SampleField, Status, TrainSample,
 };
 
 use super::test_runs::Scenario;
 use crate::pipeline::EstimatorSettings;
-use crate::train::Davis;
 
 const KINDS: [&str; 6] = ["ls", "rls", "regularised_rls", "mils", "v_mils", "resistance_kalman"];
 

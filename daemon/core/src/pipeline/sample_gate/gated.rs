@@ -1,9 +1,9 @@
 //! How an estimator takes what its gate lets pass.
 
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::RejectionReason;
 
 use super::{SampleGate, Verdict};
-use crate::force::ResolvedSample;
 use crate::pipeline::Outcome;
 
 /// An estimator whose samples pass a gate.

@@ -1,6 +1,6 @@
 //! How a force that no model knows may behave in time.
 
-use crate::track::gradient_error_kept;
+use dynocar_model::track::gradient_error_kept;
 
 /// A force of mean zero that fades with time and with the distance, and is renewed (Ornstein, Uhlenbeck
 /// 1930), in N/kN.

@@ -4,6 +4,8 @@ mod judgement;
 
 use std::sync::Arc;
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, RejectionReason, Status};
 
 use super::bank::Measured;
@@ -16,7 +18,6 @@ use super::prior::Resistance;
 use super::report::Report;
 use super::settings::TrainKalmanSettings;
 use super::systematic::Systematic;
-use crate::force::ResolvedSample;
 use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_status};
@@ -24,7 +25,6 @@ use crate::pipeline::resistance::sample::UnitSample;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, KeptEstimate, Outcome};
-use crate::train::TrainModel;
 
 /// Motion in s before anything is called known; after a warm start, before it is confirmed.
 const MOVED_MIN_S: f64 = 20.0;

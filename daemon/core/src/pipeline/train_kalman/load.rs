@@ -1,6 +1,7 @@
 //! What is known of the load, and when it may have become another one.
 
-use crate::force::ResolvedSample;
+use dynocar_model::force::ResolvedSample;
+
 use crate::pipeline::motion::{StopWatch, is_same_mass};
 
 use super::settings::TrainKalmanSettings;

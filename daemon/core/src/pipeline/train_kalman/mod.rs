@@ -29,7 +29,7 @@ pub use estimator::TrainKalman;
 pub use settings::TrainKalmanSettings;
 
 /// Standard deviation in N/kN of the declared a before any sample, by default.
-pub fn declared_a_std(train: &crate::train::TrainModel) -> f64 {
+pub fn declared_a_std(train: &dynocar_model::train::TrainModel) -> f64 {
     let relative_std = TrainKalmanSettings::default().prior_relative_std;
     prior::Resistance::declared(&train.resistance, relative_std).a_std()
 }

@@ -1,5 +1,6 @@
 //! What is believed before the first sample.
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::bank::MotionBank;
@@ -9,7 +10,6 @@ use super::motion_filter::{
 };
 use super::settings::TrainKalmanSettings;
 use crate::pipeline::resistance::regression::{regressors, scaled, unscaling};
-use crate::train::Davis;
 
 /// Share of a declared coefficient's standard deviation that comes from w0 at 20 m/s: a declared zero
 /// is no knowledge.

@@ -136,7 +136,7 @@ impl Report {
             &(scale * self.covariance * scale),
         );
         self.write_excitation(speeds, snapshot);
-        let weight_kn = crate::train::TrainModel::weight_kn(mass_kg);
+        let weight_kn = dynocar_model::train::TrainModel::weight_kn(mass_kg);
         snapshot.unexplained_force_n = self.disturbance.0 * weight_kn;
         snapshot.unexplained_force_std_n = self.disturbance.1 * weight_kn;
         speeds.write(snapshot);

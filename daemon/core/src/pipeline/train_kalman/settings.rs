@@ -1,9 +1,10 @@
 //! Settings of [`super::TrainKalman`].
 
+use dynocar_model::terms::{delay, traction};
+
 use crate::pipeline::braking::DECLARED_BRAKE_STD;
 use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::settings;
-use crate::terms::{delay, traction};
 
 settings! {
     /// Settings of [`super::TrainKalman`].

@@ -1,9 +1,9 @@
 //! What no amount of samples of one train on one line makes better known.
 
+use dynocar_model::track::GRADIENT_ERROR_FREE_M;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::pipeline::resistance::regression::regressors;
-use crate::track::GRADIENT_ERROR_FREE_M;
 
 /// The segment of line that was driven, and the scales that cannot be found.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::{ParameterSnapshot, Status};
 use rand::{RngExt, SeedableRng};
 
 use super::{TrainKalman, TrainKalmanSettings};
-use crate::force::ResolvedSample;
 use crate::pipeline::{Estimator, KeptEstimate};
-use crate::train::{Davis, TrainModel};
 
 /// A train of 100 t declared and 110 t true that drives about for so many s; what is said of it.
 fn driven(estimator: &mut TrainKalman, from_s: u32, duration_s: u32) -> ParameterSnapshot {

@@ -6,9 +6,9 @@ use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetHead, Diagnostic, ForceSource, GradientSource, Manifest,
     PositionSource, Quantity, Role, Run, RunEntry, RunQuality, TimeFormat,
 };
-use dynocar_core::terms::extra::Extra;
-use dynocar_core::track::{LinearProfile, Track};
-use dynocar_core::train::{Corrections, EffortCurve, TrainModel};
+use dynocar_model::terms::extra::Extra;
+use dynocar_model::track::{LinearProfile, Track};
+use dynocar_model::train::{Corrections, EffortCurve, TrainModel};
 use serde::Serialize;
 
 use super::Understood;

@@ -1,8 +1,8 @@
 //! What was understood, in words and columns.
 
 use dynocar_analysis::dataset::{Manifest, PositionReference, Quantity};
-use dynocar_core::track::{LinearProfile, Track};
-use dynocar_core::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
+use dynocar_model::track::{LinearProfile, Track};
+use dynocar_model::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
 
 use dynocar::cli::check as daemon;
 

@@ -2,8 +2,8 @@
 
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::{DatasetDiagnostic, DatasetError, DatasetHead, Run};
-use dynocar_core::track::Track;
-use dynocar_core::train::TrainModel;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
 
 use dynocar::config::DaemonConfig;
 use dynocar::dataset::FileKind;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_core::units::Unit;
+use dynocar_model::units::Unit;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 use serde::Serialize;
 

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::{Role, Run};
-use dynocar_core::units::Unit;
+use dynocar_model::units::Unit;
 use dynocar_shared::HALF_95;
 use serde::Serialize;
 

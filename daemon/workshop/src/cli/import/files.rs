@@ -66,7 +66,7 @@ pub fn track(line: &ImportedLine) -> String {
     if let Some(curves) = &line.curves {
         let ends =
             |start_m: f64, end_m: f64| format!("{}, {}", converted(start_m), converted(end_m));
-        let entry = |it: &dynocar_core::track::Curve| {
+        let entry = |it: &dynocar_model::track::Curve| {
             format!("{}, {}", ends(it.start_m, it.end_m), converted(it.radius_m))
         };
         text.list("curves", curves.iter().map(entry));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use dynocar_analysis::dataset::Quantity;
 use dynocar_analysis::dataset::guess::GivenColumn;
-use dynocar_core::units::Unit;
+use dynocar_model::units::Unit;
 
 use crate::cli::train_text::TrainArguments;
 

@@ -1,6 +1,6 @@
 //! The greatest forces of a train over the speed, with its resistance.
 
-use dynocar_core::train::{EffortCurve, TrainModel};
+use dynocar_model::train::{EffortCurve, TrainModel};
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
 use plotters::element::{PathElement, Text};

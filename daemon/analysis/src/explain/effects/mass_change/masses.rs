@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::{Entry, Parameter, masses};
+use dynocar_model::terms::{Entry, Parameter, masses};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 

@@ -1,6 +1,6 @@
 //! Where a mass holds: it changes only while the train stands.
 
-use dynocar_core::track::MassSection;
+use dynocar_model::track::MassSection;
 
 use crate::explain::evidence::RunData;
 use crate::explain::places::span_m;

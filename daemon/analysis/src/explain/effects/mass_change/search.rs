@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::masses::LEAST_SHARE;
-
+use dynocar_model::terms::masses::LEAST_SHARE;
 use rayon::prelude::*;
 
 use super::masses::Masses;

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use dynocar_core::terms::Parameter;
-use dynocar_core::terms::extra::Covariate;
+use dynocar_model::terms::Parameter;
+use dynocar_model::terms::extra::Covariate;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::band_axis::{AXES, BandAxis};

@@ -1,8 +1,8 @@
 //! What an unexplained residual may depend on, and what an extra force there looks like.
 
-use dynocar_core::force::ResolvedSample;
-use dynocar_core::terms::Parameter;
-use dynocar_core::terms::extra::Covariate;
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::Parameter;
+use dynocar_model::terms::extra::Covariate;
 
 use crate::explain::evidence::RunData;
 use crate::explain::scan::Scan;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::terms::extra::{self, Covariate, Extra, FORCE_MAX_N_PER_KN, Factor, Form};
-use dynocar_core::terms::{Entry, Parameter};
+use dynocar_model::terms::extra::{self, Covariate, Extra, FORCE_MAX_N_PER_KN, Factor, Form};
+use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::numbers::{edges, fitted_numbers, is_exponent, named};

@@ -4,7 +4,7 @@
 //! else it holds is laid out on a grid here and fitted later. The kinds of the library are not
 //! tried again: a force in proportion to traction, a decay from the start, places.
 
-use dynocar_core::terms::extra::{Covariate, Extra, Factor, Form};
+use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
 
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! A covariate over the fit runs, and the forms of it that are tried.
 
-use dynocar_core::terms::extra::{Covariate, Factor, Form};
+use dynocar_model::terms::extra::{Covariate, Factor, Form};
 
 use crate::explain::scan::Scan;
 

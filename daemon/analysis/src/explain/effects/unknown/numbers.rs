@@ -1,6 +1,6 @@
 //! Which numbers of a form are estimated, and between which bounds.
 
-use dynocar_core::terms::extra::Form;
+use dynocar_model::terms::extra::Form;
 
 /// Numbers of a form that are fitted, with their bounds for a covariate over the range from `low`
 /// to `high`; below `least` there are too few data to show anything.

@@ -1,6 +1,6 @@
 //! What a force of a form explains, and the numbers with which it explains most.
 
-use dynocar_core::terms::extra::{Covariate, Extra, Factor};
+use dynocar_model::terms::extra::{Covariate, Extra, Factor};
 
 use super::known::Known;
 use super::numbers::{estimated, is_exponent};

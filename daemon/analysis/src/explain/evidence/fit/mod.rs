@@ -9,7 +9,7 @@ mod robust;
 
 use std::sync::Arc;
 
-use dynocar_core::train::Davis;
+use dynocar_model::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 use rayon::prelude::*;
 

@@ -1,5 +1,6 @@
 //! Settings of the extended Kalman filter.
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, Uncertain};
 
 use super::{ADHESION_REFERENCE, BrakeFactor, BrakingSettings, declared};
@@ -9,7 +10,6 @@ use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
 use crate::pipeline::settings::{SettingError, settings};
-use crate::train::TrainModel;
 
 settings! {
     /// Settings of the extended Kalman filter with a random walk of the coefficient.

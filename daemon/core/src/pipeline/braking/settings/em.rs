@@ -1,5 +1,6 @@
 //! Settings of sliding-window EM.
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::PipelineKind;
 use serde::Deserialize;
 
@@ -9,7 +10,6 @@ use crate::pipeline::braking::intake::BrakingCoefficient;
 use crate::pipeline::braking::motion::MotionNoise;
 use crate::pipeline::papers::xie::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
 use crate::pipeline::settings::{SettingError, require, settings};
-use crate::train::TrainModel;
 
 /// How the expectation of the EM is taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]

@@ -1,5 +1,6 @@
 //! Settings of the scale of a known adhesion law.
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, RailCondition, Uncertain};
 
 use super::BrakingSettings;
@@ -10,7 +11,6 @@ use crate::pipeline::braking::law_bank::LawBank;
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, TrackerModel};
 use crate::pipeline::settings::{SettingError, settings};
-use crate::train::TrainModel;
 
 settings! {
     /// Settings of the scale of a known adhesion law.

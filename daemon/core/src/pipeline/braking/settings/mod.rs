@@ -10,6 +10,7 @@ pub use em::{EStep, EmSettings};
 pub use law::LawSettings;
 pub use smoother::{SmootherSettings, WalkSettings};
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::PipelineKind;
 use serde::Deserialize;
 
@@ -22,7 +23,6 @@ use super::report::ReportSettings;
 use crate::pipeline::Estimator;
 use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::{SettingError, require, settings};
-use crate::train::TrainModel;
 
 settings! {
     /// What every braking pipeline knows beforehand of motion, measurement and braking.

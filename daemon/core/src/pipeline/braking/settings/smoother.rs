@@ -1,5 +1,6 @@
 //! Settings of the fixed-lag smoother.
 
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, Uncertain};
 use serde::Deserialize;
 
@@ -10,7 +11,6 @@ use crate::pipeline::braking::law::{Law, SpeedTable};
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
 use crate::pipeline::settings::{SettingError, check_setting, settings};
-use crate::train::TrainModel;
 
 /// How the achieved share of the declared brake force wanders.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]

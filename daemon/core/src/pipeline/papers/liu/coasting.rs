@@ -7,6 +7,7 @@
 //! the integrals of 1, v, v² over the same samples, so that they weigh the speeds as the slope
 //! does. Spikes are refused before they reach a segment.
 
+use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
 
 use crate::filter::FittedLine;
@@ -18,7 +19,6 @@ use crate::pipeline::resistance::sample::{
     SpeedWatch, UnitSample, resistance_integral, trapezoids,
 };
 use crate::pipeline::resistance::settings::DataSettings;
-use crate::train::Davis;
 
 /// Up to this force in N per kN of weight the train counts as coasting.
 const COASTING_MAX: f64 = 0.05;

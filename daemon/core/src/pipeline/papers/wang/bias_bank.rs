@@ -255,7 +255,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     use super::*;
-    use crate::train::Davis;
+    use dynocar_model::train::Davis;
 
     const REFERENCE_KG: f64 = 100_000.0;
     const STEP_S: f64 = 0.2;

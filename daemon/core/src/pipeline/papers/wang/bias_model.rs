@@ -1,8 +1,9 @@
 //! How an acceleration that the model lacks behaves in time.
 
+use dynocar_model::track::gradient_error_kept;
+
 use super::motion::Motion;
 use crate::pipeline::motion::jump_variance;
-use crate::track::gradient_error_kept;
 
 /// Speed in m/s at which the bias of a behaviour that grows with speed is stated.
 const GROWTH_REFERENCE_MPS: f64 = 20.0;

@@ -1,9 +1,10 @@
 //! What forces do to a train of a reference mass.
 
+use dynocar_model::force::balance;
+use dynocar_model::terms::rotating;
+use dynocar_model::train::TrainModel;
+
 use super::motion::Motion;
-use crate::force::balance;
-use crate::terms::rotating;
-use crate::train::TrainModel;
 
 /// A train's mass as declared, which the unknown inverse mass refers to.
 #[derive(Clone, Copy, Debug, PartialEq)]

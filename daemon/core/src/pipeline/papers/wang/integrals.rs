@@ -13,13 +13,13 @@
 //! times the acceleration that 0.02 N/kN makes. The integrals hold the same equation with the
 //! noise of the speed itself: white, and once per sample.
 
+use dynocar_model::train::TrainModel;
 use nalgebra::SVector;
 
 use super::inertia::Inertia;
 use super::motion::Motion;
 use super::speed_basis::SpeedBasis;
 use crate::filter::drifting_level::{LEVEL, PARAMETERS};
-use crate::train::TrainModel;
 
 /// Resistance in N/kN that a curve or a tunnel typically adds.
 const TYPICAL_N_PER_KN: f64 = 5.0;

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
@@ -14,14 +16,12 @@ use super::motion::Motion;
 use super::section::Section;
 use crate::filter::bank::{Bank, Nats};
 use crate::filter::drifting_level::BIAS;
-use crate::force::ResolvedSample;
 use crate::pipeline::judge::{InputHealth, LackOfFit};
 use crate::pipeline::motion::{
     OutlierRow, SpeedNoise, SpeedRange, StopWatch, Trust, kink_variance,
 };
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
-use crate::train::{Davis, TrainModel};
 
 /// Updates between two looks at the slope of the resistance.
 const REFRESH_EVERY: u32 = 50;

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{
     Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
 };
@@ -12,14 +14,12 @@ use super::inertia::Inertia;
 use super::kalman_settings::MassKalmanSettings;
 use super::motion::Motion;
 use super::settling::Settling;
-use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
 use crate::pipeline::motion::{SpeedNoise, SpeedRange, StopWatch};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
-use crate::train::TrainModel;
 
 /// Samples over which the evidence for a behaviour of the bias is remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;

@@ -1,11 +1,12 @@
 //! Settings of [`super::MassKalman`].
 
+use dynocar_model::train::{Davis, TrainModel};
+
 use super::bias_bank::MODELS;
 use super::bias_model::BiasModel;
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
 use crate::pipeline::motion::MOVING_MPS;
 use crate::pipeline::settings::{SettingError, settings, within};
-use crate::train::{Davis, TrainModel};
 
 settings! {
     /// Settings of [`super::MassKalman`].

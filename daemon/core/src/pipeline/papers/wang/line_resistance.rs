@@ -1,7 +1,8 @@
 //! Basic, curve and tunnel resistance as functions of speed.
 
+use dynocar_model::train::{Davis, TrainModel};
+
 use super::motion::Motion;
-use crate::train::{Davis, TrainModel};
 
 /// Resistance of a train on a line, in N/kN: Wang 2022, eq. (5), (9), (10), each polynomial
 /// weighted by how much of it acts.

@@ -1,8 +1,8 @@
 //! What the estimators of mass take from a sample.
 
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::RejectionReason;
 
-use crate::force::ResolvedSample;
 use crate::pipeline::Outcome;
 use crate::pipeline::motion::BRIDGED_MAX_S;
 

@@ -1,8 +1,7 @@
 //! Speed polynomials in normalised coordinates.
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
-
-use crate::train::Davis;
 
 /// The shifted Legendre polynomials of v / scale, orthonormal over speeds from 0 to the scale.
 ///

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, Status};
 use nalgebra::{Matrix4, SVector, Vector4};
@@ -13,14 +15,12 @@ use super::motion::Motion;
 use super::section::Section;
 use super::speed_basis::SpeedBasis;
 use super::staged_settings::{MassRegression, StagedDescentSettings};
-use crate::force::ResolvedSample;
 use crate::pipeline::judge::{Case, InputHealth};
 use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::motion::StopWatch;
 use crate::pipeline::output::{write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, Outcome};
-use crate::train::{Davis, TrainModel};
 
 /// Used samples below which nothing is said.
 const SAMPLES_MIN: f64 = 50.0;

@@ -8,10 +8,10 @@
 //! - eq. 16: + (v_i - ṽ_i) ∇²v_i, where the norm form prints minus;
 //! - eq. 18 (lines 2, 3) to 23: + q with q = (1 - 2 λ c) / v_i, not - q.
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::pipeline::papers::xia::trajectory::step::{Step, StepRule};
-use crate::train::Davis;
 
 /// f(θ) of eq. 8 with derivatives with respect to (a, b, c).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +68,7 @@ pub fn deviation(steps: &[Step], speeds_mps: &[f64], davis: &Davis) -> Option<De
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::balance::mps2_per_n_per_kn;
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
     const SCALES: [f64; 3] = [1.0, 0.02, 0.001];

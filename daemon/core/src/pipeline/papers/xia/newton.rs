@@ -1,5 +1,7 @@
 //! `trajectory_newton`: a trajectory fit over a sliding window, the online scheme of Xia 2023.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,7 +9,6 @@ use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSetting
 use super::window::Window;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::filter::levenberg_marquardt::ParameterBox;
-use crate::force::ResolvedSample;
 use crate::pipeline::judge::InputHealth;
 use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::write_parameters;
@@ -23,7 +24,6 @@ use crate::pipeline::papers::xia::trajectory::unexplained::UnexplainedForce;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
-use crate::train::{Davis, TrainModel};
 
 /// Windows that the learned speed noise looks back over.
 const NOISE_WINDOWS: f64 = 50.0;

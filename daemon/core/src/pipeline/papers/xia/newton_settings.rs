@@ -1,14 +1,14 @@
 //! Settings of `trajectory_newton`.
 
+use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::train::TrainModel;
 use nalgebra::Vector3;
 use serde::Deserialize;
 
 use crate::filter::levenberg_marquardt::ParameterBox;
-use crate::force::balance::mps2_per_n_per_kn;
 use crate::pipeline::papers::xia::trajectory::fit::DavisPrior;
 use crate::pipeline::papers::xia::trajectory::quality::prior_std;
 use crate::pipeline::settings::{SettingError, require, settings};
-use crate::train::TrainModel;
 
 /// Speed noise before the first window, in m/s.
 const SPEED_NOISE_FIRST_MPS: f64 = 0.1;

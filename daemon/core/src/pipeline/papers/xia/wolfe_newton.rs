@@ -12,12 +12,12 @@
 //! - a train that stops (v² < 0 in eq. 7) counts as a stall;
 //! - when the iterations run out, the best parameters seen are the answer.
 
+use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::deviation::{Deviation, deviation};
 use crate::filter::levenberg_marquardt::ParameterBox;
 use crate::pipeline::papers::xia::trajectory::step::Step;
-use crate::train::Davis;
 
 /// When Algorithm 1 draws new parameters at random.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -213,8 +213,8 @@ fn newton_step(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force::balance::mps2_per_n_per_kn;
     use crate::pipeline::papers::xia::trajectory::step::StepRule;
+    use dynocar_model::force::balance::mps2_per_n_per_kn;
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 

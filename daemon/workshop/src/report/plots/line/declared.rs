@@ -1,6 +1,6 @@
 //! What is declared of a line, as lines over its chainage.
 
-use dynocar_core::track::{StepProfile, Track};
+use dynocar_model::track::{StepProfile, Track};
 
 use super::panel::{Content, Panel};
 use crate::report::plots::reading::thinned;

@@ -6,7 +6,7 @@ mod found;
 mod panel;
 
 use dynocar_analysis::explain::report::line::AlongLine;
-use dynocar_core::track::Track;
+use dynocar_model::track::Track;
 use plotters::backend::SVGBackend;
 use plotters::drawing::IntoDrawingArea;
 use plotters::element::{PathElement, Text};

@@ -7,6 +7,7 @@
 //! models; Adams, MacKay 2007, run lengths). Ages are kept about evenly on a logarithmic scale:
 //! when the bank is full, the two hypotheses closest in relative age become one.
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::hypothesis::{Hypothesis, Innovation, OutlierModel, united};
@@ -15,7 +16,6 @@ use super::step::{Step, StepRule};
 use crate::filter::Gaussian;
 use crate::filter::bank::{Bank, Odds};
 use crate::filter::mixture::Mixture;
-use crate::train::Davis;
 
 /// The most hypotheses of a bank.
 pub const HYPOTHESES_MAX: usize = 16;
@@ -187,7 +187,7 @@ mod tests {
     use super::super::noise::LearnedNoise;
     use super::super::test_runs::{FAST, normal, random};
     use super::*;
-    use crate::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::balance::mps2_per_n_per_kn;
 
     const NOISE_MPS: f64 = 0.05;
 

@@ -4,6 +4,7 @@
 //! squares, the search Gauss-Newton with damping within bounds: no restarts are needed. The
 //! noise of the measured speed is estimated with the coefficients unless it is given.
 
+use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::fit_settings::SCALES;
@@ -13,7 +14,6 @@ use super::residuals::InitialSpeeds;
 use super::search::{Buffers, Search};
 pub use super::step::MotionSegment;
 use super::step::Step;
-use crate::train::Davis;
 
 /// Fits trajectories; keeps its buffers between fits.
 #[derive(Clone, Debug, Default)]
@@ -109,7 +109,7 @@ mod tests {
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
     use crate::filter::levenberg_marquardt::ParameterBox;
-    use crate::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::balance::mps2_per_n_per_kn;
 
     fn fit(steps: &[Step], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
         let segments = [MotionSegment { steps, speeds_mps }];

@@ -1,11 +1,11 @@
 //! What a trajectory fit is asked for, and what it answers.
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::step::StepRule;
 use crate::filter::levenberg_marquardt::{ParameterBox, Stop};
 use crate::filter::triangular::TriangularSystem;
-use crate::train::Davis;
 
 /// What is known of the coefficients before the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,6 @@
 //! A Kalman filter of [a, b, c, v] under one hypothesis about the last jump of (a, b, c).
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::index::{A, B, C, SPEED};
@@ -9,7 +10,6 @@ use super::unit_disturbance::UnitDisturbance;
 use crate::filter::mixture::Mixture;
 use crate::filter::square_root::CovarianceFactor;
 use crate::pipeline::motion::OutlierRow;
-use crate::train::Davis;
 
 /// How often measured speeds are wrong, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -217,7 +217,7 @@ mod tests {
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
     use crate::filter::levenberg_marquardt::ParameterBox;
-    use crate::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::balance::mps2_per_n_per_kn;
 
     const NOISE_MPS: f64 = 0.1;
 

@@ -110,7 +110,7 @@ fn integrated_rows(
 mod tests {
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
-    use crate::train::Davis;
+    use dynocar_model::train::Davis;
 
     fn start(segments: &[MotionSegment<'_>], rule: StepRule) -> Vector3<f64> {
         let bounds = ParameterBox { low: Vector3::repeat(-10.0), high: Vector3::repeat(10.0) };

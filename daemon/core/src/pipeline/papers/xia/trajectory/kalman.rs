@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::Vector3;
 
@@ -14,15 +17,12 @@ use super::online::{OnlineFilter, OnlineSettings};
 use super::quality::{Estimate, prior_std};
 use super::step::{Step, StepRule};
 use super::unexplained::UnexplainedForce;
-use crate::force::ResolvedSample;
-use crate::force::balance::mps2_per_n_per_kn;
 use crate::pipeline::judge::InputHealth;
 use crate::pipeline::motion::{Rounding, SpeedRange, jump_variance};
 use crate::pipeline::output::write_parameters;
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::{SettingError, settings};
 use crate::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
-use crate::train::{Davis, TrainModel};
 
 settings! {
     /// Settings of `trajectory_kalman`.

@@ -1,9 +1,9 @@
 //! From resolved samples to steps that can be integrated.
 
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::RejectionReason;
 
 use super::step::Step;
-use crate::force::ResolvedSample;
 use crate::pipeline::motion::MOVING_MPS;
 
 /// What a sample adds to a trajectory.
@@ -103,7 +103,7 @@ impl MotionTracker {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::terms::Resistance;
+    use dynocar_model::terms::Resistance;
 
     /// A sample of a 100 t train with γ = 0.06 and every force known.
     pub fn sample(index: u32, speed_mps: f64, control_force_n: f64) -> ResolvedSample {

@@ -1,5 +1,6 @@
 //! The online filter of `trajectory_kalman`, apart from samples and snapshots.
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::bank::{JumpBank, JumpModel, StepDoubt};
@@ -7,7 +8,6 @@ use super::hypothesis::{Hypothesis, Innovation, OutlierModel};
 use super::long_run::LongRunVariance;
 use super::noise::{LearnedNoise, NoiseModel};
 use super::step::{Step, StepRule};
-use crate::train::Davis;
 
 /// How the online filter starts and what it expects.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 
 use super::kalman::TrajectoryKalmanSettings;
 use super::motion::tests::sample;
 use super::test_runs::{METRO, metro, normal, random};
-use crate::force::ResolvedSample;
 use crate::pipeline::EstimatorSettings;
 use crate::pipeline::papers::xia::newton::TrajectoryNewton;
 use crate::pipeline::papers::xia::newton_settings::{FitMethod, TrajectoryNewtonSettings};
 use crate::pipeline::{Estimator, Outcome};
-use crate::train::{BrakeGear, Davis, TrainModel};
 
 /// The metro as declared: a fifth off in every coefficient.
 fn train() -> Arc<TrainModel> {

@@ -4,6 +4,7 @@
 //! driven speeds is known well. The status therefore rests on w0 over the driven speeds; which
 //! coefficients the data excited is stated with it.
 
+use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,7 +13,6 @@ use crate::pipeline::InnovationMonitor;
 use crate::pipeline::judge::{Case, LONG_RUN_MAX};
 use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::{write_innovations, write_status};
-use crate::train::{Davis, TrainModel};
 
 /// Standard deviation of w0 over w0 above which an estimate is degraded.
 const W0_DEVIATION_MAX: f64 = 0.1;

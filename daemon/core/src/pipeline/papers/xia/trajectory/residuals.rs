@@ -9,13 +9,13 @@
 //! The initial speed of each segment is a parameter. Its column is eliminated segment by
 //! segment by orthogonal reflections, so that the work grows with the samples alone.
 
+use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::long_run::LongRunVariance;
 use super::step::{MotionSegment, Step, StepRule};
 use crate::filter::levenberg_marquardt::{LeastSquares, Linearisation};
 use crate::filter::triangular::{TriangularAccumulator, TriangularSystem};
-use crate::train::Davis;
 
 /// How residuals are weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,6 @@
 //! The search behind a trajectory fit: coefficients and noise in turn.
 
+use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fit_settings::{FitError, FitSettings, SCALES, TrajectoryFit};
@@ -7,7 +8,6 @@ use super::residuals::{InitialSpeeds, Pass, Residuals, Weighting};
 use super::step::MotionSegment;
 use crate::filter::levenberg_marquardt::{LeastSquares, Solution, SolverSettings, minimise};
 use crate::filter::triangular::TriangularSystem;
-use crate::train::Davis;
 
 /// The least speed noise in m/s that residuals are divided by; below it the round-off of a long
 /// trajectory would count as a residual.

@@ -12,9 +12,8 @@
 //! of first order in Δs. The time rule is of second order, so that samples of 1 s do as well as
 //! samples of 0.2 s.
 
+use dynocar_model::train::Davis;
 use nalgebra::Vector3;
-
-use crate::train::Davis;
 
 /// What a step's size counts, and with it the rule that leads over the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,7 +31,7 @@ pub struct Step {
     pub size: f64,
     /// Acceleration u in m/s² by every known force: traction, brake, gradient, curve, tunnel.
     pub drive_mps2: f64,
-    /// κ in m/s² per N/kN, see [`balance`](crate::force::balance::mps2_per_n_per_kn).
+    /// κ in m/s² per N/kN, see [`balance`](dynocar_model::force::balance::mps2_per_n_per_kn).
     pub resistance_gain: f64,
 }
 
@@ -136,7 +135,7 @@ fn slope(davis: &Davis, speed_mps: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::balance::mps2_per_n_per_kn;
 
     const DAVIS: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 

@@ -1,13 +1,13 @@
 //! Simulated runs for the tests of this module.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::train::Davis;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::motion::tests::sample;
 use super::step::{Step, StepRule};
-use crate::force::ResolvedSample;
-use crate::force::balance::mps2_per_n_per_kn;
-use crate::train::Davis;
 
 /// A high-speed train.
 pub const FAST: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };

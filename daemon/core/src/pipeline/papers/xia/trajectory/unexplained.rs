@@ -1,11 +1,11 @@
 //! The force that the estimated model leaves unexplained, lately.
 
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::Davis;
 use dynocar_shared::ParameterSnapshot;
 
 use super::motion::MotionStep;
 use super::step::{Step, StepRule};
-use crate::force::ResolvedSample;
-use crate::train::Davis;
 
 /// Time in s that the force is averaged over.
 const AVERAGING_S: f64 = 20.0;

@@ -106,12 +106,9 @@ impl ResolvedSample {
     pub fn driving_force_n(&self) -> Option<f64> {
         Some(self.control_force_n()? - self.weight_kn * self.known_n_per_kn()?)
     }
-}
 
-#[cfg(test)]
-impl ResolvedSample {
-    /// A train of 100 t with gamma 0.06 that coasts on the level at 20 m/s.
-    pub(crate) fn coasting() -> Self {
+    /// A train of 100 t with gamma 0.06 that coasts on the level at 20 m/s: what tests start from.
+    pub fn coasting() -> Self {
         ResolvedSample {
             time_ns: 0,
             step_s: 0.0,

@@ -1,0 +1,25 @@
+//! What is declared of a train and its line, and the forces that follow from it, pure.
+//!
+//! Everything that learns, explains or simulates stands on this library: the live estimators
+//! (`dynocar_core`), the papers' methods, the reader of recorded runs, the analysis, the daemon.
+//! It estimates nothing, and knows no channel, clock, file, thread or logger: times come in as
+//! arguments.
+//!
+//! # Layout, in the order a sample takes
+//!
+//! - [`units`]: the units that quantities may be in
+//! - [`train`], [`track`]: what is declared of the train and the line
+//! - [`validation`]: which samples are fit for use, and why the others are not
+//! - [`terms`]: the physical terms of the model, one law each, that all of the following share
+//! - [`force`]: the known forces on the train at a sample
+//! - [`simulate`]: the speed that a force model predicts over a recorded run
+//! - [`named!`]: enums whose members have names in files
+
+pub mod force;
+mod named;
+pub mod simulate;
+pub mod terms;
+pub mod track;
+pub mod train;
+pub mod units;
+pub mod validation;
