@@ -6,7 +6,8 @@ use dynocar_bench::scenarios::drive::Drive;
 use dynocar_bench::scenarios::rows::{self, NamedScenario};
 use dynocar_bench::scenarios::table::{self, Plan};
 use dynocar_bench::scenarios::world::World;
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 

@@ -8,7 +8,8 @@ mod terms;
 use std::sync::Arc;
 
 use dynocar_analysis::identify::default_estimators;
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainSample};
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use dynocar::dataset;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::identify::{identify, published_samples};
-use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_fmu::estimators::PIPELINES;
 use dynocar_fmu::ffi::Status;
 use dynocar_fmu::ffi::life::{

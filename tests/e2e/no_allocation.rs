@@ -11,7 +11,8 @@ use dynocar::runtime::exchange::Exchange;
 use dynocar_analysis::identify::published_samples;
 use dynocar_client::channel::{Sender, Transport};
 use dynocar_client::{NoAnswer, SamplePublisher, SnapshotReader, monotonic_now_ns};
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
 };

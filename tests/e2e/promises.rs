@@ -137,6 +137,7 @@ fn every_unsafe_block_is_counted_and_justified() {
         "daemon/dataset/src",
         "daemon/model/src",
         "daemon/core/src",
+        "daemon/estimators/src",
         "daemon/analysis/src",
         "daemon/fmu/src",
     ];

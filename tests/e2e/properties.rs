@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use dynocar_client::channel::Transport;
 use dynocar_client::{SnapshotReader, monotonic_now_ns};
-use dynocar_core::pipeline::{EstimatorSettings, KeptEstimate, Pipeline};
+use dynocar_core::pipeline::{KeptEstimate, Pipeline};
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,

@@ -5,11 +5,12 @@ use std::collections::BTreeMap;
 use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
-const FOLDERS: [&str; 16] = [
+const FOLDERS: [&str; 17] = [
     "daemon/src",
     "daemon/workshop/src",
     "daemon/model/src",
     "daemon/core/src",
+    "daemon/estimators/src",
     "daemon/dataset/src",
     "daemon/analysis/src",
     "daemon/fmu/src",

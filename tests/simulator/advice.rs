@@ -11,7 +11,8 @@ use dynocar_analysis::advice::known::davis_of;
 use dynocar_analysis::advice::noise::NoiseSeen;
 use dynocar_analysis::advice::rehearsal::{Known, MASS, forecast};
 use dynocar_analysis::advice::{best, forecasts};
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::simulate::motion::{Motion, advance};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::{

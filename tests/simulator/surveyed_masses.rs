@@ -5,7 +5,7 @@ use std::path::Path;
 use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role, Run};
 use dynocar_analysis::identify::identify;
-use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{Parameter, PipelineKind, SampleField, TrainSample};
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{

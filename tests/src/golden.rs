@@ -124,7 +124,7 @@ pub fn compute() -> Golden {
     let dataset = dataset::load(&folder).expect("the demo's runs");
     let train_id = TrainId(1);
     let samples = published_samples(&dataset, train_id);
-    let line = |settings: &dynocar_core::pipeline::EstimatorSettings| {
+    let line = |settings: &dynocar_estimators::EstimatorSettings| {
         let train = Arc::clone(&dataset.train);
         let estimator = settings.build(&train).expect("default settings");
         let mut pipeline = Pipeline::new(train_id, 0, train, dataset.track.clone(), estimator);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// The source folders of all packages.
-pub const FOLDERS: [&str; 17] = [
+pub const FOLDERS: [&str; 18] = [
     "shared/src",
     "client/src",
     "client/forward/src",
@@ -14,6 +14,7 @@ pub const FOLDERS: [&str; 17] = [
     "client/watch/src",
     "daemon/model/src",
     "daemon/core/src",
+    "daemon/estimators/src",
     "daemon/dataset/src",
     "daemon/analysis/src",
     "daemon/fmu/src",

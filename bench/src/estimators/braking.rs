@@ -9,7 +9,7 @@ use dynocar_core::pipeline::braking::engine::{Engine, Observation};
 use dynocar_core::pipeline::braking::law::Law;
 use dynocar_core::pipeline::braking::motion::{self, STATES, State, Walk};
 use dynocar_core::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
-use dynocar_core::pipeline::papers::xie::{
+use dynocar_estimators::xie::{
     EmModel, EmWindow, Expectation, KalmanExpectation, ParticleExpectation,
 };
 use dynocar_shared::Uncertain;

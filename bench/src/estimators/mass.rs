@@ -3,14 +3,12 @@
 use std::sync::Arc;
 
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::papers::wang::MassKalmanSettings;
-use dynocar_core::pipeline::papers::wang::bias_bank::{
-    BIAS, BiasBank, Dynamics, INVERSE_MASS, MODELS, SPEED,
-};
-use dynocar_core::pipeline::papers::wang::bias_model::BiasModel;
-use dynocar_core::pipeline::papers::wang::inertia::Inertia;
-use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
-use dynocar_core::pipeline::papers::wang::motion::Motion;
+use dynocar_estimators::wang::MassKalmanSettings;
+use dynocar_estimators::wang::bias_bank::{BIAS, BiasBank, Dynamics, INVERSE_MASS, MODELS, SPEED};
+use dynocar_estimators::wang::bias_model::BiasModel;
+use dynocar_estimators::wang::inertia::Inertia;
+use dynocar_estimators::wang::line_resistance::LineResistance;
+use dynocar_estimators::wang::motion::Motion;
 use dynocar_model::simulate::motion as simulate;
 use dynocar_model::train::TrainModel;
 use nalgebra::{Matrix3, RowVector3, Vector3};

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use dynocar_analysis::dataset::{DATASET_TRAIN, DatasetError, DatasetHead};
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::track::Track;
 use dynocar_model::train::{BrakeGear, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};

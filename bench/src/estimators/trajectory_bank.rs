@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::papers::xia::trajectory::bank::{JumpBank, JumpModel};
-use dynocar_core::pipeline::papers::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
-use dynocar_core::pipeline::papers::xia::trajectory::index::{A, B, C, SPEED};
-use dynocar_core::pipeline::papers::xia::trajectory::noise::{LearnedNoise, NoiseModel};
-use dynocar_core::pipeline::papers::xia::trajectory::online::{OnlineFilter, OnlineSettings};
-use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
+use dynocar_estimators::xia::trajectory::bank::{JumpBank, JumpModel};
+use dynocar_estimators::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
+use dynocar_estimators::xia::trajectory::index::{A, B, C, SPEED};
+use dynocar_estimators::xia::trajectory::noise::{LearnedNoise, NoiseModel};
+use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings};
+use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
 use nalgebra::{RowVector4, SMatrix, Vector3, Vector4};

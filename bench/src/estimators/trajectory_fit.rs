@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::papers::xia::trajectory::fit::{
+use dynocar_estimators::xia::trajectory::fit::{
     DavisPrior, FitSettings, MotionSegment, TrajectoryFit, TrajectoryFitter,
 };
-use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
+use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};

@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use dynocar::dataset::load_train;
 use dynocar_client::monotonic_now_ns;
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
 use super::bytes::{as_bytes, from_bytes};

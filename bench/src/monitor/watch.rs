@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::{EstimatorSettings, Outcome};
+use dynocar_core::pipeline::Outcome;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::Resistance;
 use dynocar_model::train::TrainModel;

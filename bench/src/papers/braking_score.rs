@@ -1,11 +1,11 @@
 //! Errors of the braking estimators over seeded runs.
 
-use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::{
-    BrakeFactor, BrakingSettings, EStep, EkfSettings, EmSettings, LawSettings, SmootherSettings,
-    WalkSettings,
+    BrakeFactor, BrakingSettings, EkfSettings, LawSettings, SmootherSettings, WalkSettings,
 };
+use dynocar_estimators::EstimatorSettings;
+use dynocar_estimators::xie::{EStep, EmSettings};
 
 use super::bound::Knowledge;
 use super::braking::{Braking, DrawnShare, SPEED_NOISE_MPS, Sought, WINDOW, disc_friction};

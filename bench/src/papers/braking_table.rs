@@ -1,6 +1,6 @@
 //! The rows that every braking table has.
 
-use dynocar_core::pipeline::braking::settings::EStep;
+use dynocar_estimators::xie::EStep;
 
 use super::bound::{BoundAt, Knowledge, bound, mean_relative_percent, root_mean_square};
 use super::braking::{Braking, Sought};

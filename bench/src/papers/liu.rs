@@ -10,11 +10,10 @@ pub mod scenario;
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::papers::xia::trajectory::fit::{
-    FitSettings, MotionSegment, TrajectoryFitter,
-};
-use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
+use dynocar_estimators::xia::trajectory::fit::{FitSettings, MotionSegment, TrajectoryFitter};
+use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;

@@ -51,10 +51,10 @@ mod tests {
 
     #[test]
     fn the_bound_is_that_of_the_estimators_own_derivatives() {
-        use dynocar_core::pipeline::papers::xia::trajectory::fit::{
+        use dynocar_estimators::xia::trajectory::fit::{
             FitSettings, MotionSegment, TrajectoryFitter,
         };
-        use dynocar_core::pipeline::papers::xia::trajectory::step::StepRule;
+        use dynocar_estimators::xia::trajectory::step::StepRule;
         let run = drive(Profile::Full, 25e3, 1, |_| CASES[0]);
         let numerical = bound::davis_covariance(&run, &CASES[0]);
         let settings = FitSettings {

@@ -1,7 +1,8 @@
 //! Xie 2019: wheel-rail adhesion of a braking train.
 
 use dynocar_core::pipeline::braking::gear::DeclaredGear;
-use dynocar_core::pipeline::braking::settings::{EStep, LawSettings};
+use dynocar_core::pipeline::braking::settings::LawSettings;
+use dynocar_estimators::xie::EStep;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{EffortPoint, RailAdhesion, RailCondition, Stop, Uncertain};
 

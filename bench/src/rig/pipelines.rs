@@ -1,7 +1,7 @@
 //! Which pipelines a measurement names.
 
 use dynocar::config::is_slow;
-use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::PipelineKind;
 
 /// Every pipeline that estimates and whose step is short: they may share a thread.

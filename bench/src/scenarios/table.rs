@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::settings::SettingError;
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{PipelineKind, Quantity, TrainId};
 use serde::Serialize;
 

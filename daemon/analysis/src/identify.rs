@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use dynocar_core::pipeline::braking::gear::DeclaredGear;
 use dynocar_core::pipeline::quantities::candidates;
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline, SettingError};
+use dynocar_core::pipeline::{Pipeline, SettingError};
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
 };

@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use dynocar_analysis::dataset::{parse_track, parse_train};
 use dynocar_analysis::driven::{Beginning, DrivenTrain};
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId};

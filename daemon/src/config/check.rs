@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 
-use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dynocar_core::pipeline::EstimatorSettings;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::TrainId;
 use serde::Deserialize;
 

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use dynocar_core::pipeline::{EstimatorSettings, KeptEstimate};
+use dynocar_core::pipeline::KeptEstimate;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::Parameter;
 use serde::{Deserialize, Serialize};
 

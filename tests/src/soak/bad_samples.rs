@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use dynocar_analysis::identify::default_estimators;
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::Davis;
 use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainSample};
 

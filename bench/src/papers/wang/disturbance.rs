@@ -1,7 +1,7 @@
 //! What acts on the train and is not in the model.
 
-use dynocar_core::pipeline::papers::wang::MassKalmanSettings;
-use dynocar_core::pipeline::papers::wang::bias_model::BiasModel;
+use dynocar_estimators::wang::MassKalmanSettings;
+use dynocar_estimators::wang::bias_model::BiasModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,9 +1,9 @@
 //! The rides: crossings of the line, the leg on which masses are learned, and the estimators that
 //! learn them.
 
-use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
-use dynocar_core::pipeline::papers::wang::{MassKalman, MassKalmanSettings};
-use dynocar_core::pipeline::papers::wang::{MassRegression, StagedDescent, StagedDescentSettings};
+use dynocar_estimators::wang::line_resistance::LineResistance;
+use dynocar_estimators::wang::{MassKalman, MassKalmanSettings};
+use dynocar_estimators::wang::{MassRegression, StagedDescent, StagedDescentSettings};
 
 use super::driver::{Driver, LimitDriver};
 use super::line::{CURVE_RADIUS_M, STATIONS_M};

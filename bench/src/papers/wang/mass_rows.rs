@@ -1,8 +1,8 @@
 //! Table 3: the mass on one leg.
 
 use dynocar_core::pipeline::Estimator;
-use dynocar_core::pipeline::papers::wang::MassRegression;
-use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
+use dynocar_estimators::wang::MassRegression;
+use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_model::force::ResolvedSample;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,7 @@
 //! The descent as Wang 2022 prints it: raw features, one step a sample, learning rate 1e-7.
 
-use dynocar_core::pipeline::papers::wang::motion::Motion;
-use dynocar_core::pipeline::papers::wang::section::Section;
+use dynocar_estimators::wang::motion::Motion;
+use dynocar_estimators::wang::section::Section;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;

@@ -1,10 +1,10 @@
 //! Table 1 and 2: z1, z2 and z3 from one crossing of 28,000 samples.
 
 use dynocar_core::pipeline::Estimator;
-use dynocar_core::pipeline::papers::wang::line_resistance::LineResistance;
-use dynocar_core::pipeline::papers::wang::section::Section;
-use dynocar_core::pipeline::papers::wang::{JointLeastSquares, JointLeastSquaresSettings};
-use dynocar_core::pipeline::papers::wang::{StagedDescent, StagedDescentSettings};
+use dynocar_estimators::wang::line_resistance::LineResistance;
+use dynocar_estimators::wang::section::Section;
+use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
+use dynocar_estimators::wang::{StagedDescent, StagedDescentSettings};
 use dynocar_model::train::Davis;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

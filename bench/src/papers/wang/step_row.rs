@@ -1,7 +1,7 @@
 //! Figure 9: a change of mass at a stop.
 
-use dynocar_core::pipeline::papers::wang::MassRegression;
 use dynocar_core::pipeline::{Estimator, Outcome};
+use dynocar_estimators::wang::MassRegression;
 use dynocar_model::force::ResolvedSample;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

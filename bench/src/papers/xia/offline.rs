@@ -4,11 +4,11 @@ use dynocar_core::filter::levenberg_marquardt::{
     LeastSquares, Linearisation, ParameterBox, SolverSettings, minimise,
 };
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
-use dynocar_core::pipeline::papers::xia::trajectory::fit::{
+use dynocar_estimators::xia::trajectory::fit::{
     FitSettings, MotionSegment, TrajectoryFit, TrajectoryFitter,
 };
-use dynocar_core::pipeline::papers::xia::trajectory::step::StepRule;
-use dynocar_core::pipeline::papers::xia::wolfe_newton::{
+use dynocar_estimators::xia::trajectory::step::StepRule;
+use dynocar_estimators::xia::wolfe_newton::{
     NewtonResult, NewtonSettings, RestartSource, Restarts, wolfe_newton,
 };
 use dynocar_model::train::Davis;

@@ -5,14 +5,12 @@
 //! most. The error with noise is taken from km 64 on, but for the 8 km after the switch at km 82.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-use dynocar_core::pipeline::papers::xia::trajectory::bank::JumpModel;
-use dynocar_core::pipeline::papers::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
-use dynocar_core::pipeline::papers::xia::trajectory::noise::{LearnedNoise, NoiseModel};
-use dynocar_core::pipeline::papers::xia::trajectory::online::{OnlineFilter, OnlineSettings};
-use dynocar_core::pipeline::papers::xia::trajectory::step::StepRule;
-use dynocar_core::pipeline::papers::xia::wolfe_newton::{
-    NewtonSettings, RestartSource, wolfe_newton,
-};
+use dynocar_estimators::xia::trajectory::bank::JumpModel;
+use dynocar_estimators::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
+use dynocar_estimators::xia::trajectory::noise::{LearnedNoise, NoiseModel};
+use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings};
+use dynocar_estimators::xia::trajectory::step::StepRule;
+use dynocar_estimators::xia::wolfe_newton::{NewtonSettings, RestartSource, wolfe_newton};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};

@@ -6,7 +6,7 @@
 //! no disturbance at all is far too sure. The covariance is therefore averaged over the ratios by
 //! their restricted likelihood, every decade being as likely beforehand.
 
-use dynocar_core::pipeline::papers::xia::trajectory::fit::{
+use dynocar_estimators::xia::trajectory::fit::{
     FitError, FitSettings, MotionSegment, TrajectoryFit, TrajectoryFitter,
 };
 use dynocar_model::train::Davis;
@@ -175,7 +175,7 @@ impl RatioPosterior {
 #[cfg(test)]
 mod tests {
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-    use dynocar_core::pipeline::papers::xia::trajectory::step::{Step, StepRule};
+    use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
     use dynocar_model::force::balance::mps2_per_n_per_kn;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;

@@ -4,7 +4,7 @@
 //! 0.18 m/s on the speed (a mean square of 0.05 at the truth, the paper's ε1, leaves room for
 //! just that). The truth moves by eq. 7, as the paper's own data do (mean squares of 1e-9).
 
-use dynocar_core::pipeline::papers::xia::trajectory::step::Step;
+use dynocar_estimators::xia::trajectory::step::Step;
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::track::{Curve, Track};
 use dynocar_model::train::Davis;

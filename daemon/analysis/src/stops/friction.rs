@@ -7,7 +7,8 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::track::Track;
 use dynocar_model::train::{BrakeGear, TrainModel};
 use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, TrainSample};

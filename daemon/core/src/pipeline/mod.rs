@@ -3,19 +3,16 @@
 //! A [`Pipeline`] is one estimator for one train with its own validation: the daemon feeds it
 //! from the channel, `dynocar identify` from a file, and both get the same bits.
 
-mod answers;
 pub mod braking;
 mod echo;
 mod estimator;
-mod estimator_settings;
 pub mod judge;
 mod kept;
+pub mod momentum;
 pub mod monitor;
 pub mod motion;
 pub mod output;
-pub mod papers;
 pub mod quantities;
-pub mod resistance;
 pub mod sample_gate;
 pub mod settings;
 pub mod train_kalman;
@@ -23,7 +20,6 @@ mod usable;
 
 pub use echo::Echo;
 pub use estimator::{Estimator, Outcome};
-pub use estimator_settings::EstimatorSettings;
 pub use judge::InnovationMonitor;
 pub use kept::{KeptEstimate, NotKept};
 pub use settings::SettingError;

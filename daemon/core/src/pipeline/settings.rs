@@ -27,7 +27,7 @@ pub fn require(
 }
 
 /// A setting that has a range.
-pub(crate) trait Ranged: Copy {
+pub trait Ranged: Copy {
     /// Its value; `None` while it is absent, which any range allows.
     fn value(self) -> Option<f64>;
 }
@@ -53,7 +53,7 @@ impl Ranged for Option<f64> {
 /// # Errors
 ///
 /// Names key, value and range.
-pub(crate) fn within(
+pub fn within(
     setting: impl Ranged,
     key: &'static str,
     (low, high): (f64, f64),
@@ -70,9 +70,10 @@ pub(crate) fn within(
 ///
 /// A range is `(low to high "unit")`, `(low or more)`, `(above 0)`, or `(each)` for settings of
 /// their own.
+#[macro_export]
 macro_rules! settings {
     ($(#[$meta:meta])* $name:ident { $($fields:tt)* }) => {
-        $crate::pipeline::settings::settings! { $(#[$meta])* $name in "" { $($fields)* } }
+        $crate::settings! { $(#[$meta])* $name in "" { $($fields)* } }
     };
     ($(#[$meta:meta])* $name:ident in $prefix:literal {
         $( $(#[$field_meta:meta])* $field:ident: $type:ty = $default:expr $(=> $range:tt)?; )*
@@ -90,10 +91,12 @@ macro_rules! settings {
 
         impl $name {
             /// Refuses settings outside their ranges.
-            pub(crate) fn check_ranges(
-                &self,
-            ) -> Result<(), $crate::pipeline::settings::SettingError> {
-                $( $( $crate::pipeline::settings::check_setting!(
+            ///
+            /// # Errors
+            ///
+            /// Names key, value and range.
+            pub fn check_ranges(&self) -> Result<(), $crate::pipeline::settings::SettingError> {
+                $( $( $crate::check_setting!(
                     self.$field, concat!($prefix, stringify!($field)), $range
                 ); )? )*
                 Ok(())
@@ -102,6 +105,8 @@ macro_rules! settings {
     };
 }
 
+/// Refuses one setting outside its range, in the words of [`settings!`]; returns from the function.
+#[macro_export]
 macro_rules! check_setting {
     ($setting:expr, $key:expr, (each)) => {
         $setting.check_ranges()?
@@ -131,6 +136,3 @@ macro_rules! check_setting {
         )?
     };
 }
-
-pub(crate) use check_setting;
-pub(crate) use settings;

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
-use dynocar_core::pipeline::EstimatorSettings;
 use dynocar_core::plausibility::Severity;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::units::Unit;
 use dynocar_shared::{HALF_95, Parameter, TrainId, schema};
 use serde::Serialize;

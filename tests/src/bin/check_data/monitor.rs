@@ -6,7 +6,8 @@ use std::sync::Arc;
 use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Run};
 use dynocar_analysis::identify::published_samples;
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, TrainId};
 

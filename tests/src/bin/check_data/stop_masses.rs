@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use dynocar_analysis::dataset::{Dataset, Role, Run};
 use dynocar_analysis::identify::identify;
-use dynocar_core::pipeline::{EstimatorSettings, Pipeline};
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_model::terms::wheel::STANDING_MPS;
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,

@@ -234,7 +234,6 @@ impl<const D: usize> ParticleSmoother<D> {
 
     /// Mean and covariance of the particles of a step given every measurement; valid after
     /// [`ParticleSmoother::smooth`], `None` unless the last run reached the step.
-    #[cfg(test)]
     pub fn smoothed_moments(&self, step: usize) -> Option<([f64; D], [[f64; D]; D])> {
         (step < self.steps).then(|| self.moments(step, |index| self.smoothed[index]))
     }

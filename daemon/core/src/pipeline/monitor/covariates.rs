@@ -7,7 +7,7 @@ use nalgebra::SVector;
 
 use super::place_memory::PlaceMemory;
 use super::suspects::{COVARIATES, covariate};
-use crate::pipeline::resistance::sample::UnitSample;
+use crate::pipeline::momentum::sample::UnitSample;
 
 /// One value for each column that comes from samples.
 pub type Covariates = SVector<f64, COVARIATES>;

@@ -18,13 +18,13 @@ use super::usual::Usual;
 use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
 use crate::pipeline::judge::Case;
-use crate::pipeline::motion::{STANDING_MPS, SpeedRange, is_same_mass};
-use crate::pipeline::output::{write_innovations, write_parameters, write_status};
-use crate::pipeline::resistance::momentum::MomentumBlocks;
-use crate::pipeline::resistance::regression::{
+use crate::pipeline::momentum::blocks::MomentumBlocks;
+use crate::pipeline::momentum::sample::UnitSample;
+use crate::pipeline::momentum::{
     BRAKE_SCALE, MomentumBlock, PARAMETERS as DAVIS, TRACTION_SCALE, regressors, unscaling,
 };
-use crate::pipeline::resistance::sample::UnitSample;
+use crate::pipeline::motion::{STANDING_MPS, SpeedRange, is_same_mass};
+use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 

@@ -277,7 +277,7 @@ impl Information {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::resistance::regression::TRACTION_SCALE;
+    use crate::pipeline::momentum::TRACTION_SCALE;
 
     #[test]
     fn what_another_suspect_explains_is_not_found_next_to_it_and_what_it_does_not_is() {

@@ -1,7 +1,7 @@
 //! The pipeline `residual_monitor`: which force the model does not explain, and what it may be.
 //!
 //! Momentum blocks make a linear regression in a, b, c and what is not exactly known of the
-//! forces, as in [`crate::pipeline::resistance`]. Each suspect adds one column: what one unit of
+//! forces, as in [`crate::pipeline::momentum`]. Each suspect adds one column: what one unit of
 //! it would take off the momentum. All columns go through one whitener and into one information
 //! matrix, from which the likelihood ratio of every suspect against the base model follows at
 //! any time, a, b and c being refitted together with it. The distance by position against the distance by

@@ -5,7 +5,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::onsets::Onsets;
 use super::suspects::{CANDIDATES, FIRST_ONSET, PARAMETERS, effect_of};
 use crate::pipeline::InnovationMonitor;
-use crate::pipeline::resistance::regression::FORCE_DELAY;
+use crate::pipeline::momentum::FORCE_DELAY;
 
 /// A named suspect stays until its evidence is below this share of what named it.
 const STAYS_SHARE: f64 = 0.5;
@@ -256,7 +256,7 @@ fn alternatives(chosen: usize, least: f64, standing: &Standing) -> u32 {
 mod tests {
     use super::super::suspects::WHEEL;
     use super::*;
-    use crate::pipeline::resistance::regression::FORCE_DELAY as DELAY;
+    use crate::pipeline::momentum::FORCE_DELAY as DELAY;
 
     fn after(naming: &mut Naming, blocks: u32, evidence: &[(usize, f64)]) {
         after_with(naming, &Onsets::new(), blocks, evidence);

@@ -8,10 +8,8 @@ use super::onsets::Onsets;
 use super::settings::MonitorSettings;
 use super::suspects::{COVARIATES, FIRST_ONSET, ONSETS, PARAMETERS};
 use crate::filter::Whitener;
-use crate::pipeline::resistance::momentum_error::{
-    DISTURBANCE, Disturbance, STATES, momentum_seen,
-};
-use crate::pipeline::resistance::regression::{MomentumBlock, UNKNOWNS};
+use crate::pipeline::momentum::error::{DISTURBANCE, Disturbance, STATES, momentum_seen};
+use crate::pipeline::momentum::{MomentumBlock, UNKNOWNS};
 
 const COLUMNS: usize = 1 + PARAMETERS;
 /// Innovations beyond so many standard deviations count for less (Huber).

@@ -2,8 +2,8 @@
 
 use dynocar_model::terms::curve;
 
-use crate::pipeline::resistance::settings::DataSettings;
-use crate::pipeline::settings::settings;
+use crate::pipeline::momentum::settings::DataSettings;
+use crate::settings;
 
 settings! {
     /// Settings of `residual_monitor`.

@@ -9,7 +9,7 @@ use dynocar_model::terms::speed_band::BANDS;
 use dynocar_model::terms::{SUSPECTS as TERMS, Suspect, USUAL, brake, traction};
 use dynocar_shared::vocabulary::EffectKind;
 
-use crate::pipeline::resistance::regression::{FORCE_DELAY, TRACTION_SCALE, UNKNOWNS};
+use crate::pipeline::momentum::{FORCE_DELAY, TRACTION_SCALE, UNKNOWNS};
 
 /// Columns of the base model: a, b, c, two force scales, the delay, and what else is never exact.
 pub const BASE: usize = UNKNOWNS + USUAL.len();

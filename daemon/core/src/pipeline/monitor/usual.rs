@@ -5,10 +5,10 @@ use dynocar_model::train::TrainModel;
 use super::information::BaseVector;
 use super::settings::MonitorSettings;
 use super::suspects::{CURVE, DAY_WIND, LOAD, WARMING};
-use crate::pipeline::resistance::regression::{
+use crate::pipeline::momentum::settings::DataSettings;
+use crate::pipeline::momentum::{
     BRAKE_SCALE, FORCE_DELAY, SPEED_SCALE_MPS, TRACTION_SCALE, scaled,
 };
-use crate::pipeline::resistance::settings::DataSettings;
 use crate::pipeline::settings::{SettingError, require};
 
 /// Standard deviation of a curve constant of which nothing is declared, in 1000 N/kN m.

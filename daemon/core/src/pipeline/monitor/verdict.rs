@@ -12,7 +12,7 @@ use super::suspects::{
     suspect_of,
 };
 use crate::pipeline::InnovationMonitor;
-use crate::pipeline::resistance::regression::{FORCE_DELAY, UNKNOWNS};
+use crate::pipeline::momentum::{FORCE_DELAY, UNKNOWNS};
 
 /// Blocks that a suspect which began at some moment must have acted.
 const AGE_MIN: u32 = 5;

@@ -4,9 +4,9 @@ use nalgebra::{SMatrix, SVector};
 
 use super::behaviour::Behaviour;
 use crate::filter::Gaussian;
+use crate::pipeline::momentum::regressors;
+use crate::pipeline::momentum::sample::UnitSample;
 use crate::pipeline::motion::jump_variance;
-use crate::pipeline::resistance::regression::regressors;
-use crate::pipeline::resistance::sample::UnitSample;
 
 /// Index of the speed in m/s.
 pub const SPEED: usize = 0;

@@ -9,7 +9,7 @@ use super::motion_filter::{
     TRACTION_SCALE, WIND,
 };
 use super::settings::TrainKalmanSettings;
-use crate::pipeline::resistance::regression::{regressors, scaled, unscaling};
+use crate::pipeline::momentum::{regressors, scaled, unscaling};
 
 /// Share of a declared coefficient's standard deviation that comes from w0 at 20 m/s: a declared zero
 /// is no knowledge.

@@ -6,9 +6,9 @@ use nalgebra::{Matrix4, Vector4};
 use super::bank::Published;
 use super::motion_filter::COEFFICIENTS;
 use super::systematic::Systematic;
+use crate::pipeline::momentum::{regressors, unscaling};
 use crate::pipeline::motion::SpeedRange;
 use crate::pipeline::output::write_parameters;
-use crate::pipeline::resistance::regression::{regressors, unscaling};
 
 /// Index of the load factor among what is published.
 const LOAD: usize = COEFFICIENTS;

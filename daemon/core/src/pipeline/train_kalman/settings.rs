@@ -4,7 +4,7 @@ use dynocar_model::terms::{delay, traction};
 
 use crate::pipeline::braking::DECLARED_BRAKE_STD;
 use crate::pipeline::motion::MOVING_MPS;
-use crate::pipeline::settings::settings;
+use crate::settings;
 
 settings! {
     /// Settings of [`super::TrainKalman`].

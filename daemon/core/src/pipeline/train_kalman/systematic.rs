@@ -3,7 +3,7 @@
 use dynocar_model::track::GRADIENT_ERROR_FREE_M;
 use nalgebra::{Matrix4, Vector4};
 
-use crate::pipeline::resistance::regression::regressors;
+use crate::pipeline::momentum::regressors;
 
 /// The segment of line that was driven, and the scales that cannot be found.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,8 @@ use crate::pipeline::braking::intake::BrakingCoefficient;
 use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
-use crate::pipeline::settings::{SettingError, settings};
+use crate::pipeline::settings::SettingError;
+use crate::settings;
 
 settings! {
     /// Settings of the extended Kalman filter with a random walk of the coefficient.

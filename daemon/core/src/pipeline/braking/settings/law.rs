@@ -10,7 +10,8 @@ use crate::pipeline::braking::law::Law;
 use crate::pipeline::braking::law_bank::LawBank;
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, TrackerModel};
-use crate::pipeline::settings::{SettingError, settings};
+use crate::pipeline::settings::SettingError;
+use crate::settings;
 
 settings! {
     /// Settings of the scale of a known adhesion law.

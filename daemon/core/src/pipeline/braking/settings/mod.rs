@@ -1,12 +1,10 @@
 //! Settings of the braking pipelines, and how each is built from them.
 
 mod ekf;
-mod em;
 mod law;
 mod smoother;
 
 pub use ekf::EkfSettings;
-pub use em::{EStep, EmSettings};
 pub use law::LawSettings;
 pub use smoother::{SmootherSettings, WalkSettings};
 
@@ -22,7 +20,8 @@ use super::motion::MotionNoise;
 use super::report::ReportSettings;
 use crate::pipeline::Estimator;
 use crate::pipeline::motion::MOVING_MPS;
-use crate::pipeline::settings::{SettingError, require, settings};
+use crate::pipeline::settings::{SettingError, require};
+use crate::settings;
 
 settings! {
     /// What every braking pipeline knows beforehand of motion, measurement and braking.
@@ -73,13 +72,19 @@ fn walk_per_sqrt_s(half_width: f64) -> f64 {
 }
 
 impl BrakingSettings {
-    fn check(&self) -> Result<(), SettingError> {
+    /// Refuses settings outside their ranges.
+    ///
+    /// # Errors
+    ///
+    /// Names key, value and range.
+    pub fn check(&self) -> Result<(), SettingError> {
         self.check_ranges()?;
         let is_longer = self.gap_max_s >= self.interval_s && self.gap_max_s.is_finite();
         require(is_longer, "gap_max_s", self.gap_max_s, "at least interval_s")
     }
 
-    fn noise(&self) -> MotionNoise {
+    /// The noise of motion and measurement.
+    pub fn noise(&self) -> MotionNoise {
         MotionNoise {
             distance_m2_per_s: self.position_walk_m.powi(2),
             speed_m2_per_s3: self.speed_walk_mps.powi(2),
@@ -99,7 +104,8 @@ impl BrakingSettings {
         BrakingIntake::new(quantity, settings, train)
     }
 
-    fn estimator<E: Engine + 'static>(
+    /// The estimator of a kind around an engine.
+    pub fn estimator<E: Engine + 'static>(
         &self,
         kind: PipelineKind,
         quantity: BrakingCoefficient,
@@ -130,7 +136,8 @@ pub enum BrakeFactor {
 }
 
 impl BrakeFactor {
-    pub(in crate::pipeline) fn quantity(self) -> BrakingCoefficient {
+    /// The coefficient that it is.
+    pub fn quantity(self) -> BrakingCoefficient {
         match self {
             BrakeFactor::Friction => BrakingCoefficient::Friction,
             BrakeFactor::Ratio => BrakingCoefficient::Ratio,

@@ -5,12 +5,14 @@ use dynocar_shared::{PipelineKind, Uncertain};
 use serde::Deserialize;
 
 use super::{BrakeFactor, BrakingSettings};
+use crate::check_setting;
 use crate::pipeline::Estimator;
 use crate::pipeline::braking::intake::BrakingCoefficient;
 use crate::pipeline::braking::law::{Law, SpeedTable};
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
-use crate::pipeline::settings::{SettingError, check_setting, settings};
+use crate::pipeline::settings::SettingError;
+use crate::settings;
 
 /// How the achieved share of the declared brake force wanders.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]

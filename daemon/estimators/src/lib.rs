@@ -1,0 +1,28 @@
+//! Every estimator that a configuration may name: the papers' own methods, and the list of all kinds.
+//!
+//! What answers live on a train is in [`dynocar_core::pipeline`]: resistance and mass by
+//! [`train_kalman`](dynocar_core::pipeline::train_kalman), the brake by
+//! [`braking`](dynocar_core::pipeline::braking), what the model lacks by
+//! [`monitor`](dynocar_core::pipeline::monitor). Here stands what the papers ask, one folder each:
+//! their own methods, kept as the papers have them, and ours at the statistical bound of their
+//! experiments, where the mass or the resistance is exact. On a train neither is.
+//!
+//! - [`EstimatorSettings`]: every kind with its settings, of both libraries, and how it is built
+//! - [`liu`], [`resistance`] (Liu 2018): recursive least squares on coasting or measured forces, and
+//!   ours by a robust Kalman filter
+//! - [`xia`] (Xia 2023): a trajectory fit over a sliding window, and ours sample by sample
+//! - [`wang`] (Wang 2022): resistance and mass in stages, by gradient descent, and ours by Kalman
+//!   filters and least squares
+//! - [`xie`] (Xie 2019, and Jin 2020 for the brake): expectation maximisation over a sliding window
+//!
+//! As the core, this library knows no channel, clock, file, thread or logger.
+
+mod answers;
+pub mod liu;
+pub mod resistance;
+mod settings;
+pub mod wang;
+pub mod xia;
+pub mod xie;
+
+pub use settings::EstimatorSettings;

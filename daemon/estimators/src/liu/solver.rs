@@ -1,0 +1,137 @@
+//! The recursions of Liu 2018 behind one face.
+
+use dynocar_core::filter::{Forgetting, Mils, NotPositiveDefinite, Penalty, Rls};
+use dynocar_core::pipeline::momentum::settings::DataSettings;
+use dynocar_core::pipeline::momentum::{PARAMETERS, UNKNOWNS};
+
+use crate::resistance::noise_bank::NoiseBank;
+use crate::resistance::noise_model::WhiteRow;
+use crate::resistance::regression::{Solution, Unknowns};
+use crate::resistance::settings::{INNOVATION_LENGTH_MAX, MilsSettings, RlsSettings};
+
+/// One of the paper's algorithms.
+#[derive(Clone, Debug)]
+pub enum Solver {
+    /// All rows at once: the mixture of the noise bank itself.
+    Batch,
+    /// Recursive least squares.
+    Rls(Rls<UNKNOWNS>),
+    /// Multi-innovation, of length 1 for regularised RLS.
+    Mils(Mils<UNKNOWNS, INNOVATION_LENGTH_MAX>),
+    /// Multi-innovation that skips bad data.
+    VMils {
+        /// The recursion.
+        recursion: Mils<UNKNOWNS, INNOVATION_LENGTH_MAX>,
+        /// Robust standard deviations beyond which a row is bad.
+        bad_beyond: f64,
+    },
+}
+
+/// Variances of what is not known of the forces, by the settings.
+fn force_variances(data: &DataSettings) -> [f64; UNKNOWNS - PARAMETERS] {
+    let (scale, delay) = (data.force_scale_std.powi(2), data.force_delay_std_s.powi(2));
+    [scale, scale, delay]
+}
+
+fn start(data: &DataSettings, variance: f64, uses: f64) -> Unknowns {
+    let forces = force_variances(data);
+    Unknowns::from_fn(|i, _| match i.checked_sub(PARAMETERS) {
+        None => variance,
+        // A recursion that uses every row p times needs the priors p times as strong.
+        Some(force) => forces[force] / uses,
+    })
+}
+
+/// Weights of the noise bank's penalty: lambda/2 on the resistance, the forces' own priors.
+pub fn bank_penalty(data: &DataSettings, lambda: f64) -> Unknowns {
+    let forces = force_variances(data);
+    Unknowns::from_fn(|i, _| match i.checked_sub(PARAMETERS) {
+        None => 0.5 * lambda,
+        Some(force) => 1.0 / forces[force],
+    })
+}
+
+impl Solver {
+    /// Recursive least squares (eq. 9-11).
+    pub fn rls(settings: &RlsSettings) -> Self {
+        let forgetting = match settings.forgetting {
+            1.0 => Forgetting::None,
+            factor => Forgetting::Directional(factor),
+        };
+        let variances = start(&settings.data, settings.start_variance, 1.0);
+        Solver::Rls(Rls::new(Unknowns::zeros(), &variances, forgetting))
+    }
+
+    /// Regularised multi-innovation least squares of a length; 1 is regularised RLS (eq. 12-16).
+    pub fn mils(settings: &MilsSettings, length: usize) -> Self {
+        Solver::Mils(recursion(settings, length))
+    }
+
+    /// Interval-varying multi-innovation least squares.
+    pub fn v_mils(settings: &MilsSettings) -> Self {
+        let recursion = recursion(settings, settings.innovation_length as usize);
+        Solver::VMils { recursion, bad_beyond: settings.bad_beyond }
+    }
+
+    /// Robust standard deviations beyond which a row must not be used.
+    pub fn bad_beyond(&self, otherwise: f64) -> f64 {
+        match self {
+            Solver::VMils { bad_beyond, .. } => *bad_beyond,
+            _ => otherwise,
+        }
+    }
+
+    /// Takes in a row that the noise bank has accepted.
+    ///
+    /// # Errors
+    ///
+    /// When the recursion's covariance is no longer positive definite.
+    pub fn take(&mut self, row: &WhiteRow) -> Result<(), NotPositiveDefinite> {
+        match self {
+            Solver::Batch => Ok(()),
+            Solver::Rls(rls) => rls.update(&row.features, row.observed).map(drop),
+            Solver::Mils(recursion) | Solver::VMils { recursion, .. } => {
+                recursion.update(&row.features, row.observed).map(drop)
+            }
+        }
+    }
+
+    /// Goes on from the bank's likeliest member, whose rows were whitened otherwise than the
+    /// ones taken in so far.
+    pub fn restart(&mut self, bank: &NoiseBank) {
+        let Some(Solution { estimate, covariance }) = bank.likeliest_solution() else { return };
+        match self {
+            Solver::Batch => {}
+            Solver::Rls(rls) => rls.restart(estimate, covariance),
+            Solver::Mils(recursion) | Solver::VMils { recursion, .. } => {
+                recursion.restart(estimate, covariance)
+            }
+        }
+    }
+
+    /// Goes on after a row that was refused: a stack of innovations must not hold it.
+    pub fn skip(&mut self) {
+        if let Solver::VMils { recursion, .. } = self {
+            recursion.forget_rows();
+        }
+    }
+
+    /// The solution so far; `None` while there is none.
+    pub fn solution(&self, bank: &NoiseBank) -> Option<Solution> {
+        let (estimate, covariance) = match self {
+            Solver::Batch => return bank.mixture(),
+            Solver::Rls(rls) => (*rls.estimate(), *rls.covariance()),
+            Solver::Mils(recursion) | Solver::VMils { recursion, .. } => {
+                (*recursion.estimate(), recursion.covariance())
+            }
+        };
+        bank.widened(&Solution { estimate, covariance })
+    }
+}
+
+fn recursion(settings: &MilsSettings, length: usize) -> Mils<UNKNOWNS, INNOVATION_LENGTH_MAX> {
+    let lambda = Unknowns::from_fn(|i, _| if i < PARAMETERS { settings.lambda } else { 0.0 });
+    let penalty = Penalty { lambda, length: settings.length, is_printed: settings.printed_penalty };
+    let variances = start(&settings.data, settings.start_variance, length as f64);
+    Mils::new(Unknowns::zeros(), &variances, length, penalty)
+}

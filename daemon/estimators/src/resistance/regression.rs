@@ -1,0 +1,170 @@
+//! The observations of the linear regression of [`dynocar_core::pipeline::momentum`], and what they say of
+//! the motion now.
+
+use dynocar_core::filter::{Propagation, Sighting, Whitener};
+use dynocar_core::pipeline::momentum::error::{
+    DISTURBANCE, Disturbance, MOMENTUM, STATES, momentum_seen,
+};
+use dynocar_core::pipeline::momentum::{COLUMNS, Columns, MomentumBlock, SinceBlock, UNKNOWNS};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+
+/// Values of the unknowns.
+pub type Unknowns = SVector<f64, UNKNOWNS>;
+/// The filter that makes rows independent.
+pub type RowWhitener = Whitener<STATES, COLUMNS>;
+
+/// Estimate of the unknowns with its covariance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solution {
+    /// The unknowns.
+    pub estimate: Unknowns,
+    /// Covariance for intervals by the normal distribution.
+    pub covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+}
+
+/// Speed in m/s, then disturbance in N/kN, as affine functions of the unknowns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Their values were all unknowns 0.
+    pub at_zero: Vector2<f64>,
+    /// Their derivatives by the unknowns.
+    pub gain: SMatrix<f64, STATES, UNKNOWNS>,
+    /// Their covariance for known unknowns.
+    pub covariance: Matrix2<f64>,
+}
+
+/// Least-squares slope of the speed over a coasting segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoastingSegment {
+    /// True when it shares its first half with no segment before it.
+    pub is_first: bool,
+    /// Resistance after known forces in N/kN, then the mean regressors with the slope's weights.
+    pub row: Columns,
+    /// The row of the segment before, which shares half of the samples; unused in the first.
+    pub row_before: Columns,
+    /// Variance of the resistance by the noise of the speed.
+    pub variance: f64,
+    /// Time in s from the segment before.
+    pub step_s: f64,
+    /// Time of the newest sample in ns.
+    pub time_ns: i64,
+    /// Mean speed in m/s.
+    pub speed_mps: f64,
+}
+
+/// One observation of the regression, of either source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Observation {
+    /// From measured forces.
+    Block(MomentumBlock),
+    /// From coasting.
+    Segment(CoastingSegment),
+}
+
+/// Half-overlapping slopes correlate by -1/4 (white noise, equal halves), which is a moving
+/// average of new errors, `e_k + OVERLAP e_{k-1}`: OVERLAP / (1 + OVERLAP²) = -1/4.
+const OVERLAP: f64 = -0.267_949_192_431_122_7;
+
+impl Observation {
+    /// True when nothing before it is connected with it.
+    pub fn is_first(&self) -> bool {
+        match self {
+            Observation::Block(block) => block.is_first,
+            Observation::Segment(segment) => segment.is_first,
+        }
+    }
+
+    /// Time of the newest sample in ns.
+    pub fn time_ns(&self) -> i64 {
+        match self {
+            Observation::Block(block) => block.time_ns,
+            Observation::Segment(segment) => segment.time_ns,
+        }
+    }
+
+    /// How the error moves to the first observation of a chain: momentum is new, and the
+    /// disturbance has gone on for `gap_s`; unknown for how long when `None`. A block is used up
+    /// by it.
+    pub fn restart(
+        &self,
+        disturbance: &Disturbance,
+        gap_s: Option<f64>,
+    ) -> Propagation<STATES, COLUMNS> {
+        match self {
+            Observation::Block(block) => {
+                disturbance.across_gap(gap_s, block.momentum, block.momentum_variance)
+            }
+            Observation::Segment(_) => disturbance.decay(gap_s.unwrap_or(f64::INFINITY)),
+        }
+    }
+
+    /// How the error moves from the observation before to this one.
+    pub fn propagation(&self, disturbance: &Disturbance) -> Propagation<STATES, COLUMNS> {
+        match self {
+            Observation::Block(block) => {
+                disturbance.over_impulse(block.impulse[1], &block.impulse, block.impulse_variance)
+            }
+            Observation::Segment(segment) => {
+                // The new error of the row before is that row less its other parts.
+                let mut step: Propagation<STATES, COLUMNS> = disturbance.decay(segment.step_s);
+                step.transition[(MOMENTUM, MOMENTUM)] = -OVERLAP;
+                step.transition[(MOMENTUM, DISTURBANCE)] = -OVERLAP;
+                step.input.set_row(MOMENTUM, &(segment.row_before * OVERLAP).transpose());
+                step
+            }
+        }
+    }
+
+    /// What is seen of the error.
+    pub fn sighting(&self) -> Sighting<STATES, COLUMNS> {
+        match self {
+            Observation::Block(block) => momentum_seen(block.momentum, block.momentum_variance),
+            Observation::Segment(segment) => Sighting {
+                direction: Vector2::new(1.0, 1.0),
+                observed: segment.row,
+                variance: segment.variance / (1.0 + OVERLAP * OVERLAP),
+            },
+        }
+    }
+}
+
+/// Lets the disturbance have jumped, by so much in N/kN.
+pub fn loosen_disturbance(whitener: &mut RowWhitener, std_n_per_kn: f64) {
+    whitener.loosen(DISTURBANCE, std_n_per_kn * std_n_per_kn);
+}
+
+/// The motion now, from the errors' states in the middle of the newest block; `scale` is the
+/// variance of the rows.
+pub fn motion_of(
+    whitener: &RowWhitener,
+    since: &SinceBlock,
+    disturbance: &Disturbance,
+    scale: f64,
+) -> Motion {
+    let duration_s = since.impulse[1];
+    let mut to_now = Matrix2::identity();
+    to_now[(MOMENTUM, DISTURBANCE)] = -duration_s;
+    let mut columns = to_now * whitener.state();
+    for (column, impulse) in since.impulse.iter().enumerate() {
+        columns[(MOMENTUM, column)] += impulse;
+    }
+    // A random walk of the disturbance, integrated twice.
+    let walk = 2.0 * disturbance.std_n_per_kn.powi(2) / disturbance.time_s;
+    let mut covariance = to_now * whitener.covariance() * to_now.transpose();
+    covariance[(MOMENTUM, MOMENTUM)] += walk * duration_s.powi(3) / 3.0;
+    covariance[(DISTURBANCE, DISTURBANCE)] += walk * duration_s;
+    let to_speed = Matrix2::new(1.0 / since.inertia, 0.0, 0.0, 1.0);
+    let columns = to_speed * columns;
+    Motion {
+        at_zero: columns.column(0).into_owned(),
+        gain: -columns.fixed_columns::<UNKNOWNS>(1),
+        covariance: to_speed * covariance * to_speed * scale,
+    }
+}
+
+/// The disturbance in N/kN for given parameters, with its variance in units of the errors'.
+pub fn disturbance_of(whitener: &RowWhitener, unknowns: &Unknowns) -> (f64, f64) {
+    let columns = whitener.state().row(DISTURBANCE);
+    let taken: f64 = (0..UNKNOWNS).map(|i| columns[i + 1] * unknowns[i]).sum();
+    (columns[0] - taken, whitener.covariance()[(DISTURBANCE, DISTURBANCE)])
+}

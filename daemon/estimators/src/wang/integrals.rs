@@ -1,0 +1,114 @@
+//! The regression that the equation of motion becomes when it is integrated.
+//!
+//! With u = m_ref / m, q = g / (1000 (1 + gamma)) and the coefficients theta of z1, z2, z3,
+//!
+//! ```text
+//! v(t) + q ∫ known dt = level + u ∫ F / (m_ref (1 + gamma)) dt - q Σ theta_j ∫ phi_j(v) dt
+//! ```
+//!
+//! where `known` is the gradient and every declared resistance beyond the basic one, so that z2
+//! and z3 are what curves and tunnels add to what is declared of them.
+//!
+//! Wang 2022 fits eq. (11)-(18) to a differentiated speed, whose noise at 5 Hz is five hundred
+//! times the acceleration that 0.02 N/kN makes. The integrals hold the same equation with the
+//! noise of the speed itself: white, and once per sample.
+
+use dynocar_core::filter::drifting_level::{LEVEL, PARAMETERS};
+use dynocar_model::train::TrainModel;
+use nalgebra::SVector;
+
+use super::inertia::Inertia;
+use super::motion::Motion;
+use super::speed_basis::SpeedBasis;
+
+/// Resistance in N/kN that a curve or a tunnel typically adds.
+const TYPICAL_N_PER_KN: f64 = 5.0;
+
+/// Number of unknowns: level, bias, inverse mass, z1, z2, z3.
+pub const UNKNOWNS: usize = 12;
+/// Index of the reference mass over the mass.
+pub const INVERSE_MASS: usize = PARAMETERS;
+/// Places where the coefficients of z1, z2 and z3 begin.
+pub const POLYNOMIALS: [usize; 3] = [PARAMETERS + 1, PARAMETERS + 4, PARAMETERS + 7];
+
+/// A value for each unknown.
+pub type Row = SVector<f64, UNKNOWNS>;
+
+/// What turns a motion into rates of the integrals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Regressors {
+    /// Speed polynomials.
+    pub basis: SpeedBasis,
+    /// What forces do to the train.
+    pub inertia: Inertia,
+    /// Radius in m that z2 refers to.
+    pub reference_radius_m: f64,
+}
+
+impl Regressors {
+    /// For a train; speeds are normalised by its highest.
+    pub fn new(train: &TrainModel, reference_radius_m: f64) -> Self {
+        Regressors {
+            basis: SpeedBasis::new(train.speed_max_mps().filter(|&v| v > 5.0).unwrap_or(40.0)),
+            inertia: Inertia::of(train),
+            reference_radius_m,
+        }
+    }
+
+    /// How fast the integrals grow.
+    pub fn rates(&self, motion: &Motion) -> Integrals {
+        let unit_mps2 = self.inertia.mps2_per_n_per_kn();
+        let phi = self.basis.at(motion.speed_mps) * unit_mps2;
+        let shares = [1.0, self.reference_radius_m * motion.curvature_per_m, motion.tunnel_share];
+        let mut row = Row::zeros();
+        row[INVERSE_MASS] = self.inertia.push_mps2(motion);
+        for (at, share) in POLYNOMIALS.into_iter().zip(shares) {
+            row.fixed_rows_mut::<3>(at).copy_from(&(phi * -share));
+        }
+        let known_mps = unit_mps2 * motion.known_n_per_kn;
+        let tied = motion.known_n_per_kn + TYPICAL_N_PER_KN * (shares[1] + shares[2]);
+        Integrals { row, known_mps, tied_mps: unit_mps2 * tied }
+    }
+}
+
+/// Integrals since the start of an unbroken piece of motion, or their rates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Integrals {
+    /// Of what each parameter multiplies, in m/s; 0 at the level.
+    row: Row,
+    /// Of the deceleration by gradient and declared resistance, in m/s.
+    known_mps: f64,
+    /// Of the size that accelerations tied to the place may have, in m/s.
+    tied_mps: f64,
+}
+
+impl Integrals {
+    /// At the start.
+    pub fn zero() -> Self {
+        Integrals { row: Row::zeros(), known_mps: 0.0, tied_mps: 0.0 }
+    }
+
+    /// Moves on by a step between two rates (trapezoid).
+    pub fn add(&mut self, from: &Integrals, to: &Integrals, step_s: f64) {
+        self.row += (from.row + to.row) * (0.5 * step_s);
+        self.known_mps += 0.5 * step_s * (from.known_mps + to.known_mps);
+    }
+
+    /// Replaces the rate at the end of the last step.
+    pub fn correct(&mut self, instead_of: &Integrals, rates: &Integrals, step_s: f64) {
+        self.row += (rates.row - instead_of.row) * (0.5 * step_s);
+    }
+
+    /// Changes between two rates, in m/s²: of the accelerations tied to the place, and of the
+    /// force's on the reference mass.
+    pub fn changes(from: &Integrals, to: &Integrals) -> [f64; 2] {
+        [to.tied_mps - from.tied_mps, to.row[INVERSE_MASS] - from.row[INVERSE_MASS]]
+    }
+
+    /// The equation of a measured speed: row and value.
+    pub fn equation(&self, speed_mps: f64) -> (Row, f64) {
+        let mut row = self.row;
+        row[LEVEL] = 1.0;
+        (row, speed_mps + self.known_mps)
+    }
+}

@@ -1,0 +1,107 @@
+//! What [`JointLeastSquares`] says in a snapshot.
+
+use dynocar_core::filter::drifting_level::BIAS;
+use dynocar_core::pipeline::judge::Case;
+use dynocar_core::pipeline::output::{write_innovations, write_parameters, write_status};
+use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, Reason, Status};
+use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
+
+use super::integrals::{INVERSE_MASS, POLYNOMIALS, Row, UNKNOWNS};
+use super::joint::JointLeastSquares;
+use super::section::Section;
+
+/// Used samples below which nothing is said.
+const SAMPLES_MIN: u64 = 50;
+/// Shares of the highest speed at which a, b and c are judged.
+const JUDGED_AT: [f64; 3] = [0.1, 0.5, 0.9];
+
+impl JointLeastSquares {
+    /// Writes estimate, excitation, status and unexplained force.
+    pub(super) fn write_snapshot(&self, snapshot: &mut ParameterSnapshot) {
+        snapshot.generation = self.generation;
+        write_innovations(snapshot, &self.monitor);
+        let best = self.bank.likeliest();
+        let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
+        else {
+            snapshot.parameter_count = 0;
+            write_status(snapshot, (Status::Invalid, Reason::NumericalFailure));
+            return;
+        };
+        let mass_std = self.write_estimate(&solution, &root, snapshot);
+        let is_mass_known = mass_std <= 0.01 * self.settings.usable_std_percent;
+        let usable = self.settings.usable_std_n_per_kn;
+        let known = self.resistance_stds(&root).map(|std| std <= usable);
+        let manoeuvres = [
+            (known[0], Manoeuvre::CoastSlow),
+            (known[1], Manoeuvre::VarySpeed),
+            (known[2], Manoeuvre::CoastFast),
+            (is_mass_known, Manoeuvre::Accelerate),
+        ];
+        snapshot.excited = 0;
+        snapshot.missing_manoeuvres = 0;
+        for (i, (is_known, manoeuvre)) in manoeuvres.into_iter().enumerate() {
+            snapshot.excited |= u32::from(is_known) << i;
+            snapshot.missing_manoeuvres |= if is_known { 0 } else { manoeuvre.bit() };
+        }
+        write_status(snapshot, self.case(is_mass_known, known[1]).verdict());
+        let inertia = &self.regressors.inertia;
+        let mass_kg = inertia.reference_mass_kg / solution[INVERSE_MASS];
+        let inertia_kg = inertia.inertial_mass_kg(mass_kg);
+        let shape = best.shape(self.speed_mps);
+        snapshot.unexplained_force_n = -shape * solution[BIAS] * inertia_kg;
+        snapshot.unexplained_force_std_n = shape * root.row(BIAS).norm() * inertia_kg;
+        self.speeds.write(snapshot);
+    }
+
+    fn case(&self, is_mass_known: bool, is_resistance_known: bool) -> Case {
+        let some = is_mass_known || is_resistance_known;
+        let failure = (Status::Invalid, Reason::NumericalFailure);
+        let lasting = self.fit.is_lasting().then_some(Reason::InnovationsNotWhite);
+        Case {
+            fault: (self.is_fresh_reset && !is_mass_known).then_some(failure),
+            input: self.health.input_doubt(),
+            is_ready: self.health.used() >= SAMPLES_MIN,
+            is_known: is_mass_known && is_resistance_known,
+            lacking: if some { Status::Degraded } else { Status::Unestimated },
+            contradiction: lasting.or_else(|| self.monitor.contradiction()),
+            caveat: Reason::None,
+        }
+    }
+
+    /// Writes values and covariance of [a, b, c, mass]; gives the relative standard
+    /// deviation of the mass.
+    fn write_estimate(
+        &self,
+        solution: &Row,
+        root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+        snapshot: &mut ParameterSnapshot,
+    ) -> f64 {
+        let davis = self.davis(solution, Section::Basic);
+        let inverse = solution[INVERSE_MASS];
+        let mass_kg = self.regressors.inertia.reference_mass_kg / inverse;
+        let first = POLYNOMIALS[Section::Basic as usize];
+        let own = self.covariance(root, [first, first + 1, first + 2, INVERSE_MASS]);
+        let mut to_units = Matrix4::zeros();
+        let to_davis = self.regressors.basis.to_davis_matrix();
+        to_units.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_davis);
+        to_units[(3, 3)] = -mass_kg / inverse;
+        write_parameters(
+            snapshot,
+            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass],
+            &Vector4::new(davis.a, davis.b, davis.c, mass_kg),
+            &(to_units * own * to_units.transpose()),
+        );
+        own[(3, 3)].sqrt() / inverse.abs()
+    }
+
+    /// Standard deviations of the basic resistance in N/kN at low, middle and high speed.
+    fn resistance_stds(&self, root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>) -> [f64; 3] {
+        let first = POLYNOMIALS[Section::Basic as usize];
+        let own = self.covariance(root, [first, first + 1, first + 2]);
+        JUDGED_AT.map(|share| {
+            let phi: Vector3<f64> =
+                self.regressors.basis.at(share * self.regressors.basis.scale_mps());
+            phi.dot(&(own * phi)).max(0.0).sqrt()
+        })
+    }
+}

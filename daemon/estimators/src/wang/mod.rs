@@ -1,0 +1,34 @@
+//! Wang 2022: resistance on open track, in curves and in tunnels, and the mass: the paper's method, and ours for
+//! whoever knows one of the two exactly. Where neither is known, [`dynocar_core::pipeline::train_kalman`] is better.
+//!
+//! - `descent`, `staged`: the paper's stages, by normalised gradient descent on sums over all samples
+//! - [`JointLeastSquares`]: all of it together, on [`integrals`] of motion
+//! - [`MassKalman`]: the mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
+//! - [`motion`], [`inertia`], [`section`], [`line_resistance`], [`speed_basis`], [`bias_model`]: what a sample gives,
+//!   and the parts of the model
+
+pub mod bias_bank;
+pub mod bias_model;
+mod descent;
+mod hypothesis;
+pub mod inertia;
+pub mod integrals;
+mod joint;
+mod joint_settings;
+mod joint_snapshot;
+mod kalman;
+mod kalman_settings;
+pub mod line_resistance;
+pub mod motion;
+pub mod section;
+mod settling;
+pub mod speed_basis;
+mod staged;
+mod staged_settings;
+
+pub use joint::JointLeastSquares;
+pub use joint_settings::JointLeastSquaresSettings;
+pub use kalman::MassKalman;
+pub use kalman_settings::MassKalmanSettings;
+pub use staged::StagedDescent;
+pub use staged_settings::{MassRegression, StagedDescentSettings};

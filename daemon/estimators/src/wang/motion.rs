@@ -1,0 +1,138 @@
+//! What the estimators of mass take from a sample.
+
+use dynocar_core::pipeline::Outcome;
+use dynocar_core::pipeline::motion::BRIDGED_MAX_S;
+use dynocar_model::force::ResolvedSample;
+use dynocar_shared::RejectionReason;
+
+/// The known quantities of a moving train at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Measurement time in ns.
+    pub time_ns: i64,
+    /// Number of the motion segment.
+    pub segment: u32,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Traction minus brake in N.
+    pub force_n: f64,
+    /// Declared gross mass in kg, as far as it is known here.
+    pub declared_kg: f64,
+    /// Everything known that retards in proportion to the weight, in N/kN: see
+    /// [`ResolvedSample::known_n_per_kn`].
+    pub known_n_per_kn: f64,
+    /// Standard deviation in ‰ of the gradient in it; 0 where nobody states one.
+    pub gradient_std_permille: f64,
+    /// Mean of 1/R along the train in 1/m; 0 where no curves are known.
+    pub curvature_per_m: f64,
+    /// Share of the train inside tunnels; 0 where no tunnels are known.
+    pub tunnel_share: f64,
+}
+
+impl Motion {
+    /// The motion at a sample.
+    ///
+    /// # Errors
+    ///
+    /// `WheelSlide` while the speed is not the train's, `Missing` without force or gradient,
+    /// `NotFinite` for a number that is none, `OutOfRange` for one that no train has.
+    pub fn of(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
+        if sample.is_sliding {
+            return Err(RejectionReason::WheelSlide);
+        }
+        let force_n = sample.control_force_n().ok_or(RejectionReason::Missing)?;
+        let known_n_per_kn = sample.known_n_per_kn().ok_or(RejectionReason::Missing)?;
+        let motion = Motion {
+            time_ns: sample.time_ns,
+            segment: sample.segment,
+            speed_mps: sample.speed_mps,
+            force_n,
+            declared_kg: sample.mass_kg,
+            known_n_per_kn,
+            gradient_std_permille: sample.gradient_std_permille,
+            curvature_per_m: sample.curvature_per_m.unwrap_or(0.0),
+            tunnel_share: sample.tunnel_share.unwrap_or(0.0),
+        };
+        let bounds = [
+            (motion.speed_mps, 0.0, 200.0),
+            (motion.force_n, -1e8, 1e8),
+            (motion.declared_kg, 1.0, 1e9),
+            (motion.known_n_per_kn, -500.0, 500.0),
+            (motion.gradient_std_permille, 0.0, 500.0),
+            (motion.curvature_per_m, 0.0, 1.0),
+            (motion.tunnel_share, 0.0, 1.0 + 1e-9),
+        ];
+        if bounds.iter().any(|(number, _, _)| !number.is_finite()) {
+            return Err(RejectionReason::NotFinite);
+        }
+        let is_possible = bounds.iter().all(|&(number, low, high)| number >= low && number <= high);
+        if is_possible { Ok(motion) } else { Err(RejectionReason::OutOfRange) }
+    }
+
+    /// The motion at a sample that an estimator from a least speed in m/s on takes; where there is none,
+    /// what became of the sample. A step leads neither over a standstill nor over a slide: `last` is
+    /// forgotten there.
+    ///
+    /// # Errors
+    ///
+    /// `Used` for a train that stands, else the refusal with the reason of [`Motion::of`].
+    pub fn seen<T>(
+        sample: &ResolvedSample,
+        speed_min_mps: f64,
+        last: &mut Option<T>,
+    ) -> Result<Self, Outcome> {
+        if sample.speed_mps < speed_min_mps {
+            *last = None;
+            return Err(Outcome::Used);
+        }
+        Motion::of(sample).map_err(|reason| {
+            if reason == RejectionReason::WheelSlide {
+                *last = None;
+            }
+            Outcome::Rejected(reason)
+        })
+    }
+
+    /// Time in s since an earlier sample of the same motion segment; `None` when forces and speed
+    /// between the two are not known well enough to integrate.
+    pub fn step_from(&self, earlier: &Motion) -> Option<f64> {
+        let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;
+        (self.segment == earlier.segment && step_s > 0.0 && step_s <= BRIDGED_MAX_S)
+            .then_some(step_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND_NS: i64 = 1_000_000_000;
+
+    #[test]
+    fn a_correction_that_takes_resistance_away_is_no_reason_to_refuse_a_sample() {
+        let warm = ResolvedSample { extra_n_per_kn: -1.7, ..ResolvedSample::coasting() };
+        assert_eq!(Motion::of(&warm).unwrap().known_n_per_kn, -1.7);
+        let absurd = ResolvedSample { extra_n_per_kn: -501.0, ..warm };
+        assert_eq!(Motion::of(&absurd), Err(RejectionReason::OutOfRange));
+    }
+
+    #[test]
+    fn forces_are_bridged_for_seconds_within_a_segment() {
+        let motion = |time_ns, segment| Motion {
+            time_ns,
+            segment,
+            speed_mps: 10.0,
+            force_n: 0.0,
+            declared_kg: 1e5,
+            known_n_per_kn: 0.0,
+            gradient_std_permille: 0.0,
+            curvature_per_m: 0.0,
+            tunnel_share: 0.0,
+        };
+        let earlier = motion(0, 1);
+        assert_eq!(motion(SECOND_NS / 2, 1).step_from(&earlier), Some(0.5));
+        assert_eq!(motion(3 * SECOND_NS, 1).step_from(&earlier), None);
+        assert_eq!(motion(SECOND_NS / 2, 2).step_from(&earlier), None);
+        assert_eq!(motion(0, 1).step_from(&earlier), None);
+    }
+}

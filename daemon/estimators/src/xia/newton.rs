@@ -1,0 +1,301 @@
+//! `trajectory_newton`: a trajectory fit over a sliding window, the online scheme of Xia 2023.
+
+use dynocar_core::filter::levenberg_marquardt::ParameterBox;
+use dynocar_core::pipeline::judge::InputHealth;
+use dynocar_core::pipeline::motion::SpeedRange;
+use dynocar_core::pipeline::output::write_parameters;
+use dynocar_core::pipeline::sample_gate::{Gated, SampleGate};
+use dynocar_core::pipeline::settings::SettingError;
+use dynocar_core::pipeline::{Estimator, InnovationMonitor, Outcome};
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::{Davis, TrainModel};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
+use nalgebra::{Matrix3, Vector3};
+
+use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSettings};
+use super::window::Window;
+use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
+use crate::xia::trajectory::fit::{FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
+use crate::xia::trajectory::index::DAVIS;
+use crate::xia::trajectory::long_run::LongRunVariance;
+use crate::xia::trajectory::motion::{Motion, MotionTracker};
+use crate::xia::trajectory::quality::Estimate;
+use crate::xia::trajectory::step::StepRule;
+use crate::xia::trajectory::unexplained::UnexplainedForce;
+
+/// Windows that the learned speed noise looks back over.
+const NOISE_WINDOWS: f64 = 50.0;
+/// Innovations that the published statistics look back over.
+const INNOVATION_MEMORY: u32 = 200;
+
+/// Standard deviations by which the mean square of a window's residuals may exceed the noise that
+/// windows before have shown; more, and something in the window is wrong.
+const EXCESS_MAX: f64 = 4.0;
+
+/// Blocks of 30 s that the long-run variance of the innovations looks back over.
+const LONG_RUN_BLOCKS: f64 = 60.0;
+
+/// Fits Davis coefficients to the newest window each time a step is completed.
+#[derive(Clone, Debug)]
+pub struct TrajectoryNewton {
+    settings: CheckedSettings,
+    newton: NewtonSettings,
+    fit: FitSettings,
+    speed_noise_mps: f64,
+    source: RestartSource,
+    gate: SampleGate,
+    tracker: MotionTracker,
+    window: Window,
+    fitter: TrajectoryFitter,
+    davis: Davis,
+    covariance: Matrix3<f64>,
+    /// Speed in m/s at the window's end by the newest fit, and the variance of the disturbance
+    /// in it over that of the measured speed.
+    end: Option<(f64, f64)>,
+    at_bound: bool,
+    windows: u64,
+    innovations: InnovationMonitor,
+    long_run: LongRunVariance,
+    unexplained: UnexplainedForce,
+    speeds: SpeedRange,
+    /// False when the newest window's residuals are larger than the noise accounts for.
+    is_consistent: bool,
+    health: InputHealth,
+    fault: Option<(Status, Reason)>,
+}
+
+impl TrajectoryNewton {
+    /// An estimator for a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn new(
+        settings: &TrajectoryNewtonSettings,
+        train: &TrainModel,
+    ) -> Result<Self, SettingError> {
+        let settings = settings.checked(train)?;
+        let CheckedSettings { bounds, prior, window: capacity, .. } = settings;
+        let rule = match settings.method {
+            FitMethod::LevenbergMarquardt => StepRule::Time,
+            FitMethod::WolfeNewton => StepRule::Distance,
+        };
+        Ok(TrajectoryNewton {
+            newton: NewtonSettings {
+                bounds,
+                mean_square_max: settings.mean_square_max,
+                restarts: Restarts::WhenStalled,
+                ..NewtonSettings::of_the_paper()
+            },
+            fit: FitSettings {
+                bounds,
+                prior: Some(prior),
+                decrease_tolerance: 1e-4,
+                ..FitSettings::new(rule)
+            },
+            speed_noise_mps: settings.speed_noise_mps,
+            source: RestartSource::new(settings.seed),
+            gate: SampleGate::default(),
+            tracker: MotionTracker::default(),
+            window: Window::new(rule, capacity, settings.interval_m),
+            fitter: TrajectoryFitter::with_capacity(1, capacity + 1),
+            davis: prior.davis,
+            covariance: Matrix3::from_diagonal(&prior.std.component_mul(&prior.std)),
+            end: None,
+            at_bound: false,
+            windows: 0,
+            innovations: InnovationMonitor::new(INNOVATION_MEMORY),
+            long_run: LongRunVariance::new(LONG_RUN_BLOCKS),
+            unexplained: UnexplainedForce::default(),
+            speeds: SpeedRange::default(),
+            is_consistent: true,
+            health: InputHealth::default(),
+            fault: None,
+            settings,
+        })
+    }
+
+    /// Fits the window, which has just gained a step.
+    fn take_window(&mut self) -> Outcome {
+        self.judge_prediction();
+        let needed = match self.settings.method {
+            FitMethod::LevenbergMarquardt => self.settings.window / 2,
+            FitMethod::WolfeNewton => self.settings.window,
+        };
+        if self.window.count() < needed {
+            return Outcome::Used;
+        }
+        self.fit.speed_noise_mps = Some(self.speed_noise_mps);
+        let fitted = match self.settings.method {
+            FitMethod::LevenbergMarquardt => {
+                let density = self.settings.disturbance_mps2.powi(2) + self.window.missed_density();
+                self.fit.disturbance_ratio = density / self.speed_noise_mps.powi(2);
+                let start = (self.windows > 0).then_some(self.davis);
+                self.fitter.fit(&[self.window.segment()], start.as_ref(), &self.fit)
+            }
+            FitMethod::WolfeNewton => self.run_newton(),
+        };
+        match fitted {
+            Ok(fit) => self.take_fit(&fit),
+            Err(error) => {
+                let reason = match error {
+                    FitError::NotDetermined => Reason::NotIdentifiable,
+                    _ => Reason::NumericalFailure,
+                };
+                self.fault = Some((Status::Invalid, reason));
+                self.end = None;
+                return Outcome::Used;
+            }
+        }
+        Outcome::Updated
+    }
+
+    /// Algorithm 1 from the window before; then the covariance of a fit that is held there.
+    fn run_newton(&mut self) -> Result<TrajectoryFit, FitError> {
+        let segment = self.window.segment();
+        let result = wolfe_newton(
+            segment.steps,
+            segment.speeds_mps,
+            &self.davis,
+            &self.newton,
+            &mut self.source,
+        );
+        let point = Vector3::new(result.davis.a, result.davis.b, result.davis.c);
+        let held = FitSettings { bounds: ParameterBox { low: point, high: point }, ..self.fit };
+        self.fitter.fit(&[segment], Some(&result.davis), &held)
+    }
+
+    fn take_fit(&mut self, fit: &TrajectoryFit) {
+        self.davis = fit.davis;
+        // The fit's own factor rests on the few blocks of its window.
+        self.covariance = fit.covariance / fit.inflation;
+        self.at_bound = match self.settings.method {
+            FitMethod::LevenbergMarquardt => fit.at_bound.contains(&true),
+            FitMethod::WolfeNewton => false,
+        };
+        self.windows += 1;
+        self.fault = None;
+        self.judge_residuals(fit);
+        self.end = Some((fit.end_speed_mps, fit.end_variance));
+    }
+
+    /// Compares the residuals of a window with the noise, and learns that.
+    fn judge_residuals(&mut self, fit: &TrajectoryFit) {
+        let shown = fit.residual_std_mps * fit.residual_std_mps;
+        let variance = self.speed_noise_mps * self.speed_noise_mps;
+        let limit = variance * (1.0 + EXCESS_MAX * (2.0 / fit.samples as f64).sqrt());
+        // The noise before the first window is a guess.
+        let is_first = self.settings.learns_noise && self.windows == 1;
+        self.is_consistent = is_first || (shown <= limit && fit.outliers == 0);
+        if self.settings.learns_noise {
+            let gain = 1.0 / (self.windows as f64).min(NOISE_WINDOWS);
+            // What is wrong with one window is hardly noise of the next.
+            let believed = if is_first { shown } else { shown.min(limit) };
+            self.speed_noise_mps = (variance + gain * (believed - variance)).sqrt().max(1e-6);
+        }
+    }
+
+    /// Compares the newest speed with what the fit before predicted for it.
+    fn judge_prediction(&mut self) {
+        let segment = self.window.segment();
+        let (Some((end_mps, end_variance)), Some(step), Some(measured_mps)) =
+            (self.end.take(), segment.steps.last(), segment.speeds_mps.last())
+        else {
+            self.innovations.break_here();
+            self.long_run.break_here();
+            return;
+        };
+        let (advance, _) = self.fit.rule.advance_or_crawl(step, &self.davis, end_mps);
+        let duration_s = match self.fit.rule {
+            StepRule::Time => step.size,
+            StepRule::Distance => step.size / measured_mps,
+        };
+        // The end of a line through n points has about 4 / n of a point's variance.
+        let spread = 1.0 + 4.0 / segment.steps.len() as f64 + end_variance;
+        let variance = spread * self.speed_noise_mps.powi(2)
+            + self.settings.disturbance_mps2.powi(2) * duration_s;
+        let normalised = (measured_mps - advance.speed_mps) / variance.sqrt();
+        self.innovations.push(normalised);
+        self.long_run.push(normalised, duration_s);
+    }
+
+    fn end_window(&mut self) {
+        self.window.clear();
+        self.end = None;
+        self.innovations.break_here();
+        self.long_run.break_here();
+    }
+}
+
+impl Gated for TrajectoryNewton {
+    fn gate(&mut self) -> &mut SampleGate {
+        &mut self.gate
+    }
+
+    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
+        let outcome = match self.tracker.advance(sample) {
+            Motion::Continue(motion) => {
+                self.unexplained.push(&motion, sample, &self.davis);
+                self.speeds.push(sample.speed_mps);
+                if self.window.push(&motion, sample.speed_mps) {
+                    self.take_window()
+                } else {
+                    Outcome::Used
+                }
+            }
+            Motion::Begin => {
+                self.end_window();
+                self.window.begin(sample.speed_mps);
+                self.unexplained.begin(sample.speed_mps);
+                Outcome::Used
+            }
+            Motion::Standstill => {
+                self.end_window();
+                Outcome::Used
+            }
+            Motion::Unusable(reason) => {
+                self.end_window();
+                Outcome::Rejected(reason)
+            }
+        };
+        self.health.note(outcome, sample)
+    }
+
+    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
+        self.health.refuse(reason, sample);
+        self.tracker = MotionTracker::default();
+        self.end_window();
+    }
+}
+
+impl Estimator for TrajectoryNewton {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrajectoryNewton
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.pass(sample)
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        let Davis { a, b, c } = self.davis;
+        let inflation = self.long_run.inflation();
+        let covariance = self.covariance * inflation;
+        write_parameters(snapshot, DAVIS, &Vector3::new(a, b, c), &covariance);
+        let estimate = Estimate {
+            davis: self.davis,
+            covariance,
+            prior_std: self.settings.prior.std,
+            speeds: self.speeds,
+            innovations: &self.innovations,
+            inflation,
+            is_ready: self.windows > 0,
+            is_at_bound: self.at_bound,
+            fault: self.fault,
+            input: self.health.input_doubt().or(self.gate.input_doubt()),
+            doubt: (!self.is_consistent).then_some(Reason::InnovationsTooLarge),
+        };
+        estimate.write(snapshot);
+        self.unexplained.write(snapshot, self.speed_noise_mps.powi(2));
+    }
+}

@@ -1,0 +1,248 @@
+//! Davis coefficients from whole trajectories, offline or over a window.
+//!
+//! All segments share a, b and c; each has its own initial speed. The start is integral least
+//! squares, the search Gauss-Newton with damping within bounds: no restarts are needed. The
+//! noise of the measured speed is estimated with the coefficients unless it is given.
+
+use dynocar_model::train::Davis;
+use nalgebra::Vector3;
+
+use super::fit_settings::SCALES;
+pub use super::fit_settings::{DavisPrior, FitError, FitSettings, TrajectoryFit};
+use super::integral_start::integral_start;
+use super::residuals::InitialSpeeds;
+use super::search::{Buffers, Search};
+pub use super::step::MotionSegment;
+use super::step::Step;
+
+/// Fits trajectories; keeps its buffers between fits.
+#[derive(Clone, Debug, Default)]
+pub struct TrajectoryFitter {
+    buffers: Buffers,
+}
+
+impl TrajectoryFitter {
+    /// A fitter that allocates nothing for so many segments and samples in all.
+    pub fn with_capacity(segments: usize, samples: usize) -> Self {
+        TrajectoryFitter {
+            buffers: Buffers {
+                initial: InitialSpeeds::with_capacity(segments),
+                residuals: Vec::with_capacity(samples),
+            },
+        }
+    }
+
+    /// Fits all segments jointly, from integral least squares or from given coefficients.
+    ///
+    /// # Errors
+    ///
+    /// See [`FitError`].
+    ///
+    /// # Real-time
+    ///
+    /// No allocation within the capacity; time grows with the samples, a few passes for a warm
+    /// start with known noise.
+    pub fn fit(
+        &mut self,
+        segments: &[MotionSegment<'_>],
+        start: Option<&Davis>,
+        settings: &FitSettings,
+    ) -> Result<TrajectoryFit, FitError> {
+        settings.check()?;
+        check(segments)?;
+        let prior = settings.prior.map(|prior| prior.rows());
+        let point = match start {
+            Some(davis) => Vector3::new(davis.a, davis.b, davis.c),
+            None => {
+                let from = settings.prior.map_or(Vector3::from(SCALES), |prior| {
+                    Vector3::new(prior.davis.a, prior.davis.b, prior.davis.c)
+                });
+                let noise_mps = settings.speed_noise_mps.unwrap_or(0.1);
+                integral_start(
+                    segments,
+                    settings.rule,
+                    noise_mps,
+                    prior.as_ref(),
+                    &settings.bounds,
+                    &Vector3::from(SCALES),
+                    &settings.bounds.clamp(&from),
+                )
+                .ok_or(FitError::NotFinite { segment: 0 })?
+            }
+        };
+        self.buffers.initial.reset(segments.iter().map(|segment| segment.speeds_mps[0]));
+        let mut search = Search::new(segments, settings, prior, &mut self.buffers);
+        let fitted = search.run(&point)?;
+        search.describe(&fitted)
+    }
+}
+
+fn check(segments: &[MotionSegment<'_>]) -> Result<(), FitError> {
+    let mut samples = 0;
+    for (index, segment) in segments.iter().enumerate() {
+        let (steps, speeds) = (segment.steps.len(), segment.speeds_mps.len());
+        if speeds != steps + 1 {
+            return Err(FitError::LengthMismatch { segment: index, steps, speeds });
+        }
+        let is_usable = |step: &Step| {
+            step.size > 0.0
+                && step.size.is_finite()
+                && step.drive_mps2.is_finite()
+                && step.resistance_gain.is_finite()
+        };
+        if !(segment.steps.iter().all(is_usable)
+            && segment.speeds_mps.iter().all(|speed| speed.is_finite()))
+        {
+            return Err(FitError::NotFinite { segment: index });
+        }
+        samples += speeds;
+    }
+    let need = segments.len() + 3;
+    if samples < need { Err(FitError::TooFewSamples { need, got: samples }) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+
+    use super::super::step::StepRule;
+    use super::super::test_runs::{FAST, normal, random, speeds, steps};
+    use super::*;
+    use dynocar_core::filter::levenberg_marquardt::ParameterBox;
+    use dynocar_model::force::balance::mps2_per_n_per_kn;
+
+    fn fit(steps: &[Step], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
+        let segments = [MotionSegment { steps, speeds_mps }];
+        TrajectoryFitter::default().fit(&segments, None, settings).unwrap()
+    }
+
+    fn free(rule: StepRule) -> FitSettings {
+        let bounds = ParameterBox { low: Vector3::repeat(-1e3), high: Vector3::repeat(1e3) };
+        FitSettings { bounds, ..FitSettings::new(rule) }
+    }
+
+    #[test]
+    fn without_noise_both_rules_give_the_coefficients_up_to_round_off() {
+        for rule in [StepRule::Distance, StepRule::Time] {
+            let steps = steps(rule, 400);
+            let speeds = speeds(rule, &steps, &FAST, 12.0);
+            let fit = fit(&steps, &speeds, &FitSettings::new(rule));
+            assert!((fit.davis.a - FAST.a).abs() < 1e-9, "{rule:?}: {:e}", fit.davis.a - FAST.a);
+            assert!((fit.davis.c - FAST.c).abs() < 1e-12);
+            assert_eq!((fit.stalls, fit.at_bound), (0, [false; 3]));
+        }
+    }
+
+    #[test]
+    fn every_random_start_ends_at_the_same_coefficients() {
+        let steps = steps(StepRule::Distance, 300);
+        let speeds = speeds(StepRule::Distance, &steps, &FAST, 12.0);
+        let segments = [MotionSegment { steps: &steps, speeds_mps: &speeds }];
+        let settings = FitSettings::new(StepRule::Distance);
+        let mut random = random(5);
+        for _ in 0..50 {
+            let start = Davis {
+                a: 3.0 * random.random::<f64>(),
+                b: 0.2 * random.random::<f64>(),
+                c: 0.01 * random.random::<f64>(),
+            };
+            let fit = TrajectoryFitter::default().fit(&segments, Some(&start), &settings).unwrap();
+            assert!((fit.davis.a - FAST.a).abs() < 1e-8, "{start:?}: {fit:?}");
+        }
+    }
+
+    #[test]
+    fn the_likelihood_falls_as_the_covariance_says() {
+        let rule = StepRule::Distance;
+        let steps = steps(rule, 300);
+        let mut random = random(9);
+        let mut speeds = speeds(rule, &steps, &FAST, 12.0);
+        speeds.iter_mut().for_each(|speed| *speed += 0.1 * normal(&mut random));
+        for disturbance in [0.0, 1e-3] {
+            let settings = FitSettings {
+                speed_noise_mps: Some(0.1),
+                disturbance_ratio: disturbance,
+                outlier_threshold: f64::INFINITY,
+                ..free(rule)
+            };
+            let best = fit(&steps, &speeds, &settings);
+            let precision = (best.covariance / best.inflation).try_inverse().unwrap();
+            for direction in [Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.02, -1e-3, 1e-5)] {
+                let Davis { a, b, c } = best.davis;
+                let point = Vector3::new(a, b, c) + direction;
+                let bounds = ParameterBox { low: point, high: point };
+                let held = fit(&steps, &speeds, &FitSettings { bounds, ..settings });
+                let fall = best.log_likelihood - held.log_likelihood;
+                let expected = 0.5 * direction.dot(&(precision * direction));
+                assert!((fall / expected - 1.0).abs() < 0.02, "{fall} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_few_wild_speeds_hardly_move_the_fit() {
+        let rule = StepRule::Distance;
+        let steps = steps(rule, 400);
+        let mut random = random(2);
+        let mut speeds = speeds(rule, &steps, &FAST, 12.0);
+        speeds.iter_mut().for_each(|speed| *speed += 0.1 * normal(&mut random));
+        let clean = fit(&steps, &speeds, &free(rule));
+        for index in [40, 41, 120, 200, 333] {
+            speeds[index] += 3.0;
+        }
+        let spoilt = fit(&steps, &speeds, &free(rule));
+        assert_eq!(spoilt.outliers, 5);
+        for speed_mps in [20.0, 50.0, 75.0] {
+            let apart = spoilt.davis.w0_n_per_kn(speed_mps) - clean.davis.w0_n_per_kn(speed_mps);
+            assert!(apart.abs() < clean.w0_std_n_per_kn(speed_mps), "{speed_mps}: {apart}");
+        }
+    }
+
+    #[test]
+    fn a_prior_binds_what_the_data_leave_open() {
+        // Ten steps of cruise at one speed determine w0 there and nothing else.
+        let gain = mps2_per_n_per_kn(0.06);
+        let drive_mps2 = gain * FAST.w0_n_per_kn(80.0);
+        let steps = vec![Step { size: 1.0, drive_mps2, resistance_gain: gain }; 10];
+        let speeds = vec![80.0; 11];
+        let expected = Davis { a: 1.0, b: 0.02, c: 0.0014 };
+        let std = Vector3::new(0.5, 0.01, 0.0005);
+        let settings = FitSettings {
+            prior: Some(DavisPrior { davis: expected, std }),
+            speed_noise_mps: Some(1e-3),
+            ..FitSettings::new(StepRule::Time)
+        };
+        let fit = fit(&steps, &speeds, &settings);
+        assert!((fit.davis.w0_n_per_kn(80.0) - FAST.w0_n_per_kn(80.0)).abs() < 0.01);
+        assert!((fit.davis.a - expected.a).abs() < 0.05);
+        assert!(fit.covariance[(0, 0)].sqrt() > 0.4);
+        assert!(fit.w0_std_n_per_kn(80.0) < 0.05);
+    }
+
+    #[test]
+    fn bad_input_is_refused_with_what_is_wrong() {
+        let steps = steps(StepRule::Distance, 20);
+        let speeds = speeds(StepRule::Distance, &steps, &FAST, 40.0);
+        let settings = FitSettings::new(StepRule::Distance);
+        let error = |steps: &[Step], speeds_mps: &[f64], settings: &FitSettings| {
+            let segments = [MotionSegment { steps, speeds_mps }];
+            TrajectoryFitter::default().fit(&segments, None, settings).unwrap_err()
+        };
+        let mut holed = speeds.clone();
+        holed[7] = f64::NAN;
+        let mut backwards = steps.clone();
+        backwards[3].size = -100.0;
+        assert!(matches!(
+            error(&steps, &speeds[1..], &settings),
+            FitError::LengthMismatch { segment: 0, steps: 20, speeds: 20 }
+        ));
+        assert_eq!(error(&steps, &holed, &settings), FitError::NotFinite { segment: 0 });
+        assert_eq!(error(&backwards, &speeds, &settings), FitError::NotFinite { segment: 0 });
+        assert_eq!(
+            error(&steps[..2], &speeds[..3], &settings),
+            FitError::TooFewSamples { need: 4, got: 3 }
+        );
+        let bad = FitSettings { disturbance_ratio: f64::NAN, ..settings };
+        assert!(matches!(error(&steps, &speeds, &bad), FitError::BadSetting { .. }));
+    }
+}

@@ -1,0 +1,170 @@
+//! From resolved samples to steps that can be integrated.
+
+use dynocar_core::pipeline::motion::MOVING_MPS;
+use dynocar_model::force::ResolvedSample;
+use dynocar_shared::RejectionReason;
+
+use super::step::Step;
+
+/// What a sample adds to a trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// The trajectory begins anew at this sample's speed: the forces up to here are not known.
+    Begin,
+    /// One more step.
+    Continue(MotionStep),
+    /// The train stands; a trajectory ends.
+    Standstill,
+    /// The sample cannot be used; a trajectory ends.
+    Unusable(RejectionReason),
+}
+
+/// The way from one sample to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionStep {
+    /// Time in s.
+    pub duration_s: f64,
+    /// Distance in m, from the measured speeds.
+    pub distance_m: f64,
+    /// Mean driving acceleration in m/s².
+    pub drive_mps2: f64,
+    /// Change of the driving acceleration over the step in m/s².
+    pub drive_change_mps2: f64,
+    /// κ in m/s² per N/kN.
+    pub resistance_gain: f64,
+}
+
+impl From<&MotionStep> for Step {
+    /// A step in time.
+    fn from(motion: &MotionStep) -> Step {
+        Step {
+            size: motion.duration_s,
+            drive_mps2: motion.drive_mps2,
+            resistance_gain: motion.resistance_gain,
+        }
+    }
+}
+
+/// Turns the samples of a train into steps.
+///
+/// Forces are taken to change linearly between two samples; with a controller that holds its
+/// force over a cycle that is off by half a cycle's change, which alternates in sign.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotionTracker {
+    last: Option<Anchor>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Anchor {
+    segment: u32,
+    speed_mps: f64,
+    drive_mps2: f64,
+}
+
+impl MotionTracker {
+    /// What a sample adds.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn advance(&mut self, sample: &ResolvedSample) -> Motion {
+        let last = self.last.take();
+        if sample.is_sliding {
+            return Motion::Unusable(RejectionReason::WheelSlide);
+        }
+        if sample.speed_mps <= MOVING_MPS {
+            return Motion::Standstill;
+        }
+        let Some(driving_force_n) = sample.driving_force_n() else {
+            return Motion::Unusable(RejectionReason::Missing);
+        };
+        let drive_mps2 = driving_force_n / sample.inertial_mass_kg;
+        let resistance_gain = sample.weight_kn / sample.inertial_mass_kg;
+        let speed_mps = sample.speed_mps;
+        if !(drive_mps2.is_finite() && resistance_gain.is_finite() && speed_mps.is_finite()) {
+            return Motion::Unusable(RejectionReason::NotFinite);
+        }
+        self.last = Some(Anchor { segment: sample.segment, speed_mps, drive_mps2 });
+        match last {
+            Some(last) if last.segment == sample.segment && sample.step_s > 0.0 => {
+                Motion::Continue(MotionStep {
+                    duration_s: sample.step_s,
+                    distance_m: 0.5 * (last.speed_mps + speed_mps) * sample.step_s,
+                    drive_mps2: 0.5 * (last.drive_mps2 + drive_mps2),
+                    drive_change_mps2: drive_mps2 - last.drive_mps2,
+                    resistance_gain,
+                })
+            }
+            _ => Motion::Begin,
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use dynocar_model::terms::Resistance;
+
+    /// A sample of a 100 t train with γ = 0.06 and every force known.
+    pub fn sample(index: u32, speed_mps: f64, control_force_n: f64) -> ResolvedSample {
+        ResolvedSample {
+            time_ns: i64::from(index) * 200_000_000,
+            step_s: if index == 0 { 0.0 } else { 0.2 },
+            segment: 1,
+            direction: 1.0,
+            position_m: None,
+            speed_mps,
+            mass_kg: 1e5,
+            is_mass_measured: false,
+            inertial_mass_kg: 1.06e5,
+            weight_kn: 981.0,
+            traction_force_n: Some(control_force_n.max(0.0)),
+            brake_force_n: Some((-control_force_n).max(0.0)),
+            gradient_permille: Some(0.0),
+            gradient_std_permille: 0.0,
+            curvature_per_m: None,
+            resistance: Resistance::BASIC,
+            extra_n_per_kn: 0.0,
+            since_cold_s: 0.0,
+            tunnel_share: None,
+            brake_cylinder_pressure_pa: None,
+            ambient_temperature_degc: None,
+            is_sliding: false,
+        }
+    }
+
+    #[test]
+    fn two_samples_of_a_segment_make_a_step_of_mean_force() {
+        let mut tracker = MotionTracker::default();
+        assert_eq!(tracker.advance(&sample(0, 10.0, 1.06e4)), Motion::Begin);
+        let Motion::Continue(step) = tracker.advance(&sample(1, 10.2, 3.18e4)) else { panic!() };
+        assert!((step.drive_mps2 - 0.2).abs() < 1e-12);
+        assert!((step.distance_m - 2.02).abs() < 1e-12);
+        assert!((step.resistance_gain - 9.81e-3 / 1.06).abs() < 1e-12);
+    }
+
+    #[test]
+    fn no_step_leads_across_a_gap_a_stop_a_slide_or_a_missing_force() {
+        let missing = ResolvedSample { traction_force_n: None, ..sample(1, 10.0, 0.0) };
+        let sliding = ResolvedSample { is_sliding: true, ..sample(1, 10.0, 0.0) };
+        let next_segment = ResolvedSample { segment: 2, ..sample(1, 10.0, 0.0) };
+        for (between, expected) in [
+            (missing, Motion::Unusable(RejectionReason::Missing)),
+            (sliding, Motion::Unusable(RejectionReason::WheelSlide)),
+            (sample(1, 0.0, 0.0), Motion::Standstill),
+            (next_segment, Motion::Begin),
+        ] {
+            let mut tracker = MotionTracker::default();
+            tracker.advance(&sample(0, 10.0, 0.0));
+            assert_eq!(tracker.advance(&between), expected);
+            assert_eq!(tracker.advance(&sample(2, 10.0, 0.0)), Motion::Begin);
+        }
+    }
+
+    #[test]
+    fn a_force_that_is_not_a_number_is_refused() {
+        let mut tracker = MotionTracker::default();
+        let bad = ResolvedSample { traction_force_n: Some(f64::NAN), ..sample(0, 10.0, 0.0) };
+        assert_eq!(tracker.advance(&bad), Motion::Unusable(RejectionReason::NotFinite));
+    }
+}

@@ -1,0 +1,191 @@
+//! What an estimate of (a, b, c) is worth: status, reason, excitation.
+//!
+//! In cruise a and b cannot be distinguished (correlations beyond ±0.9999), while w0 over the
+//! driven speeds is known well. The status therefore rests on w0 over the driven speeds; which
+//! coefficients the data excited is stated with it.
+
+use dynocar_core::pipeline::InnovationMonitor;
+use dynocar_core::pipeline::judge::{Case, LONG_RUN_MAX};
+use dynocar_core::pipeline::motion::SpeedRange;
+use dynocar_core::pipeline::output::{write_innovations, write_status};
+use dynocar_model::train::{Davis, TrainModel};
+use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
+use nalgebra::{Matrix3, Vector3};
+
+use super::index::{A, B, C};
+
+/// Standard deviation of w0 over w0 above which an estimate is degraded.
+const W0_DEVIATION_MAX: f64 = 0.1;
+/// A coefficient is excited when the data have cut its prior standard deviation to this share.
+const EXCITED_SHARE: f64 = 0.5;
+/// Standard deviations of declared coefficients, as a share of each, or of a fifth of the
+/// resistance at the train's highest speed where one is declared small or zero.
+pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
+    let davis = &train.resistance;
+    let speed_mps = train.speed_max_mps().filter(|speed| *speed > 1.0).unwrap_or(30.0);
+    let typical = 0.2 * davis.w0_n_per_kn(speed_mps).max(2.0);
+    Vector3::new(
+        relative * davis.a.max(typical),
+        relative * davis.b.max(typical / speed_mps),
+        relative * davis.c.max(typical / (speed_mps * speed_mps)),
+    )
+}
+
+/// An estimate with what is needed to judge it.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate<'a> {
+    /// The coefficients.
+    pub davis: Davis,
+    /// Their covariance.
+    pub covariance: Matrix3<f64>,
+    /// Their standard deviations before any data.
+    pub prior_std: Vector3<f64>,
+    /// Speeds behind them.
+    pub speeds: SpeedRange,
+    /// Innovations so far.
+    pub innovations: &'a InnovationMonitor,
+    /// Factor by which disturbances that last have widened the covariance.
+    pub inflation: f64,
+    /// True when enough samples were used.
+    pub is_ready: bool,
+    /// True when a coefficient lies at a bound.
+    pub is_at_bound: bool,
+    /// Why there is no estimate, when something else than the samples is to blame.
+    pub fault: Option<(Status, Reason)>,
+    /// What is wrong with the samples.
+    pub input: Option<Reason>,
+    /// What else contradicts the estimate.
+    pub doubt: Option<Reason>,
+}
+
+impl Estimate<'_> {
+    /// All that the judge asks for.
+    pub fn case(&self) -> Case {
+        let is_finite = self.covariance.iter().all(|entry| entry.is_finite());
+        let speeds_mps = self.speeds.get().filter(|_| self.is_ready);
+        let is_known = speeds_mps.is_none_or(|(low_mps, high_mps)| {
+            [low_mps, 0.5 * (low_mps + high_mps), high_mps].into_iter().all(|speed| {
+                let powers = Vector3::new(1.0, speed, speed * speed);
+                let variance = (powers.transpose() * self.covariance * powers)[0];
+                let w0 = self.davis.w0_n_per_kn(speed).abs().max(0.1);
+                variance.max(0.0).sqrt() <= W0_DEVIATION_MAX * w0
+            })
+        });
+        let is_ready = speeds_mps.is_some();
+        let failure = (Status::Invalid, Reason::NumericalFailure);
+        Case {
+            fault: self.fault.or((is_ready && !is_finite).then_some(failure)),
+            input: self.input,
+            is_ready,
+            is_known,
+            lacking: if is_ready { Status::Degraded } else { Status::Unestimated },
+            contradiction: self
+                .innovations
+                .contradiction()
+                .or((self.inflation > LONG_RUN_MAX).then_some(Reason::InnovationsNotWhite))
+                .or(self.doubt),
+            caveat: self.caveat(),
+        }
+    }
+
+    fn caveat(&self) -> Reason {
+        if self.is_at_bound {
+            Reason::AtBound
+        } else if self.excited() == [true; 3] {
+            Reason::None
+        } else {
+            Reason::WeakExcitation
+        }
+    }
+
+    /// Which coefficients the data distinguished.
+    pub fn excited(&self) -> [bool; 3] {
+        std::array::from_fn(|i| {
+            let std = self.covariance[(i, i)].max(0.0).sqrt();
+            self.is_ready && std <= EXCITED_SHARE * self.prior_std[i]
+        })
+    }
+
+    /// Writes everything but parameters and unexplained force.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing.
+    pub fn write(&self, snapshot: &mut ParameterSnapshot) {
+        write_status(snapshot, self.case().verdict());
+        write_innovations(snapshot, self.innovations);
+        let excited = self.excited();
+        let mut missing = 0;
+        for (parameter, manoeuvre) in
+            [(A, Manoeuvre::CoastSlow), (B, Manoeuvre::VarySpeed), (C, Manoeuvre::CoastFast)]
+        {
+            if !excited[parameter] {
+                missing |= manoeuvre.bit();
+            }
+        }
+        if self.speeds.get().is_none() {
+            missing |= Manoeuvre::Move.bit();
+        }
+        snapshot.excited = (0..3).map(|i| u32::from(excited[i]) << i).sum();
+        snapshot.missing_manoeuvres = missing;
+        self.speeds.write(snapshot);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(monitor: &InnovationMonitor, covariance: Matrix3<f64>) -> Estimate<'_> {
+        let mut speeds = SpeedRange::default();
+        [75.0, 84.0].into_iter().for_each(|speed_mps| speeds.push(speed_mps));
+        Estimate {
+            davis: Davis { a: 1.0, b: 0.02, c: 0.001 },
+            covariance,
+            prior_std: Vector3::new(0.5, 0.01, 0.0005),
+            speeds,
+            innovations: monitor,
+            inflation: 1.0,
+            is_ready: true,
+            is_at_bound: false,
+            fault: None,
+            input: None,
+            doubt: None,
+        }
+    }
+
+    /// Known at 80 m/s alone: a = -80 b in every direction but one.
+    fn cruise_covariance() -> Matrix3<f64> {
+        let slack = Vector3::new(0.8, -0.01, 0.0);
+        slack * slack.transpose() + Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-10, 1e-14))
+    }
+
+    #[test]
+    fn cruise_gives_an_estimate_that_says_what_it_lacks() {
+        let monitor = InnovationMonitor::new(100);
+        let estimate = estimate(&monitor, cruise_covariance());
+        assert_eq!(estimate.case().verdict(), (Status::Estimated, Reason::WeakExcitation));
+        assert_eq!(estimate.excited(), [false, false, true]);
+        let mut snapshot = ParameterSnapshot::empty();
+        estimate.write(&mut snapshot);
+        assert_eq!(snapshot.excited, 0b100);
+        let expected = Manoeuvre::CoastSlow.bit() | Manoeuvre::VarySpeed.bit();
+        assert_eq!(snapshot.missing_manoeuvres, expected);
+    }
+
+    #[test]
+    fn an_uncertain_resistance_degrades_the_estimate() {
+        let monitor = InnovationMonitor::new(100);
+        let covariance = Matrix3::from_diagonal(&Vector3::new(9.0, 0.0, 0.0));
+        let estimate = estimate(&monitor, covariance);
+        assert_eq!(estimate.case().verdict(), (Status::Degraded, Reason::WeakExcitation));
+    }
+
+    #[test]
+    fn correlated_innovations_degrade_the_estimate() {
+        let mut monitor = InnovationMonitor::new(100);
+        (0..200).for_each(|_| monitor.push(1.0));
+        let estimate = estimate(&monitor, cruise_covariance());
+        assert_eq!(estimate.case().verdict(), (Status::Degraded, Reason::InnovationsNotWhite));
+    }
+}

@@ -1,0 +1,182 @@
+//! The search behind a trajectory fit: coefficients and noise in turn.
+
+use dynocar_core::filter::levenberg_marquardt::{LeastSquares, Solution, SolverSettings, minimise};
+use dynocar_core::filter::triangular::TriangularSystem;
+use dynocar_model::train::Davis;
+use nalgebra::{Matrix3, Vector3};
+
+use super::fit_settings::{FitError, FitSettings, SCALES, TrajectoryFit};
+use super::residuals::{InitialSpeeds, Pass, Residuals, Weighting};
+use super::step::MotionSegment;
+
+/// The least speed noise in m/s that residuals are divided by; below it the round-off of a long
+/// trajectory would count as a residual.
+const SPEED_NOISE_MIN_MPS: f64 = 1e-8;
+const NOISE_ROUNDS_MAX: u32 = 8;
+
+/// The least-squares solution for one disturbance ratio.
+pub struct Fitted {
+    solution: Solution<3>,
+    pass: Pass,
+    /// Noise that the residuals were divided by.
+    used_noise_mps: f64,
+    /// Noise as given or, if it is to be estimated, as the residuals show it.
+    noise_mps: f64,
+    /// Noise that the residuals show.
+    shown_mps: f64,
+    log_likelihood: f64,
+    restricted_log_likelihood: f64,
+}
+
+impl Fitted {
+    /// Covariance of the coefficients by the noise that the residuals show.
+    fn covariance(&self) -> Result<Matrix3<f64>, FitError> {
+        let raw = self.solution.linearisation.system.covariance().ok_or(FitError::NotDetermined)?;
+        Ok(raw * (self.noise_mps / self.used_noise_mps).powi(2))
+    }
+}
+
+/// Memory that a fit keeps for the next.
+#[derive(Clone, Debug, Default)]
+pub struct Buffers {
+    /// Initial speeds, segment by segment.
+    pub initial: InitialSpeeds,
+    /// Residuals of a pass.
+    pub residuals: Vec<f64>,
+}
+
+/// A fit under way.
+pub struct Search<'a, 'b> {
+    segments: &'a [MotionSegment<'a>],
+    settings: &'a FitSettings,
+    prior: Option<TriangularSystem<3>>,
+    buffers: &'b mut Buffers,
+    iterations: u32,
+}
+
+impl<'a, 'b> Search<'a, 'b> {
+    /// A search from the initial speeds in the buffers.
+    pub fn new(
+        segments: &'a [MotionSegment<'a>],
+        settings: &'a FitSettings,
+        prior: Option<TriangularSystem<3>>,
+        buffers: &'b mut Buffers,
+    ) -> Self {
+        Search { segments, settings, prior, buffers, iterations: 0 }
+    }
+
+    /// Repeats the fit until the noise that weighs the residuals is the noise that they show.
+    pub fn run(&mut self, start: &Vector3<f64>) -> Result<Fitted, FitError> {
+        let mut point = *start;
+        let mut noise_mps = match self.settings.speed_noise_mps {
+            Some(known_mps) => known_mps,
+            None => self.median_noise_mps(&point)?,
+        };
+        let mut rounds = 0;
+        loop {
+            noise_mps = noise_mps.max(SPEED_NOISE_MIN_MPS);
+            rounds += 1;
+            let fitted = self.minimise(&point, noise_mps)?;
+            let is_settled = (fitted.noise_mps / noise_mps - 1.0).abs() < 0.01
+                || (fitted.noise_mps < SPEED_NOISE_MIN_MPS && noise_mps <= SPEED_NOISE_MIN_MPS);
+            let is_known = self.settings.speed_noise_mps.is_some();
+            if is_known || is_settled || rounds == NOISE_ROUNDS_MAX {
+                return Ok(fitted);
+            }
+            (point, noise_mps) = (fitted.solution.point, fitted.noise_mps);
+        }
+    }
+
+    fn minimise(&mut self, point: &Vector3<f64>, noise_mps: f64) -> Result<Fitted, FitError> {
+        let settings = self.settings;
+        let weighting = Weighting {
+            speed_noise_mps: noise_mps,
+            disturbance_ratio: settings.disturbance_ratio,
+            outlier_threshold: settings.outlier_threshold,
+        };
+        let start = settings.bounds.clamp(point);
+        let mut residuals = Residuals::new(
+            self.segments,
+            settings.rule,
+            weighting,
+            self.prior,
+            &mut self.buffers.initial,
+            start,
+        );
+        let solver = SolverSettings {
+            scales: Vector3::from(SCALES),
+            iterations_max: 60,
+            decrease_tolerance: settings.decrease_tolerance,
+            relative_tolerance: 1e-14,
+        };
+        let solution = minimise(&mut residuals, &start, &settings.bounds, &solver)
+            .ok_or(FitError::NotFinite { segment: 0 })?;
+        let pass = *residuals.pass();
+        self.iterations += solution.iterations;
+        let free = pass.count.saturating_sub(3 + self.segments.len()).max(1) as f64;
+        let shown_mps = noise_mps * (pass.clipped_square / free).sqrt();
+        let count = pass.count as f64;
+        let log_likelihood =
+            -(solution.linearisation.cost + count * noise_mps.ln() + 0.5 * pass.log_variance);
+        let factor = &solution.linearisation.system.factor;
+        let log_information =
+            pass.log_pivots + (0..3).map(|i| factor[(i, i)].abs().ln()).sum::<f64>();
+        Ok(Fitted {
+            solution,
+            pass,
+            used_noise_mps: noise_mps,
+            noise_mps: settings.speed_noise_mps.unwrap_or(shown_mps),
+            shown_mps,
+            log_likelihood,
+            restricted_log_likelihood: log_likelihood - log_information,
+        })
+    }
+
+    /// Noise by the median absolute residual, which half the residuals cannot spoil.
+    fn median_noise_mps(&mut self, point: &Vector3<f64>) -> Result<f64, FitError> {
+        let weighting = Weighting {
+            speed_noise_mps: 1.0,
+            disturbance_ratio: self.settings.disturbance_ratio,
+            outlier_threshold: f64::INFINITY,
+        };
+        let start = self.settings.bounds.clamp(point);
+        let Buffers { initial, residuals: record } = &mut *self.buffers;
+        let mut residuals =
+            Residuals::new(self.segments, self.settings.rule, weighting, None, initial, start)
+                .recording(record);
+        residuals.linearise(&start).ok_or(FitError::NotFinite { segment: 0 })?;
+        record.iter_mut().for_each(|residual| *residual = residual.abs());
+        let middle = record.len() / 2;
+        let (_, median, _) = record.select_nth_unstable_by(middle, f64::total_cmp);
+        // Median of the absolute value of a standard normal variable.
+        Ok(*median / 0.6745)
+    }
+
+    /// The fit with covariance and counts.
+    pub fn describe(&self, fitted: &Fitted) -> Result<TrajectoryFit, FitError> {
+        let Fitted { solution, pass, .. } = fitted;
+        let inflation = pass.long_run.inflation();
+        let point = solution.point;
+        let bounds = &self.settings.bounds;
+        Ok(TrajectoryFit {
+            davis: Davis { a: point[0], b: point[1], c: point[2] },
+            covariance: fitted.covariance()? * inflation,
+            inflation,
+            speed_noise_mps: fitted.noise_mps,
+            residual_std_mps: fitted.shown_mps,
+            log_likelihood: fitted.log_likelihood,
+            restricted_log_likelihood: fitted.restricted_log_likelihood,
+            rmse_mps: (pass.square_mps2 / pass.count as f64).sqrt(),
+            end_speed_mps: pass.end_speed_mps,
+            end_variance: pass.end_variance,
+            samples: pass.count,
+            outliers: pass.outliers,
+            stalls: pass.stalls,
+            iterations: self.iterations,
+            stop: solution.stop,
+            at_bound: std::array::from_fn(|i| {
+                point[i] == bounds.low[i] || point[i] == bounds.high[i]
+            }),
+        })
+    }
+}

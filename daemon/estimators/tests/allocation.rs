@@ -1,0 +1,141 @@
+//! No pipeline allocates while it takes samples: an allocator that counts proves it.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
+use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting what each thread asks for.
+struct Counting;
+
+// SAFETY: every call is passed on unchanged to the system's allocator; the counter is a plain
+// thread-local cell without a destructor and allocates nothing itself.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller keeps the contract of `GlobalAlloc::alloc`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        // SAFETY: `pointer` came from `alloc` above with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn train() -> Arc<TrainModel> {
+    Arc::new(TrainModel {
+        name: "test".into(),
+        mass_kg: 200_000.0,
+        length_m: 100.0,
+        cars: 4,
+        passenger_mass_kg: 70.0,
+        rotating_mass_factor: 0.06,
+        resistance: Davis { a: 1.8, b: 0.03, c: 0.0035 },
+        curve_constant_n_per_kn_m: 600.0,
+        tunnel_constant_n_per_kn_m: 0.00013,
+        traction: EffortCurve::new(vec![(0.0, 60_000.0), (40.0, 30_000.0)]),
+        brake: EffortCurve::new(vec![(0.0, 150_000.0)]),
+        drive: None,
+        brake_gear: BrakeGear {
+            cylinder_diameter_mm: Some(254.0),
+            disc_radius_mm: Some(240.0),
+            wheel_radius_mm: Some(460.0),
+            efficiency: Some(0.9),
+            ratio: Some(2.55),
+            friction: Some(0.35),
+            pads: Some(48.0),
+            friction_brake: None,
+        },
+        corrections: Default::default(),
+        extra: Vec::new(),
+    })
+}
+
+fn track() -> Arc<Track> {
+    let gradient: Vec<_> =
+        (0..40).map(|i| (500.0 * f64::from(i), 6.0 * f64::from(i).sin())).collect();
+    let curves = vec![Curve { start_m: 900.0, end_m: 1400.0, radius_m: 500.0 }];
+    let tunnels = vec![Tunnel { start_m: 2500.0, end_m: 3300.0 }];
+    Arc::new(Track::new("t".into(), None, Some(&gradient), Some(curves), Some(tunnels)).unwrap())
+}
+
+/// Stops and starts for half an hour at 5 Hz, with spikes, gaps, missing forces and wheel slide.
+fn samples() -> Vec<TrainSample> {
+    let (train, track) = (train(), track());
+    let weight_kn = TrainModel::weight_kn(train.mass_kg);
+    let (mut speed_mps, mut position_m) = (0.0_f64, 500.0);
+    (0..9_000_u64)
+        .map(|index| {
+            let force = match index % 900 {
+                0..150 => 30.0,
+                150..600 => 0.0,
+                _ => -20.0,
+            };
+            let gradient = track.gradient_permille(position_m, train.length_m).unwrap();
+            let retarding = train.resistance.w0_n_per_kn(speed_mps) + gradient;
+            speed_mps = (speed_mps + 0.2 * (force - retarding) / 108.0).max(0.0);
+            position_m += 0.2 * speed_mps;
+            let jitter = 0.03 * (index as f64 * 12.9898).sin();
+            let mut sample = TrainSample::empty(TrainId(1))
+                .with(SampleField::Speed, (speed_mps + jitter).max(0.0))
+                .with(SampleField::Position, position_m)
+                .with(SampleField::TractionForce, (force * weight_kn).max(0.0))
+                .with(SampleField::BrakeForce, (-force * weight_kn).max(0.0))
+                .with(SampleField::BrakeCylinderPressure, if force < 0.0 { 3e5 } else { 0.0 })
+                .with(SampleField::AmbientTemperature, 12.0);
+            sample.time_ns = index as i64 * 200_000_000;
+            sample.sequence = index + 1;
+            match index % 500 {
+                77 => sample.speed_mps += 0.7,
+                133 => sample.speed_mps = f64::NAN,
+                210..=214 => sample.valid &= !SampleField::TractionForce.bit(),
+                299 => sample.flags = 1,
+                400 => sample.time_ns += 90_000_000,
+                _ => {}
+            }
+            sample
+        })
+        .collect()
+}
+
+#[test]
+fn no_pipeline_allocates_after_it_is_built() {
+    let samples = samples();
+    let mut covered = 0;
+    for &kind in PipelineKind::ALL {
+        let Some(settings) = EstimatorSettings::default_of(kind) else { continue };
+        let (train, track) = (train(), track());
+        let estimator = settings.build(&train).expect("default settings are in range");
+        let mut pipeline = Pipeline::new(TrainId(1), 0, train, Some(track), estimator);
+        let before = ALLOCATIONS.with(Cell::get);
+        for sample in &samples {
+            std::hint::black_box(pipeline.process(sample));
+        }
+        let allocations = ALLOCATIONS.with(Cell::get) - before;
+        assert_eq!(allocations, 0, "{kind}");
+        assert!(pipeline.snapshot().samples_used > 0, "{kind}: samples were used");
+        covered += 1;
+    }
+    assert!(covered >= 2, "echo alone proves nothing");
+}
+
+#[test]
+fn the_counter_counts() {
+    let before = ALLOCATIONS.with(Cell::get);
+    drop(std::hint::black_box(vec![1_u8; 100]));
+    assert_eq!(ALLOCATIONS.with(Cell::get) - before, 2);
+}

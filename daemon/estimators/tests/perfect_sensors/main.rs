@@ -1,0 +1,95 @@
+//! What estimators trust on the samples of a simulator as a first user writes one: without noise,
+//! with it, or rounded, seen from any moment on, at any step.
+
+mod drive;
+mod judge;
+
+use std::sync::Mutex;
+
+use drive::{Drive, Forces, Phase, Sensor};
+use dynocar_estimators::EstimatorSettings;
+use dynocar_shared::PipelineKind;
+use judge::{Found, run};
+
+const STEPS_MS: [u32; 4] = [100, 200, 500, 1000];
+const SENSORS: [Sensor; 5] = [
+    Sensor::Exact,
+    Sensor::Noisy(0.03),
+    Sensor::Noisy(0.003),
+    Sensor::Quantised(0.05),
+    Sensor::Quantised(0.28),
+];
+
+/// Every start, step and sensor, with forces that change in each of some ways; the seeds differ.
+fn drives(forces: &[Forces]) -> Vec<Drive> {
+    let mut all = Vec::new();
+    for start in Phase::ALL {
+        for step_ms in STEPS_MS {
+            for sensor in SENSORS {
+                for &forces in forces {
+                    let seed = all.len() as u64;
+                    all.push(Drive { start, step_ms, sensor, forces, seed });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Runs a kind of estimator over drives, on every core; prints who is misled.
+fn watch(kind: PipelineKind, drives: &[Drive]) -> Found {
+    let settings = EstimatorSettings::default_of(kind).expect("a kind that learns");
+    let next = Mutex::new(drives.iter());
+    let all = Mutex::new(Found::default());
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let drive = next.lock().expect("no panic while holding it").next();
+                    let Some(drive) = drive else { break };
+                    let found = run(&settings, drive);
+                    let mut all = all.lock().expect("no panic while holding it");
+                    all.trusted += found.trusted;
+                    all.looks += found.looks;
+                    all.wrong += found.wrong;
+                    if let Some(first) = found.first_wrong {
+                        println!("{drive:?}: {first}");
+                    }
+                }
+            });
+        }
+    });
+    let all = all.into_inner().expect("no panic while holding it");
+    println!("{kind}: {} samples, trusted at {}, wrong at {}", all.looks, all.trusted, all.wrong);
+    all
+}
+
+#[test]
+fn a_trusted_mass_is_right_from_any_start_at_any_step_by_any_sensor() {
+    // The one is trusted once the resistance is known too.
+    for (kind, least) in [(PipelineKind::TrainKalman, 0.6), (PipelineKind::MassKalman, 0.85)] {
+        let found = watch(kind, &drives(&Forces::ALL));
+        assert_eq!(found.wrong, 0, "{kind} is trusted and wrong");
+        // Refusing to estimate would keep the promise as well.
+        let share = found.trusted as f64 / found.looks as f64;
+        assert!(share > least, "{kind} is trusted at {share:.2} of the samples");
+    }
+}
+
+#[test]
+fn other_estimators_are_hardly_ever_trusted_and_wrong_while_forces_are_those_of_the_sample() {
+    // One in seven of the drives for each kind, others for each.
+    let drives = drives(&[Forces::Jumping, Forces::Ramped]);
+    let mut all = Found::default();
+    for (index, &kind) in PipelineKind::ALL.iter().enumerate() {
+        if EstimatorSettings::default_of(kind).is_some() {
+            let own: Vec<Drive> = drives.iter().copied().skip(index % 7).step_by(7).collect();
+            let found = watch(kind, &own);
+            assert!(200 * found.wrong <= found.trusted, "{kind} is trusted and wrong");
+            all.trusted += found.trusted;
+            all.wrong += found.wrong;
+        }
+    }
+    println!("all: trusted at {}, wrong at {}", all.trusted, all.wrong);
+    assert!(1000 * all.wrong <= all.trusted, "trusted and wrong");
+}
