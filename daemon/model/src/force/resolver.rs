@@ -70,6 +70,7 @@ pub struct ResolvedSample {
 
 impl ResolvedSample {
     /// Traction minus brake in N; `None` while either is not measured.
+    #[inline]
     pub fn control_force_n(&self) -> Option<f64> {
         Some(self.traction_force_n? - self.brake_force_n?)
     }
@@ -97,12 +98,14 @@ impl ResolvedSample {
     /// and every declared resistance beyond the basic one; `None` while no gradient is known.
     ///
     /// What an estimator looks for is what the motion shows beyond this sum.
+    #[inline]
     pub fn known_n_per_kn(&self) -> Option<f64> {
         Some(self.gradient_permille? + self.extra_n_per_kn)
     }
 
     /// Everything that drives the train but its basic resistance, in N: traction minus brake
     /// minus all that is known to retard it.
+    #[inline]
     pub fn driving_force_n(&self) -> Option<f64> {
         Some(self.control_force_n()? - self.weight_kn * self.known_n_per_kn()?)
     }
