@@ -64,7 +64,7 @@ fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
     trial.kind != EffectKind::Unknown
         && !matches!(Search::refusal(trial), Some(Refusal::Immaterial | Refusal::Chance))
         && trial.bic_gain > accepted.bic_gain - EQUAL
-        && trial.reduction > ERROR_REDUCTION_SHARE * accepted.reduction
+        && trial.reduction > ERROR_REDUCTION_SHARE * accepted.reduction.max(0.0)
         && left < 0.5 * trial.evidence
 }
 

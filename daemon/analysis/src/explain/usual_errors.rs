@@ -30,7 +30,7 @@ pub fn given_usual_errors(search: &Search, outcome: &mut Outcome) -> Deviations 
 /// The model with the usual errors as its last effects, under what loads and winds make of the runs; how many
 /// of the last parameters all runs share.
 fn joint(search: &Search, fit: &Fit) -> (Fit, usize) {
-    let usual = usual_errors(|kind| is_in(fit, kind));
+    let usual = usual_errors(fit.theta[0], |kind| is_in(fit, kind));
     let shared = usual.start.len();
     let errors = map_errors(search, fit).into_iter().chain([usual]).map(Candidate::parts);
     (search.problem.with_runs_apart(&search.problem.grown(fit, errors)), shared)

@@ -13,12 +13,14 @@ use super::answer::{
 use super::competing::{CompetingHypotheses, competing_hypotheses, is_in, separating_run};
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
-use super::evidence::{acceptance_score, p_value};
+use super::evidence::p_value;
 use super::identifiability::{identifiability, not_held};
 use super::informed::{told_by_data, undetermined};
 use super::runners_up::runners_up;
 use super::score::{self, Score};
-use super::selection::{Deviations, Outcome, Search, discounted, few_runs_factor, penalty};
+use super::selection::{
+    Deviations, Outcome, Search, deciding_score, discounted, few_runs_factor, penalty,
+};
 use super::unexplained::Unexplained;
 use crate::dataset::DatasetDiagnostic;
 
@@ -68,7 +70,7 @@ pub fn answer(
         caveats: trimmed(&caveats),
         diagnostics,
         effects,
-        ambiguous_with: competing.iter().flat_map(|it| &it.kinds).map(|kind| kind.name()).collect(),
+        ambiguous_with: kinds_of(&competing),
         experiment,
         base: BaseAnswer {
             a: fit.theta[0],
@@ -211,7 +213,8 @@ fn effect_answers(
             let rest = search.without(likeliest, index);
             let decrease = discounted(likeliest, index, rest.cost - likeliest.cost);
             let reduction = score::reduction(search.problem, &rest, likeliest);
-            let score = acceptance_score(decrease - penalty(likeliest, index), reduction);
+            let evidence = decrease - penalty(likeliest, index);
+            let score = deciding_score(likeliest, index, evidence, reduction);
             let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
             let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
                 / search.problem.runs.len().max(1) as f64;
@@ -243,6 +246,17 @@ fn effect_answers(
         .collect();
     answers.sort_by(|one, other| other.0.total_cmp(&one.0));
     answers.into_iter().map(|(_, answer)| answer).collect()
+}
+
+/// The kinds that could stand in the place of some effect, each once.
+fn kinds_of(competing: &[CompetingHypotheses]) -> Vec<&'static str> {
+    let mut kinds: Vec<&'static str> = Vec::new();
+    for kind in competing.iter().flat_map(|it| &it.kinds) {
+        if !kinds.contains(&kind.name()) {
+            kinds.push(kind.name());
+        }
+    }
+    kinds
 }
 
 fn verdict(

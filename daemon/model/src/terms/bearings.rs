@@ -32,6 +32,8 @@ pub const PARAMETERS: [Parameter; 2] = [
 ];
 /// Time constant in s that is assumed before any is known.
 pub const TYPICAL_TAU_S: f64 = 200.0;
+/// Standard deviation of what bearings that warm up usually add at the start, as a share of a.
+pub const USUAL_STD: f64 = 0.05;
 /// Bearings are cold again after a gap of so many s between two samples.
 pub const COLD_AGAIN_S: f64 = 1800.0;
 

@@ -2,7 +2,7 @@
 //! curve constant. No effect, but what a finished model is fitted beside.
 
 use dynocar_model::terms::delay::DelayLine;
-use dynocar_model::terms::{Parameter, curve, delay, traction};
+use dynocar_model::terms::{Parameter, bearings, curve, delay, traction};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
@@ -20,14 +20,17 @@ enum Figure {
     Lateness,
     /// By a share of the curve resistance.
     Curves,
+    /// By a share of a when bearings are cold.
+    Warming,
 }
 
 /// All of them with the standard deviations of their errors.
-const FIGURES: [(Figure, f64); 4] = [
+const FIGURES: [(Figure, f64); 5] = [
     (Figure::Traction, traction::USUAL_STD),
     (Figure::Brake, traction::USUAL_STD),
     (Figure::Lateness, delay::USUAL_STD_S),
     (Figure::Curves, curve::USUAL_STD),
+    (Figure::Warming, bearings::USUAL_STD),
 ];
 /// What is looked for, in standard deviations, and the step of differences.
 const BEYOND: f64 = 10.0;
@@ -35,28 +38,33 @@ const STEP: f64 = 0.1;
 
 #[derive(Debug)]
 struct UsualErrors {
+    /// a, in N/kN.
+    a_n_per_kn: f64,
     figures: Vec<Figure>,
     parameters: Vec<Parameter>,
     information: DMatrix<f64>,
 }
 
 /// The errors of the figures that none of some effects is about, at none.
-pub fn usual_errors(is_in: impl Fn(EffectKind) -> bool) -> Candidate {
+pub fn usual_errors(a_n_per_kn: f64, is_in: impl Fn(EffectKind) -> bool) -> Candidate {
     let is_free = |figure: Figure| match figure {
         Figure::Traction => !is_in(EffectKind::TractionGain),
         Figure::Lateness => !is_in(EffectKind::ActuatorDelay),
         Figure::Curves => !is_in(EffectKind::CurveResistance),
+        Figure::Warming => !is_in(EffectKind::BearingTemperature),
         Figure::Brake => true,
     };
     let free: Vec<(Figure, f64)> = FIGURES.into_iter().filter(|it| is_free(it.0)).collect();
     let parameter = |&(figure, std): &(Figure, f64)| {
-        // Nothing acts before it is reported.
-        let least = if figure == Figure::Lateness { 0.0 } else { -BEYOND * std };
+        // Nothing acts before it is reported, and what warms up resists less.
+        let least =
+            if matches!(figure, Figure::Lateness | Figure::Warming) { 0.0 } else { -BEYOND * std };
         Parameter::new("usual_error", (least, BEYOND * std), STEP * std)
     };
     let precisions = free.iter().map(|(_, std)| std.powi(-2));
     let information = DMatrix::from_diagonal(&DVector::from_iterator(free.len(), precisions));
     let errors = UsualErrors {
+        a_n_per_kn,
         figures: free.iter().map(|it| it.0).collect(),
         parameters: free.iter().map(parameter).collect(),
         information,
@@ -94,6 +102,14 @@ impl Hypothesis for UsualErrors {
                 Figure::Curves => {
                     forces.iter_mut().for_each(|it| it.resistance.curve_n_per_kn *= 1.0 + error);
                 }
+                Figure::Warming => {
+                    let delta_a = error * self.a_n_per_kn;
+                    for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
+                        let since_cold_s = sample.since_cold_s;
+                        let tau_s = bearings::TYPICAL_TAU_S;
+                        bearings::act(delta_a, tau_s, since_cold_s, &mut force.resistance);
+                    }
+                }
                 Figure::Lateness => {
                     let mut line = DelayLine::new(error, 0.0);
                     for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
@@ -115,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_figure_that_an_effect_is_about_has_no_usual_error_beside_it() {
-        let free = |kind: EffectKind| usual_errors(|own| own == kind).start.len();
+        let free = |kind: EffectKind| usual_errors(1.0, |own| own == kind).start.len();
         assert_eq!(free(EffectKind::LocalResistance), FIGURES.len());
         for kind in
             [EffectKind::TractionGain, EffectKind::ActuatorDelay, EffectKind::CurveResistance]
@@ -126,7 +142,7 @@ mod tests {
 
     #[test]
     fn nothing_acts_before_it_is_reported_and_the_prior_is_what_is_usual() {
-        let errors = usual_errors(|_| false).hypothesis;
+        let errors = usual_errors(1.0, |_| false).hypothesis;
         let prior = errors.prior_information().expect("a prior");
         for (i, (figure, std)) in FIGURES.into_iter().enumerate() {
             assert!((prior[(i, i)] * std * std - 1.0).abs() < 1e-12);

@@ -76,9 +76,11 @@ pub struct RunScatter {
     pub force: f64,
     /// Of the factor on the basic resistance.
     pub resistance: f64,
+    /// Of the headwind in m/s.
+    pub wind_mps: f64,
 }
 
 impl RunScatter {
     /// What well-kept force sensors and ordinary weather give.
-    pub const USUAL: RunScatter = RunScatter { force: 0.003, resistance: 0.012 };
+    pub const USUAL: RunScatter = RunScatter { force: 0.003, resistance: 0.012, wind_mps: 0.01 };
 }

@@ -1,13 +1,13 @@
 //! What differs from run to run without being an effect: the reading of the force sensors, the
-//! resistance of the day, and the instant that a force is stamped with.
+//! resistance and the wind of the day, and the instant that a force is stamped with.
 //!
-//! Each run has a factor of its own on the control force and on the basic resistance, near 1 with
-//! a standard deviation that is estimated from the runs, and a small delay of its own. They are
-//! integrated out of every fit, so that what is common to all runs is judged by the scatter
+//! Each run has a factor of its own on the control force and on the basic resistance, near 1, and a
+//! headwind of its own, with standard deviations that are estimated from the runs, and a small delay.
+//! They are integrated out of every fit, so that what is common to all runs is judged by the scatter
 //! between them, and a few hundredths of a second between force and speed bend no resistance.
 
 use dynocar_model::train::Davis;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{SMatrix, SVector};
 
 use super::model::integrate_bins;
 use super::noise::RunScatter;
@@ -15,8 +15,11 @@ use super::run_data::RunData;
 use super::whitener::Whitener;
 
 /// A run's own deviations: of the factors on the control force and on the basic resistance from
-/// 1, and the delay of the force in s.
-const DEVIATIONS: usize = 3;
+/// 1, the headwind in m/s, and the delay of the force in s.
+const DEVIATIONS: usize = 4;
+/// The deviations of a run, and their covariance or its inverse.
+pub type RunFactors = SVector<f64, DEVIATIONS>;
+pub type FactorMatrix = SMatrix<f64, DEVIATIONS, DEVIATIONS>;
 
 /// Columns of the deviations.
 pub type Columns = [Vec<f64>; DEVIATIONS];
@@ -28,19 +31,20 @@ const DELAY_S: f64 = 0.02;
 /// What is known beforehand of the scatter between runs counts as so many of them.
 pub const PRIOR_RUNS: f64 = 4.0;
 /// Beyond these a factor is an effect and no scatter.
-pub(super) const MOST: RunScatter = RunScatter { force: 0.008, resistance: 0.03 };
+pub(super) const MOST: RunScatter = RunScatter { force: 0.008, resistance: 0.03, wind_mps: 0.01 };
 /// What loads as they are weighed and winds of ordinary days do at most, once the effects are found.
-pub(super) const MOST_BESIDE: RunScatter = RunScatter { force: 0.05, resistance: 0.15 };
+pub(super) const MOST_BESIDE: RunScatter =
+    RunScatter { force: 0.05, resistance: 0.05, wind_mps: 2.5 };
 
 impl RunScatter {
-    fn precision(self) -> Matrix3<f64> {
-        let deviations = Vector3::new(self.force, self.resistance, DELAY_S);
-        Matrix3::from_diagonal(&deviations.map(|deviation| deviation.powi(-2)))
+    fn precision(self) -> FactorMatrix {
+        let deviations = RunFactors::new(self.force, self.resistance, self.wind_mps, DELAY_S);
+        FactorMatrix::from_diagonal(&deviations.map(|deviation| deviation.powi(-2)))
     }
 
     /// The scatter under which the factors of the runs are likeliest (one step of expectation
     /// maximisation), shrunk towards the usual one and no more than the most.
-    pub fn updated(factors: &[(Vector3<f64>, Matrix3<f64>)], most: RunScatter) -> Self {
+    pub fn updated(factors: &[(RunFactors, FactorMatrix)], most: RunScatter) -> Self {
         let usual = RunScatter::USUAL;
         let count = factors.len() as f64 + PRIOR_RUNS;
         let mean_square = |k: usize, usual: f64| {
@@ -50,6 +54,7 @@ impl RunScatter {
         RunScatter {
             force: mean_square(0, usual.force).min(most.force),
             resistance: mean_square(1, usual.resistance).min(most.resistance),
+            wind_mps: mean_square(2, usual.wind_mps).min(most.wind_mps),
         }
     }
 }
@@ -61,12 +66,18 @@ pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
     let mut columns = Columns::default();
     let force =
         |i: usize| samples[i].control_force_n().unwrap_or(0.0) / samples[i].inertial_mass_kg;
-    let [by_force, by_resistance, by_delay] = &mut columns;
+    let [by_force, by_resistance, by_wind, by_delay] = &mut columns;
     let resistance = |i: usize| {
         let per_unit = samples[i].weight_kn / samples[i].inertial_mass_kg;
         -per_unit * davis.w0_n_per_kn(run.smooth_mps[i])
     };
-    integrate_bins(run, |i| [force(i), resistance(i)], [by_force, by_resistance]);
+    let wind = |i: usize| {
+        let per_unit = samples[i].weight_kn / samples[i].inertial_mass_kg;
+        let outside = 1.0 - samples[i].tunnel_share.unwrap_or(0.0);
+        -per_unit * 2.0 * outside * davis.c * run.smooth_mps[i]
+    };
+    let by = [by_force, by_resistance, by_wind];
+    integrate_bins(run, |i| [force(i), resistance(i), wind(i)], by);
     // The integral of the force's slope is the force.
     let mut segment = usize::MAX;
     let mut at_start = 0.0;
@@ -81,23 +92,16 @@ pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
 }
 
 /// A series less what deviations explain by their columns.
-pub fn remove(columns: &Columns, series: &[f64], deviations: &Vector3<f64>) -> Vec<f64> {
-    let [force, resistance, delay] = columns;
-    let columns = force.iter().zip(resistance).zip(delay);
-    series
-        .iter()
-        .zip(columns)
-        .map(|(value, ((force, resistance), delay))| {
-            value - deviations[0] * force - deviations[1] * resistance - deviations[2] * delay
-        })
-        .collect()
+pub fn remove(columns: &Columns, series: &[f64], deviations: &RunFactors) -> Vec<f64> {
+    let explained = |i: usize| (0..DEVIATIONS).map(|k| deviations[k] * columns[k][i]).sum::<f64>();
+    series.iter().enumerate().map(|(i, value)| value - explained(i)).collect()
 }
 
 /// Removes the runs' own factors from whitened series of one run.
 #[derive(Clone, Debug)]
 pub struct ScatterFilter {
     columns: Columns,
-    precision: Matrix3<f64>,
+    precision: FactorMatrix,
 }
 
 /// The filter with the weights of the innovations.
@@ -106,7 +110,7 @@ pub struct WeightedFilter {
     columns: Columns,
     weights: Vec<f64>,
     /// Covariance of the factors after the run.
-    pub covariance: Matrix3<f64>,
+    pub covariance: FactorMatrix,
     /// Logarithm of the determinant that the factors add.
     pub log_determinant: f64,
 }
@@ -127,37 +131,37 @@ impl ScatterFilter {
             let pairs = self.columns[i].iter().zip(&self.columns[j]).zip(&weights);
             pairs.map(|((one, other), weight)| weight * one * other).sum()
         };
-        let information = self.precision + Matrix3::from_fn(product);
+        let information = self.precision + FactorMatrix::from_fn(product);
         // A sum of a positive definite and a positive semidefinite matrix.
-        let covariance = information.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let covariance = information.try_inverse().unwrap_or_else(FactorMatrix::zeros);
         let log_determinant = (information.determinant() / self.precision.determinant()).ln();
         WeightedFilter { columns: self.columns.clone(), weights, covariance, log_determinant }
     }
 
     /// Cost of the factors themselves.
-    pub fn prior_cost(&self, factors: &Vector3<f64>) -> f64 {
+    pub fn prior_cost(&self, factors: &RunFactors) -> f64 {
         factors.dot(&(self.precision * factors))
     }
 }
 
 impl WeightedFilter {
     /// The factors, less 1, and the delay that fit a whitened series best.
-    pub fn factors(&self, series: &[f64]) -> Vector3<f64> {
+    pub fn factors(&self, series: &[f64]) -> RunFactors {
         let product = |column: &[f64]| -> f64 {
             column.iter().zip(series).zip(&self.weights).map(|((c, s), w)| w * c * s).sum()
         };
-        self.covariance * Vector3::from_fn(|k, _| product(&self.columns[k]))
+        self.covariance * RunFactors::from_fn(|k, _| product(&self.columns[k]))
     }
 
     /// What the factors explain of the square of a series, given its weighted product with each of
     /// their columns.
     pub fn explained(&self, product: impl Fn(&[f64]) -> f64) -> f64 {
-        let products = Vector3::from_fn(|k, _| product(&self.columns[k]));
+        let products = RunFactors::from_fn(|k, _| product(&self.columns[k]));
         products.dot(&(self.covariance * products))
     }
 
     /// The series less what the factors explain.
-    pub fn remove(&self, series: &[f64], factors: &Vector3<f64>) -> Vec<f64> {
+    pub fn remove(&self, series: &[f64], factors: &RunFactors) -> Vec<f64> {
         remove(&self.columns, series, factors)
     }
 

@@ -41,7 +41,8 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
                     sizes.push(speed_error(*value, half));
                 } else if half > 0.0 {
                     // What is a convention has no uncertainty.
-                    let [low, high] = [value - half, value + half].map(|it| number(it, Some(half)));
+                    let ends = [(value - half).max(words::least(name)), value + half];
+                    let [low, high] = ends.map(|it| number(it, Some(half)));
                     let value = number(*value, Some(half));
                     sizes.push(format!("{words} {value}{unit} (95 % interval {low} to {high})"));
                 }

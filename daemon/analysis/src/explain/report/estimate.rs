@@ -18,4 +18,23 @@ impl Estimate {
         let is_known = half.is_finite() && half > 0.0;
         Estimate { value, interval: is_known.then_some([value - half, value + half]) }
     }
+
+    /// The same of what cannot be less than a least.
+    pub fn at_least(self, least: f64) -> Self {
+        let interval = self.interval.map(|ends| ends.map(|it| it.max(least)));
+        Estimate { interval, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_interval_reaches_below_what_a_number_can_be() {
+        let lag_s = Estimate::normal(0.1, 1.0);
+        let [low, high] = lag_s.at_least(0.0).interval.expect("an interval");
+        assert_eq!((low, high), (0.0, 0.1 + HALF_95));
+        assert_eq!(lag_s.at_least(f64::NEG_INFINITY).interval, lag_s.interval);
+    }
 }

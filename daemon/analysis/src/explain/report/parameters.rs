@@ -62,7 +62,7 @@ fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
         unit,
         declared: declared(dataset, name),
         before: None,
-        after: Estimate::normal(value, deviation.unwrap_or(0.0)),
+        after: Estimate::normal(value, deviation.unwrap_or(0.0)).at_least(words::least(name)),
     };
     let rows = effect.parameters.iter().flat_map(|(name, value)| {
         let (meaning, unit) = words::parameter(name);

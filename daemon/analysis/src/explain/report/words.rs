@@ -50,6 +50,24 @@ pub fn parameter(name: &str) -> (&str, &'static str) {
     }
 }
 
+/// The least that a parameter can be: what no interval reaches below.
+pub fn least(name: &str) -> f64 {
+    match name {
+        "c_factor"
+        | "k_n_per_kn_m"
+        | "force_n"
+        | "mass_factor"
+        | "delay_s"
+        | "lag_s"
+        | "rotating_mass_factor"
+        | "delta_a_n_per_kn"
+        | "tau_s"
+        | "adhesion"
+        | "achieved_ratio" => 0.0,
+        _ => f64::NEG_INFINITY,
+    }
+}
+
 /// A value with the digits that its uncertainty leaves meaningful: two of the uncertainty's.
 pub fn number(value: f64, uncertainty: Option<f64>) -> String {
     let scale = uncertainty.filter(|it| it.is_finite() && *it > 0.0);

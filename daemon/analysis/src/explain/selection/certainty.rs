@@ -12,6 +12,8 @@ pub(super) const CERTAIN: f64 = 40.0;
 /// Evidence times the share that it takes from the error, with which it is certain too, and which is asked of what is
 /// chosen among many places or runs: at most 2.3 where nothing acts.
 const CERTAIN_WITH_SHARE: f64 = 6.0;
+/// The same for a form without a name, which is chosen among more.
+const FORM_CERTAIN_WITH_SHARE: f64 = 15.0;
 /// Fewer runs agree on nothing.
 const CERTAIN_RUNS_MIN: usize = 3;
 
@@ -21,20 +23,27 @@ pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64
     acceptance_score(evidence, reduction) > SCORE_MIN || is_certain(fit, index, evidence, reduction)
 }
 
+/// What decided for an effect of a fitted model: its acceptance score, or the least that accepts where it was
+/// accepted because it is certain.
+pub fn deciding_score(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> f64 {
+    let score = acceptance_score(evidence, reduction);
+    if is_certain(fit, index, evidence, reduction) { score.max(SCORE_MIN) } else { score }
+}
+
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
 /// whole train or line, less of it where it takes more, which the runs agree on. What is looked for at many
-/// places or in some of the runs must take more from the error. Never certain so are loads, winds and slippery rails, which change from run to run, a late
-/// speed, which late forces look like, unmapped tunnels, forms without a name, and a local resistance beside a
-/// fitted gradient, whose straight pieces leave such.
+/// places or in some of the runs, and a form without a name, must take more from the error. Never certain so are
+/// loads, winds and slippery rails, which change from run to run, a late speed, which late forces look like,
+/// unmapped tunnels, and a local resistance beside a fitted gradient, whose straight pieces leave such.
 fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
     use EffectKind::{
         DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, Unknown, Wind,
     };
     let effect = &fit.model.effects[index];
-    let is_chosen_among_many = matches!(effect.kind(), DraggingBrake | LocalResistance);
+    let is_chosen_among_many = matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
     let is_beside_a_gradient = fit.model.effects.iter().any(|other| other.is_gradient());
     let needs_the_score = match effect.kind() {
-        LowAdhesion | MassChange | SpeedDelay | Unknown | Wind => true,
+        LowAdhesion | MassChange | SpeedDelay | Wind => true,
         LocalResistance => is_beside_a_gradient,
         // What acts where the map has its tunnels and curves is one number of the line.
         _ => !effect.ends().is_empty(),
@@ -44,7 +53,8 @@ fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
         let size = effect.size(fit.effect_parameters(index)).abs();
         size > CERTAIN_STDS * std
     };
-    let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE;
+    let least = if effect.kind() == Unknown { FORM_CERTAIN_WITH_SHARE } else { CERTAIN_WITH_SHARE };
+    let takes_enough = evidence * reduction > least;
     let is_sure = if is_chosen_among_many {
         evidence > CERTAIN && takes_enough
     } else {

@@ -12,6 +12,7 @@ mod steps;
 
 pub use acceptance::Refusal;
 pub use by_run::{Deviations, deviations, deviations_beside, few_runs_factor, without_each_run};
+pub use certainty::deciding_score;
 pub use outcome::{Outcome, Trial};
 pub use price::{discounted, model_penalty, penalty};
 pub use search::{OBSERVATIONS_MIN, Search};

@@ -1,6 +1,6 @@
 //! Settings of the residual monitor.
 
-use dynocar_model::terms::curve;
+use dynocar_model::terms::{bearings, curve};
 
 use crate::pipeline::momentum::settings::DataSettings;
 use crate::settings;
@@ -35,7 +35,7 @@ settings! {
         curve_constant_std: f64 = curve::USUAL_STD => (0.001 to 1);
         /// Standard deviation of what bearings that warm up add at the start of a run, as a share of the
         /// basic resistance.
-        warming_std: f64 = 0.05 => (0.0001 to 1);
+        warming_std: f64 = bearings::USUAL_STD => (0.0001 to 1);
         /// Standard deviation of the wheels' diameter, as a share of it.
         wheel_std: f64 = 0.0015 => (0.0001 to 0.1);
         /// Standard deviation by which the scales of traction and brake force differ from run to run.

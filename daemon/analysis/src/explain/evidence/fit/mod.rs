@@ -10,7 +10,7 @@ mod robust;
 use std::sync::Arc;
 
 use dynocar_model::train::Davis;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use super::late_speed;
@@ -18,7 +18,7 @@ use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::Noise;
 use super::response::Response;
 use super::run_data::RunData;
-use super::run_scatter::{Columns, WeightedFilter, scatter_columns};
+use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns};
 use super::whitener::Whitener;
 use memory::RunMemory;
 pub use nearby::Nearby;
@@ -93,7 +93,7 @@ pub struct Fit {
     /// The filters of the runs' own factors, with the weights of the innovations.
     pub filters: Vec<WeightedFilter>,
     /// The runs' own factors less 1 and delays, with their covariance.
-    factors: Vec<(Vector3<f64>, Matrix3<f64>)>,
+    factors: Vec<(RunFactors, FactorMatrix)>,
     /// What is known of each run for the model.
     memories: Arc<[RunMemory]>,
 }

@@ -1,8 +1,6 @@
 //! The innovations of a run under Huber's loss.
 
-use nalgebra::Vector3;
-
-use super::super::run_scatter::{ScatterFilter, WeightedFilter};
+use super::super::run_scatter::{RunFactors, ScatterFilter, WeightedFilter};
 use super::super::whitener::{Whitener, robust_weight};
 
 /// The filters of one run under a noise.
@@ -16,7 +14,7 @@ pub(super) struct RunFilters {
 pub(super) struct Whitened {
     pub innovations: Vec<f64>,
     pub filter: WeightedFilter,
-    pub factors: Vector3<f64>,
+    pub factors: RunFactors,
     pub cost: f64,
 }
 
