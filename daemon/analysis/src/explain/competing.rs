@@ -68,6 +68,17 @@ fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
         && left < 0.5 * trial.evidence
 }
 
+/// The kinds that could stand in the place of some effect, each once.
+pub fn kinds_of(competing: &[CompetingHypotheses]) -> Vec<&'static str> {
+    let mut kinds: Vec<&'static str> = Vec::new();
+    for kind in competing.iter().flat_map(|it| &it.kinds) {
+        if !kinds.contains(&kind.name()) {
+            kinds.push(kind.name());
+        }
+    }
+    kinds
+}
+
 /// Whether a model has an effect of a kind.
 pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
     fit.model.effects.iter().any(|effect| effect.kind() == kind)
@@ -77,4 +88,22 @@ pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
 pub fn separating_run(kind: EffectKind, competing: &[EffectKind]) -> &'static str {
     terms::separating_run(kind, competing)
         .unwrap_or("Drive again with other speeds, loads, directions and weather.")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_that_could_stand_in_the_place_of_two_effects_is_named_once() {
+        let of = |accepted, kinds: &[EffectKind]| CompetingHypotheses {
+            accepted,
+            kinds: kinds.to_vec(),
+        };
+        let competing = [
+            of(EffectKind::TunnelDrag, &[EffectKind::Wind, EffectKind::LocalResistance]),
+            of(EffectKind::TractionGain, &[EffectKind::Wind]),
+        ];
+        assert_eq!(kinds_of(&competing), ["wind", "local_resistance"]);
+    }
 }

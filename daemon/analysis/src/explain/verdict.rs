@@ -10,7 +10,9 @@ use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Identifiability,
     Location, Meaning, PlaceUncertainty, Verdict,
 };
-use super::competing::{CompetingHypotheses, competing_hypotheses, is_in, separating_run};
+use super::competing::{
+    CompetingHypotheses, competing_hypotheses, is_in, kinds_of, separating_run,
+};
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
@@ -246,17 +248,6 @@ fn effect_answers(
         .collect();
     answers.sort_by(|one, other| other.0.total_cmp(&one.0));
     answers.into_iter().map(|(_, answer)| answer).collect()
-}
-
-/// The kinds that could stand in the place of some effect, each once.
-fn kinds_of(competing: &[CompetingHypotheses]) -> Vec<&'static str> {
-    let mut kinds: Vec<&'static str> = Vec::new();
-    for kind in competing.iter().flat_map(|it| &it.kinds) {
-        if !kinds.contains(&kind.name()) {
-            kinds.push(kind.name());
-        }
-    }
-    kinds
 }
 
 fn verdict(

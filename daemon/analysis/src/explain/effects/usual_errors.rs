@@ -133,9 +133,8 @@ mod tests {
     fn a_figure_that_an_effect_is_about_has_no_usual_error_beside_it() {
         let free = |kind: EffectKind| usual_errors(1.0, |own| own == kind).start.len();
         assert_eq!(free(EffectKind::LocalResistance), FIGURES.len());
-        for kind in
-            [EffectKind::TractionGain, EffectKind::ActuatorDelay, EffectKind::CurveResistance]
-        {
+        use EffectKind::{ActuatorDelay, BearingTemperature, CurveResistance, TractionGain};
+        for kind in [TractionGain, ActuatorDelay, CurveResistance, BearingTemperature] {
             assert_eq!(free(kind), FIGURES.len() - 1, "{kind:?}");
         }
     }
@@ -146,7 +145,8 @@ mod tests {
         let prior = errors.prior_information().expect("a prior");
         for (i, (figure, std)) in FIGURES.into_iter().enumerate() {
             assert!((prior[(i, i)] * std * std - 1.0).abs() < 1e-12);
-            assert_eq!(errors.parameters()[i].lower >= 0.0, figure == Figure::Lateness);
+            let has_a_sign = matches!(figure, Figure::Lateness | Figure::Warming);
+            assert_eq!(errors.parameters()[i].lower >= 0.0, has_a_sign);
         }
     }
 }

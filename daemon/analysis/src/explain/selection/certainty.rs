@@ -4,6 +4,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::deviations;
 use super::price::at_bound;
+use crate::explain::effects::OUTSIDE_COST;
 use crate::explain::evidence::{CERTAIN_STDS, Fit, SCORE_MIN, acceptance_score};
 
 /// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
@@ -12,8 +13,6 @@ pub(super) const CERTAIN: f64 = 40.0;
 /// Evidence times the share that it takes from the error, with which it is certain too, and which is asked of what is
 /// chosen among many places or runs: at most 2.3 where nothing acts.
 const CERTAIN_WITH_SHARE: f64 = 6.0;
-/// The same for a form without a name, which is chosen among more.
-const FORM_CERTAIN_WITH_SHARE: f64 = 15.0;
 /// Fewer runs agree on nothing.
 const CERTAIN_RUNS_MIN: usize = 3;
 
@@ -53,8 +52,9 @@ fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
         let size = effect.size(fit.effect_parameters(index)).abs();
         size > CERTAIN_STDS * std
     };
-    let least = if effect.kind() == Unknown { FORM_CERTAIN_WITH_SHARE } else { CERTAIN_WITH_SHARE };
-    let takes_enough = evidence * reduction > least;
+    // A force outside the library pays for that here too.
+    let price = if effect.kind() == Unknown { OUTSIDE_COST } else { 0.0 };
+    let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE + price;
     let is_sure = if is_chosen_among_many {
         evidence > CERTAIN && takes_enough
     } else {
