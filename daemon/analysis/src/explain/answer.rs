@@ -202,7 +202,8 @@ pub struct EffectAnswer {
     pub parameters: BTreeMap<String, ParameterValue>,
     /// Their standard deviations.
     pub std: BTreeMap<String, ParameterValue>,
-    /// Probability that the search finds as much where nothing acts.
+    /// Probability that the search finds as much where nothing acts; of what is accepted because it is certain,
+    /// at most that of the least score which accepts.
     pub p_value: f64,
     /// Share of the open-loop error on the fit runs that goes when the effect is added last.
     pub error_reduction: f64,

@@ -27,6 +27,12 @@ pub fn act(wind_plus_mps: f64, direction: f64, resistance: &mut Resistance) {
     resistance.headwind_mps += wind_plus_mps * direction;
 }
 
+/// What a little headwind adds at a speed in m/s, in N/kN for each m/s of it, with so much of the train in tunnels.
+#[inline]
+pub fn slope_n_per_kn(c: f64, speed_mps: f64, tunnel_share: f64) -> f64 {
+    2.0 * (1.0 - tunnel_share) * c * speed_mps
+}
+
 /// Unit: 1 m/s, as far as a little wind acts in proportion to its speed.
 pub const SUSPECT: Suspect = Suspect {
     effect: EffectKind::Wind,
@@ -49,4 +55,25 @@ fn unit(seen: &SuspectInput, direction: f64) -> f64 {
         air.extra_n_per_kn(seen.davis, seen.speed_mps)
     };
     0.5 * (blows(1.0) - blows(-1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::Davis;
+
+    #[test]
+    fn the_slope_is_what_a_little_wind_adds() {
+        let davis = Davis { a: 1.5, b: 0.01, c: 0.0008 };
+        for (speed_mps, tunnel_share) in [(5.0, 0.0), (30.0, 0.4), (80.0, 1.0)] {
+            let by_wind = |wind_plus_mps: f64| {
+                let mut air = Resistance::BASIC;
+                super::super::tunnel::enter(Some(tunnel_share), &mut air);
+                act(wind_plus_mps, 1.0, &mut air);
+                air.extra_n_per_kn(davis, speed_mps)
+            };
+            let slope = (by_wind(1e-3) - by_wind(-1e-3)) / 2e-3;
+            assert!((slope - slope_n_per_kn(davis.c, speed_mps, tunnel_share)).abs() < 1e-9);
+        }
+    }
 }

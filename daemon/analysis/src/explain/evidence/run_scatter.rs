@@ -6,6 +6,7 @@
 //! They are integrated out of every fit, so that what is common to all runs is judged by the scatter
 //! between them, and a few hundredths of a second between force and speed bend no resistance.
 
+use dynocar_model::terms::wind;
 use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
 
@@ -73,8 +74,8 @@ pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
     };
     let wind = |i: usize| {
         let per_unit = samples[i].weight_kn / samples[i].inertial_mass_kg;
-        let outside = 1.0 - samples[i].tunnel_share.unwrap_or(0.0);
-        -per_unit * 2.0 * outside * davis.c * run.smooth_mps[i]
+        let tunnel_share = samples[i].tunnel_share.unwrap_or(0.0);
+        -per_unit * wind::slope_n_per_kn(davis.c, run.smooth_mps[i], tunnel_share)
     };
     let by = [by_force, by_resistance, by_wind];
     integrate_bins(run, |i| [force(i), resistance(i), wind(i)], by);
