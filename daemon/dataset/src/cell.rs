@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use dynocar_model::units::Unit;
+
 use super::clock::TimeFormat;
 use super::error::Problem;
 use super::manifest::ColumnMapping;
@@ -25,11 +27,11 @@ pub fn parse_cell(cell: &[u8], decimal: u8) -> Option<f64> {
 const MAGNITUDE_MAX: f64 = 1e15;
 
 /// A cell's number as it is kept: in the quantity's unit, missing when infinite or as good as that.
-pub fn held(mapping: &ColumnMapping, cell: f64) -> f64 {
+pub fn held(mapping: &ColumnMapping, unit: &Unit, cell: f64) -> f64 {
     if mapping.quantity == Quantity::CurveRadius && cell.is_infinite() {
         return 0.0;
     }
-    let value = mapping.convert(cell);
+    let value = mapping.convert(cell, unit);
     if value.abs() <= MAGNITUDE_MAX { value } else { f64::NAN }
 }
 

@@ -53,9 +53,9 @@ pub struct ColumnMapping {
 }
 
 impl ColumnMapping {
-    /// A cell's number in the quantity's unit.
-    pub fn convert(&self, cell: f64) -> f64 {
-        self.unit.convert(cell * self.scale + self.offset, &self.quantity.unit())
+    /// A cell's number in a unit, as that of the quantity.
+    pub fn convert(&self, cell: f64, to: &Unit) -> f64 {
+        self.unit.convert(cell * self.scale + self.offset, to)
     }
 }
 

@@ -1,6 +1,7 @@
 //! A run's CSV file as columns of numbers.
 
 use csv::ByteRecord;
+use dynocar_model::units::Unit;
 
 use super::cell::{held, lossy, not_a_value, parse_cell};
 use super::clock::DayClock;
@@ -147,6 +148,8 @@ struct Rows<'m> {
 struct Column<'m> {
     mapping: &'m ColumnMapping,
     index: usize,
+    /// The quantity's unit.
+    unit: Unit,
     /// Reads the cells that are times and no numbers.
     clock: Option<DayClock>,
     values: Vec<f64>,
@@ -169,7 +172,8 @@ impl<'m> Rows<'m> {
         for mapping in mappings {
             let index = find_column(mapping, header, layout)?;
             let clock = mapping.format.as_ref().map(DayClock::new);
-            columns.push(Column { mapping, index, clock, values: Vec::new() });
+            let unit = mapping.quantity.unit();
+            columns.push(Column { mapping, index, unit, clock, values: Vec::new() });
         }
         Ok(Rows {
             label,
@@ -228,7 +232,9 @@ impl<'m> Rows<'m> {
                 Some(_) if cell.is_empty() => Some(f64::NAN),
                 Some(clock) => clock.seconds(cell),
             };
-            column.values.push(value.map_or(f64::NAN, |value| held(column.mapping, value)));
+            column
+                .values
+                .push(value.map_or(f64::NAN, |value| held(column.mapping, &column.unit, value)));
             if value.is_some() {
                 continue;
             }

@@ -58,7 +58,7 @@ pub const J_PER_KWH: f64 = 3.6e6;
 /// Metres per second in a mile per hour: 1609.344 m in 3600 s.
 const MILE_PER_HOUR_MPS: f64 = 0.44704;
 
-const UNITS: [Unit; 38] = {
+static UNITS: [Unit; 38] = {
     use Dimension::*;
     [
         unit("s", Time, 1.0, 1.0),
@@ -119,7 +119,7 @@ impl Unit {
 
     /// Every unit.
     pub fn all() -> impl Iterator<Item = Unit> {
-        UNITS.into_iter()
+        UNITS.iter().copied()
     }
 
     /// The units of a dimension.

@@ -59,7 +59,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
 
 /// Whether a trial could stand in the place of the accepted one.
 fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
-    let last = outcome.rounds.last().into_iter().flatten();
+    let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
     trial.kind != EffectKind::Unknown
         && !matches!(Search::refusal(trial), Some(Refusal::Immaterial | Refusal::Chance))

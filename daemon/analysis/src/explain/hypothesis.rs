@@ -135,6 +135,20 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         n_per_kn.resize(run.samples().len(), 0.0);
     }
 
+    /// By how much a unit of each other parameter changes that resistance, at each sample: by differences over
+    /// steps.
+    fn unit_slopes(&self, others: &[f64], steps: &[f64], run: &RunData, slopes: &mut [Vec<f64>]) {
+        let (mut base, mut others) = (Vec::new(), others.to_vec());
+        self.unit_n_per_kn(&others, run, &mut base);
+        for ((k, slope), step) in slopes.iter_mut().enumerate().zip(steps) {
+            let at = others[k];
+            others[k] += step;
+            self.unit_n_per_kn(&others, run, slope);
+            others[k] = at;
+            slope.iter_mut().zip(&base).for_each(|(moved, base)| *moved = (*moved - base) / step);
+        }
+    }
+
     /// True where what it only resists with follows the speed.
     fn feels_speed(&self) -> bool {
         false
@@ -195,6 +209,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// The same structure in other runs.
     fn with_runs(&self, _runs: Vec<String>) -> Option<SharedHypothesis> {
         None
+    }
+
+    /// True when what it follows is one number a run: then a run is one observation of it, however long.
+    fn is_one_number_a_run(&self) -> bool {
+        false
     }
 
     /// Twice the logarithm of the number of structures it was chosen from.

@@ -27,7 +27,7 @@ impl<'o> Unexplained<'o> {
     /// What a finished search leaves; `None` without motion.
     pub fn of(search: &Search, outcome: &'o Outcome) -> Option<Self> {
         let (n_per_kn, share) = search.problem.noise_n_per_kn(outcome.fit.noise, OVER_S)?;
-        let last = outcome.rounds.last().into_iter().flatten();
+        let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
         let refused = last
             .clone()
             .filter_map(|trial| Some((trial, Search::refusal(trial)?)))

@@ -283,7 +283,7 @@ fn verdict(
 fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Considered> {
     let mut list: Vec<Considered> = Vec::new();
     if let Some(last) = outcome.rounds.last() {
-        for trial in last {
+        for trial in last.iter() {
             let reason = if is_in(&outcome.fit, trial.kind) {
                 "found".into()
             } else if competing.iter().any(|it| it.kinds.contains(&trial.kind)) {

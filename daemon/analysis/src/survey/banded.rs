@@ -44,6 +44,11 @@ impl Banded {
         }
     }
 
+    /// Adds a matrix of the same size and width.
+    pub fn add(&mut self, other: &Banded) {
+        self.below.iter_mut().zip(&other.below).for_each(|(own, more)| *own += more);
+    }
+
     /// Factorises.
     ///
     /// # Errors

@@ -69,7 +69,8 @@ impl Layout {
     pub fn push(&self, block: usize, at_m: f64, weight: f64, row: &mut Vec<(usize, f64)>) {
         let (first, count) = self.blocks[block];
         let place = ((at_m - self.start_m) / HEIGHT_STEP_M).clamp(0.0, (count - 1) as f64 - 1e-9);
-        let (node, share) = (place as usize, place.fract());
+        let node = place as usize;
+        let share = place - node as f64;
         for (node, part) in [(node, 1.0 - share), (node + 1, share)] {
             match row.iter_mut().find(|entry| entry.0 == first + node) {
                 Some(entry) => entry.1 += weight * part,

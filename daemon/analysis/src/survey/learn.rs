@@ -101,8 +101,10 @@ fn group(evidence: &Evidence, observation: &Observation, by_pass: bool) -> u32 {
     if passes <= FOLDS { observation.pass } else { (observation.pass / 2) % FOLDS }
 }
 
-/// The walk under which what was left out is predicted best.
+/// The walk under which what was left out is predicted best: how smooth a line is, some passes of it show.
 fn smoothest(evidence: &Evidence) -> Result<f64, NotPositive> {
+    let few = evidence.of_few_passes();
+    let evidence = if can_leave_out(&few) { &few } else { evidence };
     let by_pass = can_leave_out(evidence);
     let scale_n = evidence.fit(1e-6, &|_| true, false)?.residual_n;
     let cost = |walk_per_m: f64, fold: u32| {

@@ -1,5 +1,7 @@
 //! The line that is driven repeatedly, and which parts are passes of it.
 
+use rayon::prelude::*;
+
 use super::alignment::Alignment;
 use super::both_directions::{Compared, compare};
 use super::centring::{PassRows, align};
@@ -12,6 +14,8 @@ use super::tracking::follow;
 const TRIED_MAX: usize = 12;
 /// Passes that the alignment is laid through, at most: more make it no better than GNSS itself.
 const ALIGNED_MAX: usize = 60;
+/// Parts among which the line is looked for, at most.
+const SOUGHT_MAX: usize = 10 * ALIGNED_MAX;
 /// Distance in m between the points of a part.
 const POINT_STEP_M: f64 = 20.0;
 /// A pass covers at least this share of the line, or `PASS_MIN_M`.
@@ -87,6 +91,9 @@ pub struct Pass {
 pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Alignments> {
     let fit: Vec<RecordingPart> =
         recording_parts.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
+    // Both directions of a line come in turns.
+    let pairs: Vec<&[RecordingPart]> = fit.chunks(2).collect();
+    let fit = thinned(&pairs, SOUGHT_MAX / 2).concat();
     let template = template(&fit, recordings)?;
     let back = template.reversed()?;
     let growing = along(&template, &fit, recordings);
@@ -121,7 +128,7 @@ pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
         |(alignment, direction)| {
             let along = self::along(&alignment, &fit, recordings);
             let passes: Vec<PassRows> = along.into_iter().map(|(_, pass)| pass).collect();
-            thinned(&passes).into_iter().map(move |pass| (pass, direction))
+            thinned(&passes, ALIGNED_MAX).into_iter().map(move |pass| (pass, direction))
         },
     );
     let growing = align(joined, &passes.collect::<Vec<_>>(), recordings);
@@ -145,13 +152,13 @@ fn alignment_of(
     };
     let passes: Vec<PassRows> =
         self::along(&first, &own, recordings).into_iter().map(|(_, pass)| pass).collect();
-    let passes: Vec<_> = thinned(&passes).into_iter().map(|pass| (pass, 1)).collect();
+    let passes: Vec<_> = thinned(&passes, ALIGNED_MAX).into_iter().map(|pass| (pass, 1)).collect();
     align(first, &passes, recordings)
 }
 
-fn thinned(passes: &[PassRows]) -> Vec<PassRows> {
-    let step = passes.len().div_ceil(ALIGNED_MAX).max(1);
-    passes.iter().step_by(step).cloned().collect()
+/// So many of them at most, evenly chosen, with the first.
+fn thinned<T: Clone>(all: &[T], most: usize) -> Vec<T> {
+    all.iter().step_by(all.len().div_ceil(most).max(1)).cloned().collect()
 }
 
 fn rows_of(part: &RecordingPart, recordings: &[Recording]) -> std::ops::Range<usize> {
@@ -222,7 +229,7 @@ fn along(
     recordings: &[Recording],
 ) -> Vec<(RecordingPart, PassRows)> {
     let pass = |part: &RecordingPart| Some((*part, pass_along(alignment, part, recordings)?));
-    recording_parts.iter().filter_map(pass).collect()
+    recording_parts.par_iter().filter_map(pass).collect()
 }
 
 fn pass_along(

@@ -13,7 +13,7 @@
 //! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
 //! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
-//!   [`banded`], `bordered`: its solver
+//!   `normal`, [`banded`], `bordered`: its equations and their solver
 //! - [`survey()`]: all of it in turn
 
 pub mod alignment;
@@ -30,6 +30,7 @@ pub mod geodesy;
 pub mod layout;
 pub mod learn;
 pub mod line;
+mod normal;
 pub mod profile;
 pub mod recording;
 mod recording_parts;

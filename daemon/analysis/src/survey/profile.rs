@@ -5,11 +5,13 @@
 //! forces are estimated jointly with them. The heights make a banded system, the few common unknowns
 //! its border; the mass of each pass is fitted in turns, so that work grows linearly with passes.
 
+use rayon::prelude::*;
+
 use super::balance::Observation;
-use super::banded::{Banded, NotPositive};
-use super::bordered::Bordered;
+use super::banded::NotPositive;
 use super::common::{Common, Prior};
 use super::layout::{Course, HEIGHT_STEP_M, Layout};
+use super::normal::Normal;
 
 /// Standard deviation in m of a row of GNSS altitude: far more than it errs, since its errors
 /// last for minutes.
@@ -22,6 +24,10 @@ const PASS_MASS_STD: f64 = 0.03;
 const ROUNDS: usize = 8;
 /// Degrees of freedom of the residuals' distribution.
 const TAIL: f64 = 4.0;
+/// A few passes are so many at most.
+const FEW_PASSES: usize = 100;
+/// Observations that one thread takes at a time.
+const CHUNK: usize = 65_536;
 const GRAVITY_MPS2: f64 = 9.81;
 
 /// An altitude that GNSS gave.
@@ -73,7 +79,38 @@ pub struct Profile {
 /// Which observations count.
 pub type Fold<'f> = &'f (dyn Fn(&Observation) -> bool + Sync);
 
+/// Whether a pass is one of the few, evenly chosen and of both directions alike, that show what is a property
+/// of the line or of the recording, and no number to be averaged.
+pub fn is_one_of_few(pass: usize, passes: usize) -> bool {
+    // Both directions of a line come in turns.
+    (pass / 2).is_multiple_of(one_in(passes))
+}
+
+/// One in so many passes is one of the few.
+fn one_in(passes: usize) -> usize {
+    passes.div_ceil(FEW_PASSES)
+}
+
 impl Evidence {
+    /// What a few passes show.
+    pub fn of_few_passes(&self) -> Evidence {
+        let (passes, each) = (self.courses.len(), one_in(self.courses.len()));
+        let is_chosen = |pass: usize| is_one_of_few(pass, passes);
+        let mut numbers = vec![None; self.courses.len()];
+        let chosen = (0..self.courses.len()).filter(|&pass| is_chosen(pass));
+        chosen.enumerate().for_each(|(number, pass)| numbers[pass] = Some(number as u32));
+        let renumbered =
+            |it: &Observation| Some(Observation { pass: numbers[it.pass as usize]?, ..*it });
+        let courses = self.courses.iter().enumerate().filter(|(pass, _)| is_chosen(*pass));
+        Evidence {
+            layout: self.layout.clone(),
+            courses: courses.map(|(_, course)| *course).collect(),
+            observations: self.observations.iter().filter_map(renumbered).collect(),
+            altitudes: self.altitudes.iter().step_by(each).copied().collect(),
+            prior: self.prior,
+        }
+    }
+
     /// Fits the profile for a variance per m of the gradient's random walk.
     ///
     /// # Errors
@@ -118,43 +155,31 @@ impl Evidence {
         counts: Fold,
         wants_std: bool,
     ) -> Result<(), NotPositive> {
-        let size = self.layout.size();
         let reach_max_m = self.observations.iter().map(|it| it.reach_m).fold(0.0, f64::max);
-        let mut matrix = Banded::zeros(size, self.layout.width(reach_max_m));
-        let mut right = vec![0.0; size];
-        self.add_priors(state, walk_per_m, &mut matrix, &mut right);
-        let mut border = vec![[0.0; Common::COUNT]; size];
-        let (mut corner, mut corner_right) = self.prior.rows(&state.common);
-        let mut row = Vec::with_capacity(16);
-        let mut sizes = Vec::new();
-        for observation in self.observations.iter().filter(|it| counts(it)) {
-            let course = self.courses[observation.pass as usize];
-            self.layout.gradient(course, observation.along_m, observation.reach_m, &mut row);
-            let (residual_n, mass_kg, unit) = state.residual(observation, &row, &self.prior);
-            let ratio = residual_n / state.residual_n;
-            let weight = (TAIL + 1.0) / (TAIL + ratio * ratio) / state.residual_n.powi(2);
-            sizes.push(residual_n.abs());
-            for entry in &mut row {
-                entry.1 *= mass_kg * GRAVITY_MPS2;
-            }
-            let slopes = self.prior.slopes(observation, mass_kg, unit);
-            matrix.add_row(&row, weight);
-            for &(node, value) in &row {
-                right[node] += weight * value * residual_n;
-                for (entry, slope) in border[node].iter_mut().zip(&slopes) {
-                    *entry += weight * value * slope;
+        let none = || Normal::zeros(self.layout.size(), self.layout.width(reach_max_m));
+        let mut normal = none();
+        self.add_priors(state, walk_per_m, &mut normal);
+        normal.add_common(self.prior.rows(&state.common));
+        let of_chunk = |observations: &[Observation]| {
+            let (mut normal, mut row) = (none(), Vec::with_capacity(16));
+            for observation in observations.iter().filter(|it| counts(it)) {
+                let course = self.courses[observation.pass as usize];
+                self.layout.gradient(course, observation.along_m, observation.reach_m, &mut row);
+                let (residual_n, mass_kg, unit) = state.residual(observation, &row, &self.prior);
+                let weight = state.weight(residual_n);
+                for entry in &mut row {
+                    entry.1 *= mass_kg * GRAVITY_MPS2;
                 }
+                let slopes = self.prior.slopes(observation, mass_kg, unit);
+                normal.add_row(&row, &slopes, (residual_n, weight));
             }
-            for (one, slope) in slopes.iter().enumerate() {
-                corner_right[one] += weight * slope * residual_n;
-                for (other, second) in slopes[..=one].iter().enumerate() {
-                    corner[(one, other)] += weight * slope * second;
-                }
-            }
-        }
-        corner.fill_upper_triangle_with_lower_triangle();
-        let factor = matrix.factor()?;
-        let step = Bordered { factor: &factor, border: &border, corner, corner_right }.solve(right);
+            normal
+        };
+        // Added up in order: the same on any number of threads.
+        let chunks: Vec<Normal> = self.observations.par_chunks(CHUNK).map(of_chunk).collect();
+        chunks.into_iter().for_each(|chunk| normal.add(chunk));
+        let mut sizes_n = std::mem::take(&mut normal.sizes_n);
+        let (factor, step) = normal.solve()?;
         for (height, change) in state.heights_m.iter_mut().zip(&step.heights_m) {
             *height += change;
         }
@@ -164,9 +189,9 @@ impl Evidence {
             state.gradient_var =
                 self.layout.gradient_variances(&factor, &step.columns, &step.covariance);
         }
-        if !sizes.is_empty() {
-            let middle = sizes.len() / 2;
-            let scale = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        if !sizes_n.is_empty() {
+            let middle = sizes_n.len() / 2;
+            let scale = 1.4826 * *sizes_n.select_nth_unstable_by(middle, f64::total_cmp).1;
             // The first residuals hold the whole profile and say little of the noise.
             state.residual_n = scale.max(0.3 * state.residual_n);
         }
@@ -174,8 +199,8 @@ impl Evidence {
     }
 
     /// Smoothness of the gradient, a gradient of nothing, and GNSS altitudes.
-    fn add_priors(&self, state: &Profile, walk_per_m: f64, matrix: &mut Banded, right: &mut [f64]) {
-        let heights = &state.heights_m;
+    fn add_priors(&self, state: &Profile, walk_per_m: f64, normal: &mut Normal) {
+        let (heights, Normal { matrix, right, .. }) = (&state.heights_m, normal);
         let mut add = |row: &[(usize, f64)], target: f64, weight: f64| {
             let now: f64 = row.iter().map(|&(node, value)| value * heights[node]).sum();
             matrix.add_row(row, weight);
@@ -210,26 +235,25 @@ impl Evidence {
 
     /// The mass of each pass, given all else.
     fn fit_masses(&self, state: &mut Profile, counts: Fold) {
-        let mut sums = vec![(0.0, 1.0 / (PASS_MASS_STD * PASS_MASS_STD)); self.courses.len()];
-        let mut row = Vec::with_capacity(16);
-        for observation in self.observations.iter().filter(|it| counts(it)) {
-            let pass = observation.pass as usize;
-            self.layout.gradient(
-                self.courses[pass],
-                observation.along_m,
-                observation.reach_m,
-                &mut row,
-            );
-            let (residual_n, _, unit) = state.residual(observation, &row, &self.prior);
-            let slope = observation.mass_kg * unit;
-            let ratio = residual_n / state.residual_n;
-            let weight = (TAIL + 1.0) / (TAIL + ratio * ratio) / state.residual_n.powi(2);
-            sums[pass].0 += weight * slope * (residual_n + slope * state.pass_mass[pass]);
-            sums[pass].1 += weight * slope * slope;
-        }
-        for (mass, (top, bottom)) in state.pass_mass.iter_mut().zip(sums) {
-            *mass = top / bottom;
-        }
+        let of_pass = |observations: &[Observation]| {
+            let pass = observations[0].pass as usize;
+            let mut row = Vec::with_capacity(16);
+            let (mut top, mut bottom) = (0.0, 1.0 / (PASS_MASS_STD * PASS_MASS_STD));
+            for observation in observations.iter().filter(|it| counts(it)) {
+                let Observation { along_m, reach_m, .. } = *observation;
+                self.layout.gradient(self.courses[pass], along_m, reach_m, &mut row);
+                let (residual_n, _, unit) = state.residual(observation, &row, &self.prior);
+                let slope = observation.mass_kg * unit;
+                let weight = state.weight(residual_n);
+                top += weight * slope * (residual_n + slope * state.pass_mass[pass]);
+                bottom += weight * slope * slope;
+            }
+            (pass, top / bottom)
+        };
+        let by_pass = self.observations.par_chunk_by(|one, next| one.pass == next.pass);
+        let masses: Vec<(usize, f64)> = by_pass.map(of_pass).collect();
+        state.pass_mass.fill(0.0);
+        masses.into_iter().for_each(|(pass, mass)| state.pass_mass[pass] = mass);
         // What all passes share is the vehicle's, and moves there at once.
         let driven: Vec<usize> = state.driven(&self.observations, counts);
         let mean = driven.iter().map(|&pass| state.pass_mass[pass]).sum::<f64>()
@@ -269,6 +293,12 @@ impl Evidence {
 }
 
 impl Profile {
+    /// Weight of a residual in N: Student's distribution.
+    fn weight(&self, residual_n: f64) -> f64 {
+        let ratio = residual_n / self.residual_n;
+        (TAIL + 1.0) / (TAIL + ratio * ratio) / self.residual_n.powi(2)
+    }
+
     /// Passes with observations that count.
     fn driven(&self, observations: &[Observation], counts: Fold) -> Vec<usize> {
         let mut has = vec![false; self.pass_mass.len()];

@@ -11,7 +11,7 @@ use super::geodesy::LocalPlane;
 use super::layout::{Course, Layout};
 use super::learn::{Learned, acting_from_pa, learn};
 use super::line::{Alignments, find, pass_of};
-use super::profile::{Altitude, Evidence};
+use super::profile::{Altitude, Evidence, is_one_of_few};
 use super::recording::{RawRecording, Recording, plane_of};
 use super::recording_parts::{RecordingPart, recording_parts};
 use super::stops::{Stop, stands, stops};
@@ -217,8 +217,7 @@ fn profile(
         prior: vehicle.prior,
     };
     let released_pa = acting_from_pa(raws.iter().filter(|raw| raw.is_fit));
-    for block_s in BLOCKS_S {
-        evidence.observations.clear();
+    let observe = |block_s: f64, of: &(dyn Fn(usize) -> bool + Sync)| {
         let of_pass = |(pass, &number): (usize, &usize)| {
             let trip = &trips[number];
             let raw = &raws[trip.recording];
@@ -236,20 +235,38 @@ fn profile(
             };
             seen.into_iter().filter_map(on_line).collect::<Vec<Observation>>()
         };
-        evidence.observations.par_extend(fit.par_iter().enumerate().flat_map_iter(of_pass));
+        let passes = fit.par_iter().enumerate().filter(|(pass, _)| of(*pass));
+        passes.flat_map_iter(of_pass).collect::<Vec<Observation>>()
+    };
+    let of_few = |block_s: f64| observe(block_s, &|pass| is_one_of_few(pass, fit.len()));
+    let block_s = shortest_block_s(&mut evidence, of_few)?;
+    evidence.observations = observe(block_s, &|_| true);
+    if evidence.observations.is_empty() {
+        return Err(SurveyError::NoForces);
+    }
+    evidence.prior.speed_mps = typical_speed(&evidence.observations);
+    let learned = learn(&mut evidence, released_pa)?;
+    let observed = evidence.observations.len();
+    Ok(SurveyedProfile { learned, curves, trips: fit, block_s, observed })
+}
+
+/// Length in s of the shortest blocks of which residuals do not alternate.
+fn shortest_block_s(
+    evidence: &mut Evidence,
+    observed: impl Fn(f64) -> Vec<Observation>,
+) -> Result<f64, NotPositive> {
+    let [shorter @ .., longest_s] = BLOCKS_S;
+    for block_s in shorter {
+        evidence.observations = observed(block_s);
         if evidence.observations.is_empty() {
-            return Err(SurveyError::NoForces);
+            break;
         }
-        let is_longest = block_s == BLOCKS_S[BLOCKS_S.len() - 1];
-        let rough = evidence.fit(1e-6, &|_| true, false)?;
-        if rough.autocorrelation > ALTERNATING || is_longest {
-            evidence.prior.speed_mps = typical_speed(&evidence.observations);
-            let learned = learn(&mut evidence, released_pa)?;
-            let observed = evidence.observations.len();
-            return Ok(SurveyedProfile { learned, curves, trips: fit, block_s, observed });
+        let rough = evidence.of_few_passes().fit(1e-6, &|_| true, false)?;
+        if rough.autocorrelation > ALTERNATING {
+            return Ok(block_s);
         }
     }
-    unreachable!("the longest block is always taken")
+    Ok(longest_s)
 }
 
 /// Where a direction lies in the profile.

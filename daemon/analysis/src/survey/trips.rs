@@ -1,5 +1,7 @@
 //! One-way trips along the line, and what of the recordings is none.
 
+use rayon::prelude::*;
+
 use super::chainage::{Chained, Estimate, WheelsAndLag, chain};
 use super::line::{Alignments, Pass};
 use super::recording::Recording;
@@ -58,7 +60,7 @@ pub fn trips(
     recordings: &[Recording],
 ) -> (Vec<Trip>, WheelsAndLag) {
     let placed: Vec<_> = passes
-        .iter()
+        .par_iter()
         .map(|pass| {
             let recording = &recordings[pass.rows.recording];
             let alignment = alignments.of(pass.direction)?;
@@ -77,9 +79,8 @@ pub fn trips(
         .filter_map(|(_, placed)| placed.as_ref().map(|it| it.2))
         .collect();
     let together = WheelsAndLag::together(&learned, SCALE_SPREAD).unwrap_or(WheelsAndLag::UNKNOWN);
-    let mut trips = Vec::new();
-    for (pass, placed) in passes.iter().zip(placed) {
-        let Some((rows, placed, _)) = placed else { continue };
+    let of_pass = |(pass, placed): (&Pass, Option<(_, Vec<_>, _)>)| {
+        let (rows, placed, _) = placed?;
         let recording = &recordings[pass.rows.recording];
         let is_fit = recording.raw.is_fit;
         // Another day's wheels may be worn or new.
@@ -88,11 +89,10 @@ pub fn trips(
             false => WheelsAndLag::UNKNOWN.scale,
         };
         let lag_s = Estimate { std: together.lag_s.std.max(0.05), ..together.lag_s };
-        if let Some(along) = chain(recording, rows, &placed, WheelsAndLag { scale, lag_s }) {
-            let (recording, direction) = (pass.rows.recording, pass.direction);
-            trips.push(Trip { recording, is_fit, direction, along });
-        }
-    }
+        let along = chain(recording, rows, &placed, WheelsAndLag { scale, lag_s })?;
+        Some(Trip { recording: pass.rows.recording, is_fit, direction: pass.direction, along })
+    };
+    let mut trips: Vec<Trip> = passes.par_iter().zip(placed).filter_map(of_pass).collect();
     trips.sort_by_key(|trip| (trip.recording, trip.along.first_row));
     for index in 1..trips.len() {
         let end = trips[index - 1].rows().end;

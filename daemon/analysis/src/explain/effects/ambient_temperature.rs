@@ -67,6 +67,10 @@ impl Hypothesis for Linear {
         parameters[0].abs() > ambient::LEAST_PER_K
     }
 
+    fn is_one_number_a_run(&self) -> bool {
+        true
+    }
+
     fn affine_in(&self) -> Option<fn(f64) -> f64> {
         Some(|value| value)
     }

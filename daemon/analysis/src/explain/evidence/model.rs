@@ -13,7 +13,7 @@ use super::sample_forces::SampleForces;
 use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
 
 /// Samples that are looked at together.
-const BLOCK: usize = 256;
+const BLOCK: usize = 128;
 
 /// The declared model with Davis coefficients and effects as parameters.
 #[derive(Clone, Default)]
@@ -98,34 +98,38 @@ impl UpdatedModel {
         columns: &mut [Vec<f64>],
     ) {
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-        let bins = |forces: &[SampleForces], scale: f64, bins: &mut Vec<f64>| {
-            let acceleration = |i: usize| {
-                let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
-                let [p0, p1, p2] = forces[i].polynomial(davis, speed_mps);
-                [scale * (p0 + speed_mps * (p1 + speed_mps * p2))]
-            };
-            integrate_bins(run, acceleration, [bins]);
-        };
         let order = self.in_turn(&acts);
         let [before, moved] = forces.each_mut().map(|forces| &mut forces.samples);
-        before.clone_from(&run.declared);
-        let mut elsewhere = theta.to_vec();
-        for (turn, (effect, range)) in order.iter().enumerate() {
-            for &(i, step) in moves.iter().filter(|(i, _)| range.contains(i)) {
-                elsewhere[i] = theta[i] + step;
-                moved.clone_from(before);
-                for (effect, range) in &order[turn..] {
-                    effect.apply(&elsewhere[range.clone()], run, 0, moved);
+        let (mut elsewhere, mut base_mps2) = (theta.to_vec(), Vec::new());
+        let mut moved_mps2 = vec![Vec::new(); moves.len()];
+        for block in self.blocks(run, &acts) {
+            let first = block.start;
+            let push = |forces: &[SampleForces], scale: f64, mps2: &mut Vec<f64>| {
+                mps2.extend(forces.iter().zip(&run.smooth_mps[first..]).map(|(forces, speed)| {
+                    let speed_mps = wheel::true_speed_mps(*speed, scale);
+                    let [p0, p1, p2] = forces.polynomial(davis, speed_mps);
+                    scale * (p0 + speed_mps * (p1 + speed_mps * p2))
+                }));
+            };
+            before.clear();
+            before.extend_from_slice(&run.declared[block]);
+            for (turn, (effect, range)) in order.iter().enumerate() {
+                let own = moves.iter().zip(&mut moved_mps2);
+                for (&(i, step), mps2) in own.filter(|((i, _), _)| range.contains(i)) {
+                    elsewhere[i] = theta[i] + step;
+                    moved.clone_from(before);
+                    for (effect, range) in &order[turn..] {
+                        effect.apply(&elsewhere[range.clone()], run, first, moved);
+                    }
+                    push(moved, self.speed_scale(&elsewhere, &acts), mps2);
+                    elsewhere[i] = theta[i];
                 }
-                bins(moved, self.speed_scale(&elsewhere, &acts), &mut columns[i]);
-                elsewhere[i] = theta[i];
+                effect.apply(&theta[range.clone()], run, first, before);
             }
-            effect.apply(&theta[range.clone()], run, 0, before);
+            push(before, self.speed_scale(theta, &acts), &mut base_mps2);
         }
-        let mut base = Vec::new();
-        bins(before, self.speed_scale(theta, &acts), &mut base);
-        for &(i, step) in moves {
-            columns[i].iter_mut().zip(&base).for_each(|(own, base)| *own = (*own - base) / step);
+        for (&(i, step), mps2) in moves.iter().zip(&moved_mps2) {
+            integrate_bins(run, |k| [(mps2[k] - base_mps2[k]) / step], [&mut columns[i]]);
         }
     }
 
@@ -148,16 +152,25 @@ impl UpdatedModel {
         if is_local { from..(from + BLOCK).min(count) } else { 0..count }
     }
 
+    /// All samples of a run, part by part.
+    fn blocks(
+        &self,
+        run: &RunData,
+        acts: &impl Fn(usize) -> bool,
+    ) -> impl Iterator<Item = Range<usize>> {
+        let next = |block: &Range<usize>| {
+            (block.end < run.samples().len()).then(|| self.block(run, acts, block.end))
+        };
+        std::iter::successors(Some(self.block(run, acts, 0)), next)
+    }
+
     /// The forces on a run for given parameters; `theta` starts with a, b, c.
     pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut UpdatedForces) {
         let all = |_: usize| true;
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let scale = self.speed_scale(theta, &all);
-        let (count, samples) = (run.samples().len(), &mut forces.samples);
-        let next =
-            |block: &Range<usize>| (block.end < count).then(|| self.block(run, &all, block.end));
-        let blocks = std::iter::successors(Some(self.block(run, &all, 0)), next);
-        let polynomials = blocks.flat_map(|block| {
+        let samples = &mut forces.samples;
+        let polynomials = self.blocks(run, &all).flat_map(|block| {
             self.act((run, theta), &all, block.clone(), samples);
             let own = samples.iter().zip(&run.smooth_mps[block]);
             let polynomial = |(state, &speed_mps): (&SampleForces, &f64)| {

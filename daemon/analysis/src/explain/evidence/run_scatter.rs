@@ -6,6 +6,8 @@
 //! They are integrated out of every fit, so that what is common to all runs is judged by the scatter
 //! between them, and a few hundredths of a second between force and speed bend no resistance.
 
+use std::sync::Arc;
+
 use dynocar_model::terms::wind;
 use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
@@ -101,14 +103,14 @@ pub fn remove(columns: &Columns, series: &[f64], deviations: &RunFactors) -> Vec
 /// Removes the runs' own factors from whitened series of one run.
 #[derive(Clone, Debug)]
 pub struct ScatterFilter {
-    columns: Columns,
+    columns: Arc<Columns>,
     precision: FactorMatrix,
 }
 
 /// The filter with the weights of the innovations.
 #[derive(Clone, Debug)]
 pub struct WeightedFilter {
-    columns: Columns,
+    columns: Arc<Columns>,
     weights: Vec<f64>,
     /// Covariance of the factors after the run.
     pub covariance: FactorMatrix,
@@ -123,7 +125,7 @@ impl ScatterFilter {
         for (column, out) in columns.iter().zip(&mut whitened) {
             whitener.whiten(column, out);
         }
-        ScatterFilter { columns: whitened, precision: scatter.precision() }
+        ScatterFilter { columns: whitened.into(), precision: scatter.precision() }
     }
 
     /// The filter with given weights of the innovations.
@@ -132,7 +134,13 @@ impl ScatterFilter {
             let pairs = self.columns[i].iter().zip(&self.columns[j]).zip(&weights);
             pairs.map(|((one, other), weight)| weight * one * other).sum()
         };
-        let information = self.precision + FactorMatrix::from_fn(product);
+        let mut information = self.precision;
+        for i in 0..DEVIATIONS {
+            for j in 0..=i {
+                let sum = self.precision[(i, j)] + product(i, j);
+                (information[(i, j)], information[(j, i)]) = (sum, sum);
+            }
+        }
         // A sum of a positive definite and a positive semidefinite matrix.
         let covariance = information.try_inverse().unwrap_or_else(FactorMatrix::zeros);
         let log_determinant = (information.determinant() / self.precision.determinant()).ln();

@@ -72,7 +72,7 @@ impl Search<'_> {
     /// The greatest strength of the trials of the first round that only their strength may refuse:
     /// what is compared with its distribution where nothing acts.
     pub fn greatest_score(outcome: &Outcome) -> f64 {
-        let first = outcome.rounds.first().into_iter().flatten();
+        let first = outcome.rounds.first().into_iter().flat_map(|round| round.iter());
         first
             .filter(|trial| is_material(trial) && is_possible(trial))
             .map(Trial::acceptance_score)

@@ -1,5 +1,7 @@
 //! What the search tries and finds.
 
+use std::sync::Arc;
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use crate::explain::evidence::{Fit, acceptance_score};
@@ -32,6 +34,9 @@ impl Trial {
     }
 }
 
+/// The best trial of each kind, the strongest first.
+pub type Round = Arc<[Trial]>;
+
 /// What the search found.
 #[derive(Clone)]
 pub struct Outcome {
@@ -41,11 +46,10 @@ pub struct Outcome {
     pub fit: Fit,
     /// The same where it explains most, before usual errors beside it moved it: how sure effects are.
     pub likeliest: Fit,
-    /// The best trial of each kind in each round, the strongest first; the last round is the one
-    /// in which nothing more was accepted.
-    pub rounds: Vec<Vec<Trial>>,
+    /// The rounds; the last is the one in which nothing more was accepted.
+    pub rounds: Vec<Round>,
     /// Where several effects were found, what was tried in the place of each.
-    pub instead: Vec<(EffectKind, Vec<Trial>)>,
+    pub instead: Vec<(EffectKind, Round)>,
     /// Kinds that the data do not allow to test, and why.
     pub not_testable: Vec<(EffectKind, String)>,
     /// Kinds that are certain and small: part of the model, and not named.
@@ -61,7 +65,7 @@ impl Outcome {
     /// The trials of what is certain and small, as they were when it was taken in.
     pub fn small_trials(&self) -> impl Iterator<Item = &Trial> {
         let of = |kind: &EffectKind| {
-            let rounds = self.rounds.iter().rev().flatten();
+            let rounds = self.rounds.iter().rev().flat_map(|round| round.iter());
             rounds.clone().find(|trial| trial.kind == *kind)
         };
         self.small.iter().filter_map(of)

@@ -8,7 +8,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 
 use super::certainty::{is_accepted, may_be};
-use super::outcome::{Outcome, Trial};
+use super::outcome::{Outcome, Round, Trial};
 use super::price::{discounted, model_penalty, penalty};
 use super::steps::{Progress, Steps, round_share};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
@@ -105,7 +105,8 @@ impl Search<'_> {
             let next = self.best(&trials).map(|trial| trial.fit.clone());
             let small = Self::certain_and_small(&trials).filter(|_| next.is_none());
             let small = small.map(|trial| (trial.kind, trial.fit.clone()));
-            outcome.rounds.push(trials);
+            let round = Round::from(trials);
+            outcome.rounds.push(round.clone());
             if let Some((kind, fit)) = small {
                 outcome.small.push(kind);
                 outcome.fit = fit;
@@ -115,7 +116,7 @@ impl Search<'_> {
             outcome.fit = next;
             if outcome.fit.model.effects.len() > 1 {
                 (self.progress)(round_share(outcome.rounds.len(), 0.0), "swapping effects");
-                outcome.instead = self.swap(&mut outcome.fit, &outcome.small);
+                outcome.instead = self.swap(&mut outcome.fit, &outcome.small, round);
                 self.prune(&mut outcome.fit, &outcome.small);
             }
         }
@@ -211,23 +212,17 @@ impl Search<'_> {
         match effect.propose(scan) {
             Proposal::NotTestable(reason) => Tried::NotTestable(effect.kind(), reason),
             Proposal::Candidates(candidates) => {
-                let best = self.best_attempt(base, base, candidates, false);
+                let best = self.best_attempt(base, base, candidates);
                 Tried::Best(best.map(Box::new), effect)
             }
         }
     }
 
     /// The candidate that explains most for its price, fitted on top of a fit.
-    fn best_attempt(
-        &self,
-        base: &Fit,
-        onto: &Fit,
-        candidates: Vec<Candidate>,
-        own_noise: bool,
-    ) -> Option<Trial> {
+    fn best_attempt(&self, base: &Fit, onto: &Fit, candidates: Vec<Candidate>) -> Option<Trial> {
         let attempts: Vec<Trial> = candidates
             .into_par_iter()
-            .map(|candidate| self.attempt(base, onto, candidate, own_noise))
+            .map(|candidate| self.attempt(base, onto, candidate))
             .collect();
         attempts.into_iter().max_by(|one, other| one.bic_gain.total_cmp(&other.bic_gain))
     }
@@ -238,10 +233,9 @@ impl Search<'_> {
     }
 
     /// Fits a candidate on top of a fit; its evidence counts against `base`.
-    fn attempt(&self, base: &Fit, onto: &Fit, candidate: Candidate, own_noise: bool) -> Trial {
+    fn attempt(&self, base: &Fit, onto: &Fit, candidate: Candidate) -> Trial {
         let kind = candidate.hypothesis.kind();
         let fit = self.problem.grown(onto, [candidate.parts()]);
-        let fit = if own_noise { self.problem.with_own_noise(&fit) } else { fit };
         Self::trial(base, fit, kind)
     }
 
@@ -292,7 +286,8 @@ impl Search<'_> {
         let scan = self.scan(&onto)?;
         let Proposal::Candidates(candidates) = effect.propose(&scan) else { return None };
         let many = candidates.len() > 1 || candidates.iter().any(Candidate::is_chosen_among_many);
-        Some((self.best_attempt(base, &onto, candidates, true)?, many))
+        let best = self.best_attempt(base, &onto, candidates)?;
+        Some((Self::trial(base, self.problem.with_own_noise(&best.fit), best.kind), many))
     }
 
     /// Total cost of a model: fit and price.
@@ -301,10 +296,22 @@ impl Search<'_> {
     }
 
     /// Takes each effect out in turn and looks whether another kind does better in its place; what was
-    /// tried in the place of each kind that stands after it.
-    fn swap(&self, fit: &mut Fit, small: &[EffectKind]) -> Vec<(EffectKind, Vec<Trial>)> {
+    /// tried in the place of each kind that stands after it: of the last, while the others stay, in the round
+    /// that brought it.
+    fn swap(
+        &self,
+        fit: &mut Fit,
+        small: &[EffectKind],
+        brought_last: Round,
+    ) -> Vec<(EffectKind, Round)> {
         let mut tried = Vec::new();
-        for index in 0..fit.model.effects.len() {
+        let last = fit.model.effects.len() - 1;
+        let mut others_stay = true;
+        for index in 0..=last {
+            if index == last && others_stay {
+                tried.push((fit.model.effects[last].kind(), brought_last));
+                break;
+            }
             if small.contains(&fit.model.effects[index].kind()) {
                 continue;
             }
@@ -317,8 +324,9 @@ impl Search<'_> {
             {
                 *fit = best.fit.clone();
                 stands = best.kind;
+                others_stay = false;
             }
-            tried.push((stands, trials));
+            tried.push((stands, trials.into()));
         }
         tried
     }

@@ -69,8 +69,13 @@ impl Form {
         match self {
             Form::Power => {
                 let share = (u / one).max(0.0);
-                let steep = other * share.max(POWER_LEAST).powf(other - 1.0) / one;
-                (share.powf(other), if share > 0.0 { steep } else { 0.0 })
+                let value = share.powf(other);
+                let slope = match share {
+                    share if share >= POWER_LEAST => other * value / (share * one),
+                    share if share > 0.0 => other * POWER_LEAST.powf(other - 1.0) / one,
+                    _ => 0.0,
+                };
+                (value, slope)
             }
             Form::Hyperbola => {
                 let held = u.max(other);
@@ -97,6 +102,23 @@ impl Form {
                 (value, -value * away / other)
             }
         }
+    }
+
+    /// Its value at u, and by how much a unit of each number changes it; by nothing where it jumps.
+    #[inline]
+    pub fn value_and_by_numbers(self, numbers: [f64; 2], u: f64) -> (f64, [f64; 2]) {
+        let ([one, other], (value, slope)) = (numbers, self.value_and_slope(numbers, u));
+        let by_numbers = match self {
+            Form::Power if value > 0.0 => [-other * value / one, value * (u / one).ln()],
+            Form::Hyperbola if value > 0.0 => {
+                let held = u.max(other);
+                [1.0 / held, if u > other { 0.0 } else { -one / (held * held) }]
+            }
+            Form::Above | Form::Below | Form::Bell => [-slope, -slope * (u - one) / other],
+            Form::Decay | Form::Rise => [-slope * u / one, 0.0],
+            _ => [0.0; 2],
+        };
+        (value, by_numbers)
     }
 
     /// The formula for a covariate of this name.
@@ -163,6 +185,26 @@ mod tests {
                 let slope = (value(u + 1e-5) - value(u - 1e-5)) / 2e-5;
                 let (_, own) = form.value_and_slope(numbers, u);
                 assert!((own - slope).abs() < 1e-6 * (1.0 + slope.abs()), "{form:?} at {u}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_number_changes_is_that_of_the_values() {
+        for (form, numbers) in CASES {
+            for u in [0.7, 2.0, 4.3, 7.1, 12.0, 18.0] {
+                let (value, own) = form.value_and_by_numbers(numbers, u);
+                assert_eq!(value, form.value_and_slope(numbers, u).0);
+                for number in 0..form.numbers().len() {
+                    let moved = |by: f64| {
+                        let mut moved = numbers;
+                        moved[number] += by;
+                        form.value_and_slope(moved, u).0
+                    };
+                    let difference = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                    let away = (own[number] - difference).abs();
+                    assert!(away < 1e-6 * (1.0 + difference.abs()), "{form:?} {number} at {u}");
+                }
             }
         }
     }

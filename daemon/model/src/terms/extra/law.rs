@@ -32,13 +32,19 @@ impl Factor {
         Some((value, if self.of == Covariate::Speed { slope } else { 0.0 }))
     }
 
-    /// Multiplies values, with their slopes over the speed, by those at each of a covariate; none where
-    /// that is `NaN`, not known.
-    pub fn multiply(&self, covariate: &[f64], values: &mut [f64], slopes: &mut [f64]) {
-        let known = |at: f64| (!at.is_nan()).then_some(at);
-        for ((value, slope), &at) in values.iter_mut().zip(slopes).zip(covariate) {
-            let (own, own_slope) = self.at(|_| known(at)).unwrap_or((0.0, 0.0));
-            (*value, *slope) = (*value * own, *slope * own + *value * own_slope);
+    /// Multiplies values by those at each of a covariate; by none where that is `NaN`, not known.
+    pub fn multiply(&self, covariate: &[f64], values: &mut [f64]) {
+        for (value, &at) in values.iter_mut().zip(covariate) {
+            *value *= if at.is_nan() { 0.0 } else { self.form.value_and_slope(self.numbers, at).0 };
+        }
+    }
+
+    /// Its value at a covariate, and by how much a unit of each number changes it; none where that is `NaN`.
+    #[inline]
+    pub fn value_and_by_numbers(&self, at: f64) -> (f64, [f64; 2]) {
+        match at.is_nan() {
+            true => (0.0, [0.0; 2]),
+            false => self.form.value_and_by_numbers(self.numbers, at),
         }
     }
 

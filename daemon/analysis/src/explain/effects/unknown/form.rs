@@ -98,6 +98,11 @@ impl FormForce {
     }
 }
 
+/// A covariate at each sample; the speed as resistances are evaluated.
+fn covariate(run: &RunData, of: Covariate) -> &[f64] {
+    if of == Covariate::Speed { &run.smooth_mps } else { run.covariate(of) }
+}
+
 /// The greatest product of the factors over the fit runs, and where it lives.
 fn lives(extra: &Extra, scan: &Scan) -> (f64, Location) {
     let unit = Extra { n_per_kn: 1.0, ..extra.clone() };
@@ -155,18 +160,27 @@ impl Hypothesis for FormForce {
     }
 
     fn unit_n_per_kn(&self, others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
-        let factors = self.factors_at(others);
-        let mut slopes = vec![0.0; run.samples().len()];
         n_per_kn.clear();
-        n_per_kn.resize(slopes.len(), 1.0);
-        for factor in &factors {
-            factor.multiply(run.covariate(factor.of), n_per_kn, &mut slopes);
+        n_per_kn.resize(run.samples().len(), 1.0);
+        for factor in self.factors_at(others) {
+            factor.multiply(covariate(run, factor.of), n_per_kn);
         }
-        let away = run.smooth_mps.iter().zip(run.covariate(Covariate::Speed));
-        for ((n_per_kn, slope), (smooth_mps, speed_mps)) in
-            n_per_kn.iter_mut().zip(slopes).zip(away)
-        {
-            *n_per_kn += slope * (smooth_mps - speed_mps);
+    }
+
+    fn unit_slopes(&self, others: &[f64], _: &[f64], run: &RunData, slopes: &mut [Vec<f64>]) {
+        let factors = self.factors_at(others);
+        let covariates: Vec<&[f64]> = factors.iter().map(|it| covariate(run, it.of)).collect();
+        slopes.iter_mut().for_each(Vec::clear);
+        let mut at = vec![(0.0, [0.0; 2]); factors.len()];
+        for i in 0..run.samples().len() {
+            for ((at, factor), covariate) in at.iter_mut().zip(&factors).zip(&covariates) {
+                *at = factor.value_and_by_numbers(covariate[i]);
+            }
+            for (slope, &(factor, number)) in slopes.iter_mut().zip(&self.fitted) {
+                let others = at.iter().enumerate().filter(|(other, _)| *other != factor);
+                let product: f64 = others.map(|(_, (value, _))| value).product();
+                slope.push(product * at[factor].1[number]);
+            }
         }
     }
 

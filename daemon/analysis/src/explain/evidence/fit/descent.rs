@@ -55,7 +55,7 @@ impl FitProblem {
             theta.extend(start);
         }
         let (plan, grown) = (Plan::of(&fit.model), Plan::of(&model));
-        let memories = RunMemory::of_grown(&fit.memories, &plan, &grown);
+        let memories = RunMemory::of_grown(&fit.memories, &self.runs, &plan, &grown);
         self.fit_remembering(&model, (theta, fit.noise), memories)
     }
 

@@ -1,13 +1,14 @@
 //! What a model makes of one run, and by its parameters; what has not changed is not computed again.
 //!
-//! Of what acts together, one effect in which the forces are affine takes two looks at the samples for all
-//! parameters; where there are more, a slope serves as far as the step that it was taken over.
+//! Of what acts together on a run, one effect in which the forces are affine takes two looks at the samples for
+//! all parameters; where there are more, a slope serves as far as the step that it was taken over.
 
 use std::cell::RefCell;
 use std::ops::Range;
 
 use super::super::model::{UpdatedForces, integrate_bins};
 use super::super::response::Response;
+use super::super::run_data::RunData;
 use super::plan::{At, Handling, Plan};
 use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
 
@@ -38,6 +39,7 @@ struct Scratch {
     moved: [UpdatedForces; 2],
     /// At each sample.
     samples: Vec<f64>,
+    slopes: Vec<Vec<f64>>,
 }
 
 /// What the effects make that act together.
@@ -55,12 +57,17 @@ enum Together {
 
 impl RunMemory {
     /// What is known serves a model with more effects, as far as these change nothing of it.
-    pub fn of_grown(memories: &[RunMemory], plan: &Plan, grown: &Plan) -> Vec<RunMemory> {
-        if plan.serves(grown) {
-            memories.to_vec()
-        } else {
-            memories.iter().map(|_| RunMemory::default()).collect()
-        }
+    pub fn of_grown(
+        memories: &[RunMemory],
+        runs: &[RunData],
+        plan: &Plan,
+        grown: &Plan,
+    ) -> Vec<RunMemory> {
+        let of_run = |(memory, run): (&RunMemory, &RunData)| match plan.serves(grown, run) {
+            true => memory.clone(),
+            false => RunMemory::default(),
+        };
+        memories.iter().zip(runs).map(of_run).collect()
     }
 
     /// The modelled speeds at the bins.
@@ -100,19 +107,18 @@ impl RunMemory {
         }
         for (number, effect, range) in at.plan.handled(Handling::Added) {
             let first = at.theta[range.start] - effect.none();
-            let unit = self.added_bins(at, number).to_vec();
-            let mut others = at.theta[range.start + 1..range.end].to_vec();
-            for (k, i) in (range.start + 1..range.end).enumerate() {
-                let step = steps[i - 3];
-                others[k] += step;
-                let column = &mut columns[i];
-                Self::resist(at, effect, &others, column);
-                others[k] = at.theta[i];
-                for (moved, unit) in column.iter_mut().zip(&unit) {
-                    *moved = scale * first * (*moved - unit) / step;
-                }
-            }
+            let unit = self.added_bins(at, number);
             columns[range.start] = unit.iter().map(|unit| scale * unit).collect();
+            let others = range.start + 1..range.end;
+            let by_mps2 = -at.unit_mps2() * scale * first;
+            with_scratch(|Scratch { slopes, .. }| {
+                slopes.resize_with(others.len(), Vec::new);
+                let steps = &steps[others.start - 3..others.end - 3];
+                effect.unit_slopes(&at.theta[others.clone()], steps, at.run, slopes);
+                for (slope, column) in slopes.iter().zip(&mut columns[others]) {
+                    integrate_bins(at.run, |i| [by_mps2 * slope[i]], [column]);
+                }
+            });
         }
         self.columns_together(at, steps, &mut columns);
         self.columns_of_scale(at, steps, &mut columns);
@@ -146,20 +152,17 @@ impl RunMemory {
     /// Reckons what the effects make that act together, where that has changed.
     fn act_together(&mut self, at: At) {
         let At { plan, run, theta, .. } = at;
-        let touches = |(_, effect, range): (usize, &SharedHypothesis, Range<usize>)| {
-            (0..range.len()).any(|parameter| effect.touches(parameter, run))
-        };
         if matches!(self.together, Together::Unknown) {
-            if !plan.handled(Handling::Together).any(touches) {
+            if plan.acting(run).next().is_none() {
                 self.together = Together::Nothing;
-            } else if let Some((effect, range, _)) = plan.affine() {
+            } else if let Some((effect, range, _)) = plan.affine(run) {
                 self.together = with_scratch(|it| affine(at, effect, range, &mut it.forces));
             }
         }
         match &mut self.together {
             Together::Nothing => {}
             Together::Affine { at: response, none, slopes } => {
-                let Some((effect, range, affine_in)) = plan.affine() else { return };
+                let Some((effect, range, affine_in)) = plan.affine(run) else { return };
                 response.clone_from(none);
                 for (value, slope) in theta[range].iter().zip(slopes) {
                     if let Some(slope) = slope {
@@ -168,26 +171,26 @@ impl RunMemory {
                 }
             }
             Together::At(known, _)
-                if plan.together().map(|i| theta[i]).eq(known.iter().copied()) => {}
+                if plan.together(run).map(|i| theta[i]).eq(known.iter().copied()) => {}
             Together::At(known, response) => {
                 known.clear();
-                known.extend(plan.together().map(|i| theta[i]));
+                known.extend(plan.together(run).map(|i| theta[i]));
                 reckon(at, response);
             }
             Together::Unknown => {
                 let mut response = Response::default();
                 reckon(at, &mut response);
-                let known = plan.together().map(|i| theta[i]).collect();
+                let known = plan.together(run).map(|i| theta[i]).collect();
                 self.together = Together::At(known, response);
             }
         }
     }
 
     fn columns_together(&mut self, at: At, steps: &[f64], columns: &mut [Vec<f64>]) {
-        let At { plan, theta, .. } = at;
+        let At { plan, run, theta, .. } = at;
         let davis = at.davis();
         if let Together::Affine { slopes, .. } = &self.together {
-            let Some((_, range, affine_in)) = plan.affine() else { return };
+            let Some((_, range, affine_in)) = plan.affine(run) else { return };
             for (i, slope) in range.zip(slopes) {
                 let Some(slope) = slope else { continue };
                 let step = steps[i - 3];
@@ -197,14 +200,15 @@ impl RunMemory {
             }
             return;
         }
-        let known: Vec<f64> = davis.into_iter().chain(plan.together().map(|i| theta[i])).collect();
-        let own_steps: Vec<f64> = plan.together().map(|i| steps[i - 3]).collect();
+        let together = || plan.together(run);
+        let known: Vec<f64> = davis.into_iter().chain(together().map(|i| theta[i])).collect();
+        let own_steps: Vec<f64> = together().map(|i| steps[i - 3]).collect();
         if self.slopes.as_ref().is_none_or(|(at, _)| !is_near(at, &known, &own_steps)) {
             Self::differences(at, steps, columns);
-            let slopes = plan.together().map(|i| columns[i].clone()).collect();
+            let slopes = together().map(|i| columns[i].clone()).collect();
             self.slopes = Some((known, slopes));
         } else if let Some((_, slopes)) = &self.slopes {
-            plan.together().zip(slopes).for_each(|(i, slope)| columns[i].clone_from(slope));
+            together().zip(slopes).for_each(|(i, slope)| columns[i].clone_from(slope));
         }
     }
 
@@ -216,11 +220,11 @@ impl RunMemory {
             range.filter(move |i| effect.touches(i - start, run)).map(move |i| (i, i - start))
         };
         let (gradients, others): (Vec<_>, Vec<_>) =
-            plan.handled(Handling::Together).partition(|(_, effect, _)| effect.is_gradient());
+            plan.acting(run).partition(|(_, effect, _)| effect.is_gradient());
         for own in gradients {
             let effect = own.1.clone();
             for (i, parameter) in touched(own) {
-                let acts = plan.acts_together();
+                let acts = plan.acts_together(run);
                 with_scratch(|Scratch { samples, .. }| {
                     effect.gradient_permille(parameter, run, samples);
                     plan.model.gradient_slopes((run, theta), acts, samples, &mut columns[i]);
@@ -230,7 +234,7 @@ impl RunMemory {
         let moves: Vec<(usize, f64)> =
             others.into_iter().flat_map(touched).map(|(i, _)| (i, steps[i - 3])).collect();
         if !moves.is_empty() {
-            let acts = plan.acts_together();
+            let acts = plan.acts_together(run);
             with_scratch(|it| {
                 plan.model.differences((run, theta), acts, &moves, &mut it.moved, columns);
             });
@@ -285,7 +289,7 @@ fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
 
 /// What the effects make that act together.
 fn reckon(At { plan, run, theta, .. }: At, response: &mut Response) {
-    let acts = plan.acts_together();
+    let acts = plan.acts_together(run);
     with_scratch(|it| plan.model.response((run, theta), acts, &mut it.forces, response));
 }
 
@@ -312,7 +316,7 @@ fn affine(
     let mut elsewhere = theta.to_vec();
     elsewhere[range.clone()].fill(effect.none());
     let mut none = Response::default();
-    plan.model.response((run, &elsewhere), plan.acts_together(), forces, &mut none);
+    plan.model.response((run, &elsewhere), plan.acts_together(run), forces, &mut none);
     let slope = |(parameter, i): (usize, usize)| {
         let spec = &effect.parameters()[parameter];
         // As far away as possible, where rounding matters least.
@@ -321,7 +325,7 @@ fn affine(
         effect.touches(parameter, run).then(|| {
             elsewhere[i] = far;
             let mut slope = Response::default();
-            plan.model.response((run, &elsewhere), plan.acts_together(), forces, &mut slope);
+            plan.model.response((run, &elsewhere), plan.acts_together(run), forces, &mut slope);
             elsewhere[i] = effect.none();
             let affine_in = effect.affine_in().unwrap_or(|it| it);
             slope.become_slope_from(&none, affine_in(far) - affine_in(effect.none()));

@@ -65,25 +65,39 @@ impl<'m> Plan<'m> {
         own.map(|(number, (effect, range))| (number, effect, range.clone()))
     }
 
-    /// The parameters of what acts together, by their numbers.
-    pub fn together(&self) -> impl Iterator<Item = usize> {
-        self.handled(Handling::Together).flat_map(|(_, _, range)| range)
+    /// What acts together on a run.
+    pub fn acting(
+        &self,
+        run: &RunData,
+    ) -> impl Iterator<Item = (usize, &SharedHypothesis, Range<usize>)> {
+        self.handled(Handling::Together).filter(move |(number, ..)| self.acts_on(*number, run))
     }
 
-    /// Whether what is known for a model serves another, which has its effects and some more.
-    pub fn serves(&self, grown: &Plan) -> bool {
+    fn acts_on(&self, number: usize, run: &RunData) -> bool {
+        let effect = &self.model.effects[number];
+        (0..self.ranges[number].len()).any(|parameter| effect.touches(parameter, run))
+    }
+
+    /// The parameters of what acts together on a run, by their numbers.
+    pub fn together(&self, run: &RunData) -> impl Iterator<Item = usize> {
+        self.acting(run).flat_map(|(_, _, range)| range)
+    }
+
+    /// Whether what is known of a run for a model serves another, which has its effects and some more.
+    pub fn serves(&self, grown: &Plan, run: &RunData) -> bool {
         let count = self.handlings.len();
-        let (own, more) = grown.handlings.split_at(count);
-        own == self.handlings && !more.contains(&Handling::Together)
+        let is_new = |(number, ..): (usize, &SharedHypothesis, Range<usize>)| number >= count;
+        grown.handlings[..count] == self.handlings && !grown.acting(run).any(is_new)
     }
 
-    pub fn acts_together(&self) -> impl Fn(usize) -> bool {
-        |number| self.handlings[number] == Handling::Together
+    pub fn acts_together(&self, run: &RunData) -> impl Fn(usize) -> bool {
+        let numbers: Vec<usize> = self.acting(run).map(|(number, ..)| number).collect();
+        move |number| numbers.contains(&number)
     }
 
-    /// The one effect that acts together, with the function in which it is affine.
-    pub fn affine(&self) -> Option<Affine<'_>> {
-        let mut together = self.handled(Handling::Together);
+    /// The one effect that acts together on a run, with the function in which it is affine.
+    pub fn affine(&self, run: &RunData) -> Option<Affine<'_>> {
+        let mut together = self.acting(run);
         let (_, effect, range) = together.next()?;
         let affine_in = effect.affine_in()?;
         together.next().is_none().then_some((effect, range, affine_in))
