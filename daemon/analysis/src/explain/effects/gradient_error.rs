@@ -200,8 +200,7 @@ impl Hypothesis for Profile {
         let node = parameter % nodes;
         let from_m = if node == 0 { f64::MIN } else { self.nodes_m[node - 1] };
         let to_m = if node == last { f64::MAX } else { self.nodes_m[node + 1] };
-        let passes = |at_m: f64| (from_m..=to_m).contains(&at_m);
-        run.samples().iter().any(|sample| sample.position_m.is_some_and(passes))
+        run.span_m.is_some_and(|[low, high]| low <= to_m && from_m <= high)
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {

@@ -216,19 +216,21 @@ impl UpdatedModel {
         self.integrate(at, acts, accelerations, forces, [rest, by_a, by_b, by_c]);
     }
 
-    /// What the bins change by for a gradient in ‰ along the travel at each sample.
+    /// Acceleration in m/s² of the measured speed by each ‰ of gradient along the travel, at each sample.
     pub fn gradient_slopes(
         &self,
         at: (&RunData, &[f64]),
         acts: impl Fn(usize) -> bool,
-        permille: &[f64],
-        bins: &mut Vec<f64>,
+        forces: &mut UpdatedForces,
+        slopes: &mut Vec<f64>,
     ) {
         let (run, theta) = at;
-        let (scale, mut samples) = (self.speed_scale(theta, &acts), Vec::new());
-        self.act(at, &acts, 0..run.samples().len(), &mut samples);
-        let slope = |i: usize| [scale * samples[i].gradient_slope() * permille[i]];
-        integrate_bins(run, slope, [bins]);
+        let (scale, samples) = (self.speed_scale(theta, &acts), &mut forces.samples);
+        slopes.clear();
+        for block in self.blocks(run, &acts) {
+            self.act(at, &acts, block, samples);
+            slopes.extend(samples.iter().map(|forces| scale * forces.gradient_slope()));
+        }
     }
 
     /// Integrates accelerations under the forces and at the true speed at each sample, as measured.

@@ -32,6 +32,8 @@ pub struct RunData {
     pub declared: Vec<SampleForces>,
     /// Cleaned speed in m/s, lightly smoothed, at which resistances are evaluated.
     pub smooth_mps: Vec<f64>,
+    /// Least and greatest position in m; `None` without one.
+    pub span_m: Option<[f64; 2]>,
     /// What a force may depend on, by the number of the covariate, at each sample; `NaN` where unknown.
     covariates: Vec<Vec<f64>>,
     /// The bins of all segments of motion, in order of time.
@@ -155,6 +157,11 @@ fn prepare_run(
         recording.samples().iter().map(|sample| sample.covariate(*of).unwrap_or(f64::NAN)).collect()
     };
     let covariates = Covariate::ALL.iter().map(of_samples).collect();
+    let positions_m = recording.samples().iter().filter_map(|sample| sample.position_m);
+    let span_m = positions_m.fold(None, |span: Option<[f64; 2]>, at_m| {
+        let [low, high] = span.unwrap_or([at_m; 2]);
+        Some([low.min(at_m), high.max(at_m)])
+    });
     let bins = bins::bins(&recording);
     let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
     let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
@@ -171,6 +178,7 @@ fn prepare_run(
         recording,
         declared,
         smooth_mps,
+        span_m,
         covariates,
         bins,
         distance_ratio,

@@ -1,5 +1,6 @@
 //! Cost, residuals, regressors and normal equations at given parameters.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use dynocar_core::filter::lanes::dot;
@@ -231,6 +232,15 @@ fn difference_steps(model: &UpdatedModel, theta: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// Where a series is more than rounding.
+fn support(series: &[f64]) -> Range<usize> {
+    const ROUNDING: f64 = 1e-15;
+    let most = series.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let counts = |value: &f64| value.abs() > ROUNDING * most;
+    let first = series.iter().position(counts).unwrap_or(0);
+    first..series.iter().rposition(counts).map_or(first, |last| last + 1)
+}
+
 /// `free` are the columns less what the run's own factors would explain.
 fn normal_equations(columns: &[Vec<f64>], free: &[Vec<f64>], whitened: &Whitened) -> RunNormal {
     let (count, weights) = (columns.len(), whitened.filter.weights());
@@ -238,17 +248,18 @@ fn normal_equations(columns: &[Vec<f64>], free: &[Vec<f64>], whitened: &Whitened
         .iter()
         .map(|column| column.iter().zip(weights).map(|(value, weight)| weight * value).collect())
         .collect();
-    // A column that is empty is zero.
-    let product = |one: &[f64], other: &[f64]| match one.is_empty() || other.is_empty() {
+    // A column that is empty is zero, and so is a local one far behind its place.
+    let product = |one: &[f64], range: &Range<usize>, other: &[f64]| match other.is_empty() {
         true => 0.0,
-        false => dot(one, other),
+        false => dot(&one[range.clone()], &other[range.clone()]),
     };
     let mut information = DMatrix::zeros(count, count);
     let mut score = DVector::zeros(count);
     for i in 0..count {
-        score[i] = product(&weighted[i], &whitened.innovations);
+        let range = support(&weighted[i]);
+        score[i] = product(&weighted[i], &range, &whitened.innovations);
         for j in 0..=i {
-            let sum = product(&weighted[i], &free[j]);
+            let sum = product(&weighted[i], &range, &free[j]);
             (information[(i, j)], information[(j, i)]) = (sum, sum);
         }
     }

@@ -39,6 +39,7 @@ struct Scratch {
     moved: [UpdatedForces; 2],
     /// At each sample.
     samples: Vec<f64>,
+    by_permille: Vec<f64>,
     slopes: Vec<Vec<f64>>,
 }
 
@@ -221,15 +222,18 @@ impl RunMemory {
         };
         let (gradients, others): (Vec<_>, Vec<_>) =
             plan.acting(run).partition(|(_, effect, _)| effect.is_gradient());
-        for own in gradients {
-            let effect = own.1.clone();
-            for (i, parameter) in touched(own) {
+        if !gradients.is_empty() {
+            with_scratch(|Scratch { forces, samples, by_permille, .. }| {
                 let acts = plan.acts_together(run);
-                with_scratch(|Scratch { samples, .. }| {
-                    effect.gradient_permille(parameter, run, samples);
-                    plan.model.gradient_slopes((run, theta), acts, samples, &mut columns[i]);
-                });
-            }
+                plan.model.gradient_slopes((run, theta), acts, forces, by_permille);
+                for own in gradients {
+                    let effect = own.1.clone();
+                    for (i, parameter) in touched(own) {
+                        effect.gradient_permille(parameter, run, samples);
+                        integrate_bins(run, |k| [by_permille[k] * samples[k]], [&mut columns[i]]);
+                    }
+                }
+            });
         }
         let moves: Vec<(usize, f64)> =
             others.into_iter().flat_map(touched).map(|(i, _)| (i, steps[i - 3])).collect();
