@@ -48,7 +48,7 @@ pub struct Evidence {
     pub layout: Layout,
     /// The alignment of each pass.
     pub courses: Vec<Course>,
-    /// What the forces say.
+    /// What the forces say, in the order of the passes.
     pub observations: Vec<Observation>,
     /// What GNSS says.
     pub altitudes: Vec<Altitude>,
@@ -88,7 +88,7 @@ pub fn is_one_of_few(pass: usize, passes: usize) -> bool {
 
 /// One in so many passes is one of the few.
 fn one_in(passes: usize) -> usize {
-    passes.div_ceil(FEW_PASSES)
+    passes.div_ceil(FEW_PASSES).max(1)
 }
 
 impl Evidence {

@@ -8,7 +8,8 @@ use crate::explain::evidence::Fit;
 /// Price of an effect of a fitted model in -2 log likelihood: each parameter costs the logarithm of
 /// the number of observations (Schwarz 1978), each choice of a structure twice the logarithm of the
 /// number of structures; what is one number a run is observed once a run. Parameters with a prior of
-/// their own cost what the data narrow them by (Laplace's approximation of the evidence; Rasmussen and Williams 2006, equation 3.32).
+/// their own cost what the data narrow them by (Laplace's approximation of the evidence; Rasmussen and
+/// Williams 2006, equation 3.32).
 pub fn penalty(fit: &Fit, index: usize) -> f64 {
     let effect = &fit.model.effects[index];
     let narrowed = effect.prior_information().and_then(|prior| narrowed(fit, index, prior));

@@ -109,7 +109,7 @@ impl Form {
     pub fn value_and_by_numbers(self, numbers: [f64; 2], u: f64) -> (f64, [f64; 2]) {
         let ([one, other], (value, slope)) = (numbers, self.value_and_slope(numbers, u));
         let by_numbers = match self {
-            Form::Power if value > 0.0 => [-other * value / one, value * (u / one).ln()],
+            Form::Power if u > 0.0 => [-other * value / one, value * (u / one).ln()],
             Form::Hyperbola if value > 0.0 => {
                 let held = u.max(other);
                 [1.0 / held, if u > other { 0.0 } else { -one / (held * held) }]
@@ -163,8 +163,9 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    const CASES: [(Form, [f64; 2]); 11] = [
+    const CASES: [(Form, [f64; 2]); 12] = [
         (Form::Power, [10.0, 1.5]),
+        (Form::Power, [10.0, 0.0]),
         (Form::Power, [10.0, 0.5]),
         (Form::Hyperbola, [15.0, 3.0]),
         (Form::Above, [8.0, 4.0]),
@@ -216,6 +217,8 @@ mod tests {
             for u in [-1e9, -1.0, 0.0, 1e-12, 1e9] {
                 let (value, slope) = form.value_and_slope(numbers, u);
                 assert!(value.is_finite() && slope.is_finite(), "{form:?} at {u}");
+                let (_, by_numbers) = form.value_and_by_numbers(numbers, u);
+                assert!(by_numbers.into_iter().all(f64::is_finite), "{form:?} at {u}");
             }
         }
     }
