@@ -46,6 +46,21 @@ fn in_an_hour_of_ordinary_driving_what_may_be_used_is_right_and_changes_seldom()
     }
 }
 
+#[test]
+fn a_strong_wind_on_a_train_of_more_air_resistance_than_declared_stays_in_the_interval() {
+    // Drawn so: 3.6 m/s of wind and a c two thirds above the declared one, all the way in one direction.
+    let scenarios = named(&["EMU, weighed 2 % wrong"]);
+    let world = World::draw(scenarios[0].scenario, 30_028);
+    let c_share = world.truth.resistance.c / world.declared.resistance.c;
+    assert!(world.wind_mps.abs() > 3.5 && c_share > 1.6, "{} {c_share}", world.wind_mps);
+    let kinds = &[PipelineKind::TrainKalman];
+    let plan =
+        Plan { scenarios: &scenarios, kinds, seeds: 1, first_seed: 30_028, hours: 1.0, threads: 1 };
+    for line in table::run(&plan).unwrap() {
+        assert!(line.usable_percent > 80.0 && line.wrong_s <= 1.0, "{line:?}");
+    }
+}
+
 /// Every snapshot of the recommended pipelines over an hour of a healthy train.
 fn each_snapshot(mut look: impl FnMut(f64, &ParameterSnapshot)) {
     let mut scenario = named(&["EMU, load exact"])[0].scenario;

@@ -2,14 +2,13 @@
 
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::ExplainAnswer;
-use dynocar_model::track::LinearProfile;
-use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
 use super::attainable::attainable_mps;
 use super::case::Case;
+use super::parameters::{ParameterGrade, graded};
 use super::place::{ends_within, place_iou};
 use super::scenario::Competing;
 
@@ -41,24 +40,6 @@ pub struct Grade {
     pub attainable_ratio: Option<f64>,
     /// Greatest acceptance score of a candidate in the first round of the search.
     pub acceptance_score: f64,
-}
-
-/// One parameter.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ParameterGrade {
-    /// Its name.
-    pub name: String,
-    /// Error over the size of the effect.
-    pub error: f64,
-    /// Error over the standard deviation.
-    pub z: f64,
-}
-
-impl ParameterGrade {
-    /// True when the 95 % interval holds the truth.
-    pub fn is_held(&self) -> bool {
-        self.z.abs() < HALF_95
-    }
 }
 
 /// Grades the explanation of a case.
@@ -204,107 +185,4 @@ fn attained(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<A
     let share = (before > 1.2 * oracle).then_some(share);
     let attainable_ratio = attainable_mps(simulated, explanation).map(|left| left / oracle);
     (oracle > 0.0).then(|| Attained { share, left_ratio: after / oracle, attainable_ratio })
-}
-
-/// Parameters that have a single true number; the size of an effect is its distance from none.
-fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<ParameterGrade> {
-    let declared = simulated.declared_train();
-    let number = |name: &str| own["parameters"][name].as_f64();
-    let deviation = |name: &str| own["std"][name].as_f64();
-    let one = |name: &str, truth: f64, none: f64| {
-        (truth != none).then_some(())?;
-        let (value, deviation) = (number(name)?, deviation(name)?);
-        let error = (value - truth) / (truth - none);
-        Some(ParameterGrade { name: name.into(), error, z: (value - truth) / deviation })
-    };
-    let list = match effect {
-        Effect::TunnelDrag { c_factor } => vec![one("c_factor", *c_factor, 1.0)],
-        Effect::CurveResistance { k_n_per_kn_m } => {
-            vec![one("k_n_per_kn_m", *k_n_per_kn_m, declared.curve_constant_n_per_kn_m)]
-        }
-        Effect::Wind { wind_plus_mps, .. } => vec![one("wind_plus_mps", *wind_plus_mps, 0.0)],
-        Effect::DraggingBrake { force_n, .. } => vec![one("force_n", *force_n, 0.0)],
-        Effect::WheelDiameter { speed_scale } => vec![one("speed_scale", *speed_scale, 1.0)],
-        Effect::GradientShift { shift_m } => vec![one("shift_m", *shift_m, 0.0)],
-        Effect::GradientError { profile } => gradient_errors(profile, own),
-        Effect::TractionGain { gain } => vec![one("gain", *gain, 1.0)],
-        Effect::ActuatorDelay { delay_s, lag_s } | Effect::SpeedDelay { delay_s, lag_s } => {
-            vec![one("delay_s", *delay_s, 0.0), one("lag_s", *lag_s, 0.0)]
-        }
-        Effect::RotatingMass { rotating_mass_factor } => {
-            vec![one("rotating_mass_factor", *rotating_mass_factor, declared.rotating_mass_factor)]
-        }
-        Effect::BearingTemperature { delta_a_n_per_kn, tau_s } => {
-            vec![one("delta_a_n_per_kn", *delta_a_n_per_kn, 0.0), one("tau_s", *tau_s, 0.0)]
-        }
-        Effect::AmbientTemperature { w0_per_k, .. } => vec![one("w0_per_k", *w0_per_k, 0.0)],
-        Effect::LocalResistance { extra_n_per_kn, .. } => {
-            vec![one("extra_n_per_kn", *extra_n_per_kn, 0.0)]
-        }
-        Effect::LowAdhesion { adhesion, .. } => vec![one("adhesion", *adhesion, 0.0)],
-        Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) | Effect::Unlisted(_) => {
-            mass_factors(effect, own)
-        }
-    };
-    list.into_iter().flatten().collect()
-}
-
-/// The error of the gradient at every node that was found, over its true root mean square.
-fn gradient_errors(profile: &[(f64, f64)], own: &Value) -> Vec<Option<ParameterGrade>> {
-    let Ok(truth) = LinearProfile::new(profile.to_vec()) else { return Vec::new() };
-    let squares: f64 = profile.iter().map(|(_, permille)| permille * permille).sum();
-    let rms = (squares / profile.len() as f64).sqrt();
-    let found = own["parameters"]["profile"].as_array().into_iter().flatten();
-    let deviations = own["std"]["profile"].as_array().into_iter().flatten();
-    found
-        .zip(deviations)
-        .map(|(node, deviation)| {
-            let away = node[1].as_f64()? - truth.at(node[0].as_f64()?);
-            let z = away / deviation[1].as_f64()?;
-            Some(ParameterGrade { name: "permille".into(), error: away / rms, z })
-        })
-        .collect()
-}
-
-/// Every true factor against the factor found where it holds longest.
-fn mass_factors(effect: &Effect, own: &Value) -> Vec<Option<ParameterGrade>> {
-    let graded = |list: &str, truth: f64, overlap: &dyn Fn(&Value) -> f64| {
-        let found = own["parameters"][list].as_array()?;
-        let (at, best) = found
-            .iter()
-            .enumerate()
-            .max_by(|one, other| overlap(one.1).total_cmp(&overlap(other.1)))?;
-        (overlap(best) > 0.0).then_some(())?;
-        let (value, deviation) = (best["mass_factor"].as_f64()?, own["std"][list][at].as_f64()?);
-        let error = (value - truth) / (truth - 1.0);
-        Some(ParameterGrade { name: "mass_factor".into(), error, z: (value - truth) / deviation })
-    };
-    let length = |entry: &Value, keys: (&str, &str), (from, to): (f64, f64)| {
-        let low = entry[keys.0].as_f64().unwrap_or(0.0).max(from);
-        (entry[keys.1].as_f64().unwrap_or(0.0).min(to) - low).max(0.0)
-    };
-    match effect {
-        Effect::MassChangeSections(sections) => sections
-            .iter()
-            .map(|section| {
-                graded("sections", section.mass_factor, &|entry| {
-                    let same = entry["direction"].as_f64() == Some(section.direction);
-                    let range = (section.from_m, section.to_m);
-                    if same { length(entry, ("from_m", "to_m"), range) } else { 0.0 }
-                })
-            })
-            .collect(),
-        Effect::MassChangeWindows(windows) => windows
-            .iter()
-            .map(|(window, factor)| {
-                let file = dynocar_tests::simulator::run_file::run_file(window.run);
-                graded("windows", *factor, &|entry| {
-                    let range = (window.start_s, window.end_s);
-                    let same = entry["run"] == file.as_str();
-                    if same { length(entry, ("t_start_s", "t_end_s"), range) } else { 0.0 }
-                })
-            })
-            .collect(),
-        _ => Vec::new(),
-    }
 }

@@ -5,6 +5,7 @@
 //! - [`case`]: one simulated dataset, explained in this process
 //! - [`grade`]: the answer against the truth
 //! - [`attainable`]: what the true law leaves when its numbers are estimated
+//! - [`parameters`]: its numbers against the true ones
 //! - [`place`]: its places against the true ones
 //! - [`matrix`]: all kinds over all seeds, in numbers
 //! - [`growth`]: time for 1, 4 and 16 times the data
@@ -16,7 +17,7 @@ pub mod command;
 pub mod grade;
 pub mod growth;
 pub mod matrix;
+pub mod parameters;
 pub mod place;
-
 pub mod scenario;
 pub mod world;

@@ -15,6 +15,8 @@ use crate::pipeline::motion::{OutlierRow, Trust};
 const LOG_WEIGHT_MIN: f64 = -30.0;
 /// Time in s over which evidence is remembered.
 const EVIDENCE_MEMORY_S: f64 = 600.0;
+/// Variance in (m/s)² of a wind that is taken for known.
+const WIND_LEAST: f64 = 1e-12;
 /// Behaviours of a smaller share are left out of what is published.
 const SHARE_MIN: f64 = 1e-4;
 
@@ -154,12 +156,12 @@ impl MotionBank {
     }
 
     /// What all behaviours say together, each by its share; the wind is part of the disturbance, with what
-    /// 1 m/s of it adds in N/kN.
+    /// 1 m/s of it adds in N/kN by an air resistance c (scaled).
     ///
     /// # Real-time
     ///
     /// A few sums for each behaviour, no allocation.
-    pub fn published(&self, by_wind: f64) -> Published {
+    pub fn published(&self, by_wind: f64, c: f64) -> Published {
         const PLACES: [usize; 6] =
             [RESISTANCE, RESISTANCE + 1, RESISTANCE + 2, LOAD, DISTURBANCE, WIND];
         let mut mixture = Mixture::<6>::default();
@@ -178,9 +180,15 @@ impl MotionBank {
         let variance = covariance[(4, 4)]
             + 2.0 * by_wind * covariance[(4, 5)]
             + by_wind * by_wind * covariance[(5, 5)];
+        // The filters take the wind by the declared air resistance. What it leaves open grows with the mean
+        // square of the one that is learned.
+        let square = mean[2] * mean[2] + covariance[(2, 2)];
+        let excess = if c > 0.0 { (square / (c * c) - 1.0).max(0.0) } else { 0.0 };
+        let with_wind = covariance.fixed_view::<4, 1>(0, 5).into_owned();
+        let by_wind_alone = with_wind * with_wind.transpose() / covariance[(5, 5)].max(WIND_LEAST);
         Published {
             mean: mean.fixed_rows::<4>(0).into_owned(),
-            covariance: covariance.fixed_view::<4, 4>(0, 0).into_owned(),
+            covariance: covariance.fixed_view::<4, 4>(0, 0) + by_wind_alone * excess,
             disturbance: (mean[4] + by_wind * mean[5], variance.max(0.0).sqrt()),
         }
     }
@@ -195,5 +203,28 @@ impl MotionBank {
         };
         self.rivals.hypotheses().iter().all(|it| is_sound(&it.filter.belief))
             && self.rivals.weights().iter().all(|weight| weight.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_wind_leaves_open_grows_with_the_air_resistance_that_is_learned() {
+        let c = 0.4;
+        let variance_of_a = |learned_c: f64| {
+            let (mut mean, mut covariance) = (State::zeros(), StateCovariance::zeros());
+            mean[RESISTANCE + 2] = learned_c;
+            for (i, j, value) in [(3, 3, 0.010), (9, 9, 2.0), (3, 9, -0.1), (9, 3, -0.1)] {
+                covariance[(i, j)] = value;
+            }
+            MotionBank::new(&mean, &covariance).published(0.0, c).covariance[(0, 0)]
+        };
+        // Of 0.010 the wind leaves 0.1² / 2 = 0.005; it acts in proportion to c.
+        assert!((variance_of_a(c) - 0.010).abs() < 1e-12);
+        assert!((variance_of_a(2.0 * c) - (0.005 + 4.0 * 0.005)).abs() < 1e-12);
+        // A lower one is no reason to trust more than the declared figure.
+        assert!((variance_of_a(0.5 * c) - 0.010).abs() < 1e-12);
     }
 }

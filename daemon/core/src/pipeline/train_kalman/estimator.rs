@@ -79,7 +79,7 @@ impl TrainKalman {
         let first = Resistance::declared(&train.resistance, settings.prior_relative_std);
         let learned = Learned::new(&settings, &first);
         Ok(TrainKalman {
-            report: Report::new(&learned.bank.published(0.0)),
+            report: Report::new(&learned.bank.published(0.0, 0.0)),
             braking: BrakingWatch::default(),
             before_braking: learned.clone(),
             learned,
@@ -140,6 +140,7 @@ impl TrainKalman {
             map_std_permille: sample.gradient_std_permille,
             drift_variance: drift,
             by_wind: sample.direction * self.first.by_wind(to.speed_mps),
+            by_wind_square: self.first.by_wind_square(),
             wind: wind_over(duration_s, self.settings.wind_std_mps),
             brake_variance: (walk, self.settings.brake_scale_std.powi(2)),
             ..step
@@ -198,7 +199,7 @@ impl TrainKalman {
 
     fn judge(&mut self, by_wind: f64) {
         let inflation = self.long_run().clamp(1.0, LONG_RUN_MAX);
-        let published = self.learned.bank.published(by_wind);
+        let published = self.learned.bank.published(by_wind, self.first.air_resistance());
         self.report.take(&published, inflation, &self.systematic, &self.speeds);
     }
 
@@ -211,7 +212,7 @@ impl TrainKalman {
         self.braking = BrakingWatch::default();
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
-        self.report = Report::new(&self.learned.bank.published(0.0));
+        self.report = Report::new(&self.learned.bank.published(0.0, 0.0));
         self.is_fresh_reset = true;
         self.resets += 1;
     }
@@ -335,7 +336,7 @@ impl Estimator for TrainKalman {
         let Some((mean, covariance)) = kept.moments(davis) else { return false };
         self.first = Resistance::kept(&mean, &covariance);
         self.learned.bank = self.first.bank(&self.settings);
-        self.report = Report::new(&self.learned.bank.published(0.0));
+        self.report = Report::new(&self.learned.bank.published(0.0, 0.0));
         self.moved_min_s = CONFIRMED_S;
         self.kept_mass = kept.moments([Parameter::Mass]).and_then(|(mass_kg, variance)| {
             let relative_variance = variance[(0, 0)] / (mass_kg[0] * mass_kg[0]);

@@ -80,6 +80,8 @@ pub struct Step {
     /// What 1 m/s of wind along the line adds in N/kN. It goes by the declared air resistance: with the
     /// one learned so far the product of two unknowns would seem better known than it is.
     pub by_wind: f64,
+    /// What its square adds in N/kN, headwind or tailwind.
+    pub by_wind_square: f64,
     /// Share of the wind that is left, and the variance in (m/s)² of what comes to it.
     pub wind: (f64, f64),
     /// Variance that comes to the scale of the brake force, and its greatest.
@@ -106,6 +108,7 @@ impl Step {
             map_std_permille: 0.0,
             drift_variance: 0.0,
             by_wind: 0.0,
+            by_wind_square: 0.0,
             wind: (1.0, 0.0),
             brake_variance: (0.0, 0.0),
         }
@@ -152,7 +155,7 @@ impl MotionFilter {
         let slope = (resistance(&at_end) - w0_at_start) / (end_mps - start_mps);
         let slope = if slope.is_finite() { slope } else { 0.0 };
 
-        let wind = step.by_wind * state[WIND];
+        let wind = (step.by_wind + step.by_wind_square * state[WIND]) * state[WIND];
         let seconds = step.duration_s * per_inertia;
         let mut gradient = State::zeros();
         gradient[SPEED] = 1.0 - seconds * slope;
@@ -161,7 +164,7 @@ impl MotionFilter {
         for i in 0..COEFFICIENTS {
             gradient[RESISTANCE + i] = -seconds * mean[i];
         }
-        gradient[WIND] = -seconds * step.by_wind;
+        gradient[WIND] = -seconds * (step.by_wind + 2.0 * step.by_wind_square * state[WIND]);
         gradient[TRACTION_SCALE] = per_inertia * load * traction;
         gradient[BRAKE_SCALE] = -per_inertia * load * brake;
         gradient[FORCE_DELAY] = -per_inertia * load * change;
@@ -216,6 +219,7 @@ mod tests {
             map_std_permille: 0.0,
             drift_variance: 0.0,
             by_wind: 0.07,
+            by_wind_square: 0.002,
             wind: (1.0, 0.0),
             brake_variance: (0.0, 0.0),
         }

@@ -11,9 +11,9 @@ use super::motion_filter::{
 use super::settings::TrainKalmanSettings;
 use crate::pipeline::momentum::{regressors, scaled, unscaling};
 
-/// Share of a declared coefficient's standard deviation that comes from w0 at 20 m/s: a declared zero
-/// is no knowledge.
-const FLOOR_SHARE: f64 = 0.3;
+/// No declared coefficient is taken for known better than one that makes this share of w0 at 20 m/s: a
+/// declared zero is no knowledge.
+const FLOOR_SHARE: f64 = 0.2;
 
 /// a, b, c (scaled, N/kN) with their covariance, declared or kept from earlier.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +27,7 @@ impl Resistance {
     pub fn declared(davis: &Davis, relative_std: f64) -> Self {
         let mean = scaled(davis);
         let floor = FLOOR_SHARE * davis.w0_n_per_kn(20.0).abs();
-        let stds = mean.map(|value| relative_std * (value.abs() + floor));
+        let stds = mean.map(|value| relative_std * value.abs().max(floor));
         Resistance { mean, covariance: Matrix3::from_diagonal(&stds.component_mul(&stds)) }
     }
 
@@ -42,10 +42,20 @@ impl Resistance {
         Resistance { mean: scale * davis, covariance: scale * covariance * scale }
     }
 
+    /// c, scaled.
+    pub fn air_resistance(&self) -> f64 {
+        self.mean[2]
+    }
+
     /// What a headwind of 1 m/s adds at a speed in m/s, in N/kN.
     pub fn by_wind(&self, speed_mps: f64) -> f64 {
         let square = |mps: f64| regressors(mps)[2];
         0.5 * self.mean[2] * (square(speed_mps + 1.0) - square(speed_mps - 1.0))
+    }
+
+    /// What the square of a wind of 1 m/s adds, in N/kN.
+    pub fn by_wind_square(&self) -> f64 {
+        self.mean[2] * regressors(1.0)[2]
     }
 
     /// Filters that believe this, and forces and load as the settings trust them.
