@@ -10,5 +10,6 @@ mod physics;
 mod places;
 mod plausibility;
 mod residual_monitor;
+mod rough;
 mod survey;
 mod surveyed_masses;

@@ -35,13 +35,15 @@ const RUNS_MIN: usize = 2;
 pub struct GradientError;
 
 #[derive(Debug)]
-struct Profile {
-    nodes_m: Vec<f64>,
+pub(super) struct Profile {
+    pub(super) nodes_m: Vec<f64>,
     /// Every node's, or those of growing and then those of falling chainage.
-    parameters: Vec<Parameter>,
-    information: DMatrix<f64>,
-    is_one_way: bool,
-    choice_cost: f64,
+    pub(super) parameters: Vec<Parameter>,
+    pub(super) information: DMatrix<f64>,
+    pub(super) is_one_way: bool,
+    pub(super) choice_cost: f64,
+    /// None for the map's own small error.
+    pub(super) kind: EffectKind,
 }
 
 impl Effect for GradientError {
@@ -81,13 +83,6 @@ impl Effect for GradientError {
     }
 }
 
-/// The map's own small error, at none: no effect, but what the finished model is fitted beside.
-pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
-    let profile = Profile::new(span_m, scale, 1, false);
-    let start = vec![0.0; profile.parameters.len()];
-    Candidate::new(profile, start)
-}
-
 /// Inverse covariance of an Ornstein-Uhlenbeck process at `count` equally distant nodes, for each
 /// of one or two directions.
 fn prior_information(
@@ -113,7 +108,7 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 impl Profile {
-    fn new(
+    pub(super) fn new(
         [low_m, high_m]: [f64; 2],
         scale: ErrorScale,
         directions: usize,
@@ -129,6 +124,7 @@ impl Profile {
             nodes_m,
             is_one_way,
             choice_cost: 0.0,
+            kind: EffectKind::GradientError,
         }
     }
 
@@ -161,7 +157,7 @@ impl Profile {
 
 impl Hypothesis for Profile {
     fn kind(&self) -> EffectKind {
-        EffectKind::GradientError
+        self.kind
     }
 
     fn parameters(&self) -> &[Parameter] {

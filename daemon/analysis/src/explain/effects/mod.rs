@@ -15,6 +15,7 @@ mod gradient_error;
 mod gradient_shift;
 mod local_resistance;
 mod low_adhesion;
+mod map_error;
 mod mass_change;
 mod proposal;
 mod rotating_mass;
@@ -29,7 +30,7 @@ mod wind;
 pub use super::hypothesis::{
     AtBound, Hypothesis, OnOthers, ReportContext, Reported, SharedHypothesis, Turn,
 };
-pub use gradient_error::map_error;
+pub use map_error::{map_error, map_error_as_fitted};
 pub use proposal::{Candidate, Effect, Proposal};
 pub use usual_errors::usual_errors;
 

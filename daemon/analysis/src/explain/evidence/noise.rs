@@ -18,6 +18,8 @@ pub struct Noise {
     pub fading_s: f64,
     /// What differs from run to run.
     pub scatter: RunScatter,
+    /// What it is taken for at most.
+    pub scatter_most: RunScatter,
 }
 
 impl Noise {
@@ -29,6 +31,7 @@ impl Noise {
         fading_var: 1e-5,
         fading_s: 20.0,
         scatter: RunScatter::USUAL,
+        scatter_most: RunScatter::MOST,
     };
 
     /// The same with a share of the fading force only: under it a lasting force counts in full, which a

@@ -33,13 +33,14 @@ const DELAY_S: f64 = 0.02;
 
 /// What is known beforehand of the scatter between runs counts as so many of them.
 pub const PRIOR_RUNS: f64 = 4.0;
-/// Beyond these a factor is an effect and no scatter.
-pub(super) const MOST: RunScatter = RunScatter { force: 0.008, resistance: 0.03, wind_mps: 0.01 };
-/// What loads as they are weighed and winds of ordinary days do at most, once the effects are found.
-pub(super) const MOST_BESIDE: RunScatter =
-    RunScatter { force: 0.05, resistance: 0.05, wind_mps: 2.5 };
-
 impl RunScatter {
+    /// Beyond these a factor is an effect and no scatter.
+    pub(super) const MOST: RunScatter =
+        RunScatter { force: 0.008, resistance: 0.03, wind_mps: 0.01 };
+    /// What loads as they are weighed and winds of ordinary days do at most.
+    pub(super) const MOST_BESIDE: RunScatter =
+        RunScatter { force: 0.05, resistance: 0.05, wind_mps: 2.5 };
+
     fn precision(self) -> FactorMatrix {
         let deviations = RunFactors::new(self.force, self.resistance, self.wind_mps, DELAY_S);
         FactorMatrix::from_diagonal(&deviations.map(|deviation| deviation.powi(-2)))

@@ -81,7 +81,7 @@ impl Search<'_> {
 }
 
 /// Whether the last effect of a trial is larger than what declared figures are good for.
-fn is_material(trial: &Trial) -> bool {
+pub(super) fn is_material(trial: &Trial) -> bool {
     let last = trial.last();
     let parameters = trial.fit.effect_parameters(last);
     trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])

@@ -8,44 +8,57 @@ use crate::explain::effects::OUTSIDE_COST;
 use crate::explain::evidence::{CERTAIN_STDS, Fit, SCORE_MIN, acceptance_score};
 
 /// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
-/// where everything declared is a little off, at most 26 for what is not in that world.
-pub(super) const CERTAIN: f64 = 40.0;
+/// where everything declared is a little off, at most 26 for what is not in that world; beside the usual errors 8.
+pub(super) const CERTAIN: f64 = 30.0;
 /// Evidence times the share that it takes from the error, with which it is certain too, and which is asked of what is
-/// chosen among many places or runs: at most 2.3 where nothing acts.
+/// chosen among many places, runs or forms: at most 2.3 where nothing acts; beside the usual errors 5.3 for what is
+/// not the effect.
 const CERTAIN_WITH_SHARE: f64 = 6.0;
 /// Fewer runs agree on nothing.
-const CERTAIN_RUNS_MIN: usize = 3;
+pub(super) const CERTAIN_RUNS_MIN: usize = 3;
 
 /// Whether an effect of a fitted model is more than chance and more than what declared figures are good for: it
 /// takes much from the error for its evidence, or is certain.
 pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
-    acceptance_score(evidence, reduction) > SCORE_MIN || is_certain(fit, index, evidence, reduction)
+    acceptance_score(evidence, reduction) > SCORE_MIN
+        || is_certain(fit, index, evidence, reduction, false)
 }
 
 /// What decided for an effect of a fitted model: its acceptance score, or the least that accepts where it was
 /// accepted because it is certain.
 pub fn deciding_score(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> f64 {
     let score = acceptance_score(evidence, reduction);
-    if is_certain(fit, index, evidence, reduction) { score.max(SCORE_MIN) } else { score }
+    if is_certain(fit, index, evidence, reduction, false) { score.max(SCORE_MIN) } else { score }
 }
 
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
-/// whole train or line, less of it where it takes more, which the runs agree on. What is looked for at many
-/// places or in some of the runs, and a form without a name, must take more from the error. Never certain so are
-/// loads, winds and slippery rails, which change from run to run, a late speed, which late forces look like,
-/// unmapped tunnels, and a local resistance beside a fitted gradient, whose straight pieces leave such.
-fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
+/// whole train or line, less of it where it takes more, which the runs agree on. What is chosen among many places,
+/// runs or forms must take more from the error, and is certain only beside the usual errors, which such choices
+/// stand for else. Never certain are loads, winds and slippery rails, which change from run to run, a late speed,
+/// which late forces look like, and a local resistance beside a fitted gradient, whose straight pieces leave such.
+pub(super) fn is_certain(
+    fit: &Fit,
+    index: usize,
+    evidence: f64,
+    reduction: f64,
+    is_beside_usual_errors: bool,
+) -> bool {
     use EffectKind::{
-        DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, Unknown, Wind,
+        DraggingBrake, GradientError, LocalResistance, LowAdhesion, MassChange, SpeedDelay,
+        Unknown, Wind,
     };
     let effect = &fit.model.effects[index];
-    let is_chosen_among_many = matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
-    let is_beside_a_gradient = fit.model.effects.iter().any(|other| other.is_gradient());
+    let effects = &fit.model.effects;
+    let is_beside_a_gradient = effects.iter().any(|other| other.kind() == GradientError);
+    // What acts where the map has its tunnels and curves is one number of the line.
+    let is_chosen_among_many = match effect.kind() {
+        DraggingBrake | LocalResistance | Unknown => true,
+        _ => !effect.ends().is_empty(),
+    };
     let needs_the_score = match effect.kind() {
         LowAdhesion | MassChange | SpeedDelay | Wind => true,
-        LocalResistance => is_beside_a_gradient,
-        // What acts where the map has its tunnels and curves is one number of the line.
-        _ => !effect.ends().is_empty(),
+        LocalResistance if is_beside_a_gradient => true,
+        _ => is_chosen_among_many && !is_beside_usual_errors,
     };
     let runs_agree = || {
         let std = deviations(fit).std[fit.model.ranges()[index].start];
@@ -55,10 +68,13 @@ fn is_certain(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
     // A force outside the library pays for that here too.
     let price = if effect.kind() == Unknown { OUTSIDE_COST } else { 0.0 };
     let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE + price;
+    // Runs are independent as samples are not.
+    let is_by_run = is_beside_usual_errors && effect.is_one_number_a_run();
+    let least = if is_by_run { CERTAIN_WITH_SHARE } else { CERTAIN };
     let is_sure = if is_chosen_among_many {
-        evidence > CERTAIN && takes_enough
+        evidence > least && takes_enough
     } else {
-        evidence > CERTAIN || takes_enough
+        evidence > least || takes_enough
     };
     is_sure && !needs_the_score && fit.runs.len() >= CERTAIN_RUNS_MIN && runs_agree()
 }

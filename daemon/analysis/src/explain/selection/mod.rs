@@ -1,16 +1,19 @@
 //! The search for effects.
 
 mod acceptance;
+mod beside;
 mod by_run;
 mod certainty;
 mod outcome;
 mod outside;
 mod price;
+mod revision;
 mod search;
 mod small;
 mod steps;
 
 pub use acceptance::Refusal;
+pub use beside::is_certain_beside;
 pub use by_run::{Deviations, deviations, deviations_beside, few_runs_factor, without_each_run};
 pub use certainty::deciding_score;
 pub use outcome::{Outcome, Trial};

@@ -6,6 +6,9 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use crate::explain::evidence::{Fit, acceptance_score};
 
+/// Named effects at most.
+const EFFECTS_MAX: usize = 4;
+
 /// One candidate, fitted together with everything accepted so far.
 #[derive(Clone)]
 pub struct Trial {
@@ -54,12 +57,34 @@ pub struct Outcome {
     pub not_testable: Vec<(EffectKind, String)>,
     /// Kinds that are certain and small: part of the model, and not named.
     pub small: Vec<EffectKind>,
+    /// Kinds that are certain beside the usual errors, with what was tried beside them.
+    pub certain: Vec<(EffectKind, Round)>,
 }
 
 impl Outcome {
     /// Whether an effect of the model is named: it is more than a small, certain error of what is declared.
     pub fn is_named(&self, kind: EffectKind) -> bool {
         !self.small.contains(&kind)
+    }
+
+    /// The kinds of the model's effects.
+    pub(super) fn kinds(&self) -> Vec<EffectKind> {
+        self.fit.model.effects.iter().map(|effect| effect.kind()).collect()
+    }
+
+    /// Whether nothing more is looked for.
+    pub(super) fn is_full(&self) -> bool {
+        self.fit.model.effects.len() >= EFFECTS_MAX + self.small.len()
+    }
+
+    /// Whether another kind may take the place of one of the model, or none.
+    pub(super) fn is_on_trial(&self, kind: EffectKind) -> bool {
+        self.is_named(kind) && !self.is_certain(kind)
+    }
+
+    /// Whether an effect of the model is certain beside the usual errors, whatever it takes from the error.
+    pub fn is_certain(&self, kind: EffectKind) -> bool {
+        self.certain.iter().any(|(certain, _)| *certain == kind)
     }
 
     /// The trials of what is certain and small, as they were when it was taken in.

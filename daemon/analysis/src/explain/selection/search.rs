@@ -7,17 +7,15 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 
-use super::certainty::{is_accepted, may_be};
 use super::outcome::{Outcome, Round, Trial};
 use super::price::{discounted, model_penalty, penalty};
 use super::steps::{Progress, Steps, round_share};
 use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, Noise, RunData, UpdatedModel};
 use crate::explain::scan::Scan;
-use crate::explain::score::{FitErrors, reduction};
+use crate::explain::score::FitErrors;
 
-/// Named effects at most, and rounds: what is taken in and dropped again must come to an end.
-const EFFECTS_MAX: usize = 4;
+/// Rounds at most: what is taken in and dropped again must come to an end.
 const ROUNDS_MAX: usize = 10;
 /// Kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
@@ -89,6 +87,7 @@ impl Search<'_> {
             instead: Vec::new(),
             not_testable: Vec::new(),
             small: Vec::new(),
+            certain: Vec::new(),
         }
     }
 
@@ -98,11 +97,23 @@ impl Search<'_> {
         if outcome.base.observations() < OBSERVATIONS_MIN {
             return outcome;
         }
-        while outcome.fit.model.effects.len() < EFFECTS_MAX + outcome.small.len()
-            && outcome.rounds.len() < ROUNDS_MAX
-        {
+        self.take_what_scores(&mut outcome);
+        while self.take_certain_beside(&mut outcome) {
+            self.take_what_scores(&mut outcome);
+        }
+        self.name_or_forget_small(&mut outcome);
+        outcome
+    }
+
+    /// Takes in what takes much from the error for its evidence, and what is certain alone, until nothing is left
+    /// that does.
+    fn take_what_scores(&self, outcome: &mut Outcome) {
+        let most = outcome.rounds.len() + ROUNDS_MAX;
+        // Kinds that others took the place of at once.
+        let mut fruitless: Vec<EffectKind> = Vec::new();
+        while !outcome.is_full() && outcome.rounds.len() < most {
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
-            let next = self.best(&trials).map(|trial| trial.fit.clone());
+            let next = self.best(&trials, &fruitless).map(|trial| (trial.kind, trial.fit.clone()));
             let small = Self::certain_and_small(&trials).filter(|_| next.is_none());
             let small = small.map(|trial| (trial.kind, trial.fit.clone()));
             let round = Round::from(trials);
@@ -112,24 +123,26 @@ impl Search<'_> {
                 outcome.fit = fit;
                 continue;
             }
-            let Some(next) = next else { break };
+            let Some((kind, next)) = next else { break };
+            let before = outcome.kinds();
             outcome.fit = next;
             if outcome.fit.model.effects.len() > 1 {
                 (self.progress)(round_share(outcome.rounds.len(), 0.0), "swapping effects");
-                outcome.instead = self.swap(&mut outcome.fit, &outcome.small, round);
-                self.prune(&mut outcome.fit, &outcome.small);
+                self.swap(outcome, round);
+                self.prune(outcome);
+            }
+            if outcome.kinds() == before {
+                fruitless.push(kind);
             }
         }
-        self.name_or_forget_small(&mut outcome);
-        outcome
     }
 
     /// The trial to accept: the one with the strongest evidence, or one with about the same that
     /// takes away more of the open-loop error. What is outside the library must explain more than
     /// anything in it.
-    fn best<'t>(&self, trials: &'t [Trial]) -> Option<&'t Trial> {
-        let accepted: Vec<&Trial> =
-            trials.iter().filter(|trial| Self::refusal(trial).is_none()).collect();
+    pub(super) fn best<'t>(&self, trials: &'t [Trial], except: &[EffectKind]) -> Option<&'t Trial> {
+        let asked = trials.iter().filter(|trial| !except.contains(&trial.kind));
+        let accepted: Vec<&Trial> = asked.filter(|trial| Self::refusal(trial).is_none()).collect();
         let strongest = accepted.first()?;
         accepted
             .iter()
@@ -141,10 +154,24 @@ impl Search<'_> {
     }
 
     /// Tries every kind that the model does not have yet; the strongest first.
-    fn round(&self, base: &Fit, not_testable: &mut Vec<(EffectKind, String)>) -> Vec<Trial> {
+    pub(super) fn round(
+        &self,
+        base: &Fit,
+        not_testable: &mut Vec<(EffectKind, String)>,
+    ) -> Vec<Trial> {
+        self.round_of(base, not_testable, |_| true)
+    }
+
+    /// The same of some kinds.
+    pub(super) fn round_of(
+        &self,
+        base: &Fit,
+        not_testable: &mut Vec<(EffectKind, String)>,
+        is_asked: impl Fn(EffectKind) -> bool,
+    ) -> Vec<Trial> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
         let steps = Steps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
-        let mut trials = self.try_all(base, &scan, &steps, not_testable);
+        let mut trials = self.try_all(base, &scan, &steps, not_testable, is_asked);
         let by_advantage = |one: &Trial, other: &Trial| other.bic_gain.total_cmp(&one.bic_gain);
         let before = FitErrors::of(self.problem, base);
         let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
@@ -186,9 +213,11 @@ impl Search<'_> {
         scan: &Scan,
         steps: &Steps,
         not_testable: &mut Vec<(EffectKind, String)>,
+        is_asked: impl Fn(EffectKind) -> bool,
     ) -> Vec<(Trial, &'e dyn Effect)> {
         let is_new = |effect: &&dyn Effect| {
-            !base.model.effects.iter().any(|own| own.kind() == effect.kind())
+            is_asked(effect.kind())
+                && !base.model.effects.iter().any(|own| own.kind() == effect.kind())
         };
         let (outside, library): (Vec<&dyn Effect>, Vec<&dyn Effect>) =
             LIBRARY.into_iter().filter(is_new).partition(|it| it.kind() == EffectKind::Unknown);
@@ -239,7 +268,7 @@ impl Search<'_> {
         Self::trial(base, fit, kind)
     }
 
-    fn trial(base: &Fit, fit: Fit, kind: EffectKind) -> Trial {
+    pub(super) fn trial(base: &Fit, fit: Fit, kind: EffectKind) -> Trial {
         let decrease = base.cost - fit.cost;
         let last = fit.model.effects.len() - 1;
         let price = penalty(&fit, last);
@@ -295,63 +324,6 @@ impl Search<'_> {
         fit.cost + model_penalty(fit)
     }
 
-    /// Takes each effect out in turn and looks whether another kind does better in its place; what was
-    /// tried in the place of each kind that stands after it: of the last, while the others stay, in the round
-    /// that brought it.
-    fn swap(
-        &self,
-        fit: &mut Fit,
-        small: &[EffectKind],
-        brought_last: Round,
-    ) -> Vec<(EffectKind, Round)> {
-        let mut tried = Vec::new();
-        let last = fit.model.effects.len() - 1;
-        let mut others_stay = true;
-        for index in 0..=last {
-            if index == last && others_stay {
-                tried.push((fit.model.effects[last].kind(), brought_last));
-                break;
-            }
-            if small.contains(&fit.model.effects[index].kind()) {
-                continue;
-            }
-            let rest = self.without(fit, index);
-            let trials = self.round(&rest, &mut Vec::new());
-            let mut stands = fit.model.effects[index].kind();
-            if let Some(best) = self.best(&trials)
-                && Self::total(&best.fit) < Self::total(fit) - EQUAL
-                && all_may_be(&best.fit)
-            {
-                *fit = best.fit.clone();
-                stands = best.kind;
-                others_stay = false;
-            }
-            tried.push((stands, trials.into()));
-        }
-        tried
-    }
-
-    /// Drops effects that the others have made needless, and that none of the others stands in for against
-    /// what its own kind says: winds that blow ahead of every train instead of a tunnel's drag.
-    fn prune(&self, fit: &mut Fit, small: &[EffectKind]) {
-        let mut index = 0;
-        while index < fit.model.effects.len() && fit.model.effects.len() > 1 {
-            if small.contains(&fit.model.effects[index].kind()) {
-                index += 1;
-                continue;
-            }
-            let rest = self.without(fit, index);
-            let evidence = Self::total(&rest) - Self::total(fit);
-            let reduction = reduction(self.problem, &rest, fit);
-            let is_needless = !is_accepted(fit, index, evidence, reduction) && all_may_be(&rest);
-            if is_needless || !may_be(fit, index) {
-                *fit = rest;
-            } else {
-                index += 1;
-            }
-        }
-    }
-
     /// The model without one effect, refitted.
     pub fn without(&self, fit: &Fit, index: usize) -> Fit {
         let range = fit.model.ranges()[index].clone();
@@ -361,9 +333,4 @@ impl Search<'_> {
         let start = kept.map(|(_, value)| *value).collect();
         self.problem.fit_with_noise(&model, start, fit.noise)
     }
-}
-
-/// Whether every effect of a fitted model may be what its kind says.
-fn all_may_be(fit: &Fit) -> bool {
-    (0..fit.model.effects.len()).all(|index| may_be(fit, index))
 }

@@ -54,8 +54,7 @@ impl Search<'_> {
     /// Names what has turned out to matter beside the effects that were found, and forgets what is small
     /// where nothing was found, and what is no more certain beside what was.
     pub(super) fn name_or_forget_small(&self, outcome: &mut Outcome) {
-        let kinds: Vec<EffectKind> =
-            outcome.fit.model.effects.iter().map(|effect| effect.kind()).collect();
+        let kinds = outcome.kinds();
         outcome.small.retain(|small| kinds.contains(small));
         if kinds.len() == outcome.small.len() {
             outcome.fit = outcome.base.clone();

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::{Noise, RunScatter};
-use super::super::run_scatter::{MOST, MOST_BESIDE, ScatterFilter, remove};
+use super::super::run_scatter::{ScatterFilter, remove};
 use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::Plan;
@@ -35,7 +35,7 @@ impl FitProblem {
 
     /// The noise that a fit's residuals show, and its model fitted again.
     pub fn with_own_noise(&self, fit: &Fit) -> Fit {
-        self.again(fit, self.noise_left_by(fit, MOST))
+        self.again(fit, self.noise_left_by(fit))
     }
 
     /// Fits the model of a fit again, under another noise.
@@ -62,9 +62,11 @@ impl FitProblem {
     /// The model of a fit where loads and winds of ordinary days may set the runs apart, as far as they
     /// show it.
     pub fn with_runs_apart(&self, fit: &Fit) -> Fit {
-        let mut fit = self.again(fit, Noise { scatter: MOST_BESIDE, ..fit.noise });
+        let most = RunScatter::MOST_BESIDE;
+        let noise = Noise { scatter: most, scatter_most: most, ..fit.noise };
+        let mut fit = self.again(fit, noise);
         for _ in 0..APART_TURNS {
-            fit = self.again(&fit, self.noise_left_by(&fit, MOST_BESIDE));
+            fit = self.with_own_noise(&fit);
         }
         fit
     }
@@ -129,8 +131,8 @@ impl FitProblem {
     }
 
     /// The noise that the residuals of a fit show.
-    fn noise_left_by(&self, fit: &Fit, most: RunScatter) -> Noise {
-        let scatter = RunScatter::updated(&fit.factors, most);
+    fn noise_left_by(&self, fit: &Fit) -> Noise {
+        let scatter = RunScatter::updated(&fit.factors, fit.noise.scatter_most);
         let residuals: Vec<Vec<f64>> = fit
             .residuals
             .iter()

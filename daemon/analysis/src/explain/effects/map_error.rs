@@ -1,0 +1,61 @@
+//! The map's own small error: no effect, but what a finished model is fitted beside.
+
+use dynocar_model::terms::Parameter;
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::gradient_error::Profile;
+use super::{Candidate, Hypothesis, SharedHypothesis};
+use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::gradient_prior::ErrorScale;
+
+/// It, at none.
+pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
+    let profile = Profile { kind: EffectKind::None, ..Profile::new(span_m, scale, 1, false) };
+    let start = vec![0.0; profile.parameters.len()];
+    Candidate::new(profile, start)
+}
+
+/// It in the shape in which it was fitted, of any size: one number in the place of its many.
+pub fn map_error_as_fitted(error: SharedHypothesis, permille: &[f64]) -> Candidate {
+    let parameters = [Parameter::new("share", (-10.0, 10.0), 0.1)];
+    Candidate::new(Fitted { error, permille: permille.to_vec(), parameters }, vec![1.0])
+}
+
+#[derive(Debug)]
+struct Fitted {
+    error: SharedHypothesis,
+    /// Its parameters.
+    permille: Vec<f64>,
+    parameters: [Parameter; 1],
+}
+
+impl Hypothesis for Fitted {
+    fn kind(&self) -> EffectKind {
+        EffectKind::None
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        let mut with = forces.to_vec();
+        self.error.apply(&self.permille, run, first, &mut with);
+        for (force, with) in forces.iter_mut().zip(with) {
+            force.gradient_permille +=
+                parameters[0] * (with.gradient_permille - force.gradient_permille);
+        }
+    }
+
+    fn is_gradient(&self) -> bool {
+        true
+    }
+
+    fn gradient_permille(&self, _parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
+        let mut with = run.declared.clone();
+        self.error.apply(&self.permille, run, 0, &mut with);
+        let added = with.iter().zip(&run.declared);
+        permille.clear();
+        permille.extend(added.map(|(with, own)| with.gradient_permille - own.gradient_permille));
+    }
+}

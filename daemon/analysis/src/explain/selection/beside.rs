@@ -1,0 +1,138 @@
+//! What is certain beside the usual errors of everything declared.
+//!
+//! Gradients of a map, scales of forces, their lateness, loads and winds of single runs err in every dataset. What
+//! is left of an effect beside all of them is certain or is not, however much of the error they make: they are part
+//! of the model here, with the spread that declared figures have, and integrated out.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::acceptance::{is_material, is_possible};
+use super::certainty::{CERTAIN_RUNS_MIN, is_certain};
+use super::outcome::{Outcome, Round, Trial};
+use super::price::penalty;
+use super::search::Search;
+use crate::explain::effects::{
+    Candidate, SharedHypothesis, map_error, map_error_as_fitted, usual_errors,
+};
+use crate::explain::evidence::Fit;
+use crate::explain::gradient_prior::SURVEYED;
+use crate::explain::places::span_m;
+
+/// The last effect of a trial, and its parameters.
+fn last_parts(trial: &Trial) -> (SharedHypothesis, Vec<f64>) {
+    let last = trial.last();
+    (trial.fit.model.effects[last].clone(), trial.fit.effect_parameters(last).to_vec())
+}
+
+/// Whether some evidence makes the last effect of a trial certain beside the usual errors.
+pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
+    is_material(trial)
+        && is_possible(trial)
+        && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
+}
+
+/// What acts on the train by one law in all runs. Errors of the record and of the map, and loads, winds and slippery
+/// rails, which differ from run to run, are what usual errors stand for.
+fn is_sought(kind: EffectKind) -> bool {
+    use EffectKind::{
+        ActuatorDelay, GradientError, GradientShift, LowAdhesion, MassChange, SpeedDelay,
+        TractionGain, WheelDiameter, Wind,
+    };
+    !matches!(
+        kind,
+        ActuatorDelay
+            | GradientError
+            | GradientShift
+            | LowAdhesion
+            | MassChange
+            | SpeedDelay
+            | TractionGain
+            | WheelDiameter
+            | Wind
+    )
+}
+
+impl Search<'_> {
+    /// A model with the usual errors as its last effects, under what loads and winds make of the runs; how many
+    /// of the last parameters all runs share.
+    pub fn beside_usual_errors(&self, fit: &Fit) -> (Fit, usize) {
+        let is_in = |kind| fit.model.effects.iter().any(|own| own.kind() == kind);
+        let usual = usual_errors(fit.theta[0], is_in);
+        let shared = usual.start.len();
+        let errors = self.map_errors(fit).into_iter().chain([usual]).map(Candidate::parts);
+        (self.problem.with_runs_apart(&self.problem.grown(fit, errors)), shared)
+    }
+
+    /// The errors of the map; `None` where a gradient is fitted anyway, and where there is no map or no measured
+    /// position.
+    fn map_errors(&self, fit: &Fit) -> Option<Candidate> {
+        let is_fitted = fit.model.effects.iter().any(|effect| effect.is_gradient());
+        if is_fitted || self.track.is_none() || self.problem.distance_ratio.is_none() {
+            return None;
+        }
+        let span_m = span_m(&self.scan(fit)?).filter(|[low, high]| high > low)?;
+        Some(map_error(span_m, SURVEYED))
+    }
+
+    /// Takes in what is certain beside the usual errors; false for nothing.
+    ///
+    /// It is looked for with the map's error in the shape that it has without it, and judged with all of it free.
+    pub(super) fn take_certain_beside(&self, outcome: &mut Outcome) -> bool {
+        let (beside, _) = self.beside_usual_errors(&outcome.fit);
+        if outcome.is_full() || self.problem.runs.len() < CERTAIN_RUNS_MIN {
+            self.drop_form_of_usual_errors(&beside, outcome);
+            return false;
+        }
+        let looked = self.with_map_as_fitted(&outcome.fit, &beside);
+        let tried = self.round_of(&looked, &mut Vec::new(), is_sought);
+        let may_be_certain = tried.iter().filter(|trial| is_certain_beside(trial, trial.bic_gain));
+        let judged = may_be_certain.map(|trial| self.with_map_free(&beside, trial));
+        let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
+        let best = certain.max_by(|one, other| one.evidence.total_cmp(&other.evidence));
+        let Some(found) = best else {
+            self.drop_form_of_usual_errors(&beside, outcome);
+            return false;
+        };
+        let grown = self.problem.grown(&outcome.fit, [last_parts(&found)]);
+        outcome.fit = self.problem.with_own_noise(&grown);
+        outcome.certain.push((found.kind, Round::from(tried)));
+        true
+    }
+
+    /// The model beside the usual errors with the map's error in the shape that was fitted.
+    fn with_map_as_fitted(&self, fit: &Fit, beside: &Fit) -> Fit {
+        let (effects, ranges) = (&beside.model.effects, beside.model.ranges());
+        let usual = (fit.model.effects.len()..effects.len()).map(|number| {
+            let (own, values) = (effects[number].clone(), &beside.theta[ranges[number].clone()]);
+            if own.is_gradient() {
+                map_error_as_fitted(own, values).parts()
+            } else {
+                (own, values.to_vec())
+            }
+        });
+        self.problem.grown(&self.problem.again(fit, beside.noise), usual)
+    }
+
+    /// A trial with every number of the map's error free; its evidence is the least under the noise that is left
+    /// with it and without it. What all runs share of the map's error is in the model.
+    fn with_map_free(&self, beside: &Fit, trial: &Trial) -> Trial {
+        let grown = self.problem.grown(beside, [last_parts(trial)]);
+        let free = Self::trial(beside, self.problem.with_own_noise(&grown), trial.kind);
+        let (with, last) = (&free.fit, free.last());
+        let alike = self.problem.again(beside, with.noise).cost - with.cost - penalty(with, last);
+        let has_map_error = with.model.effects.iter().any(|effect| effect.is_gradient());
+        let own = if has_map_error { free.bic_gain } else { free.evidence };
+        Trial { evidence: own.min(alike), reduction: trial.reduction, ..free }
+    }
+
+    /// Drops a force outside the library that explains no more than chance beside the usual errors.
+    fn drop_form_of_usual_errors(&self, beside: &Fit, outcome: &mut Outcome) {
+        let is_form = |kind: EffectKind| kind == EffectKind::Unknown && !outcome.is_certain(kind);
+        let index = outcome.fit.model.effects.iter().position(|own| is_form(own.kind()));
+        let Some(index) = index else { return };
+        let without = self.without(beside, index).cost - beside.cost;
+        if without <= penalty(beside, index) {
+            outcome.fit = self.without(&outcome.fit, index);
+        }
+    }
+}

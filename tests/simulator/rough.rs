@@ -1,0 +1,77 @@
+//! What is found where everything declared is a little off: weights, map, winds, forces, wheels, curve constant.
+
+use dynocar_analysis::explain::answer::ExplainAnswer;
+use dynocar_analysis::explain::explain;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
+use dynocar_tests::simulator::{
+    Deviations, Effect, EffectRequest, SimulatedDataset, SimulatorSettings, simulate,
+};
+
+/// Kinds that no ordinary error of a declared figure looks like.
+const STRUCTURAL: [EffectKind; 6] = [
+    EffectKind::TunnelDrag,
+    EffectKind::DraggingBrake,
+    EffectKind::LocalResistance,
+    EffectKind::LowAdhesion,
+    EffectKind::RotatingMass,
+    EffectKind::Unknown,
+];
+
+fn explained(kind: Option<EffectKind>, seed: u64) -> (SimulatedDataset, ExplainAnswer) {
+    let simulated = simulate(&SimulatorSettings {
+        deviations: Deviations::ROUGH,
+        ..SimulatorSettings::new(seed, EffectRequest::Kinds(kind.into_iter().collect()))
+    });
+    let dataset = read_files(&dataset_files(&simulated));
+    let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
+    (simulated, answer)
+}
+
+/// What was found of a kind and its standard deviation.
+fn found(answer: &ExplainAnswer, kind: EffectKind, parameter: &str) -> Option<[f64; 2]> {
+    let written = serde_json::to_value(answer).unwrap();
+    let effects = written["effects"].as_array()?;
+    let own = effects.iter().find(|effect| effect["kind"] == kind.name())?;
+    Some([own["parameters"][parameter].as_f64()?, own["std"][parameter].as_f64()?])
+}
+
+#[test]
+fn a_dragging_brake_is_found_although_loads_winds_and_the_map_are_off() {
+    for seed in 1_500_002..1_500_005 {
+        let (simulated, answer) = explained(Some(EffectKind::DraggingBrake), seed);
+        let Effect::DraggingBrake { force_n: truth, .. } = simulated.effects[0] else {
+            panic!("another effect")
+        };
+        let [force_n, std] = found(&answer, EffectKind::DraggingBrake, "force_n")
+            .unwrap_or_else(|| panic!("seed {seed}: {}", answer.statement));
+        assert!((force_n - truth).abs() < 4.0 * std, "seed {seed}: {force_n} ± {std} for {truth}");
+    }
+}
+
+#[test]
+fn cold_days_are_found_although_each_day_has_its_wind() {
+    for seed in [1_500_002, 2_100_003] {
+        let (_, answer) = explained(Some(EffectKind::AmbientTemperature), seed);
+        let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
+        assert!(
+            kinds.contains(&EffectKind::AmbientTemperature.name()),
+            "seed {seed}: {}",
+            answer.statement
+        );
+    }
+}
+
+#[test]
+fn what_is_a_little_off_is_no_structural_effect() {
+    for seed in [861_011, 861_015, 861_017] {
+        let (_, answer) = explained(None, seed);
+        let structural: Vec<&str> = STRUCTURAL.iter().map(|kind| kind.name()).collect();
+        let named = answer.effects.iter().map(|effect| effect.kind);
+        let invented: Vec<&str> = named
+            .chain(answer.ambiguous_with.iter().copied())
+            .filter(|kind| structural.contains(kind))
+            .collect();
+        assert!(invented.is_empty(), "seed {seed}: {invented:?}: {}", answer.statement);
+    }
+}
