@@ -31,18 +31,19 @@ pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
 }
 
-/// What acts on the train by one law in all runs. Errors of the record and of the map, and loads, winds and slippery
-/// rails, which differ from run to run, are what usual errors stand for.
+/// What acts on the train by one law wherever it is. Errors of the record and of the map, places that pieces of the
+/// map's error look like, and loads, winds and slippery rails, which differ from run to run, are not.
 fn is_sought(kind: EffectKind) -> bool {
     use EffectKind::{
-        ActuatorDelay, GradientError, GradientShift, LowAdhesion, MassChange, SpeedDelay,
-        TractionGain, WheelDiameter, Wind,
+        ActuatorDelay, GradientError, GradientShift, LocalResistance, LowAdhesion, MassChange,
+        SpeedDelay, TractionGain, WheelDiameter, Wind,
     };
     !matches!(
         kind,
         ActuatorDelay
             | GradientError
             | GradientShift
+            | LocalResistance
             | LowAdhesion
             | MassChange
             | SpeedDelay

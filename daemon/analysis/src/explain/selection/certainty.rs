@@ -11,8 +11,7 @@ use crate::explain::evidence::{CERTAIN_STDS, Fit, SCORE_MIN, acceptance_score};
 /// where everything declared is a little off, at most 26 for what is not in that world; beside the usual errors 8.
 pub(super) const CERTAIN: f64 = 30.0;
 /// Evidence times the share that it takes from the error, with which it is certain too, and which is asked of what is
-/// chosen among many places, runs or forms: at most 2.3 where nothing acts; beside the usual errors 5.3 for what is
-/// not the effect.
+/// chosen among many places, runs or forms: at most 2.3 where nothing acts; beside the usual errors 0.3 for a brake.
 const CERTAIN_WITH_SHARE: f64 = 6.0;
 /// Fewer runs agree on nothing.
 pub(super) const CERTAIN_RUNS_MIN: usize = 3;
@@ -32,10 +31,10 @@ pub fn deciding_score(fit: &Fit, index: usize, evidence: f64, reduction: f64) ->
 }
 
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
-/// whole train or line, less of it where it takes more, which the runs agree on. What is chosen among many places,
-/// runs or forms must take more from the error, and is certain only beside the usual errors, which such choices
-/// stand for else. Never certain are loads, winds and slippery rails, which change from run to run, a late speed,
-/// which late forces look like, and a local resistance beside a fitted gradient, whose straight pieces leave such.
+/// whole train or line, less of it where it takes more, which the runs agree on. What is chosen among many must take
+/// more from the error; among runs or forms, it is certain only beside the usual errors, which such choices stand for
+/// else. Never certain are loads, winds and slippery rails, which change from run to run, a late speed, which late
+/// forces look like, unmapped tunnels, and a local resistance beside gradients, whose straight pieces leave such.
 pub(super) fn is_certain(
     fit: &Fit,
     index: usize,
@@ -44,21 +43,17 @@ pub(super) fn is_certain(
     is_beside_usual_errors: bool,
 ) -> bool {
     use EffectKind::{
-        DraggingBrake, GradientError, LocalResistance, LowAdhesion, MassChange, SpeedDelay,
-        Unknown, Wind,
+        DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, Unknown, Wind,
     };
     let effect = &fit.model.effects[index];
-    let effects = &fit.model.effects;
-    let is_beside_a_gradient = effects.iter().any(|other| other.kind() == GradientError);
-    // What acts where the map has its tunnels and curves is one number of the line.
-    let is_chosen_among_many = match effect.kind() {
-        DraggingBrake | LocalResistance | Unknown => true,
-        _ => !effect.ends().is_empty(),
-    };
+    let is_chosen_among_many = matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
+    let is_beside_a_gradient = fit.model.effects.iter().any(|other| other.is_gradient());
     let needs_the_score = match effect.kind() {
         LowAdhesion | MassChange | SpeedDelay | Wind => true,
-        LocalResistance if is_beside_a_gradient => true,
-        _ => is_chosen_among_many && !is_beside_usual_errors,
+        DraggingBrake | Unknown => !is_beside_usual_errors,
+        LocalResistance => is_beside_a_gradient || is_beside_usual_errors,
+        // What acts where the map has its tunnels and curves is one number of the line.
+        _ => !effect.ends().is_empty(),
     };
     let runs_agree = || {
         let std = deviations(fit).std[fit.model.ranges()[index].start];
