@@ -15,7 +15,7 @@ use super::competing::{
 };
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
-use super::evidence::{SCORE_MIN, p_value};
+use super::evidence::p_value;
 use super::identifiability::{identifiability, not_held};
 use super::informed::{told_by_data, undetermined};
 use super::runners_up::runners_up;
@@ -216,11 +216,8 @@ fn effect_answers(
             let decrease = discounted(likeliest, index, rest.cost - likeliest.cost);
             let reduction = score::reduction(search.problem, &rest, likeliest);
             let evidence = decrease - penalty(likeliest, index);
-            let score = if outcome.is_certain(effect.kind()) {
-                SCORE_MIN
-            } else {
-                deciding_score(likeliest, index, evidence, reduction)
-            };
+            let is_certain = outcome.is_certain(effect.kind());
+            let score = deciding_score(likeliest, index, (evidence, reduction), is_certain);
             let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
             let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
                 / search.problem.runs.len().max(1) as f64;

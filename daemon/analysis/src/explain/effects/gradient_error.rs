@@ -35,15 +35,13 @@ const RUNS_MIN: usize = 2;
 pub struct GradientError;
 
 #[derive(Debug)]
-pub(super) struct Profile {
-    pub(super) nodes_m: Vec<f64>,
+struct Profile {
+    nodes_m: Vec<f64>,
     /// Every node's, or those of growing and then those of falling chainage.
-    pub(super) parameters: Vec<Parameter>,
-    pub(super) information: DMatrix<f64>,
-    pub(super) is_one_way: bool,
-    pub(super) choice_cost: f64,
-    /// None for the map's own small error.
-    pub(super) kind: EffectKind,
+    parameters: Vec<Parameter>,
+    information: DMatrix<f64>,
+    is_one_way: bool,
+    choice_cost: f64,
 }
 
 impl Effect for GradientError {
@@ -83,6 +81,13 @@ impl Effect for GradientError {
     }
 }
 
+/// The map's own small error, at none: no effect, but what the finished model is fitted beside.
+pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
+    let profile = Profile::new(span_m, scale, 1, false);
+    let start = vec![0.0; profile.parameters.len()];
+    Candidate::new(profile, start)
+}
+
 /// Inverse covariance of an Ornstein-Uhlenbeck process at `count` equally distant nodes, for each
 /// of one or two directions.
 fn prior_information(
@@ -108,7 +113,7 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 impl Profile {
-    pub(super) fn new(
+    fn new(
         [low_m, high_m]: [f64; 2],
         scale: ErrorScale,
         directions: usize,
@@ -124,7 +129,6 @@ impl Profile {
             nodes_m,
             is_one_way,
             choice_cost: 0.0,
-            kind: EffectKind::GradientError,
         }
     }
 
@@ -157,7 +161,7 @@ impl Profile {
 
 impl Hypothesis for Profile {
     fn kind(&self) -> EffectKind {
-        self.kind
+        EffectKind::GradientError
     }
 
     fn parameters(&self) -> &[Parameter] {

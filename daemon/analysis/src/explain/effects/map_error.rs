@@ -1,21 +1,12 @@
-//! The map's own small error: no effect, but what a finished model is fitted beside.
+//! The map's own small error where its shape is known: no effect, but what others are looked for beside.
 
 use dynocar_model::terms::Parameter;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::gradient_error::Profile;
 use super::{Candidate, Hypothesis, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::gradient_prior::ErrorScale;
 
-/// It, at none.
-pub fn map_error(span_m: [f64; 2], scale: ErrorScale) -> Candidate {
-    let profile = Profile { kind: EffectKind::None, ..Profile::new(span_m, scale, 1, false) };
-    let start = vec![0.0; profile.parameters.len()];
-    Candidate::new(profile, start)
-}
-
-/// It in the shape in which it was fitted, of any size: one number in the place of its many.
+/// The error of the map in the shape in which it was fitted, of any size: one number in the place of its many.
 pub fn map_error_as_fitted(error: SharedHypothesis, permille: &[f64]) -> Candidate {
     let parameters = [Parameter::new("share", (-10.0, 10.0), 0.1)];
     Candidate::new(Fitted { error, permille: permille.to_vec(), parameters }, vec![1.0])

@@ -30,7 +30,8 @@ mod wind;
 pub use super::hypothesis::{
     AtBound, Hypothesis, OnOthers, ReportContext, Reported, SharedHypothesis, Turn,
 };
-pub use map_error::{map_error, map_error_as_fitted};
+pub use gradient_error::map_error;
+pub use map_error::map_error_as_fitted;
 pub use proposal::{Candidate, Effect, Proposal};
 pub use usual_errors::usual_errors;
 

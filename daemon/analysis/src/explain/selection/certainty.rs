@@ -24,10 +24,16 @@ pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64
 }
 
 /// What decided for an effect of a fitted model: its acceptance score, or the least that accepts where it was
-/// accepted because it is certain.
-pub fn deciding_score(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> f64 {
+/// accepted because it is certain, here or beside the usual errors.
+pub fn deciding_score(
+    fit: &Fit,
+    index: usize,
+    (evidence, reduction): (f64, f64),
+    is_certain_beside: bool,
+) -> f64 {
     let score = acceptance_score(evidence, reduction);
-    if is_certain(fit, index, evidence, reduction, false) { score.max(SCORE_MIN) } else { score }
+    let is_certain = is_certain_beside || is_certain(fit, index, evidence, reduction, false);
+    if is_certain { score.max(SCORE_MIN) } else { score }
 }
 
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
@@ -51,7 +57,7 @@ pub(super) fn is_certain(
     let needs_the_score = match effect.kind() {
         LowAdhesion | MassChange | SpeedDelay | Wind => true,
         DraggingBrake | Unknown => !is_beside_usual_errors,
-        LocalResistance => is_beside_a_gradient || is_beside_usual_errors,
+        LocalResistance => is_beside_a_gradient,
         // What acts where the map has its tunnels and curves is one number of the line.
         _ => !effect.ends().is_empty(),
     };
