@@ -53,6 +53,17 @@ fn every_link_leads_to_a_file_and_a_heading_in_it() {
     assert_none(&wrong);
 }
 
+#[test]
+fn the_book_has_a_chapter_for_every_page() {
+    let chapters = std::fs::read_to_string(workspace().join(".mkdocs.yml")).unwrap();
+    let of_the_book = pages().into_iter().filter(|it| it.path.starts_with("docs"));
+    let paths: Vec<String> = of_the_book.map(|it| it.path.display().to_string()).collect();
+    assert!(paths.len() > 50, "the pages are found: {}", paths.len());
+    let is_missing = |it: &&String| !chapters.contains(&format!(": {it}\n"));
+    let missing: Vec<String> = paths.iter().filter(is_missing).cloned().collect();
+    assert_none(&missing);
+}
+
 /// The command line that takes these words: `dynocar` hands some of its commands to other programs.
 fn command_line(words: &[String]) -> (clap::Command, usize) {
     match words.first().map(String::as_str) {
