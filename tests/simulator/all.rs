@@ -5,6 +5,7 @@ mod couplings;
 mod drive_power;
 mod effects;
 mod files;
+mod fits;
 mod force_sampling;
 mod physics;
 mod places;

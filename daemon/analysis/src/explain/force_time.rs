@@ -40,20 +40,16 @@ impl Hypothesis for LateStamps {
         &PARAMETERS
     }
 
-    fn is_local(&self) -> bool {
-        false
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, _first: usize, forces: &mut [SampleForces]) {
+    /// Nothing acts before it: what it finds around a sample is what is declared.
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let (late_s, time_s) = (parameters[0], run.recording.time_s());
-        let recorded: Vec<[f64; 2]> = forces.iter().map(|it| [it.traction_n, it.brake_n]).collect();
-        for (i, force) in forces.iter_mut().enumerate() {
+        for (i, force) in (first..).zip(forces) {
             let other = if late_s >= 0.0 { i + 1 } else { i.wrapping_sub(1) };
-            let Some(ahead) = recorded.get(other) else { continue };
+            let Some(ahead) = run.declared.get(other) else { continue };
             let step_s = (time_s[other] - time_s[i]).abs();
-            let at =
-                |k: usize| stamps::stamped_late(recorded[i][k], ahead[k], step_s, late_s.abs());
-            [force.traction_n, force.brake_n] = [at(0), at(1)];
+            let at = |own, ahead| stamps::stamped_late(own, ahead, step_s, late_s.abs());
+            force.traction_n = at(force.traction_n, ahead.traction_n);
+            force.brake_n = at(force.brake_n, ahead.brake_n);
         }
     }
 }

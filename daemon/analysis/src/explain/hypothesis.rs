@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use dynocar_model::terms::delay::DelayLine;
+use dynocar_model::terms::speed_delay::LateSpeed;
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
@@ -80,6 +82,35 @@ pub enum Turn {
     Last,
 }
 
+/// What an effect that looks back remembers of the samples before.
+#[derive(Clone, Debug, Default)]
+pub struct Past {
+    forces: Option<DelayLine<2>>,
+    speed: Option<Box<LateSpeed>>,
+}
+
+impl Past {
+    /// Traction and brake force in N behind a dead time and a lag in s; of nothing before sample number 0.
+    pub fn forces(&mut self, delay_and_lag_s: [f64; 2], first: usize) -> &mut DelayLine<2> {
+        let [delay_s, lag_s] = delay_and_lag_s;
+        let line = self.forces.get_or_insert_with(|| DelayLine::new(delay_s, lag_s));
+        if first == 0 {
+            line.restart(delay_s, lag_s);
+        }
+        line
+    }
+
+    /// What acted when the speed that is measured now was true, likewise.
+    pub fn speed(&mut self, delay_and_lag_s: [f64; 2], first: usize) -> &mut LateSpeed {
+        let [delay_s, lag_s] = delay_and_lag_s;
+        let late = self.speed.get_or_insert_with(|| LateSpeed::new(delay_s, lag_s).into());
+        if first == 0 {
+            late.restart(delay_s, lag_s);
+        }
+        late
+    }
+}
+
 /// A structure that a kind proposes: everything but the values of its parameters.
 pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// The kind it belongs to.
@@ -88,13 +119,25 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// Its parameters, in order.
     fn parameters(&self) -> &[Parameter];
 
-    /// Changes the forces at some samples of a run, which follow each other from number `first` on; at
-    /// all of them where it is not [local](Hypothesis::is_local).
+    /// Changes the forces at some samples of a run, which follow each other from number `first` on; from
+    /// the first of all where it [looks back](Hypothesis::looks_back).
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]);
 
-    /// True when what it does at a sample takes nothing of other samples.
-    fn is_local(&self) -> bool {
-        true
+    /// True when what it does at a sample takes something of those before.
+    fn looks_back(&self) -> bool {
+        false
+    }
+
+    /// The same behind the samples before, of which `past` is what it remembers.
+    fn apply_after(
+        &self,
+        _past: &mut Past,
+        parameters: &[f64],
+        run: &RunData,
+        first: usize,
+        forces: &mut [SampleForces],
+    ) {
+        self.apply(parameters, run, first, forces);
     }
 
     /// False when a parameter changes nothing on a fit run.

@@ -13,10 +13,8 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::{Fit, FitProblem, RunData};
-
-/// Bins after which the whitening filter has forgotten a force.
-const MEMORY_BINS: usize = 200;
+use super::evidence::{Bin, Fit, FitProblem, RunData, SampleForces};
+use super::hypothesis::{Hypothesis, Past};
 
 /// Inner products of a whitened regressor.
 #[derive(Clone, Debug)]
@@ -121,40 +119,66 @@ impl<'a> Scan<'a> {
 
     /// The tuple of accelerations in m/s² at the bins of one run.
     pub fn shape_tuple(&self, index: usize, shape: &[f64]) -> Tuple {
+        self.local_tuple(index, 0, shape)
+    }
+
+    /// The same of accelerations at the bins from one on; none act at the others.
+    pub fn local_tuple(&self, index: usize, from: usize, shape: &[f64]) -> Tuple {
         let mut tuple = Tuple::zero(self.fit.theta.len());
-        let Some(first) = shape.iter().position(|&a| a != 0.0) else { return tuple };
-        let last = shape.iter().rposition(|&a| a != 0.0).unwrap_or(first);
-        // The filter forgets what is long past.
-        let until = (last + MEMORY_BINS).min(shape.len());
-        let bins = &self.problem.runs[index].bins;
-        let mut gained = Vec::with_capacity(until - first);
-        let mut speed = 0.0;
-        for k in first..until {
+        let acts = |mps2: &f64| *mps2 != 0.0;
+        let Some(first) = shape.iter().position(acts) else { return tuple };
+        let last = shape.iter().rposition(acts).unwrap_or(first);
+        let acting = from + first..from + last + 1;
+        let (bins, start) = (&self.problem.runs[index].bins, acting.start);
+        let (mut speed_mps, mut before_mps2) = (0.0, 0.0);
+        let gained = |k: usize| {
+            let mps2 = if k < acting.end { shape[k - from] } else { 0.0 };
             if k > 0 && bins[k - 1].segment == bins[k].segment {
                 let step_s = bins[k].time_s - bins[k - 1].time_s;
-                speed += 0.5 * step_s * (shape[k - 1] + shape[k]);
+                speed_mps += 0.5 * step_s * (before_mps2 + mps2);
             } else {
-                speed = 0.0;
+                speed_mps = 0.0;
             }
-            gained.push(speed);
-        }
-        let mut column = Vec::with_capacity(until - first);
-        self.fit.whiteners[index].whiten_from(first, &gained, &mut column);
-        let filter = &self.fit.filters[index];
-        let weighted = &mut gained;
-        for ((weighted, value), weight) in
-            weighted.iter_mut().zip(&column).zip(&filter.weights()[first..])
-        {
-            *weighted = value * weight;
-        }
-        let with = |series: &[f64]| dot(weighted, &series[first..until]);
+            before_mps2 = mps2;
+            speed_mps
+        };
+        let mut column = Vec::with_capacity(2 * acting.len());
+        self.fit.whitener(index).whiten_local(acting.clone(), gained, &mut column);
+        let (filter, until) = (&self.fit.filters[index], start + column.len());
+        let weights = &filter.weights()[start..until];
+        let weighted: Vec<f64> = column.iter().zip(weights).map(|(v, w)| v * w).collect();
+        let with = |series: &[f64]| dot(&weighted, &series[start..until]);
         tuple.score = with(&self.fit.innovations[index]);
-        tuple.square = dot(weighted, &column) - filter.explained(with);
+        tuple.square = dot(&weighted, &column) - filter.explained(with);
         let columns = &self.fit.columns[index];
         for (cross, other) in tuple.cross.iter_mut().zip(columns).filter(|(_, o)| !o.is_empty()) {
             *cross = with(other);
         }
         tuple
+    }
+
+    /// Decrease of the cost when an effect acts, by what it changes at a sample in m/s².
+    pub fn decrease_by(
+        &self,
+        effect: &dyn Hypothesis,
+        parameters: &[f64],
+        change_mps2: impl Fn(&RunData, usize, &SampleForces) -> f64,
+    ) -> f64 {
+        let mut sum = Tuple::zero(self.fit.theta.len());
+        for (index, run) in self.problem.runs.iter().enumerate() {
+            let (mut past, mut middles) = (Past::default(), run.bins.iter().map(Bin::middle));
+            let (mut shape, mut middle) = (Vec::with_capacity(run.bins.len()), middles.next());
+            for (i, declared) in run.declared.iter().enumerate() {
+                let mut acting = [*declared];
+                effect.apply_after(&mut past, parameters, run, i, &mut acting);
+                if middle == Some(i) {
+                    shape.push(change_mps2(run, i, &acting[0]));
+                    middle = middles.next();
+                }
+            }
+            sum.add(&self.shape_tuple(index, &shape));
+        }
+        self.decrease_at_one(&sum)
     }
 
     /// What is left of a regressor's square when the model's regressors are projected out.

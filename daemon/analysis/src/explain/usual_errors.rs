@@ -11,13 +11,13 @@ use super::selection::{Deviations, Outcome, Search, deviations_beside};
 /// they fit best beside the effects alone: what predicts runs knows of no usual errors. How surely the
 /// parameters are known then.
 pub fn given_usual_errors(search: &Search, outcome: &mut Outcome) -> Deviations {
-    let (joint, shared) = search.beside_usual_errors(&outcome.fit);
+    let joint = search.beside_usual_errors(outcome);
     outcome.likeliest = outcome.fit.clone();
     let fit = &outcome.likeliest;
     let count = fit.theta.len();
     if !fit.model.effects.is_empty() {
-        let theta = joint.theta[..count].to_vec();
+        let theta = joint.fit.theta[..count].to_vec();
         outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
     }
-    deviations_beside(&joint, count, shared)
+    deviations_beside(&joint.fit, count, joint.shared)
 }

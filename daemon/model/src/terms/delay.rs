@@ -73,6 +73,12 @@ impl<const N: usize> DelayLine<N> {
         }
     }
 
+    /// Forgets all numbers, behind another dead time and lag in s.
+    pub fn restart(&mut self, delay_s: f64, lag_s: f64) {
+        (self.delay_s, self.lag_s) = (delay_s, lag_s);
+        (self.count, self.next, self.newer, self.last) = (0, 0, 0, None);
+    }
+
     /// The numbers that hold at a time in ns behind those that are reported then; `None` while they
     /// are not. A new motion segment forgets what was before it.
     pub fn acting(

@@ -59,6 +59,15 @@ impl LateSpeed {
         }
     }
 
+    /// Forgets what was before, behind another dead time and lag in s.
+    pub fn restart(&mut self, delay_s: f64, lag_s: f64) {
+        self.forces.restart(delay_s, lag_s);
+        self.resisting.restart(delay_s, lag_s);
+        self.position_m.restart(delay_s, lag_s);
+        self.specific_force_mps2.restart(delay_s, lag_s);
+        self.cylinder_pressure_pa.restart(delay_s, lag_s);
+    }
+
     /// The forces in N behind a speed in m/s of a time in ns of a motion segment; `None` while none are known.
     /// What brakes a train that stands moves nothing, and no lag remembers it.
     pub fn forces(

@@ -1,18 +1,18 @@
 //! Forces that act later than reported: a dead time, then a first-order lag.
 
-use dynocar_model::terms::delay::{self, DelayLine};
+use dynocar_model::terms::delay;
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal, Turn};
+use super::{Candidate, Effect, Hypothesis, Past, Proposal, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::scan::{Scan, Tuple};
+use crate::explain::scan::Scan;
 
 /// Where positions are integrated from the speed, they are late with it; where nothing of the line is felt,
 /// a speed whose odometer is late with it looks the same.
 const NEVER_REPORTED: [EffectKind; 1] = [EffectKind::SpeedDelay];
-/// Delay and lag in s that a fit may start from.
-const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
+/// Delay and lag in s that a fit may start from, the least first.
+const STARTS: [[f64; 2]; 5] = [[0.1, 0.05], [0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
 
 /// The kind.
 pub struct ActuatorDelay;
@@ -43,18 +43,11 @@ impl Effect for ActuatorDelay {
 }
 
 /// Decrease of the cost when the forces act with this delay and lag.
-fn decrease(scan: &Scan, [delay_s, lag_s]: [f64; 2]) -> f64 {
-    let mut sum = Tuple::zero(scan.fit.theta.len());
-    for (index, run) in scan.problem.runs.iter().enumerate() {
-        let mut late = run.declared.clone();
-        DelayAndLag::default().apply(&[delay_s, lag_s], run, 0, &mut late);
+fn decrease(scan: &Scan, start: [f64; 2]) -> f64 {
+    scan.decrease_by(&DelayAndLag::default(), &start, |run, i, late| {
         let control_n = |force: &SampleForces| force.traction_n - force.brake_n;
-        sum.add(&scan.run_tuple(index, |run, i| {
-            let change_n = control_n(&late[i]) - control_n(&run.declared[i]);
-            change_n / run.samples()[i].inertial_mass_kg
-        }));
-    }
-    scan.decrease_at_one(&sum)
+        (control_n(late) - control_n(&run.declared[i])) / run.samples()[i].inertial_mass_kg
+    })
 }
 
 impl Hypothesis for DelayAndLag {
@@ -74,14 +67,24 @@ impl Hypothesis for DelayAndLag {
         Turn::First
     }
 
-    fn is_local(&self) -> bool {
-        false
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        self.apply_after(&mut Past::default(), parameters, run, first, forces);
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        let mut line = DelayLine::new(parameters[0], parameters[1]);
-        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-            let at = (sample.time_ns, sample.segment);
+    fn looks_back(&self) -> bool {
+        true
+    }
+
+    fn apply_after(
+        &self,
+        past: &mut Past,
+        parameters: &[f64],
+        run: &RunData,
+        first: usize,
+        forces: &mut [SampleForces],
+    ) {
+        let line = past.forces([parameters[0], parameters[1]], first);
+        for (force, &at) in forces.iter_mut().zip(&run.stamps[first..]) {
             if let Some(late) = line.acting(at, Some([force.traction_n, force.brake_n])) {
                 [force.traction_n, force.brake_n] = late;
             }

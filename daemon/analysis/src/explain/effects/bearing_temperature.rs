@@ -1,5 +1,6 @@
 //! Cold bearings that warm up.
 
+use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Entry, Parameter, Resistance, bearings};
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -56,16 +57,17 @@ impl Hypothesis for Warming {
 
     fn unit_n_per_kn(&self, others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
         n_per_kn.clear();
-        n_per_kn.extend(run.samples().iter().map(|sample| {
+        let since_cold_s = run.covariate(Covariate::TimeSinceStart);
+        n_per_kn.extend(since_cold_s.iter().map(|&since_cold_s| {
             let mut resistance = Resistance::BASIC;
-            bearings::act(1.0, others[0], sample.since_cold_s, &mut resistance);
+            bearings::act(1.0, others[0], since_cold_s, &mut resistance);
             resistance.bearing_n_per_kn
         }));
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-            let since_cold_s = sample.since_cold_s;
+        let since_cold_s = &run.covariate(Covariate::TimeSinceStart)[first..];
+        for (force, &since_cold_s) in forces.iter_mut().zip(since_cold_s) {
             bearings::act(parameters[0], parameters[1], since_cold_s, &mut force.resistance);
         }
     }

@@ -28,7 +28,7 @@ mod wheel_diameter;
 mod wind;
 
 pub use super::hypothesis::{
-    AtBound, Hypothesis, OnOthers, ReportContext, Reported, SharedHypothesis, Turn,
+    AtBound, Hypothesis, OnOthers, Past, ReportContext, Reported, SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
 pub use map_error::map_error_as_fitted;

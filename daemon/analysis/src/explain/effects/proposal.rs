@@ -28,6 +28,19 @@ impl Candidate {
         !of.ends().is_empty() || of.is_event() || of.is_gradient()
     }
 
+    /// Whether its structure is the only one, whatever is left to explain.
+    pub fn is_fixed(&self) -> bool {
+        !self.is_chosen_among_many() && self.hypothesis.choice_cost() == 0.0
+    }
+
+    /// The structure, and no effect where a fit comes to its values in one step: it is linear in them.
+    pub fn from_none(self) -> (SharedHypothesis, Vec<f64>) {
+        let effect = &self.hypothesis;
+        let is_linear = effect.is_gradient() || effect.only_resists() && self.start.len() == 1;
+        let start = if is_linear { vec![effect.none(); self.start.len()] } else { self.start };
+        (self.hypothesis, start)
+    }
+
     /// The structure and the values.
     pub fn parts(self) -> (SharedHypothesis, Vec<f64>) {
         (self.hypothesis, self.start)

@@ -1,17 +1,18 @@
 //! A measured speed that is late. Forces that act late leave the gradient on time, a late speed does
 //! not: what the line does distinguishes the two, and so does a position that runs ahead of the speed.
 
-use dynocar_model::terms::speed_delay::{self, LateSpeed};
+use dynocar_model::terms::extra::Covariate;
+use dynocar_model::terms::speed_delay;
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, OnOthers, Proposal, Turn};
+use super::{Candidate, Effect, Hypothesis, OnOthers, Past, Proposal, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::scan::{Scan, Tuple};
+use crate::explain::scan::Scan;
 
-/// Delay and lag in s that a fit may start from.
-const STARTS: [[f64; 2]; 4] = [[0.6, 0.1], [0.1, 0.6], [1.2, 0.3], [0.3, 1.2]];
+/// Delay and lag in s that a fit may start from, the least first.
+const STARTS: [[f64; 2]; 5] = [[0.1, 0.05], [0.6, 0.1], [0.1, 0.6], [1.2, 0.3], [0.3, 1.2]];
 
 /// The kind.
 pub struct SpeedDelay;
@@ -42,23 +43,17 @@ impl Effect for SpeedDelay {
 }
 
 /// Decrease of the cost when the speed is late by this delay and lag.
-fn decrease(scan: &Scan, parameters: [f64; 2]) -> f64 {
+fn decrease(scan: &Scan, start: [f64; 2]) -> f64 {
     let theta = &scan.fit.theta;
     let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-    let mut sum = Tuple::zero(theta.len());
-    for (index, run) in scan.problem.runs.iter().enumerate() {
-        let mut late = run.declared.clone();
-        DelayAndLag.apply(&parameters, run, 0, &mut late);
-        sum.add(&scan.run_tuple(index, |run, i| {
-            let speed_mps = run.smooth_mps[i];
-            let mps2 = |force: &SampleForces| {
-                let [p0, p1, p2] = force.polynomial(davis, speed_mps);
-                p0 + speed_mps * (p1 + speed_mps * p2)
-            };
-            mps2(&late[i]) - mps2(&run.declared[i])
-        }));
-    }
-    scan.decrease_at_one(&sum)
+    scan.decrease_by(&DelayAndLag, &start, |run, i, late| {
+        let speed_mps = run.smooth_mps[i];
+        let mps2 = |force: &SampleForces| {
+            let [p0, p1, p2] = force.polynomial(davis, speed_mps);
+            p0 + speed_mps * (p1 + speed_mps * p2)
+        };
+        mps2(late) - mps2(&run.declared[i])
+    })
 }
 
 impl Hypothesis for DelayAndLag {
@@ -78,16 +73,29 @@ impl Hypothesis for DelayAndLag {
         OnOthers::Changes
     }
 
-    fn is_local(&self) -> bool {
-        false
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        self.apply_after(&mut Past::default(), parameters, run, first, forces);
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        let mut late = LateSpeed::new(parameters[0], parameters[1]);
-        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-            let at = (sample.time_ns, sample.segment);
+    fn looks_back(&self) -> bool {
+        true
+    }
+
+    fn apply_after(
+        &self,
+        past: &mut Past,
+        parameters: &[f64],
+        run: &RunData,
+        first: usize,
+        forces: &mut [SampleForces],
+    ) {
+        let late = past.speed([parameters[0], parameters[1]], first);
+        let speeds_mps = &run.covariate(Covariate::Speed)[first..];
+        for (force, (&at, &speed_mps)) in
+            forces.iter_mut().zip(run.stamps[first..].iter().zip(speeds_mps))
+        {
             let now = Some([force.traction_n, force.brake_n]);
-            if let Some(acting) = late.forces(at, sample.speed_mps, now) {
+            if let Some(acting) = late.forces(at, speed_mps, now) {
                 [force.traction_n, force.brake_n] = acting;
             }
             (force.gradient_permille, force.resistance) =

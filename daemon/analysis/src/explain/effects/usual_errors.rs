@@ -1,12 +1,12 @@
 //! What is a little wrong in every train's figures: scales of the reported forces, how late they act, the
 //! curve constant. No effect, but what a finished model is fitted beside.
 
-use dynocar_model::terms::delay::DelayLine;
+use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Parameter, bearings, curve, delay, traction};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Candidate, Hypothesis, Turn};
+use super::{Candidate, Hypothesis, Past, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 
 /// A figure that is usually a little wrong.
@@ -90,11 +90,22 @@ impl Hypothesis for UsualErrors {
         Turn::First
     }
 
-    fn is_local(&self) -> bool {
-        !self.figures.contains(&Figure::Lateness)
+    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+        self.apply_after(&mut Past::default(), parameters, run, first, forces);
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn looks_back(&self) -> bool {
+        self.figures.contains(&Figure::Lateness)
+    }
+
+    fn apply_after(
+        &self,
+        past: &mut Past,
+        parameters: &[f64],
+        run: &RunData,
+        first: usize,
+        forces: &mut [SampleForces],
+    ) {
         for (figure, &error) in self.figures.iter().zip(parameters) {
             match figure {
                 Figure::Traction => forces.iter_mut().for_each(|it| it.traction_n *= 1.0 + error),
@@ -104,16 +115,15 @@ impl Hypothesis for UsualErrors {
                 }
                 Figure::Warming => {
                     let delta_a = error * self.a_n_per_kn;
-                    for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-                        let since_cold_s = sample.since_cold_s;
+                    let since_cold_s = run.covariate(Covariate::TimeSinceStart);
+                    for (force, &since_cold_s) in forces.iter_mut().zip(&since_cold_s[first..]) {
                         let tau_s = bearings::TYPICAL_TAU_S;
                         bearings::act(delta_a, tau_s, since_cold_s, &mut force.resistance);
                     }
                 }
                 Figure::Lateness => {
-                    let mut line = DelayLine::new(error, 0.0);
-                    for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-                        let at = (sample.time_ns, sample.segment);
+                    let line = past.forces([error, 0.0], first);
+                    for (force, &at) in forces.iter_mut().zip(&run.stamps[first..]) {
                         let now = Some([force.traction_n, force.brake_n]);
                         if let Some(late) = line.acting(at, now) {
                             [force.traction_n, force.brake_n] = late;

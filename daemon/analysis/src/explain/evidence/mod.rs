@@ -17,6 +17,7 @@ mod late_speed;
 mod model;
 mod noise;
 mod noise_search;
+mod pass;
 mod response;
 mod run_data;
 mod run_scatter;

@@ -1,19 +1,15 @@
 //! The declared model with effects added, as acceleration at each sample.
 
-use std::ops::Range;
-
 use dynocar_model::simulate::{ForceModel, Polynomial, QuadraticForces};
 use dynocar_model::terms::wheel;
 use dynocar_model::train::Davis;
 
 use super::bins::Bin;
+use super::pass::{Acting, Pass, blocks};
 use super::response::Response;
 use super::run_data::RunData;
 use super::sample_forces::SampleForces;
 use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
-
-/// Samples that are looked at together.
-const BLOCK: usize = 128;
 
 /// The declared model with Davis coefficients and effects as parameters.
 #[derive(Clone, Default)]
@@ -71,20 +67,10 @@ impl UpdatedModel {
         own.map(|(_, (effect, range))| effect.speed_scale(&theta[range])).product()
     }
 
-    /// Some of the effects on the declared forces at some samples of a run.
-    fn act(
-        &self,
-        (run, theta): (&RunData, &[f64]),
-        acts: &impl Fn(usize) -> bool,
-        samples: Range<usize>,
-        forces: &mut Vec<SampleForces>,
-    ) {
-        let first = samples.start;
-        forces.clear();
-        forces.extend_from_slice(&run.declared[samples]);
-        for (effect, range) in self.in_turn(acts) {
-            effect.apply(&theta[range], run, first, forces);
-        }
+    /// Some of the effects, in the order in which they act.
+    fn pass(&self, acts: &impl Fn(usize) -> bool) -> Pass<'_> {
+        let effects = self.effects.iter().zip(self.ranges()).enumerate();
+        Pass::of(effects.filter(|(number, _)| acts(*number)).map(|(_, own)| own))
     }
 
     /// What the bins change by for a step of each of some parameters of effects, over the step: `moves` are
@@ -98,11 +84,11 @@ impl UpdatedModel {
         columns: &mut [Vec<f64>],
     ) {
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-        let order = self.in_turn(&acts);
-        let [before, moved] = forces.each_mut().map(|forces| &mut forces.samples);
+        let pass = self.pass(&acts);
+        let [before, moved] = forces.each_mut().map(|forces| &mut forces.acting);
         let (mut elsewhere, mut base_mps2) = (theta.to_vec(), Vec::new());
         let mut moved_mps2 = vec![Vec::new(); moves.len()];
-        for block in self.blocks(run, &acts) {
+        for block in blocks(run) {
             let first = block.start;
             let push = |forces: &[SampleForces], scale: f64, mps2: &mut Vec<f64>| {
                 mps2.extend(forces.iter().zip(&run.smooth_mps[first..]).map(|(forces, speed)| {
@@ -111,57 +97,24 @@ impl UpdatedModel {
                     scale * (p0 + speed_mps * (p1 + speed_mps * p2))
                 }));
             };
-            before.clear();
-            before.extend_from_slice(&run.declared[block]);
-            for (turn, (effect, range)) in order.iter().enumerate() {
-                let own = moves.iter().zip(&mut moved_mps2);
-                for (&(i, step), mps2) in own.filter(|((i, _), _)| range.contains(i)) {
+            before.declared(run, block);
+            for (turn, (_, range)) in pass.order.iter().enumerate() {
+                let own = moves.iter().zip(&mut moved_mps2).enumerate();
+                for (number, (&(i, step), mps2)) in own.filter(|it| range.contains(&it.1.0.0)) {
                     elsewhere[i] = theta[i] + step;
-                    moved.clone_from(before);
-                    for (effect, range) in &order[turn..] {
-                        effect.apply(&elsewhere[range.clone()], run, first, moved);
-                    }
-                    push(moved, self.speed_scale(&elsewhere, &acts), mps2);
+                    moved.samples.clone_from(&before.samples);
+                    let past = number * pass.order.len();
+                    pass.act((run, &elsewhere, first), turn..pass.order.len(), moved, past);
+                    push(&moved.samples, self.speed_scale(&elsewhere, &acts), mps2);
                     elsewhere[i] = theta[i];
                 }
-                effect.apply(&theta[range.clone()], run, first, before);
+                pass.act((run, theta, first), turn..turn + 1, before, 0);
             }
-            push(before, self.speed_scale(theta, &acts), &mut base_mps2);
+            push(&before.samples, self.speed_scale(theta, &acts), &mut base_mps2);
         }
         for (&(i, step), mps2) in moves.iter().zip(&moved_mps2) {
             integrate_bins(run, |k| [(mps2[k] - base_mps2[k]) / step], [&mut columns[i]]);
         }
-    }
-
-    /// Some of the effects with the ranges of their parameters, in the order in which they act.
-    fn in_turn(&self, acts: &impl Fn(usize) -> bool) -> Vec<(&SharedHypothesis, Range<usize>)> {
-        let acting = || {
-            let effects = self.effects.iter().zip(self.ranges()).enumerate();
-            effects.filter(|(number, _)| acts(*number)).map(|(_, own)| own)
-        };
-        let mut order: Vec<_> = acting().collect();
-        order.sort_by_key(|(effect, _)| effect.turn());
-        order
-    }
-
-    /// The samples from one on that are looked at together: few enough to stay near the processor, but all
-    /// of the run where an effect looks at others than its own.
-    fn block(&self, run: &RunData, acts: &impl Fn(usize) -> bool, from: usize) -> Range<usize> {
-        let mut acting = self.effects.iter().enumerate().filter(|(number, _)| acts(*number));
-        let (is_local, count) = (acting.all(|(_, effect)| effect.is_local()), run.samples().len());
-        if is_local { from..(from + BLOCK).min(count) } else { 0..count }
-    }
-
-    /// All samples of a run, part by part.
-    fn blocks(
-        &self,
-        run: &RunData,
-        acts: &impl Fn(usize) -> bool,
-    ) -> impl Iterator<Item = Range<usize>> {
-        let next = |block: &Range<usize>| {
-            (block.end < run.samples().len()).then(|| self.block(run, acts, block.end))
-        };
-        std::iter::successors(Some(self.block(run, acts, 0)), next)
     }
 
     /// The forces on a run for given parameters; `theta` starts with a, b, c.
@@ -169,10 +122,10 @@ impl UpdatedModel {
         let all = |_: usize| true;
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let scale = self.speed_scale(theta, &all);
-        let samples = &mut forces.samples;
-        let polynomials = self.blocks(run, &all).flat_map(|block| {
-            self.act((run, theta), &all, block.clone(), samples);
-            let own = samples.iter().zip(&run.smooth_mps[block]);
+        let (pass, acting) = (self.pass(&all), &mut forces.acting);
+        let polynomials = blocks(run).flat_map(|block| {
+            pass.on_declared((run, theta), block.clone(), acting);
+            let own = acting.samples.iter().zip(&run.smooth_mps[block]);
             let polynomial = |(state, &speed_mps): (&SampleForces, &f64)| {
                 state.polynomial(davis, wheel::true_speed_mps(speed_mps, scale))
             };
@@ -225,11 +178,12 @@ impl UpdatedModel {
         slopes: &mut Vec<f64>,
     ) {
         let (run, theta) = at;
-        let (scale, samples) = (self.speed_scale(theta, &acts), &mut forces.samples);
+        let scale = self.speed_scale(theta, &acts);
+        let (pass, acting) = (self.pass(&acts), &mut forces.acting);
         slopes.clear();
-        for block in self.blocks(run, &acts) {
-            self.act(at, &acts, block, samples);
-            slopes.extend(samples.iter().map(|forces| scale * forces.gradient_slope()));
+        for block in blocks(run) {
+            pass.on_declared(at, block, acting);
+            slopes.extend(acting.samples.iter().map(|forces| scale * forces.gradient_slope()));
         }
     }
 
@@ -243,25 +197,23 @@ impl UpdatedModel {
         mut bins: [&mut Vec<f64>; N],
     ) {
         let scale = self.speed_scale(theta, &acts);
-        let (mut integral, mut rest) = (Integral::START, &run.bins[..]);
+        let (pass, acting) = (self.pass(&acts), &mut forces.acting);
+        let (mut integral, mut rest, mut done) = (Integral::START, &run.bins[..], 0);
         bins.iter_mut().for_each(|bins| bins.clear());
         while let Some(bin) = rest.first() {
-            let mut block = self.block(run, &acts, bin.first);
-            // A bin may be longer than a block.
-            block.end = block.end.max(bin.end);
-            let together = rest.iter().take_while(|bin| bin.end <= block.end).count();
-            let (own, after) = rest.split_at(together);
-            let first = block.start;
-            self.act((run, theta), &acts, block, &mut forces.samples);
+            let first = if pass.looks_back { done } else { bin.first };
+            let own = pass.bins(first, rest);
+            done = own.last().map_or(run.samples().len(), |last| last.end);
+            pass.on_declared((run, theta), first..done, acting);
             for bin in own {
                 let means = integral.mean(run, bin, |i| {
                     let speed_mps = wheel::true_speed_mps(run.smooth_mps[i], scale);
-                    let own = accelerations(&forces.samples[i - first], speed_mps);
+                    let own = accelerations(&acting.samples[i - first], speed_mps);
                     own.map(|own| scale * own)
                 });
                 bins.iter_mut().zip(means).for_each(|(bins, mean)| bins.push(mean));
             }
-            rest = after;
+            rest = &rest[own.len()..];
         }
     }
 }
@@ -323,8 +275,7 @@ pub fn integrate_bins<const N: usize>(
 /// Forces of a grown model over one run; keeps its memory from one evaluation to the next.
 #[derive(Clone, Debug, Default)]
 pub struct UpdatedForces {
-    /// At the samples looked at last.
-    samples: Vec<SampleForces>,
+    acting: Acting,
     quadratic: QuadraticForces,
 }
 

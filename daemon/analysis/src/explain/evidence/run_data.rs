@@ -36,6 +36,8 @@ pub struct RunData {
     pub span_m: Option<[f64; 2]>,
     /// What a force may depend on, by the number of the covariate, at each sample; `NaN` where unknown.
     covariates: Vec<Vec<f64>>,
+    /// Time in ns and motion segment of each sample.
+    pub stamps: Vec<(i64, u32)>,
     /// The bins of all segments of motion, in order of time.
     pub bins: Vec<Bin>,
     /// Distance by position over distance by integrated speed, with its standard deviation, where
@@ -157,6 +159,8 @@ fn prepare_run(
         recording.samples().iter().map(|sample| sample.covariate(*of).unwrap_or(f64::NAN)).collect()
     };
     let covariates = Covariate::ALL.iter().map(of_samples).collect();
+    let stamps =
+        recording.samples().iter().map(|sample| (sample.time_ns, sample.segment)).collect();
     let positions_m = recording.samples().iter().filter_map(|sample| sample.position_m);
     let span_m = positions_m.fold(None, |span: Option<[f64; 2]>, at_m| {
         let [low, high] = span.unwrap_or([at_m; 2]);
@@ -180,6 +184,7 @@ fn prepare_run(
         smooth_mps,
         span_m,
         covariates,
+        stamps,
         bins,
         distance_ratio,
         speed_late_s,

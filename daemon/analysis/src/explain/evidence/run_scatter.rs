@@ -112,7 +112,7 @@ pub struct ScatterFilter {
 #[derive(Clone, Debug)]
 pub struct WeightedFilter {
     columns: Arc<Columns>,
-    weights: Vec<f64>,
+    weights: Arc<[f64]>,
     /// Covariance of the factors after the run.
     pub covariance: FactorMatrix,
     /// Logarithm of the determinant that the factors add.
@@ -145,7 +145,8 @@ impl ScatterFilter {
         // A sum of a positive definite and a positive semidefinite matrix.
         let covariance = information.try_inverse().unwrap_or_else(FactorMatrix::zeros);
         let log_determinant = (information.determinant() / self.precision.determinant()).ln();
-        WeightedFilter { columns: self.columns.clone(), weights, covariance, log_determinant }
+        let (columns, weights) = (self.columns.clone(), weights.into());
+        WeightedFilter { columns, weights, covariance, log_determinant }
     }
 
     /// Cost of the factors themselves.
@@ -158,7 +159,7 @@ impl WeightedFilter {
     /// The factors, less 1, and the delay that fit a whitened series best.
     pub fn factors(&self, series: &[f64]) -> RunFactors {
         let product = |column: &[f64]| -> f64 {
-            column.iter().zip(series).zip(&self.weights).map(|((c, s), w)| w * c * s).sum()
+            column.iter().zip(series).zip(&self.weights[..]).map(|((c, s), w)| w * c * s).sum()
         };
         self.covariance * RunFactors::from_fn(|k, _| product(&self.columns[k]))
     }

@@ -1,5 +1,8 @@
 //! Whitening of the noise, and Huber's loss of what it leaves.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use nalgebra::{Matrix2, Vector2};
 
 use super::bins::Bin;
@@ -29,10 +32,15 @@ pub(super) fn robust_weight(nu: f64) -> f64 {
     if size <= HUBER { 1.0 } else { HUBER / size }
 }
 
+/// Innovations behind a local series that are, two in a row, no more than this share of its greatest are none; so are
+/// all after so many bins.
+const FORGOTTEN_SHARE: f64 = 1e-6;
+const MEMORY_BINS: usize = 200;
+
 /// Turns bin differences of one run into white innovations of unit variance.
 #[derive(Clone, Debug)]
 pub struct Whitener {
-    steps: Vec<Step>,
+    steps: Arc<[Step]>,
     /// Sum of the logarithms of the innovations' variances.
     log_determinant: f64,
 }
@@ -206,15 +214,33 @@ impl Whitener {
 
     /// Innovations of a series of bin differences; 0 where a segment starts.
     pub fn whiten(&self, series: &[f64], innovations: &mut Vec<f64>) {
-        self.whiten_from(0, series, innovations);
-    }
-
-    /// Innovations of a series that is zero before bin number `first` and starts there.
-    pub fn whiten_from(&self, first: usize, series: &[f64], innovations: &mut Vec<f64>) {
         innovations.clear();
         let mut tracked = Tracked::default();
-        let steps = self.steps[first..].iter().zip(series);
+        let steps = self.steps.iter().zip(series);
         innovations.extend(steps.map(|(step, &value)| tracked.innovation(step, value)));
+    }
+
+    /// Innovations of a series that is zero before the first of some bins and starts there: of these, and of those
+    /// behind them until what they left is forgotten.
+    pub fn whiten_local(
+        &self,
+        bins: Range<usize>,
+        mut series: impl FnMut(usize) -> f64,
+        innovations: &mut Vec<f64>,
+    ) {
+        innovations.clear();
+        let mut tracked = Tracked::default();
+        let until = (bins.end + MEMORY_BINS).min(self.steps.len());
+        let (mut most, mut small) = (0.0_f64, 0);
+        for (bin, step) in (bins.start..until).zip(&self.steps[bins.start..until]) {
+            let innovation = tracked.innovation(step, series(bin));
+            innovations.push(innovation);
+            most = most.max(innovation.abs());
+            small = if innovation.abs() <= FORGOTTEN_SHARE * most { small + 1 } else { 0 };
+            if bin >= bins.end && small == 2 {
+                break;
+            }
+        }
     }
 
     /// Robust -2 log likelihood of the innovations, up to a constant.

@@ -76,16 +76,20 @@ impl<'s, 'a> Places<'s, 'a> {
         let may_be_in = |[low, high]: &[f64; 2]| {
             intervals_m.iter().any(|[from, to]| low - reach_m <= *to && high + reach_m >= *from)
         };
-        let bins = &self.bins[index];
-        if !self.blocks[index].iter().any(may_be_in) {
+        let (bins, blocks) = (&self.bins[index], &self.blocks[index]);
+        let Some(first) = blocks.iter().position(may_be_in) else {
             return Tuple::zero(self.scan.fit.theta.len());
-        }
-        let mut shape = vec![0.0; bins.len()];
-        let blocks = shape.chunks_mut(BLOCK).zip(bins.chunks(BLOCK)).zip(&self.blocks[index]);
-        for ((shape, bins), _) in blocks.filter(|(_, extent)| may_be_in(extent)) {
+        };
+        let last = blocks.iter().rposition(may_be_in).unwrap_or(first);
+        let near = BLOCK * first..(BLOCK * (last + 1)).min(bins.len());
+        let mut shape = vec![0.0; near.len()];
+        let blocks = bins[near.clone()].chunks(BLOCK).zip(&blocks[first..=last]);
+        for (shape, (bins, _)) in
+            shape.chunks_mut(BLOCK).zip(blocks).filter(|(_, (_, extent))| may_be_in(extent))
+        {
             shape.iter_mut().zip(bins).for_each(|(shape, bin)| *shape = value(bin));
         }
-        self.scan.shape_tuple(index, &shape)
+        self.scan.local_tuple(index, near.start, &shape)
     }
 
     fn tuples(&self, interval_m: [f64; 2]) -> Vec<Tuple> {

@@ -4,13 +4,16 @@
 //! is left of an effect beside all of them is certain or is not, however much of the error they make: they are part
 //! of the model here, with the spread that declared figures have, and integrated out.
 
+use std::sync::Arc;
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{is_material, is_possible};
 use super::certainty::{CERTAIN_RUNS_MIN, is_certain};
-use super::outcome::{Outcome, Round, Trial};
-use super::price::penalty;
+use super::outcome::{Beside, Outcome, Round, Trial};
+use super::price::{at_bound, penalty};
 use super::search::Search;
+use super::trying::Asked;
 use crate::explain::effects::{
     Candidate, SharedHypothesis, map_error, map_error_as_fitted, usual_errors,
 };
@@ -54,14 +57,22 @@ fn is_sought(kind: EffectKind) -> bool {
 }
 
 impl Search<'_> {
-    /// A model with the usual errors as its last effects, under what loads and winds make of the runs; how many
-    /// of the last parameters all runs share.
-    pub fn beside_usual_errors(&self, fit: &Fit) -> (Fit, usize) {
+    /// What was found with the usual errors beside it.
+    pub fn beside_usual_errors(&self, outcome: &mut Outcome) -> Arc<Beside> {
+        let fit = &outcome.fit;
+        if let Some((from, beside)) = &outcome.beside
+            && beside.is_of(fit, from)
+        {
+            return beside.clone();
+        }
         let is_in = |kind| fit.model.effects.iter().any(|own| own.kind() == kind);
         let usual = usual_errors(fit.theta[0], is_in);
         let shared = usual.start.len();
         let errors = self.map_errors(fit).into_iter().chain([usual]).map(Candidate::parts);
-        (self.problem.with_runs_apart(&self.problem.grown(fit, errors)), shared)
+        let fit = self.problem.with_runs_apart(&self.problem.grown(fit, errors));
+        let beside = Arc::new(Beside { fit, shared });
+        outcome.beside = Some((outcome.fit.theta.clone(), beside.clone()));
+        beside
     }
 
     /// The errors of the map; `None` where a gradient is fitted anyway, and where there is no map or no measured
@@ -79,19 +90,23 @@ impl Search<'_> {
     ///
     /// It is looked for with the map's error in the shape that it has without it, and judged with all of it free.
     pub(super) fn take_certain_beside(&self, outcome: &mut Outcome) -> bool {
-        let (beside, _) = self.beside_usual_errors(&outcome.fit);
+        let beside = &self.beside_usual_errors(outcome).fit;
         if outcome.is_full() || self.problem.runs.len() < CERTAIN_RUNS_MIN {
-            self.drop_form_of_usual_errors(&beside, outcome);
+            self.drop_what_does_not_stand(beside, outcome);
             return false;
         }
-        let looked = self.with_map_as_fitted(&outcome.fit, &beside);
-        let tried = self.round_of(&looked, &mut Vec::new(), is_sought);
+        let looked = self.with_map_as_fitted(&outcome.fit, beside);
+        let tried = self.round_of(
+            &looked,
+            &mut Vec::new(),
+            Asked { is_asked: &is_sought, rivals_of: None },
+        );
         let may_be_certain = tried.iter().filter(|trial| is_certain_beside(trial, trial.bic_gain));
-        let judged = may_be_certain.map(|trial| self.with_map_free(&beside, trial));
+        let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
         let best = certain.max_by(|one, other| one.evidence.total_cmp(&other.evidence));
         let Some(found) = best else {
-            self.drop_form_of_usual_errors(&beside, outcome);
+            self.drop_what_does_not_stand(beside, outcome);
             return false;
         };
         let grown = self.problem.grown(&outcome.fit, [last_parts(&found)]);
@@ -126,13 +141,19 @@ impl Search<'_> {
         Trial { evidence: own.min(alike), reduction: trial.reduction, ..free }
     }
 
-    /// Drops a force outside the library that explains no more than chance beside the usual errors.
-    fn drop_form_of_usual_errors(&self, beside: &Fit, outcome: &mut Outcome) {
+    /// Drops what does not stand beside the usual errors: a force outside the library that explains no more than
+    /// chance there, and an effect that runs to a bound of what is looked for.
+    fn drop_what_does_not_stand(&self, beside: &Fit, outcome: &mut Outcome) {
         let is_form = |kind: EffectKind| kind == EffectKind::Unknown && !outcome.is_certain(kind);
-        let index = outcome.fit.model.effects.iter().position(|own| is_form(own.kind()));
-        let Some(index) = index else { return };
-        let without = self.without(beside, index).cost - beside.cost;
-        if without <= penalty(beside, index) {
+        let is_chance =
+            |index: usize| self.without(beside, index).cost - beside.cost <= penalty(beside, index);
+        let falls = |index: &usize| {
+            let kind = outcome.fit.model.effects[*index].kind();
+            let runs_to_bound =
+                || at_bound(beside, *index).is_some() && at_bound(&outcome.fit, *index).is_none();
+            outcome.is_named(kind) && (is_form(kind) && is_chance(*index) || runs_to_bound())
+        };
+        if let Some(index) = (0..outcome.fit.model.effects.len()).find(falls) {
             outcome.fit = self.without(&outcome.fit, index);
         }
     }

@@ -11,6 +11,7 @@ mod revision;
 mod search;
 mod small;
 mod steps;
+mod trying;
 
 pub use acceptance::Refusal;
 pub use beside::is_certain_beside;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::{Fit, acceptance_score};
 
 /// Named effects at most.
@@ -23,6 +24,8 @@ pub struct Trial {
     /// Share of the open-loop error that it takes away, of the fit runs and of each by what the others
     /// say of it, whichever is less; 0 where the evidence does not ask for it.
     pub reduction: f64,
+    /// Whether its kind has this one structure, whatever is left to explain.
+    pub is_only: bool,
 }
 
 impl Trial {
@@ -39,6 +42,25 @@ impl Trial {
 
 /// The best trial of each kind, the strongest first.
 pub type Round = Arc<[Trial]>;
+
+/// A model with the usual errors beside it.
+#[derive(Clone)]
+pub struct Beside {
+    /// Fitted, with the usual errors as its last effects, under what loads and winds make of the runs.
+    pub fit: Fit,
+    /// How many of the last parameters all runs share.
+    pub shared: usize,
+}
+
+impl Beside {
+    /// Whether it is a fitted model with the usual errors beside it.
+    pub(super) fn is_of(&self, fit: &Fit, from: &[f64]) -> bool {
+        let effects = fit.model.effects.iter().zip(&self.fit.model.effects);
+        let is_same =
+            |(one, other): (&SharedHypothesis, &SharedHypothesis)| Arc::ptr_eq(one, other);
+        fit.theta == from && effects.map(is_same).all(|is_same| is_same)
+    }
+}
 
 /// What the search found.
 #[derive(Clone)]
@@ -59,6 +81,8 @@ pub struct Outcome {
     pub small: Vec<EffectKind>,
     /// Kinds that are certain beside the usual errors, with what was tried beside them.
     pub certain: Vec<(EffectKind, Round)>,
+    /// The parameters of a model that was fitted beside the usual errors last, and what came of it.
+    pub(super) beside: Option<(Vec<f64>, Arc<Beside>)>,
 }
 
 impl Outcome {

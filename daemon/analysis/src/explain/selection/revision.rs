@@ -22,7 +22,7 @@ impl Search<'_> {
             let index = outcome.fit.model.effects.iter().position(|own| own.kind() == *kind);
             let Some(index) = index.filter(|_| outcome.is_on_trial(*kind)) else { continue };
             let rest = self.without(&outcome.fit, index);
-            let trials = self.round(&rest, &mut Vec::new());
+            let trials = self.rivals(&rest, *kind);
             let mut stands = *kind;
             if let Some(best) = self.best(&trials, &[])
                 && Self::total(&best.fit) < Self::total(&outcome.fit) - EQUAL

@@ -145,9 +145,10 @@ impl Hypothesis for FormForce {
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let extra = [self.extra(parameters)];
-        for (sample, force) in run.samples()[first..].iter().zip(forces) {
-            let known = |of: Covariate| sample.covariate(of);
-            extra::act(&extra, sample.speed_mps, known, &mut force.resistance);
+        let speed_mps = run.covariate(Covariate::Speed);
+        for (i, force) in (first..).zip(forces) {
+            let known = |of: Covariate| Some(run.covariate(of)[i]).filter(|it| !it.is_nan());
+            extra::act(&extra, speed_mps[i], known, &mut force.resistance);
         }
     }
 

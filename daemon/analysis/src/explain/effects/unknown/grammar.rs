@@ -62,15 +62,26 @@ pub fn forms(scan: &Scan) -> Vec<Candidate> {
     alike(best, 1).into_iter().map(candidate).collect()
 }
 
-fn tried(ground: &Ground, forms: Vec<Vec<Factor>>) -> Vec<Tried> {
-    forms.into_par_iter().map(|factors| ground.tried(factors, false)).collect()
+/// Products of each of some factors with each of others.
+fn products(ground: &Ground, first: Vec<Factor>, second: Vec<Factor>) -> Vec<Tried> {
+    type AtBins = (Factor, Vec<Vec<f64>>);
+    let at_bins = |factors: Vec<Factor>| -> Vec<AtBins> {
+        factors.into_par_iter().map(|factor| (factor, ground.values(&factor))).collect()
+    };
+    let (first, second) = (at_bins(first), at_bins(second));
+    let product = |((one, by_one), (other, by_other)): (&AtBins, &AtBins)| {
+        ground.tried_at(vec![*one, *other], &[by_one, by_other], false)
+    };
+    let pairs: Vec<_> =
+        first.iter().flat_map(|one| second.iter().map(move |it| (one, it))).collect();
+    pairs.into_par_iter().map(product).collect()
 }
 
 /// Every form of one covariate, and the products; the best first.
 fn all_tried(ground: &Ground) -> Vec<Tried> {
-    let alone = ground.known.iter().flat_map(Known::alone);
-    let alone: Vec<Vec<Factor>> = alone.map(|factor| vec![factor]).collect();
-    let mut all = tried(ground, alone);
+    let alone: Vec<Factor> = ground.known.iter().flat_map(Known::alone).collect();
+    let mut all: Vec<Tried> =
+        alone.into_par_iter().map(|factor| ground.tried(vec![factor], false)).collect();
     sort(&mut all);
     let Some(speed) = ground.covariate(Covariate::Speed) else { return all };
     let of_speed = all.iter().filter(|it| it.factors[0].of == Covariate::Speed);
@@ -78,8 +89,7 @@ fn all_tried(ground: &Ground) -> Vec<Tried> {
     first.extend(speed.powers(&WHOLE_EXPONENTS));
     let others = ground.known.iter().filter(|one| one.of != Covariate::Speed);
     let second: Vec<Factor> = others.flat_map(Known::given_speed).collect();
-    let products = first.iter().flat_map(|one| second.iter().map(|other| vec![*one, *other]));
-    all.extend(tried(ground, products.collect()));
+    all.extend(products(ground, first, second));
     sort(&mut all);
     all
 }

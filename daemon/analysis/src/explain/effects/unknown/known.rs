@@ -2,6 +2,7 @@
 
 use dynocar_model::terms::extra::{Covariate, Factor, Form};
 
+use crate::explain::evidence::RunData;
 use crate::explain::scan::Scan;
 
 /// So many bins show too little, or a share of them where there are few.
@@ -12,8 +13,8 @@ const FEW_SHARE: f64 = 0.03;
 pub struct Known {
     /// Which.
     pub of: Covariate,
-    /// By run and bin.
-    pub values: Vec<Vec<Option<f64>>>,
+    /// By run and bin; `NaN` where it is not known.
+    pub values: Vec<Vec<f64>>,
     /// Least value.
     pub low: f64,
     /// Of less, there are too few values to show anything.
@@ -25,19 +26,15 @@ pub struct Known {
 impl Known {
     /// `None` where it is known nowhere or is the same throughout.
     pub fn of(scan: &Scan, of: Covariate) -> Option<Self> {
-        let values: Vec<Vec<Option<f64>>> = scan
-            .problem
-            .runs
-            .iter()
-            .map(|run| {
-                run.bins.iter().map(|bin| run.samples()[bin.middle()].covariate(of)).collect()
-            })
-            .collect();
-        let mut sorted: Vec<f64> = values.iter().flatten().flatten().copied().collect();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let (low, high) = (*sorted.first()?, *sorted.last()?);
-        let few = FEW_BINS.min((FEW_SHARE * sorted.len() as f64) as usize);
-        let least = sorted[few];
+        let of_run =
+            |run: &RunData| run.bins.iter().map(|bin| run.covariate(of)[bin.middle()]).collect();
+        let values: Vec<Vec<f64>> = scan.problem.runs.iter().map(of_run).collect();
+        let mut known: Vec<f64> =
+            values.iter().flatten().copied().filter(|value| !value.is_nan()).collect();
+        let low = known.iter().copied().min_by(f64::total_cmp)?;
+        let high = known.iter().copied().max_by(f64::total_cmp)?;
+        let few = FEW_BINS.min((FEW_SHARE * known.len() as f64) as usize);
+        let least = *known.select_nth_unstable_by(few, f64::total_cmp).1;
         let is_varied = high - low > 1e-6 && (high - low).is_finite();
         is_varied.then_some(Known { of, values, low, least, high })
     }

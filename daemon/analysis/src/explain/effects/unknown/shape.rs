@@ -1,6 +1,6 @@
 //! What a force of a form explains, and the numbers with which it explains most.
 
-use dynocar_model::terms::extra::{Covariate, Extra, Factor};
+use dynocar_model::terms::extra::{Covariate, Factor};
 
 use super::known::Known;
 use super::numbers::{estimated, is_exponent};
@@ -52,20 +52,40 @@ impl<'s> Ground<'s> {
         self.known.iter().find(|known| known.of == of)
     }
 
+    /// A factor by run and bin; none where its covariate is not known.
+    pub fn values(&self, factor: &Factor) -> Vec<Vec<f64>> {
+        let of_run = |covariate: &Vec<f64>| {
+            let mut values = vec![1.0; covariate.len()];
+            factor.multiply(covariate, &mut values);
+            values
+        };
+        self.covariate(factor.of).into_iter().flat_map(|it| &it.values).map(of_run).collect()
+    }
+
     /// What a force of these factors explains.
     pub fn tried(&self, factors: Vec<Factor>, holds_exponents: bool) -> Tried {
-        let shape_of = Extra { n_per_kn: 1.0, factors };
+        let values: Vec<_> = factors.iter().map(|factor| self.values(factor)).collect();
+        let values: Vec<&[Vec<f64>]> = values.iter().map(Vec::as_slice).collect();
+        self.tried_at(factors, &values, holds_exponents)
+    }
+
+    /// The same of factors whose values are known.
+    pub fn tried_at(
+        &self,
+        factors: Vec<Factor>,
+        values: &[&[Vec<f64>]],
+        holds_exponents: bool,
+    ) -> Tried {
         let mut sum = Tuple::zero(self.scan.fit.theta.len());
         for (index, per_unit_mps2) in self.per_unit_mps2.iter().enumerate() {
-            let at_bin = |(bin, per_unit_mps2): (usize, &f64)| {
-                let of = |of: Covariate| self.covariate(of)?.values[index][bin];
-                -per_unit_mps2 * shape_of.at(of).0
-            };
-            let shape: Vec<f64> = per_unit_mps2.iter().enumerate().map(at_bin).collect();
+            let mut shape = vec![1.0; per_unit_mps2.len()];
+            for values in values {
+                shape.iter_mut().zip(&values[index]).for_each(|(shape, value)| *shape *= value);
+            }
+            shape.iter_mut().zip(per_unit_mps2).for_each(|(shape, unit)| *shape *= -unit);
             sum.add(&self.scan.shape_tuple(index, &shape));
         }
         let (gain, n_per_kn) = self.scan.gain(&sum);
-        let factors = shape_of.factors;
         let of_factors = factors.iter().map(|factor| estimated(factor.form, holds_exponents));
         let worth = gain - (1 + of_factors.sum::<usize>()) as f64 * self.number_cost;
         Tried { gain, worth, n_per_kn, factors, holds_exponents }

@@ -9,7 +9,7 @@ use super::super::run_scatter::{ScatterFilter, remove};
 use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::Plan;
-use super::robust::RunFilters;
+use super::robust::{RunFilters, SharedFilters};
 use super::{Fit, FitProblem};
 use crate::explain::hypothesis::SharedHypothesis;
 
@@ -49,14 +49,34 @@ impl FitProblem {
         fit: &Fit,
         more: impl IntoIterator<Item = (SharedHypothesis, Vec<f64>)>,
     ) -> Fit {
+        self.grown_if(fit, more, |_, _| true)
+    }
+
+    /// The same; what does not promise enough stays at its start: `promises` gets the model there, and by how much
+    /// the cost would fall if all were linear.
+    pub fn grown_if(
+        &self,
+        fit: &Fit,
+        more: impl IntoIterator<Item = (SharedHypothesis, Vec<f64>)>,
+        promises: impl Fn(&Fit, f64) -> bool,
+    ) -> Fit {
         let (mut model, mut theta) = (fit.model.clone(), fit.theta.clone());
+        let mut are_at_none = true;
         for (effect, start) in more {
+            are_at_none &= start.iter().all(|value| *value == effect.none());
             model.effects.push(effect);
             theta.extend(start);
         }
         let (plan, grown) = (Plan::of(&fit.model), Plan::of(&model));
-        let memories = RunMemory::of_grown(&fit.memories, &self.runs, &plan, &grown);
-        self.fit_remembering(&model, (theta, fit.noise), memories)
+        let mut memories = RunMemory::of_grown(&fit.memories, &self.runs, &plan, &grown);
+        let filters = &fit.run_filters;
+        let is_one = model.effects.len() == fit.model.effects.len() + 1;
+        let first = if is_one && are_at_none {
+            self.bordered(&grown, fit, &mut memories)
+        } else {
+            self.first(&grown, &model, (theta, fit.noise), (filters, &mut memories))
+        };
+        self.descended(&grown, first, (filters, memories), promises)
     }
 
     /// The model of a fit where loads and winds of ordinary days may set the runs apart, as far as they
@@ -104,10 +124,23 @@ impl FitProblem {
         mut memories: Vec<RunMemory>,
     ) -> Fit {
         let (plan, filters) = (Plan::of(model), self.filters(at.1));
-        let mut fit = self.first(&plan, model, at, (&filters, &mut memories));
-        for _ in 0..STEPS_MAX {
+        let first = self.first(&plan, model, at, (&filters, &mut memories));
+        self.descended(&plan, first, (&filters, memories), |_, _| true)
+    }
+
+    /// The least cost from a model on, where it promises enough.
+    fn descended(
+        &self,
+        plan: &Plan,
+        mut fit: Fit,
+        (filters, mut memories): (&SharedFilters, Vec<RunMemory>),
+        promises: impl Fn(&Fit, f64) -> bool,
+    ) -> Fit {
+        let promised = self.bounded_step(&fit, &fit.score(), 0.0).map_or(0.0, |step| step.1);
+        let steps = if promises(&fit, promised) { STEPS_MAX } else { 0 };
+        for _ in 0..steps {
             let score = fit.score();
-            let next = self.descend(&plan, &fit, &score, (&filters, &mut memories));
+            let next = self.descend(plan, &fit, &score, (filters, &mut memories));
             let Some(next) = next else { break };
             let gained = fit.cost - next.cost;
             fit = next;
@@ -124,7 +157,7 @@ impl FitProblem {
         plan: &Plan,
         model: &UpdatedModel,
         (theta, noise): (Vec<f64>, Noise),
-        (filters, memories): (&[RunFilters], &mut [RunMemory]),
+        (filters, memories): (&SharedFilters, &mut [RunMemory]),
     ) -> Fit {
         let left = self.left(plan, &theta, filters, memories);
         self.linearised(plan, model, (theta, noise), left, (filters, memories))
@@ -143,7 +176,7 @@ impl FitProblem {
         Noise::estimate(&self.runs, &residuals, Noise { scatter, ..fit.noise })
     }
 
-    pub(super) fn filters(&self, noise: Noise) -> Vec<RunFilters> {
+    fn filters(&self, noise: Noise) -> SharedFilters {
         self.runs
             .par_iter()
             .zip(&self.scatter_columns)
@@ -152,7 +185,8 @@ impl FitProblem {
                 let scatter = ScatterFilter::new(columns, &whitener, noise.scatter);
                 RunFilters { whitener, scatter }
             })
-            .collect()
+            .collect::<Vec<_>>()
+            .into()
     }
 
     /// A step of Levenberg and Marquardt within the bounds, damped until the cost falls; `None`
@@ -162,7 +196,7 @@ impl FitProblem {
         plan: &Plan,
         fit: &Fit,
         score: &DVector<f64>,
-        (filters, memories): (&[RunFilters], &mut [RunMemory]),
+        (filters, memories): (&SharedFilters, &mut [RunMemory]),
     ) -> Option<Fit> {
         for damping in [0.0, 0.01, 0.3, 10.0, 300.0] {
             let (theta, promised) = self.bounded_step(fit, score, damping)?;

@@ -9,10 +9,12 @@ use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::Noise;
+use super::super::run_scatter::WeightedFilter;
+use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::{At, Plan};
-use super::robust::{RunFilters, Whitened};
-use super::{Fit, FitProblem, RunNormal};
+use super::robust::{RunFilters, SharedFilters, Whitened};
+use super::{Column, Fit, FitProblem, RunNormal};
 
 /// What a model leaves of one run at given parameters.
 pub(super) struct Left {
@@ -22,82 +24,6 @@ pub(super) struct Left {
 }
 
 impl FitProblem {
-    /// Pull of the prior: information and score.
-    pub(super) fn prior(
-        &self,
-        model: &UpdatedModel,
-        theta: &[f64],
-    ) -> (DMatrix<f64>, DVector<f64>, f64) {
-        let count = theta.len();
-        let (mut information, mut score) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let mut cost = 0.0;
-        let declared = [self.declared.a, self.declared.b, self.declared.c];
-        for i in 0..3 {
-            let weight = self.prior_deviation[i].powi(-2);
-            let away = declared[i] - theta[i];
-            information[(i, i)] += weight;
-            score[i] += weight * away;
-            cost += weight * away * away;
-        }
-        for (effect, range) in model.effects.iter().zip(model.ranges()) {
-            let Some(own) = effect.prior_information() else { continue };
-            let at = DVector::from_column_slice(&theta[range.clone()]).add_scalar(-effect.none());
-            let pull = own * &at;
-            cost += at.dot(&pull);
-            let (start, count) = (range.start, range.len());
-            let mut block = information.view_mut((start, start), (count, count));
-            block += own;
-            let mut part = score.rows_mut(start, count);
-            part -= pull;
-        }
-        self.take_positions(model, theta, (&mut information, &mut score, &mut cost));
-        (information, score, cost)
-    }
-
-    /// What positions say of the scale of the speeds and of how late they are.
-    fn take_positions(
-        &self,
-        model: &UpdatedModel,
-        theta: &[f64],
-        (information, score, cost): (&mut DMatrix<f64>, &mut DVector<f64>, &mut f64),
-    ) {
-        if let Some((ratio, deviation)) = self.distance_ratio {
-            let mut scale = 1.0;
-            let mut at = None;
-            for (effect, range) in model.effects.iter().zip(model.ranges()) {
-                let own = effect.speed_scale(&theta[range.clone()]);
-                if own != 1.0 || effect.changes_speed_scale() {
-                    at = Some(range.start);
-                }
-                scale *= own;
-            }
-            let away = (ratio - 1.0 / scale) / deviation;
-            *cost += away * away;
-            if let Some(i) = at {
-                let slope = -1.0 / (scale * scale) / deviation;
-                information[(i, i)] += slope * slope;
-                score[i] += slope * away;
-            }
-        }
-        if let Some((late_s, deviation)) = self.speed_late_s {
-            let effects = model.effects.iter().zip(model.ranges());
-            let late = effects.filter_map(|(effect, range)| {
-                Some((effect.speed_late_s(&theta[range.clone()])?, range))
-            });
-            let late: Vec<_> = late.collect();
-            let known_s: f64 = late.iter().map(|(late_s, _)| late_s).sum();
-            let away = (late_s - known_s) / deviation;
-            *cost += away * away;
-            let numbers: Vec<usize> = late.into_iter().flat_map(|(_, range)| range).collect();
-            for &i in &numbers {
-                score[i] += away / deviation;
-                for &j in &numbers {
-                    information[(i, j)] += deviation.powi(-2);
-                }
-            }
-        }
-    }
-
     /// Memories of the runs for a model.
     pub(super) fn memories(&self) -> Vec<RunMemory> {
         self.runs.iter().map(|_| RunMemory::default()).collect()
@@ -131,7 +57,7 @@ impl FitProblem {
         model: &UpdatedModel,
         (theta, noise): (Vec<f64>, Noise),
         left: Vec<Left>,
-        (filters, memories): (&[RunFilters], &mut [RunMemory]),
+        (filters, memories): (&SharedFilters, &mut [RunMemory]),
     ) -> Fit {
         let (prior_information, prior_score, mut cost) = self.prior(model, &theta);
         let mut fit = Fit {
@@ -145,15 +71,16 @@ impl FitProblem {
             innovations: Vec::new(),
             columns: Vec::new(),
             residuals: Vec::new(),
-            whiteners: filters.iter().map(|filters| filters.whitener.clone()).collect(),
+            run_filters: filters.clone(),
             filters: Vec::new(),
             factors: Vec::new(),
             memories: Arc::default(),
             theta,
         };
         let theta = &fit.theta[..];
-        let runs = self.runs.par_iter().zip(&self.declared_responses).zip(filters).zip(memories);
-        let linearised: Vec<(RunNormal, Vec<Vec<f64>>)> = runs
+        let runs = self.runs.par_iter().zip(&self.declared_responses).zip(&filters[..]);
+        let runs = runs.zip(memories);
+        let linearised: Vec<(RunNormal, Vec<Column>)> = runs
             .zip(&left)
             .map(|((((run, declared), filters), memory), left)| {
                 left.normal(model, At { plan, run, declared, theta }, filters, memory)
@@ -170,6 +97,28 @@ impl FitProblem {
             fit.filters.push(filter);
         }
         fit.cost = cost;
+        fit.held_information = self.held_information(&fit.theta, &fit.score());
+        fit
+    }
+
+    /// A model with the effects of a fit and one more that is at none, where nothing but what it would change is new.
+    pub(super) fn bordered(&self, plan: &Plan, fit: &Fit, memories: &mut [RunMemory]) -> Fit {
+        let mut theta = fit.theta.clone();
+        let last = plan.model.effects.len() - 1;
+        theta.resize(theta.len() + plan.ranges[last].len(), plan.model.effects[last].none());
+        let (prior_information, prior_score, _) = self.prior(plan.model, &theta);
+        let steps = difference_steps(plan.model, &theta);
+        let runs = self.runs.par_iter().zip(&self.declared_responses).zip(memories).enumerate();
+        let bordered: Vec<(RunNormal, Vec<Column>)> = runs
+            .map(|(index, ((run, declared), memory))| {
+                let at = At { plan, run, declared, theta: &theta };
+                fit.bordered_run(index, memory.columns_of_last(at, &steps))
+            })
+            .collect();
+        let (runs, columns) = bordered.into_iter().unzip();
+        let model = plan.model.clone();
+        let mut fit =
+            Fit { model, theta, prior_information, prior_score, runs, columns, ..fit.clone() };
         fit.held_information = self.held_information(&fit.theta, &fit.score());
         fit
     }
@@ -207,19 +156,55 @@ impl Left {
         at: At,
         filters: &RunFilters,
         memory: &mut RunMemory,
-    ) -> (RunNormal, Vec<Vec<f64>>) {
+    ) -> (RunNormal, Vec<Column>) {
         let mut columns = memory.columns(at, &difference_steps(model, at.theta));
-        let mut whitened = Vec::new();
-        for column in &mut columns {
-            filters.whitener.whiten(column, &mut whitened);
-            std::mem::swap(column, &mut whitened);
+        let Whitened { innovations, filter, cost, .. } = &self.whitened;
+        let free = whiten(&filters.whitener, filter, &mut columns);
+        let (count, mut rows) = (columns.len(), columns.iter().map(|it| Row::of(it, filter)));
+        let mut information = DMatrix::zeros(count, count);
+        let mut score = DVector::zeros(count);
+        for (i, row) in rows.by_ref().enumerate() {
+            score[i] = row.times(innovations);
+            for j in 0..=i {
+                let sum = row.times(&free[j]);
+                (information[(i, j)], information[(j, i)]) = (sum, sum);
+            }
         }
-        let own = &self.whitened.filter;
-        let free: Vec<Vec<f64>> =
-            columns.iter().map(|column| own.remove(column, &own.factors(column))).collect();
-        let normal = normal_equations(&columns, &free, &self.whitened);
-        (normal, free)
+        (RunNormal { information, score, cost: *cost }, free)
     }
+}
+
+impl Fit {
+    /// Normal equations and free columns of one run with some columns more, not whitened.
+    fn bordered_run(&self, index: usize, mut more: Vec<Vec<f64>>) -> (RunNormal, Vec<Column>) {
+        let filter = &self.filters[index];
+        let mut free = self.columns[index].clone();
+        let RunNormal { information, score, cost } = &self.runs[index];
+        let (before, count) = (free.len(), free.len() + more.len());
+        free.extend(whiten(&self.run_filters[index].whitener, filter, &mut more));
+        let mut information = information.clone().resize(count, count, 0.0);
+        let mut score = score.clone().resize_vertically(count, 0.0);
+        for (i, column) in (before..).zip(&more) {
+            let row = Row::of(column, filter);
+            score[i] = row.times(&self.innovations[index]);
+            for j in 0..=i {
+                let sum = row.times(&free[j]);
+                (information[(i, j)], information[(j, i)]) = (sum, sum);
+            }
+        }
+        (RunNormal { information, score, cost: *cost }, free)
+    }
+}
+
+/// Whitens columns; what of them the run's own factors would not explain.
+fn whiten(whitener: &Whitener, own: &WeightedFilter, columns: &mut [Vec<f64>]) -> Vec<Column> {
+    let mut whitened = Vec::new();
+    for column in &mut *columns {
+        whitener.whiten(column, &mut whitened);
+        std::mem::swap(column, &mut whitened);
+    }
+    let free = columns.iter().map(|column| own.remove(column, &own.factors(column)));
+    free.map(Arc::new).collect()
 }
 
 /// Steps for finite differences of the effects' parameters, towards the inside of the bounds.
@@ -241,27 +226,26 @@ fn support(series: &[f64]) -> Range<usize> {
     first..series.iter().rposition(counts).map_or(first, |last| last + 1)
 }
 
-/// `free` are the columns less what the run's own factors would explain.
-fn normal_equations(columns: &[Vec<f64>], free: &[Vec<f64>], whitened: &Whitened) -> RunNormal {
-    let (count, weights) = (columns.len(), whitened.filter.weights());
-    let weighted: Vec<Vec<f64>> = columns
-        .iter()
-        .map(|column| column.iter().zip(weights).map(|(value, weight)| weight * value).collect())
-        .collect();
-    // A column that is empty is zero, and so is a local one far behind its place.
-    let product = |one: &[f64], range: &Range<usize>, other: &[f64]| match other.is_empty() {
-        true => 0.0,
-        false => dot(&one[range.clone()], &other[range.clone()]),
-    };
-    let mut information = DMatrix::zeros(count, count);
-    let mut score = DVector::zeros(count);
-    for i in 0..count {
-        let range = support(&weighted[i]);
-        score[i] = product(&weighted[i], &range, &whitened.innovations);
-        for j in 0..=i {
-            let sum = product(&weighted[i], &range, &free[j]);
-            (information[(i, j)], information[(j, i)]) = (sum, sum);
-        }
+/// A whitened column with the weights of the innovations, where it is more than none.
+struct Row {
+    weighted: Vec<f64>,
+    support: Range<usize>,
+}
+
+impl Row {
+    fn of(column: &[f64], filter: &WeightedFilter) -> Self {
+        let weights = filter.weights();
+        let weighted: Vec<f64> =
+            column.iter().zip(weights).map(|(value, weight)| weight * value).collect();
+        let support = support(&weighted);
+        Row { weighted, support }
     }
-    RunNormal { information, score, cost: whitened.cost }
+
+    /// Its product with a series. One that is empty is zero, and so is a local one far behind its place.
+    fn times(&self, other: &[f64]) -> f64 {
+        if other.is_empty() {
+            return 0.0;
+        }
+        dot(&self.weighted[self.support.clone()], &other[self.support.clone()])
+    }
 }

@@ -5,6 +5,7 @@ mod linearised;
 mod memory;
 mod nearby;
 mod plan;
+mod prior;
 mod robust;
 
 use std::sync::Arc;
@@ -22,6 +23,7 @@ use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scat
 use super::whitener::Whitener;
 use memory::RunMemory;
 pub use nearby::Nearby;
+use robust::SharedFilters;
 
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
 /// directions apart which the runs do not excite.
@@ -50,6 +52,9 @@ pub struct FitProblem {
     /// Seconds by which the speed is late by the position, with their standard deviation.
     speed_late_s: Option<(f64, f64)>,
 }
+
+/// A series of a run that models share.
+type Column = Arc<Vec<f64>>;
 
 /// Normal equations of one run at the fitted parameters.
 #[derive(Clone, Debug)]
@@ -85,11 +90,11 @@ pub struct Fit {
     pub innovations: Vec<Vec<f64>>,
     /// Whitened regressors by run and parameter, less what the runs' own factors would explain;
     /// empty for a parameter that does not touch the run.
-    pub columns: Vec<Vec<Vec<f64>>>,
+    pub columns: Vec<Vec<Column>>,
     /// Differences of the bins by run, not whitened.
     pub residuals: Vec<Vec<f64>>,
     /// The filters by run.
-    pub whiteners: Vec<Whitener>,
+    run_filters: SharedFilters,
     /// The filters of the runs' own factors, with the weights of the innovations.
     pub filters: Vec<WeightedFilter>,
     /// The runs' own factors less 1 and delays, with their covariance.
@@ -125,7 +130,12 @@ impl Fit {
 
     /// Number of innovations.
     pub fn observations(&self) -> usize {
-        self.whiteners.iter().map(Whitener::count).sum()
+        self.run_filters.iter().map(|filters| filters.whitener.count()).sum()
+    }
+
+    /// The filter of a run, by number.
+    pub fn whitener(&self, index: usize) -> &Whitener {
+        &self.run_filters[index].whitener
     }
 
     /// Measured over true speed.

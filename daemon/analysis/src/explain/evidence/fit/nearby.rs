@@ -4,21 +4,18 @@ use nalgebra::Cholesky;
 use rayon::prelude::*;
 
 use super::super::run_data::RunData;
-use super::robust::RunFilters;
 use super::{Fit, FitProblem, UpdatedModel};
 
 /// Models in which only places differ from those of a fit.
 pub struct Nearby<'a> {
     problem: &'a FitProblem,
     fit: &'a Fit,
-    filters: Vec<RunFilters>,
 }
 
 impl<'a> Nearby<'a> {
     /// Around a fit.
     pub fn new(problem: &'a FitProblem, fit: &'a Fit) -> Self {
-        let filters = problem.filters(fit.noise);
-        Nearby { problem, fit, filters }
+        Nearby { problem, fit }
     }
 
     /// Cost that a model reaches when all parameters are fitted again, to second order; `run` is
@@ -29,7 +26,8 @@ impl<'a> Nearby<'a> {
         let (mut information, mut score, mut cost) = self.problem.prior(model, theta);
         let moved = |(index, own): (usize, &RunData)| {
             let may_differ = run.is_none_or(|run| run == own.file);
-            may_differ.then(|| self.problem.run_normal(index, model, theta, &self.filters[index]))
+            may_differ
+                .then(|| self.problem.run_normal(index, model, theta, &self.fit.run_filters[index]))
         };
         let moved: Vec<_> = self.problem.runs.par_iter().enumerate().map(moved).collect();
         for (moved, fitted) in moved.iter().zip(&self.fit.runs) {

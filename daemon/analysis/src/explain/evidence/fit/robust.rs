@@ -1,5 +1,7 @@
 //! The innovations of a run under Huber's loss.
 
+use std::sync::Arc;
+
 use super::super::run_scatter::{RunFactors, ScatterFilter, WeightedFilter};
 use super::super::whitener::{Whitener, robust_weight};
 
@@ -9,6 +11,9 @@ pub(super) struct RunFilters {
     pub whitener: Whitener,
     pub scatter: ScatterFilter,
 }
+
+/// Those of all runs.
+pub(super) type SharedFilters = Arc<[RunFilters]>;
 
 /// Innovations of one run and what follows from them.
 pub(super) struct Whitened {

@@ -3,14 +3,17 @@
 //! Of what acts together on a run, one effect in which the forces are affine takes two looks at the samples for
 //! all parameters; where there are more, a slope serves as far as the step that it was taken over.
 
+mod columns;
+
 use std::cell::RefCell;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::super::model::{UpdatedForces, integrate_bins};
 use super::super::response::Response;
 use super::super::run_data::RunData;
 use super::plan::{At, Handling, Plan};
-use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
+use crate::explain::hypothesis::SharedHypothesis;
 
 /// The speed in m/s at which a, b and c are compared, and the share of the resistance that changes no slope.
 const USUAL_MPS: f64 = 20.0;
@@ -21,11 +24,11 @@ const NEAR_SHARE: f64 = 0.05;
 pub(super) struct RunMemory {
     together: Together,
     /// a, b, c and the parameters of what acts together, and by the latter's number what a unit changes.
-    slopes: Option<(Vec<f64>, Vec<Vec<f64>>)>,
+    slopes: Option<Arc<(Vec<f64>, Vec<Vec<f64>>)>>,
     /// By effect: parameters but the first, and the bins for a first one of 1 above none.
-    added: Vec<Option<(Vec<f64>, Vec<f64>)>>,
+    added: Vec<Option<Arc<(Vec<f64>, Vec<f64>)>>>,
     /// By parameter of gradients: the bins for one of 1; empty where it does not touch the run.
-    gradients: Vec<Option<Vec<f64>>>,
+    gradients: Vec<Option<Arc<Vec<f64>>>>,
 }
 
 thread_local! {
@@ -51,9 +54,9 @@ enum Together {
     /// Nothing: what is declared stays.
     Nothing,
     /// That at none, and by how much it changes with each parameter's affine coordinate.
-    Affine { at: Response, none: Response, slopes: Vec<Option<Response>> },
+    Affine { at: Response, none: Arc<Response>, slopes: Arc<Vec<Option<Response>>> },
     /// That at some of their parameters.
-    At(Vec<f64>, Response),
+    At(Vec<f64>, Arc<Response>),
 }
 
 impl RunMemory {
@@ -93,59 +96,10 @@ impl RunMemory {
         }
     }
 
-    /// By parameter what a unit of it changes, not whitened: a, b, c and gradients by their slopes, the
-    /// others by differences over some steps; empty for a parameter that does not touch the run.
-    pub fn columns(&mut self, at: At, steps: &[f64]) -> Vec<Vec<f64>> {
-        let mut columns = vec![Vec::new(); at.theta.len()];
-        self.act_together(at);
-        columns[..3].clone_from_slice(&self.response(at.declared).davis);
-        let scale = at.plan.model.scale_of_added(at.theta);
-        for (number, _, range) in at.plan.handled(Handling::Gradient) {
-            for (parameter, i) in range.enumerate() {
-                let unit = self.gradient_bins(at, number, parameter);
-                columns[i].extend(unit.iter().map(|unit| scale * unit));
-            }
-        }
-        for (number, effect, range) in at.plan.handled(Handling::Added) {
-            let first = at.theta[range.start] - effect.none();
-            let unit = self.added_bins(at, number);
-            columns[range.start] = unit.iter().map(|unit| scale * unit).collect();
-            let others = range.start + 1..range.end;
-            let by_mps2 = -at.unit_mps2() * scale * first;
-            with_scratch(|Scratch { slopes, .. }| {
-                slopes.resize_with(others.len(), Vec::new);
-                let steps = &steps[others.start - 3..others.end - 3];
-                effect.unit_slopes(&at.theta[others.clone()], steps, at.run, slopes);
-                for (slope, column) in slopes.iter().zip(&mut columns[others]) {
-                    integrate_bins(at.run, |i| [by_mps2 * slope[i]], [column]);
-                }
-            });
-        }
-        self.columns_together(at, steps, &mut columns);
-        self.columns_of_scale(at, steps, &mut columns);
-        columns
-    }
-
-    /// Adds to the columns of what scales the added effects what it changes of these.
-    fn columns_of_scale(&mut self, at: At, steps: &[f64], columns: &mut [Vec<f64>]) {
-        if at.plan.handlings.iter().all(|handling| *handling == Handling::Together) {
-            return;
-        }
-        let effects = at.plan.model.effects.iter().zip(&at.plan.ranges);
-        let scaling = effects.filter(|(effect, _)| effect.on_others() == OnOthers::Scales);
-        let mut elsewhere = at.theta.to_vec();
-        for i in scaling.flat_map(|(_, range)| range.clone()) {
-            elsewhere[i] += steps[i - 3];
-            let [before, after] =
-                [at.theta, &elsewhere].map(|theta| at.plan.model.scale_of_added(theta));
-            elsewhere[i] = at.theta[i];
-            self.add(at, (after - before) / steps[i - 3], &mut columns[i]);
-        }
-    }
-
     fn response<'r>(&'r self, declared: &'r Response) -> &'r Response {
         match &self.together {
-            Together::At(_, response) | Together::Affine { at: response, .. } => response,
+            Together::At(_, response) => response,
+            Together::Affine { at: response, .. } => response,
             Together::Nothing | Together::Unknown => declared,
         }
     }
@@ -165,7 +119,7 @@ impl RunMemory {
             Together::Affine { at: response, none, slopes } => {
                 let Some((effect, range, affine_in)) = plan.affine(run) else { return };
                 response.clone_from(none);
-                for (value, slope) in theta[range].iter().zip(slopes) {
+                for (value, slope) in theta[range].iter().zip(&slopes[..]) {
                     if let Some(slope) = slope {
                         response.add(affine_in(*value) - affine_in(effect.none()), slope);
                     }
@@ -176,72 +130,12 @@ impl RunMemory {
             Together::At(known, response) => {
                 known.clear();
                 known.extend(plan.together(run).map(|i| theta[i]));
-                reckon(at, response);
+                *response = reckon(at).into();
             }
             Together::Unknown => {
-                let mut response = Response::default();
-                reckon(at, &mut response);
                 let known = plan.together(run).map(|i| theta[i]).collect();
-                self.together = Together::At(known, response);
+                self.together = Together::At(known, reckon(at).into());
             }
-        }
-    }
-
-    fn columns_together(&mut self, at: At, steps: &[f64], columns: &mut [Vec<f64>]) {
-        let At { plan, run, theta, .. } = at;
-        let davis = at.davis();
-        if let Together::Affine { slopes, .. } = &self.together {
-            let Some((_, range, affine_in)) = plan.affine(run) else { return };
-            for (i, slope) in range.zip(slopes) {
-                let Some(slope) = slope else { continue };
-                let step = steps[i - 3];
-                let per_unit = (affine_in(theta[i] + step) - affine_in(theta[i])) / step;
-                slope.bins(davis, &mut columns[i]);
-                columns[i].iter_mut().for_each(|value| *value *= per_unit);
-            }
-            return;
-        }
-        let together = || plan.together(run);
-        let known: Vec<f64> = davis.into_iter().chain(together().map(|i| theta[i])).collect();
-        let own_steps: Vec<f64> = together().map(|i| steps[i - 3]).collect();
-        if self.slopes.as_ref().is_none_or(|(at, _)| !is_near(at, &known, &own_steps)) {
-            Self::differences(at, steps, columns);
-            let slopes = together().map(|i| columns[i].clone()).collect();
-            self.slopes = Some((known, slopes));
-        } else if let Some((_, slopes)) = &self.slopes {
-            together().zip(slopes).for_each(|(i, slope)| columns[i].clone_from(slope));
-        }
-    }
-
-    /// What a unit of each parameter changes of what acts together, by another look at the samples.
-    fn differences(at: At, steps: &[f64], columns: &mut [Vec<f64>]) {
-        let At { plan, run, theta, .. } = at;
-        let touched = |(_, effect, range): (usize, &SharedHypothesis, Range<usize>)| {
-            let (effect, start) = (effect.clone(), range.start);
-            range.filter(move |i| effect.touches(i - start, run)).map(move |i| (i, i - start))
-        };
-        let (gradients, others): (Vec<_>, Vec<_>) =
-            plan.acting(run).partition(|(_, effect, _)| effect.is_gradient());
-        if !gradients.is_empty() {
-            with_scratch(|Scratch { forces, samples, by_permille, .. }| {
-                let acts = plan.acts_together(run);
-                plan.model.gradient_slopes((run, theta), acts, forces, by_permille);
-                for own in gradients {
-                    let effect = own.1.clone();
-                    for (i, parameter) in touched(own) {
-                        effect.gradient_permille(parameter, run, samples);
-                        integrate_bins(run, |k| [by_permille[k] * samples[k]], [&mut columns[i]]);
-                    }
-                }
-            });
-        }
-        let moves: Vec<(usize, f64)> =
-            others.into_iter().flat_map(touched).map(|(i, _)| (i, steps[i - 3])).collect();
-        if !moves.is_empty() {
-            let acts = plan.acts_together(run);
-            with_scratch(|it| {
-                plan.model.differences((run, theta), acts, &moves, &mut it.moved, columns);
-            });
         }
     }
 
@@ -250,12 +144,12 @@ impl RunMemory {
         let range = at.plan.ranges[number].clone();
         let others = &at.theta[range.start + 1..range.end];
         self.added.resize_with(at.plan.handlings.len(), || None);
-        if self.added[number].as_ref().is_none_or(|(known, _)| known != others) {
-            let mut bins = self.added[number].take().map_or_else(Vec::new, |(_, bins)| bins);
+        if self.added[number].as_ref().is_none_or(|added| added.0 != others) {
+            let mut bins = Vec::new();
             Self::resist(at, &at.plan.model.effects[number], others, &mut bins);
-            self.added[number] = Some((others.to_vec(), bins));
+            self.added[number] = Some(Arc::new((others.to_vec(), bins)));
         }
-        self.added[number].as_ref().map_or(&[], |(_, bins)| bins)
+        self.added[number].as_ref().map_or(&[], |added| &added.1)
     }
 
     fn resist(at: At, effect: &SharedHypothesis, others: &[f64], bins: &mut Vec<f64>) {
@@ -280,9 +174,9 @@ impl RunMemory {
                     integrate_bins(at.run, |i| [-unit_mps2 * samples[i]], [&mut bins]);
                 });
             }
-            self.gradients[i] = Some(bins);
+            self.gradients[i] = Some(Arc::new(bins));
         }
-        self.gradients[i].as_deref().unwrap_or(&[])
+        self.gradients[i].as_ref().map_or(&[], |bins| &bins[..])
     }
 }
 
@@ -292,9 +186,10 @@ fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
 }
 
 /// What the effects make that act together.
-fn reckon(At { plan, run, theta, .. }: At, response: &mut Response) {
-    let acts = plan.acts_together(run);
-    with_scratch(|it| plan.model.response((run, theta), acts, &mut it.forces, response));
+fn reckon(At { plan, run, theta, .. }: At) -> Response {
+    let (acts, mut response) = (plan.acts_together(run), Response::default());
+    with_scratch(|it| plan.model.response((run, theta), acts, &mut it.forces, &mut response));
+    response
 }
 
 /// Whether parameters lie within a step of others, and a, b, c within a small share: a slope is a difference
@@ -336,6 +231,6 @@ fn affine(
             slope
         })
     };
-    let slopes = range.enumerate().map(slope).collect();
-    Together::Affine { at: none.clone(), none, slopes }
+    let slopes = range.enumerate().map(slope).collect::<Vec<_>>().into();
+    Together::Affine { at: none.clone(), none: none.into(), slopes }
 }

@@ -1,0 +1,86 @@
+//! Effects that act on the forces of a run, block by block: few enough samples at a time to stay near the
+//! processor.
+
+use std::ops::Range;
+
+use super::bins::Bin;
+use super::run_data::RunData;
+use super::sample_forces::SampleForces;
+use crate::explain::hypothesis::{Past, SharedHypothesis};
+
+/// Samples that are looked at together.
+const BLOCK: usize = 128;
+
+/// All samples of a run, block by block.
+pub(super) fn blocks(run: &RunData) -> impl Iterator<Item = Range<usize>> {
+    let count = run.samples().len();
+    (0..count).step_by(BLOCK).map(move |first| first..(first + BLOCK).min(count))
+}
+
+/// Effects of a model with the ranges of their parameters, in the order in which they act.
+pub(super) struct Pass<'m> {
+    pub order: Vec<(&'m SharedHypothesis, Range<usize>)>,
+    /// Whether one of them takes something of earlier samples: then none may be left out.
+    pub looks_back: bool,
+}
+
+impl<'m> Pass<'m> {
+    /// Of effects in the order of the model.
+    pub fn of(effects: impl Iterator<Item = (&'m SharedHypothesis, Range<usize>)>) -> Self {
+        let mut order: Vec<_> = effects.collect();
+        order.sort_by_key(|(effect, _)| effect.turn());
+        let looks_back = order.iter().any(|(effect, _)| effect.looks_back());
+        Pass { order, looks_back }
+    }
+
+    /// The first of some bins that are looked at together with the samples from one on: one at least.
+    pub fn bins<'b>(&self, first: usize, bins: &'b [Bin]) -> &'b [Bin] {
+        let fits = |bin: &&Bin| bin.end <= first + BLOCK;
+        let count = bins.iter().take_while(fits).count();
+        &bins[..count.max(1).min(bins.len())]
+    }
+
+    /// Acts on the declared forces at some samples of a run.
+    pub fn on_declared(
+        &self,
+        (run, theta): (&RunData, &[f64]),
+        samples: Range<usize>,
+        acting: &mut Acting,
+    ) {
+        let first = samples.start;
+        acting.declared(run, samples);
+        self.act((run, theta, first), 0..self.order.len(), acting, 0);
+    }
+
+    /// Some of them act on what acted before, at the samples from one on. What they remember stands from number
+    /// `past` on.
+    pub fn act(
+        &self,
+        (run, theta, first): (&RunData, &[f64], usize),
+        turns: Range<usize>,
+        acting: &mut Acting,
+        past: usize,
+    ) {
+        let Acting { samples, pasts } = acting;
+        pasts.resize_with(pasts.len().max(past + self.order.len()), Past::default);
+        let own = self.order[turns.clone()].iter().zip(&mut pasts[past + turns.start..]);
+        for ((effect, range), past) in own {
+            effect.apply_after(past, &theta[range.clone()], run, first, samples);
+        }
+    }
+}
+
+/// What acts at the samples looked at last, with what the effects remember of those before.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Acting {
+    pub samples: Vec<SampleForces>,
+    pasts: Vec<Past>,
+}
+
+impl Acting {
+    /// As declared, at some samples of a run.
+    pub fn declared(&mut self, run: &RunData, samples: Range<usize>) {
+        self.samples.clear();
+        self.samples.extend_from_slice(&run.declared[samples]);
+    }
+}

@@ -1,0 +1,273 @@
+//! What is tried in a round: every kind beside the model, fitted, and the best once more under their own noise.
+
+use dynocar_shared::vocabulary::EffectKind;
+use rayon::prelude::*;
+
+use super::outcome::Trial;
+use super::price::{discounted, penalty};
+use super::search::Search;
+use super::steps::Steps;
+use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
+use crate::explain::evidence::{Fit, Noise};
+use crate::explain::scan::Scan;
+use crate::explain::score::FitErrors;
+
+/// Kinds that get a noise of their own and a second localisation in each round.
+const FINALISTS: usize = 5;
+/// A finalist's advantage: not far below none, and no less than this share of the greatest.
+const FINALIST_MIN: f64 = -20.0;
+const FINALIST_SHARE: f64 = 0.1;
+/// The same where only what may come as far as a kind in its place is looked for.
+const RIVAL_SHARE: f64 = 0.25;
+/// Kinds that take away this share of the open-loop error come before the others, and are all that is
+/// looked at again beyond this number of observations, where small things are significant.
+const FINALIST_ERROR_REDUCTION: f64 = 0.02;
+const MANY_OBSERVATIONS: usize = 5_000;
+/// How often a finalist looks again at most.
+const ATTEMPTS: usize = 3;
+/// Shares of the slow part of a noise under which a kind looks again.
+pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
+/// What would not pay its price with so many times the decrease that its start promises is not fitted.
+const PROMISE_TIMES: f64 = 2.0;
+/// Which kinds are tried.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    /// Whether one is.
+    pub is_asked: &'a dyn Fn(EffectKind) -> bool,
+    /// Only what comes near this one matters.
+    pub rivals_of: Option<EffectKind>,
+}
+
+/// What trying a kind brought.
+enum Tried<'e> {
+    /// The data do not allow to test it, and why.
+    NotTestable(EffectKind, String),
+    /// Its best candidate, if any, by this kind or its forms.
+    Best(Option<Box<Trial>>, &'e dyn Effect),
+}
+
+impl<'e> Tried<'e> {
+    /// Among the trials, or what cannot be tested.
+    fn take(
+        self,
+        trials: &mut Vec<(Trial, &'e dyn Effect)>,
+        not_testable: &mut Vec<(EffectKind, String)>,
+    ) {
+        match self {
+            Tried::Best(best, effect) => trials.extend(best.map(|trial| (*trial, effect))),
+            Tried::NotTestable(kind, reason) => {
+                if !not_testable.iter().any(|(other, _)| *other == kind) {
+                    not_testable.push((kind, reason));
+                }
+            }
+        }
+    }
+}
+
+impl Search<'_> {
+    /// Tries every kind that the model does not have yet; the strongest first.
+    pub(super) fn round(
+        &self,
+        base: &Fit,
+        not_testable: &mut Vec<(EffectKind, String)>,
+    ) -> Vec<Trial> {
+        self.round_of(base, not_testable, Asked { is_asked: &|_| true, rivals_of: None })
+    }
+
+    /// Tries a kind and what could stand in its place.
+    pub(super) fn rivals(&self, base: &Fit, kind: EffectKind) -> Vec<Trial> {
+        let asked = Asked { is_asked: &|_| true, rivals_of: Some(kind) };
+        self.round_of(base, &mut Vec::new(), asked)
+    }
+
+    /// Tries some kinds; the strongest first.
+    pub(super) fn round_of(
+        &self,
+        base: &Fit,
+        not_testable: &mut Vec<(EffectKind, String)>,
+        asked: Asked,
+    ) -> Vec<Trial> {
+        let Some(scan) = self.scan(base) else { return Vec::new() };
+        let steps = Steps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
+        let share = if asked.rivals_of.is_some() { RIVAL_SHARE } else { FINALIST_SHARE };
+        let mut trials = self.try_all(base, &scan, &steps, not_testable, asked);
+        let by_advantage = |one: &Trial, other: &Trial| other.bic_gain.total_cmp(&one.bic_gain);
+        let before = FitErrors::of(self.problem, base);
+        let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
+        let measure = |trials: &mut [(Trial, &dyn Effect)], is_asked: fn(f64) -> bool| {
+            trials
+                .par_iter_mut()
+                .filter(|(trial, _)| is_asked(trial.bic_gain))
+                .for_each(|(trial, _)| trial.reduction = reduction(&trial.fit));
+        };
+        measure(&mut trials, |gain| gain > 0.0);
+        if !trials.iter().any(|(trial, _)| trial.reduction > FINALIST_ERROR_REDUCTION) {
+            measure(&mut trials, |gain| gain > FINALIST_MIN && gain <= 0.0);
+        }
+        // What takes nothing from the error comes last, and is no measure for the others.
+        let helps = |trial: &Trial| trial.reduction > FINALIST_ERROR_REDUCTION;
+        let key = |trial: &Trial| (helps(trial), trial.bic_gain);
+        trials.sort_by(|(one, _), (other, _)| {
+            let (one, other) = (key(one), key(other));
+            other.0.cmp(&one.0).then(other.1.total_cmp(&one.1))
+        });
+        let greatest = trials.first().map_or(0.0, |(trial, _)| trial.bic_gain);
+        let least = FINALIST_MIN.max(share * greatest);
+        let is_long = base.observations() > MANY_OBSERVATIONS;
+        let mut finished: Vec<Trial> = trials
+            .into_par_iter()
+            .enumerate()
+            .map(|(rank, (trial, effect))| {
+                let is_finalist =
+                    rank < FINALISTS && trial.bic_gain > least && (helps(&trial) || !is_long);
+                if !is_finalist {
+                    return trial;
+                }
+                let trial = steps.done_with(effect, |effect| self.finalist(base, trial, effect));
+                Trial { reduction: reduction(&trial.fit), ..trial }
+            })
+            .collect();
+        finished.sort_by(by_advantage);
+        finished
+    }
+
+    /// Tries every kind that the model does not have yet, what is outside the library last.
+    fn try_all<'e>(
+        &self,
+        base: &Fit,
+        scan: &Scan,
+        steps: &Steps,
+        not_testable: &mut Vec<(EffectKind, String)>,
+        Asked { is_asked, rivals_of }: Asked,
+    ) -> Vec<(Trial, &'e dyn Effect)> {
+        let is_new = |effect: &&dyn Effect| {
+            is_asked(effect.kind())
+                && !base.model.effects.iter().any(|own| own.kind() == effect.kind())
+        };
+        let (outside, library): (Vec<&dyn Effect>, Vec<&dyn Effect>) =
+            LIBRARY.into_iter().filter(is_new).partition(|it| it.kind() == EffectKind::Unknown);
+        let (own, library): (Vec<&dyn Effect>, Vec<&dyn Effect>) =
+            library.into_iter().partition(|it| rivals_of == Some(it.kind()));
+        let try_kind = |effect, least| {
+            steps.done_with(effect, |effect| self.try_kind((base, least), scan, effect))
+        };
+        let mut trials = Vec::new();
+        own.into_iter().for_each(|own| try_kind(own, 0.0).take(&mut trials, not_testable));
+        let gains = trials.iter().map(|(own, _): &(Trial, _)| RIVAL_SHARE * own.bic_gain);
+        let least = gains.fold(0.0, f64::max);
+        let tried: Vec<Tried> =
+            library.into_par_iter().map(|effect| try_kind(effect, least)).collect();
+        tried.into_iter().for_each(|tried| tried.take(&mut trials, not_testable));
+        let mut has_forms = false;
+        for effect in outside {
+            has_forms = self.asks_for_a_form(scan, &trials);
+            let effect = if has_forms { UNKNOWN } else { effect };
+            try_kind(effect, least).take(&mut trials, not_testable);
+        }
+        if !has_forms {
+            self.take_form_that_noise_holds(base, &mut trials);
+        }
+        trials
+    }
+
+    /// The best candidate of a kind, beside everything accepted so far; what promises less than a gain is not
+    /// fitted to its end.
+    fn try_kind<'e>(
+        &self,
+        (base, least): (&Fit, f64),
+        scan: &Scan,
+        effect: &'e dyn Effect,
+    ) -> Tried<'e> {
+        match effect.propose(scan) {
+            Proposal::NotTestable(reason) => Tried::NotTestable(effect.kind(), reason),
+            Proposal::Candidates(candidates) => {
+                let is_only = candidates.len() == 1 && candidates.iter().all(Candidate::is_fixed);
+                let best = self.best_attempt((base, least), base, candidates);
+                let best = best.map(|trial| Box::new(Trial { is_only, ..trial }));
+                Tried::Best(best, effect)
+            }
+        }
+    }
+
+    /// The candidate that explains most for its price, fitted on top of a fit.
+    fn best_attempt(
+        &self,
+        base: (&Fit, f64),
+        onto: &Fit,
+        candidates: Vec<Candidate>,
+    ) -> Option<Trial> {
+        let attempts: Vec<Trial> = candidates
+            .into_par_iter()
+            .map(|candidate| self.attempt(base, onto, candidate))
+            .collect();
+        attempts.into_iter().max_by(|one, other| one.bic_gain.total_cmp(&other.bic_gain))
+    }
+
+    /// Fits a candidate on top of a fit; its evidence counts against `base`. What promises less than a gain is not
+    /// fitted to its end.
+    fn attempt(&self, (base, least): (&Fit, f64), onto: &Fit, candidate: Candidate) -> Trial {
+        let kind = candidate.hypothesis.kind();
+        let may_pay = |fit: &Fit, promised: f64| {
+            let last = fit.model.effects.len() - 1;
+            base.cost - fit.cost + PROMISE_TIMES * promised > penalty(fit, last) + least
+        };
+        let fit = self.problem.grown_if(onto, [candidate.from_none()], may_pay);
+        Self::trial(base, fit, kind)
+    }
+
+    pub(super) fn trial(base: &Fit, fit: Fit, kind: EffectKind) -> Trial {
+        let decrease = base.cost - fit.cost;
+        let last = fit.model.effects.len() - 1;
+        let price = penalty(&fit, last);
+        let evidence = discounted(&fit, last, decrease) - price;
+        Trial { kind, fit, bic_gain: decrease - price, evidence, reduction: 0.0, is_only: false }
+    }
+
+    /// Gives a trial the noise that remains under it and lets its kind look again for places and windows
+    /// under that noise: the noise of the smaller model holds the effect itself. Where there are many to
+    /// choose from, it looks under stiff noises too; where there is one, its fit goes on.
+    fn finalist(&self, base: &Fit, trial: Trial, effect: &dyn Effect) -> Trial {
+        let with_own_noise =
+            |fit: &Fit| Self::trial(base, self.problem.with_own_noise(fit), trial.kind);
+        let mut best = with_own_noise(&trial.fit);
+        for attempt in 0..ATTEMPTS {
+            let own = best.fit.noise;
+            let look = |noise: Noise| self.look_again(base, noise, effect);
+            let (again, many) = if trial.is_only {
+                (Some(with_own_noise(&best.fit)), false)
+            } else {
+                look(own).map_or((None, false), |(trial, many)| (Some(trial), many))
+            };
+            let shares = if attempt == 0 && many { &STIFF[..] } else { &[] };
+            let stiff: Vec<_> =
+                shares.par_iter().filter_map(|share| look(own.stiff(*share))).collect();
+            let mut is_better = false;
+            for again in again.into_iter().chain(stiff.into_iter().map(|it| it.0)) {
+                if again.bic_gain > best.bic_gain + 1.0 {
+                    best = again;
+                    is_better = true;
+                }
+            }
+            if !is_better {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The best candidate of a kind when it looks for places and windows under a given noise, and whether
+    /// there are many to choose from.
+    pub(super) fn look_again(
+        &self,
+        base: &Fit,
+        noise: Noise,
+        effect: &dyn Effect,
+    ) -> Option<(Trial, bool)> {
+        let onto = self.problem.again(base, noise);
+        let scan = self.scan(&onto)?;
+        let Proposal::Candidates(candidates) = effect.propose(&scan) else { return None };
+        let many = candidates.len() > 1 || candidates.iter().any(Candidate::is_chosen_among_many);
+        let best = self.best_attempt((base, 0.0), &onto, candidates)?;
+        Some((Self::trial(base, self.problem.with_own_noise(&best.fit), best.kind), many))
+    }
+}
