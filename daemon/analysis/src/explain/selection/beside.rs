@@ -13,7 +13,7 @@ use super::certainty::{CERTAIN_RUNS_MIN, is_certain};
 use super::outcome::{Beside, Outcome, Round, Trial};
 use super::price::{at_bound, penalty};
 use super::search::Search;
-use super::trying::Asked;
+use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{
     Candidate, SharedHypothesis, map_error, map_error_as_fitted, usual_errors,
 };
@@ -88,7 +88,8 @@ impl Search<'_> {
 
     /// Takes in what is certain beside the usual errors; false for nothing.
     ///
-    /// It is looked for with the map's error in the shape that it has without it, and judged with all of it free.
+    /// It is looked for with the map's error in the shape that it has without it, and judged with all of it free
+    /// where it may be certain: freed, the map holds less of the effect.
     pub(super) fn take_certain_beside(&self, outcome: &mut Outcome) -> bool {
         let beside = &self.beside_usual_errors(outcome).fit;
         if outcome.is_full() || self.problem.runs.len() < CERTAIN_RUNS_MIN {
@@ -101,7 +102,8 @@ impl Search<'_> {
             &mut Vec::new(),
             Asked { is_asked: &is_sought, rivals_of: None },
         );
-        let may_be_certain = tried.iter().filter(|trial| is_certain_beside(trial, trial.bic_gain));
+        let may_be = |trial: &&Trial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
+        let may_be_certain = tried.iter().filter(may_be);
         let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
         let best = certain.max_by(|one, other| one.evidence.total_cmp(&other.evidence));

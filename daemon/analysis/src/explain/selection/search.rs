@@ -62,6 +62,8 @@ impl Search<'_> {
         while self.take_certain_beside(&mut outcome) {
             self.take_what_scores(&mut outcome);
         }
+        // What was certain and small has joined since.
+        self.prune(&mut outcome);
         self.name_or_forget_small(&mut outcome);
         outcome
     }
