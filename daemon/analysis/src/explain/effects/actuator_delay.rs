@@ -11,8 +11,8 @@ use crate::explain::scan::Scan;
 /// Where positions are integrated from the speed, they are late with it; where nothing of the line is felt,
 /// a speed whose odometer is late with it looks the same.
 const NEVER_REPORTED: [EffectKind; 1] = [EffectKind::SpeedDelay];
-/// Delay and lag in s that a fit may start from, the least first.
-const STARTS: [[f64; 2]; 5] = [[0.1, 0.05], [0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
+/// Delay and lag in s that a fit may start from.
+const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
 
 /// The kind.
 pub struct ActuatorDelay;

@@ -11,8 +11,8 @@ use super::{Candidate, Effect, Hypothesis, OnOthers, Past, Proposal, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
-/// Delay and lag in s that a fit may start from, the least first.
-const STARTS: [[f64; 2]; 5] = [[0.1, 0.05], [0.6, 0.1], [0.1, 0.6], [1.2, 0.3], [0.3, 1.2]];
+/// Delay and lag in s that a fit may start from.
+const STARTS: [[f64; 2]; 4] = [[0.6, 0.1], [0.1, 0.6], [1.2, 0.3], [0.3, 1.2]];
 
 /// The kind.
 pub struct SpeedDelay;
