@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::{Fit, acceptance_score};
 
 /// Named effects at most.
@@ -55,10 +54,8 @@ pub struct Beside {
 impl Beside {
     /// Whether it is a fitted model with the usual errors beside it.
     pub(super) fn is_of(&self, fit: &Fit, from: &[f64]) -> bool {
-        let effects = fit.model.effects.iter().zip(&self.fit.model.effects);
-        let is_same =
-            |(one, other): (&SharedHypothesis, &SharedHypothesis)| Arc::ptr_eq(one, other);
-        fit.theta == from && effects.map(is_same).all(|is_same| is_same)
+        let mut effects = fit.model.effects.iter().zip(&self.fit.model.effects);
+        fit.theta == from && effects.all(|(one, other)| Arc::ptr_eq(one, other))
     }
 }
 

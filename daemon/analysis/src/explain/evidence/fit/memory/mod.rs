@@ -19,14 +19,17 @@ use crate::explain::hypothesis::SharedHypothesis;
 const USUAL_MPS: f64 = 20.0;
 const NEAR_SHARE: f64 = 0.05;
 
+/// What is known at some parameters, shared by models.
+type Known<T> = Arc<(Vec<f64>, T)>;
+
 /// What is known of one run, for one model.
 #[derive(Clone, Default)]
 pub(super) struct RunMemory {
     together: Together,
     /// a, b, c and the parameters of what acts together, and by the latter's number what a unit changes.
-    slopes: Option<Arc<(Vec<f64>, Vec<Vec<f64>>)>>,
+    slopes: Option<Known<Vec<Vec<f64>>>>,
     /// By effect: parameters but the first, and the bins for a first one of 1 above none.
-    added: Vec<Option<Arc<(Vec<f64>, Vec<f64>)>>>,
+    added: Vec<Option<Known<Vec<f64>>>>,
     /// By parameter of gradients: the bins for one of 1; empty where it does not touch the run.
     gradients: Vec<Option<Arc<Vec<f64>>>>,
 }
