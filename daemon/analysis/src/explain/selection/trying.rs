@@ -30,6 +30,7 @@ pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
 /// What would not pay its price with so many times the decrease that its start promises is not fitted;
 /// what would not be certain with so many times its evidence is not judged.
 pub(super) const PROMISE_TIMES: f64 = 2.0;
+
 /// Which kinds are tried.
 #[derive(Clone, Copy)]
 pub(super) struct Asked<'a> {
