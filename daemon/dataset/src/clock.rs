@@ -233,7 +233,7 @@ pub(super) fn unix_s(at: &toml::value::Datetime) -> Option<i64> {
     let month = time::Month::try_from(date.month).ok()?;
     let day = Date::from_calendar_date(i32::from(date.year), month, date.day).ok()?;
     let second = at.time.map_or(0, |it| {
-        i64::from(it.hour) * 3600 + i64::from(it.minute) * 60 + i64::from(it.second.unwrap_or(0))
+        i64::from(it.hour) * 3600 + i64::from(it.minute) * 60 + i64::from(it.second)
     });
     let zone_min = match at.offset {
         Some(toml::value::Offset::Custom { minutes }) => i64::from(minutes),

@@ -157,22 +157,23 @@ impl<'a> Scan<'a> {
         tuple
     }
 
-    /// Decrease of the cost when an effect acts, by what it changes at a sample in m/s².
+    /// Decrease of the cost when an effect acts, by what it changes at a sample in m/s²: from what is declared
+    /// to what acts.
     pub fn decrease_by(
         &self,
         effect: &dyn Hypothesis,
         parameters: &[f64],
-        change_mps2: impl Fn(&RunData, usize, &SampleForces) -> f64,
+        change_mps2: impl Fn(&RunData, usize, [&SampleForces; 2]) -> f64,
     ) -> f64 {
         let mut sum = Tuple::zero(self.fit.theta.len());
         for (index, run) in self.problem.runs.iter().enumerate() {
             let (mut past, mut middles) = (Past::default(), run.bins.iter().map(Bin::middle));
             let (mut shape, mut middle) = (Vec::with_capacity(run.bins.len()), middles.next());
-            for (i, declared) in run.declared.iter().enumerate() {
-                let mut acting = [*declared];
+            for (i, declared) in run.declared.all().enumerate() {
+                let mut acting = [declared];
                 effect.apply_after(&mut past, parameters, run, i, &mut acting);
                 if middle == Some(i) {
-                    shape.push(change_mps2(run, i, &acting[0]));
+                    shape.push(change_mps2(run, i, [&declared, &acting[0]]));
                     middle = middles.next();
                 }
             }

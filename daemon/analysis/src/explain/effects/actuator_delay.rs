@@ -44,9 +44,9 @@ impl Effect for ActuatorDelay {
 
 /// Decrease of the cost when the forces act with this delay and lag.
 fn decrease(scan: &Scan, start: [f64; 2]) -> f64 {
-    scan.decrease_by(&DelayAndLag::default(), &start, |run, i, late| {
+    scan.decrease_by(&DelayAndLag::default(), &start, |run, i, [declared, late]| {
         let control_n = |force: &SampleForces| force.traction_n - force.brake_n;
-        (control_n(late) - control_n(&run.declared[i])) / run.samples()[i].inertial_mass_kg
+        (control_n(late) - control_n(declared)) / run.samples()[i].inertial_mass_kg
     })
 }
 

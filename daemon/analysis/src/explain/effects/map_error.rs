@@ -43,9 +43,9 @@ impl Hypothesis for Fitted {
     }
 
     fn gradient_permille(&self, _parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
-        let mut with = run.declared.clone();
+        let mut with: Vec<SampleForces> = run.declared.all().collect();
         self.error.apply(&self.permille, run, 0, &mut with);
-        let added = with.iter().zip(&run.declared);
+        let added = with.iter().zip(run.declared.all());
         permille.clear();
         permille.extend(added.map(|(with, own)| with.gradient_permille - own.gradient_permille));
     }

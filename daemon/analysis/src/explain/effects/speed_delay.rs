@@ -46,13 +46,13 @@ impl Effect for SpeedDelay {
 fn decrease(scan: &Scan, start: [f64; 2]) -> f64 {
     let theta = &scan.fit.theta;
     let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
-    scan.decrease_by(&DelayAndLag, &start, |run, i, late| {
+    scan.decrease_by(&DelayAndLag, &start, |run, i, [declared, late]| {
         let speed_mps = run.smooth_mps[i];
         let mps2 = |force: &SampleForces| {
             let [p0, p1, p2] = force.polynomial(davis, speed_mps);
             p0 + speed_mps * (p1 + speed_mps * p2)
         };
-        mps2(late) - mps2(&run.declared[i])
+        mps2(late) - mps2(declared)
     })
 }
 

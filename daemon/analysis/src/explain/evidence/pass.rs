@@ -81,6 +81,6 @@ impl Acting {
     /// As declared, at some samples of a run.
     pub fn declared(&mut self, run: &RunData, samples: Range<usize>) {
         self.samples.clear();
-        self.samples.extend_from_slice(&run.declared[samples]);
+        self.samples.extend(run.declared.at(samples));
     }
 }

@@ -13,7 +13,7 @@ use super::bins::{self, Bin};
 use super::cleaning;
 use super::distance_ratio::distance_ratio;
 use super::late_speed;
-use super::sample_forces::SampleForces;
+use super::sample_forces::DeclaredForces;
 
 /// A run, ready for fitting and for open-loop simulation.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ pub struct RunData {
     /// The cleaned run.
     pub recording: Recording,
     /// What the declared model says of each sample.
-    pub declared: Vec<SampleForces>,
+    pub declared: DeclaredForces,
     /// Cleaned speed in m/s, lightly smoothed, at which resistances are evaluated.
     pub smooth_mps: Vec<f64>,
     /// Least and greatest position in m; `None` without one.
@@ -149,11 +149,7 @@ fn prepare_run(
     let replaced = cleaning::clean(&mut samples, bins::sampling_period_s(&time_s));
     let recording = Recording::new(samples, BridgeLimits::default())
         .map_err(|source| RunDataError::Simulate { file: run.file.clone(), source })?;
-    let declared = recording
-        .samples()
-        .iter()
-        .map(|sample| SampleForces::declared(sample, train.rotating_mass_factor))
-        .collect();
+    let declared = DeclaredForces::of(recording.samples(), train.rotating_mass_factor);
     let smooth_mps = smoothed(&recording);
     let of_samples = |of: &Covariate| {
         recording.samples().iter().map(|sample| sample.covariate(*of).unwrap_or(f64::NAN)).collect()

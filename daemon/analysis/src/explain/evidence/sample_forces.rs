@@ -1,5 +1,7 @@
 //! What accelerates the train at one sample.
 
+use std::ops::Range;
+
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::force::balance::{ActingForces, mps2_per_n_per_kn};
 use dynocar_model::terms::Resistance;
@@ -66,5 +68,67 @@ impl SampleForces {
     pub(super) fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {
         let unit = mps2_per_n_per_kn(self.rotating_mass_factor);
         self.resistance.davis_slopes(speed_mps).map(|slope| -unit * slope)
+    }
+}
+
+/// What acts at the samples of a run as declared: three times smaller than the forces themselves, for all
+/// fits read it again and again.
+#[derive(Clone, Debug)]
+pub struct DeclaredForces {
+    rotating_mass_factor: f64,
+    samples: Vec<DeclaredSample>,
+    /// What resists, once where samples that follow each other have it alike.
+    resistances: Vec<Resistance>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct DeclaredSample {
+    mass_kg: f64,
+    traction_n: f64,
+    brake_n: f64,
+    gradient_permille: f64,
+    resistance: usize,
+}
+
+impl DeclaredForces {
+    /// Of some samples of a train.
+    pub fn of(samples: &[ResolvedSample], rotating_mass_factor: f64) -> Self {
+        let mut resistances: Vec<Resistance> = Vec::new();
+        let samples = samples.iter().map(|sample| {
+            let SampleForces {
+                mass_kg, traction_n, brake_n, gradient_permille, resistance, ..
+            } = SampleForces::declared(sample, rotating_mass_factor);
+            if resistances.last() != Some(&resistance) {
+                resistances.push(resistance);
+            }
+            let resistance = resistances.len() - 1;
+            DeclaredSample { mass_kg, traction_n, brake_n, gradient_permille, resistance }
+        });
+        DeclaredForces { rotating_mass_factor, samples: samples.collect(), resistances }
+    }
+
+    /// What acts at some samples, in their order.
+    #[inline]
+    pub fn at(&self, samples: Range<usize>) -> impl ExactSizeIterator<Item = SampleForces> + '_ {
+        self.samples[samples].iter().map(|sample| SampleForces {
+            mass_kg: sample.mass_kg,
+            traction_n: sample.traction_n,
+            brake_n: sample.brake_n,
+            mass_factor: 1.0,
+            rotating_mass_factor: self.rotating_mass_factor,
+            gradient_permille: sample.gradient_permille,
+            resistance: self.resistances[sample.resistance],
+            extra_n: 0.0,
+        })
+    }
+
+    /// What acts at all of them.
+    pub fn all(&self) -> impl ExactSizeIterator<Item = SampleForces> + '_ {
+        self.at(0..self.samples.len())
+    }
+
+    /// What acts at one of them; `None` behind the last.
+    pub fn get(&self, index: usize) -> Option<SampleForces> {
+        (index < self.samples.len()).then(|| self.at(index..index + 1).next())?
     }
 }

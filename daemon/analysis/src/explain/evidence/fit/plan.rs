@@ -121,7 +121,7 @@ impl At<'_> {
 
     /// Acceleration in m/s² that 1 N/kN takes away.
     pub fn unit_mps2(&self) -> f64 {
-        let first = self.run.declared.first();
+        let first = self.run.declared.get(0);
         first.map_or(0.0, |first| mps2_per_n_per_kn(first.rotating_mass_factor))
     }
 }
