@@ -1,36 +1,157 @@
-//! Results for people and for machines, with errors as this program reports them: text and exit status.
+//! Results for people and for machines, and how a command of this program fails.
 
+use std::error::Error;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-/// Gives a result; an error has its text and the exit status.
+/// Why a command fails, in words; exit status 1, or 2 for [`Usage`].
+pub type Failure = Box<dyn Error + Send + Sync>;
+
+/// What the command line has wrong, and what was expected: exit status 2.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Usage(pub String);
+
+/// Refuses the command line unless a condition holds.
+///
+/// # Errors
+///
+/// When it does not hold.
+pub fn expect(holds: bool, words: impl FnOnce() -> String) -> Result<(), Failure> {
+    if holds { Ok(()) } else { Err(Usage(words()).into()) }
+}
+
+/// Says during what an error happened.
+pub fn during<E: Display>(what: impl Display) -> impl FnOnce(E) -> Failure {
+    move |error| format!("{what}: {error}").into()
+}
+
+/// Gives a result to machines where they want it, and to people unless standard output is taken.
+///
+/// # Errors
+///
+/// When it cannot be written.
 pub fn give(
     json: &Option<PathBuf>,
     result: &impl Serialize,
     for_people: impl FnOnce() -> String,
-) -> Result<(), (String, u8)> {
-    dynocar::output::give(json.as_deref(), result, for_people)
-        .map_err(|error| (error.to_string(), 1))
+) -> Result<(), Failure> {
+    Ok(dynocar::output::give(json.as_deref(), result, for_people)?)
 }
 
 /// A row of a table of figures: each column's name with its cell, empty where there is no figure.
-pub type CsvRow = Vec<(&'static str, String)>;
+#[derive(Clone, Debug, Default)]
+pub struct Record(Vec<(String, String)>);
 
-/// Writes rows with the same columns as CSV under a line of their names; an error has its text and the exit status.
-pub fn write_csv(file: &Path, rows: &[CsvRow]) -> Result<(), (String, u8)> {
-    let refused = |error: csv::Error| (format!("{}: {error}", file.display()), 1);
-    let mut writer = csv::Writer::from_path(file).map_err(refused)?;
-    if let Some(first) = rows.first() {
-        writer.write_record(first.iter().map(|(name, _)| name)).map_err(refused)?;
+impl Record {
+    /// With one more cell.
+    #[must_use]
+    pub fn with(mut self, name: impl Into<String>, cell: impl Display) -> Self {
+        self.0.push((name.into(), cell.to_string()));
+        self
     }
-    for row in rows {
-        writer.write_record(row.iter().map(|(_, cell)| cell)).map_err(refused)?;
+
+    /// With one more number of so many decimals; empty where there is none.
+    #[must_use]
+    pub fn number(
+        self,
+        name: impl Into<String>,
+        value: impl Into<Option<f64>>,
+        decimals: usize,
+    ) -> Self {
+        let known = value.into().filter(|it| it.is_finite());
+        self.with(name, known.map_or(String::new(), |it| format!("{it:.decimals$}")))
     }
-    writer.flush().map_err(|error| refused(error.into()))
+
+    /// The cell of a column.
+    #[cfg(test)]
+    pub fn cell(&self, name: &str) -> Option<&str> {
+        self.0.iter().find(|it| it.0 == name).map(|it| it.1.as_str())
+    }
+
+    /// As people read it: units in words, and an interval in the cell of its figure.
+    fn for_people(&self) -> Vec<(String, String)> {
+        let mut cells: Vec<(String, String)> = Vec::with_capacity(self.0.len());
+        let mut rest = self.0.iter();
+        while let Some((name, cell)) = rest.next() {
+            let is_figure = rest.as_slice().first().is_some_and(|it| it.0 == format!("{name}_low"));
+            let mut cell = cell.clone();
+            if is_figure
+                && let (Some(low), Some(high)) = (rest.next(), rest.next())
+                && !low.1.is_empty()
+            {
+                cell += &format!(" ({}–{})", low.1, high.1);
+            }
+            cells.push((name.replace('_', " ").replace("percent", "%"), cell));
+        }
+        cells
+    }
 }
 
-/// A figure with so many decimals; empty where there is none.
-pub fn cell(value: Option<f64>, decimals: usize) -> String {
-    value.filter(|it| it.is_finite()).map_or(String::new(), |it| format!("{it:.decimals$}"))
+/// Rows with the same columns as a table of Markdown that reads in a terminal too: words to the left, numbers
+/// to the right.
+pub fn table(records: &[Record]) -> String {
+    let rows: Vec<_> = records.iter().map(Record::for_people).collect();
+    let Some(first) = rows.first() else { return String::new() };
+    let columns: Vec<(usize, bool)> = (0..first.len())
+        .map(|column| {
+            let cells = || rows.iter().map(|row| &row[column].1).filter(|it| !it.is_empty());
+            let longest = cells().chain([&first[column].0]).map(|it| it.chars().count()).max();
+            let words = cells().filter(|it| it.starts_with(|one: char| one.is_alphabetic()));
+            (longest.unwrap_or(0).max(3), 2 * words.count() > cells().count())
+        })
+        .collect();
+    let line = |cells: &mut dyn Iterator<Item = &String>| {
+        let cells = cells.zip(&columns).map(|(cell, &(width, is_words))| match is_words {
+            true => format!(" {cell:<width$} |"),
+            false => format!(" {cell:>width$} |"),
+        });
+        cells.fold(String::from("|"), |line, cell| line + &cell) + "\n"
+    };
+    let rule = columns.iter().map(|&(width, is_words)| match is_words {
+        true => "-".repeat(width),
+        false => "-".repeat(width - 1) + ":",
+    });
+    let rule: Vec<String> = rule.collect();
+    let head = line(&mut first.iter().map(|it| &it.0)) + &line(&mut rule.iter());
+    rows.iter().fold(head, |text, row| text + &line(&mut row.iter().map(|it| &it.1)))
+}
+
+/// Writes rows with the same columns as CSV under a line of their names.
+///
+/// # Errors
+///
+/// When the file cannot be written.
+pub fn write_csv(file: &Path, records: &[Record]) -> Result<(), Failure> {
+    let write = || -> Result<(), csv::Error> {
+        let mut writer = csv::Writer::from_path(file)?;
+        if let Some(first) = records.first() {
+            writer.write_record(first.0.iter().map(|it| &it.0))?;
+        }
+        for record in records {
+            writer.write_record(record.0.iter().map(|it| &it.1))?;
+        }
+        Ok(writer.flush()?)
+    };
+    write().map_err(during(file.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_stand_left_and_numbers_right_with_their_intervals() {
+        let row = |name: &str, value: Option<f64>| {
+            let row = Record::default().with("driver", name).number("late_s", value, 1);
+            row.number("late_s_low", value.map(|it| it - 1.0), 1).number("late_s_high", value, 1)
+        };
+        let text = table(&[row("declared", Some(11.25)), row("true", None)]);
+        let expected = "| driver   |           late s |\n| -------- | ---------------: |\n\
+                        | declared | 11.2 (10.2–11.2) |\n| true     |                  |\n";
+        assert_eq!(text, expected);
+        assert_eq!(table(&[]), "");
+    }
 }

@@ -12,7 +12,7 @@ use dynocar_tests::simulator::{
 use dynocar_workshop::survey::read::{recordings, vehicle};
 use serde::Serialize;
 
-use crate::output::give;
+use crate::output::{Failure, Record, give, table};
 
 /// Seconds for each pass of a survey of a simulated line, for growing numbers of passes.
 #[derive(Debug, Args)]
@@ -49,48 +49,50 @@ struct Row {
     pass_ms: f64,
 }
 
-/// Surveys ever more passes of one line.
-///
-/// # Errors
-///
-/// A text and an exit status when a survey fails or the result cannot be given.
-pub fn run(arguments: &SurveyArguments) -> Result<(), (String, u8)> {
-    let failed = |error: &dyn std::fmt::Display| (error.to_string(), 1);
-    let settings = SimulatorSettings {
-        train_type: Some(TrainType::Metro),
-        runs: RECORDINGS,
-        holdout_runs: 0,
-        duration_s: DURATION_S,
-        gnss: Some(GnssReceiver::USUAL),
-        ..SimulatorSettings::new(1, EffectRequest::none())
-    };
-    let folder = tempfile::tempdir().map_err(|error| failed(&error))?;
-    let raw = arguments.write.as_deref().unwrap_or(folder.path());
-    write_dataset(&simulate(&settings), raw).map_err(|error| failed(&error))?;
-    let dataset = dynocar::dataset::load(raw).map_err(|error| failed(&error))?;
-    let (few, vehicle) = (recordings(&dataset), vehicle(&dataset));
-    let mut rows = Vec::new();
-    for &passes in &arguments.passes {
-        let raws: Vec<_> = few.iter().cycle().take(passes).cloned().collect();
-        let start = Instant::now();
-        let surveyed = survey(&raws, &vehicle, None).map_err(|error| failed(&error))?;
-        let total_s = start.elapsed().as_secs_f64();
-        rows.push(Row {
-            passes,
-            samples: raws.iter().map(|raw| raw.time_s.len()).sum(),
-            line_m: surveyed.alignments.growing.length_m(),
-            total_s,
-            pass_ms: 1e3 * total_s / passes as f64,
-        });
+impl SurveyArguments {
+    /// Surveys ever more passes of one line.
+    ///
+    /// # Errors
+    ///
+    /// When a survey fails or the result cannot be given.
+    pub fn run(&self) -> Result<(), Failure> {
+        let settings = SimulatorSettings {
+            train_type: Some(TrainType::Metro),
+            runs: RECORDINGS,
+            holdout_runs: 0,
+            duration_s: DURATION_S,
+            gnss: Some(GnssReceiver::USUAL),
+            ..SimulatorSettings::new(1, EffectRequest::none())
+        };
+        let folder = tempfile::tempdir()?;
+        let raw = self.write.as_deref().unwrap_or(folder.path());
+        write_dataset(&simulate(&settings), raw)?;
+        let dataset = dynocar::dataset::load(raw)?;
+        let (few, vehicle) = (recordings(&dataset), vehicle(&dataset));
+        let mut rows = Vec::new();
+        for &passes in &self.passes {
+            let raws: Vec<_> = few.iter().cycle().take(passes).cloned().collect();
+            let start = Instant::now();
+            let surveyed = survey(&raws, &vehicle, None)?;
+            let total_s = start.elapsed().as_secs_f64();
+            rows.push(Row {
+                passes,
+                samples: raws.iter().map(|raw| raw.time_s.len()).sum(),
+                line_m: surveyed.alignments.growing.length_m(),
+                total_s,
+                pass_ms: 1e3 * total_s / passes as f64,
+            });
+        }
+        let records: Vec<Record> = rows.iter().map(record).collect();
+        give(&self.json, &Report { rows }, || table(&records))
     }
-    let report = Report { rows };
-    give(&arguments.json, &report, || table(&report))
 }
 
-fn table(report: &Report) -> String {
-    let mut text = String::from("passes   samples   line, m   total, s   ms a pass\n");
-    for Row { passes, samples, line_m, total_s, pass_ms } in &report.rows {
-        text += &format!("{passes:>6}{samples:>10}{line_m:>10.0}{total_s:>11.2}{pass_ms:>12.1}\n");
-    }
-    text
+fn record(row: &Row) -> Record {
+    Record::default()
+        .with("passes", row.passes)
+        .with("samples", row.samples)
+        .number("line m", row.line_m, 0)
+        .number("total s", row.total_s, 2)
+        .number("ms a pass", row.pass_ms, 1)
 }

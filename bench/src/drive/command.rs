@@ -1,6 +1,6 @@
 //! `dynocar-bench drive`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use dynocar::output::{report_line, write_file};
@@ -8,10 +8,9 @@ use dynocar::output::{report_line, write_file};
 use super::line::{Condition, Service};
 use super::run::{Extent, Informant, drive as drive_all};
 use super::score::{Scored, score};
-use super::{csv, picture, table};
-use crate::output::{give, write_csv};
+use super::{picture, records};
+use crate::output::{Failure, Record, expect, give, table, write_csv};
 use crate::parallel;
-use crate::rig::RigError;
 use crate::scenarios::world::Traffic;
 
 /// What a controller gains: an automatic driver with declared parameters, with the daemon's answers, and
@@ -61,69 +60,68 @@ fn services(cycle_ms: Option<u32>) -> Vec<Service> {
     all.into_iter().flat_map(of).chain(cycle_ms.is_none().then_some(fast)).collect()
 }
 
-/// Runs the command; an error has its text and the exit status.
-pub fn drive(arguments: &DriveArguments) -> Result<(), (String, u8)> {
-    let mut chosen = services(arguments.cycle_ms);
-    chosen.retain(|service| service.name().contains(&arguments.scenario));
-    if chosen.is_empty() {
-        let text = &arguments.scenario;
-        return Err((format!("--scenario {text}: expected a part of a scenario's name"), 2));
-    }
-    if arguments.trains == 0 || arguments.stops == 0 {
-        return Err(("--trains and --stops: expected more than 0".into(), 2));
-    }
-    if let Some(cycle_ms) = arguments.cycle_ms
-        && !(10..=200).contains(&cycle_ms)
-    {
-        return Err((format!("--cycle-ms {cycle_ms}: expected 10 to 200"), 2));
-    }
-    let extent = Extent {
-        trains: arguments.trains,
-        stops: arguments.stops,
-        first_seed: arguments.first_seed,
-    };
-    let scored: Result<Vec<Scored>, RigError> =
-        parallel::over(&chosen, arguments.threads, |service| measure(*service, extent))
-            .into_iter()
-            .collect();
-    let scored = scored.map_err(|error| (error.to_string(), 1))?;
-    if let Some(file) = &arguments.picture {
-        // One row of each traffic; that of its usual cycle comes first.
-        let mut ordinary: Vec<(Traffic, Scored)> = Vec::new();
-        for (service, it) in chosen.iter().zip(&scored) {
-            let is_drawn = ordinary.iter().any(|(traffic, _)| *traffic == service.traffic);
-            if service.condition == Condition::Ordinary && !is_drawn {
-                ordinary.push((service.traffic, it.clone()));
+impl DriveArguments {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When the command line is wrong, a process fails, or the driver with Dynocar is worse.
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut chosen = services(self.cycle_ms);
+        chosen.retain(|service| service.name().contains(&self.scenario));
+        expect(!chosen.is_empty(), || {
+            format!("--scenario {}: expected a part of a scenario's name", self.scenario)
+        })?;
+        expect(self.trains > 0 && self.stops > 0, || {
+            "--trains and --stops: expected more than 0".into()
+        })?;
+        let cycle_ms = self.cycle_ms.unwrap_or(50);
+        expect((10..=200).contains(&cycle_ms), || {
+            format!("--cycle-ms {cycle_ms}: expected 10 to 200")
+        })?;
+        let extent = Extent { trains: self.trains, stops: self.stops, first_seed: self.first_seed };
+        let scored = parallel::over(&chosen, self.threads, |service| measure(*service, extent));
+        let scored = scored.into_iter().collect::<Result<Vec<Scored>, _>>()?;
+        if let Some(file) = &self.picture {
+            write_file(file, &picture::svg(&ordinary(&chosen, &scored))?)?;
+        }
+        let lines = scored.iter().flat_map(|it| &it.lines).map(records::drive);
+        let answers = scored.iter().flat_map(|it| &it.answers).map(records::answer);
+        let differences = scored.iter().flat_map(|it| records::differences(&it.comparison));
+        let tables: [Vec<Record>; 3] = [lines.collect(), answers.collect(), differences.collect()];
+        if let Some(file) = &self.csv {
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+            for (ending, records) in ["", "_answers", "_differences"].iter().zip(&tables) {
+                write_csv(&file.with_file_name(format!("{stem}{ending}.csv")), records)?;
             }
         }
-        let ordinary: Vec<Scored> = ordinary.into_iter().map(|(_, it)| it).collect();
-        let drawn = picture::svg(&ordinary).map_err(|error| (error.to_string(), 1))?;
-        write_file(file, &drawn).map_err(|error| (error.to_string(), 1))?;
-    }
-    if let Some(file) = &arguments.csv {
-        write_csv(file, &csv::drives(&scored))?;
-        write_csv(&beside(file, "answers"), &csv::answers(&scored))?;
-        write_csv(&beside(file, "differences"), &csv::differences(&scored))?;
-    }
-    give(&arguments.json, &scored, || table::tables(&scored))?;
-    let broken: Vec<String> = scored
-        .iter()
-        .filter(|it| it.comparison.is_broken)
-        .map(|it| format!("{}: {}", it.comparison.scenario, it.comparison.listed(false).join("; ")))
-        .collect();
-    match broken.is_empty() {
-        true => Ok(()),
-        false => Err((format!("worse with Dynocar:\n{}", broken.join("\n")), 1)),
+        give(&self.json, &scored, || tables.each_ref().map(|it| table(it)).join("\n"))?;
+        let broken: Vec<String> = scored
+            .iter()
+            .filter(|it| it.comparison.is_broken)
+            .map(|it| format!("{}: {}", it.comparison.scenario, it.comparison.worse()))
+            .collect();
+        match broken.is_empty() {
+            true => Ok(()),
+            false => Err(format!("worse with Dynocar:\n{}", broken.join("\n")).into()),
+        }
     }
 }
 
-/// A file next to another: `gain_answers.csv` to `gain.csv`.
-fn beside(file: &Path, what: &str) -> PathBuf {
-    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-    file.with_file_name(format!("{stem}_{what}.csv"))
+/// The ordinary service of each traffic; that of its usual cycle comes first.
+fn ordinary(chosen: &[Service], scored: &[Scored]) -> Vec<Scored> {
+    let is_ordinary = |service: &Service| service.condition == Condition::Ordinary;
+    let all = chosen.iter().zip(scored).filter(|(service, _)| is_ordinary(service));
+    let mut first: Vec<(Traffic, Scored)> = Vec::new();
+    for (service, it) in all {
+        if first.iter().all(|(traffic, _)| *traffic != service.traffic) {
+            first.push((service.traffic, it.clone()));
+        }
+    }
+    first.into_iter().map(|(_, it)| it).collect()
 }
 
-fn measure(service: Service, extent: Extent) -> Result<Scored, RigError> {
+fn measure(service: Service, extent: Extent) -> Result<Scored, Failure> {
     let mut all = [Vec::new(), Vec::new(), Vec::new()];
     for (driven, informant) in all.iter_mut().zip(Informant::ALL) {
         *driven = drive_all(service, informant, extent)?;

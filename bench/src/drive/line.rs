@@ -8,7 +8,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::Ability;
-use crate::scenarios::world::{BRAKE_STD, LoadSource, Scenario, Traffic, World, normal};
+use crate::scenarios::world::{BRAKE_STD, LoadSource, Scenario, Traffic, World};
+use crate::statistics::normal;
 
 /// What is particular about brakes, rail or daemon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,17 +2,15 @@
 //! its channel, and nobody drives on before every pipeline has answered it. So the daemon misses
 //! nothing, however much faster than real time it goes, and a seed gives the same figures on any machine.
 
-use std::fmt::Write;
-use std::time::{Duration, Instant};
-
 use dynocar::config::IdleStrategy;
 use dynocar_client::{Reading, SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_model::train::{EffortCurve, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, TrainId, TrainSample};
+use dynocar_tests::process::{Process, Site};
+use serde_json::json;
 
-use crate::rig::RigError;
-use crate::rig::child::Peer;
-use crate::rig::site::{DaemonPlan, Site, ThreadPlan};
+use crate::output::Failure;
+use crate::rig::site::{DaemonPlan, ThreadPlan, await_all};
 
 /// What config/daemon.toml recommends, with the brake's friction, which these trains can give.
 const KINDS: [PipelineKind; 4] = [
@@ -21,11 +19,6 @@ const KINDS: [PipelineKind; 4] = [
     PipelineKind::BrakeSmoother,
     PipelineKind::ResidualMonitor,
 ];
-/// How long a daemon may take to begin, or to answer a sample.
-const PATIENCE: Duration = Duration::from_secs(60);
-/// Looks for an answer before the thread sleeps.
-const LOOKS: u32 = 200;
-const SLEEP: Duration = Duration::from_micros(20);
 /// The simulated clock is not the host's: a busy machine makes no daemon silent.
 const NEVER_STALE_NS: i64 = 600_000_000_000;
 
@@ -38,8 +31,8 @@ struct Ends {
 /// The trains' channels and the daemon behind them.
 pub struct Link {
     ends: Vec<Ends>,
-    daemon: Option<Peer>,
-    config: String,
+    daemon: Option<Process>,
+    plan: DaemonPlan,
     /// Last, for it takes the folder away.
     site: Site,
 }
@@ -50,8 +43,9 @@ impl Link {
     /// # Errors
     ///
     /// When a process, file or channel cannot be had.
-    pub fn open(train: &TrainModel, trains: usize) -> Result<Self, RigError> {
-        let site = Site::with_train(&train_toml(train))?;
+    pub fn open(train: &TrainModel, trains: usize) -> Result<Self, Failure> {
+        let site = Site::new();
+        site.write("train.toml", &train_toml(train)?);
         let fast = ThreadPlan {
             name: "fast",
             core: None,
@@ -61,13 +55,12 @@ impl Link {
         };
         let lines = "[state]\nkeep = false\n".to_owned();
         let plan = DaemonPlan { trains: trains as u64, threads: vec![fast], lines };
-        let config = site.write_config(&plan)?.to_string_lossy().into_owned();
         let mut ends = Vec::with_capacity(trains);
         for id in (1..=trains as u64).map(TrainId) {
-            let reader = SnapshotReader::open(site.host(), id)?;
-            ends.push(Ends { reader, publisher: SamplePublisher::open(site.host(), id)? });
+            let reader = SnapshotReader::open(&site.host(), id)?;
+            ends.push(Ends { reader, publisher: SamplePublisher::open(&site.host(), id)? });
         }
-        let mut link = Link { ends, daemon: None, config, site };
+        let mut link = Link { ends, daemon: None, plan, site };
         link.start_daemon()?;
         Ok(link)
     }
@@ -77,12 +70,13 @@ impl Link {
     /// # Errors
     ///
     /// When it does not come to it.
-    pub fn start_daemon(&mut self) -> Result<(), RigError> {
+    pub fn start_daemon(&mut self) -> Result<(), Failure> {
         let begin_ns = monotonic_now_ns();
-        let mut daemon = Peer::start(&self.site, &["daemon", &self.config])?;
+        let mut daemon = self.plan.start(&self.site)?;
         for ends in &mut self.ends {
             ends.reader.set_stale_after_ns(NEVER_STALE_NS);
-            await_all(&mut ends.reader, &mut daemon, |it| it.published_ns >= begin_ns)?;
+            let is_new = |it: &ParameterSnapshot| it.published_ns >= begin_ns;
+            await_all(&mut ends.reader, &mut daemon, KINDS.len(), is_new)?;
         }
         self.daemon = Some(daemon);
         Ok(())
@@ -106,7 +100,7 @@ impl Link {
     /// # Errors
     ///
     /// When a sample is not taken, or the daemon ends or does not answer.
-    pub fn exchange(&mut self, samples: &mut [(usize, TrainSample)]) -> Result<(), RigError> {
+    pub fn exchange(&mut self, samples: &mut [(usize, TrainSample)]) -> Result<(), Failure> {
         for (train, sample) in samples.iter_mut() {
             self.ends[*train].publisher.publish(sample)?;
         }
@@ -114,7 +108,7 @@ impl Link {
         for (train, sample) in samples {
             let sequence = sample.sequence;
             let is_answer = |it: &ParameterSnapshot| it.sample_sequence >= sequence;
-            await_all(&mut self.ends[*train].reader, daemon, is_answer)?;
+            await_all(&mut self.ends[*train].reader, daemon, KINDS.len(), is_answer)?;
         }
         Ok(())
     }
@@ -132,73 +126,34 @@ impl Link {
     }
 }
 
-/// Polls until the newest snapshot of every pipeline is as wanted.
-fn await_all(
-    reader: &mut SnapshotReader,
-    daemon: &mut Peer,
-    is_wanted: impl Fn(&ParameterSnapshot) -> bool,
-) -> Result<(), RigError> {
-    let (mut looks, start) = (0, Instant::now());
-    loop {
-        reader.poll();
-        if reader.readings(0).filter(|it| is_wanted(it.snapshot)).count() == KINDS.len() {
-            return Ok(());
-        }
-        looks += 1;
-        if looks < LOOKS {
-            std::thread::yield_now();
-            continue;
-        }
-        std::thread::sleep(SLEEP);
-        if looks % 1000 == 0 {
-            daemon.require()?;
-            if start.elapsed() > PATIENCE {
-                return Err(RigError::Silent {
-                    what: "the daemon".into(),
-                    seconds: PATIENCE.as_secs(),
-                });
-            }
-        }
-    }
-}
-
-/// A train's file.
-fn train_toml(train: &TrainModel) -> String {
-    let (name, mass_t, length_m) = (&train.name, 1e-3 * train.mass_kg, train.length_m);
-    let gamma = train.rotating_mass_factor;
-    let (a, b, c) = (train.resistance.a, train.resistance.b, train.resistance.c);
-    let curve = train.curve_constant_n_per_kn_m;
-    let mut text = format!(
-        "[train]\nname = \"{name}\"\nmass_t = {mass_t}\nlength_m = {length_m}\n\
-         rotating_mass_factor = {gamma}\ncars = {}\n\
-         [resistance]\na = {a}\nb = {b}\nc = {c}\ncurve_constant_n_per_kn_m = {curve}\n",
-        train.cars
-    );
-    let effort = |curve: &EffortCurve| {
-        let points = curve.points().iter().map(|(v, force_n)| format!("[{v}, {}]", 1e-3 * force_n));
-        points.collect::<Vec<_>>().join(", ")
+/// The train's file.
+fn train_toml(train: &TrainModel) -> Result<String, Failure> {
+    let effort = |curve: &EffortCurve| -> Vec<[f64; 2]> {
+        curve.points().iter().map(|(speed_mps, force_n)| [*speed_mps, 1e-3 * force_n]).collect()
     };
-    // Writing into a String cannot fail.
-    if let Some(traction) = &train.traction {
-        let _ = writeln!(text, "[traction]\neffort = [{}]", effort(traction));
-    }
-    let _ = writeln!(text, "[brake]");
-    if let Some(brake) = &train.brake {
-        let _ = writeln!(text, "max_force_kn = {}", 1e-3 * brake.force_max_n());
-    }
-    let gear = &train.brake_gear;
-    for (key, value) in [
-        ("cylinder_diameter_mm", gear.cylinder_diameter_mm),
-        ("disc_radius_mm", gear.disc_radius_mm),
-        ("wheel_radius_mm", gear.wheel_radius_mm),
-        ("efficiency", gear.efficiency),
-        ("ratio", gear.ratio),
-        ("friction", gear.friction),
-        ("pads", gear.pads),
-    ] {
-        if let Some(value) = value {
-            let _ = writeln!(text, "{key} = {value}");
-        }
-    }
-    text
+    let (davis, gear) = (&train.resistance, &train.brake_gear);
+    Ok(toml::to_string(&json!({
+        "train": {
+            "name": train.name,
+            "mass_t": 1e-3 * train.mass_kg,
+            "length_m": train.length_m,
+            "rotating_mass_factor": train.rotating_mass_factor,
+            "cars": train.cars,
+        },
+        "resistance": {
+            "a": davis.a, "b": davis.b, "c": davis.c,
+            "curve_constant_n_per_kn_m": train.curve_constant_n_per_kn_m,
+        },
+        "traction": { "effort": train.traction.as_ref().map_or(Vec::new(), effort) },
+        "brake": {
+            "max_force_kn": train.brake.as_ref().map_or(0.0, |it| 1e-3 * it.force_max_n()),
+            "cylinder_diameter_mm": gear.cylinder_diameter_mm,
+            "disc_radius_mm": gear.disc_radius_mm,
+            "wheel_radius_mm": gear.wheel_radius_mm,
+            "efficiency": gear.efficiency,
+            "ratio": gear.ratio,
+            "friction": gear.friction,
+            "pads": gear.pads,
+        },
+    }))?)
 }

@@ -12,13 +12,12 @@
 //! - [`journey`]: a train and its driver from stop to stop
 //! - [`link`]: channels to a daemon of its own, in lock-step
 //! - [`run`]: all trains of a service with one kind of parameters
-//! - [`score`], [`table`], [`picture`]: what it comes to
+//! - [`score`], `records`, [`picture`]: what it comes to
 //! - [`command`]: the command line
 
 pub mod answers;
 pub mod braking;
 pub mod command;
-mod csv;
 pub mod driver;
 pub mod journey;
 pub mod knowledge;
@@ -27,7 +26,7 @@ pub mod line;
 pub mod link;
 pub mod picture;
 pub mod plan;
+mod records;
 pub mod run;
 pub mod score;
-pub mod table;
 pub mod train;

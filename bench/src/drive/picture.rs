@@ -4,20 +4,21 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::score::{Figure, ReportRow, Scored};
+use crate::output::Failure;
 
 const SIZE: (u32, u32) = (1_080, 400);
 const COLORS: [RGBColor; 3] =
     [RGBColor(176, 176, 176), RGBColor(31, 119, 180), RGBColor(44, 160, 44)];
 const NAMES: [&str; 3] = ["declared parameters", "with Dynocar", "true parameters"];
 
-type Drawn = Result<(), Box<dyn std::error::Error>>;
+type Drawn = Result<(), Failure>;
 
 /// The picture of some services as SVG; one group of bars each.
 ///
 /// # Errors
 ///
 /// When it cannot be drawn.
-pub fn svg(scored: &[Scored]) -> Result<String, Box<dyn std::error::Error>> {
+pub fn svg(scored: &[Scored]) -> Result<String, Failure> {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();

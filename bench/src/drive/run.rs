@@ -7,7 +7,7 @@ use super::journey::{DrivenLeg, Journey};
 use super::line::{Condition, Service};
 use super::link::Link;
 use super::train::Train;
-use crate::rig::RigError;
+use crate::output::Failure;
 
 /// By which parameters the driver drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +86,7 @@ pub fn drive(
     service: Service,
     informant: Informant,
     extent: Extent,
-) -> Result<Vec<Driven>, RigError> {
+) -> Result<Vec<Driven>, Failure> {
     let seeds = extent.first_seed..extent.first_seed + extent.trains as u64;
     let trains = seeds.map(|seed| Train::new(service, seed));
     if informant == Informant::Dynocar {
@@ -112,11 +112,7 @@ fn cycles_unnoticed(service: &Service) -> u32 {
     250_u32.div_ceil(service.cycle_ms)
 }
 
-fn with_daemon(
-    service: Service,
-    trains: Vec<Train>,
-    stops: usize,
-) -> Result<Vec<Driven>, RigError> {
+fn with_daemon(service: Service, trains: Vec<Train>, stops: usize) -> Result<Vec<Driven>, Failure> {
     let mut link = Link::open(&service.declared(), trains.len())?;
     let mut asking: Vec<Asking> = trains
         .into_iter()
@@ -158,7 +154,7 @@ fn with_daemon(
     }
     let lost = link.lost();
     if lost > 0 && service.condition != Condition::DaemonDies {
-        return Err(RigError::Daemon(format!("{lost} samples were lost in lock-step")));
+        return Err(format!("daemon: {lost} samples were lost in lock-step").into());
     }
     Ok(asking.into_iter().map(|it| Driven { legs: it.journey.legs, uses: it.uses }).collect())
 }

@@ -8,6 +8,7 @@ use super::answers::{ASKED, Use};
 use super::journey::DrivenLeg;
 use super::line::Service;
 use super::run::{Driven, Informant};
+use crate::statistics::{median, quantiles};
 
 /// Draws of the trains behind an interval.
 const DRAWS: usize = 400;
@@ -36,16 +37,16 @@ impl Figure {
     fn of(trains: usize, statistic: impl Fn(&[usize]) -> f64) -> Self {
         let all: Vec<usize> = (0..trains).collect();
         let mut random = ChaCha8Rng::seed_from_u64(95);
-        let mut draws: Vec<f64> = (0..DRAWS)
+        let draws: Vec<f64> = (0..DRAWS)
             .map(|_| {
                 let drawn: Vec<usize> =
                     all.iter().map(|_| random.random_range(0..trains)).collect();
                 statistic(&drawn)
             })
             .collect();
-        draws.sort_by(f64::total_cmp);
-        let at = |share: f64| draws[(share * (DRAWS - 1) as f64).round() as usize];
-        Figure { value: statistic(&all), low: at(0.025), high: at(0.975) }
+        let value = statistic(&all);
+        let [low, high] = quantiles(draws, [0.025, 0.975]).unwrap_or([f64::NAN; 2]);
+        Figure { value, low, high }
     }
 }
 
@@ -131,14 +132,14 @@ pub struct Difference {
 }
 
 impl Comparison {
-    /// What is better beyond the noise, or worse, in words.
-    pub fn listed(&self, is_better: bool) -> Vec<String> {
-        let own = self.differences.iter().filter(|it| it.is_better == is_better);
+    /// What is worse beyond the noise, in words.
+    pub fn worse(&self) -> String {
+        let own = self.differences.iter().filter(|it| !it.is_better);
         let words = own.map(|Difference { measure, figure, .. }| {
             let Figure { value, low, high } = figure;
             format!("{measure}: {value:+.3} ({low:+.3} to {high:+.3})")
         });
-        words.chain(self.exceeded.clone().filter(|_| !is_better)).collect()
+        words.chain(self.exceeded.clone()).collect::<Vec<_>>().join("; ")
     }
 }
 
@@ -249,10 +250,11 @@ fn line(service: Service, informant: Informant, drives: &Drives<'_>) -> ReportRo
 fn answered(service: Service, index: usize, driven: &[Driven], stops: usize) -> Answered {
     let mut total = Use::default();
     driven.iter().for_each(|it| total.join(&it.uses[index]));
-    let mut firsts: Vec<u64> =
-        driven.iter().map(|it| it.uses[index].first.unwrap_or(u64::MAX)).collect();
-    firsts.sort_unstable();
-    let first = firsts[firsts.len() / 2];
+    let cycle_ms = f64::from(service.cycle_ms);
+    let first_s = |it: &Driven| {
+        it.uses[index].first.map_or(f64::INFINITY, |cycles| 1e-3 * cycles as f64 * cycle_ms)
+    };
+    let first_s = median(driven.iter().map(first_s).collect()).filter(|it| it.is_finite());
     let usable = total.usable.max(1) as f64;
     let percent = |count: u64| 100.0 * count as f64 / usable;
     let error = |square: f64| {
@@ -265,7 +267,7 @@ fn answered(service: Service, index: usize, driven: &[Driven], stops: usize) -> 
         wrong_percent: percent(total.wrong),
         worse_percent: percent(total.worse),
         error_percent: total.squares.map(error),
-        first_s: (first < u64::MAX).then(|| 1e-3 * first as f64 * f64::from(service.cycle_ms)),
+        first_s,
         changes_per_stop: total.changes as f64 / stops.max(1) as f64,
     }
 }

@@ -13,7 +13,8 @@ use rand_chacha::ChaCha8Rng;
 use super::knowledge::{Ability, Knowledge};
 use super::leg::{Leg, PIECE_M};
 use super::line::{Condition, Hidden, Service, ability, declared_gear, next_load_kg};
-use crate::scenarios::world::{LoadSource, STOP_TO_STOP_STD, WEIGHING_STD, World, normal};
+use crate::scenarios::world::{LoadSource, STOP_TO_STOP_STD, WEIGHING_STD, World};
+use crate::statistics::normal;
 
 /// Longest step of the simulation in s.
 const STEP_MAX_S: f64 = 0.02;

@@ -3,24 +3,17 @@
 //! Both programs measure the same cases by turns, each in a process of its own. Ratios and
 //! differences are taken round by round.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use serde::Serialize;
 use serde_json::Value;
 
-use super::measure::Spread;
+use super::measure::quartiles;
+use crate::output::{Failure, Record, table};
 
 /// Rounds of both programs.
 const ROUNDS: usize = 31;
-
-/// A program does not give what is asked of it.
-#[derive(Debug, thiserror::Error)]
-#[error("{program}: expected the times of the cases as JSON, {came}")]
-pub struct AgainstError {
-    program: PathBuf,
-    came: String,
-}
 
 /// Times of a case by two builds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -44,11 +37,8 @@ pub struct CaseAgainst {
 /// # Errors
 ///
 /// When one of them cannot be run, or has no such case.
-pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseAgainst>, AgainstError> {
-    let ours = std::env::current_exe().map_err(|error| AgainstError {
-        program: "this program".into(),
-        came: error.to_string(),
-    })?;
+pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseAgainst>, Failure> {
+    let ours = std::env::current_exe()?;
     let mut rounds: Vec<[Vec<(String, f64)>; 2]> = Vec::with_capacity(ROUNDS);
     for round in 0..ROUNDS {
         // Who is first turns from round to round.
@@ -73,22 +63,25 @@ pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseAgainst>, AgainstErro
 
 impl CaseAgainst {
     fn of(name: String, pairs: &[(f64, f64)]) -> Self {
-        let spread = |of: fn(&(f64, f64)) -> f64| Spread::of(pairs.iter().map(of).collect());
-        let ratio = spread(|(ours, other)| ours / other);
+        let of = |of: fn(&(f64, f64)) -> f64| quartiles(pairs.iter().map(of).collect());
+        let [low, ratio, high] = of(|(ours, other)| ours / other);
         CaseAgainst {
             name,
-            ns_per_update: spread(|pair| pair.0).median,
-            other_ns_per_update: spread(|pair| pair.1).median,
-            more_ns: spread(|(ours, other)| ours - other).median,
-            ratio: ratio.median,
-            ratio_quartiles: [ratio.low, ratio.high],
+            ns_per_update: of(|pair| pair.0)[1],
+            other_ns_per_update: of(|pair| pair.1)[1],
+            more_ns: of(|(ours, other)| ours - other)[1],
+            ratio,
+            ratio_quartiles: [low, high],
         }
     }
 }
 
 /// One measurement of a program: cases by name with the time of an update in ns.
-fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, AgainstError> {
-    let failed = |came: String| AgainstError { program: program.into(), came };
+fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, Failure> {
+    let failed = |came: String| -> Failure {
+        let program = program.display();
+        format!("{program}: expected the times of the cases as JSON, {came}").into()
+    };
     let arguments = ["estimators", "--quick", "--case", case, "--json", "-"];
     let output = Command::new(program).args(arguments).output();
     let output = output.map_err(|error| failed(error.to_string()))?;
@@ -106,18 +99,18 @@ fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, AgainstError>
 }
 
 /// The cases as a table for people.
-pub fn table(cases: &[CaseAgainst]) -> String {
-    let mut text = String::from(
-        "case                                  ns   other ns    more ns   ratio (quartiles)\n",
-    );
-    for case in cases {
-        let [low, high] = case.ratio_quartiles;
-        text += &format!(
-            "{:30} {:9.1}  {:9.1}  {:9.1}   {:5.2} ({low:.2} to {high:.2})\n",
-            case.name, case.ns_per_update, case.other_ns_per_update, case.more_ns, case.ratio
-        );
-    }
-    text
+pub fn text(cases: &[CaseAgainst]) -> String {
+    let row = |case: &CaseAgainst| {
+        Record::default()
+            .with("case", &case.name)
+            .number("ns", case.ns_per_update, 1)
+            .number("other ns", case.other_ns_per_update, 1)
+            .number("more ns", case.more_ns, 1)
+            .number("ratio", case.ratio, 2)
+            .number("ratio_low", case.ratio_quartiles[0], 2)
+            .number("ratio_high", case.ratio_quartiles[1], 2)
+    };
+    table(&cases.iter().map(row).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

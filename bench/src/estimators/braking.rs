@@ -97,28 +97,25 @@ fn em_contender<E: Expectation + 'static>(windows: &Windows, expectation: E) -> 
 
 fn particle_em(windows: &Windows) -> Case {
     let mut random = Random::new(17);
-    Case {
-        name: "EM window, 20 particles, 50 iterations, 40 samples".into(),
-        target_ns: Some(3e6),
-        ours: em_contender(windows, ParticleExpectation::new(PARTICLES, SAMPLES, 11)),
-        peers: vec![contender("textbook particle EM", windows, move |window| {
-            vec![textbook_particle_em(window, &mut random)]
-        })],
-        // Both scatter with their particles.
-        agreement: Agreement::Absolute(0.008),
-    }
+    let ours = em_contender(windows, ParticleExpectation::new(PARTICLES, SAMPLES, 11));
+    let peer = contender("textbook particle EM", windows, move |window| {
+        vec![textbook_particle_em(window, &mut random)]
+    });
+    // Both scatter with their particles.
+    Case::new(
+        "EM window, 20 particles, 50 iterations, 40 samples",
+        Agreement::Absolute(0.008),
+        ours,
+    )
+    .peer(peer)
+    .aim(3e6)
 }
 
 fn kalman_em(windows: &Windows) -> Case {
-    Case {
-        name: "EM window, Kalman E-step, 50 iterations, 40 samples".into(),
-        target_ns: None,
-        ours: em_contender(windows, KalmanExpectation::new(SAMPLES)),
-        peers: vec![contender("textbook Kalman + RTS EM", windows, |window| {
-            vec![textbook_kalman_em(window)]
-        })],
-        agreement: SAME,
-    }
+    let ours = em_contender(windows, KalmanExpectation::new(SAMPLES));
+    let peer =
+        contender("textbook Kalman + RTS EM", windows, |window| vec![textbook_kalman_em(window)]);
+    Case::new("EM window, Kalman E-step, 50 iterations, 40 samples", SAME, ours).peer(peer)
 }
 
 fn tracker_model(walk: Walk) -> TrackerModel {
@@ -162,35 +159,31 @@ fn window_smoother(windows: &Windows) -> Case {
     let of_peer = model.clone();
     let lag_s = LAG as f64 * INPUTS.step_s;
     let mut tracker = Tracker::new(model, lag_s, LAG, false);
-    Case {
-        name: "fixed-lag smoother, window of 40 samples".into(),
-        target_ns: Some(20_000.0),
-        ours: contender("ours", windows, move |window| {
-            tracker.start(&window[0]);
-            for observation in &window[1..] {
-                tracker.step(&INPUTS, observation).expect("a sound window");
-            }
-            let Uncertain { value, std } = tracker.estimate().expect("it has begun").coefficient;
-            vec![value, std * std]
-        }),
-        peers: vec![contender("textbook Kalman + RTS", windows, move |window| {
-            let mut filter = textbook_first(&of_peer, &window[0]);
-            let mut forward = vec![TextbookStep {
-                predicted: filter,
-                filtered: filter,
-                transition: nalgebra::SMatrix::identity(),
-            }];
-            for observed in &window[1..] {
-                let measure = TextbookFilter::measure;
-                forward.push(textbook_step(&mut filter, measure, &of_peer, observed));
-            }
-            let smoothed = smooth(&forward).expect("covariances have inverses");
-            let lagged = &smoothed[SAMPLES - 1 - LAG];
-            let scale = State::Scale as usize;
-            vec![lagged.mean[scale], lagged.covariance[(scale, scale)]]
-        })],
-        agreement: SAME,
-    }
+    let ours = contender("ours", windows, move |window| {
+        tracker.start(&window[0]);
+        for observation in &window[1..] {
+            tracker.step(&INPUTS, observation).expect("a sound window");
+        }
+        let Uncertain { value, std } = tracker.estimate().expect("it has begun").coefficient;
+        vec![value, std * std]
+    });
+    let peer = contender("textbook Kalman + RTS", windows, move |window| {
+        let mut filter = textbook_first(&of_peer, &window[0]);
+        let mut forward = vec![TextbookStep {
+            predicted: filter,
+            filtered: filter,
+            transition: nalgebra::SMatrix::identity(),
+        }];
+        for observed in &window[1..] {
+            let measure = TextbookFilter::measure;
+            forward.push(textbook_step(&mut filter, measure, &of_peer, observed));
+        }
+        let smoothed = smooth(&forward).expect("covariances have inverses");
+        let lagged = &smoothed[SAMPLES - 1 - LAG];
+        let scale = State::Scale as usize;
+        vec![lagged.mean[scale], lagged.covariance[(scale, scale)]]
+    });
+    Case::new("fixed-lag smoother, window of 40 samples", SAME, ours).peer(peer).aim(20_000.0)
 }
 
 fn filter_step() -> Case {
@@ -219,14 +212,7 @@ fn filter_step() -> Case {
         peer
     };
     ours.updates = steps;
-    Case {
-        name: "braking EKF step".into(),
-        target_ns: None,
-        ours,
-        peers: vec![
-            peer("textbook EKF", TextbookFilter::measure),
-            peer("textbook EKF, Joseph form", TextbookFilter::measure_joseph),
-        ],
-        agreement: SAME,
-    }
+    Case::new("braking EKF step", SAME, ours)
+        .peer(peer("textbook EKF", TextbookFilter::measure))
+        .peer(peer("textbook EKF, Joseph form", TextbookFilter::measure_joseph))
 }

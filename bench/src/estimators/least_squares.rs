@@ -37,7 +37,34 @@ fn rows() -> Rows {
 /// The cases of this module.
 pub fn cases() -> Vec<Case> {
     let rows = rows();
-    vec![plain(&rows), directional(&rows), regularised(&rows), multi_innovation(&rows)]
+    let of = |name: &str, run: fn(&[Row]) -> Vector3<f64>| contender(name, &rows, run);
+    let length = ROWS as u32;
+    let lambda = Vector3::repeat(PENALTY * f64::from(length));
+    let penalty = Penalty { lambda, length, is_printed: true };
+    let penalised = contender("ours", &rows, move |rows| ours_mils::<1>(rows, 1, penalty));
+    vec![
+        Case::new("rls", SAME, of("ours", |rows| ours_rls(rows, Forgetting::None)))
+            .aim(60.0)
+            .peer(of("textbook, static", textbook_rls))
+            .peer(of("textbook, Joseph form", joseph_rls))
+            .peer(of("textbook, dynamic", dynamic_rls)),
+        Case::new(
+            "rls, directional forgetting",
+            SAME,
+            of("ours", |rows| ours_rls(rows, Forgetting::Directional(FORGETTING))),
+        )
+        .peer(of("textbook, static", textbook_directional)),
+        Case::new("regularised rls", SAME, penalised)
+            .peer(of("textbook, static", textbook_regularised)),
+        Case::new(
+            "mils, p = 6",
+            SAME,
+            of("ours", |rows| ours_mils::<LENGTH>(rows, LENGTH, Penalty::none())),
+        )
+        .aim(400.0)
+        .peer(of("textbook, static", textbook_mils))
+        .peer(of("textbook, dynamic", dynamic_mils)),
+    ]
 }
 
 fn contender(name: &str, rows: &Rows, run: impl Fn(&[Row]) -> Vector3<f64> + 'static) -> Contender {
@@ -62,42 +89,55 @@ fn ours_mils<const L: usize>(rows: &[Row], length: usize, penalty: Penalty<3>) -
     *mils.estimate()
 }
 
-fn plain(rows: &Rows) -> Case {
-    Case {
-        name: "rls".into(),
-        target_ns: Some(60.0),
-        ours: contender("ours", rows, |rows| ours_rls(rows, Forgetting::None)),
-        peers: vec![
-            contender("textbook, static", rows, textbook_rls),
-            contender("textbook, Joseph form", rows, joseph_rls),
-            contender("textbook, dynamic", rows, dynamic_rls),
-        ],
-        agreement: SAME,
+/// A recursion of the textbook over all rows: each changes the estimate and its P.
+fn recursion(
+    rows: &[Row],
+    mut step: impl FnMut(&mut Vector3<f64>, &mut Matrix3<f64>, &Vector3<f64>, f64),
+) -> Vector3<f64> {
+    let (mut theta, mut p) = (Vector3::zeros(), Matrix3::identity() * START_VARIANCE);
+    for (features, observed) in rows {
+        step(&mut theta, &mut p, features, *observed);
     }
+    theta
+}
+
+/// The gain of a row.
+fn gain(p: &Matrix3<f64>, features: &Vector3<f64>) -> Vector3<f64> {
+    p * features / (1.0 + (features.transpose() * p * features)[0])
+}
+
+/// What a row leaves of the covariance.
+fn kept(gain: &Vector3<f64>, features: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::identity() - gain * features.transpose()
 }
 
 fn textbook_rls(rows: &[Row]) -> Vector3<f64> {
-    let mut theta = Vector3::zeros();
-    let mut p = Matrix3::identity() * START_VARIANCE;
-    for (features, observed) in rows {
-        let gain = p * features / (1.0 + (features.transpose() * p * features)[0]);
-        theta += gain * (observed - features.dot(&theta));
-        p = (Matrix3::identity() - gain * features.transpose()) * p;
-    }
-    theta
+    recursion(rows, |theta, p, features, observed| {
+        let gain = gain(p, features);
+        *theta += gain * (observed - features.dot(theta));
+        *p = kept(&gain, features) * *p;
+    })
 }
 
 /// As robust as ours: P = (I - K x') P (I - K x')' + K K'.
 fn joseph_rls(rows: &[Row]) -> Vector3<f64> {
-    let mut theta = Vector3::zeros();
-    let mut p = Matrix3::identity() * START_VARIANCE;
-    for (features, observed) in rows {
-        let gain = p * features / (1.0 + (features.transpose() * p * features)[0]);
-        theta += gain * (observed - features.dot(&theta));
-        let keep = Matrix3::identity() - gain * features.transpose();
-        p = keep * p * keep.transpose() + gain * gain.transpose();
-    }
-    theta
+    recursion(rows, |theta, p, features, observed| {
+        let gain = gain(p, features);
+        *theta += gain * (observed - features.dot(theta));
+        let keep = kept(&gain, features);
+        *p = keep * *p * keep.transpose() + gain * gain.transpose();
+    })
+}
+
+fn textbook_directional(rows: &[Row]) -> Vector3<f64> {
+    recursion(rows, |theta, p, features, observed| {
+        let information = p.try_inverse().expect("positive definite");
+        let held = (features.transpose() * information * features)[0];
+        *p += features * features.transpose() * ((1.0 - FORGETTING) / (FORGETTING * held));
+        let gain = gain(p, features);
+        *theta += gain * (observed - features.dot(theta));
+        *p = kept(&gain, features) * *p;
+    })
 }
 
 fn dynamic_rls(rows: &[Row]) -> Vector3<f64> {
@@ -112,68 +152,15 @@ fn dynamic_rls(rows: &[Row]) -> Vector3<f64> {
     Vector3::from_column_slice(theta.as_slice())
 }
 
-fn directional(rows: &Rows) -> Case {
-    Case {
-        name: "rls, directional forgetting".into(),
-        target_ns: None,
-        ours: contender("ours", rows, |rows| ours_rls(rows, Forgetting::Directional(FORGETTING))),
-        peers: vec![contender("textbook, static", rows, textbook_directional)],
-        agreement: SAME,
-    }
-}
-
-fn textbook_directional(rows: &[Row]) -> Vector3<f64> {
-    let mut theta = Vector3::zeros();
-    let mut p = Matrix3::identity() * START_VARIANCE;
-    for (features, observed) in rows {
-        let information = p.try_inverse().expect("positive definite");
-        let held = (features.transpose() * information * features)[0];
-        p += features * features.transpose() * ((1.0 - FORGETTING) / (FORGETTING * held));
-        let gain = p * features / (1.0 + (features.transpose() * p * features)[0]);
-        theta += gain * (observed - features.dot(&theta));
-        p = (Matrix3::identity() - gain * features.transpose()) * p;
-    }
-    theta
-}
-
-fn regularised(rows: &Rows) -> Case {
-    let length = ROWS as u32;
-    let lambda = Vector3::repeat(PENALTY * f64::from(length));
-    let penalty = Penalty { lambda, length, is_printed: true };
-    Case {
-        name: "regularised rls".into(),
-        target_ns: None,
-        ours: contender("ours", rows, move |rows| ours_mils::<1>(rows, 1, penalty)),
-        peers: vec![contender("textbook, static", rows, textbook_regularised)],
-        agreement: SAME,
-    }
-}
-
 /// Liu 2018, eq. 12-16: the penalty by a matrix inverse.
 fn textbook_regularised(rows: &[Row]) -> Vector3<f64> {
-    let mut theta = Vector3::zeros();
-    let mut p = Matrix3::identity() * START_VARIANCE;
-    for (features, observed) in rows {
-        let inner = Matrix3::identity() + p * PENALTY;
-        let q = p * inner.try_inverse().expect("positive definite");
-        let gain = q * features / (1.0 + (features.transpose() * q * features)[0]);
-        p = (Matrix3::identity() - gain * features.transpose()) * q;
-        theta = theta + gain * (observed - features.dot(&theta)) - p * theta * PENALTY;
-    }
-    theta
-}
-
-fn multi_innovation(rows: &Rows) -> Case {
-    Case {
-        name: "mils, p = 6".into(),
-        target_ns: Some(400.0),
-        ours: contender("ours", rows, |rows| ours_mils::<LENGTH>(rows, LENGTH, Penalty::none())),
-        peers: vec![
-            contender("textbook, static", rows, textbook_mils),
-            contender("textbook, dynamic", rows, dynamic_mils),
-        ],
-        agreement: SAME,
-    }
+    recursion(rows, |theta, p, features, observed| {
+        let inner = Matrix3::identity() + *p * PENALTY;
+        let q = *p * inner.try_inverse().expect("positive definite");
+        let gain = gain(&q, features);
+        *p = kept(&gain, features) * q;
+        *theta += gain * (observed - features.dot(theta)) - *p * *theta * PENALTY;
+    })
 }
 
 /// K = P Φ (I + Φ' P Φ)⁻¹ over the newest p rows; a missing row is one of zeros.

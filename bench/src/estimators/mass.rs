@@ -69,13 +69,12 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
 pub fn cases(train: &TrainModel) -> Vec<Case> {
     let drive = drive(train);
     let of_peer = drive.clone();
-    vec![Case {
-        name: "mass Kalman step, 8 behaviours".into(),
-        target_ns: None,
-        ours: Contender::new("ours", SAMPLES - 1, move || ours(&drive)),
-        peers: vec![Contender::new("textbook EKF bank", SAMPLES - 1, move || textbook(&of_peer))],
-        agreement: Agreement::Relative(1e-6),
-    }]
+    let case = Case::new(
+        "mass Kalman step, 8 behaviours",
+        Agreement::Relative(1e-6),
+        Contender::new("ours", SAMPLES - 1, move || ours(&drive)),
+    );
+    vec![case.peer(Contender::new("textbook EKF bank", SAMPLES - 1, move || textbook(&of_peer)))]
 }
 
 fn ours(drive: &Drive) -> Vec<f64> {

@@ -10,6 +10,10 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
+use serde::Serialize;
+
+use crate::output::Failure;
+use crate::statistics::quantiles;
 
 /// One way to do the work of a case.
 pub struct Contender {
@@ -87,91 +91,76 @@ impl Effort {
     pub const QUICK: Effort = Effort { rounds: 5, slice: Duration::from_millis(1) };
 }
 
-/// Median and quartiles over the rounds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
-    /// Lower quartile.
-    pub low: f64,
-    /// Median.
-    pub median: f64,
-    /// Upper quartile.
-    pub high: f64,
-}
-
-impl Spread {
-    /// Of at least one value; quartiles by the nearest rank.
-    pub fn of(mut values: Vec<f64>) -> Self {
-        values.sort_by(f64::total_cmp);
-        let at = |share: f64| values[(share * (values.len() - 1) as f64).round() as usize];
-        Spread { low: at(0.25), median: at(0.5), high: at(0.75) }
-    }
-
-    /// Half the distance of the quartiles as a share of the median.
-    pub fn relative(&self) -> f64 {
-        0.5 * (self.high - self.low) / self.median
-    }
-}
-
-/// Time of a peer and of ours.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PeerTime {
-    /// Name of the peer.
+/// Time of one contender.
+#[derive(Debug, Serialize)]
+pub struct Entry {
+    /// Name of the work; a peer's with its own name in brackets.
     pub name: String,
-    /// Time of an update in ns.
-    pub ns: Spread,
-    /// Its time over ours: how many times faster ours is.
-    pub ratio: Spread,
-}
-
-/// Times of a case.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CaseTimes {
-    /// Name of the work.
-    pub name: String,
-    /// Target of an update in ns.
+    /// True for a peer.
+    pub peer: bool,
+    /// Median over the rounds in ns.
+    pub ns_per_update: f64,
+    /// Quartiles over the rounds in ns.
+    pub quartiles_ns: [f64; 2],
+    /// Median over the rounds of the peer's time over ours; absent for ours.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peer_over_ours: Option<f64>,
+    /// What is aimed at, in ns.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub target_ns: Option<f64>,
-    /// Time of an update of ours in ns.
-    pub ours_ns: Spread,
-    /// The peers.
-    pub peers: Vec<PeerTime>,
+    /// Whether the median meets it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub meets_target: Option<bool>,
 }
 
-/// An answer of a peer is not ours.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{case}: expected {peer} to agree with ours, {share:.3} times the tolerance apart")]
-pub struct Disagreement {
-    /// Name of the work.
-    pub case: String,
-    /// Name of the peer.
-    pub peer: String,
-    /// Difference over tolerance.
-    pub share: f64,
+/// Lower quartile, median and upper quartile of at least one value.
+pub fn quartiles(values: Vec<f64>) -> [f64; 3] {
+    quantiles(values, [0.25, 0.5, 0.75]).unwrap_or([f64::NAN; 3])
 }
 
 impl Case {
+    /// A case without peers and without an aim.
+    pub fn new(name: impl Into<String>, agreement: Agreement, ours: Contender) -> Self {
+        Case { name: name.into(), target_ns: None, ours, peers: Vec::new(), agreement }
+    }
+
+    /// With one more peer.
+    #[must_use]
+    pub fn peer(mut self, peer: Contender) -> Self {
+        self.peers.push(peer);
+        self
+    }
+
+    /// With an aim in ns.
+    #[must_use]
+    pub fn aim(self, target_ns: f64) -> Self {
+        Case { target_ns: Some(target_ns), ..self }
+    }
+
     /// Runs every contender once and compares the answers.
     ///
     /// # Errors
     ///
     /// The first peer whose answer differs from ours.
-    pub fn check(&mut self) -> Result<(), Disagreement> {
+    pub fn check(&mut self) -> Result<(), Failure> {
         let ours = (self.ours.pass)();
         for peer in &mut self.peers {
             let share = self.agreement.difference(&ours, &(peer.pass)());
             if share > 1.0 {
-                let (case, peer) = (self.name.clone(), peer.name.clone());
-                return Err(Disagreement { case, peer, share });
+                let (case, peer) = (&self.name, &peer.name);
+                let words = format!("expected {peer} to agree with ours, {share:.3} times");
+                return Err(format!("{case}: {words} the tolerance apart").into());
             }
         }
         Ok(())
     }
 
-    /// Checks the answers, warms up and measures.
+    /// Checks the answers, warms up and measures; ours comes first.
     ///
     /// # Errors
     ///
     /// The first peer whose answer differs from ours.
-    pub fn measure(mut self, effort: &Effort) -> Result<CaseTimes, Disagreement> {
+    pub fn measure(mut self, effort: &Effort) -> Result<Vec<Entry>, Failure> {
         self.check()?;
         let mut contenders: Vec<_> =
             std::iter::once(&mut self.ours).chain(&mut self.peers).collect();
@@ -184,17 +173,24 @@ impl Case {
                 times[index].push(time(contenders[index], passes[index]));
             }
         }
-        let peers = self.peers.iter().zip(&times[1..]).map(|(peer, peer_times)| PeerTime {
-            name: peer.name.clone(),
-            ns: Spread::of(peer_times.clone()),
-            ratio: Spread::of(peer_times.iter().zip(&times[0]).map(|(p, o)| p / o).collect()),
-        });
-        Ok(CaseTimes {
-            peers: peers.collect(),
-            name: self.name,
-            target_ns: self.target_ns,
-            ours_ns: Spread::of(times[0].clone()),
-        })
+        let entry = |(index, contender): (usize, &&mut Contender)| {
+            let (case, [low, median, high]) = (&self.name, quartiles(times[index].clone()));
+            let target_ns = self.target_ns.filter(|_| index == 0);
+            let ratios = || times[index].iter().zip(&times[0]).map(|(own, ours)| own / ours);
+            Entry {
+                name: match index {
+                    0 => case.clone(),
+                    _ => format!("{case} ({})", contender.name),
+                },
+                peer: index > 0,
+                ns_per_update: median,
+                quartiles_ns: [low, high],
+                peer_over_ours: (index > 0).then(|| quartiles(ratios().collect())[1]),
+                target_ns,
+                meets_target: target_ns.map(|target_ns| median < target_ns),
+            }
+        };
+        Ok(contenders.iter().enumerate().map(entry).collect())
     }
 }
 
@@ -234,12 +230,8 @@ mod tests {
     #[test]
     fn a_peer_with_another_answer_is_refused() {
         let contender = |answer: f64| Contender::new("x", 1, move || vec![answer]);
-        let case = |peer: f64| Case {
-            name: "case".into(),
-            target_ns: None,
-            ours: contender(1.0),
-            peers: vec![contender(peer)],
-            agreement: Agreement::Relative(1e-3),
+        let case = |peer: f64| {
+            Case::new("case", Agreement::Relative(1e-3), contender(1.0)).peer(contender(peer))
         };
         assert!(case(1.0005).check().is_ok());
         assert!(case(1.002).check().is_err());
@@ -247,9 +239,13 @@ mod tests {
     }
 
     #[test]
-    fn the_spread_is_that_of_the_middle_half() {
-        let spread = Spread::of(vec![5.0, 1.0, 100.0, 2.0, 3.0]);
-        assert_eq!(spread, Spread { low: 2.0, median: 3.0, high: 5.0 });
-        assert_eq!(spread.relative(), 0.5);
+    fn peers_follow_ours_and_only_ours_has_a_target() {
+        let contender = |name: &str| Contender::new(name, 1, || vec![1.0]);
+        let case = Case::new("c", Agreement::Absolute(0.0), contender("ours"));
+        let case = case.peer(contender("p")).aim(1e9);
+        let entries = case.measure(&Effort { rounds: 1, slice: Duration::ZERO }).unwrap();
+        assert_eq!((entries[0].meets_target, entries[0].peer), (Some(true), false));
+        assert_eq!((entries[1].name.as_str(), entries[1].target_ns), ("c (p)", None));
+        assert!(entries[1].peer && entries[1].peer_over_ours.is_some());
     }
 }

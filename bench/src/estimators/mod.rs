@@ -8,7 +8,7 @@
 //! - [`least_squares`], [`trajectory_bank`], [`trajectory_fit`], [`braking`], [`mass`],
 //!   [`resistance`]: the cases
 //! - [`pipelines`]: every kind of pipeline from sample to snapshot
-//! - [`report`]: the table and the JSON
+//! - [`report`]: the table
 //! - [`against`]: another build of the program beside this one
 
 pub mod against;
@@ -24,17 +24,71 @@ pub mod textbook;
 pub mod trajectory_bank;
 pub mod trajectory_fit;
 
-use dynocar_analysis::dataset::DatasetError;
+use std::path::PathBuf;
 
-use measure::Case;
+use clap::Args;
+use serde::Serialize;
+
+use crate::output::{Failure, Usage, give};
+use measure::{Case, Effort, Entry};
 use pipelines::DemoRun;
+
+/// Speed of every estimator compared with peers that do the same work on the same data.
+#[derive(Debug, Args)]
+pub struct EstimatorsArguments {
+    /// Few rounds: a check that everything runs, not a measurement
+    #[arg(long)]
+    quick: bool,
+    /// Only the cases whose name contains this, as rls
+    #[arg(long, value_name = "TEXT")]
+    case: Option<String>,
+    /// Another build of this program, measured by turns with this one
+    #[arg(long, value_name = "PROGRAM", requires = "case", conflicts_with = "quick")]
+    beside: Option<PathBuf>,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Everything that was measured; a peer follows ours.
+#[derive(Serialize)]
+struct Report {
+    cases: Vec<Entry>,
+}
+
+impl EstimatorsArguments {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such case, a peer disagrees, or the other build does not measure.
+    pub fn run(&self) -> Result<(), Failure> {
+        if let (Some(other), Some(case)) = (&self.beside, &self.case) {
+            let cases = against::measure(other, case)?;
+            return give(&self.json, &cases, || against::text(&cases));
+        }
+        let effort = if self.quick { Effort::QUICK } else { Effort::FULL };
+        let mut chosen = cases()?;
+        if let Some(text) = &self.case {
+            chosen.retain(|case| case.name.contains(text));
+            if chosen.is_empty() {
+                let words = format!("--case {text}: expected a part of a case's name");
+                return Err(Usage(words).into());
+            }
+        }
+        let measured: Result<Vec<_>, _> =
+            chosen.into_iter().map(|case| case.measure(&effort)).collect();
+        let report = Report { cases: measured?.into_iter().flatten().collect() };
+        give(&self.json, &report, || report::text(&report.cases))
+    }
+}
 
 /// Every case, in the order of the table.
 ///
 /// # Errors
 ///
 /// When the demonstration dataset is wrong.
-pub fn cases() -> Result<Vec<Case>, DatasetError> {
+pub fn cases() -> Result<Vec<Case>, Failure> {
     let run = DemoRun::read()?;
     let mut cases = least_squares::cases();
     cases.extend(trajectory_bank::cases());

@@ -67,16 +67,12 @@ pub fn cases(run: &Arc<DemoRun>) -> Vec<Case> {
     let all = PipelineKind::ALL.iter().filter_map(|&kind| EstimatorSettings::default_of(kind));
     all.map(|settings| {
         let run = run.clone();
-        Case {
-            name: format!("pipeline {}", settings.kind()),
-            target_ns: None,
-            ours: Contender::new("ours", run.samples.len(), move || {
-                let snapshot = run.process(&settings);
-                vec![snapshot.samples_used as f64, snapshot.updates as f64]
-            }),
-            peers: Vec::new(),
-            agreement: Agreement::Absolute(0.0),
-        }
+        let name = format!("pipeline {}", settings.kind());
+        let ours = Contender::new("ours", run.samples.len(), move || {
+            let snapshot = run.process(&settings);
+            vec![snapshot.samples_used as f64, snapshot.updates as f64]
+        });
+        Case::new(name, Agreement::Absolute(0.0), ours)
     })
     .collect()
 }

@@ -70,13 +70,12 @@ fn first() -> (SVector<f64, STATES>, SMatrix<f64, STATES, STATES>) {
 pub fn cases() -> Vec<Case> {
     let samples = samples();
     let of_peer = samples.clone();
-    vec![Case {
-        name: "resistance Kalman step, 8 states".into(),
-        target_ns: None,
-        ours: Contender::new("ours", SAMPLES, move || ours(&samples)),
-        peers: vec![Contender::new("textbook EKF", SAMPLES, move || textbook(&of_peer))],
-        agreement: Agreement::Relative(1e-6),
-    }]
+    let case = Case::new(
+        "resistance Kalman step, 8 states",
+        Agreement::Relative(1e-6),
+        Contender::new("ours", SAMPLES, move || ours(&samples)),
+    );
+    vec![case.peer(Contender::new("textbook EKF", SAMPLES, move || textbook(&of_peer)))]
 }
 
 fn ours(samples: &[Sample]) -> Vec<f64> {

@@ -43,29 +43,35 @@ impl<const N: usize> TextbookFilter<N> {
         self.covariance = transition * self.covariance * transition.transpose() + noise;
     }
 
-    /// Takes in a measurement: K = P H' / (H P H' + R), P = (I - K H) P.
-    pub fn measure(&mut self, row: &RowSVector<f64, N>, measured: f64, noise: f64) -> Said {
+    /// Takes a measurement into the mean, K = P H' / (H P H' + R); gives K.
+    fn correct(
+        &mut self,
+        row: &RowSVector<f64, N>,
+        measured: f64,
+        noise: f64,
+    ) -> (SVector<f64, N>, Said) {
         let variance = (row * self.covariance * row.transpose())[0] + noise;
         let gain = self.covariance * row.transpose() / variance;
         let innovation = measured - (row * self.mean)[0];
         self.mean += gain * innovation;
-        self.covariance = (SMatrix::<f64, N, N>::identity() - gain * row) * self.covariance;
-        Said { innovation, variance }
+        (gain, Said { innovation, variance })
     }
-}
 
-impl<const N: usize> TextbookFilter<N> {
+    /// Takes in a measurement: P = (I - K H) P.
+    pub fn measure(&mut self, row: &RowSVector<f64, N>, measured: f64, noise: f64) -> Said {
+        let (gain, said) = self.correct(row, measured, noise);
+        self.covariance = (SMatrix::<f64, N, N>::identity() - gain * row) * self.covariance;
+        said
+    }
+
     /// As [`TextbookFilter::measure`] with P = (I - K H) P (I - K H)' + K R K', as textbooks
     /// advise where rounding matters.
     pub fn measure_joseph(&mut self, row: &RowSVector<f64, N>, measured: f64, noise: f64) -> Said {
-        let variance = (row * self.covariance * row.transpose())[0] + noise;
-        let gain = self.covariance * row.transpose() / variance;
-        let innovation = measured - (row * self.mean)[0];
-        self.mean += gain * innovation;
+        let (gain, said) = self.correct(row, measured, noise);
         let keep = SMatrix::<f64, N, N>::identity() - gain * row;
         self.covariance =
             keep * self.covariance * keep.transpose() + gain * gain.transpose() * noise;
-        Said { innovation, variance }
+        said
     }
 }
 

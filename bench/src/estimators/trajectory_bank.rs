@@ -113,81 +113,68 @@ fn textbook_step(filter: &mut TextbookFilter<4>, step: &Step, measured_mps: f64)
 }
 
 fn step_of_one(drive: &Arc<Drive>) -> Case {
-    Case {
-        name: "trajectory filter step, one hypothesis".into(),
-        target_ns: None,
-        ours: contender("ours", drive, |drive| {
-            let model = noise(false);
-            let mut filter = first_hypothesis(drive, &model);
-            for (step, measured_mps) in &drive.samples {
-                filter.predict(StepRule::Time, step, STEP_S, 0.0);
-                filter.measure(*measured_mps, &model, &NO_OUTLIERS);
-            }
-            filter.state.as_slice().to_vec()
-        }),
-        peers: vec![contender("textbook EKF", drive, |drive| {
-            let mut filter = first_textbook(drive);
-            for (step, measured_mps) in &drive.samples {
-                textbook_step(&mut filter, step, *measured_mps);
-            }
-            filter.mean.as_slice().to_vec()
-        })],
-        agreement: SAME,
-    }
+    let ours = contender("ours", drive, |drive| {
+        let model = noise(false);
+        let mut filter = first_hypothesis(drive, &model);
+        for (step, measured_mps) in &drive.samples {
+            filter.predict(StepRule::Time, step, STEP_S, 0.0);
+            filter.measure(*measured_mps, &model, &NO_OUTLIERS);
+        }
+        filter.state.as_slice().to_vec()
+    });
+    let peer = contender("textbook EKF", drive, |drive| {
+        let mut filter = first_textbook(drive);
+        for (step, measured_mps) in &drive.samples {
+            textbook_step(&mut filter, step, *measured_mps);
+        }
+        filter.mean.as_slice().to_vec()
+    });
+    Case::new("trajectory filter step, one hypothesis", SAME, ours).peer(peer)
 }
 
 fn step_of_bank(drive: &Arc<Drive>) -> Case {
-    Case {
-        name: "jump bank step, 8 hypotheses".into(),
-        target_ns: Some(3000.0),
-        ours: contender("ours", drive, |drive| {
-            let model = noise(false);
-            let first = first_hypothesis(drive, &model);
-            let mut bank = JumpBank::new(first, HYPOTHESES, JUMPS, model, NO_OUTLIERS);
-            for (step, measured_mps) in &drive.samples {
-                bank.advance(StepRule::Time, step, STEP_S, *measured_mps);
-            }
-            let likeliest = bank.likeliest();
-            let variances = likeliest.davis_covariance().diagonal();
-            likeliest.state.iter().chain(&variances).copied().collect()
-        }),
-        peers: vec![contender("textbook EKF bank", drive, |drive| {
-            let mut bank = TextbookBank::new(first_textbook(drive));
-            for (step, measured_mps) in &drive.samples {
-                bank.advance(step, *measured_mps);
-            }
-            let likeliest = &bank.members[bank.likeliest()].filter;
-            let variances = likeliest.covariance.diagonal();
-            likeliest.mean.iter().chain(variances.iter().take(3)).copied().collect()
-        })],
-        agreement: SAME,
-    }
+    let ours = contender("ours", drive, |drive| {
+        let model = noise(false);
+        let first = first_hypothesis(drive, &model);
+        let mut bank = JumpBank::new(first, HYPOTHESES, JUMPS, model, NO_OUTLIERS);
+        for (step, measured_mps) in &drive.samples {
+            bank.advance(StepRule::Time, step, STEP_S, *measured_mps);
+        }
+        let likeliest = bank.likeliest();
+        let variances = likeliest.davis_covariance().diagonal();
+        likeliest.state.iter().chain(&variances).copied().collect()
+    });
+    let peer = contender("textbook EKF bank", drive, |drive| {
+        let mut bank = TextbookBank::new(first_textbook(drive));
+        for (step, measured_mps) in &drive.samples {
+            bank.advance(step, *measured_mps);
+        }
+        let likeliest = &bank.members[bank.likeliest()].filter;
+        let variances = likeliest.covariance.diagonal();
+        likeliest.mean.iter().chain(variances.iter().take(3)).copied().collect()
+    });
+    Case::new("jump bank step, 8 hypotheses", SAME, ours).peer(peer).aim(3000.0)
 }
 
 /// As the pipeline runs it, with noise learned and outliers judged; no peer does that.
 fn step_as_run(drive: &Arc<Drive>) -> Case {
-    Case {
-        name: "jump bank step, noise learned, published".into(),
-        target_ns: Some(3000.0),
-        ours: contender("ours", drive, |drive| {
-            let mut filter = OnlineFilter::new(OnlineSettings {
-                davis: DECLARED,
-                davis_std: DAVIS_STD,
-                jumps: JUMPS,
-                hypotheses: HYPOTHESES,
-                noise: noise(true),
-            });
-            filter.begin(drive.first_mps);
-            for (step, measured_mps) in &drive.samples {
-                filter.advance(StepRule::Time, step, STEP_S, *measured_mps);
-                std::hint::black_box(filter.davis());
-            }
-            let (davis, _) = filter.davis();
-            vec![davis.a, davis.b, davis.c]
-        }),
-        peers: Vec::new(),
-        agreement: SAME,
-    }
+    let ours = contender("ours", drive, |drive| {
+        let mut filter = OnlineFilter::new(OnlineSettings {
+            davis: DECLARED,
+            davis_std: DAVIS_STD,
+            jumps: JUMPS,
+            hypotheses: HYPOTHESES,
+            noise: noise(true),
+        });
+        filter.begin(drive.first_mps);
+        for (step, measured_mps) in &drive.samples {
+            filter.advance(StepRule::Time, step, STEP_S, *measured_mps);
+            std::hint::black_box(filter.davis());
+        }
+        let (davis, _) = filter.davis();
+        vec![davis.a, davis.b, davis.c]
+    });
+    Case::new("jump bank step, noise learned, published", SAME, ours).aim(3000.0)
 }
 
 #[derive(Clone)]

@@ -95,9 +95,13 @@ impl Windows {
             .expect("the window determines the coefficients")
     }
 
-    fn answer(&self, window: usize, davis: &Davis, answers: &mut Vec<f64>) {
-        let point = Vector3::new(davis.a, davis.b, davis.c);
-        answers.extend(point.component_div(&self.deviations[window]).iter());
+    /// The coefficients of every window, in standard deviations.
+    fn answers(&self, mut of_window: impl FnMut(usize) -> Davis) -> Vec<f64> {
+        let answer = |(window, deviations): (usize, &Vector3<f64>)| {
+            let Davis { a, b, c } = of_window(window);
+            Vector3::new(a, b, c).component_div(deviations).data.0[0]
+        };
+        self.deviations.iter().enumerate().flat_map(answer).collect()
     }
 }
 
@@ -110,28 +114,15 @@ fn case(samples: usize, target_ns: f64) -> Case {
     let windows = Windows::new(samples);
     let of_peer = windows.clone();
     let mut fitter = TrajectoryFitter::with_capacity(1, samples);
-    Case {
-        name: format!("trajectory fit, warm, {samples} samples"),
-        target_ns: Some(target_ns),
-        ours: Contender::new("ours", WINDOWS, move || {
-            let mut answers = Vec::with_capacity(3 * WINDOWS);
-            for window in 0..WINDOWS {
-                let fit = windows.fit(&mut fitter, window);
-                windows.answer(window, &fit.davis, &mut answers);
-            }
-            answers
-        }),
-        peers: vec![Contender::new("levenberg-marquardt", WINDOWS, move || {
-            let mut answers = Vec::with_capacity(3 * WINDOWS);
-            for window in 0..WINDOWS {
-                let davis = peer_fit(of_peer.segment(window), &of_peer.warm[window]);
-                of_peer.answer(window, &davis, &mut answers);
-            }
-            answers
-        })],
-        // In standard deviations.
-        agreement: Agreement::Absolute(5e-3),
-    }
+    let ours = Contender::new("ours", WINDOWS, move || {
+        windows.answers(|window| windows.fit(&mut fitter, window).davis)
+    });
+    let peer = Contender::new("levenberg-marquardt", WINDOWS, move || {
+        of_peer.answers(|window| peer_fit(of_peer.segment(window), &of_peer.warm[window]))
+    });
+    let name = format!("trajectory fit, warm, {samples} samples");
+    // In standard deviations.
+    Case::new(name, Agreement::Absolute(5e-3), ours).peer(peer).aim(target_ns)
 }
 
 fn peer_fit(segment: MotionSegment<'_>, start: &Davis) -> Davis {

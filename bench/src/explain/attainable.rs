@@ -23,7 +23,7 @@ struct TrueLaw {
 }
 
 /// The numbers of a law besides its size; one that only scales another is none.
-fn numbers(law: Law) -> Vec<f64> {
+fn numbers_of(law: &mut Law) -> Vec<&mut f64> {
     match law {
         Law::Band { centre_mps, width_mps } => vec![centre_mps, width_mps],
         Law::Slow { below_mps, least_mps } => vec![below_mps, least_mps],
@@ -35,17 +35,14 @@ fn numbers(law: Law) -> Vec<f64> {
     }
 }
 
+fn numbers(mut law: Law) -> Vec<f64> {
+    numbers_of(&mut law).into_iter().map(|number| *number).collect()
+}
+
 /// The law with other numbers.
-fn with_numbers(law: Law, numbers: &[f64]) -> Law {
-    match law {
-        Law::Band { .. } => Law::Band { centre_mps: numbers[0], width_mps: numbers[1] },
-        Law::Slow { .. } => Law::Slow { below_mps: numbers[0], least_mps: numbers[1] },
-        Law::Power { at_mps, .. } => Law::Power { at_mps, exponent: numbers[0] },
-        Law::Beyond { span_mps, .. } => Law::Beyond { from_mps: numbers[0], span_mps },
-        Law::Levelling { .. } => Law::Levelling { over_mps: numbers[0] },
-        Law::FastInCold { at_mps, .. } => Law::FastInCold { at_mps, until_degc: numbers[0] },
-        Law::FastLater { at_mps, .. } => Law::FastLater { at_mps, from_s: numbers[0] },
-    }
+fn with_numbers(mut law: Law, numbers: &[f64]) -> Law {
+    numbers_of(&mut law).into_iter().zip(numbers).for_each(|(own, number)| *own = *number);
+    law
 }
 
 impl TrueLaw {

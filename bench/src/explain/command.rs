@@ -3,88 +3,62 @@
 use std::path::PathBuf;
 
 use clap::Args;
-
-use super::case::Case;
-use super::grade::Grade;
-use super::scenario::Scenario;
-use super::world::World;
-use super::{growth, matrix};
-use crate::output::give;
+use dynocar::output::report_line;
 use dynocar_shared::vocabulary::EffectKind;
+
+use super::case::{Case, explained, read};
+use super::family::FamilyArguments;
+use super::grade::{Grade, grade};
+use super::scenario::Scenario;
+use super::{growth, matrix};
+use crate::output::{Failure, during, give};
 
 /// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,
 /// confusions, localisation, parameters and their coverage.
 #[derive(Debug, Args)]
 pub struct ExplainArguments {
-    /// Simulated datasets for each kind
-    #[arg(long, default_value_t = 20)]
-    seeds: usize,
-    /// The first seed
-    #[arg(long, default_value_t = 1)]
-    first_seed: u64,
-    /// Only this kind, as tunnel_drag, or none, two_effects, poor_recording; may be repeated
-    #[arg(long = "kind", value_name = "NAME")]
-    kinds: Vec<String>,
-    /// What is a little wrong besides the effect
-    #[arg(long, value_enum, default_value_t = World::Plain)]
-    world: World,
-    /// Datasets at a time
-    #[arg(long, default_value_t = 2)]
-    threads: usize,
+    #[command(flatten)]
+    family: FamilyArguments,
     /// Instead of the matrix, the time for 1, 4 and 16 times the data: one dataset of each kind
     /// (none, tunnel_drag, dragging_brake and wind unless chosen) with more runs, then longer ones
     #[arg(long, conflicts_with_all = ["seeds", "threads", "write", "verbose", "world"])]
     growth: bool,
-    /// Print the outcome of every dataset on standard error
-    #[arg(long)]
-    verbose: bool,
     /// Write the simulated datasets with their truth into this folder
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
 }
 
 impl ExplainArguments {
-    fn scenarios(&self) -> Result<Vec<Scenario>, (String, u8)> {
-        let all = || {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such kind, or a file cannot be written.
+    pub fn run(&self) -> Result<(), Failure> {
+        let family = &self.family;
+        if self.growth {
             use EffectKind::{DraggingBrake, None, TunnelDrag, Wind};
-            let few = [None, TunnelDrag, DraggingBrake, Wind].map(Scenario::Kind);
-            if self.growth { few.to_vec() } else { Scenario::all() }
-        };
-        Ok(Scenario::named(&self.kinds)?.unwrap_or_else(all))
-    }
-}
-
-/// Runs the command; an error has its text and the exit status.
-pub fn explain(arguments: &ExplainArguments) -> Result<(), (String, u8)> {
-    let scenarios = arguments.scenarios()?;
-    let (seeds, first) = (arguments.seeds, arguments.first_seed);
-    if arguments.growth {
-        let sizes = growth::measure(&scenarios, first, &|size| {
-            dynocar::output::report_line(&format!(
-                "{} x{}: {:.1} s",
-                size.axis.name(),
-                size.factor,
-                size.seconds
-            ));
+            let few = [None, TunnelDrag, DraggingBrake, Wind].map(Scenario::Kind).to_vec();
+            let sizes = growth::measure(&family.scenarios(few)?, family.first_seed);
+            return give(&family.json, &sizes, || growth::table(&sizes));
+        }
+        let scenarios = family.scenarios(Scenario::all())?;
+        if let Some(folder) = &self.write {
+            for case in family.cases(&scenarios) {
+                case.write(folder).map_err(during(folder.display()))?;
+            }
+        }
+        let grades = family.over(&scenarios, |case| {
+            let simulated = case.simulate();
+            let graded = grade(&simulated, case, &explained(&read(&simulated)));
+            if family.verbose {
+                print_case(case, &graded);
+            }
+            graded
         });
-        return give(&arguments.json, &sizes, || growth::table(&sizes));
+        let matrix = matrix::Matrix::of(&grades);
+        give(&family.json, &matrix, || matrix::table(&matrix))
     }
-    let cases = matrix::cases(&scenarios, seeds, first, arguments.world);
-    if let Some(folder) = &arguments.write {
-        for case in &cases {
-            case.write(folder).map_err(|error| (format!("{}: {error}", folder.display()), 1))?;
-        }
-    }
-    let report = |case: &Case, grade: &Grade| {
-        if arguments.verbose {
-            print_case(case, grade);
-        }
-    };
-    let matrix = matrix::run(&scenarios, &cases, arguments.threads.max(1), &report);
-    give(&arguments.json, &matrix, || matrix::table(&matrix))
 }
 
 /// One dataset's outcome on standard error.
@@ -95,7 +69,7 @@ fn print_case(case: &Case, grade: &Grade) {
         .iter()
         .map(|p| format!("{} {:+.3} ({:+.1} sd)", p.name, p.error, p.z))
         .collect();
-    dynocar::output::report_line(&format!(
+    report_line(&format!(
         "{} seed {}: {} {} {} iou {:?} ends {}/{} share {:?} {}",
         if grade.is_right { "right" } else { "WRONG" },
         case.seed,
@@ -108,8 +82,8 @@ fn print_case(case: &Case, grade: &Grade) {
         grade.share,
         parameters.join(", ")
     ));
-    dynocar::output::report_line(&format!("    acceptance score {:.2}", grade.acceptance_score));
+    report_line(&format!("    acceptance score {:.2}", grade.acceptance_score));
     for detail in &grade.details {
-        dynocar::output::report_line(&format!("    {detail}"));
+        report_line(&format!("    {detail}"));
     }
 }

@@ -2,11 +2,13 @@
 
 use std::time::Instant;
 
+use dynocar::output::report_line;
 use serde::Serialize;
 
 use super::case::{explained, read};
 use super::scenario::Scenario;
 use super::world::World;
+use crate::output::{self, Record};
 use dynocar_tests::simulator::{SimulatorSettings, simulate};
 
 /// The data are made so many times more.
@@ -70,7 +72,7 @@ impl Size {
 }
 
 /// Explains one dataset of each scenario at every size, one after the other on one thread.
-pub fn measure(scenarios: &[Scenario], seed: u64, report: &dyn Fn(&Size)) -> Vec<Size> {
+pub fn measure(scenarios: &[Scenario], seed: u64) -> Vec<Size> {
     let mut sizes = Vec::new();
     for axis in [Axis::Runs, Axis::Duration] {
         for factor in FACTORS {
@@ -85,7 +87,7 @@ pub fn measure(scenarios: &[Scenario], seed: u64, report: &dyn Fn(&Size)) -> Vec
                 explained(&dataset);
                 size.seconds += since.elapsed().as_secs_f64();
             }
-            report(&size);
+            report_line(&format!("{} x{factor}: {:.1} s", axis.name(), size.seconds));
             sizes.push(size);
         }
     }
@@ -94,21 +96,17 @@ pub fn measure(scenarios: &[Scenario], seed: u64, report: &dyn Fn(&Size)) -> Vec
 
 /// The sizes as a table for people.
 pub fn table(sizes: &[Size]) -> String {
-    let mut text =
-        String::from("grows     times  runs  each s    samples     time s  us/sample  to first\n");
-    for size in sizes {
+    let row = |size: &Size| {
         let first = sizes.iter().find(|other| other.axis == size.axis).unwrap_or(size);
-        text += &format!(
-            "{:9} {:5} {:5} {:7.0} {:10} {:10.2} {:10.1} {:9.2}\n",
-            size.axis.name(),
-            size.factor,
-            size.runs,
-            size.duration_s,
-            size.samples,
-            size.seconds,
-            size.per_sample_us(),
-            size.per_sample_us() / first.per_sample_us()
-        );
-    }
-    text
+        Record::default()
+            .with("grows", size.axis.name())
+            .with("times", size.factor)
+            .with("runs", size.runs)
+            .number("each s", size.duration_s, 0)
+            .with("samples", size.samples)
+            .number("time s", size.seconds, 2)
+            .number("us/sample", size.per_sample_us(), 1)
+            .number("to first", size.per_sample_us() / first.per_sample_us(), 2)
+    };
+    output::table(&sizes.iter().map(row).collect::<Vec<_>>())
 }

@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::case::{Case, explained, read};
-use super::grade::{Grade, grade};
+use super::grade::Grade;
 use super::scenario::Scenario;
-use super::world::World;
-use crate::parallel::over;
+use crate::output::{self, Record};
+use crate::statistics::{mean, median, quantiles, root_mean_square};
 
 /// An error at most so many times another is as good.
 const NEAR: f64 = 1.1;
@@ -75,81 +74,34 @@ pub struct Intervals {
     pub held: f64,
 }
 
-/// The middle of some values, the upper one of two.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    values.sort_unstable_by(f64::total_cmp);
-    Some(values[values.len() / 2])
-}
-
-/// Every scenario with every seed, scenario by scenario.
-pub fn cases(scenarios: &[Scenario], seeds: usize, first_seed: u64, world: World) -> Vec<Case> {
-    let of = |scenario: Scenario| {
-        let seeds = first_seed..first_seed + seeds as u64;
-        seeds.map(move |seed| Case { scenario, seed, world })
-    };
-    scenarios.iter().flat_map(|&scenario| of(scenario)).collect()
-}
-
-/// Runs the matrix over [`cases`] of these scenarios, on `threads` threads. Every finished case is
-/// reported to `report`.
-pub fn run(
-    scenarios: &[Scenario],
-    cases: &[Case],
-    threads: usize,
-    report: &(dyn Fn(&Case, &Grade) + Sync),
-) -> Matrix {
-    let seeds = cases.len() / scenarios.len().max(1);
-    let grades = over(cases, threads, |case| {
-        let simulated = case.simulate();
-        let explanation = explained(&read(&simulated));
-        let graded = grade(&simulated, case, &explanation);
-        report(case, &graded);
-        graded
-    });
-    let rows = scenarios.iter().zip(grades.chunks(seeds.max(1)));
-    let nulls = rows.clone().filter(|(scenario, _)| scenario.is_null());
-    let raised = nulls.clone().map(|(_, grades)| grades.iter().filter(|g| !g.is_right).count());
-    let strengths = nulls.clone().flat_map(|(_, grades)| grades.iter().map(|g| g.acceptance_score));
-    let strengths: Vec<f64> = strengths.collect();
-    Matrix {
-        intervals: intervals(&grades),
-        false_alarms: FalseAlarms {
-            runs: nulls.map(|(_, grades)| grades.len()).sum(),
-            raised: raised.sum(),
-            strength_quantiles: quantiles(strengths),
-        },
-        kinds: rows.map(|(scenario, grades)| row(scenario.name(), grades)).collect(),
+impl Matrix {
+    /// Of what came of every scenario.
+    pub fn of(grades: &[(Scenario, Vec<Grade>)]) -> Self {
+        let nulls = || grades.iter().filter(|(scenario, _)| scenario.is_null());
+        let of_nulls = || nulls().flat_map(|(_, grades)| grades);
+        let shares = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0];
+        let scores = of_nulls().map(|grade| grade.acceptance_score).collect();
+        let strengths = quantiles(scores, shares).map(|values| shares.into_iter().zip(values));
+        Matrix {
+            intervals: intervals(grades.iter().flat_map(|(_, grades)| grades)),
+            false_alarms: FalseAlarms {
+                runs: of_nulls().count(),
+                raised: of_nulls().filter(|grade| !grade.is_right).count(),
+                strength_quantiles: strengths.into_iter().flatten().collect(),
+            },
+            kinds: grades.iter().map(|(scenario, own)| row(scenario.name(), own)).collect(),
+        }
     }
 }
 
-fn quantiles(mut values: Vec<f64>) -> Vec<(f64, f64)> {
-    values.sort_unstable_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1) as f64;
-    let at = |share: f64| Some((share, *values.get((share * last).round() as usize)?));
-    [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0].into_iter().filter_map(at).collect()
-}
-
-fn root_mean_square(all: impl ExactSizeIterator<Item = f64>) -> Option<f64> {
-    let count = all.len() as f64;
-    (count > 0.0).then(|| (all.map(|one| one * one).sum::<f64>() / count).sqrt())
-}
-
-/// Share of what is true; `None` of nothing.
 fn share_of(all: impl Iterator<Item = bool>) -> Option<f64> {
-    let (mut count, mut held) = (0, 0);
-    for own in all {
-        count += 1;
-        held += usize::from(own);
-    }
-    (count > 0).then(|| f64::from(held as u32) / f64::from(count))
+    let all: Vec<f64> = all.map(|is_so| f64::from(u8::from(is_so))).collect();
+    (!all.is_empty()).then(|| mean(&all))
 }
 
-fn intervals(grades: &[Grade]) -> Intervals {
+fn intervals<'a>(grades: impl Iterator<Item = &'a Grade>) -> Intervals {
     let mut of_all = Intervals::default();
-    for grade in grades.iter().filter(|grade| grade.is_right) {
+    for grade in grades.filter(|grade| grade.is_right) {
         let mut lists: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
         for parameter in &grade.parameters {
             lists.entry(&parameter.name).or_default().push(parameter.is_held());
@@ -169,6 +121,7 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
     }
     let right: Vec<&Grade> = grades.iter().filter(|grade| grade.is_right).collect();
     let parameters: Vec<_> = right.iter().flat_map(|grade| &grade.parameters).collect();
+    let deviations: Vec<f64> = parameters.iter().map(|parameter| parameter.z).collect();
     KindRow {
         kind: kind.into(),
         runs: grades.len(),
@@ -178,7 +131,7 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
         place_coverage: share_of(right.iter().flat_map(|grade| grade.ends_held.iter().copied())),
         parameter_error: median(parameters.iter().map(|p| p.error.abs()).collect()),
         coverage: share_of(parameters.iter().map(|parameter| parameter.is_held())),
-        z_rms: root_mean_square(parameters.iter().map(|parameter| parameter.z)),
+        z_rms: (!deviations.is_empty()).then(|| root_mean_square(&deviations)),
         within_a_tenth: share_of(
             grades.iter().filter_map(|grade| grade.left_ratio).map(|ratio| ratio <= NEAR),
         ),
@@ -195,30 +148,23 @@ fn row(kind: &str, grades: &[Grade]) -> KindRow {
 
 /// The matrix as a table for people.
 pub fn table(matrix: &Matrix) -> String {
-    let mut text = String::from(
-        "kind                  right      IoU   ends  error  cover      z  share  tenth  (law   of it)  named instead\n",
-    );
-    let shown = |value: Option<f64>| value.map_or("     -".into(), |value| format!("{value:6.3}"));
-    for row in &matrix.kinds {
-        let confused: Vec<String> =
-            row.confused_with.iter().map(|(named, count)| format!("{named} {count}")).collect();
-        text += &format!(
-            "{:20} {:3}/{:<3} {} {} {} {} {} {} {} {} {}  {}\n",
-            row.kind,
-            row.right,
-            row.runs,
-            shown(row.iou),
-            shown(row.place_coverage),
-            shown(row.parameter_error),
-            shown(row.coverage),
-            shown(row.z_rms),
-            shown(row.error_reduction_share),
-            shown(row.within_a_tenth),
-            shown(row.attainable_within_a_tenth),
-            shown(row.within_a_tenth_of_attainable),
-            confused.join(", ")
-        );
-    }
+    let record = |row: &KindRow| {
+        let confused = row.confused_with.iter().map(|(named, count)| format!("{named} {count}"));
+        Record::default()
+            .with("kind", &row.kind)
+            .with("right", format!("{}/{}", row.right, row.runs))
+            .number("IoU", row.iou, 3)
+            .number("ends", row.place_coverage, 3)
+            .number("error", row.parameter_error, 3)
+            .number("cover", row.coverage, 3)
+            .number("z", row.z_rms, 3)
+            .number("share", row.error_reduction_share, 3)
+            .number("tenth", row.within_a_tenth, 3)
+            .number("of the law", row.attainable_within_a_tenth, 3)
+            .number("beside it", row.within_a_tenth_of_attainable, 3)
+            .with("named instead", confused.collect::<Vec<_>>().join(", "))
+    };
+    let mut text = output::table(&matrix.kinds.iter().map(record).collect::<Vec<_>>());
     let Intervals { all, held } = matrix.intervals;
     if all > 0 {
         let share = 100.0 * held / all as f64;

@@ -7,6 +7,7 @@
 //! - [`attainable`]: what the true law leaves when its numbers are estimated
 //! - [`parameters`]: its numbers against the true ones
 //! - [`place`]: its places against the true ones
+//! - [`family`]: which simulated datasets
 //! - [`matrix`]: all kinds over all seeds, in numbers
 //! - [`growth`]: time for 1, 4 and 16 times the data
 //! - [`command`]: the command line
@@ -14,6 +15,7 @@
 pub mod attainable;
 pub mod case;
 pub mod command;
+pub mod family;
 pub mod grade;
 pub mod growth;
 pub mod matrix;

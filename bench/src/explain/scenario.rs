@@ -92,26 +92,6 @@ impl Scenario {
         kinds.chain(others).collect()
     }
 
-    /// The scenario of this name.
-    pub fn from_name(name: &str) -> Option<Scenario> {
-        Scenario::all().into_iter().find(|scenario| scenario.name() == name)
-    }
-
-    /// Those of these names on a command line; `None` of none.
-    ///
-    /// # Errors
-    ///
-    /// For a name that is none, with the names there are and the exit status.
-    pub fn named(names: &[String]) -> Result<Option<Vec<Scenario>>, (String, u8)> {
-        let one = |name: &String| {
-            let all: Vec<_> = Scenario::all().iter().map(|scenario| scenario.name()).collect();
-            Scenario::from_name(name)
-                .ok_or((format!("--kind {name}: expected one of {}", all.join(", ")), 2))
-        };
-        let named = names.iter().map(one).collect::<Result<Vec<_>, _>>()?;
-        Ok(Some(named).filter(|named| !named.is_empty()))
-    }
-
     /// Its name on the command line and in the table.
     pub fn name(self) -> &'static str {
         match self {

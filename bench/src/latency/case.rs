@@ -3,19 +3,19 @@
 use dynocar::config::IdleStrategy;
 use dynocar_client::monotonic_now_ns;
 use dynocar_shared::PipelineKind;
+use dynocar_tests::process::{Process, Site};
 
 use super::companion::Companion;
-use super::link::{ClientLink, DatagramLink, Link, NotifyingLink};
+use super::link::{ClientLink, Datagrams, Link, Notifying, Numbered};
 use super::schedule::{Schedule, Slice, await_ready, drive};
 use super::server::TRAIN;
 #[cfg(feature = "zeromq")]
-use super::zeromq::ZeroMqLink;
-use crate::rig::RigError;
-use crate::rig::child::Peer;
+use super::zeromq::ZeroMq;
+use crate::output::Failure;
 use crate::rig::cores::{Cores, bind, prioritise};
 use crate::rig::motion::Motion;
 use crate::rig::pipelines;
-use crate::rig::site::{DaemonPlan, Site, ThreadPlan};
+use crate::rig::site::{DaemonPlan, ThreadPlan, peer, put_candidates, require, site, stop};
 use crate::rig::usage::{self, ThreadUsage};
 
 /// The pipeline that is compared with the floor and the alternatives.
@@ -151,65 +151,50 @@ pub struct Outcome {
 /// # Errors
 ///
 /// When a process or a transport fails.
-pub fn measure(case: &Case, cores: Cores, schedule: &Schedule) -> Result<Outcome, RigError> {
-    let site = Site::new()?;
+pub fn measure(case: &Case, cores: Cores, schedule: &Schedule) -> Result<Outcome, Failure> {
+    let site = site();
     let blocks = case.idle == IdleStrategy::Event;
     let mut peer = start(case, &site, cores)?;
-    let started: Result<Vec<Peer>, RigError> =
+    let started: Result<Vec<Process>, Failure> =
         case.companions.iter().map(|it| it.start(&site)).collect();
     // They end with the slice.
     let _companions = started?;
     prioritise(cores.priority);
-    match (&case.answerer, blocks) {
-        (Answerer::Floor, true) => {
-            let mut link = NotifyingLink::open(&site, TRAIN)?;
-            run(&mut link, &mut peer, cores, schedule)
-        }
-        (Answerer::Floor, false) => {
-            let mut link = ClientLink::open(&site, TRAIN, PipelineKind::Echo)?;
-            run(&mut link, &mut peer, cores, schedule)
-        }
-        (Answerer::Daemon { polled, .. }, _) => {
-            let mut link = ClientLink::open(&site, TRAIN, *polled)?;
-            let outcome = run(&mut link, &mut peer, cores, schedule)?;
-            peer.stop()?;
-            Ok(outcome)
-        }
-        (Answerer::UnixDatagram, _) => {
-            let mut link = DatagramLink::open(&site, blocks)?;
-            run(&mut link, &mut peer, cores, schedule)
-        }
+    let mut link: Box<dyn Link> = match &case.answerer {
+        Answerer::Floor if blocks => Box::new(Numbered::new(Notifying::open(&site, TRAIN)?)),
+        Answerer::Floor => Box::new(ClientLink::open(&site, TRAIN, PipelineKind::Echo)?),
+        Answerer::Daemon { polled, .. } => Box::new(ClientLink::open(&site, TRAIN, *polled)?),
+        Answerer::UnixDatagram => Box::new(Numbered::new(Datagrams::open(&site, blocks)?)),
         #[cfg(feature = "zeromq")]
-        (Answerer::ZeroMq, _) => {
-            let mut link = ZeroMqLink::open(&site, blocks)?;
-            run(&mut link, &mut peer, cores, schedule)
-        }
+        Answerer::ZeroMq => Box::new(Numbered::new(ZeroMq::open(&site, blocks)?)),
+    };
+    let outcome = run(&mut *link, &mut peer, cores, schedule)?;
+    if matches!(case.answerer, Answerer::Daemon { .. }) {
+        stop(peer)?;
     }
+    Ok(outcome)
 }
 
 fn run(
-    link: &mut impl Link,
-    peer: &mut Peer,
+    link: &mut dyn Link,
+    peer: &mut Process,
     cores: Cores,
     schedule: &Schedule,
-) -> Result<Outcome, RigError> {
+) -> Result<Outcome, Failure> {
     bind(cores.controller);
     let mut motion = Motion::of(TRAIN, monotonic_now_ns());
-    await_ready(link, &mut motion, || peer.require())?;
+    await_ready(link, &mut motion, || require(peer))?;
     drive(link, &mut motion, schedule.rate_hz, schedule.warm_up_s)?;
-    let before = usage::of_thread(peer.process_id(), THREAD);
+    let before = usage::of_thread(peer.id(), THREAD);
     let slice = drive(link, &mut motion, schedule.rate_hz, schedule.measure_s)?;
-    let after = usage::of_thread(peer.process_id(), THREAD);
-    peer.require()?;
+    let after = usage::of_thread(peer.id(), THREAD);
+    require(peer)?;
     let suffered = before.zip(after).map(|(before, after)| after.since(&before));
     Ok(Outcome { slice, suffered })
 }
 
-fn start(case: &Case, site: &Site, cores: Cores) -> Result<Peer, RigError> {
-    let folder = site.path().to_string_lossy().into_owned();
-    let core = cores.server.to_string();
-    let priority = cores.priority.map(|priority| priority.to_string());
-    let mut arguments: Vec<&str> = match &case.answerer {
+fn start(case: &Case, site: &Site, cores: Cores) -> Result<Process, Failure> {
+    let kind = match &case.answerer {
         Answerer::Daemon { pipelines, .. } => {
             let thread = ThreadPlan {
                 name: THREAD,
@@ -220,26 +205,21 @@ fn start(case: &Case, site: &Site, cores: Cores) -> Result<Peer, RigError> {
             };
             let lines = match case.candidates {
                 0 => String::new(),
-                count => site.put_candidates(TRAIN, count)?,
+                count => put_candidates(site, TRAIN, count)?,
             };
-            let plan = DaemonPlan { trains: 1, threads: vec![thread], lines };
-            let config = site.write_config(&plan)?;
-            return Peer::start(site, &["daemon", &config.to_string_lossy()]);
+            return DaemonPlan { trains: 1, threads: vec![thread], lines }.start(site);
         }
-        Answerer::Floor if case.idle == IdleStrategy::Event => vec!["listening-echo", &folder],
-        Answerer::Floor => vec!["echo", &folder],
-        Answerer::UnixDatagram => vec!["unix-datagram", &folder],
+        Answerer::Floor => "echo",
+        Answerer::UnixDatagram => "unix-datagram",
         #[cfg(feature = "zeromq")]
-        Answerer::ZeroMq => vec!["zero-mq", &folder],
+        Answerer::ZeroMq => "zeromq",
     };
-    arguments.extend(["--core", &core]);
-    if let Some(priority) = &priority {
-        arguments.extend(["--priority", priority]);
-    }
-    if case.idle == IdleStrategy::Event {
-        arguments.push("--blocks");
-    }
-    Peer::start(site, &arguments)
+    let (folder, core) = (site.path().to_string_lossy(), cores.server.to_string());
+    let priority = cores.priority.map(|priority| priority.to_string());
+    let mut arguments: Vec<&str> = vec![&folder, "--core", &core];
+    arguments.extend(priority.iter().flat_map(|priority| ["--priority", priority]));
+    arguments.extend((case.idle == IdleStrategy::Event).then_some("--blocks"));
+    peer(site, kind, &arguments)
 }
 
 #[cfg(test)]

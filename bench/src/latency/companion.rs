@@ -1,14 +1,11 @@
 //! Programs beside a daemon that read the same channels: what they cost is measured like everything else.
 
-use std::io::{BufRead, BufReader};
-use std::process::Stdio;
-
-use dynocar::programs::{RECORDING, call};
+use dynocar::programs::{LIVE, RECORDING, call};
+use dynocar_tests::process::{Process, Site};
 
 use super::server::TRAIN;
-use crate::rig::child::Peer;
-use crate::rig::site::Site;
-use crate::rig::{RigError, system};
+use crate::output::Failure;
+use crate::rig::site::require;
 
 /// A program that reads what a controller and the daemon write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,33 +25,23 @@ impl Companion {
         }
     }
 
-    /// Starts it on a site, and waits until its channels are open.
+    /// Starts it on a site, and waits for its first line: by then its channels are open.
     ///
     /// # Errors
     ///
     /// When it cannot be started.
-    pub fn start(self, site: &Site) -> Result<Peer, RigError> {
-        let train = TRAIN.to_string();
-        let mut command = match self {
-            Companion::Recorder => {
-                let mut command = call(RECORDING);
-                command.args(["record", "--output", "run.mcap", "--train", &train]);
-                command
-            }
-            Companion::Live => {
-                let mut command = call("dynocar-live");
-                command.args(["--port", "0", "--train", &train]);
-                command
-            }
+    pub fn start(self, site: &Site) -> Result<Process, Failure> {
+        let (train, file) = (TRAIN.to_string(), site.path().join("run.mcap"));
+        let file = file.to_string_lossy();
+        let (package, arguments) = match self {
+            Companion::Recorder => (RECORDING, vec!["record", "--output", &file]),
+            Companion::Live => (LIVE, vec!["--port", "0"]),
         };
-        command.stderr(Stdio::piped());
-        let mut peer = Peer::start_command(site, self.name(), command)?;
-        if let Some(output) = peer.take_errors() {
-            // Its first line: by then its channels are open.
-            let line = BufReader::new(output).lines().next().transpose();
-            line.map_err(system("reading what a process prints"))?;
-        }
-        peer.require()?;
-        Ok(peer)
+        let program = call(package);
+        let program = program.get_program().to_string_lossy();
+        let mut process = site.start(&program, &[&arguments[..], &["--train", &train]].concat());
+        process.await_error("\n");
+        require(&mut process)?;
+        Ok(process)
     }
 }

@@ -3,11 +3,12 @@
 use dynocar_client::channel::{Receiver, Sender, Transport};
 use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+use dynocar_tests::process::Site;
 use serde::Serialize;
 
-use crate::rig::RigError;
-use crate::rig::quantiles::median;
-use crate::rig::site::Site;
+use crate::output::Failure;
+use crate::rig::site::site;
+use crate::statistics::median;
 
 const TRAIN: TrainId = TrainId(1);
 /// Calls that are timed together, so that the clock's own cost is spread.
@@ -35,23 +36,23 @@ struct Ends {
 }
 
 impl Ends {
-    fn open() -> Result<Self, RigError> {
-        let site = Site::new()?;
-        let transport = Transport::open(site.host(), "dynocar-bench-costs")?;
+    fn open() -> Result<Self, Failure> {
+        let site = site();
+        let transport = Transport::open(&site.host(), "dynocar-bench-costs")?;
         let mut snapshot = ParameterSnapshot::empty();
         snapshot.train_id = TRAIN.0;
         snapshot.pipeline_kind = PipelineKind::Rls as u32;
         Ok(Ends {
             snapshots: transport.sender(TRAIN)?,
             samples: transport.receiver(TRAIN)?,
-            publisher: SamplePublisher::open(site.host(), TRAIN)?,
-            reader: SnapshotReader::open(site.host(), TRAIN)?,
+            publisher: SamplePublisher::open(&site.host(), TRAIN)?,
+            reader: SnapshotReader::open(&site.host(), TRAIN)?,
             snapshot,
             _site: site,
         })
     }
 
-    fn send_snapshot(&mut self) -> Result<(), RigError> {
+    fn send_snapshot(&mut self) -> Result<(), Failure> {
         self.snapshot.sequence += 1;
         Ok(self.snapshots.send(&self.snapshot)?)
     }
@@ -62,7 +63,7 @@ impl Ends {
 /// # Errors
 ///
 /// When a channel cannot be used.
-pub fn measure(batches: usize) -> Result<Costs, RigError> {
+pub fn measure(batches: usize) -> Result<Costs, Failure> {
     let mut ends = Ends::open()?;
     let mut sample = TrainSample::empty(TRAIN);
     for _ in 0..100 {
@@ -71,22 +72,11 @@ pub fn measure(batches: usize) -> Result<Costs, RigError> {
         ends.reader.poll();
         while ends.samples.receive().is_some() {}
     }
-    let clock_ns = median(
-        (0..batches)
-            .map(|_| {
-                of_batch(|| {
-                    std::hint::black_box(monotonic_now_ns());
-                })
-            })
-            .collect(),
-    );
-    let without_news = (0..batches)
-        .map(|_| {
-            of_batch(|| {
-                std::hint::black_box(ends.reader.poll());
-            })
-        })
-        .collect();
+    let of_batches = |call: &mut dyn FnMut()| {
+        median((0..batches).map(|_| of_batch(&mut *call)).collect()).unwrap_or(f64::NAN)
+    };
+    let clock_ns = of_batches(&mut || _ = std::hint::black_box(monotonic_now_ns()));
+    let poll_without_news_ns = of_batches(&mut || _ = std::hint::black_box(ends.reader.poll()));
     let (mut with_news, mut publish) = (Vec::new(), Vec::new());
     for _ in 0..batches {
         for _ in 0..CALLS {
@@ -103,9 +93,9 @@ pub fn measure(batches: usize) -> Result<Costs, RigError> {
         while ends.samples.receive().is_some() {}
     }
     Ok(Costs {
-        poll_without_news_ns: median(without_news),
-        poll_with_news_ns: (median(with_news) - clock_ns).max(0.0),
-        publish_ns: median(publish),
+        poll_without_news_ns,
+        poll_with_news_ns: median(with_news).map_or(f64::NAN, |ns| (ns - clock_ns).max(0.0)),
+        publish_ns: median(publish).unwrap_or(f64::NAN),
     })
 }
 

@@ -2,17 +2,20 @@
 
 use std::io::ErrorKind;
 use std::os::unix::net::UnixDatagram;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use dynocar_client::channel::{Receiver, Sender, Transport};
 use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+use dynocar_tests::process::Site;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::prelude::ipc;
 
 use super::bytes::{as_bytes, from_bytes};
-use super::plain::{PlainNode, PlainNotifier};
+use super::plain::{self, refused};
 use super::sockets::{CLIENT_SOCKET, SERVER_SOCKET};
-use crate::rig::site::Site;
-use crate::rig::{RigError, system};
+use crate::output::{Failure, during};
 
 /// Sends samples, and counts how far the answers have come.
 pub trait Link {
@@ -21,7 +24,7 @@ pub trait Link {
     /// # Errors
     ///
     /// When the transport fails for good; a message that a full queue refuses is only lost.
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError>;
+    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, Failure>;
 
     /// The sequence number of the newest sample behind the polled pipeline's newest snapshot, 0
     /// when none has come.
@@ -29,7 +32,7 @@ pub trait Link {
     /// # Errors
     ///
     /// When the transport fails for good.
-    fn poll(&mut self) -> Result<u64, RigError>;
+    fn poll(&mut self) -> Result<u64, Failure>;
 
     /// When the newest answered sample left, and when its answer did, in ns of the monotonic clock;
     /// `None` where the peer does not say so.
@@ -43,7 +46,7 @@ pub trait Link {
     /// # Errors
     ///
     /// As [`Link::poll`].
-    fn rest(&mut self) -> Result<(), RigError> {
+    fn rest(&mut self) -> Result<(), Failure> {
         std::hint::spin_loop();
         Ok(())
     }
@@ -54,8 +57,29 @@ pub struct ClientLink {
     publisher: SamplePublisher,
     reader: SnapshotReader,
     pipeline: PipelineKind,
+    answer: Answer,
+}
+
+/// How far the answers have come, and when sample and answer left.
+#[derive(Clone, Copy, Debug, Default)]
+struct Answer {
     newest: u64,
-    stamps: (i64, i64),
+    left_ns: i64,
+    answered_ns: i64,
+}
+
+impl Answer {
+    fn of(snapshot: &ParameterSnapshot) -> Self {
+        Answer {
+            newest: snapshot.sample_sequence,
+            left_ns: snapshot.sample_published_ns,
+            answered_ns: snapshot.published_ns,
+        }
+    }
+
+    fn stamps(&self) -> Option<(i64, i64)> {
+        (self.answered_ns > 0).then_some((self.left_ns, self.answered_ns))
+    }
 }
 
 impl ClientLink {
@@ -64,81 +88,120 @@ impl ClientLink {
     /// # Errors
     ///
     /// When a channel cannot be opened.
-    pub fn open(site: &Site, train: TrainId, pipeline: PipelineKind) -> Result<Self, RigError> {
-        let publisher = SamplePublisher::open(site.host(), train)?;
-        let reader = SnapshotReader::open(site.host(), train)?;
-        Ok(ClientLink { publisher, reader, pipeline, newest: 0, stamps: (0, 0) })
+    pub fn open(site: &Site, train: TrainId, pipeline: PipelineKind) -> Result<Self, Failure> {
+        let publisher = SamplePublisher::open(&site.host(), train)?;
+        let reader = SnapshotReader::open(&site.host(), train)?;
+        Ok(ClientLink { publisher, reader, pipeline, answer: Answer::default() })
     }
 }
 
 impl Link for ClientLink {
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
+    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, Failure> {
         Ok(self.publisher.publish(sample)?)
     }
 
-    fn poll(&mut self) -> Result<u64, RigError> {
+    fn poll(&mut self) -> Result<u64, Failure> {
         if self.reader.poll() > 0
             && let Some(reading) = self.reader.latest(self.pipeline, 0)
         {
-            self.newest = reading.snapshot.sample_sequence;
-            self.stamps = (reading.snapshot.sample_published_ns, reading.snapshot.published_ns);
+            self.answer = Answer::of(reading.snapshot);
         }
-        Ok(self.newest)
+        Ok(self.answer.newest)
     }
 
     fn stamps(&self) -> Option<(i64, i64)> {
-        (self.stamps.1 > 0).then_some(self.stamps)
+        self.answer.stamps()
     }
 
-    fn rest(&mut self) -> Result<(), RigError> {
+    fn rest(&mut self) -> Result<(), Failure> {
         self.poll().map(|_| ())
     }
 }
 
-/// The plain transport with a notification for every sample: the floor of the event strategy.
-pub struct NotifyingLink {
-    sender: Sender<TrainSample>,
-    receiver: Receiver<ParameterSnapshot>,
-    notifier: PlainNotifier,
-    _node: PlainNode,
-    sequence: u64,
-    newest: u64,
+/// A transport that carries samples there and snapshots back, and counts nothing.
+pub trait Wire {
+    /// Sends a sample; one that a full queue refuses is lost.
+    ///
+    /// # Errors
+    ///
+    /// When the transport fails for good.
+    fn send(&mut self, sample: &TrainSample) -> Result<(), Failure>;
+
+    /// Takes one snapshot, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// When the transport fails for good.
+    fn receive(&mut self) -> Result<Option<ParameterSnapshot>, Failure>;
 }
 
-impl NotifyingLink {
+/// A wire whose samples are numbered here.
+pub struct Numbered<W> {
+    wire: W,
+    sequence: u64,
+    answer: Answer,
+}
+
+impl<W: Wire> Numbered<W> {
+    /// Numbers from 1.
+    pub fn new(wire: W) -> Self {
+        Numbered { wire, sequence: 0, answer: Answer::default() }
+    }
+}
+
+impl<W: Wire> Link for Numbered<W> {
+    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, Failure> {
+        self.sequence += 1;
+        (sample.sequence, sample.published_ns) = (self.sequence, monotonic_now_ns());
+        self.wire.send(sample)?;
+        Ok(self.sequence)
+    }
+
+    fn poll(&mut self) -> Result<u64, Failure> {
+        let newer = |it: &ParameterSnapshot| it.sample_sequence >= self.answer.newest;
+        if let Some(snapshot) = self.wire.receive()?.filter(newer) {
+            self.answer = Answer::of(&snapshot);
+        }
+        Ok(self.answer.newest)
+    }
+
+    fn stamps(&self) -> Option<(i64, i64)> {
+        self.answer.stamps()
+    }
+}
+
+/// The plain transport with a notification for every sample: the floor of the event strategy.
+pub struct Notifying {
+    sender: Sender<TrainSample>,
+    receiver: Receiver<ParameterSnapshot>,
+    notifier: Notifier<ipc::Service>,
+}
+
+impl Notifying {
     /// Opens the ports.
     ///
     /// # Errors
     ///
     /// When the transport refuses one.
-    pub fn open(site: &Site, train: TrainId) -> Result<Self, RigError> {
-        let transport = Transport::open(site.host(), "dynocar-bench")?;
-        let node = PlainNode::open(site.path())?;
-        Ok(NotifyingLink {
+    pub fn open(site: &Site, train: TrainId) -> Result<Self, Failure> {
+        let transport = Transport::open(&site.host(), "dynocar-bench")?;
+        let service = plain::service(&site.host(), site.path())?;
+        Ok(Notifying {
             sender: transport.sender(train)?,
             receiver: transport.receiver(train)?,
-            notifier: node.notifier()?,
-            _node: node,
-            sequence: 0,
-            newest: 0,
+            notifier: service.notifier_builder().create().map_err(refused("notifier"))?,
         })
     }
 }
 
-impl Link for NotifyingLink {
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
-        self.sequence += 1;
-        sample.sequence = self.sequence;
+impl Wire for Notifying {
+    fn send(&mut self, sample: &TrainSample) -> Result<(), Failure> {
         self.sender.send(sample)?;
-        self.notifier.notify()?;
-        Ok(self.sequence)
+        self.notifier.notify().map(|_| ()).map_err(refused("notification"))
     }
 
-    fn poll(&mut self) -> Result<u64, RigError> {
-        while let Some(snapshot) = self.receiver.receive() {
-            self.newest = snapshot.sample_sequence;
-        }
-        Ok(self.newest)
+    fn receive(&mut self) -> Result<Option<ParameterSnapshot>, Failure> {
+        Ok(self.receiver.receive())
     }
 }
 
@@ -146,70 +209,46 @@ impl Link for NotifyingLink {
 pub(super) const BLOCK: Duration = Duration::from_millis(1);
 
 /// Unix datagram sockets, as a user would write them.
-pub struct DatagramLink {
+pub struct Datagrams {
     socket: UnixDatagram,
-    server: std::path::PathBuf,
-    sequence: u64,
-    newest: u64,
-    stamps: (i64, i64),
+    server: PathBuf,
 }
 
-impl DatagramLink {
-    /// Binds the controller's socket; `blocks` waits in the kernel for answers instead of
-    /// asking again and again.
+impl Datagrams {
+    /// Binds the controller's socket; `blocks` waits in the kernel for answers.
     ///
     /// # Errors
     ///
-    /// When the system refuses the socket.
-    pub fn open(site: &Site, blocks: bool) -> Result<Self, RigError> {
-        let socket = UnixDatagram::bind(site.path().join(CLIENT_SOCKET)).map_err(system("bind"))?;
-        socket.set_nonblocking(!blocks).map_err(system("socket mode"))?;
-        socket.set_read_timeout(blocks.then_some(BLOCK)).map_err(system("socket timeout"))?;
-        let server = site.path().join(SERVER_SOCKET);
-        Ok(DatagramLink { socket, server, sequence: 0, newest: 0, stamps: (0, 0) })
+    /// When the system refuses it.
+    pub fn open(site: &Site, blocks: bool) -> Result<Self, Failure> {
+        let socket = UnixDatagram::bind(site.path().join(CLIENT_SOCKET)).map_err(during("bind"))?;
+        socket.set_nonblocking(!blocks)?;
+        socket.set_read_timeout(blocks.then_some(BLOCK))?;
+        Ok(Datagrams { socket, server: site.path().join(SERVER_SOCKET) })
     }
 }
 
-impl Link for DatagramLink {
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
-        self.sequence += 1;
-        sample.sequence = self.sequence;
-        sample.published_ns = monotonic_now_ns();
+impl Wire for Datagrams {
+    fn send(&mut self, sample: &TrainSample) -> Result<(), Failure> {
         match self.socket.send_to(as_bytes(sample), &self.server) {
-            Ok(_) => Ok(self.sequence),
+            Err(error) if !is_passing(error.kind()) => Err(during("sending a datagram")(error)),
             // Full, or the server does not listen yet: lost.
-            Err(error) if is_passing(error.kind()) => Ok(self.sequence),
-            Err(error) => Err(system("sending a datagram")(error)),
+            _ => Ok(()),
         }
     }
 
-    fn poll(&mut self) -> Result<u64, RigError> {
+    fn receive(&mut self) -> Result<Option<ParameterSnapshot>, Failure> {
         let mut bytes = [0; size_of::<ParameterSnapshot>()];
         match self.socket.recv(&mut bytes) {
-            Ok(count) => {
-                if let Some(snapshot) = from_bytes::<ParameterSnapshot>(&bytes[..count]) {
-                    self.newest = self.newest.max(snapshot.sample_sequence);
-                    self.stamps = (snapshot.sample_published_ns, snapshot.published_ns);
-                }
-            }
-            Err(error) if is_passing(error.kind()) => {}
-            Err(error) => return Err(system("receiving a datagram")(error)),
+            Ok(count) => Ok(from_bytes(&bytes[..count])),
+            Err(error) if is_passing(error.kind()) => Ok(None),
+            Err(error) => Err(during("receiving a datagram")(error)),
         }
-        Ok(self.newest)
-    }
-
-    fn stamps(&self) -> Option<(i64, i64)> {
-        (self.stamps.1 > 0).then_some(self.stamps)
     }
 }
 
+/// True for what a receiver or sender has to live with.
 fn is_passing(kind: ErrorKind) -> bool {
-    matches!(
-        kind,
-        ErrorKind::WouldBlock
-            | ErrorKind::TimedOut
-            | ErrorKind::NotFound
-            | ErrorKind::ConnectionRefused
-            | ErrorKind::Interrupted
-    )
+    use ErrorKind::{ConnectionRefused, Interrupted, NotFound, TimedOut, WouldBlock};
+    matches!(kind, WouldBlock | TimedOut | NotFound | ConnectionRefused | Interrupted)
 }

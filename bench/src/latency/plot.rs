@@ -9,7 +9,7 @@ use plotters::prelude::*;
 use super::Measured;
 use super::case::{Answerer, COMPARED, Case};
 use super::report::pooled;
-use crate::rig::RigError;
+use crate::output::{Failure, during};
 
 const SIZE: (u32, u32) = (1_000, 640);
 /// Latencies shown, in µs.
@@ -22,14 +22,13 @@ const NINES: f64 = 4.5;
 /// # Errors
 ///
 /// When the file cannot be written.
-pub fn draw(measured: &Measured, file: &Path) -> Result<(), RigError> {
+pub fn draw(measured: &Measured, file: &Path) -> Result<(), Failure> {
     let mut svg = String::new();
-    draw_into(measured, &mut svg)
-        .map_err(|error| RigError::File { path: file.into(), reason: error.to_string() })?;
+    draw_into(measured, &mut svg).map_err(during(file.display()))?;
     Ok(write_file(file, &svg)?)
 }
 
-fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Failure> {
     let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let caption = format!("Sample → snapshot polled at {} Hz", measured.schedule.rate_hz);

@@ -1,7 +1,5 @@
 //! The result for machines and for people.
 
-use std::fmt::Write;
-
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
@@ -9,8 +7,10 @@ use super::Measured;
 use super::case::{Case, Outcome};
 use super::costs::Costs;
 use super::rest::AtRest;
-use crate::rig::quantiles::{Quantiles, for_people, histogram, median};
+use crate::output::{self, Record};
+use crate::rig::quantiles::{self, Quantiles, for_people};
 use crate::rig::usage::ThreadUsage;
+use crate::statistics::median;
 
 /// The result for machines.
 #[derive(Clone, Debug, Serialize)]
@@ -59,12 +59,7 @@ pub struct ReportRow {
 
 /// All latencies of a case.
 pub fn pooled(outcomes: &[Outcome]) -> Histogram<u64> {
-    let mut all = histogram();
-    for outcome in outcomes {
-        // Every histogram has the same bounds.
-        let _ = all.add(&outcome.slice.from_appointed);
-    }
-    all
+    quantiles::pooled(outcomes.iter().map(|it| &it.slice.from_appointed))
 }
 
 impl Report {
@@ -88,20 +83,15 @@ fn line((case, outcomes): &(Case, Vec<Outcome>), all: &[(Case, Vec<Outcome>)]) -
         let of =
             |outcome: &Outcome| outcome.slice.from_appointed.value_at_quantile(quantile) as f64;
         let rounds = floor.into_iter().flat_map(|(_, floors)| outcomes.iter().zip(floors));
-        median(rounds.map(|(ours, floor)| of(ours) / of(floor)).collect())
+        median(rounds.map(|(ours, floor)| of(ours) / of(floor)).collect()).unwrap_or(f64::NAN)
     };
-    let mut from_publish = histogram();
-    let mut stages: [_; 3] = std::array::from_fn(|_| histogram());
+    let stages: [_; 3] = std::array::from_fn(|stage| {
+        quantiles::pooled(outcomes.iter().map(|it| &it.slice.stages[stage]))
+    });
+    let from_publish = quantiles::pooled(outcomes.iter().map(|it| &it.slice.from_publish));
     let mut suffered = None;
-    for outcome in outcomes {
-        for (all, own) in stages.iter_mut().zip(&outcome.slice.stages) {
-            let _ = all.add(own);
-        }
-        // Every histogram has the same bounds.
-        let _ = from_publish.add(&outcome.slice.from_publish);
-        if let Some(usage) = outcome.suffered {
-            *suffered.get_or_insert(ThreadUsage::default()) += usage;
-        }
+    for usage in outcomes.iter().filter_map(|it| it.suffered) {
+        *suffered.get_or_insert(ThreadUsage::default()) += usage;
     }
     ReportRow {
         name: case.name.clone(),
@@ -118,93 +108,58 @@ fn line((case, outcomes): &(Case, Vec<Outcome>), all: &[(Case, Vec<Outcome>)]) -
 
 /// The result for people.
 pub fn table(report: &Report) -> String {
-    let mut text = cases_table(report);
-    add_stages(&mut text, report);
-    add_costs(&mut text, report);
-    if cfg!(not(feature = "zeromq")) {
-        text += "ZeroMQ was not measured: build with --features zeromq and a C++ compiler\n";
-    }
-    text
-}
-
-/// A line for each case.
-fn cases_table(report: &Report) -> String {
-    let mut text = format!(
+    let records: Vec<Record> = report.cases.iter().map(record).collect();
+    let mut lines = vec![format!(
         "Sample → snapshot polled, open loop at {} Hz, {} rounds, controller on core {}, daemon on \
-         core {}\n{:<34} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>9}\n",
+         core {}\n{}",
         report.rate_hz,
         report.rounds,
         report.controller_core,
         report.daemon_core,
-        "case (idle)",
-        "count",
-        "p50",
-        "p99",
-        "p99.9",
-        "p99.99",
-        "max",
-        "p50/floor",
-        "p99/floor"
-    );
-    for line in &report.cases {
-        let it = &line.latency;
-        let [p50, p99, p999, p9999, max] =
-            [it.p50_ns, it.p99_ns, it.p999_ns, it.p9999_ns, it.max_ns]
-                .map(|ns| for_people(ns as f64));
-        // Writing into a String cannot fail.
-        let _ = writeln!(
-            text,
-            "{:<34} {:>8} {p50:>10} {p99:>10} {p999:>10} {p9999:>10} {max:>10} {:>9.2} {:>9.2}",
-            format!("{} ({})", line.name, line.idle),
-            it.count,
-            line.floor_ratio_p50,
-            line.floor_ratio_p99,
-        );
-    }
-    text
-}
-
-/// Where the time goes, where that was measured.
-fn add_stages(text: &mut String, report: &Report) {
-    for line in &report.cases {
-        if let Some(stages) = line.stages_p50_ns {
-            let [leaving, answering, polling] = stages.map(|ns| for_people(ns as f64));
-            let _ = writeln!(
-                text,
-                "{:<34} p50 until the sample leaves {leaving}, until its answer leaves {answering}, \
-                 until that is polled {polling}",
-                format!("{} ({})", line.name, line.idle),
-            );
-        }
-    }
-}
-
-/// What a poll, a publish and a rest cost, and what the threads suffered.
-fn add_costs(text: &mut String, report: &Report) {
+        output::table(&records)
+    )];
     let costs = &report.costs;
-    let _ = writeln!(
-        text,
+    lines.push(format!(
         "One poll without news {:.0} ns, with news {:.0} ns; one publish {:.0} ns",
         costs.poll_without_news_ns, costs.poll_with_news_ns, costs.publish_ns
+    ));
+    let at_rest = report.at_rest.iter();
+    lines.extend(
+        at_rest.map(|it| format!("no samples ({}): {:.2} % of a core", it.idle, it.cpu_percent)),
     );
-    for it in &report.at_rest {
-        let _ = writeln!(text, "no samples ({}): {:.2} % of a core", it.idle, it.cpu_percent);
-    }
-    for line in &report.cases {
-        if let Some(it) = line.suffered {
-            let _ = writeln!(
-                text,
-                "{} ({}): {} page faults, {} waits of its own, {} times preempted",
-                line.name,
-                line.idle,
-                it.minor_faults + it.major_faults,
-                it.voluntary_switches,
-                it.involuntary_switches
-            );
-        }
-    }
     let unanswered: u64 = report.cases.iter().map(|line| line.unanswered).sum();
     if unanswered > 0 {
-        let _ = writeln!(text, "{unanswered} samples were not answered");
+        lines.push(format!("{unanswered} samples were not answered"));
     }
+    if cfg!(not(feature = "zeromq")) {
+        lines.push(
+            "ZeroMQ was not measured: build with --features zeromq and a C++ compiler".into(),
+        );
+    }
+    lines.join("\n") + "\n"
+}
+
+/// A case: its quantiles, where the time went (until the sample left, until its answer left, until that was
+/// polled), and what the daemon's thread suffered.
+fn record(line: &ReportRow) -> Record {
+    let record = Record::default()
+        .with("case (idle)", format!("{} ({})", line.name, line.idle))
+        .with("count", line.latency.count);
+    let record = quantiles::cells(record, &line.latency)
+        .number("p50/floor", line.floor_ratio_p50, 2)
+        .number("p99/floor", line.floor_ratio_p99, 2);
+    let record = (["p50 leaving", "answering", "polling"].into_iter().enumerate()).fold(
+        record,
+        |record, (stage, name)| {
+            let ns = line.stages_p50_ns.map(|stages| for_people(stages[stage] as f64));
+            record.with(name, ns.unwrap_or_default())
+        },
+    );
+    let suffered = |of: fn(&ThreadUsage) -> u64| {
+        line.suffered.as_ref().map_or(String::new(), |it| of(it).to_string())
+    };
+    record
+        .with("page faults", suffered(|it| it.minor_faults + it.major_faults))
+        .with("own waits", suffered(|it| it.voluntary_switches))
+        .with("preempted", suffered(|it| it.involuntary_switches))
 }

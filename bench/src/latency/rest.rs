@@ -5,12 +5,11 @@ use std::time::{Duration, Instant};
 use dynocar::config::IdleStrategy;
 use serde::Serialize;
 
-use crate::rig::RigError;
-use crate::rig::child::Peer;
+use crate::output::Failure;
 use crate::rig::cores::Cores;
 use crate::rig::pipelines;
-use crate::rig::site::{DaemonPlan, Site, ThreadPlan};
-use crate::rig::usage::{self, ProcessUsage};
+use crate::rig::site::{DaemonPlan, ThreadPlan, require, site, stop};
+use crate::rig::usage;
 
 /// How long the daemon may take to start and fall asleep.
 const SETTLE: Duration = Duration::from_millis(500);
@@ -31,8 +30,8 @@ pub struct AtRest {
 /// # Errors
 ///
 /// When it ends before its time.
-pub fn measure(idle: IdleStrategy, cores: Cores, seconds: f64) -> Result<AtRest, RigError> {
-    let site = Site::new()?;
+pub fn measure(idle: IdleStrategy, cores: Cores, seconds: f64) -> Result<AtRest, Failure> {
+    let site = site();
     let thread = ThreadPlan {
         name: "fast",
         core: Some(cores.server),
@@ -40,18 +39,15 @@ pub fn measure(idle: IdleStrategy, cores: Cores, seconds: f64) -> Result<AtRest,
         priority: cores.priority,
         pipelines: pipelines::fast(),
     };
-    let plan = DaemonPlan { trains: 1, threads: vec![thread], lines: String::new() };
-    let config = site.write_config(&plan)?;
-    let mut daemon = Peer::start(&site, &["daemon", &config.to_string_lossy()])?;
+    let plan = DaemonPlan { trains: 1, threads: vec![thread], ..DaemonPlan::default() };
+    let mut daemon = plan.start(&site)?;
     std::thread::sleep(SETTLE);
-    let usage = |daemon: &Peer| -> ProcessUsage {
-        usage::of_process(daemon.process_id()).unwrap_or_default()
-    };
-    let (before, start) = (usage(&daemon), Instant::now());
+    let usage = || usage::of_process(daemon.id()).unwrap_or_default();
+    let (before, start) = (usage(), Instant::now());
     std::thread::sleep(Duration::from_secs_f64(seconds));
-    let (after, elapsed_s) = (usage(&daemon), start.elapsed().as_secs_f64());
-    daemon.require()?;
-    daemon.stop()?;
+    let (after, elapsed_s) = (usage(), start.elapsed().as_secs_f64());
+    require(&mut daemon)?;
+    stop(daemon)?;
     Ok(AtRest {
         idle: idle.to_string(),
         cpu_percent: 100.0 * (after.cpu_s - before.cpu_s) / elapsed_s,

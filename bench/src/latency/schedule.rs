@@ -4,7 +4,7 @@ use dynocar_client::monotonic_now_ns;
 use hdrhistogram::Histogram;
 
 use super::link::Link;
-use crate::rig::RigError;
+use crate::output::Failure;
 use crate::rig::motion::Motion;
 use crate::rig::quantiles::{histogram, record};
 
@@ -76,20 +76,17 @@ struct InFlight {
 ///
 /// When it stays silent.
 pub fn await_ready(
-    link: &mut impl Link,
+    link: &mut dyn Link,
     motion: &mut Motion,
-    mut require: impl FnMut() -> Result<(), RigError>,
-) -> Result<(), RigError> {
+    mut require: impl FnMut() -> Result<(), Failure>,
+) -> Result<(), Failure> {
     let start_ns = monotonic_now_ns();
     let mut next_ns = start_ns;
     let mut sent = 0;
     while link.poll()? == 0 || sent == 0 {
         let now_ns = monotonic_now_ns();
         if now_ns - start_ns > READY_WITHIN_S as i64 * 1_000_000_000 {
-            return Err(RigError::Silent {
-                what: "the peer of a measurement".into(),
-                seconds: READY_WITHIN_S,
-            });
+            return Err(format!("no peer answers within {READY_WITHIN_S} s").into());
         }
         if now_ns >= next_ns {
             require()?;
@@ -108,11 +105,11 @@ pub fn await_ready(
 ///
 /// When the transport fails.
 pub fn drive(
-    link: &mut impl Link,
+    link: &mut dyn Link,
     motion: &mut Motion,
     rate_hz: f64,
     seconds: f64,
-) -> Result<Slice, RigError> {
+) -> Result<Slice, Failure> {
     let period_ns = 1e9 / rate_hz;
     let total = (seconds * rate_hz).max(1.0) as u64;
     let mut slice = Slice::empty();
@@ -148,11 +145,11 @@ impl InFlight {
     /// those before it too, for a snapshot stands on all of them.
     fn await_answer(
         &mut self,
-        link: &mut impl Link,
+        link: &mut dyn Link,
         sequence: u64,
         until_ns: i64,
         slice: &mut Slice,
-    ) -> Result<(), RigError> {
+    ) -> Result<(), Failure> {
         while self.answered < sequence {
             let newest = link.poll()?;
             if newest > self.answered {
@@ -189,7 +186,7 @@ mod tests {
     }
 
     impl Link for HeldUp {
-        fn publish(&mut self, _: &mut TrainSample) -> Result<u64, RigError> {
+        fn publish(&mut self, _: &mut TrainSample) -> Result<u64, Failure> {
             self.sent += 1;
             if self.sent == self.silent_from {
                 self.until_ns = monotonic_now_ns() + 50_000_000;
@@ -197,7 +194,7 @@ mod tests {
             Ok(self.sent)
         }
 
-        fn poll(&mut self) -> Result<u64, RigError> {
+        fn poll(&mut self) -> Result<u64, Failure> {
             let is_silent = monotonic_now_ns() < self.until_ns;
             Ok(if is_silent { self.silent_from - 1 } else { self.sent })
         }
@@ -218,12 +215,12 @@ mod tests {
     fn a_sample_without_an_answer_is_counted_as_such() {
         struct Silent(u64);
         impl Link for Silent {
-            fn publish(&mut self, _: &mut TrainSample) -> Result<u64, RigError> {
+            fn publish(&mut self, _: &mut TrainSample) -> Result<u64, Failure> {
                 self.0 += 1;
                 Ok(self.0)
             }
 
-            fn poll(&mut self) -> Result<u64, RigError> {
+            fn poll(&mut self) -> Result<u64, Failure> {
                 Ok(self.0.min(3))
             }
         }

@@ -1,16 +1,15 @@
 //! The processes that a case is measured against: the hidden command `peer`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
+use clap::{Args, ValueEnum};
 use dynocar::config::DaemonConfig;
 use dynocar_client::channel::{Receiver, Sender, Transport};
 use dynocar_client::{Host, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
-use super::plain::PlainNode;
-use super::sockets;
-use crate::rig::RigError;
+use super::{plain, sockets};
+use crate::output::Failure;
 use crate::rig::cores::{bind, prioritise};
 
 /// The train of every latency case.
@@ -19,45 +18,11 @@ pub const TRAIN: TrainId = TrainId(1);
 /// A process of a measurement; started by the measuring commands, not by people.
 #[derive(Debug, Args)]
 pub struct PeerArguments {
-    #[command(subcommand)]
-    peer: PeerKind,
-}
-
-#[derive(Debug, Subcommand)]
-enum PeerKind {
-    /// The daemon itself, as `dynocar run` starts it
-    Daemon {
-        /// Its configuration
-        config: PathBuf,
-    },
-    /// Copies sample to snapshot on the daemon's channels, looking without pause
-    Echo(ServerSite),
-    /// The same, woken by a listener of the plain transport
-    ListeningEcho(ServerSite),
-    /// The estimator behind a Unix datagram socket
-    UnixDatagram(ServerSite),
-    /// The estimator behind a ZeroMQ socket
-    #[cfg(feature = "zeromq")]
-    ZeroMq(ServerSite),
-}
-
-impl PeerKind {
-    /// The real-time priority asked for; the daemon has it from its configuration.
-    fn priority(&self) -> Option<u8> {
-        match self {
-            PeerKind::Daemon { .. } => None,
-            PeerKind::Echo(place) | PeerKind::ListeningEcho(place) => place.priority,
-            PeerKind::UnixDatagram(place) => place.priority,
-            #[cfg(feature = "zeromq")]
-            PeerKind::ZeroMq(place) => place.priority,
-        }
-    }
-}
-
-#[derive(Debug, Args)]
-struct ServerSite {
-    /// The site's folder
-    folder: PathBuf,
+    /// What it does
+    #[arg(value_enum)]
+    kind: PeerKind,
+    /// The site's folder, or the daemon's configuration
+    place: PathBuf,
     /// The core to bind to
     #[arg(long)]
     core: Option<usize>,
@@ -69,12 +34,18 @@ struct ServerSite {
     blocks: bool,
 }
 
-impl ServerSite {
-    fn pin(&self) {
-        if let Some(core) = self.core {
-            bind(core);
-        }
-    }
+/// What a process of a measurement does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum PeerKind {
+    /// The daemon itself, as `dynocar run` starts it
+    Daemon,
+    /// Copies sample to snapshot on the daemon's channels
+    Echo,
+    /// The estimator behind a Unix datagram socket
+    UnixDatagram,
+    /// The estimator behind a ZeroMQ socket
+    #[cfg(feature = "zeromq")]
+    Zeromq,
 }
 
 /// Serves until killed; the daemon until it is asked to stop.
@@ -82,34 +53,44 @@ impl ServerSite {
 /// # Errors
 ///
 /// When a channel, socket or configuration cannot be used.
-pub fn serve(arguments: &PeerArguments) -> Result<(), RigError> {
-    prioritise(arguments.peer.priority());
-    match &arguments.peer {
-        PeerKind::Daemon { config } => run_daemon(config),
-        PeerKind::Echo(place) => {
-            place.pin();
-            echo(&Host::from_environment()?)
-        }
-        PeerKind::ListeningEcho(place) => {
-            place.pin();
-            echo_when_notified(&Host::from_environment()?, &place.folder)
-        }
-        PeerKind::UnixDatagram(place) => {
-            place.pin();
-            let pipeline = sockets::pipeline(&place.folder, TRAIN)?;
-            sockets::serve_datagrams(&place.folder, pipeline, place.blocks)
-        }
+pub fn serve(arguments: &PeerArguments) -> Result<(), Failure> {
+    let PeerArguments { kind, place, core, priority, blocks } = arguments;
+    prioritise(*priority);
+    let pin = || core.iter().copied().for_each(bind);
+    match kind {
+        PeerKind::Daemon => Ok(dynocar::run::run(&DaemonConfig::load(place)?)?),
         #[cfg(feature = "zeromq")]
-        PeerKind::ZeroMq(place) => {
-            let pipeline = sockets::pipeline(&place.folder, TRAIN)?;
-            super::zeromq::serve(&place.folder, pipeline, place.blocks, || place.pin())
+        PeerKind::Zeromq => {
+            super::zeromq::serve(place, sockets::pipeline(place, TRAIN)?, *blocks, pin)
+        }
+        PeerKind::Echo => {
+            pin();
+            let host = Host::from_environment()?;
+            let mut echo = Echo::open(&host)?;
+            let wait: Box<dyn Fn() -> Result<(), Failure>> = match blocks {
+                // Woken by a listener of the plain transport.
+                true => {
+                    let service = plain::service(&host, place)?;
+                    let listener = service.listener_builder().create();
+                    let listener = listener.map_err(plain::refused("listener"))?;
+                    let wait = move || listener.blocking_wait(|_| {}).map(|_| ());
+                    Box::new(move || wait().map_err(plain::refused("wait")))
+                }
+                false => Box::new(|| {
+                    std::hint::spin_loop();
+                    Ok(())
+                }),
+            };
+            loop {
+                wait()?;
+                while echo.answer()? {}
+            }
+        }
+        PeerKind::UnixDatagram => {
+            pin();
+            sockets::serve_datagrams(place, sockets::pipeline(place, TRAIN)?, *blocks)
         }
     }
-}
-
-fn run_daemon(config: &Path) -> Result<(), RigError> {
-    let config = DaemonConfig::load(config).map_err(|error| RigError::Daemon(error.to_string()))?;
-    dynocar::run::run(&config).map_err(|error| RigError::Daemon(error.to_string()))
 }
 
 /// The echo's ports and the snapshot it sends.
@@ -120,7 +101,7 @@ struct Echo {
 }
 
 impl Echo {
-    fn open(host: &Host) -> Result<Self, RigError> {
+    fn open(host: &Host) -> Result<Self, Failure> {
         let transport = Transport::open(host, "dynocar-bench-echo")?;
         let mut snapshot = ParameterSnapshot::empty();
         snapshot.train_id = TRAIN.0;
@@ -131,7 +112,7 @@ impl Echo {
     }
 
     /// True when there was a sample, and it has been answered.
-    fn answer(&mut self) -> Result<bool, RigError> {
+    fn answer(&mut self) -> Result<bool, Failure> {
         let Some(sample) = self.samples.receive() else { return Ok(false) };
         self.snapshot.sequence += 1;
         self.snapshot.sample_sequence = sample.sequence;
@@ -139,23 +120,5 @@ impl Echo {
         self.snapshot.sample_published_ns = sample.published_ns;
         self.snapshots.send(&self.snapshot)?;
         Ok(true)
-    }
-}
-
-fn echo(host: &Host) -> Result<(), RigError> {
-    let mut echo = Echo::open(host)?;
-    loop {
-        if !echo.answer()? {
-            std::hint::spin_loop();
-        }
-    }
-}
-
-fn echo_when_notified(host: &Host, folder: &Path) -> Result<(), RigError> {
-    let mut echo = Echo::open(host)?;
-    let listener = PlainNode::open(folder)?.listener()?;
-    loop {
-        listener.wait()?;
-        while echo.answer()? {}
     }
 }

@@ -9,10 +9,11 @@ use dynocar::dataset::load_train;
 use dynocar_client::monotonic_now_ns;
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 
 use super::bytes::{as_bytes, from_bytes};
-use crate::rig::{RigError, system};
+use super::case::COMPARED;
+use crate::output::{Failure, during};
 
 /// The controller's socket, in the site's folder.
 pub const CLIENT_SOCKET: &str = "client.socket";
@@ -24,14 +25,10 @@ pub const SERVER_SOCKET: &str = "server.socket";
 /// # Errors
 ///
 /// When the train's file or a setting is wrong.
-pub fn pipeline(folder: &Path, train: TrainId) -> Result<Pipeline, RigError> {
-    let path = folder.join("train.toml");
-    let refused = |reason: String| RigError::File { path: path.clone(), reason };
-    let model = Arc::new(load_train(&path).map_err(|error| refused(error.to_string()))?);
-    let kind = PipelineKind::RegularisedRls;
-    let settings = EstimatorSettings::default_of(kind)
-        .ok_or_else(|| refused(format!("{kind} cannot be built")))?;
-    let estimator = settings.build(&model).map_err(|error| refused(error.to_string()))?;
+pub fn pipeline(folder: &Path, train: TrainId) -> Result<Pipeline, Failure> {
+    let model = Arc::new(load_train(&folder.join("train.toml"))?);
+    let settings = EstimatorSettings::default_of(COMPARED).expect("the kind can be built");
+    let estimator = settings.build(&model)?;
     Ok(Pipeline::new(train, 0, model, None, estimator))
 }
 
@@ -50,13 +47,9 @@ pub(super) fn answer<'a>(
 /// # Errors
 ///
 /// When the system refuses the socket.
-pub fn serve_datagrams(
-    folder: &Path,
-    mut pipeline: Pipeline,
-    blocks: bool,
-) -> Result<(), RigError> {
-    let socket = UnixDatagram::bind(folder.join(SERVER_SOCKET)).map_err(system("bind"))?;
-    socket.set_nonblocking(!blocks).map_err(system("socket mode"))?;
+pub fn serve_datagrams(folder: &Path, mut pipeline: Pipeline, blocks: bool) -> Result<(), Failure> {
+    let socket = UnixDatagram::bind(folder.join(SERVER_SOCKET)).map_err(during("bind"))?;
+    socket.set_nonblocking(!blocks)?;
     let client = folder.join(CLIENT_SOCKET);
     let mut bytes = [0; size_of::<TrainSample>()];
     loop {
@@ -68,7 +61,7 @@ pub fn serve_datagrams(
             }
             Err(error) if error.kind() == ErrorKind::WouldBlock => std::hint::spin_loop(),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) => return Err(system("receiving a datagram")(error)),
+            Err(error) => return Err(during("receiving a datagram")(error)),
         }
     }
 }

@@ -4,31 +4,44 @@ use std::path::Path;
 
 use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{ParameterSnapshot, TrainSample};
+use dynocar_tests::process::Site;
 
 use super::bytes::{as_bytes, from_bytes};
-use super::link::{BLOCK, Link};
+use super::link::{BLOCK, Wire};
 use super::sockets::answer;
-use crate::rig::RigError;
-use crate::rig::site::Site;
+use crate::output::Failure;
 
 fn address(folder: &Path) -> String {
     format!("ipc://{}/zeromq.socket", folder.display())
 }
 
-/// Answers ZeroMQ messages until killed; `pin` is called once the library's own threads run, so
-/// that they are not bound to the same core.
+fn pair() -> Result<zmq::Socket, zmq::Error> {
+    let socket = zmq::Context::new().socket(zmq::PAIR)?;
+    socket.set_linger(0)?;
+    Ok(socket)
+}
+
+/// Sends to whoever reads: what nobody takes is lost.
+fn send(socket: &zmq::Socket, bytes: &[u8]) -> Result<(), Failure> {
+    match socket.send(bytes, zmq::DONTWAIT) {
+        Ok(()) | Err(zmq::Error::EAGAIN) => Ok(()),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// Answers until killed; `blocks` waits in the kernel instead of asking again, `pin` is called once
+/// the library's threads are there.
 ///
 /// # Errors
 ///
-/// When the library refuses.
+/// When the library fails.
 pub fn serve(
     folder: &Path,
     mut pipeline: Pipeline,
     blocks: bool,
     pin: impl FnOnce(),
-) -> Result<(), RigError> {
-    let socket = zmq::Context::new().socket(zmq::PAIR)?;
-    socket.set_linger(0)?;
+) -> Result<(), Failure> {
+    let socket = pair()?;
     socket.bind(&address(folder))?;
     pin();
     let flags = if blocks { 0 } else { zmq::DONTWAIT };
@@ -38,11 +51,7 @@ pub fn serve(
             Ok(count) => {
                 let bytes = &bytes[..count.min(size_of::<TrainSample>())];
                 let Some(sample) = from_bytes::<TrainSample>(bytes) else { continue };
-                match socket.send(as_bytes(answer(&mut pipeline, &sample)), zmq::DONTWAIT) {
-                    // A controller that does not read loses its answer.
-                    Ok(()) | Err(zmq::Error::EAGAIN) => {}
-                    Err(error) => return Err(error.into()),
-                }
+                send(&socket, as_bytes(answer(&mut pipeline, &sample)))?;
             }
             Err(zmq::Error::EAGAIN) => std::hint::spin_loop(),
             Err(zmq::Error::EINTR) => {}
@@ -51,52 +60,37 @@ pub fn serve(
     }
 }
 
-/// ZeroMQ's pair sockets over its `ipc` transport.
-pub struct ZeroMqLink {
+/// The controller's end of a pair socket.
+pub struct ZeroMq {
     socket: zmq::Socket,
     flags: i32,
-    sequence: u64,
-    newest: u64,
 }
 
-impl ZeroMqLink {
-    /// Connects to the server's socket; see [`DatagramLink::open`] for `blocks`.
+impl ZeroMq {
+    /// Connects; `blocks` waits in the kernel for answers.
     ///
     /// # Errors
     ///
-    /// When the library refuses.
-    pub fn open(site: &Site, blocks: bool) -> Result<Self, RigError> {
-        let socket = zmq::Context::new().socket(zmq::PAIR)?;
-        socket.set_linger(0)?;
+    /// When the library fails.
+    pub fn open(site: &Site, blocks: bool) -> Result<Self, Failure> {
+        let socket = pair()?;
         socket.set_rcvtimeo(BLOCK.as_millis() as i32)?;
         socket.connect(&address(site.path()))?;
-        let flags = if blocks { 0 } else { zmq::DONTWAIT };
-        Ok(ZeroMqLink { socket, flags, sequence: 0, newest: 0 })
+        Ok(ZeroMq { socket, flags: if blocks { 0 } else { zmq::DONTWAIT } })
     }
 }
 
-impl Link for ZeroMqLink {
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, RigError> {
-        self.sequence += 1;
-        sample.sequence = self.sequence;
-        match self.socket.send(as_bytes(sample), zmq::DONTWAIT) {
-            Ok(()) | Err(zmq::Error::EAGAIN) => Ok(self.sequence),
-            Err(error) => Err(error.into()),
-        }
+impl Wire for ZeroMq {
+    fn send(&mut self, sample: &TrainSample) -> Result<(), Failure> {
+        send(&self.socket, as_bytes(sample))
     }
 
-    fn poll(&mut self) -> Result<u64, RigError> {
+    fn receive(&mut self) -> Result<Option<ParameterSnapshot>, Failure> {
         let mut bytes = [0; size_of::<ParameterSnapshot>()];
         match self.socket.recv_into(&mut bytes, self.flags) {
-            Ok(count) => {
-                let bytes = &bytes[..count.min(size_of::<ParameterSnapshot>())];
-                if let Some(snapshot) = from_bytes::<ParameterSnapshot>(bytes) {
-                    self.newest = self.newest.max(snapshot.sample_sequence);
-                }
-            }
-            Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => {}
-            Err(error) => return Err(error.into()),
+            Ok(count) => Ok(from_bytes(&bytes[..count.min(size_of::<ParameterSnapshot>())])),
+            Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => Ok(None),
+            Err(error) => Err(error.into()),
         }
-        Ok(self.newest)
     }
 }

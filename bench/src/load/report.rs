@@ -1,14 +1,13 @@
 //! The result for machines and for people.
 
-use std::fmt::Write;
-
 use serde::Serialize;
 
 use super::search::{Found, Size};
 use super::trial::{Trial, TrialPlan};
 use super::waits::Waits;
+use crate::output::{self, Record};
 use crate::rig::host::HostFigures;
-use crate::rig::quantiles::{Quantiles, for_people};
+use crate::rig::quantiles::{self, Quantiles, for_people};
 
 /// The result for machines.
 #[derive(Clone, Debug, Serialize)]
@@ -92,105 +91,69 @@ const MEBIBYTE: f64 = 1024.0 * 1024.0;
 
 /// The result for people.
 pub fn table(report: &Report) -> String {
-    let mut text = pipelines_table(report);
-    add_host(&mut text, report);
-    add_limits(&mut text, report);
-    text
+    let since_appointed = report.pipelines.iter().map(|it| (it, &it.latency, "appointed"));
+    let since_leaving = report.pipelines.iter().map(|it| (it, &it.since_leaving, "leaving"));
+    let record = |(it, latency, since): (&ReportRow, &Quantiles, &str)| {
+        let counts = Record::default()
+            .with("pipeline", &it.name)
+            .with("since", since)
+            .with("offered", it.offered)
+            .with("used", it.used)
+            .with("rejected", it.rejected)
+            .with("lost", it.lost);
+        quantiles::cells(counts, latency)
+    };
+    let records: Vec<Record> = since_appointed.chain(since_leaving).map(record).collect();
+    let Report { trains, rate_hz, seconds, waits, host, .. } = report;
+    let share = |waited_s: f64| 100.0 * waited_s / seconds;
+    let lines = [
+        format!("{trains} trains at {rate_hz} Hz for {seconds} s\n{}", output::table(&records)),
+        format!(
+            "daemon: {:.0} % of a core, {:.1} MiB resident ({:.1} MiB at first); samples left at most \
+             {} late",
+            report.cpu_percent,
+            report.rss_bytes as f64 / MEBIBYTE,
+            report.rss_start_bytes as f64 / MEBIBYTE,
+            for_people(report.publisher_lag_ns as f64)
+        ),
+        format!(
+            "ready but without a processor: publishers {:.2} %, daemon {:.2} % of the time; the machine \
+             beneath says that it took {:.2} %",
+            share(waits.publishers_s),
+            share(waits.daemon_s),
+            share(waits.stolen_s)
+        ),
+        format!(
+            "host: threads that only read the clock were away {:.1} % of the time, {} at most; that \
+             alone makes p99 {} and p99.9 {}",
+            host.away_percent,
+            for_people(host.longest_ns as f64),
+            for_people(host.p99_ns as f64),
+            for_people(host.p999_ns as f64)
+        ),
+    ];
+    lines.join("\n") + "\n" + &limits(report)
 }
 
-/// A line for each pipeline, and one for its answers counted from where the sample left.
-fn pipelines_table(report: &Report) -> String {
-    let mut text = format!(
-        "{} trains at {} Hz for {} s\n{:<22} {:>10} {:>10} {:>9} {:>9} {:>10} {:>10} {:>10} {:>10}\n",
-        report.trains,
-        report.rate_hz,
-        report.seconds,
-        "pipeline",
-        "offered",
-        "used",
-        "rejected",
-        "lost",
-        "p50",
-        "p99",
-        "p99.9",
-        "max"
-    );
-    // Writing into a String cannot fail.
-    for line in &report.pipelines {
-        let it = &line.latency;
-        let [p50, p99, p999, max] =
-            [it.p50_ns, it.p99_ns, it.p999_ns, it.max_ns].map(|ns| for_people(ns as f64));
-        let _ = writeln!(
-            text,
-            "{:<22} {:>10} {:>10} {:>9} {:>9} {p50:>10} {p99:>10} {p999:>10} {max:>10}",
-            line.name, line.offered, line.used, line.rejected, line.lost
-        );
-    }
-    for line in &report.pipelines {
-        let it = &line.since_leaving;
-        let [p50, p99, p999, max] =
-            [it.p50_ns, it.p99_ns, it.p999_ns, it.max_ns].map(|ns| for_people(ns as f64));
-        let name = format!("  {} since leaving", line.name);
-        let _ = writeln!(text, "{name:<64} {p50:>10} {p99:>10} {p999:>10} {max:>10}");
-    }
-    text
-}
-
-/// What daemon and machine had to do for it.
-fn add_host(text: &mut String, report: &Report) {
-    let _ = writeln!(
-        text,
-        "daemon: {:.0} % of a core, {:.1} MiB resident ({:.1} MiB at first); samples left at most \
-         {} late",
-        report.cpu_percent,
-        report.rss_bytes as f64 / MEBIBYTE,
-        report.rss_start_bytes as f64 / MEBIBYTE,
-        for_people(report.publisher_lag_ns as f64)
-    );
-    let waits = &report.waits;
-    let share = |seconds: f64| 100.0 * seconds / report.seconds;
-    let _ = writeln!(
-        text,
-        "ready but without a processor: publishers {:.2} %, daemon {:.2} % of the time; the machine \
-         beneath says that it took {:.2} %",
-        share(waits.publishers_s),
-        share(waits.daemon_s),
-        share(waits.stolen_s)
-    );
-    let host = &report.host;
-    let _ = writeln!(
-        text,
-        "host: threads that only read the clock were away {:.1} % of the time, {} at most; that \
-         alone makes p99 {} and p99.9 {}",
-        host.away_percent,
-        for_people(host.longest_ns as f64),
-        for_people(host.p99_ns as f64),
-        for_people(host.p999_ns as f64)
-    );
-}
-
-/// The highest rate and how the load grows, where that was looked for.
-fn add_limits(text: &mut String, report: &Report) {
+/// The highest rate and the growth, where they were asked for.
+fn limits(report: &Report) -> String {
+    let mut text = String::new();
     if let Some(found) = &report.search {
         let limit = if found.limited_by_publishers { "the publishers'" } else { "the daemon's" };
-        let _ = writeln!(
-            text,
-            "highest rate without loss: {:.0} Hz a train, {:.0} samples/s; the limit is {limit}",
+        text += &format!(
+            "highest rate without loss: {:.0} Hz a train, {:.0} samples/s; the limit is {limit}\n",
             found.rate_hz, found.samples_per_s
         );
     }
-    for size in report.growth.iter().flatten() {
-        let _ = writeln!(
-            text,
-            "{:>3} trains, {:>2} pipelines: {:>6} lost, p50 {:>9}, p99 {:>9}, {:>5.1} % of a core, \
-             {:.1} MiB",
-            size.trains,
-            size.pipelines,
-            size.lost,
-            for_people(size.latency.p50_ns as f64),
-            for_people(size.latency.p99_ns as f64),
-            size.cpu_percent,
-            size.rss_bytes as f64 / MEBIBYTE
-        );
-    }
+    let sizes =
+        report.growth.iter().flatten().map(|size| {
+            let counts = Record::default()
+                .with("trains", size.trains)
+                .with("pipelines", size.pipelines)
+                .with("lost", size.lost);
+            quantiles::cells(counts, &size.latency)
+                .number("% of a core", size.cpu_percent, 1)
+                .number("MiB", size.rss_bytes as f64 / MEBIBYTE, 1)
+        });
+    text + &output::table(&sizes.collect::<Vec<_>>())
 }

@@ -1,11 +1,12 @@
 //! The highest rate without loss, and how things grow with trains and pipelines.
 
+use dynocar::output::report_line;
 use serde::Serialize;
 
 use super::trial::{self, Trial, TrialPlan};
-use crate::rig::RigError;
+use crate::output::Failure;
 use crate::rig::cores::in_thread;
-use crate::rig::quantiles::{Quantiles, histogram};
+use crate::rig::quantiles::{Quantiles, pooled};
 
 /// A publisher that is later than this has itself reached its limit, in ns.
 const PUBLISHER_LAG_NS: i64 = 50_000_000;
@@ -27,28 +28,12 @@ pub struct Found {
     pub limited_by_publishers: bool,
 }
 
-enum Verdict {
-    Clean,
-    Lost,
-    PublishersLate,
-}
-
-fn judge(trial: &Trial) -> Verdict {
-    if trial.missing() > 0 {
-        Verdict::Lost
-    } else if trial.publisher_lag_ns > PUBLISHER_LAG_NS {
-        Verdict::PublishersLate
-    } else {
-        Verdict::Clean
-    }
-}
-
 /// Doubles the rate until something is lost, then halves the interval.
 ///
 /// # Errors
 ///
 /// When a process or channel fails.
-pub fn highest_rate(plan: &TrialPlan) -> Result<Found, RigError> {
+pub fn highest_rate(plan: &TrialPlan) -> Result<Found, Failure> {
     let mut found = Found {
         rate_hz: 0.0,
         samples_per_s: 0.0,
@@ -60,21 +45,19 @@ pub fn highest_rate(plan: &TrialPlan) -> Result<Found, RigError> {
     while steps > 0 && rate_hz < RATE_MAX_HZ {
         let mut plan = plan.clone();
         plan.traffic.rate_hz = rate_hz;
-        let verdict = judge(&in_thread(|| trial::run(&plan))?);
-        dynocar::output::report_line(&format!(
-            "{rate_hz:.0} Hz: {}",
-            match verdict {
-                Verdict::Clean => "nothing lost",
-                Verdict::Lost => "samples lost",
-                Verdict::PublishersLate => "the publishers fall behind",
-            }
-        ));
-        match verdict {
-            Verdict::Clean => found.rate_hz = rate_hz,
-            failure => {
-                found.failed_at_hz = Some(rate_hz);
-                found.limited_by_publishers = matches!(failure, Verdict::PublishersLate);
-            }
+        let trial = in_thread(|| trial::run(&plan))?;
+        let is_late = trial.publisher_lag_ns > PUBLISHER_LAG_NS;
+        let verdict = match (trial.missing() > 0, is_late) {
+            (true, _) => "samples lost",
+            (false, true) => "the publishers fall behind",
+            (false, false) => "nothing lost",
+        };
+        report_line(&format!("{rate_hz:.0} Hz: {verdict}"));
+        if trial.missing() > 0 || is_late {
+            found.failed_at_hz = Some(rate_hz);
+            found.limited_by_publishers = trial.missing() == 0;
+        } else {
+            found.rate_hz = rate_hz;
         }
         rate_hz = match found.failed_at_hz {
             None => rate_hz * 2.0,
@@ -111,7 +94,7 @@ pub struct Size {
 /// # Errors
 ///
 /// When a process or channel fails.
-pub fn growth(plan: &TrialPlan) -> Result<Vec<Size>, RigError> {
+pub fn growth(plan: &TrialPlan) -> Result<Vec<Size>, Failure> {
     let mut counts = vec![1];
     while counts[counts.len() - 1] * 4 < plan.trains {
         counts.push(counts[counts.len() - 1] * 4);
@@ -128,7 +111,7 @@ pub fn growth(plan: &TrialPlan) -> Result<Vec<Size>, RigError> {
             let mut plan = plan.clone();
             plan.trains = trains;
             plan.pipelines.truncate(width);
-            dynocar::output::report_line(&format!("{trains} trains, {width} pipelines"));
+            report_line(&format!("{trains} trains, {width} pipelines"));
             sizes.push(size(&plan, &in_thread(|| trial::run(&plan))?));
         }
     }
@@ -136,16 +119,11 @@ pub fn growth(plan: &TrialPlan) -> Result<Vec<Size>, RigError> {
 }
 
 fn size(plan: &TrialPlan, trial: &Trial) -> Size {
-    let mut latency = histogram();
-    for pipeline in &trial.pipelines {
-        // Every histogram has the same bounds.
-        let _ = latency.add(&pipeline.latency);
-    }
     Size {
         trains: plan.trains,
         pipelines: plan.pipelines.len(),
         lost: trial.missing(),
-        latency: Quantiles::of(&latency),
+        latency: Quantiles::of(&pooled(trial.pipelines.iter().map(|it| &it.latency))),
         cpu_percent: trial.cpu_percent,
         rss_bytes: trial.rss_bytes,
     }

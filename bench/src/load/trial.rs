@@ -4,16 +4,16 @@ use dynocar::config::IdleStrategy;
 use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
+use dynocar_tests::process::Site;
 use hdrhistogram::Histogram;
 
 use super::traffic::{Traffic, TrafficPlan};
 use super::waits::Waits;
-use crate::rig::RigError;
-use crate::rig::child::Peer;
+use crate::output::Failure;
 use crate::rig::cores::{Cores, bind, prioritise};
 use crate::rig::pipelines;
 use crate::rig::quantiles::{histogram, record};
-use crate::rig::site::{DaemonPlan, Site, ThreadPlan};
+use crate::rig::site::{DaemonPlan, ThreadPlan, await_all, require, site, stop};
 use crate::rig::usage::{self, ProcessUsage};
 
 /// What is put on the daemon.
@@ -88,7 +88,6 @@ impl Trial {
 
 /// Appointed times that are remembered for each train.
 const IN_FLIGHT: usize = 1 << 13;
-const READY_WITHIN_NS: i64 = 30_000_000_000;
 /// How long after the last sample slow pipelines may go on without anything new.
 const SETTLED_AFTER_NS: i64 = 1_000_000_000;
 
@@ -111,16 +110,18 @@ const FAST: &str = "fast";
 /// # Errors
 ///
 /// When a process or channel fails.
-pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
-    let site = Site::new()?;
-    let config = site.write_config(&daemon_plan(plan))?;
-    let mut daemon = Peer::start(&site, &["daemon", &config.to_string_lossy()])?;
+pub fn run(plan: &TrialPlan) -> Result<Trial, Failure> {
+    let site = site();
+    let mut daemon = daemon_plan(plan).start(&site)?;
     let mut trains = (1..=plan.trains)
         .map(|id| open_train(&site, TrainId(id), plan))
         .collect::<Result<Vec<_>, _>>()?;
     bind(plan.cores.controller);
     prioritise(plan.cores.priority);
-    await_daemon(&mut trains, &mut daemon, plan.pipelines.len())?;
+    // Every pipeline sends a first, empty snapshot for every train.
+    for train in &mut trains {
+        await_all(&mut train.reader, &mut daemon, plan.pipelines.len(), |_| true)?;
+    }
     let mut outcomes: Vec<PipelineOutcome> = plan.pipelines.iter().copied().map(fresh).collect();
     let start_ns = monotonic_now_ns() + 600_000_000;
     for (index, train) in trains.iter_mut().enumerate() {
@@ -128,7 +129,7 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
         let id = TrainId(index as u64 + 1);
         train.traffic = Traffic::new(plan.traffic, id, spread, start_ns, plan.seed);
     }
-    let waits_before = Waits::so_far(daemon.process_id(), FAST, plan.cores);
+    let waits_before = Waits::so_far(daemon.id(), FAST, plan.cores);
     let (mut lag_ns, mut early) = (0, ProcessUsage::default());
     let end_ns = start_ns + (plan.seconds * 1e9) as i64;
     let early_ns = start_ns + (plan.seconds * 1e8) as i64;
@@ -140,9 +141,9 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
             break;
         }
         if early_at_ns == 0 && now_ns >= early_ns {
-            early = usage::of_process(daemon.process_id()).unwrap_or_default();
+            early = usage::of_process(daemon.id()).unwrap_or_default();
             early_at_ns = now_ns;
-            daemon.require()?;
+            require(&mut daemon)?;
         }
         for train in &mut trains {
             lag_ns = lag_ns.max(train.publish_due(now_ns)?);
@@ -150,15 +151,15 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, RigError> {
         turn = (turn + 1) % trains.len();
         trains[turn].poll(&mut outcomes);
     }
-    let late = usage::of_process(daemon.process_id()).unwrap_or_default();
-    let waits = Waits::so_far(daemon.process_id(), FAST, plan.cores).since(waits_before);
+    let late = usage::of_process(daemon.id()).unwrap_or_default();
+    let waits = Waits::so_far(daemon.id(), FAST, plan.cores).since(waits_before);
     let wall_s = (monotonic_now_ns() - early_at_ns) as f64 * 1e-9;
     settle(&mut trains, &mut outcomes);
     for train in &trains {
         train.account(&mut outcomes);
     }
     drop(trains);
-    daemon.stop()?;
+    stop(daemon)?;
     Ok(Trial {
         pipelines: outcomes,
         cpu_percent: 100.0 * (late.cpu_s - early.cpu_s) / wall_s,
@@ -186,7 +187,7 @@ fn daemon_plan(plan: &TrialPlan) -> DaemonPlan {
         thread("slow", None, None, slow),
     ];
     let threads = threads.into_iter().filter(|thread| !thread.pipelines.is_empty()).collect();
-    DaemonPlan { trains: plan.trains, threads, lines: String::new() }
+    DaemonPlan { trains: plan.trains, threads, ..DaemonPlan::default() }
 }
 
 fn fresh(kind: PipelineKind) -> PipelineOutcome {
@@ -194,32 +195,15 @@ fn fresh(kind: PipelineKind) -> PipelineOutcome {
     PipelineOutcome { kind, offered: 0, used: 0, rejected: 0, lost: 0, latency, since_leaving }
 }
 
-fn open_train(site: &Site, id: TrainId, plan: &TrialPlan) -> Result<Train, RigError> {
+fn open_train(site: &Site, id: TrainId, plan: &TrialPlan) -> Result<Train, Failure> {
     Ok(Train {
-        publisher: SamplePublisher::open(site.host(), id)?,
-        reader: SnapshotReader::open(site.host(), id)?,
+        publisher: SamplePublisher::open(&site.host(), id)?,
+        reader: SnapshotReader::open(&site.host(), id)?,
         traffic: Traffic::new(plan.traffic, id, 0.0, monotonic_now_ns(), plan.seed),
         appointed: vec![0; IN_FLIGHT].into(),
         left: vec![0; IN_FLIGHT].into(),
         seen: [0; PIPELINES_MAX],
     })
-}
-
-/// Waits until every pipeline has sent its first, empty snapshot for every train.
-fn await_daemon(trains: &mut [Train], daemon: &mut Peer, pipelines: usize) -> Result<(), RigError> {
-    let start_ns = monotonic_now_ns();
-    for train in trains {
-        while train.reader.readings(0).count() < pipelines {
-            train.reader.poll();
-            daemon.require()?;
-            if monotonic_now_ns() - start_ns > READY_WITHIN_NS {
-                let seconds = READY_WITHIN_NS as u64 / 1_000_000_000;
-                return Err(RigError::Silent { what: "the daemon".into(), seconds });
-            }
-            std::thread::yield_now();
-        }
-    }
-    Ok(())
 }
 
 /// Polls until every pipeline has come to its train's last sample, or nothing new comes.
@@ -242,7 +226,7 @@ fn settle(trains: &mut [Train], outcomes: &mut [PipelineOutcome]) {
 
 impl Train {
     /// Publishes what is due; gives how late the latest was, in ns.
-    fn publish_due(&mut self, now_ns: i64) -> Result<i64, RigError> {
+    fn publish_due(&mut self, now_ns: i64) -> Result<i64, Failure> {
         let mut lag_ns = 0;
         while self.traffic.next_ns() <= now_ns {
             let (mut sample, appointed_ns) = self.traffic.take();

@@ -1,70 +1,57 @@
 //! `dynocar-bench monitor`.
 
-use std::path::PathBuf;
-
 use clap::Args;
+use dynocar::output::report_line;
+use dynocar_tests::simulator::{SimulatorSettings, simulate};
 
 use super::matrix;
+use super::watch::{Watched, watch};
+use crate::explain::case::Case;
+use crate::explain::family::FamilyArguments;
 use crate::explain::scenario::Scenario;
-use crate::explain::world::World;
-use crate::output::give;
+use crate::output::{Failure, give};
 
 /// The live monitor on every kind of undeclared effect, and on nulls: seconds of motion from onset
 /// to the right suspect, hours with a wrong one, false suspicions in 100 hours.
 #[derive(Debug, Args)]
 pub struct MonitorArguments {
-    /// Simulated datasets for each kind
-    #[arg(long, default_value_t = 20)]
-    seeds: usize,
-    /// The first seed
-    #[arg(long, default_value_t = 1)]
-    first_seed: u64,
-    /// What is a little wrong besides the effect
-    #[arg(long, value_enum, default_value_t = World::Plain)]
-    world: World,
+    #[command(flatten)]
+    family: FamilyArguments,
     /// Runs of a quarter of an hour in each dataset
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(2..))]
     runs: u16,
-    /// Only this kind, as tunnel_drag, or none, none_poor_recording; may be repeated
-    #[arg(long = "kind", value_name = "NAME")]
-    kinds: Vec<String>,
-    /// Datasets at a time
-    #[arg(long, default_value_t = 2)]
-    threads: usize,
-    /// Print every suspicion of every dataset on standard error
-    #[arg(long)]
-    verbose: bool,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
 }
 
-/// Runs the command; an error has its text and the exit status.
-pub fn monitor(arguments: &MonitorArguments) -> Result<(), (String, u8)> {
-    let scenarios = Scenario::named(&arguments.kinds)?.unwrap_or_else(Scenario::all);
-    let matrix = matrix::run(
-        &matrix::Plan {
-            scenarios: &scenarios,
-            seeds: arguments.seeds,
-            first_seed: arguments.first_seed,
-            world: arguments.world,
-            runs: usize::from(arguments.runs),
-            threads: arguments.threads,
-        },
-        &|case, watched| {
-            if arguments.verbose {
-                let raised = watched.raised.iter().map(|(kind, s)| format!("{kind} at {s:.0} s"));
-                let raised: Vec<String> = raised.collect();
-                dynocar::output::report_line(&format!(
-                    "{} seed {}: {} (wrong {:.0} s of {:.0})",
-                    case.scenario.name(),
-                    case.seed,
-                    if raised.is_empty() { "silent".into() } else { raised.join(", ") },
-                    watched.wrong_s,
-                    watched.driven_s
-                ));
+impl MonitorArguments {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such kind, or the result cannot be written.
+    pub fn run(&self) -> Result<(), Failure> {
+        let (family, runs) = (&self.family, usize::from(self.runs));
+        let watched = family.over(&family.scenarios(Scenario::all())?, |case| {
+            let watched = watch(&simulate(&SimulatorSettings { runs, ..case.settings() }));
+            if family.verbose {
+                print_case(case, &watched);
             }
-        },
-    );
-    give(&arguments.json, &matrix, || matrix::table(&matrix))
+            watched
+        });
+        let matrix = matrix::Matrix::of(&watched);
+        give(&family.json, &matrix, || matrix::table(&matrix))
+    }
+}
+
+/// One dataset's suspicions on standard error.
+fn print_case(case: &Case, watched: &Watched) {
+    let raised = watched.raised.iter().map(|(kind, s)| format!("{kind} at {s:.0} s"));
+    let raised: Vec<String> = raised.collect();
+    report_line(&format!(
+        "{} seed {}: {} (wrong {:.0} s of {:.0})",
+        case.scenario.name(),
+        case.seed,
+        if raised.is_empty() { "silent".into() } else { raised.join(", ") },
+        watched.wrong_s,
+        watched.driven_s
+    ));
 }

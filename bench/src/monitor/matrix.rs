@@ -2,32 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_tests::simulator::{SimulatorSettings, simulate};
 use serde::Serialize;
 
-use super::watch::{Watched, watch};
-use crate::explain::case::Case;
-use crate::explain::matrix::{cases, median};
+use super::watch::Watched;
 use crate::explain::scenario::Scenario;
-use crate::explain::world::World;
-use crate::parallel::over;
-
-/// What is run.
-#[derive(Clone, Copy, Debug)]
-pub struct Plan<'a> {
-    /// The families.
-    pub scenarios: &'a [Scenario],
-    /// Datasets of each.
-    pub seeds: usize,
-    /// The first seed.
-    pub first_seed: u64,
-    /// What is a little wrong besides the effect.
-    pub world: World,
-    /// Runs of each dataset.
-    pub runs: usize,
-    /// Datasets at a time.
-    pub threads: usize,
-}
+use crate::output::{self, Record};
+use crate::statistics::median;
 
 /// What came out for one kind; times are of motion.
 #[derive(Clone, Debug, Serialize)]
@@ -73,27 +53,16 @@ pub struct Matrix {
     pub per_100_h: f64,
 }
 
-/// Runs the matrix. Every finished case is reported to `report`.
-pub fn run(plan: &Plan<'_>, report: &(dyn Fn(&Case, &Watched) + Sync)) -> Matrix {
-    let cases = cases(plan.scenarios, plan.seeds, plan.first_seed, plan.world);
-    let watched = over(&cases, plan.threads, |case| {
-        let watched = watch(&simulate(&SimulatorSettings { runs: plan.runs, ..case.settings() }));
-        report(case, &watched);
-        watched
-    });
-    let rows = plan.scenarios.iter().zip(watched.chunks(plan.seeds.max(1)));
-    let kinds: Vec<KindRow> = rows.map(|(scenario, watched)| row(*scenario, watched)).collect();
-    let nulls = || {
-        let all = kinds.iter().zip(plan.scenarios);
-        all.filter(|(_, scenario)| scenario.is_null()).map(|(row, _)| row)
-    };
-    let null_hours: f64 = nulls().map(|row| row.hours).sum();
-    let null_suspicions: usize = nulls().map(|row| row.false_suspicions).sum();
-    Matrix {
-        null_hours,
-        null_suspicions,
-        per_100_h: 100.0 * null_suspicions as f64 / null_hours.max(f64::MIN_POSITIVE),
-        kinds,
+impl Matrix {
+    /// Of what came of every scenario.
+    pub fn of(watched: &[(Scenario, Vec<Watched>)]) -> Self {
+        let kinds: Vec<KindRow> =
+            watched.iter().map(|(scenario, own)| row(*scenario, own)).collect();
+        let nulls = || kinds.iter().zip(watched).filter(|(_, (scenario, _))| scenario.is_null());
+        let null_hours: f64 = nulls().map(|(row, _)| row.hours).sum();
+        let null_suspicions: usize = nulls().map(|(row, _)| row.false_suspicions).sum();
+        let per_100_h = 100.0 * null_suspicions as f64 / null_hours.max(f64::MIN_POSITIVE);
+        Matrix { null_hours, null_suspicions, per_100_h, kinds }
     }
 }
 
@@ -134,32 +103,26 @@ fn row(scenario: Scenario, all: &[Watched]) -> KindRow {
 
 /// The matrix as a table for people.
 pub fn table(matrix: &Matrix) -> String {
-    let mut text = String::from(
-        "kind                  right  alone  wrong  missed  after s  90 % s   hours  wrong h  stale h  others that led\n",
-    );
-    let shown = |value: Option<f64>| value.map_or("      -".into(), |value| format!("{value:7.0}"));
-    for row in &matrix.kinds {
-        let confused: Vec<String> =
-            row.confused_with.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
-        text += &format!(
-            "{:20} {:3}/{:<3} {:5} {:6} {:7}  {} {} {:7.1} {:8.2} {:8.2}  {}\n",
-            row.kind,
-            row.right,
-            row.datasets,
-            row.alone,
-            row.wrong,
-            row.missed,
-            shown(row.named_after_s),
-            shown(row.named_after_90_s),
-            row.hours,
-            row.wrong_hours,
-            row.stale_hours,
-            confused.join(", ")
-        );
-    }
-    text += &format!(
-        "nothing undeclared: {} suspicions in {:.0} h of motion, {:.2} in 100 h\n",
-        matrix.null_suspicions, matrix.null_hours, matrix.per_100_h
-    );
-    text
+    let record = |row: &KindRow| {
+        let confused = row.confused_with.iter().map(|(kind, count)| format!("{kind} {count}"));
+        Record::default()
+            .with("kind", &row.kind)
+            .with("right", format!("{}/{}", row.right, row.datasets))
+            .with("alone", row.alone)
+            .with("wrong", row.wrong)
+            .with("missed", row.missed)
+            .number("after s", row.named_after_s, 0)
+            .number("90 % s", row.named_after_90_s, 0)
+            .number("hours", row.hours, 1)
+            .number("wrong h", row.wrong_hours, 2)
+            .number("stale h", row.stale_hours, 2)
+            .with("others that led", confused.collect::<Vec<_>>().join(", "))
+    };
+    let rows: Vec<Record> = matrix.kinds.iter().map(record).collect();
+    let Matrix { null_hours, null_suspicions, per_100_h, .. } = matrix;
+    output::table(&rows)
+        + &format!(
+            "nothing undeclared: {null_suspicions} suspicions in {null_hours:.0} h of motion, \
+             {per_100_h:.2} in 100 h\n"
+        )
 }

@@ -9,24 +9,20 @@
 use nalgebra::{Matrix4, RowVector4, Vector4};
 
 use super::braking::{
-    Braking, Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, Sought, declared,
-    disc_friction, train,
+    Braking, Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, ShareStep,
+    declared, disc_friction, train,
 };
+use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::RailCondition;
+
+use crate::statistics::root_mean_square;
 
 /// What is known of the coefficient beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Knowledge {
-    /// The share of the declared brake force drifts.
-    Drift {
-        /// Standard deviation of the drift in 1/s.
-        std_per_s: f64,
-        /// Time in s after which it is forgotten.
-        time_s: f64,
-    },
-    /// The share walks at random, gaining this standard deviation in 1 s.
-    Walk(f64),
+    /// How the share of the declared brake force moves.
+    Share(ShareStep),
     /// The curve over speed is known but for a constant scale, of this standard deviation
     /// beforehand.
     Law(f64),
@@ -79,11 +75,11 @@ pub fn bound(braking: &Braking, knowledge: Knowledge, lag_steps: usize) -> Vec<B
 fn shape(braking: &Braking, knowledge: Knowledge, speed_mps: f64) -> (f64, f64) {
     let declared = declared(braking.sought);
     match (knowledge, braking.sought) {
-        (Knowledge::Law(_), Sought::Adhesion) => (
+        (Knowledge::Law(_), BrakingCoefficient::Adhesion) => (
             RailCondition::Wet.adhesion(speed_mps) / declared,
             RailCondition::Wet.adhesion_slope_s_per_m(speed_mps) / declared,
         ),
-        (Knowledge::Law(_), Sought::Friction) => {
+        (Knowledge::Law(_), BrakingCoefficient::Friction) => {
             let difference = disc_friction(speed_mps + 1e-4) - disc_friction(speed_mps - 1e-4);
             (disc_friction(speed_mps) / declared, difference / 2e-4 / declared)
         }
@@ -98,15 +94,22 @@ fn coefficient_row(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> 
 }
 
 fn forward(braking: &Braking, knowledge: Knowledge, moments: &[Moment]) -> Vec<Step> {
-    let (scale_std, drift_std) = match knowledge {
-        Knowledge::Drift { std_per_s, .. } => (1.0, std_per_s),
-        Knowledge::Walk(_) => (1.0, 0.0),
-        Knowledge::Law(scale_std) => (scale_std, 0.0),
+    let (scale_std, share) = match knowledge {
+        Knowledge::Share(share) => (1.0, share),
+        Knowledge::Law(scale_std) => (scale_std, ShareStep::default()),
     };
     let first_speed_std = SPEED_NOISE_MPS / 3.0_f64.sqrt();
-    let prior = Vector4::new(POSITION_STD_M, first_speed_std, scale_std, drift_std);
+    let prior = Vector4::new(POSITION_STD_M, first_speed_std, scale_std, share.drift_std_per_s);
     let mut covariance = Matrix4::from_diagonal(&prior.component_mul(&prior));
-    let added = added_noise(knowledge);
+    // A uniform step of half width w has variance w² / 3.
+    let third = 3.0_f64.sqrt();
+    let added_std = Vector4::new(
+        POSITION_NOISE_M / third,
+        SPEED_NOISE_MPS / third,
+        share.share_std,
+        share.gained_std_per_s,
+    );
+    let added = Matrix4::from_diagonal(&added_std.component_mul(&added_std));
     let mut steps = Vec::with_capacity(moments.len());
     for k in 0..moments.len() {
         let jacobian = match k {
@@ -138,7 +141,7 @@ fn regular(mut covariance: Matrix4<f64>) -> Matrix4<f64> {
 fn transition(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> Matrix4<f64> {
     let davis = train().resistance;
     let gravity_mps2 = 1000.0 * TrainModel::weight_kn(1.0);
-    let full_mps2 = declared(Sought::Adhesion) * gravity_mps2;
+    let full_mps2 = declared(BrakingCoefficient::Adhesion) * gravity_mps2;
     let (value, slope) = shape(braking, knowledge, moment.speed_mps);
     let resistance_slope = 1e-3 * gravity_mps2 * (davis.b + 2.0 * davis.c * moment.speed_mps);
     let mut jacobian = Matrix4::identity();
@@ -146,35 +149,16 @@ fn transition(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> Matri
     jacobian[(1, SCALE)] = -STEP_S * full_mps2 * value;
     jacobian[(0, 1)] = 0.5 * STEP_S * (1.0 + jacobian[(1, 1)]);
     jacobian[(0, SCALE)] = 0.5 * STEP_S * jacobian[(1, SCALE)];
-    if let Knowledge::Drift { time_s, .. } = knowledge {
+    if let Knowledge::Share(share) = knowledge {
         jacobian[(SCALE, DRIFT)] = STEP_S;
-        jacobian[(DRIFT, DRIFT)] = (-STEP_S / time_s).exp();
+        jacobian[(DRIFT, DRIFT)] = share.kept;
     }
     jacobian
 }
 
-fn added_noise(knowledge: Knowledge) -> Matrix4<f64> {
-    let (scale, drift) = match knowledge {
-        Knowledge::Drift { std_per_s, time_s } => {
-            (0.0, std_per_s * std_per_s * -(-2.0 * STEP_S / time_s).exp_m1())
-        }
-        Knowledge::Walk(std_after_1_s) => (std_after_1_s * std_after_1_s * STEP_S, 0.0),
-        Knowledge::Law(_) => (0.0, 0.0),
-    };
-    // A uniform step of half width w has variance w² / 3.
-    let third = |half_width: f64| half_width * half_width / 3.0;
-    Matrix4::from_diagonal(&Vector4::new(
-        third(POSITION_NOISE_M),
-        third(SPEED_NOISE_MPS),
-        scale,
-        drift,
-    ))
-}
-
 /// Root of the mean variance.
-pub fn root_mean_square(bounds: &[BoundAt]) -> f64 {
-    let sum: f64 = bounds.iter().map(|bound| bound.std * bound.std).sum();
-    (sum / bounds.len() as f64).sqrt()
+pub fn deviation(bounds: &[BoundAt]) -> f64 {
+    root_mean_square(&bounds.iter().map(|bound| bound.std).collect::<Vec<_>>())
 }
 
 /// Mean of |error| / truth in % of a Gaussian error at the bound.
@@ -188,22 +172,22 @@ mod tests {
     use super::*;
     use crate::papers::braking::{JIN_TABLE_3, XIE_TABLE_2};
     use crate::papers::braking_run::run;
-    use crate::papers::braking_score::{LAG_S, LAG_STEPS, smoother, smoother_knowledge};
+    use crate::papers::braking_score::{LAG_S, LAG_STEPS, presumed, smoother};
 
     #[test]
     fn later_measurements_and_a_known_law_lower_the_bound() {
         for braking in [XIE_TABLE_2, JIN_TABLE_3] {
-            let knowledge = smoother_knowledge(braking.sought);
-            let at = |lag_steps| root_mean_square(&bound(&braking, knowledge, lag_steps));
+            let knowledge = Knowledge::Share(presumed(braking.sought));
+            let at = |lag_steps| deviation(&bound(&braking, knowledge, lag_steps));
             assert!(at(25) < at(10) && at(10) < at(0));
-            let known = root_mean_square(&bound(&braking, Knowledge::Law(0.25), 0));
+            let known = deviation(&bound(&braking, Knowledge::Law(0.25), 0));
             assert!(known < at(25), "{known}");
         }
     }
 
     #[test]
     fn the_bound_of_a_law_falls_with_what_is_known_of_its_scale() {
-        let at = |std| root_mean_square(&bound(&XIE_TABLE_2, Knowledge::Law(std), 0));
+        let at = |std| deviation(&bound(&XIE_TABLE_2, Knowledge::Law(std), 0));
         assert!(at(0.01) < at(0.1) && at(0.1) < at(1.0));
     }
 
@@ -211,7 +195,7 @@ mod tests {
     fn the_filter_claims_what_the_independent_recursion_allows() {
         for braking in [XIE_TABLE_2, JIN_TABLE_3] {
             let moments = braking.nominal();
-            let knowledge = smoother_knowledge(braking.sought);
+            let knowledge = Knowledge::Share(presumed(braking.sought));
             for (lag_s, lag_steps) in [(0.0, 0), (LAG_S, LAG_STEPS)] {
                 let [scored] = run(&smoother(braking.sought, lag_s), &moments, [lag_steps]);
                 let bounds = bound(&braking, knowledge, lag_steps);

@@ -2,16 +2,17 @@
 
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::{
-    BrakeFactor, BrakingSettings, EkfSettings, LawSettings, SmootherSettings, WalkSettings,
+    BrakeFactor, BrakingSettings, EkfSettings, LawSettings, SmootherSettings,
 };
 use dynocar_estimators::EstimatorSettings;
-use dynocar_estimators::xie::{EStep, EmSettings};
+use dynocar_estimators::xie::EmSettings;
 
-use super::bound::Knowledge;
-use super::braking::{Braking, DrawnShare, SPEED_NOISE_MPS, Sought, WINDOW, disc_friction};
+use super::braking::{Braking, SPEED_NOISE_MPS, ShareStep, WINDOW, disc_friction};
 use super::braking_run::{Scored, run};
+use super::row::Row;
 use super::seeds::Seeds;
-use super::statistics::mean;
+use crate::parallel;
+use crate::statistics::mean;
 
 /// Lag in s of our smoother.
 pub const LAG_S: f64 = 5.0;
@@ -23,19 +24,7 @@ pub const MIDDLE_STEPS: usize = WINDOW - 1 - WINDOW / 2;
 /// Runs `work` for every seed, on as many threads as the machine has.
 pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, |count| count.get());
-    let share = seeds.count.div_ceil(threads).max(1);
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = seeds
-            .range()
-            .step_by(share)
-            .map(|from| {
-                let work = &work;
-                let until = (from + share as u64).min(seeds.range().end);
-                scope.spawn(move || (from..until).map(work).collect::<Vec<_>>())
-            })
-            .collect();
-        workers.into_iter().flat_map(|worker| worker.join().expect("a worker")).collect()
-    })
+    parallel::over(&seeds.range().collect::<Vec<_>>(), threads, |&seed| work(seed))
 }
 
 /// Errors of one estimator over all runs.
@@ -74,6 +63,12 @@ impl Score {
         let both = drawn.nees_run_variance * drawn.errors_per_run / self.errors_per_run;
         let curve = (both - self.nees_run_variance).max(0.0);
         2.0 / (curve + self.nees_run_variance / self.runs as f64)
+    }
+
+    /// A row with coverage and consistency, of so many degrees of freedom.
+    pub fn row(&self, freedom: f64, row: Row) -> Row {
+        let (coverage, nees) = (Some(self.coverage), Some(self.nees));
+        Row { coverage, nees, nees_freedom: Some(freedom), ..row }
     }
 
     /// The errors of runs, pooled.
@@ -133,43 +128,26 @@ fn braking_settings() -> BrakingSettings {
     }
 }
 
-fn reports(sought: Sought) -> BrakeFactor {
+fn reports(sought: BrakingCoefficient) -> BrakeFactor {
     match sought {
-        Sought::Ratio => BrakeFactor::Ratio,
-        Sought::Adhesion | Sought::Friction => BrakeFactor::Friction,
+        BrakingCoefficient::Ratio => BrakeFactor::Ratio,
+        BrakingCoefficient::Adhesion | BrakingCoefficient::Friction => BrakeFactor::Friction,
     }
 }
 
-/// The papers' EM from an initial value.
-pub fn em(sought: Sought, initial: f64, seed: u64, e_step: EStep) -> EstimatorSettings {
-    em_with_cap(sought, initial, seed, e_step, false)
-}
-
-/// The papers' EM, with the printed cap or without.
-pub fn em_with_cap(
-    sought: Sought,
-    initial: f64,
-    seed: u64,
-    e_step: EStep,
-    has_printed_cap: bool,
-) -> EstimatorSettings {
-    let settings = EmSettings {
-        braking: braking_settings(),
-        initial: Some(initial),
-        seed,
-        e_step,
-        has_printed_cap,
-        reports: reports(sought),
-        ..EmSettings::default()
-    };
+/// The papers' EM, of which these settings are given.
+pub fn em(sought: BrakingCoefficient, given: EmSettings) -> EstimatorSettings {
+    let settings = EmSettings { braking: braking_settings(), reports: reports(sought), ..given };
     match sought {
-        Sought::Adhesion => EstimatorSettings::AdhesionEm(settings),
-        Sought::Friction | Sought::Ratio => EstimatorSettings::BrakeEm(settings),
+        BrakingCoefficient::Adhesion => EstimatorSettings::AdhesionEm(settings),
+        BrakingCoefficient::Friction | BrakingCoefficient::Ratio => {
+            EstimatorSettings::BrakeEm(settings)
+        }
     }
 }
 
 /// The papers' baseline from an initial value.
-pub fn ekf(sought: Sought, initial: f64) -> EstimatorSettings {
+pub fn ekf(sought: BrakingCoefficient, initial: f64) -> EstimatorSettings {
     let settings = EkfSettings {
         braking: braking_settings(),
         initial: Some(initial),
@@ -177,13 +155,15 @@ pub fn ekf(sought: Sought, initial: f64) -> EstimatorSettings {
         ..EkfSettings::default()
     };
     match sought {
-        Sought::Adhesion => EstimatorSettings::AdhesionEkf(settings),
-        Sought::Friction | Sought::Ratio => EstimatorSettings::BrakeEkf(settings),
+        BrakingCoefficient::Adhesion => EstimatorSettings::AdhesionEkf(settings),
+        BrakingCoefficient::Friction | BrakingCoefficient::Ratio => {
+            EstimatorSettings::BrakeEkf(settings)
+        }
     }
 }
 
 /// Our smoother.
-pub fn smoother(sought: Sought, lag_s: f64) -> EstimatorSettings {
+pub fn smoother(sought: BrakingCoefficient, lag_s: f64) -> EstimatorSettings {
     let settings = SmootherSettings {
         braking: braking_settings(),
         lag_s,
@@ -191,14 +171,16 @@ pub fn smoother(sought: Sought, lag_s: f64) -> EstimatorSettings {
         ..SmootherSettings::default()
     };
     match sought {
-        Sought::Adhesion => EstimatorSettings::AdhesionSmoother(settings),
-        Sought::Friction | Sought::Ratio => EstimatorSettings::BrakeSmoother(settings),
+        BrakingCoefficient::Adhesion => EstimatorSettings::AdhesionSmoother(settings),
+        BrakingCoefficient::Friction | BrakingCoefficient::Ratio => {
+            EstimatorSettings::BrakeSmoother(settings)
+        }
     }
 }
 
 /// Our estimator where the curve over speed is known but for its scale.
-pub fn known_law(sought: Sought) -> EstimatorSettings {
-    if sought == Sought::Adhesion {
+pub fn known_law(sought: BrakingCoefficient) -> EstimatorSettings {
+    if sought == BrakingCoefficient::Adhesion {
         let settings = LawSettings { braking: braking_settings(), ..LawSettings::default() };
         return EstimatorSettings::AdhesionLaw(settings);
     }
@@ -213,29 +195,15 @@ pub fn known_law(sought: Sought) -> EstimatorSettings {
     })
 }
 
-/// What the smoother presumes of the coefficient, as the bound wants it.
-pub fn smoother_knowledge(sought: Sought) -> Knowledge {
-    match smoother_walk(sought) {
-        WalkSettings::Drift { std_per_s, time_s } => Knowledge::Drift { std_per_s, time_s },
-        WalkSettings::Scale { std_after_1_s } => Knowledge::Walk(std_after_1_s),
-    }
+/// What the smoother presumes of a coefficient.
+pub fn presumed(sought: BrakingCoefficient) -> ShareStep {
+    SmootherSettings::default().walk(sought).into()
 }
 
-fn smoother_walk(sought: Sought) -> WalkSettings {
-    SmootherSettings::default().walk(match sought {
-        Sought::Adhesion => BrakingCoefficient::Adhesion,
-        Sought::Friction => BrakingCoefficient::Friction,
-        Sought::Ratio => BrakingCoefficient::Ratio,
-    })
-}
-
-/// A braking whose coefficient is drawn from the smoother's own model.
-pub fn drawn_braking(sought: Sought) -> Braking {
-    let drawn = match smoother_walk(sought) {
-        WalkSettings::Drift { std_per_s, time_s } => DrawnShare::Drift { std_per_s, time_s },
-        WalkSettings::Scale { std_after_1_s } => DrawnShare::Walk { std_after_1_s },
-    };
-    Braking { sought, drawn: Some(drawn), from_kmh: 300.0, to_kmh: 180.0, scored_from_kmh: 265.0 }
+/// A braking whose coefficient is drawn from what the smoother presumes.
+pub fn drawn_braking(sought: BrakingCoefficient) -> Braking {
+    let drawn = Some(presumed(sought));
+    Braking { sought, drawn, from_kmh: 300.0, to_kmh: 180.0, scored_from_kmh: 265.0 }
 }
 
 #[cfg(test)]
@@ -251,15 +219,13 @@ mod tests {
             .filter(|pair| pair[1].is_scored)
             .map(|pair| (pair[1].truth - pair[0].truth) / declared(braking.sought) / STEP_S)
             .collect();
-        crate::papers::statistics::root_mean_square(&drifts)
+        crate::statistics::root_mean_square(&drifts)
     }
 
     #[test]
     fn the_drift_that_the_smoother_presumes_is_that_of_the_laws() {
         for braking in [XIE_TABLE_2, XIE_TABLE_3, JIN_TABLE_3] {
-            let Knowledge::Drift { std_per_s, .. } = smoother_knowledge(braking.sought) else {
-                panic!("a drift");
-            };
+            let std_per_s = presumed(braking.sought).drift_std_per_s;
             let ratio = drift_per_s(&braking) / std_per_s;
             assert!((0.5..2.0).contains(&ratio), "{braking:?}: {ratio}");
         }

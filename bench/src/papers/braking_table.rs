@@ -1,12 +1,13 @@
 //! The rows that every braking table has.
 
-use dynocar_estimators::xie::EStep;
+use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
+use dynocar_estimators::xie::{EStep, EmSettings};
 
-use super::bound::{BoundAt, Knowledge, bound, mean_relative_percent, root_mean_square};
-use super::braking::{Braking, Sought};
+use super::bound::{BoundAt, Knowledge, bound, deviation, mean_relative_percent};
+use super::braking::Braking;
 use super::braking_score::{
-    LAG_S, LAG_STEPS, MIDDLE_STEPS, Score, drawn_braking, ekf, em, known_law, score, smoother,
-    smoother_knowledge,
+    LAG_S, LAG_STEPS, MIDDLE_STEPS, Score, drawn_braking, ekf, em, known_law, presumed, score,
+    smoother,
 };
 use super::row::Row;
 use super::seeds::Seeds;
@@ -44,16 +45,18 @@ impl Table {
     pub fn comparison(&self, seeds: Seeds) -> Vec<Row> {
         let sought = self.braking.sought;
         let lags = [0, MIDDLE_STEPS];
-        let [em_end, em_middle] = score(&self.braking, seeds, lags, |seed| {
-            em(sought, self.initial(seed), seed, EStep::Particle)
-        });
-        let [_, exact_middle] = score(&self.braking, seeds, lags, |seed| {
-            em(sought, self.initial(seed), seed, EStep::Kalman)
-        });
+        let em_by = |e_step| {
+            score(&self.braking, seeds, lags, |seed| {
+                let initial = Some(self.initial(seed));
+                em(sought, EmSettings { initial, seed, e_step, ..EmSettings::default() })
+            })
+        };
+        let [em_end, em_middle] = em_by(EStep::Particle);
+        let [_, exact_middle] = em_by(EStep::Kalman);
         let [ekf] = score(&self.braking, seeds, [0], |seed| ekf(sought, self.initial(seed)));
         let [present] = score(&self.braking, seeds, [0], |_| smoother(sought, 0.0));
         let [back] = score(&self.braking, seeds, [LAG_STEPS], |_| smoother(sought, LAG_S));
-        let knowledge = smoother_knowledge(sought);
+        let knowledge = Knowledge::Share(presumed(sought));
         let drawn = |lag_s, lag_steps| drawn_score(sought, lag_s, lag_steps, seeds);
         let freedom = |own: &Score, drawn: Score| own.nees_freedom_of_one_curve(&drawn);
         let (at_present, at_back) =
@@ -104,12 +107,7 @@ impl Table {
         bounds: &[BoundAt],
         seeds: Seeds,
     ) -> Vec<Row> {
-        let row = |what: &str, unit| Row {
-            coverage: Some(ours.coverage),
-            nees: Some(ours.nees),
-            nees_freedom: Some(freedom),
-            ..self.row(what, unit, seeds)
-        };
+        let row = |what: &str, unit| ours.row(freedom, self.row(what, unit, seeds));
         vec![
             Row {
                 published: Some(self.published_percent),
@@ -123,7 +121,7 @@ impl Table {
                 paper_method: em.map(|score| score.rmse),
                 baseline: ekf.map(|score| score.rmse),
                 ours: Some(ours.rmse),
-                bound: Some(root_mean_square(bounds)),
+                bound: Some(deviation(bounds)),
                 ..row(&format!("root mean square error, {what}"), "1")
             },
         ]
@@ -131,7 +129,12 @@ impl Table {
 }
 
 /// Our smoother over runs that each draw a coefficient from its own model.
-pub fn drawn_score(sought: Sought, lag_s: f64, lag_steps: usize, seeds: Seeds) -> Score {
+pub fn drawn_score(
+    sought: BrakingCoefficient,
+    lag_s: f64,
+    lag_steps: usize,
+    seeds: Seeds,
+) -> Score {
     let [score] = score(&drawn_braking(sought), seeds, [lag_steps], |_| smoother(sought, lag_s));
     score
 }
@@ -140,7 +143,7 @@ pub fn drawn_score(sought: Sought, lag_s: f64, lag_steps: usize, seeds: Seeds) -
 /// coverage and NEES apply without reservation.
 pub fn drawn_rows(
     paper: &'static str,
-    sought: Sought,
+    sought: BrakingCoefficient,
     name: &'static str,
     seeds: Seeds,
 ) -> Vec<Row> {
@@ -154,18 +157,18 @@ pub fn drawn_rows(
         published_percent: f64::NAN,
         published_baseline_percent: f64::NAN,
     };
-    let knowledge = smoother_knowledge(sought);
+    let knowledge = Knowledge::Share(presumed(sought));
     [("the present", 0.0, 0), ("5 s back", LAG_S, LAG_STEPS)]
         .into_iter()
         .map(|(what, lag_s, lag_steps)| {
             let score = drawn_score(sought, lag_s, lag_steps, seeds);
             Row {
                 ours: Some(score.rmse),
-                bound: Some(root_mean_square(&bound(&braking, knowledge, lag_steps))),
-                coverage: Some(score.coverage),
-                nees: Some(score.nees),
-                nees_freedom: Some(score.nees_freedom()),
-                ..table.row(&format!("root mean square error, {what}"), "1", seeds)
+                bound: Some(deviation(&bound(&braking, knowledge, lag_steps))),
+                ..score.row(
+                    score.nees_freedom(),
+                    table.row(&format!("root mean square error, {what}"), "1", seeds),
+                )
             }
         })
         .collect()

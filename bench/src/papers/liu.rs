@@ -27,7 +27,7 @@ use self::scenario::{
 use super::row::Row;
 use super::score::{Score, w0_errors};
 use super::seeds::Seeds;
-use super::statistics::{mean, root_mean_square};
+use crate::statistics::{mean, root_mean_square};
 
 const PAPER: &str = "Liu 2018";
 

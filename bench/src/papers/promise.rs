@@ -3,7 +3,7 @@
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::Row;
+use super::row::Row;
 
 /// What a row's own figure has to obey.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,7 +152,7 @@ fn nees_band(freedom: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::papers::Seeds;
+    use crate::papers::seeds::Seeds;
 
     fn row(quantity: &str, ours: f64, seeds: usize) -> Row {
         let seeds = Seeds::from_zero(seeds);

@@ -4,10 +4,15 @@ use serde::Serialize;
 
 use super::seeds::Seeds;
 
+/// Xia 2023.
+pub const XIA: &str = "Xia 2023";
+/// Wang 2022.
+pub const WANG: &str = "Wang 2022";
+
 /// A figure of a paper, measured here with the paper's method, its baseline and ours.
 ///
 /// Errors are in `unit`; a method that a table does not have is `None`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
     /// Short name of the paper, as `Xia 2023`.
     pub paper: &'static str,
@@ -46,20 +51,7 @@ impl Row {
         unit: &'static str,
         seeds: Seeds,
     ) -> Self {
-        Row {
-            paper,
-            table,
-            quantity: quantity.into(),
-            unit,
-            published: None,
-            paper_method: None,
-            baseline: None,
-            ours: None,
-            bound: None,
-            seeds: seeds.count,
-            coverage: None,
-            nees: None,
-            nees_freedom: None,
-        }
+        let (quantity, seeds) = (quantity.into(), seeds.count);
+        Row { paper, table, quantity, unit, seeds, ..Row::default() }
     }
 }

@@ -4,7 +4,7 @@ use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::row::Row;
-use super::statistics::{mean, root_mean_square};
+use crate::statistics::{mean, root_mean_square};
 
 /// Standard deviations to either side of an estimate that hold the truth with 95 %.
 const INTERVAL: f64 = 1.96;

@@ -1,9 +1,6 @@
-//! Which runs are behind a figure, and the noise that is drawn for them.
+//! Which runs are behind a figure.
 
 use std::ops::Range;
-
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 /// Runs by their seeds, one after the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,12 +33,6 @@ impl Seeds {
     pub fn each(self, runs: usize) -> Self {
         Seeds { first: self.first * runs as u64, count: self.count * runs }
     }
-}
-
-/// A standard normal number (Box and Muller 1958).
-pub fn normal(random: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
 }
 
 #[cfg(test)]

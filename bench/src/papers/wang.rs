@@ -6,19 +6,18 @@
 //! - [`printed`]: the descent as printed
 //! - [`resistance_rows`], [`leg`], [`mass_rows`], [`step_row`], [`energy_rows`]: the comparison
 
-pub mod bound;
-pub mod disturbance;
-pub mod driver;
-pub mod energy_rows;
-pub mod leg;
-pub mod line;
-pub mod mass_rows;
-mod paper;
-pub mod printed;
-pub mod resistance_rows;
-pub mod sensor;
-pub mod shuttle;
-pub mod step_row;
+mod bound;
+mod disturbance;
+mod driver;
+mod energy_rows;
+mod leg;
+mod line;
+mod mass_rows;
+mod printed;
+mod resistance_rows;
+mod sensor;
+mod shuttle;
+mod step_row;
 
 use super::row::Row;
 use super::seeds::Seeds;

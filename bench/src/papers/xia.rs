@@ -6,12 +6,11 @@
 //!   an unknown disturbance
 //! - [`online`]: Table 4 (coefficients that switch on the way)
 
-pub mod bound;
-pub mod offline;
-pub mod online;
+mod bound;
+mod offline;
+mod online;
 mod ratio_posterior;
-mod row;
-pub mod scenario;
+mod scenario;
 
 use super::row::Row;
 use super::seeds::Seeds;

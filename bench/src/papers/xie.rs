@@ -1,18 +1,19 @@
 //! Xie 2019: wheel-rail adhesion of a braking train.
 
 use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::LawSettings;
-use dynocar_estimators::xie::EStep;
+use dynocar_estimators::xie::{EStep, EmSettings};
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{EffortPoint, RailAdhesion, RailCondition, Stop, Uncertain};
 
-use super::braking::{MPS_PER_KMH, PRESSURE_PA, STEP_S, Sought, XIE_TABLE_2, XIE_TABLE_3, train};
-use super::braking_score::{MIDDLE_STEPS, em_with_cap, over_seeds, score};
+use super::braking::{PRESSURE_PA, STEP_S, XIE_TABLE_2, XIE_TABLE_3, train};
+use super::braking_score::{MIDDLE_STEPS, em, over_seeds, score};
 use super::braking_table::{Table, drawn_rows};
 use super::literal_em::finite_changes;
 use super::row::Row;
 use super::seeds::Seeds;
-use super::statistics::mean;
+use crate::statistics::{KMH, mean};
 
 /// Initial values of both tables.
 const INITIALS: &[f64] = &[0.0, 0.03, 0.05, 0.09, 0.12];
@@ -46,7 +47,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
         rows.extend(table.known_law(LawSettings::default().scale_std, seeds));
     }
     rows.extend(printed_forms(&TABLES[0], seeds));
-    rows.extend(drawn_rows("Xie 2019", Sought::Adhesion, "adhesion", seeds));
+    rows.extend(drawn_rows("Xie 2019", BrakingCoefficient::Adhesion, "adhesion", seeds));
     rows.extend(stops());
     rows
 }
@@ -55,7 +56,9 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
     let capped = |initial, what| {
         let [score] = score(&table.braking, seeds, [MIDDLE_STEPS], |seed| {
-            em_with_cap(Sought::Adhesion, initial, seed, EStep::Kalman, true)
+            let (e_step, has_printed_cap) = (EStep::Kalman, true);
+            let given = EmSettings { initial, seed, e_step, has_printed_cap, ..Default::default() };
+            em(BrakingCoefficient::Adhesion, given)
         });
         Row { paper_method: Some(score.relative_percent), ..table.row(what, "%", seeds) }
     };
@@ -75,8 +78,8 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
         )
     });
     vec![
-        capped(0.05, "mean relative error, printed cap min(F, B), from 0.05"),
-        capped(0.12, "mean relative error, printed cap min(F, B), from 0.12"),
+        capped(Some(0.05), "mean relative error, printed cap min(F, B), from 0.05"),
+        capped(Some(0.12), "mean relative error, printed cap min(F, B), from 0.12"),
         Row {
             paper_method: Some(mean(&widths)),
             ..table.row(
@@ -137,10 +140,10 @@ fn stops() -> Vec<Row> {
     let mut rows = Vec::new();
     for published in &STOPS {
         let stop = Stop {
-            to_speed_mps: published.to_kmh * MPS_PER_KMH,
+            to_speed_mps: published.to_kmh * KMH,
             adhesion: published.adhesion,
             gravity_mps2: PAPER_GRAVITY_MPS2,
-            ..Stop::level(published.from_kmh * MPS_PER_KMH, train.mass_kg, davis, &effort)
+            ..Stop::level(published.from_kmh * KMH, train.mass_kg, davis, &effort)
         };
         let ours = stop.estimate(0.95).expect("a stop");
         let carried = |speed_mps| match published.adhesion {
@@ -226,7 +229,9 @@ mod tests {
 
     #[test]
     fn drawn_adhesion_is_found_at_the_bound_with_honest_intervals() {
-        for row in drawn_rows("Xie 2019", Sought::Adhesion, "adhesion", Seeds::from_zero(60)) {
+        for row in
+            drawn_rows("Xie 2019", BrakingCoefficient::Adhesion, "adhesion", Seeds::from_zero(60))
+        {
             let ratio = row.ours.unwrap() / row.bound.unwrap();
             assert!((0.9..1.1).contains(&ratio), "{row:?}");
             assert!((0.92..0.98).contains(&row.coverage.unwrap()), "{row:?}");

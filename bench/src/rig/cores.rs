@@ -1,10 +1,9 @@
 //! Cores and priorities of a measurement.
 
+use clap::Args;
 use dynocar::output::report_line;
 use dynocar::runtime::affinity::pin_to_core;
 use dynocar::runtime::scheduling::set_fifo_priority;
-
-use super::RigError;
 
 /// The two cores of a measurement, and the priority of what runs there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,25 +16,37 @@ pub struct Cores {
     pub priority: Option<u8>,
 }
 
+/// Where a measurement of processes runs.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct CoreArguments {
+    /// Core of the controller, or of the publishers
+    #[arg(long, value_name = "CORE")]
+    controller_core: Option<usize>,
+    /// Core of the daemon's thread, and of whatever else answers
+    #[arg(long, value_name = "CORE")]
+    daemon_core: Option<usize>,
+    /// Real-time priority (SCHED_FIFO) of the controller and of whatever answers, 1 to 99
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
+    priority: Option<u8>,
+    /// Seed of everything drawn
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
 impl Cores {
     /// The cores asked for, else the first two; on a machine with one core both are the same.
-    pub fn choose(controller: Option<usize>, server: Option<usize>, priority: Option<u8>) -> Self {
+    pub fn choose(asked: &CoreArguments) -> Self {
         let count = std::thread::available_parallelism().map_or(1, usize::from);
-        let controller = controller.unwrap_or(0);
+        let controller = asked.controller_core.unwrap_or(0);
         let other = (controller + 1) % count.max(1);
-        Cores { controller, server: server.unwrap_or(other), priority }
+        let server = asked.daemon_core.unwrap_or(other);
+        Cores { controller, server, priority: asked.priority }
     }
 }
 
 /// Runs something in a thread of its own, which it may bind to a core: threads and processes
 /// that are started before are not bound with it.
-///
-/// # Errors
-///
-/// The work's own.
-pub fn in_thread<T: Send>(
-    work: impl FnOnce() -> Result<T, RigError> + Send,
-) -> Result<T, RigError> {
+pub fn in_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     std::thread::scope(|scope| match scope.spawn(work).join() {
         Ok(result) => result,
         Err(panic) => std::panic::resume_unwind(panic),
@@ -44,21 +55,19 @@ pub fn in_thread<T: Send>(
 
 /// Binds the calling thread to a core; without that the figures vary more, which is said.
 pub fn bind(core: usize) {
-    if let Err(error) = pin_to_core(core) {
-        report_line(&format!(
-            "dynocar-bench: not bound to core {core}, figures will vary more: {error}"
-        ));
-    }
+    said(&format!("not bound to core {core}"), pin_to_core(core));
 }
 
 /// Gives the calling thread, and every thread it starts from then on, a real-time priority; without
 /// it the figures vary more, which is said.
 pub fn prioritise(priority: Option<u8>) {
-    if let Some(priority) = priority
-        && let Err(error) = set_fifo_priority(priority)
-    {
-        report_line(&format!(
-            "dynocar-bench: no priority {priority}, figures will vary more: {error}"
-        ));
+    if let Some(priority) = priority {
+        said(&format!("no priority {priority}"), set_fifo_priority(priority));
+    }
+}
+
+fn said<E: std::fmt::Display>(lacking: &str, result: Result<(), E>) {
+    if let Err(error) = result {
+        report_line(&format!("dynocar-bench: {lacking}, figures will vary more: {error}"));
     }
 }

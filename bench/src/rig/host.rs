@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::RigError;
-use super::cores::{Cores, bind, in_thread, prioritise};
+use super::cores::{Cores, bind, prioritise};
+use crate::parallel;
 
 /// A look at the clock that comes so long after the last one was kept from it.
 const GAP_MIN: Duration = Duration::from_micros(20);
@@ -33,29 +33,15 @@ pub struct HostFigures {
 
 impl HostGaps {
     /// Watches both cores for some time and adds what is seen.
-    ///
-    /// # Errors
-    ///
-    /// Never of its own.
-    pub fn watch(&mut self, cores: Cores, seconds: f64) -> Result<(), RigError> {
+    pub fn watch(&mut self, cores: Cores, seconds: f64) {
         let watched = Duration::from_secs_f64(seconds);
-        let look = |core: usize| {
-            move || {
-                bind(core);
-                prioritise(cores.priority);
-                Ok(gaps_s(watched))
-            }
-        };
-        let (one, other) = std::thread::scope(|scope| {
-            let one = scope.spawn(|| in_thread(look(cores.controller)));
-            let other = in_thread(look(cores.server));
-            (one.join(), other)
+        let gaps_s = parallel::over(&[cores.controller, cores.server], 2, |&core| {
+            bind(core);
+            prioritise(cores.priority);
+            gaps_s(watched)
         });
-        let one = one.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        self.gaps_s.extend(one?);
-        self.gaps_s.extend(other?);
+        self.gaps_s.extend(gaps_s.into_iter().flatten());
         self.watched_s += seconds;
-        Ok(())
     }
 
     /// What was seen, in figures.
@@ -124,7 +110,7 @@ mod tests {
     #[test]
     fn watching_sees_the_time_it_was_given() {
         let mut host = HostGaps::default();
-        host.watch(Cores::choose(None, None, None), 0.02).unwrap();
+        host.watch(Cores { controller: 0, server: 0, priority: None }, 0.02);
         assert_eq!(host.watched_s, 0.02);
         assert!(host.figures().longest_ns as f64 * 1e-9 <= host.gaps_s.iter().sum::<f64>() + 1e-9);
     }

@@ -4,6 +4,8 @@ use dynocar::config::is_slow;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::PipelineKind;
 
+use crate::output::{Failure, Usage};
+
 /// Every pipeline that estimates and whose step is short: they may share a thread.
 pub fn fast() -> Vec<PipelineKind> {
     estimating().filter(|&kind| !is_slow(kind)).collect()
@@ -21,21 +23,24 @@ fn estimating() -> impl Iterator<Item = PipelineKind> {
         .filter(|&kind| kind != PipelineKind::Echo && EstimatorSettings::default_of(kind).is_some())
 }
 
-/// The pipelines of a list of names.
+/// The pipelines of a list of names; `fast`, `slow` and `all` are groups.
 ///
 /// # Errors
 ///
 /// In words, with the names there are.
-pub fn by_names(names: &[String]) -> Result<Vec<PipelineKind>, String> {
-    names
-        .iter()
-        .map(|name| {
-            PipelineKind::from_name(name)
-                .filter(|&kind| EstimatorSettings::default_of(kind).is_some())
-                .ok_or_else(|| {
-                    let known: Vec<_> = estimating().map(|kind| kind.name()).collect();
-                    format!("{name}: expected one of {}", known.join(", "))
-                })
+pub fn by_names(names: &[String]) -> Result<Vec<PipelineKind>, Failure> {
+    let one = |name: &String| {
+        let kind = PipelineKind::from_name(name)
+            .filter(|&kind| EstimatorSettings::default_of(kind).is_some());
+        kind.ok_or_else(|| {
+            let known: Vec<_> = estimating().map(|kind| kind.name()).collect();
+            Usage(format!("--pipelines {name}: expected one of {}", known.join(", "))).into()
         })
-        .collect()
+    };
+    match names {
+        [name] if name == "all" => Ok([fast(), slow()].concat()),
+        [name] if name == "fast" => Ok(fast()),
+        [name] if name == "slow" => Ok(slow()),
+        names => names.iter().map(one).collect(),
+    }
 }

@@ -3,6 +3,8 @@
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
+use crate::output::Record;
+
 /// The longest latency resolved, in ns.
 const LONGEST_NS: u64 = 60_000_000_000;
 
@@ -51,14 +53,27 @@ impl Quantiles {
     }
 }
 
-/// The middle of some numbers; NaN of none.
-pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => f64::NAN,
-        count if count % 2 == 1 => values[count / 2],
-        count => 0.5 * (values[count / 2 - 1] + values[count / 2]),
+/// Cells of a table: the quantiles of latencies.
+pub fn cells(record: Record, it: &Quantiles) -> Record {
+    [
+        ("p50", it.p50_ns),
+        ("p99", it.p99_ns),
+        ("p99.9", it.p999_ns),
+        ("p99.99", it.p9999_ns),
+        ("max", it.max_ns),
+    ]
+    .into_iter()
+    .fold(record, |record, (name, ns)| record.with(name, for_people(ns as f64)))
+}
+
+/// All of some histograms with the bounds of [`histogram`].
+pub fn pooled<'a>(histograms: impl IntoIterator<Item = &'a Histogram<u64>>) -> Histogram<u64> {
+    let mut all = histogram();
+    for own in histograms {
+        // Every histogram has the same bounds.
+        let _ = all.add(own);
     }
+    all
 }
 
 /// A time in ns for people: `812 ns`, `4.31 µs`, `2.20 ms`.
@@ -91,13 +106,6 @@ mod tests {
         let mut histogram = histogram();
         record(&mut histogram, -5);
         assert_eq!(histogram.max(), 1);
-    }
-
-    #[test]
-    fn the_median_of_an_even_number_lies_between() {
-        assert_eq!(median(vec![3.0, 1.0, 10.0, 2.0]), 2.5);
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
-        assert!(median(Vec::new()).is_nan());
     }
 
     #[test]

@@ -1,16 +1,15 @@
-//! A run-time directory with a daemon configuration of its own.
+//! A run-time directory with a daemon of its own, and other processes on it.
 
-use std::fmt::Write;
-use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use dynocar::config::IdleStrategy;
 use dynocar::models::{ModelText, Moment, NewModel, Origin, Store};
-use dynocar_client::Host;
-use dynocar_shared::{PipelineKind, TrainId};
-use tempfile::TempDir;
+use dynocar_client::SnapshotReader;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
+use dynocar_tests::process::{Process, Site};
+use rustix::process::Signal;
 
-use super::{RigError, system};
+use crate::output::{Failure, during};
 
 /// The train that latency and load drive; its brake gear is declared, so that every pipeline
 /// has what it needs.
@@ -56,7 +55,7 @@ pub struct ThreadPlan {
 }
 
 /// A daemon's configuration, as far as measurements vary it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct DaemonPlan {
     /// Number of trains, numbered from 1.
     pub trains: u64,
@@ -67,122 +66,124 @@ pub struct DaemonPlan {
 }
 
 impl DaemonPlan {
-    /// The configuration's text.
-    pub fn to_toml(&self) -> String {
+    fn to_toml(&self) -> String {
         let mut text = format!("[daemon]\nlog = \"error\"\n{}\n", self.lines);
         for id in 1..=self.trains {
             text += &format!("[[trains]]\nid = {id}\nfile = \"train.toml\"\n");
         }
-        for thread in &self.threads {
-            let (name, idle) = (thread.name, thread.idle);
-            // Writing into a String cannot fail.
-            let _ = write!(text, "[[threads]]\nname = \"{name}\"\nidle = \"{idle}\"\n");
-            if let Some(core) = thread.core {
-                let _ = writeln!(text, "core = {core}");
-            }
-            if let Some(priority) = thread.priority {
-                let _ = writeln!(text, "priority = {priority}");
-            }
-            for kind in &thread.pipelines {
-                let _ = write!(text, "[[pipelines]]\nkind = \"{kind}\"\nthread = \"{name}\"\n");
+        for ThreadPlan { name, core, idle, priority, pipelines } in &self.threads {
+            text += &format!("[[threads]]\nname = \"{name}\"\nidle = \"{idle}\"\n");
+            let line = |(key, value)| format!("{key} = {value}\n");
+            text.extend(core.map(|core| line(("core", core))));
+            text.extend(priority.map(|it| line(("priority", usize::from(it)))));
+            for kind in pipelines {
+                text += &format!("[[pipelines]]\nkind = \"{kind}\"\nthread = \"{name}\"\n");
             }
         }
         text
     }
-}
 
-/// A folder for one slice of a measurement; processes of different sites never meet.
-#[derive(Debug)]
-pub struct Site {
-    folder: TempDir,
-    host: Host,
-}
-
-impl Site {
-    /// A new site with the train that latency and load drive.
+    /// Starts the daemon.
     ///
     /// # Errors
     ///
-    /// When no temporary folder can be had.
-    pub fn new() -> Result<Self, RigError> {
-        Site::with_train(TRAIN)
-    }
-
-    /// A new site with a train's file of this text.
-    ///
-    /// # Errors
-    ///
-    /// When no temporary folder can be had.
-    pub fn with_train(text: &str) -> Result<Self, RigError> {
-        let folder = tempfile::Builder::new()
-            .prefix("dynocar-bench-")
-            .tempdir()
-            .map_err(system("a temporary folder"))?;
-        let host = Host::at(&folder.path().join("root"))?;
-        let site = Site { folder, host };
-        std::fs::write(site.train_file(), text).map_err(system("writing the train's file"))?;
-        Ok(site)
-    }
-
-    /// The folder.
-    pub fn path(&self) -> &Path {
-        self.folder.path()
-    }
-
-    /// The run-time directory.
-    pub fn host(&self) -> &Host {
-        &self.host
-    }
-
-    /// Where the train's file lies.
-    pub fn train_file(&self) -> PathBuf {
-        self.path().join("train.toml")
-    }
-
-    /// Puts candidates into a store of models, each with another resistance than the train's file; gives
-    /// the lines of the configuration that have them tried.
-    ///
-    /// # Errors
-    ///
-    /// When they cannot be written.
-    pub fn put_candidates(&self, train: TrainId, count: u32) -> Result<String, RigError> {
-        let store = self.path().join("models");
-        std::fs::create_dir(&store).map_err(system("making a store of models"))?;
-        let parent = Some(ModelText { train: TRAIN.into(), track: None }.hash());
-        for number in 1..=count {
-            let a = format!("[resistance]\na = 2.{number}");
-            let text = ModelText { train: TRAIN.replace("[resistance]\na = 1.9", &a), track: None };
-            let origin =
-                Origin::written("Of a measurement.", parent, Moment::of(SystemTime::now()));
-            let new = NewModel { text, origin, answer_json: None, report_html: None };
-            Store::at(&store).train(train).put(&new)?;
-        }
-        Ok("[models]\ndirectory = \"models\"".into())
-    }
-
-    /// Writes the daemon's configuration and gives its path.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be written.
-    pub fn write_config(&self, plan: &DaemonPlan) -> Result<PathBuf, RigError> {
-        let path = self.path().join("daemon.toml");
-        std::fs::write(&path, plan.to_toml()).map_err(system("writing the configuration"))?;
-        Ok(path)
+    /// When this program cannot be found.
+    pub fn start(&self, site: &Site) -> Result<Process, Failure> {
+        let config = site.write("daemon.toml", &self.to_toml());
+        peer(site, "daemon", &[&config.to_string_lossy()])
     }
 }
 
-impl Drop for Site {
-    fn drop(&mut self) {
-        // Peers are killed, so what they had in shared memory is still there.
-        let own = self.path().file_name().unwrap_or_default().to_string_lossy();
-        let prefixes = [self.host.segment_prefix(), own.into_owned()];
-        for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
-            let name = entry.file_name();
-            if prefixes.iter().any(|prefix| name.to_string_lossy().starts_with(prefix)) {
-                // Gone already is as good.
-                let _ = std::fs::remove_file(entry.path());
-            }
+/// A new site with the train that latency and load drive.
+pub fn site() -> Site {
+    let site = Site::new();
+    site.write("train.toml", TRAIN);
+    site
+}
+
+/// Starts a process of a measurement: this program again, with its hidden command.
+///
+/// # Errors
+///
+/// When this program cannot be found.
+pub fn peer(site: &Site, kind: &str, arguments: &[&str]) -> Result<Process, Failure> {
+    let program = std::env::current_exe().map_err(during("finding this program"))?;
+    Ok(site.start(&program.to_string_lossy(), &[&["peer", kind], arguments].concat()))
+}
+
+/// Fails when a process has ended.
+///
+/// # Errors
+///
+/// When it has, with what it said.
+pub fn require(process: &mut Process) -> Result<(), Failure> {
+    match process.try_wait() {
+        None => Ok(()),
+        Some(status) => {
+            let said = process.errors();
+            Err(format!("a process of the measurement ended: {status} {}", said.trim()).into())
         }
     }
+}
+
+/// Asks a process to end, and waits until it has.
+///
+/// # Errors
+///
+/// When it ended before, or badly.
+pub fn stop(mut process: Process) -> Result<(), Failure> {
+    require(&mut process)?;
+    let status = process.end(Signal::TERM);
+    // Peers without a handler of their own end by the signal.
+    let is_well = status.success() || status.code().is_none();
+    if is_well { Ok(()) } else { Err(format!("a process ended: {status}").into()) }
+}
+
+/// Polls until as many pipelines as this show a wanted snapshot; looks ever more seldom.
+///
+/// # Errors
+///
+/// When the daemon ends, or says nothing for a minute.
+pub fn await_all(
+    reader: &mut SnapshotReader,
+    daemon: &mut Process,
+    pipelines: usize,
+    is_wanted: impl Fn(&ParameterSnapshot) -> bool,
+) -> Result<(), Failure> {
+    // A daemon answers within some of these looks, unless it shares its core with this thread.
+    for look in 1..3_000_000 {
+        reader.poll();
+        if reader.readings(0).filter(|it| is_wanted(it.snapshot)).count() == pipelines {
+            return Ok(());
+        }
+        if look < 200 {
+            std::thread::yield_now();
+            continue;
+        }
+        std::thread::sleep(Duration::from_micros(20));
+        if look % 1000 == 0 {
+            require(daemon)?;
+        }
+    }
+    Err("the daemon: no answer for a minute".into())
+}
+
+/// Puts candidates into a store of models, each with another resistance than the train's file; gives
+/// the lines of the configuration that have them tried.
+///
+/// # Errors
+///
+/// When they cannot be written.
+pub fn put_candidates(site: &Site, train: TrainId, count: u32) -> Result<String, Failure> {
+    let store = site.path().join("models");
+    std::fs::create_dir(&store).map_err(during("making a store of models"))?;
+    let parent = Some(ModelText { train: TRAIN.into(), track: None }.hash());
+    for number in 1..=count {
+        let a = format!("[resistance]\na = 2.{number}");
+        let text = ModelText { train: TRAIN.replace("[resistance]\na = 1.9", &a), track: None };
+        let origin = Origin::written("Of a measurement.", parent, Moment::of(SystemTime::now()));
+        let new = NewModel { text, origin, answer_json: None, report_html: None };
+        Store::at(&store).train(train).put(&new)?;
+    }
+    Ok("[models]\ndirectory = \"models\"".into())
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use dynocar_shared::PipelineKind;
 
 use super::{rows, table};
-use crate::output::{give, write_csv};
+use crate::output::{self, Failure, Record, Usage, expect, give, write_csv};
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
 /// changes, and whether its intervals hold.
@@ -38,36 +38,38 @@ pub struct ScenariosArguments {
     csv: Option<PathBuf>,
 }
 
-/// Runs the command; an error has its text and the exit status.
-pub fn scenarios(arguments: &ScenariosArguments) -> Result<(), (String, u8)> {
-    let mut chosen = rows::all();
-    chosen.retain(|row| row.name.contains(&arguments.scenario));
-    if chosen.is_empty() {
-        let text = &arguments.scenario;
-        return Err((format!("--scenario {text}: expected a part of a scenario's name"), 2));
+impl ScenariosArguments {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When the command line is wrong, or the result cannot be written.
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut chosen = rows::all();
+        chosen.retain(|row| row.name.contains(&self.scenario));
+        expect(!chosen.is_empty(), || {
+            format!("--scenario {}: expected a part of a scenario's name", self.scenario)
+        })?;
+        let kind = |name: &String| {
+            PipelineKind::from_name(name)
+                .ok_or_else(|| Usage(format!("--pipeline {name}: expected a pipeline's kind")))
+        };
+        let kinds = self.pipelines.iter().map(kind).collect::<Result<Vec<_>, _>>()?;
+        let is_some = self.hours > 0.0 && self.hours.is_finite() && self.seeds > 0;
+        expect(is_some, || "--hours and --seeds: expected more than 0".into())?;
+        let plan = table::Plan {
+            scenarios: &chosen,
+            kinds: &kinds,
+            seeds: self.seeds,
+            first_seed: self.first_seed,
+            hours: self.hours,
+            threads: self.threads,
+        };
+        let lines = table::run(&plan)?;
+        let records: Vec<Record> = lines.iter().map(|line| table::record(&plan, line)).collect();
+        if let Some(file) = &self.csv {
+            write_csv(file, &records)?;
+        }
+        give(&self.json, &lines, || output::table(&records))
     }
-    let kinds: Result<Vec<PipelineKind>, _> = arguments
-        .pipelines
-        .iter()
-        .map(|name| {
-            let kind = PipelineKind::from_name(name);
-            kind.ok_or_else(|| (format!("--pipeline {name}: expected a pipeline's kind"), 2))
-        })
-        .collect();
-    if !(arguments.hours > 0.0 && arguments.hours.is_finite()) || arguments.seeds == 0 {
-        return Err(("--hours and --seeds: expected more than 0".into(), 2));
-    }
-    let plan = table::Plan {
-        scenarios: &chosen,
-        kinds: &kinds?,
-        seeds: arguments.seeds,
-        first_seed: arguments.first_seed,
-        hours: arguments.hours,
-        threads: arguments.threads,
-    };
-    let lines = table::run(&plan).map_err(|error| (error.to_string(), 1))?;
-    if let Some(file) = &arguments.csv {
-        write_csv(file, &table::csv(&plan, &lines))?;
-    }
-    give(&arguments.json, &lines, || table::table(&lines))
 }

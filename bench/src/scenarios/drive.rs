@@ -6,7 +6,8 @@ use dynocar_model::train::Davis;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::RngExt;
 
-use super::world::{GUST_S, Habits, KNOT_OVER_MEAN, LoadSource, WEIGHING_STD, World, normal};
+use super::world::{GUST_S, Habits, KNOT_OVER_MEAN, LoadSource, WEIGHING_STD, World};
+use crate::statistics::normal;
 
 /// Steps of the simulation per cycle of the controller.
 const STEPS: u32 = 10;

@@ -13,8 +13,9 @@ use super::drive::Drive;
 use super::rows::NamedScenario;
 use super::score::{Score, answer, least_deviation};
 use super::world::{LoadSource, Scenario, World};
-use crate::output::{CsvRow, cell};
+use crate::output::Record;
 use crate::parallel;
+use crate::statistics::median;
 
 /// Speed in m/s from which an answer counts.
 const COUNTS_MPS: f64 = 2.0;
@@ -154,10 +155,8 @@ fn line(
     row: &NamedScenario,
     kind: PipelineKind,
     quantity: Quantity,
-    (total, mut firsts): (Score, Vec<f64>),
+    (total, firsts): (Score, Vec<f64>),
 ) -> ReportRow {
-    firsts.sort_by(f64::total_cmp);
-    let first_s = firsts[firsts.len() / 2];
     let usable = total.usable.max(1) as f64;
     ReportRow {
         scenario: row.name.clone(),
@@ -165,7 +164,7 @@ fn line(
         quantity: quantity.name(),
         usable_percent: 100.0 * total.usable as f64 / total.cycles.max(1) as f64,
         covered_percent: 100.0 * total.covered as f64 / usable,
-        first_s: first_s.is_finite().then_some(first_s),
+        first_s: median(firsts).filter(|it| it.is_finite()),
         changes_per_h: total.changes as f64 / (plan.hours * plan.seeds as f64),
         wrong_s: total.wrong_s,
         error_percent: 100.0 * (total.error_square / usable).sqrt(),
@@ -175,58 +174,23 @@ fn line(
     }
 }
 
-/// The lines as a table of Markdown, which reads in a terminal too.
-pub fn table(lines: &[ReportRow]) -> String {
-    let mut text = String::from(
-        "| scenario | pipeline | quantity | usable % | truth within 95 % | first use s | changes per h \
-         | longest wrong s | error % | error / deviation | error / bound |\n\
-         | --- | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
-    );
-    for line in lines {
-        let first = line.first_s.map_or("never".into(), |first_s| format!("{first_s:.0}"));
-        let known = line.usable_percent > 0.0;
-        let number = |value: f64, digits: usize| match known {
-            true => format!("{value:.digits$}"),
-            false => "–".into(),
-        };
-        text += &format!(
-            "| {} | `{}` | {} | {:.1} | {} | {first} | {:.1} | {:.1} | {} | {} | {} |\n",
-            line.scenario,
-            line.pipeline,
-            line.quantity,
-            line.usable_percent,
-            number(line.covered_percent, 1),
-            line.changes_per_h,
-            line.wrong_s,
-            number(line.error_percent, 2),
-            number(line.error_over_deviation, 2),
-            line.error_over_bound.map_or("–".into(), |ratio| format!("{ratio:.2}")),
-        );
-    }
-    text
-}
-
-/// The lines for a file of CSV.
-pub fn csv(plan: &Plan<'_>, lines: &[ReportRow]) -> Vec<CsvRow> {
-    let row = |line: &ReportRow| {
-        let (traffic, condition) = line.scenario.split_once(", ").unwrap_or((&line.scenario, ""));
-        let used = |value: f64| Some(value).filter(|_| line.usable_percent > 0.0);
-        vec![
-            ("traffic", traffic.to_owned()),
-            ("condition", condition.to_owned()),
-            ("pipeline", line.pipeline.to_owned()),
-            ("quantity", line.quantity.to_owned()),
-            ("seeds", plan.seeds.to_string()),
-            ("first_seed", plan.first_seed.to_string()),
-            ("usable_percent", cell(Some(line.usable_percent), 1)),
-            ("coverage_percent", cell(used(line.covered_percent), 1)),
-            ("first_use_s", cell(line.first_s, 0)),
-            ("changes_per_h", cell(Some(line.changes_per_h), 1)),
-            ("longest_wrong_s", cell(Some(line.wrong_s), 1)),
-            ("error_percent", cell(used(line.error_percent), 2)),
-            ("error_over_std", cell(used(line.error_over_deviation), 2)),
-            ("error_over_bound", cell(line.error_over_bound, 2)),
-        ]
-    };
-    lines.iter().map(row).collect()
+/// A line for people and for a file of CSV.
+pub fn record(plan: &Plan<'_>, line: &ReportRow) -> Record {
+    let (traffic, condition) = line.scenario.split_once(", ").unwrap_or((&line.scenario, ""));
+    let used = |value: f64| Some(value).filter(|_| line.usable_percent > 0.0);
+    Record::default()
+        .with("traffic", traffic)
+        .with("condition", condition)
+        .with("pipeline", line.pipeline)
+        .with("quantity", line.quantity)
+        .with("seeds", plan.seeds)
+        .with("first_seed", plan.first_seed)
+        .number("usable_percent", line.usable_percent, 1)
+        .number("coverage_percent", used(line.covered_percent), 1)
+        .number("first_use_s", line.first_s, 0)
+        .number("changes_per_h", line.changes_per_h, 1)
+        .number("longest_wrong_s", line.wrong_s, 1)
+        .number("error_percent", used(line.error_percent), 2)
+        .number("error_over_std", used(line.error_over_deviation), 2)
+        .number("error_over_bound", line.error_over_bound, 2)
 }

@@ -5,6 +5,8 @@ use dynocar_tests::simulator::Deviations;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::statistics::normal;
+
 /// The kinds of traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traffic {
@@ -265,10 +267,4 @@ fn profile(
         values[range.clone()].iter().sum::<f64>() / range.len() as f64
     };
     (0..pieces).map(|at| (mean(&map, at), mean(&error, at))).map(|(m, e)| [m, m + e]).collect()
-}
-
-/// A standard normal number.
-pub fn normal(random: &mut ChaCha8Rng) -> f64 {
-    let (one, two) = (1.0 - random.random::<f64>(), random.random::<f64>());
-    (-2.0 * one.ln()).sqrt() * (std::f64::consts::TAU * two).cos()
 }

@@ -9,8 +9,9 @@ use nalgebra::{DMatrix, Matrix3};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use super::scenario::{
-    Condition, NOISE_KMH, OUTLIER_KMH, QUANTUM_KMH, RUNS_KMH, STEP_S, true_speeds_kmh, truth,
+    Condition, NOISE_KMH, OUTLIER_KMH, QUANTUM_KMH, RUNS_KMH, true_speeds_kmh, truth,
 };
+use crate::papers::differences;
 
 /// Fisher information of one rounded speed about the true speed, in 1/(km/h)².
 pub fn sample_information(outlier_share: f64) -> f64 {
@@ -97,25 +98,12 @@ pub fn covariance(condition: Condition, is_kept: impl Fn(usize, usize) -> bool) 
 
 /// Central differences of the speed in m/s by a, b, c and the start speed, at every sample.
 fn derivatives(start_mps: f64, count: usize) -> Vec<[f64; 4]> {
-    let changes = [1e-4, 1e-5, 1e-6, 1e-4];
-    let moved = |index: usize, change: f64| {
+    differences::jacobian([1e-4, 1e-5, 1e-6, 1e-4], |[da, db, dc, dv]| {
         let Davis { a, b, c } = truth();
-        let mut values = [a, b, c, start_mps];
-        values[index] += change;
-        let davis = Davis { a: values[0], b: values[1], c: values[2] };
-        let mut speeds = true_speeds_kmh((values[3] * 3.6, 20.0), &davis);
-        speeds.truncate(count);
-        speeds
-    };
-    let mut rows = vec![[0.0; 4]; count];
-    for (index, change) in changes.into_iter().enumerate() {
-        let (up, down) = (moved(index, change), moved(index, -change));
-        for (row, (up, down)) in rows.iter_mut().zip(up.iter().zip(&down)) {
-            row[index] = (up - down) / 3.6 / (2.0 * change);
-        }
-    }
-    debug_assert!(rows.len() as f64 * STEP_S > 10.0);
-    rows
+        let davis = Davis { a: a + da, b: b + db, c: c + dc };
+        let speeds_kmh = true_speeds_kmh(((start_mps + dv) * 3.6, 20.0), &davis);
+        speeds_kmh.iter().take(count).map(|speed_kmh| speed_kmh / 3.6).collect()
+    })
 }
 
 #[cfg(test)]

@@ -1,58 +1,38 @@
 //! How the train is driven.
 
-use super::shuttle::{BRAKE_MAX_N, Instant, KMH, Shuttle};
+use super::shuttle::{BRAKE_MAX_N, Instant, Shuttle};
+use crate::statistics::KMH;
 
 const SERVICE_BRAKE_MPS2: f64 = 0.7;
 
-/// Decides on the force.
-pub trait Driver {
-    /// Traction minus brake in N that is wanted now on the way to a stop at `to_m`.
-    fn force_n(&mut self, shuttle: &Shuttle, now: &Instant, to_m: f64) -> f64;
-}
+/// Decides on traction minus brake in N that is wanted now on the way to a stop at a chainage in m.
+pub type Driver<'a> = dyn FnMut(&Shuttle, &Instant, f64) -> f64 + 'a;
 
 /// Powers to the limit, lets the speed fall by 6 km/h while coasting, brakes for lower limits
 /// and for the stop.
-#[derive(Clone, Copy, Debug)]
-pub struct LimitDriver {
-    is_powering: bool,
-    is_stopping: bool,
-}
-
-impl LimitDriver {
-    /// A driver about to pull away.
-    pub fn new() -> Self {
-        LimitDriver { is_powering: true, is_stopping: false }
-    }
-}
-
-impl Default for LimitDriver {
-    fn default() -> Self {
-        LimitDriver::new()
-    }
-}
-
-impl Driver for LimitDriver {
-    fn force_n(&mut self, shuttle: &Shuttle, now: &Instant, to_m: f64) -> f64 {
+pub fn limit_driver() -> impl FnMut(&Shuttle, &Instant, f64) -> f64 {
+    let (mut is_powering, mut is_stopping) = (true, false);
+    move |shuttle, now, to_m| {
         let brake_n = |deceleration: f64| (-now.mass_kg * deceleration).max(-BRAKE_MAX_N);
         let stop_m = (now.direction * (to_m - now.position_m)).max(1.0);
         let stop_mps2 = now.speed_mps * now.speed_mps / (2.0 * stop_m);
-        self.is_stopping |= stop_mps2 > SERVICE_BRAKE_MPS2;
-        if self.is_stopping {
+        is_stopping |= stop_mps2 > SERVICE_BRAKE_MPS2;
+        if is_stopping {
             return brake_n(stop_mps2.clamp(0.5, 1.0));
         }
         let (needed_mps2, limit_mps) = limit_need(now);
         if needed_mps2 > SERVICE_BRAKE_MPS2 || now.speed_mps > limit_mps + 2.0 * KMH {
-            self.is_powering = false;
+            is_powering = false;
             return brake_n(needed_mps2.clamp(0.4, 1.0));
         }
         if now.speed_mps < limit_mps - 6.0 * KMH {
-            self.is_powering = true;
+            is_powering = true;
         } else if now.speed_mps > limit_mps - 0.5 * KMH {
-            self.is_powering = false;
+            is_powering = false;
         }
         let is_near = needed_mps2.max(stop_mps2) > 0.6 * SERVICE_BRAKE_MPS2;
         match &shuttle.train.traction {
-            Some(effort) if self.is_powering && !is_near => 0.95 * effort.force_n(now.speed_mps),
+            Some(effort) if is_powering && !is_near => 0.95 * effort.force_n(now.speed_mps),
             _ => 0.0,
         }
     }

@@ -9,15 +9,13 @@ use dynocar_core::pipeline::Estimator;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::driver::Driver;
 use super::leg::{kalman, known_resistance, leg};
 use super::line::STATIONS_M;
-use super::paper::PAPER;
 use super::sensor::measure;
-use super::shuttle::{BRAKE_MAX_N, Calm, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle};
-use crate::papers::row::Row;
+use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle, calm};
+use crate::papers::row::{Row, WANG};
 use crate::papers::seeds::Seeds;
-use crate::papers::statistics::mean;
+use crate::statistics::mean;
 
 /// The fixed mass in kg that the controller assumes without learning.
 const ASSUMED_MASS_KG: f64 = 117_100.0;
@@ -98,7 +96,7 @@ fn comparison(
     }
     let row = |quantity: String, unit, paper_method: &[f64]| Row {
         paper_method: Some(mean(paper_method)),
-        ..Row::new(PAPER, "Figure 10", quantity, unit, Seeds::from_zero(at_equal_time.len()))
+        ..Row::new(WANG, "Figure 10", quantity, unit, Seeds::from_zero(at_equal_time.len()))
     };
     let saving = format!(
         "traction energy saved, {text} (paper's method: whatever the running times; ours: at \
@@ -135,7 +133,7 @@ fn energy_at_time(shuttle: &Shuttle, case: &Case, time_s: f64) -> f64 {
 
 /// What the filter knows after the leg before.
 fn learned_mass_kg(shuttle: &Shuttle, seed: u64) -> f64 {
-    let ride = leg(shuttle, EMPTY_MASS_KG, &mut Calm);
+    let ride = leg(shuttle, EMPTY_MASS_KG, &mut calm);
     let mut filter = kalman(shuttle, &known_resistance(shuttle));
     for sample in measure(shuttle, &ride, &mut ChaCha8Rng::seed_from_u64(seed)) {
         filter.update(&sample);
@@ -145,8 +143,8 @@ fn learned_mass_kg(shuttle: &Shuttle, seed: u64) -> f64 {
 
 fn drive(shuttle: &Shuttle, case: &Case, cruise_mps: f64) -> Driven {
     let start = shuttle.standing_at(STATIONS_M[1], case.mass_kg);
-    let mut follower = PlanFollower { case: *case, cruise_mps, is_stopping: false };
-    let ride = shuttle.drive_with(&mut follower, &start, STATIONS_M[0], 1.0, &mut Calm);
+    let mut follower = plan_follower(*case, cruise_mps);
+    let ride = shuttle.drive_with(&mut follower, &start, STATIONS_M[0], 1.0, &mut calm);
     // The train stops between two samples.
     let moving = ride.iter().rposition(|instant| instant.speed_mps > 0.0).expect("it has moved");
     let [before, last] = [ride[moving - 1], ride[moving]];
@@ -168,36 +166,31 @@ fn traction_energy_j(ride: &[Instant]) -> f64 {
 }
 
 /// A controller that follows the plan from station to station.
-struct PlanFollower {
-    case: Case,
-    cruise_mps: f64,
-    is_stopping: bool,
-}
-
-impl Driver for PlanFollower {
-    fn force_n(&mut self, shuttle: &Shuttle, now: &Instant, to_m: f64) -> f64 {
+fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &Instant, f64) -> f64 {
+    let mut is_stopping = false;
+    move |shuttle, now, to_m| {
         let left_m = (to_m - now.position_m).abs();
         // Wherever the plan has led, the train has to stop at the platform; no mass is assumed.
         let stop_mps2 = now.speed_mps * now.speed_mps / (2.0 * left_m.max(1.0));
-        self.is_stopping |= stop_mps2 > BRAKING_MPS2;
-        if self.is_stopping {
+        is_stopping |= stop_mps2 > BRAKING_MPS2;
+        if is_stopping {
             return -now.mass_kg * stop_mps2.clamp(0.5, 1.0);
         }
         let travelled_m = (now.position_m - STATIONS_M[1]).abs();
         let rising_mps = (2.0 * ACCELERATION_MPS2 * travelled_m).sqrt();
-        let (speed_mps, acceleration_mps2) = if rising_mps < self.cruise_mps {
+        let (speed_mps, acceleration_mps2) = if rising_mps < cruise_mps {
             (rising_mps, ACCELERATION_MPS2)
         } else {
-            (self.cruise_mps, 0.0)
+            (cruise_mps, 0.0)
         };
-        let planned = Instant { speed_mps, mass_kg: self.case.assumed_kg, force_n: 0.0, ..*now };
+        let planned = Instant { speed_mps, mass_kg: case.assumed_kg, force_n: 0.0, ..*now };
         // The force at which the assumed train would just move as planned.
         let drag_mps2 = -shuttle.acceleration_mps2(&planned, 0.0);
-        let correction_mps2 = match self.case.control {
+        let correction_mps2 = match case.control {
             Control::FeedForward => 0.0,
             Control::ClosedLoop => SPEED_GAIN_PER_S * (speed_mps - now.speed_mps),
         };
-        let wanted_n = self.case.assumed_kg * (acceleration_mps2 + drag_mps2 + correction_mps2);
+        let wanted_n = case.assumed_kg * (acceleration_mps2 + drag_mps2 + correction_mps2);
         let most_n =
             shuttle.train.traction.as_ref().map_or(0.0, |curve| curve.force_n(now.speed_mps));
         wanted_n.clamp(-BRAKE_MAX_N, most_n)

@@ -5,7 +5,7 @@ use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_estimators::wang::{MassKalman, MassKalmanSettings};
 use dynocar_estimators::wang::{MassRegression, StagedDescent, StagedDescentSettings};
 
-use super::driver::{Driver, LimitDriver};
+use super::driver::{Driver, limit_driver};
 use super::line::{CURVE_RADIUS_M, STATIONS_M};
 use super::shuttle::{Disturbance, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle};
 
@@ -18,25 +18,25 @@ impl Shuttle {
         start: &Instant,
         to_m: f64,
         dwell_s: f64,
-        disturbance: &mut dyn Disturbance,
+        disturbance: &mut Disturbance<'_>,
     ) -> Vec<Instant> {
-        self.drive_with(&mut LimitDriver::new(), start, to_m, dwell_s, disturbance)
+        self.drive_with(&mut limit_driver(), start, to_m, dwell_s, disturbance)
     }
 
     /// Drives from standstill to standstill at `to_m`, then stands for `dwell_s`.
     pub fn drive_with(
         &self,
-        driver: &mut dyn Driver,
+        driver: &mut Driver<'_>,
         start: &Instant,
         to_m: f64,
         dwell_s: f64,
-        disturbance: &mut dyn Disturbance,
+        disturbance: &mut Disturbance<'_>,
     ) -> Vec<Instant> {
         let mut now = Instant { speed_mps: 0.0, force_n: 0.0, ..*start };
         now.direction = (to_m - now.position_m).signum();
         let mut ride = vec![now];
         loop {
-            let wanted_n = driver.force_n(self, &now, to_m);
+            let wanted_n = driver(self, &now, to_m);
             let change = FORCE_SLEW_N_PER_S * PERIOD_S;
             let to_n = wanted_n.clamp(now.force_n - change, now.force_n + change);
             let next = self.advance(&now, to_n, disturbance);
@@ -56,7 +56,7 @@ impl Shuttle {
     }
 
     /// Drives to and fro until there are `count` samples, the empty train throughout.
-    pub fn crossing(&self, count: usize, disturbance: &mut dyn Disturbance) -> Vec<Instant> {
+    pub fn crossing(&self, count: usize, disturbance: &mut Disturbance<'_>) -> Vec<Instant> {
         let mut ride: Vec<Instant> = Vec::with_capacity(count + 8_000);
         let mut now = self.standing_at(STATIONS_M[0], EMPTY_MASS_KG);
         let mut station = 0_usize;
@@ -79,7 +79,7 @@ impl Shuttle {
 }
 
 /// The leg of 3 km from the first station: power, coasting around 80 km/h, braking.
-pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut dyn Disturbance) -> Vec<Instant> {
+pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut Disturbance<'_>) -> Vec<Instant> {
     shuttle.drive(&shuttle.standing_at(STATIONS_M[0], mass_kg), STATIONS_M[1], 10.0, disturbance)
 }
 
@@ -90,7 +90,7 @@ pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut dyn Disturbance) -
 pub fn there_and_back(
     shuttle: &Shuttle,
     mass_kg: f64,
-    disturbance: &mut dyn Disturbance,
+    disturbance: &mut Disturbance<'_>,
 ) -> Vec<Instant> {
     let empty = shuttle.standing_at(STATIONS_M[1], EMPTY_MASS_KG);
     let mut ride = shuttle.drive(&empty, STATIONS_M[0], 20.0, disturbance);

@@ -8,16 +8,15 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::bound::{Information, mass_std_in_wind};
-use super::disturbance::{GradientError, Presumed, Wind};
+use super::disturbance::{presumed, wind};
 use super::leg::{kalman, known_resistance, leg, staged, there_and_back};
-use super::paper::PAPER;
 use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::sensor::measure;
-use super::shuttle::{Calm, Disturbance, Shuttle};
-use crate::papers::row::Row;
+use super::shuttle::{Disturbance, Shuttle, calm};
+use crate::papers::row::{Row, WANG};
 use crate::papers::score::Score;
 use crate::papers::seeds::Seeds;
-use crate::papers::statistics::{mean, root_mean_square};
+use crate::statistics::{mean, root_mean_square};
 
 /// Mass in kg and published deviation in % of each line of Table 3.
 const TABLE_3: [(f64, f64); 3] = [(110_000.0, 2.45), (117_100.0, 3.08), (114_000.0, 2.55)];
@@ -32,14 +31,13 @@ enum Condition {
 }
 
 impl Condition {
-    fn disturbance(self, shuttle: &Shuttle, seed: u64) -> Box<dyn Disturbance> {
+    fn disturbance(self, shuttle: &Shuttle, seed: u64) -> Box<Disturbance<'_>> {
+        let permille = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
         match self {
-            Condition::Calm => Box::new(Calm),
-            Condition::Wind => Box::new(Wind::new(shuttle.truth.basic.c, seed ^ 0x5eed)),
-            Condition::Presumed => Box::new(Presumed::new(seed)),
-            Condition::GradientError => {
-                Box::new(GradientError(if seed.is_multiple_of(2) { 1.0 } else { -1.0 }))
-            }
+            Condition::Calm => Box::new(calm),
+            Condition::Wind => Box::new(wind(shuttle.truth.basic.c, seed ^ 0x5eed)),
+            Condition::Presumed => Box::new(presumed(seed)),
+            Condition::GradientError => Box::new(move |_| permille),
         }
     }
 }
@@ -64,7 +62,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = Vec::new();
     for (mass_kg, published) in TABLE_3 {
         let errors = run(&shuttle, mass_kg, Condition::Calm, 1.0, seeds);
-        let leg = leg(&shuttle, mass_kg, &mut Calm);
+        let leg = leg(&shuttle, mass_kg, &mut calm);
         let bound = 100.0 * Information::of(&shuttle, &leg).mass_std();
         let quantity =
             format!("mass of {:.1} t after one leg of 3 km, newly loaded", 1e-3 * mass_kg);
@@ -72,21 +70,8 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     }
     let (mass_kg, published) = TABLE_3[1];
     let calm = run(&shuttle, mass_kg, Condition::Calm, 1.0, seeds);
-    rows.push(Row {
-        paper_method: Some(mean(&calm.force_on_acceleration)),
-        baseline: Some(mean(&calm.acceleration_on_force)),
-        ours: Some(mean(&calm.ours.errors)),
-        coverage: None,
-        nees: None,
-        nees_freedom: None,
-        ..error_row(
-            "bias of the mass of 117.1 t: mean error with its sign".into(),
-            Some(-published),
-            &calm,
-            None,
-            seeds,
-        )
-    });
+    let quantity = "bias of the mass of 117.1 t: mean error with its sign";
+    rows.push(bias_row(quantity.into(), Some(-published), &calm, seeds));
     rows.extend(disturbed_rows(&shuttle, mass_kg, seeds));
     rows.extend(misdeclared_rows(&shuttle, mass_kg, seeds));
     rows.push(chain_row(&shuttle, mass_kg, crossings));
@@ -95,8 +80,8 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 
 /// The whole chain: resistances from one crossing, then the mass with them.
 fn chain_row(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> Row {
-    let crossing = shuttle.crossing(CROSSING, &mut Calm);
-    let ride = there_and_back(shuttle, mass_kg, &mut Calm);
+    let crossing = shuttle.crossing(CROSSING, &mut calm);
+    let ride = there_and_back(shuttle, mass_kg, &mut calm);
     let mut errors = Errors::default();
     for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -117,35 +102,27 @@ fn chain_row(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> Row {
 }
 
 fn disturbed_rows(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> [Row; 3] {
-    let calm_leg = leg(shuttle, mass_kg, &mut Calm);
-    let wind = run(shuttle, mass_kg, Condition::Wind, 1.0, seeds);
-    let gradient = run(shuttle, mass_kg, Condition::GradientError, 1.0, seeds);
-    let presumed = run(shuttle, mass_kg, Condition::Presumed, 1.0, seeds);
+    let calm_leg = leg(shuttle, mass_kg, &mut calm);
     let wind_bound = 100.0 * mass_std_in_wind(shuttle, &calm_leg);
     let gradient_bound = 100.0 * Information::of(shuttle, &calm_leg).mass_std_with_bias();
     [
-        error_row(
-            "mass of 117.1 t after one leg, headwind of 3 m/s mean and 1 m/s gusts (standard deviations)".into(),
-            None,
-            &wind,
+        (
+            Condition::Wind,
+            "headwind of 3 m/s mean and 1 m/s gusts (standard deviations)",
             Some(wind_bound),
-            seeds,
         ),
-        error_row(
-            "mass of 117.1 t after one leg, gradient wrong by 1 permille".into(),
+        (Condition::GradientError, "gradient wrong by 1 permille", Some(gradient_bound)),
+        (
+            Condition::Presumed,
+            "unexplained acceleration drawn from the filter's eight behaviours",
             None,
-            &gradient,
-            Some(gradient_bound),
-            seeds,
-        ),
-        error_row(
-            "mass of 117.1 t after one leg, unexplained acceleration drawn from the filter's eight behaviours".into(),
-            None,
-            &presumed,
-            None,
-            seeds,
         ),
     ]
+    .map(|(condition, text, bound)| {
+        let errors = run(shuttle, mass_kg, condition, 1.0, seeds);
+        let quantity = format!("mass of 117.1 t after one leg, {text}");
+        error_row(quantity, None, &errors, bound, seeds)
+    })
 }
 
 /// What no estimator can distinguish from mass: the rows show the shift.
@@ -158,22 +135,22 @@ fn misdeclared_rows(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> [Row; 2] {
     ];
     cases.map(|(shuttle, force_gain, text)| {
         let errors = run(shuttle, mass_kg, Condition::Calm, force_gain, seeds);
-        Row {
-            paper_method: Some(mean(&errors.force_on_acceleration)),
-            baseline: Some(mean(&errors.acceleration_on_force)),
-            ours: Some(mean(&errors.ours.errors)),
-            coverage: None,
-            nees: None,
-            nees_freedom: None,
-            ..error_row(
-                format!("mean error of the mass of 117.1 t with {text}: not identifiable"),
-                None,
-                &errors,
-                None,
-                seeds,
-            )
-        }
+        let quantity = format!("mean error of the mass of 117.1 t with {text}: not identifiable");
+        bias_row(quantity, None, &errors, seeds)
     })
+}
+
+/// A row of mean errors with their sign; intervals say nothing of a bias.
+fn bias_row(quantity: String, published: Option<f64>, errors: &Errors, seeds: Seeds) -> Row {
+    Row {
+        paper_method: Some(mean(&errors.force_on_acceleration)),
+        baseline: Some(mean(&errors.acceleration_on_force)),
+        ours: Some(mean(&errors.ours.errors)),
+        coverage: None,
+        nees: None,
+        nees_freedom: None,
+        ..error_row(quantity, published, errors, None, seeds)
+    }
 }
 
 fn error_row(
@@ -191,7 +168,7 @@ fn error_row(
         paper_method: Some(root_mean_square(&errors.force_on_acceleration)),
         baseline: Some(root_mean_square(&errors.acceleration_on_force)),
         bound,
-        ..errors.ours.row(Row::new(PAPER, "Table 3", quantity, "%", seeds))
+        ..errors.ours.row(Row::new(WANG, "Table 3", quantity, "%", seeds))
     }
 }
 

@@ -10,14 +10,13 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::bound::Information;
-use super::paper::PAPER;
 use super::printed::PrintedDescent;
 use super::sensor::measure;
-use super::shuttle::{Calm, Instant, Shuttle};
-use crate::papers::row::Row;
+use super::shuttle::{Instant, Shuttle, calm};
+use crate::papers::row::{Row, WANG};
 use crate::papers::score::{Score, w0_errors};
 use crate::papers::seeds::Seeds;
-use crate::papers::statistics::{mean, root_mean_square};
+use crate::statistics::{mean, root_mean_square};
 
 /// Samples of one crossing.
 pub const CROSSING: usize = 28_000;
@@ -34,7 +33,7 @@ struct Errors {
 /// The rows for resistance.
 pub fn rows(seeds: Seeds) -> Vec<Row> {
     let shuttle = Shuttle::new(false);
-    let ride = shuttle.crossing(CROSSING, &mut Calm);
+    let ride = shuttle.crossing(CROSSING, &mut calm);
     let speeds = Section::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
     let information = Information::of(&shuttle, &ride);
     let errors = run(&shuttle, &ride, &speeds, seeds);
@@ -58,7 +57,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 /// With curves inside tunnels, which Algorithm 1 puts into the curve set.
 fn curve_in_tunnel_row(seeds: Seeds) -> Row {
     let shuttle = Shuttle::new(true);
-    let ride = shuttle.crossing(CROSSING, &mut Calm);
+    let ride = shuttle.crossing(CROSSING, &mut calm);
     let speeds = Section::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
     let curve = Section::Curve as usize;
     let bound = Information::of(&shuttle, &ride).resistance_std(curve, &speeds[curve]);
@@ -75,7 +74,7 @@ fn error_row(quantity: String, errors: &Errors, bound: Option<f64>, seeds: Seeds
     Row {
         paper_method: Some(root_mean_square(&errors.staged)),
         bound,
-        ..errors.ours.row(Row::new(PAPER, "Table 2", quantity, "N/kN", seeds))
+        ..errors.ours.row(Row::new(WANG, "Table 2", quantity, "N/kN", seeds))
     }
 }
 
@@ -125,7 +124,7 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [Row; 2] {
     }
     let row = |quantity: &str, unit, value| Row {
         paper_method: Some(value),
-        ..Row::new(PAPER, "section 3.1", quantity, unit, seeds)
+        ..Row::new(WANG, "section 3.1", quantity, unit, seeds)
     };
     [
         row("learning rate 1e-7, speed in km/h: samples until it has diverged", "1", mean(&until)),

@@ -6,7 +6,7 @@ use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand_chacha::ChaCha8Rng;
 
 use super::shuttle::{Instant, Shuttle};
-use crate::papers::seeds::normal;
+use crate::statistics::normal;
 
 /// Standard deviation of the speed sensor in m/s: 0.05 km/h.
 pub const SPEED_STD_MPS: f64 = 0.05 / 3.6;

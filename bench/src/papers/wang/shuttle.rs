@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use super::line::{CURVE_RADIUS_M, curves, gradients, tunnels};
+use crate::statistics::KMH;
 use dynocar_model::simulate::motion::{Motion, advance};
 use dynocar_model::track::Track;
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
@@ -17,8 +18,6 @@ pub const PERIOD_S: f64 = 0.2;
 /// Mass in kg of the empty train, Table 1.
 pub const EMPTY_MASS_KG: f64 = 110_000.0;
 
-/// m/s of one km/h.
-pub const KMH: f64 = 1.0 / 3.6;
 /// Greatest brake force in N.
 pub const BRAKE_MAX_N: f64 = 110_000.0;
 
@@ -91,19 +90,13 @@ pub struct Instant {
     pub mass_kg: f64,
 }
 
-/// What acts on the train that neither map nor model knows.
-pub trait Disturbance {
-    /// Resistance in N/kN beyond the model's, at a time and a speed.
-    fn resistance_n_per_kn(&mut self, time_s: f64, speed_mps: f64) -> f64;
-}
+/// What acts on the train and neither map nor model knows: resistance in N/kN beyond the model's at a speed in m/s,
+/// asked for once a period.
+pub type Disturbance<'a> = dyn FnMut(f64) -> f64 + 'a;
 
 /// Nothing beyond the model.
-pub struct Calm;
-
-impl Disturbance for Calm {
-    fn resistance_n_per_kn(&mut self, _time_s: f64, _speed_mps: f64) -> f64 {
-        0.0
-    }
+pub fn calm(_speed_mps: f64) -> f64 {
+    0.0
 }
 
 impl Shuttle {
@@ -154,8 +147,8 @@ impl Shuttle {
     }
 
     /// One sampling period further, the force linear between `from.force_n` and `to_n`.
-    pub fn advance(&self, from: &Instant, to_n: f64, disturbance: &mut dyn Disturbance) -> Instant {
-        let extra = disturbance.resistance_n_per_kn(from.time_s, from.speed_mps);
+    pub fn advance(&self, from: &Instant, to_n: f64, disturbance: &mut Disturbance<'_>) -> Instant {
+        let extra = disturbance(from.speed_mps);
         let slew_n_per_s = (to_n - from.force_n) / PERIOD_S;
         let at = |ahead_s: f64, motion: Motion| Instant {
             time_s: from.time_s + ahead_s,

@@ -7,17 +7,16 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::leg::{kalman, known_resistance, staged, there_and_back};
-use super::paper::PAPER;
 use super::sensor::measure;
-use super::shuttle::{Calm, EMPTY_MASS_KG, Shuttle};
-use crate::papers::row::Row;
+use super::shuttle::{EMPTY_MASS_KG, Shuttle, calm};
+use crate::papers::row::{Row, WANG};
 use crate::papers::seeds::Seeds;
-use crate::papers::statistics::mean;
+use crate::statistics::mean;
 
 /// A change of mass at a stop: seconds under force until the error stays below 1 %.
 pub fn row(shuttle: &Shuttle, seeds: Seeds) -> Row {
     let loaded_kg = 1.12 * EMPTY_MASS_KG;
-    let ride = there_and_back(shuttle, loaded_kg, &mut Calm);
+    let ride = there_and_back(shuttle, loaded_kg, &mut calm);
     let stop = ride.iter().position(|instant| instant.mass_kg == loaded_kg).expect("a second leg");
     let resistance = known_resistance(shuttle);
     let (mut paper, mut reverse, mut ours) = (Vec::new(), Vec::new(), Vec::new());
@@ -49,7 +48,7 @@ pub fn row(shuttle: &Shuttle, seeds: Seeds) -> Row {
         paper_method: time_s(&paper),
         baseline: time_s(&reverse),
         ours: time_s(&ours),
-        ..Row::new(PAPER, "Figure 9", quantity, "s", seeds)
+        ..Row::new(WANG, "Figure 9", quantity, "s", seeds)
     }
 }
 

@@ -5,19 +5,19 @@ use dynocar_model::train::Davis;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::scenario::{DISTURBANCE_N_PER_KN, DISTURBANCE_S, Run, SPEED_NOISE_MPS, speeds_mps};
+use crate::papers::differences;
 
 /// Least covariance of (a, b, c) that an unbiased estimator can have from a run's speeds with
 /// white noise, when the initial speed is not known either.
 pub fn davis_covariance(run: &Run, davis: &Davis) -> Matrix3<f64> {
-    let rows = jacobian(run, davis);
-    covariance(rows.row_iter().map(|row| [row[0], row[1], row[2], row[3], 0.0]))
-        * SPEED_NOISE_MPS.powi(2)
+    covariance(jacobian(run, davis)) * SPEED_NOISE_MPS.powi(2)
 }
 
 /// The same where the resistance is disturbed as in [`Run::disturbed`] and the disturbance's
 /// strength and correlation are known: generalised least squares.
 pub fn disturbed_davis_covariance(run: &Run, davis: &Davis) -> Matrix3<f64> {
     let rows = jacobian(run, davis);
+    let rows = DMatrix::from_fn(rows.len(), 4, |i, j| rows[i][j]);
     let count = run.speeds_mps.len();
     let mut times_s = vec![0.0];
     for (step, speed_mps) in run.steps.iter().zip(&run.speeds_mps) {
@@ -34,27 +34,16 @@ pub fn disturbed_davis_covariance(run: &Run, davis: &Davis) -> Matrix3<f64> {
     }
     let factor = noise.cholesky().expect("white noise makes it positive definite").unpack();
     let whitened = factor.solve_lower_triangular(&rows).expect("a positive diagonal");
-    covariance(whitened.row_iter().map(|row| [row[0], row[1], row[2], row[3], 0.0]))
+    covariance(whitened.row_iter().map(|row| [row[0], row[1], row[2], row[3]]))
 }
 
 /// Derivatives of every speed with respect to v_0, a, b and c, by central differences of the
 /// truth's own recursion rather than by the derivatives that the estimators use.
-fn jacobian(run: &Run, davis: &Davis) -> DMatrix<f64> {
-    let at = |[dv, da, db, dc]: [f64; 4]| {
+fn jacobian(run: &Run, davis: &Davis) -> Vec<[f64; 4]> {
+    differences::jacobian([1e-4, 1e-4, 1e-6, 1e-8], |[dv, da, db, dc]| {
         let moved = Davis { a: davis.a + da, b: davis.b + db, c: davis.c + dc };
         speeds_mps(&run.steps, run.speeds_mps[0] + dv, &moved)
-    };
-    let widths = [1e-4, 1e-4, 1e-6, 1e-8];
-    let mut rows = DMatrix::zeros(run.speeds_mps.len(), 4);
-    for (column, width) in widths.into_iter().enumerate() {
-        let mut change = [0.0; 4];
-        change[column] = width;
-        let (plus, minus) = (at(change), at(change.map(|width| -width)));
-        for (row, (plus, minus)) in plus.iter().zip(minus).enumerate() {
-            rows[(row, column)] = (plus - minus) / (2.0 * width);
-        }
-    }
-    rows
+    })
 }
 
 /// Derivatives of every speed with respect to 1 N/kN of resistance during each step.
@@ -77,9 +66,9 @@ fn effects(run: &Run, davis: &Davis) -> DMatrix<f64> {
 }
 
 /// Covariance of the last three parameters for rows of unit variance.
-fn covariance(rows: impl Iterator<Item = [f64; 5]>) -> Matrix3<f64> {
+fn covariance(rows: impl IntoIterator<Item = [f64; 4]>) -> Matrix3<f64> {
     let mut gathered = TriangularAccumulator::<5>::default();
-    rows.for_each(|row| gathered.push(&row));
+    rows.into_iter().for_each(|[v, a, b, c]| gathered.push(&[v, a, b, c, 0.0]));
     let information = TriangularSystem::<3>::from_rows(&mut gathered);
     information.covariance().expect("a run that excites a, b and c")
 }

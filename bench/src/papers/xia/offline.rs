@@ -18,12 +18,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bound::{davis_covariance, disturbed_davis_covariance};
 use super::ratio_posterior::likeliest_fit;
-use super::row::row;
 use super::scenario::{CASES, Profile, Run, all_speeds_mps, drive, fast_speeds_mps};
-use crate::papers::row::Row;
+use crate::papers::row::{Row, XIA};
 use crate::papers::score::{Score, w0_errors};
 use crate::papers::seeds::Seeds;
-use crate::papers::statistics::root_mean_square;
+use crate::statistics::root_mean_square;
 
 /// Identified a of Table 3, case by case.
 const PUBLISHED_A: [f64; 4] = [0.7901, 0.2956, 1.0525, 0.3485];
@@ -111,7 +110,7 @@ pub fn convergence_rows(seeds: Seeds) -> Vec<Row> {
                 paper_method: share(converged[1]),
                 baseline: share(converged[0]),
                 ours: share(converged[2]),
-                ..row("Table 3", quantity, "%", seeds)
+                ..Row::new(XIA, "Table 3", quantity, "%", seeds)
             });
         }
     }
@@ -148,7 +147,7 @@ pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
                 published: Some((PUBLISHED_A[case] - truth.a).abs()),
                 paper_method: (!paper.is_empty()).then(|| root_mean_square(&paper)),
                 ours: (ours.len() == seeds.count).then(|| root_mean_square(&ours)),
-                ..row("Table 3", quantity, "N/kN", seeds)
+                ..Row::new(XIA, "Table 3", quantity, "N/kN", seeds)
             });
         }
     }
@@ -187,8 +186,9 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
         }
     }
     let published = w0_errors(&PUBLISHED_NOISY, &truth, &fast);
-    let line =
-        |quantity: &str, score: &Score| score.row(row("Figure 4", quantity.into(), "N/kN", seeds));
+    let line = |quantity: &str, score: &Score| {
+        score.row(Row::new(XIA, "Figure 4", quantity, "N/kN", seeds))
+    };
     vec![
         Row {
             paper_method: Some(root_mean_square(&paper_free)),
@@ -198,9 +198,10 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
             published: Some(root_mean_square(&published)),
             paper_method: Some(root_mean_square(&paper_boxed)),
             ours: Some(root_mean_square(&boxed)),
-            ..row(
+            ..Row::new(
+                XIA,
                 "Figure 4",
-                "w0 over 270-305 km/h, cruise of 120 km, within Table 2's bounds".into(),
+                "w0 over 270-305 km/h, cruise of 120 km, within Table 2's bounds",
                 "N/kN",
                 seeds,
             )
@@ -282,6 +283,6 @@ fn disturbed_row(seeds: Seeds) -> Row {
                     5 s (AR 1); paper's method: output error with v_0 free";
     Row {
         paper_method: Some(root_mean_square(&output_error.errors)),
-        ..ours.row(row("Figure 4", quantity.into(), "N/kN", seeds))
+        ..ours.row(Row::new(XIA, "Figure 4", quantity, "N/kN", seeds))
     }
 }

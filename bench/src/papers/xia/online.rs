@@ -19,15 +19,14 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bound::disturbed_davis_covariance;
 use super::offline;
-use super::row::row;
 use super::scenario::{
     CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps, drive,
     fast_speeds_mps,
 };
-use crate::papers::row::Row;
+use crate::papers::row::{Row, XIA};
 use crate::papers::score::{Score, w0_std};
-use crate::papers::seeds::{Seeds, normal};
-use crate::papers::statistics::{mean, root_mean_square};
+use crate::papers::seeds::Seeds;
+use crate::statistics::{mean, normal, root_mean_square};
 
 /// Data capacity I of the paper's window.
 const WINDOW: usize = 20;
@@ -212,7 +211,13 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
         }
     }
     let line = |quantity: &str, unit| {
-        row("Table 4", format!("{quantity} (paper's method: {paper_lines} lines)"), unit, seeds)
+        Row::new(
+            XIA,
+            "Table 4",
+            format!("{quantity} (paper's method: {paper_lines} lines)"),
+            unit,
+            seeds,
+        )
     };
     vec![
         Row {
@@ -274,7 +279,7 @@ fn exact_forces_row(seeds: Seeds) -> Row {
         }
     }
     let quantity = "online, no switch: w0 over 30-300 km/h after a full profile of 40 km";
-    score.row(row("Table 4", quantity.into(), "N/kN", seeds))
+    score.row(Row::new(XIA, "Table 4", quantity, "N/kN", seeds))
 }
 
 /// Cruise under a disturbance that lasts for seconds, of which the filter knows nothing; the
@@ -303,5 +308,5 @@ fn disturbed_row(seeds: Seeds) -> Row {
     }
     let quantity = "online, no switch, resistance disturbed by 0.25 N/kN for 5 s (AR 1): \
                     w0 over 270-305 km/h after 120 km";
-    score.row(row("Table 4", quantity.into(), "N/kN", seeds))
+    score.row(Row::new(XIA, "Table 4", quantity, "N/kN", seeds))
 }

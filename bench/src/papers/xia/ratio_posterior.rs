@@ -17,8 +17,6 @@ use nalgebra::{Matrix3, Vector3};
 const EXPONENTS: std::ops::RangeInclusive<i32> = -7..=2;
 /// Nodes between two decades around the likeliest one, the later decade among them.
 const PER_DECADE: i32 = 4;
-/// Every decade, and the nodes between the likeliest and its neighbours.
-const NODES_MAX: usize = 16;
 
 /// Decrease of the cost worth an iteration when disturbance ratios are compared.
 const ROUGH_DECREASE: f64 = 2e-4;
@@ -34,7 +32,7 @@ pub fn likeliest_fit(
         let settings = FitSettings { disturbance_ratio, decrease_tolerance, ..*settings };
         fitter.fit(segments, start, &settings)
     };
-    let mut posterior = RatioPosterior::new();
+    let mut posterior = RatioPosterior::default();
     let mut davis = None;
     // Downwards, since much disturbance binds the trajectory to the measured speeds.
     for exponent in EXPONENTS.rev().map(f64::from) {
@@ -89,41 +87,24 @@ impl Tried {
 }
 
 /// The ratios tried, in ascending order.
-#[derive(Clone, Copy, Debug)]
-struct RatioPosterior {
-    nodes: [Tried; NODES_MAX],
-    count: usize,
-}
+#[derive(Clone, Debug, Default)]
+struct RatioPosterior(Vec<Tried>);
 
 impl RatioPosterior {
-    /// Before any trial.
-    fn new() -> Self {
-        RatioPosterior { nodes: [Tried::default(); NODES_MAX], count: 0 }
-    }
-
-    /// Adds a trial; beyond the capacity it is left out.
+    /// Adds a trial.
     fn add(&mut self, tried: Tried) {
-        if self.count == NODES_MAX {
-            return;
-        }
-        let index = self.nodes[..self.count].partition_point(|node| node.exponent < tried.exponent);
-        self.nodes.copy_within(index..self.count, index + 1);
-        self.nodes[index] = tried;
-        self.count += 1;
-    }
-
-    fn nodes(&self) -> &[Tried] {
-        &self.nodes[..self.count]
+        let index = self.0.partition_point(|node| node.exponent < tried.exponent);
+        self.0.insert(index, tried);
     }
 
     fn likeliest_index(&self) -> usize {
-        let likelihood = |i: &usize| self.nodes[*i].log_likelihood;
-        (0..self.count).max_by(|i, j| likelihood(i).total_cmp(&likelihood(j))).unwrap_or(0)
+        let likelihood = |i: &usize| self.0[*i].log_likelihood;
+        (0..self.0.len()).max_by(|i, j| likelihood(i).total_cmp(&likelihood(j))).unwrap_or(0)
     }
 
     /// The likeliest of the ratios tried.
     fn likeliest(&self) -> &Tried {
-        &self.nodes[self.likeliest_index()]
+        &self.0[self.likeliest_index()]
     }
 
     /// Exponents between the likeliest decade and its neighbours, downwards.
@@ -140,7 +121,7 @@ impl RatioPosterior {
     /// Exponent of the greatest likelihood, by a parabola through the likeliest ratio and its
     /// neighbours where they are as far apart.
     fn peak_exponent(&self) -> f64 {
-        let (nodes, at) = (self.nodes(), self.likeliest_index());
+        let (nodes, at) = (&self.0, self.likeliest_index());
         let centre = &nodes[at];
         let (Some(left), Some(right)) = (at.checked_sub(1).map(|i| &nodes[i]), nodes.get(at + 1))
         else {
@@ -157,7 +138,7 @@ impl RatioPosterior {
     /// Mean square error of given coefficients over all ratios, by the trapezoidal rule; `None`
     /// without a trial.
     fn covariance_about(&self, point: &Vector3<f64>) -> Option<Matrix3<f64>> {
-        let nodes = self.nodes();
+        let nodes = &self.0;
         let best = self.likeliest().log_likelihood;
         let (mut sum, mut total) = (Matrix3::zeros(), 0.0);
         for (i, node) in nodes.iter().enumerate() {
@@ -181,7 +162,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::papers::seeds::normal;
+    use crate::statistics::normal;
 
     const FAST: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 
@@ -214,7 +195,7 @@ mod tests {
             point: Vector3::new(exponent - centre, 0.0, 0.0),
             covariance: Matrix3::identity() * 10f64.powf(exponent - centre),
         };
-        let mut posterior = RatioPosterior::new();
+        let mut posterior = RatioPosterior::default();
         EXPONENTS.for_each(|exponent| posterior.add(tried(f64::from(exponent))));
         for exponent in posterior.between_neighbours() {
             posterior.add(tried(exponent));
@@ -273,7 +254,7 @@ mod tests {
     fn at_the_end_of_the_range_only_its_inner_side_is_tried() {
         let posterior = posterior(-9.0, 3.0);
         assert_eq!(posterior.peak_exponent(), -7.0);
-        assert!(posterior.nodes().iter().all(|node| (-7.0..=2.0).contains(&node.exponent)));
+        assert!(posterior.0.iter().all(|node| (-7.0..=2.0).contains(&node.exponent)));
         assert!(posterior.covariance_about(&Vector3::zeros()).unwrap()[(1, 1)] > 10.0);
     }
 }

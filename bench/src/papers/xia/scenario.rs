@@ -11,7 +11,7 @@ use dynocar_model::train::Davis;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::papers::seeds::normal;
+use crate::statistics::normal;
 
 /// Mass in t.
 pub const MASS_T: f64 = 981.7;

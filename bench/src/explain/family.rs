@@ -1,0 +1,75 @@
+//! Which simulated datasets explain and monitor work on.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::case::Case;
+use super::scenario::Scenario;
+use super::world::World;
+use crate::output::{Failure, Usage};
+use crate::parallel;
+
+/// The simulated datasets of a command, and what becomes of its result.
+#[derive(Debug, Args)]
+pub struct FamilyArguments {
+    /// Simulated datasets for each kind
+    #[arg(long, default_value_t = 20)]
+    seeds: usize,
+    /// The first seed
+    #[arg(long, default_value_t = 1)]
+    pub first_seed: u64,
+    /// Only this kind, as tunnel_drag, or none, two_effects, none_poor_recording; may be repeated
+    #[arg(long = "kind", value_name = "NAME")]
+    kinds: Vec<String>,
+    /// What is a little wrong besides the effect
+    #[arg(long, value_enum, default_value_t = World::Plain)]
+    world: World,
+    /// Datasets at a time
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
+    /// Print the outcome of every dataset on standard error
+    #[arg(long)]
+    pub verbose: bool,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+impl FamilyArguments {
+    /// The scenarios asked for, else the usual ones.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such kind.
+    pub fn scenarios(&self, usual: Vec<Scenario>) -> Result<Vec<Scenario>, Failure> {
+        let all = Scenario::all();
+        let one = |name: &String| {
+            let found = all.iter().find(|scenario| scenario.name() == name).copied();
+            found.ok_or_else(|| {
+                let known: Vec<_> = all.iter().map(|scenario| scenario.name()).collect();
+                Usage(format!("--kind {name}: expected one of {}", known.join(", "))).into()
+            })
+        };
+        if self.kinds.is_empty() { Ok(usual) } else { self.kinds.iter().map(one).collect() }
+    }
+
+    /// Every scenario with every seed, scenario by scenario.
+    pub fn cases(&self, scenarios: &[Scenario]) -> Vec<Case> {
+        let (first, world) = (self.first_seed, self.world);
+        let seeds = move || first..first + self.seeds as u64;
+        let of = |&scenario| seeds().map(move |seed| Case { scenario, seed, world });
+        scenarios.iter().flat_map(of).collect()
+    }
+
+    /// Does the work on every case; gives what came of it by scenario.
+    pub fn over<R: Clone + Send>(
+        &self,
+        scenarios: &[Scenario],
+        work: impl Fn(&Case) -> R + Sync,
+    ) -> Vec<(Scenario, Vec<R>)> {
+        let results = parallel::over(&self.cases(scenarios), self.threads, work);
+        let by_scenario = results.chunks(self.seeds.max(1)).map(<[R]>::to_vec);
+        scenarios.iter().copied().zip(by_scenario).collect()
+    }
+}
