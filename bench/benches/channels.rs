@@ -2,16 +2,11 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use dynocar_client::channel::{Sender, Transport};
-use dynocar_client::{Host, SamplePublisher, SnapshotReader};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_tests::process::Site;
 
 const TRAIN: TrainId = TrainId(1);
-
-fn host() -> (tempfile::TempDir, Host) {
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let host = Host::at(directory.path()).expect("a run-time directory");
-    (directory, host)
-}
 
 fn snapshot(pipeline_index: u32) -> ParameterSnapshot {
     let mut snapshot = ParameterSnapshot::empty();
@@ -22,7 +17,8 @@ fn snapshot(pipeline_index: u32) -> ParameterSnapshot {
 fn poll(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("crit_poll");
     for pipelines in [1_u32, 4, 8, 16] {
-        let (_directory, host) = host();
+        let site = Site::new();
+        let host = site.host();
         let transport = Transport::open(&host, "bench").expect("the transport");
         let senders: Vec<Sender<ParameterSnapshot>> =
             (0..pipelines).map(|_| transport.sender(TRAIN).expect("a sender")).collect();
@@ -51,7 +47,8 @@ fn poll(criterion: &mut Criterion) {
 fn publish(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("crit_publish");
     for threads in [0_u32, 1, 4, 8] {
-        let (_directory, host) = host();
+        let site = Site::new();
+        let host = site.host();
         let transport = Transport::open(&host, "bench").expect("the transport");
         let _receivers: Vec<_> = (0..threads)
             .map(|_| transport.receiver::<TrainSample>(TRAIN).expect("a receiver"))

@@ -112,13 +112,8 @@ impl Train {
     pub fn turn_to_next(&mut self) {
         self.start_m = self.chainage_m();
         self.motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
-        let last = self.world.stops_m.len() - 1;
-        if self.direction > 0.0 && self.next_stop == last {
-            self.direction = -1.0;
-        } else if self.direction < 0.0 && self.next_stop == 0 {
-            self.direction = 1.0;
-        }
-        self.next_stop = (self.next_stop as f64 + self.direction) as usize;
+        (self.next_stop, self.direction) =
+            self.world.after_stop(self.next_stop, self.direction);
         self.load();
     }
 

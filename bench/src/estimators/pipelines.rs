@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use dynocar_analysis::dataset::{DATASET_TRAIN, DatasetError, DatasetHead};
-use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::track::Track;
 use dynocar_model::train::{BrakeGear, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 
 use super::measure::{Agreement, Case, Contender};
+use crate::rig::pipelines::default_pipeline;
 
 /// The files of the dataset that is measured on.
 const FILES: &[(&str, &str)] = &[
@@ -51,10 +51,9 @@ impl DemoRun {
     }
 
     /// Runs a pipeline over all samples.
-    fn process(&self, settings: &EstimatorSettings) -> ParameterSnapshot {
-        let estimator = settings.build(&self.train).expect("default settings are in range");
-        let (train, track) = (self.train.clone(), self.track.clone());
-        let mut pipeline = Pipeline::new(DATASET_TRAIN, 0, train, track, estimator);
+    fn process(&self, kind: PipelineKind) -> ParameterSnapshot {
+        let mut pipeline =
+            default_pipeline(kind, DATASET_TRAIN, &self.train, self.track.clone());
         for sample in &self.samples {
             std::hint::black_box(pipeline.process(sample));
         }
@@ -64,12 +63,13 @@ impl DemoRun {
 
 /// One case for each kind that can be built.
 pub fn cases(run: &Arc<DemoRun>) -> Vec<Case> {
-    let all = PipelineKind::ALL.iter().filter_map(|&kind| EstimatorSettings::default_of(kind));
-    all.map(|settings| {
+    let can_be_built = |kind: &&PipelineKind| EstimatorSettings::default_of(**kind).is_some();
+    let all = PipelineKind::ALL.iter().filter(can_be_built);
+    all.map(|&kind| {
         let run = run.clone();
-        let name = format!("pipeline {}", settings.kind());
+        let name = format!("pipeline {kind}");
         let ours = Contender::new("ours", run.samples.len(), move || {
-            let snapshot = run.process(&settings);
+            let snapshot = run.process(kind);
             vec![snapshot.samples_used as f64, snapshot.updates as f64]
         });
         Case::new(name, Agreement::Absolute(0.0), ours)

@@ -8,12 +8,12 @@ use std::sync::Arc;
 use dynocar::dataset::load_train;
 use dynocar_client::monotonic_now_ns;
 use dynocar_core::pipeline::Pipeline;
-use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 
 use super::bytes::{as_bytes, from_bytes};
 use super::case::COMPARED;
 use crate::output::{Failure, during};
+use crate::rig::pipelines::default_pipeline;
 
 /// The controller's socket, in the site's folder.
 pub const CLIENT_SOCKET: &str = "client.socket";
@@ -27,9 +27,7 @@ pub const SERVER_SOCKET: &str = "server.socket";
 /// When the train's file or a setting is wrong.
 pub fn pipeline(folder: &Path, train: TrainId) -> Result<Pipeline, Failure> {
     let model = Arc::new(load_train(&folder.join("train.toml"))?);
-    let settings = EstimatorSettings::default_of(COMPARED).expect("the kind can be built");
-    let estimator = settings.build(&model)?;
-    Ok(Pipeline::new(train, 0, model, None, estimator))
+    Ok(default_pipeline(COMPARED, train, &model, None))
 }
 
 pub(super) fn answer<'a>(

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::Pipeline;
-use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
@@ -11,6 +9,7 @@ use dynocar_tests::simulator::true_run::TRUE_STEP_S;
 use dynocar_tests::simulator::{SimulatedDataset, SimulatedRun};
 
 use super::acting::{MOVING_MPS, acts};
+use crate::rig::pipelines::default_pipeline;
 
 /// A longer step in s between samples is a gap, not driving.
 const STEP_MAX_S: f64 = 5.0;
@@ -65,10 +64,9 @@ impl Said {
 /// When the monitor cannot be built with its default settings.
 pub fn watch(data: &SimulatedDataset) -> Watched {
     let train = Arc::new(data.declared_train().clone());
-    let settings = EstimatorSettings::default_of(PipelineKind::ResidualMonitor);
-    let monitor = settings.expect("the kind can be built").build(&train).expect("default settings");
     let track = Some(Arc::new(data.track().clone()));
-    let mut pipeline = Pipeline::new(SIMULATED_TRAIN, 0, train, track, monitor);
+    let kind = PipelineKind::ResidualMonitor;
+    let mut pipeline = default_pipeline(kind, SIMULATED_TRAIN, &train, track);
     let truth: Vec<EffectKind> = data.effects.iter().map(|effect| effect.kind()).collect();
     let mut watched = Watched { truth: truth.clone(), ..Watched::default() };
     let mut acted_at_s = None;

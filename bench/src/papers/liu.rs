@@ -10,8 +10,6 @@ pub mod scenario;
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::Pipeline;
-use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::xia::trajectory::fit::{FitSettings, MotionSegment, TrajectoryFitter};
 use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
@@ -27,6 +25,7 @@ use self::scenario::{
 use super::row::Row;
 use super::score::{Score, w0_errors};
 use super::seeds::Seeds;
+use crate::rig::pipelines::default_pipeline;
 use crate::statistics::{mean, root_mean_square};
 
 const PAPER: &str = "Liu 2018";
@@ -133,10 +132,8 @@ fn live(runs: &[Vec<Measured>]) -> Estimate {
         rotating_mass_factor: ROTATING_MASS_FACTOR,
         ..TrainModel::bare("Liu 2018", 200_000.0, declared)
     });
-    let settings = EstimatorSettings::default_of(PipelineKind::ResistanceKalman)
-        .expect("the kind can be built");
-    let estimator = settings.build(&train).expect("default settings are in range");
-    let mut pipeline = Pipeline::new(TrainId(1), 0, train, None, estimator);
+    let kind = PipelineKind::ResistanceKalman;
+    let mut pipeline = default_pipeline(kind, TrainId(1), &train, None);
     let mut sequence = 0;
     for (run, samples) in runs.iter().enumerate() {
         for measured in samples {

@@ -1,10 +1,31 @@
 //! Which pipelines a measurement names.
 
+use std::sync::Arc;
+
 use dynocar::config::is_slow;
+use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
-use dynocar_shared::PipelineKind;
+use dynocar_model::track::Track;
+use dynocar_model::train::TrainModel;
+use dynocar_shared::{PipelineKind, TrainId};
 
 use crate::output::{Failure, Usage};
+
+/// A pipeline of a kind with its default settings.
+///
+/// # Panics
+///
+/// When the kind cannot be built.
+pub fn default_pipeline(
+    kind: PipelineKind,
+    id: TrainId,
+    train: &Arc<TrainModel>,
+    track: Option<Arc<Track>>,
+) -> Pipeline {
+    let settings = EstimatorSettings::default_of(kind).expect("the kind can be built");
+    let estimator = settings.build(train).expect("default settings are in range");
+    Pipeline::new(id, 0, Arc::clone(train), track, estimator)
+}
 
 /// Every pipeline that estimates and whose step is short: they may share a thread.
 pub fn fast() -> Vec<PipelineKind> {

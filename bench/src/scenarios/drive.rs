@@ -278,13 +278,8 @@ impl Drive {
     fn arrive(&mut self) {
         self.speed_mps = 0.0;
         self.phase = Phase::Standing { left_s: self.habits.standing_s };
-        let last = self.world.stops_m.len() - 1;
-        if self.direction > 0.0 && self.next_stop == last {
-            self.direction = -1.0;
-        } else if self.direction < 0.0 && self.next_stop == 0 {
-            self.direction = 1.0;
-        }
-        self.next_stop = (self.next_stop as f64 + self.direction) as usize;
+        (self.next_stop, self.direction) =
+            self.world.after_stop(self.next_stop, self.direction);
         if self.world.scenario.load == LoadSource::Changing {
             let share = 0.24 * (self.world.random.random::<f64>() - 0.5);
             self.mass_kg = self.world.declared.mass_kg * (1.0 + share);

@@ -226,6 +226,16 @@ impl World {
         self
     }
 
+    /// The stop after one, and the direction there: at either end of the line the train turns.
+    pub fn after_stop(&self, stop: usize, direction: f64) -> (usize, f64) {
+        let direction = match stop {
+            0 if direction < 0.0 => 1.0,
+            last if direction > 0.0 && last == self.stops_m.len() - 1 => -1.0,
+            _ => direction,
+        };
+        ((stop as f64 + direction) as usize, direction)
+    }
+
     /// Gradient in ‰ along growing chainage by the map and in truth, under a train whose centre is here.
     pub fn gradient_permille(&self, centre_m: f64) -> [f64; 2] {
         let place = (centre_m / PIECE_M).clamp(0.0, (self.gradient.len() - 2) as f64);

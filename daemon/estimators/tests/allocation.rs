@@ -10,6 +10,11 @@ use dynocar_model::track::{Curve, Track, Tunnel};
 use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 
+/// The train of the braking tests.
+#[allow(dead_code)]
+#[path = "braking/simulation.rs"]
+mod simulation;
+
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
@@ -131,6 +136,46 @@ fn no_pipeline_allocates_after_it_is_built() {
         covered += 1;
     }
     assert!(covered >= 2, "echo alone proves nothing");
+}
+
+/// A steady deceleration, with an outlier, a gap and a pause.
+fn braking_sample(index: u64) -> TrainSample {
+    let time_s = 0.2 * index as f64 + if index > 200 { 30.0 } else { 0.0 };
+    let speed_mps = (90.0 - 0.9 * 0.2 * index as f64).max(0.0);
+    let position_m = 90.0 * time_s - 0.45 * time_s * time_s;
+    let spike_m = if index == 100 { 20.0 } else { 0.0 };
+    let pressure_pa = if (150..160).contains(&index) { 0.0 } else { 410_000.0 };
+    let mut sample = TrainSample::empty(TrainId(1))
+        .with(SampleField::Position, position_m + spike_m)
+        .with(SampleField::Speed, speed_mps)
+        .with(SampleField::BrakeCylinderPressure, pressure_pa)
+        .with(SampleField::Gradient, 0.0);
+    sample.time_ns = (time_s * 1e9) as i64;
+    sample.sequence = index + 1;
+    sample
+}
+
+#[test]
+fn a_braking_pipeline_allocates_only_while_it_is_built() {
+    for kind in [
+        PipelineKind::AdhesionEm,
+        PipelineKind::AdhesionEkf,
+        PipelineKind::AdhesionSmoother,
+        PipelineKind::AdhesionLaw,
+        PipelineKind::BrakeEm,
+        PipelineKind::BrakeEkf,
+        PipelineKind::BrakeSmoother,
+    ] {
+        let settings = EstimatorSettings::default_of(kind).expect("a braking pipeline");
+        let mut pipeline = simulation::pipeline(&settings);
+        let before = ALLOCATIONS.with(Cell::get);
+        for index in 0..400 {
+            pipeline.process(&braking_sample(index));
+        }
+        let allocated = ALLOCATIONS.with(Cell::get) - before;
+        assert!(pipeline.snapshot().updates > 0, "{kind} has worked");
+        assert_eq!(allocated, 0, "{kind}");
+    }
 }
 
 #[test]

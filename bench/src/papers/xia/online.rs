@@ -256,57 +256,66 @@ fn drawn((mean, std): (Davis, Vector3<f64>), random: &mut ChaCha8Rng) -> Davis {
     }
 }
 
-/// A full speed profile; the forces are exact, as the filter is set to assume.
-fn exact_forces_row(seeds: Seeds) -> Row {
-    let (mean_davis, std) = constant_prior();
-    let speeds_mps = all_speeds_mps();
+/// Truth, estimate and bound of a run with coefficients drawn from [`constant_prior`].
+type Drawn = Option<(Davis, (Davis, Matrix3<f64>), Matrix3<f64>)>;
+
+/// A row over seeds that draw the coefficients of a run without a switch.
+fn drawn_row(
+    quantity: &str,
+    speeds_mps: &[f64],
+    seeds: Seeds,
+    of_seed: impl Fn(u64, &mut ChaCha8Rng) -> Drawn,
+) -> Row {
     let mut score = Score::default();
     for seed in seeds.range() {
         let mut random = ChaCha8Rng::seed_from_u64(9000 + seed);
-        let truth = drawn(constant_prior(), &mut random);
+        if let Some((truth, (davis, covariance), bound)) = of_seed(seed, &mut random) {
+            score.take_resistance((&davis, &covariance), &truth, speeds_mps);
+            score.take_bound(&bound, speeds_mps);
+        }
+    }
+    score.row(Row::new(XIA, "Table 4", quantity, "N/kN", seeds))
+}
+
+/// The last estimate of a run.
+fn last(mut estimates: Estimates) -> Option<(Davis, Matrix3<f64>)> {
+    let (davis, covariance) = estimates.pop()?;
+    Some((davis, covariance?))
+}
+
+/// A full speed profile; the forces are exact, as the filter is set to assume.
+fn exact_forces_row(seeds: Seeds) -> Row {
+    let (mean_davis, std) = constant_prior();
+    let quantity = "online, no switch: w0 over 30-300 km/h after a full profile of 40 km";
+    drawn_row(quantity, &all_speeds_mps(), seeds, |seed, random| {
+        let truth = drawn(constant_prior(), random);
         let run = drive(Profile::Full, 40e3, seed, |_| truth);
-        let measured = run.measured_mps(0, &mut random);
+        let measured = run.measured_mps(0, random);
         let mut settings = settings(mean_davis, std);
         settings.noise.disturbance = 0.0;
         settings.noise.learns_disturbance = false;
-        let informed_filter =
-            informed(&run, &measured, constant_prior(), |_| SPEED_NOISE_MPS, &[]).pop();
-        if let Some((_, Some(bound))) = informed_filter
-            && let Some((davis, Some(covariance))) = ours(&run, &measured, settings).pop()
-        {
-            score.take_resistance((&davis, &covariance), &truth, &speeds_mps);
-            score.take_bound(&bound, &speeds_mps);
-        }
-    }
-    let quantity = "online, no switch: w0 over 30-300 km/h after a full profile of 40 km";
-    score.row(Row::new(XIA, "Table 4", quantity, "N/kN", seeds))
+        let noise_mps = |_| SPEED_NOISE_MPS;
+        let (_, bound) = last(informed(&run, &measured, constant_prior(), noise_mps, &[]))?;
+        Some((truth, last(ours(&run, &measured, settings))?, bound))
+    })
 }
 
 /// Cruise under a disturbance that lasts for seconds, of which the filter knows nothing; the
 /// bound knows its strength and correlation.
 fn disturbed_row(seeds: Seeds) -> Row {
     let (mean_davis, std) = constant_prior();
-    let speeds_mps = fast_speeds_mps();
     let nominal = drive(Profile::Cruise, 120e3, 1, |_| mean_davis);
     let prior = Matrix3::from_diagonal(&std.map(|std| 1.0 / (std * std)));
     let bound = disturbed_davis_covariance(&nominal, &mean_davis)
         .try_inverse()
         .and_then(|information| (information + prior).try_inverse())
         .expect("a positive definite information");
-    let mut score = Score::default();
-    for seed in seeds.range() {
-        let mut random = ChaCha8Rng::seed_from_u64(9000 + seed);
-        let truth = drawn(constant_prior(), &mut random);
-        let run = drive(Profile::Cruise, 120e3, 1, |_| truth).disturbed(&truth, &mut random);
-        let measured = run.measured_mps(0, &mut random);
-        if let Some((davis, Some(covariance))) =
-            ours(&run, &measured, settings(mean_davis, std)).pop()
-        {
-            score.take_resistance((&davis, &covariance), &truth, &speeds_mps);
-            score.take_bound(&bound, &speeds_mps);
-        }
-    }
     let quantity = "online, no switch, resistance disturbed by 0.25 N/kN for 5 s (AR 1): \
                     w0 over 270-305 km/h after 120 km";
-    score.row(Row::new(XIA, "Table 4", quantity, "N/kN", seeds))
+    drawn_row(quantity, &fast_speeds_mps(), seeds, |_, random| {
+        let truth = drawn(constant_prior(), random);
+        let run = drive(Profile::Cruise, 120e3, 1, |_| truth).disturbed(&truth, random);
+        let measured = run.measured_mps(0, random);
+        Some((truth, last(ours(&run, &measured, settings(mean_davis, std)))?, bound))
+    })
 }

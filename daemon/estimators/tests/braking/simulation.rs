@@ -16,18 +16,9 @@ pub const DEMAND: f64 = 494_973.0 / (536_000.0 * 9.81);
 
 pub fn train() -> TrainModel {
     TrainModel {
-        name: "CRH3".into(),
-        mass_kg: 536_000.0,
         length_m: 200.0,
         cars: 8,
-        passenger_mass_kg: 70.0,
         rotating_mass_factor: 0.06,
-        resistance: Davis { a: 0.79, b: 0.023, c: 0.0015 },
-        curve_constant_n_per_kn_m: 600.0,
-        tunnel_constant_n_per_kn_m: 0.0,
-        traction: None,
-        brake: None,
-        drive: None,
         brake_gear: BrakeGear {
             cylinder_diameter_mm: Some(203.0),
             disc_radius_mm: Some(297.6),
@@ -38,8 +29,7 @@ pub fn train() -> TrainModel {
             pads: Some(95.0),
             friction_brake: None,
         },
-        corrections: Default::default(),
-        extra: Vec::new(),
+        ..TrainModel::bare("CRH3", 536_000.0, Davis { a: 0.79, b: 0.023, c: 0.0015 })
     }
 }
 
