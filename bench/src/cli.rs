@@ -9,7 +9,7 @@ use dynocar::output::report_line;
 use crate::drive::command::DriveArguments;
 use crate::estimators::EstimatorsArguments;
 use crate::explain::command::ExplainArguments;
-use crate::latency::LatencyArguments;
+use crate::latency::command::LatencyArguments;
 use crate::latency::server::{PeerArguments, serve};
 use crate::load::LoadArguments;
 use crate::monitor::command::MonitorArguments;

@@ -112,8 +112,7 @@ impl Train {
     pub fn turn_to_next(&mut self) {
         self.start_m = self.chainage_m();
         self.motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
-        (self.next_stop, self.direction) =
-            self.world.after_stop(self.next_stop, self.direction);
+        (self.next_stop, self.direction) = self.world.after_stop(self.next_stop, self.direction);
         self.load();
     }
 

@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn peers_follow_ours_and_only_ours_has_a_target() {
         let contender = |name: &str| Contender::new(name, 1, || vec![1.0]);
-        let case = Case::new("c", Agreement::Absolute(0.0), contender("ours"));
+        let case = Case::new("c", Agreement::Relative(1e-6), contender("ours"));
         let case = case.peer(contender("p")).aim(1e9);
         let entries = case.measure(&Effort { rounds: 1, slice: Duration::ZERO }).unwrap();
         assert_eq!((entries[0].meets_target, entries[0].peer), (Some(true), false));

@@ -52,8 +52,7 @@ impl DemoRun {
 
     /// Runs a pipeline over all samples.
     fn process(&self, kind: PipelineKind) -> ParameterSnapshot {
-        let mut pipeline =
-            default_pipeline(kind, DATASET_TRAIN, &self.train, self.track.clone());
+        let mut pipeline = default_pipeline(kind, DATASET_TRAIN, &self.train, self.track.clone());
         for sample in &self.samples {
             std::hint::black_box(pipeline.process(sample));
         }

@@ -22,8 +22,6 @@ pub struct Grade {
     /// True when verdict and kinds are right; where everything is a little wrong, small things that
     /// are in the world may be named too.
     pub is_right: bool,
-    /// Kinds that are named and are not in the world.
-    pub invented: Vec<String>,
     /// Intersection over union of the places, where the effect has one.
     pub iou: Option<f64>,
     /// For every end of a place with a 95 % interval, whether that holds the true end.
@@ -52,17 +50,16 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
     found.extend(&answer.ambiguous_with);
     let everyday: Vec<&str> = case.world.everyday().iter().map(|kind| kind.name()).collect();
     let competing = case.scenario.competing();
-    let invented: Vec<String> = found
-        .iter()
-        .filter(|kind| !truth.contains(kind) && !everyday.contains(kind))
-        .filter(|kind| competing.is_none_or(|competing| competing.kind.name() != **kind))
-        .map(|kind| (*kind).to_string())
-        .collect();
+    let is_invented = |kind: &&str| {
+        let is_competing = competing.is_some_and(|competing| competing.kind.name() == *kind);
+        !truth.contains(kind) && !everyday.contains(kind) && !is_competing
+    };
     let is_right = if everyday.is_empty() {
         is_exactly(simulated, competing, verdict, &found)
     } else {
         let is_found = truth.iter().all(|kind| found.contains(kind));
-        is_found && invented.is_empty() && (verdict != "unknown" || truth.contains(&"unknown"))
+        let is_known = verdict != "unknown" || truth.contains(&"unknown");
+        is_found && is_known && !found.iter().any(is_invented)
     };
     let attained = attained(simulated, explanation);
     let json = serde_json::to_value(answer).unwrap_or(Value::Null);
@@ -80,7 +77,6 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
     Grade {
         details,
         named,
-        invented,
         verdict: verdict.into(),
         is_right,
         iou,

@@ -9,6 +9,7 @@ use super::companion::Companion;
 use super::link::{ClientLink, Datagrams, Link, Notifying, Numbered};
 use super::schedule::{Schedule, Slice, await_ready, drive};
 use super::server::TRAIN;
+use super::sockets::COMPARED;
 #[cfg(feature = "zeromq")]
 use super::zeromq::ZeroMq;
 use crate::output::Failure;
@@ -18,8 +19,6 @@ use crate::rig::pipelines;
 use crate::rig::site::{DaemonPlan, ThreadPlan, peer, put_candidates, require, site, stop};
 use crate::rig::usage::{self, ThreadUsage};
 
-/// The pipeline that is compared with the floor and the alternatives.
-pub const COMPARED: PipelineKind = PipelineKind::RegularisedRls;
 /// The daemon's thread in every case.
 const THREAD: &str = "measured";
 

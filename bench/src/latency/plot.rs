@@ -7,8 +7,9 @@ use hdrhistogram::Histogram;
 use plotters::prelude::*;
 
 use super::Measured;
-use super::case::{Answerer, COMPARED, Case};
+use super::case::{Answerer, Case};
 use super::report::pooled;
+use super::sockets::COMPARED;
 use crate::output::{Failure, during};
 
 const SIZE: (u32, u32) = (1_000, 640);

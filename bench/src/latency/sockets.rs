@@ -8,13 +8,14 @@ use std::sync::Arc;
 use dynocar::dataset::load_train;
 use dynocar_client::monotonic_now_ns;
 use dynocar_core::pipeline::Pipeline;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
 use super::bytes::{as_bytes, from_bytes};
-use super::case::COMPARED;
 use crate::output::{Failure, during};
 use crate::rig::pipelines::default_pipeline;
 
+/// The pipeline that is compared with the floor and the alternatives.
+pub const COMPARED: PipelineKind = PipelineKind::RegularisedRls;
 /// The controller's socket, in the site's folder.
 pub const CLIENT_SOCKET: &str = "client.socket";
 /// The server's socket, in the site's folder.

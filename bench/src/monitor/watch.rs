@@ -32,8 +32,6 @@ pub struct Watched {
     pub raised: Vec<(EffectKind, f64)>,
     /// Time in s during which a suspicion stood that did not hold the effect.
     pub wrong_s: f64,
-    /// Time in s during which alternatives were named.
-    pub ambiguous_s: f64,
     /// Time in s during which the effect was named in runs in which it did not act.
     pub stale_s: f64,
     /// The leading kind at the end.
@@ -118,7 +116,6 @@ impl Watched {
         }
         let if_true = |is_true: bool| if is_true { step_s } else { 0.0 };
         self.wrong_s += if_true(!said.holds_truth);
-        self.ambiguous_s += if_true(said.is_ambiguous);
         self.stale_s += if_true(said.holds_truth && !acts_in_run);
         let Some(acted_at_s) = acted_at_s.filter(|_| said.holds_truth) else { return };
         let after_s = self.driven_s - acted_at_s;

@@ -42,8 +42,6 @@ pub fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> Resolved
 /// An estimate and the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scored {
-    /// Time in s of the moment that the estimate belongs to.
-    pub time_s: f64,
     /// The true coefficient.
     pub truth: f64,
     /// Estimate minus truth.
@@ -73,7 +71,7 @@ pub fn run<const LAGS: usize>(
             let of = k.checked_sub(lag_steps).map(|i| &moments[i]);
             if let Some(of) = of.filter(|of| of.is_scored) {
                 let error = value - of.truth;
-                scored.push(Scored { time_s: of.time_s, truth: of.truth, error, std });
+                scored.push(Scored { truth: of.truth, error, std });
             }
         }
     }

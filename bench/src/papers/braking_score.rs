@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn a_score_of_exact_gaussian_errors_is_consistent() {
         // Errors of +- one standard deviation: NEES 1, all covered, 1 % of the truth.
-        let scored = |sign: f64| Scored { time_s: 0.0, truth: 2.0, error: 0.02 * sign, std: 0.02 };
+        let scored = |sign: f64| Scored { truth: 2.0, error: 0.02 * sign, std: 0.02 };
         let score = Score::of(&[vec![scored(1.0), scored(-1.0)], vec![scored(1.0)]]);
         assert!((score.relative_percent - 1.0).abs() < 1e-12);
         assert!((score.rmse - 0.02).abs() < 1e-15);

@@ -278,8 +278,7 @@ impl Drive {
     fn arrive(&mut self) {
         self.speed_mps = 0.0;
         self.phase = Phase::Standing { left_s: self.habits.standing_s };
-        (self.next_stop, self.direction) =
-            self.world.after_stop(self.next_stop, self.direction);
+        (self.next_stop, self.direction) = self.world.after_stop(self.next_stop, self.direction);
         if self.world.scenario.load == LoadSource::Changing {
             let share = 0.24 * (self.world.random.random::<f64>() - 0.5);
             self.mass_kg = self.world.declared.mass_kg * (1.0 + share);
