@@ -1,10 +1,12 @@
 //! Programs beside a daemon that read the same channels: what they cost is measured like everything else.
 
+use std::process::Stdio;
+
 use dynocar::programs::{LIVE, RECORDING, call};
 use dynocar_tests::process::{Process, Site};
 
 use super::server::TRAIN;
-use crate::output::Failure;
+use crate::output::{Failure, during};
 use crate::rig::site::require;
 
 /// A program that reads what a controller and the daemon write.
@@ -37,7 +39,10 @@ impl Companion {
             Companion::Recorder => (RECORDING, vec!["record", "--output", &file]),
             Companion::Live => (LIVE, vec!["--port", "0"]),
         };
-        let program = call(package);
+        let mut program = call(package);
+        // One that is not there is named in words.
+        let look = program.arg("--version").stdout(Stdio::null()).status();
+        look.map_err(during(package))?;
         let program = program.get_program().to_string_lossy();
         let mut process = site.start(&program, &[&arguments[..], &["--train", &train]].concat());
         process.await_error("\n");
