@@ -1,10 +1,8 @@
 //! The columns' names: where the mapped ones stand.
 
-use csv::ByteRecord;
-
 use super::cell::lossy;
 use super::error::Problem;
-use super::lines::reader;
+use super::lines::{Row, RowReader};
 use super::manifest::ColumnMapping;
 use super::names::Choices;
 use super::text_layout::TextLayout;
@@ -20,10 +18,9 @@ pub fn misplaced(
 ) -> Problem {
     let Problem::UnknownName { what, name, context, choices } = problem else { return problem };
     let holds_names = |line: &str| {
-        let mut record = ByteRecord::new();
-        let is_read =
-            matches!(reader(line, layout.delimiter).read_byte_record(&mut record), Ok(true));
-        let cells: Vec<_> = record.iter().map(|cell| lossy(cell).trim().to_owned()).collect();
+        let mut row = Row::default();
+        let is_read = RowReader::new(line, layout.delimiter, layout.decimal).read(&mut row);
+        let cells = names_of(&row);
         is_read && mappings.iter().all(|mapping| cells.contains(&mapping.column))
     };
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -33,6 +30,11 @@ pub fn misplaced(
     });
     let context = context.strip_suffix(')').map_or(context.clone(), |it| format!("{it}{hint})"));
     Problem::UnknownName { what, name, context, choices }
+}
+
+/// The names in a row, without spaces around them.
+pub fn names_of(row: &Row) -> Vec<String> {
+    row.cells.iter().map(|cell| lossy(&cell.text).trim().to_owned()).collect()
 }
 
 /// The index of a mapped column among the names.

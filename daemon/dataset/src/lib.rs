@@ -14,7 +14,7 @@
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
-//! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
+//! - `plain_number`, `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], `detected_faults`, [`diagnostic`], `diagnosing`, `declared`, [`diagnostic`]: samples,
@@ -43,6 +43,7 @@ pub mod manifest;
 mod motion;
 mod names;
 mod order;
+mod plain_number;
 mod power;
 pub mod quality;
 pub mod quantity;

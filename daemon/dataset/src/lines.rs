@@ -1,16 +1,127 @@
 //! The lines of a CSV file: those above the names, and the rows.
 
-use csv::{ByteRecord, ReaderBuilder};
+use std::borrow::Cow;
 
 use super::error::{DatasetError, Problem, SourcePosition};
+use super::plain_number::plain_number;
 
-/// A reader of a text's rows.
-pub fn reader(text: &str, delimiter: u8) -> csv::Reader<&[u8]> {
-    ReaderBuilder::new()
-        .delimiter(delimiter)
-        .has_headers(false)
-        .flexible(true)
-        .from_reader(text.as_bytes())
+/// A cell of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cell<'t> {
+    /// What stands in it, without quotes around it.
+    pub text: Cow<'t, [u8]>,
+    /// The number that it is, where that is written plainly.
+    pub plain: Option<f64>,
+}
+
+/// A row of cells; never blank.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row<'t> {
+    /// The cells.
+    pub cells: Vec<Cell<'t>>,
+    /// The line of the text, from 1, in which it begins.
+    pub line: usize,
+}
+
+impl Row<'_> {
+    /// The text of a cell, trimmed of spaces; empty beyond the last one.
+    pub fn trimmed(&self, index: usize) -> &[u8] {
+        self.cells.get(index).map_or(b"", |cell| cell.text.trim_ascii())
+    }
+}
+
+/// Reads the rows of a text, one after the other.
+///
+/// A line ends with `\n`, `\r` or both. Within quotes all marks are text, and two quotes stand for one; what
+/// follows the closing quote belongs to the cell, too.
+#[derive(Clone, Debug)]
+pub struct RowReader<'t> {
+    /// What is not read yet.
+    rest: &'t [u8],
+    line: usize,
+    delimiter: u8,
+    decimal: u8,
+    /// False where the delimiter may stand in a number.
+    has_plain: bool,
+}
+
+impl<'t> RowReader<'t> {
+    /// A reader of a text's rows with these marks between cells and within numbers.
+    pub fn new(text: &'t str, delimiter: u8, decimal: u8) -> Self {
+        let rest = text.strip_prefix('\u{feff}').unwrap_or(text).as_bytes();
+        let has_plain = delimiter != decimal && !b"0123456789+-".contains(&delimiter);
+        RowReader { rest, line: 1, delimiter, decimal, has_plain }
+    }
+
+    /// The bytes that are not read yet.
+    pub fn bytes_left(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Reads the next row; false where there is none.
+    pub fn read(&mut self, row: &mut Row<'t>) -> bool {
+        row.cells.clear();
+        while let [mark @ (b'\n' | b'\r'), rest @ ..] = self.rest {
+            self.line += usize::from(*mark == b'\n');
+            self.rest = rest;
+        }
+        row.line = self.line;
+        if self.rest.is_empty() {
+            return false;
+        }
+        loop {
+            row.cells.push(self.cell());
+            match self.rest {
+                [mark, rest @ ..] if *mark == self.delimiter => self.rest = rest,
+                _ => return true,
+            }
+        }
+    }
+
+    /// Reads up to the end of a cell.
+    #[inline]
+    fn cell(&mut self) -> Cell<'t> {
+        if self.rest.first() == Some(&b'"') {
+            return self.quoted_cell();
+        }
+        let (length, plain) = match self.has_plain {
+            true => plain_number(self.rest, self.decimal),
+            false => (0, None),
+        };
+        let end = self.end_from(length);
+        let (text, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        Cell { text: Cow::Borrowed(text), plain: plain.filter(|_| end == length) }
+    }
+
+    fn quoted_cell(&mut self) -> Cell<'t> {
+        let all = self.rest;
+        let quote_from = |from: usize| {
+            all[from..].iter().position(|byte| *byte == b'"').map_or(all.len(), |it| from + it)
+        };
+        let mut close = quote_from(1);
+        let mut text = Cow::Borrowed(&all[1..close]);
+        while all.get(close + 1) == Some(&b'"') {
+            let next = quote_from(close + 2);
+            text.to_mut().extend_from_slice(&all[close + 1..next]);
+            close = next;
+        }
+        let behind = all.len().min(close + 1);
+        let end = self.end_from(behind);
+        if end > behind {
+            text.to_mut().extend_from_slice(&all[behind..end]);
+        }
+        self.line += all[..end].iter().filter(|byte| **byte == b'\n').count();
+        self.rest = &all[end..];
+        Cell { text, plain: None }
+    }
+
+    /// Where the next delimiter or end of the line stands.
+    #[inline]
+    fn end_from(&self, from: usize) -> usize {
+        let is_end = |byte: &u8| *byte == self.delimiter || matches!(byte, b'\n' | b'\r');
+        self.rest[from..].iter().position(is_end).map_or(self.rest.len(), |it| from + it)
+    }
 }
 
 /// A text without its byte-order mark and the lines above the names.
@@ -28,11 +139,67 @@ pub fn below<'t>(label: &str, text: &'t str, skip_rows: usize) -> Result<&'t str
     Ok(rest)
 }
 
-/// The line of a text, from 1, in which a record begins. The reader stands at the end of the line before,
-/// or before blank lines.
-pub fn line_of(text: &str, record: &ByteRecord) -> usize {
-    let Some(position) = record.position() else { return 0 };
-    let rest = text.as_bytes().get(position.byte() as usize..).unwrap_or_default();
-    let ends = rest.iter().take_while(|byte| b"\r\n".contains(byte));
-    position.line() as usize + ends.filter(|&&byte| byte == b'\n').count()
+#[cfg(test)]
+mod tests {
+    use csv::{ByteRecord, ReaderBuilder};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// The rows of a text, with their lines.
+    fn rows(text: &str, delimiter: u8) -> Vec<(usize, Vec<String>)> {
+        let (mut reader, mut row) = (RowReader::new(text, delimiter, b'.'), Row::default());
+        let mut rows = Vec::new();
+        while reader.read(&mut row) {
+            let cells = row.cells.iter();
+            let cells = cells.map(|cell| String::from_utf8(cell.text.to_vec()).unwrap());
+            rows.push((row.line, cells.collect()));
+        }
+        rows
+    }
+
+    /// The same by the crate `csv`, whose reader stands at the end of the line before, or before blank lines.
+    fn rows_of_csv(text: &str, delimiter: u8) -> Vec<(usize, Vec<String>)> {
+        let mut builder = ReaderBuilder::new();
+        builder.delimiter(delimiter).has_headers(false).flexible(true);
+        let mut reader = builder.from_reader(text.as_bytes());
+        let (mut record, mut rows) = (ByteRecord::new(), Vec::new());
+        while reader.read_byte_record(&mut record).unwrap() {
+            let position = record.position().unwrap();
+            let rest = &text.as_bytes()[position.byte() as usize..];
+            let ends = rest.iter().take_while(|byte| b"\r\n".contains(byte));
+            let line = position.line() as usize + ends.filter(|byte| **byte == b'\n').count();
+            let cells = record.iter().map(|cell| String::from_utf8(cell.to_vec()).unwrap());
+            rows.push((line, cells.collect()));
+        }
+        rows
+    }
+
+    proptest! {
+        #[test]
+        fn rows_are_those_of_the_crate_for_csv(
+            text in "[\u{feff}]?([-0-9.]{0,4}|[\"]{0,3}|[,;\r\n]|[ aä\"]{0,2}){0,40}",
+            delimiter in prop::sample::select(&b",;-1"[..]),
+        ) {
+            prop_assert_eq!(rows(&text, delimiter), rows_of_csv(&text, delimiter), "{:?}", text);
+        }
+    }
+
+    #[test]
+    fn quotes_hold_delimiters_ends_of_lines_and_quotes() {
+        let cells = |text| rows(text, b',').remove(0).1;
+        assert_eq!(cells("\"a,b\",\"c\nd\",e\n"), ["a,b", "c\nd", "e"]);
+        assert_eq!(cells("\"say \"\"no\"\"\",\"\",x\"y\n"), ["say \"no\"", "", "x\"y"]);
+        assert_eq!(cells("\"5\"0,\"un"), ["50", "un"]);
+    }
+
+    #[test]
+    fn plain_numbers_are_those_that_fill_their_cell() {
+        let (mut reader, mut row) =
+            (RowReader::new("1.5,-2,3e4,,7 ,9", b',', b'.'), Row::default());
+        assert!(reader.read(&mut row));
+        let plain: Vec<Option<f64>> = row.cells.iter().map(|cell| cell.plain).collect();
+        assert_eq!(plain, [Some(1.5), Some(-2.0), None, None, None, Some(9.0)]);
+        assert_eq!(reader.bytes_left(), 0);
+    }
 }

@@ -1,16 +1,18 @@
 //! A run's CSV file as columns of numbers.
 
-use csv::ByteRecord;
 use dynocar_model::units::Unit;
 
 use super::cell::{held, lossy, not_a_value, parse_cell};
 use super::clock::DayClock;
 use super::error::{DatasetError, Problem, SourcePosition};
-use super::header::{find_column, misplaced};
-use super::lines::{below, line_of, reader};
+use super::header::{find_column, misplaced, names_of};
+use super::lines::{Row, RowReader, below};
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
+
+/// So many rows show how many there will be.
+const ROWS_BEFORE_RESERVE: usize = 1000;
 
 /// The mapped columns of a run's file, each in its quantity's unit, `NaN` where missing.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,34 +96,29 @@ impl Table {
         let whole = text;
         let text = below(label, text, layout.skip_rows)?;
         let is_closed = text.ends_with(['\n', '\r']);
-        let mut reader = reader(text, layout.delimiter);
-        let mut record = ByteRecord::new();
-        let mut read = |record: &mut ByteRecord| match reader.read_byte_record(record) {
-            Ok(has_more) => Ok(has_more),
-            Err(error) => {
-                let message = error.to_string();
-                Err(SourcePosition::whole(label)
-                    .problem(Problem::Syntax { language: "CSV", message }))
-            }
-        };
-        if !read(&mut record)? {
+        let mut reader = RowReader::new(text, layout.delimiter, layout.decimal);
+        let mut row = Row::default();
+        if !reader.read(&mut row) {
             return Err(SourcePosition::whole(label).problem(Problem::NoHeader));
         }
-        let header: Vec<String> = record.iter().map(|name| lossy(name).trim().into()).collect();
-        let mut rows = Rows::new((label, text), layout, mappings, &header)
+        let mut rows = Rows::new(label, layout, mappings, &names_of(&row))
             .map_err(|problem| misplaced(problem, whole, (layout, mappings)))
             .map_err(|problem| {
-                let line = layout.skip_rows + line_of(text, &record);
-                SourcePosition::line(label, line).problem(problem)
+                SourcePosition::line(label, layout.skip_rows + row.line).problem(problem)
             })?;
-        let mut has_row = read(&mut record)?;
+        let mut has_row = reader.read(&mut row);
         if layout.units_row && has_row {
-            rows.require_units(&record)?;
-            has_row = read(&mut record)?;
+            rows.require_units(&row)?;
+            has_row = reader.read(&mut row);
         }
+        let bytes = reader.bytes_left();
         while has_row {
-            rows.push(&record)?;
-            has_row = read(&mut record)?;
+            rows.push(&row)?;
+            if rows.lines.rows == ROWS_BEFORE_RESERVE {
+                let left = reader.bytes_left();
+                rows.reserve(left * ROWS_BEFORE_RESERVE / (bytes - left).max(1));
+            }
+            has_row = reader.read(&mut row);
             if has_row || is_closed {
                 rows.settle()?;
             }
@@ -133,8 +130,6 @@ impl Table {
 /// The rows read so far.
 struct Rows<'m> {
     label: &'m str,
-    /// What stands below the lines that are passed over.
-    text: &'m str,
     width: usize,
     layout: &'m TextLayout,
     columns: Vec<Column<'m>>,
@@ -163,7 +158,7 @@ enum Flaw {
 
 impl<'m> Rows<'m> {
     fn new(
-        (label, text): (&'m str, &'m str),
+        label: &'m str,
         layout: &'m TextLayout,
         mappings: &'m [ColumnMapping],
         header: &[String],
@@ -177,7 +172,6 @@ impl<'m> Rows<'m> {
         }
         Ok(Rows {
             label,
-            text,
             width: header.len(),
             layout,
             columns,
@@ -187,18 +181,20 @@ impl<'m> Rows<'m> {
         })
     }
 
-    fn line_of(&self, record: &ByteRecord) -> usize {
-        self.layout.skip_rows + line_of(self.text, record)
+    /// Makes room for so many more rows.
+    fn reserve(&mut self, rows: usize) {
+        self.columns.iter_mut().for_each(|column| column.values.reserve(rows));
+        self.line_of_row.reserve(rows);
     }
 
     /// Refuses a row of values in the place of that of units, which would be lost.
-    fn require_units(&self, record: &ByteRecord) -> Result<(), DatasetError> {
+    fn require_units(&self, row: &Row) -> Result<(), DatasetError> {
         for column in &self.columns {
-            let cell = record.get(column.index).unwrap_or(b"").trim_ascii();
+            let cell = row.trimmed(column.index);
             let is_number = parse_cell(cell, self.layout.decimal).is_some_and(|it| !it.is_nan());
             // The unit "1" is one.
             if is_number && cell != b"1" {
-                let place = SourcePosition::line(self.label, self.line_of(record));
+                let place = SourcePosition::line(self.label, self.layout.skip_rows + row.line);
                 let (column, found) = (column.mapping.column.clone(), lossy(cell).into());
                 return Err(place.problem(Problem::NoUnits { column, found }));
             }
@@ -207,30 +203,32 @@ impl<'m> Rows<'m> {
     }
 
     /// Takes in a row; what is wrong with it stays pending.
-    fn push(&mut self, record: &ByteRecord) -> Result<(), DatasetError> {
-        let line = self.line_of(record);
+    fn push(&mut self, row: &Row) -> Result<(), DatasetError> {
+        let line = self.layout.skip_rows + row.line;
         let place = || SourcePosition::line(self.label, line);
-        if record.len() < self.width && record.as_slice().contains(&b'\n') {
+        let found = row.cells.len();
+        if found < self.width && row.cells.iter().any(|cell| cell.text.contains(&b'\n')) {
             return Err(place().problem(Problem::UnclosedQuote));
         }
-        if record.iter().skip(self.width).any(|cell| !cell.trim_ascii().is_empty()) {
+        if (self.width..found).any(|index| !row.trimmed(index).is_empty()) {
             let hint = match self.layout.decimal {
-                b'.' if record.len() > self.width + 1 => "; are there decimal commas?",
+                b'.' if found > self.width + 1 => "; are there decimal commas?",
                 decimal if decimal == self.layout.delimiter => {
                     "; where commas separate the cells, numbers with decimal commas need quotes"
                 }
                 _ => "",
             };
-            let (expected, found) = (self.width, record.len());
+            let expected = self.width;
             return Err(place().problem(Problem::TooManyCells { expected, found, hint }));
         }
-        self.pending = (record.len() < self.width).then_some(Flaw::Short);
+        self.pending = (found < self.width).then_some(Flaw::Short);
         for column in &mut self.columns {
-            let cell = record.get(column.index).unwrap_or(b"").trim_ascii();
+            let plain = row.cells.get(column.index).and_then(|cell| cell.plain);
             let value = match &mut column.clock {
-                None => parse_cell(cell, self.layout.decimal),
-                Some(_) if cell.is_empty() => Some(f64::NAN),
-                Some(clock) => clock.seconds(cell),
+                None if plain.is_some() => plain,
+                None => parse_cell(row.trimmed(column.index), self.layout.decimal),
+                Some(_) if row.trimmed(column.index).is_empty() => Some(f64::NAN),
+                Some(clock) => clock.seconds(row.trimmed(column.index)),
             };
             column
                 .values
@@ -238,11 +236,12 @@ impl<'m> Rows<'m> {
             if value.is_some() {
                 continue;
             }
+            let cell = row.trimmed(column.index);
             let is_below_names = line <= self.layout.lines_above() + 1;
             let problem = not_a_value(column.mapping, cell, self.layout, is_below_names);
             let error = place().problem(problem);
             // What is left of a number where a file breaks off is such a cell.
-            let may_be_cut = column.index + 1 == record.len()
+            let may_be_cut = column.index + 1 == found
                 && cell.iter().all(|letter| b"0123456789+-.,eE:T/ ".contains(letter));
             if !may_be_cut {
                 return Err(error);

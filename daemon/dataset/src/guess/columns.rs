@@ -1,13 +1,10 @@
 //! The columns of all files together, with what their values are like.
-
-use csv::ByteRecord;
-
 use super::facts::Facts;
 use super::guessed::{GuessResult, Recording};
 use super::layout::{Layout, layout};
 use super::name::Name;
 use super::problem::{GuessError, GuessProblem};
-use crate::lines::{below, line_of, reader};
+use crate::lines::{Row, RowReader, below};
 use crate::{Problem, SourcePosition};
 
 /// A column of the first file's header.
@@ -146,26 +143,20 @@ fn shown(is_there: bool) -> String {
 /// What the values of every column are like, and the number of rows.
 fn read_file(file: &Recording, layout: &Layout, decimal: u8) -> GuessResult<(Vec<Facts>, usize)> {
     let text = below(file.label, file.text, layout.skip_rows)?;
-    let mut reader = reader(text, layout.delimiter);
+    let mut reader = RowReader::new(text, layout.delimiter, decimal);
     let mut facts = vec![Facts::new(); layout.header.len()];
     let above = 1 + usize::from(layout.units_row);
-    let (mut record, mut rows) = (ByteRecord::new(), 0);
-    loop {
-        let has_row = reader.read_byte_record(&mut record).map_err(|error| {
-            let message = error.to_string();
-            SourcePosition::whole(file.label).problem(Problem::Syntax { language: "CSV", message })
-        })?;
-        if !has_row {
-            // Names and units are no rows of values.
-            return Ok((facts, rows - above));
-        }
+    let (mut row, mut rows) = (Row::default(), 0);
+    while reader.read(&mut row) {
         rows += 1;
         if rows <= above {
             continue;
         }
-        let line = line_of(text, &record) + layout.skip_rows;
-        for (facts, cell) in facts.iter_mut().zip(&record) {
-            facts.push_cell(line, cell.trim_ascii(), decimal);
+        let line = row.line + layout.skip_rows;
+        for (facts, cell) in facts.iter_mut().zip(&row.cells) {
+            facts.push_cell(line, cell.text.trim_ascii(), decimal);
         }
     }
+    // Names and units are no rows of values.
+    Ok((facts, rows - above))
 }

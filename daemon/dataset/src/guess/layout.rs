@@ -1,12 +1,9 @@
 //! How a file's text falls into cells: delimiter, decimal mark, the lines above the names, names and units.
-
-use csv::ByteRecord;
-
 use super::name::Name;
 use super::problem::{GuessError, GuessProblem};
 use super::spelling;
 use crate::cell::parse_cell;
-use crate::lines::{line_of, reader};
+use crate::lines::{self, RowReader};
 use crate::{Problem, SourcePosition, TimeFormat};
 
 /// What may separate cells, in the order of preference.
@@ -98,12 +95,11 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
 }
 
 fn first_rows(text: &str, delimiter: u8) -> Vec<Row> {
-    let mut reader = reader(text, delimiter);
-    let (mut rows, mut record) = (Vec::new(), ByteRecord::new());
-    while rows.len() <= ROWS_MAX && matches!(reader.read_byte_record(&mut record), Ok(true)) {
-        let line = line_of(text, &record);
-        let cells = record.iter().map(|cell| String::from_utf8_lossy(cell).into()).collect();
-        rows.push(Row { line, cells });
+    let mut reader = RowReader::new(text, delimiter, b'.');
+    let (mut rows, mut row) = (Vec::new(), lines::Row::default());
+    while rows.len() <= ROWS_MAX && reader.read(&mut row) {
+        let cells = row.cells.iter().map(|cell| String::from_utf8_lossy(&cell.text).into());
+        rows.push(Row { line: row.line, cells: cells.collect() });
     }
     rows
 }
