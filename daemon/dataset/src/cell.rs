@@ -26,12 +26,14 @@ pub fn parse_cell(cell: &[u8], decimal: u8) -> Option<f64> {
 /// A greater number in SI units is none of a railway's; its square or sum might be infinite.
 const MAGNITUDE_MAX: f64 = 1e15;
 
-/// A cell's number as it is kept: in the quantity's unit, missing when infinite or as good as that.
-pub fn held(mapping: &ColumnMapping, unit: &Unit, cell: f64) -> f64 {
+/// A cell's number as it is kept: in the quantity's unit, `to` which it is converted where it is in another
+/// ([`ColumnMapping::converted_to`]); missing when infinite or as good as that.
+pub fn held(mapping: &ColumnMapping, to: Option<&Unit>, cell: f64) -> f64 {
     if mapping.quantity == Quantity::CurveRadius && cell.is_infinite() {
         return 0.0;
     }
-    let value = mapping.convert(cell, unit);
+    let scaled = mapping.scaled(cell);
+    let value = to.map_or(scaled, |unit| mapping.unit.convert(scaled, unit));
     if value.abs() <= MAGNITUDE_MAX { value } else { f64::NAN }
 }
 

@@ -94,7 +94,7 @@ fn of_content(
     let quantities = context.manifest.columns.iter().map(|mapping| mapping.quantity);
     let empty = quantities.filter(|&quantity| run.table.filled(quantity).is_none());
     diagnostics.extend(empty.map(|quantity| Diagnostic::NoValues { quantity }));
-    if run.order.in_order.iter().filter(|&&mark| mark).count() < 2 {
+    if run.order.rows().nth(1).is_none() {
         diagnostics.push(Diagnostic::OneRow);
     } else if let Some((_, highest_mps)) = quality.speed_range_mps
         && highest_mps < MOVING_MPS
@@ -143,20 +143,20 @@ fn of_position(
         }
         return;
     }
-    let ordered = |row: &usize| run.order.in_order[*row] && !run.position_m[*row].is_nan();
-    let rows: Vec<usize> = (0..run.position_m.len()).filter(ordered).collect();
-    if rows.len() < 2 {
+    let positions = run.order.rows().map(|row| run.position_m[row]).filter(|it| !it.is_nan());
+    let count = positions.clone().count();
+    if count < 2 {
         return;
     }
     // The medians of a few rows, since a row at an end may be an outlier; of so few that the way
     // between them is the run's.
-    let few = END_ROWS.min(rows.len() / 100).max(1);
-    let median_m = |rows: &[usize]| {
-        let mut positions: Vec<f64> = rows.iter().map(|&row| run.position_m[row]).collect();
+    let few = END_ROWS.min(count / 100).max(1);
+    let median_m = |mut positions: Vec<f64>| {
         positions.sort_by(f64::total_cmp);
         positions[(positions.len() - 1) / 2]
     };
-    let net_m = median_m(&rows[rows.len() - few..]) - median_m(&rows[..few]);
+    let (first, last) = (positions.clone().take(few), positions.rev().take(few));
+    let net_m = median_m(last.collect()) - median_m(first.collect());
     let direction = run.entry.direction;
     let is_reported =
         |faults: &[InputFault]| detected.iter().any(|detected| faults.contains(&detected.fault));

@@ -139,7 +139,7 @@ impl Force {
             return curve.force_max_n();
         }
         let sizes = self.force_n.iter().map(|force| force.abs()).filter(|size| *size > 0.0);
-        quantile(sizes.collect(), GREATEST_QUANTILE).unwrap_or(0.0)
+        quantile(&mut sizes.collect::<Vec<_>>(), GREATEST_QUANTILE).unwrap_or(0.0)
     }
 }
 
@@ -246,7 +246,7 @@ mod tests {
         let manifest = Manifest::parse("dataset.toml", &text).unwrap();
         let table = Table::parse("a.csv", csv, (&manifest.layout, &manifest.columns)).unwrap();
         let times = table.column(Quantity::Time).unwrap();
-        let order = TimeOrder::of(times, &vec![0; times.len()]);
+        let order = TimeOrder::of(times, vec![0; times.len()]);
         let train = parse_train("train.toml", train).unwrap();
         Forces::of(&table, table.column(Quantity::Speed).unwrap(), &train, &order)
     }

@@ -17,7 +17,7 @@
 //! - `plain_number`, `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
-//! - `resolved`, [`run`], [`quality`], `detected_faults`, [`diagnostic`], `diagnosing`, `declared`, [`diagnostic`]: samples,
+//! - `resolved`, [`run`], [`quality`], `judge`, [`diagnostic`], `diagnosing`, `declared`: samples,
 //!   counts and warnings
 //! - [`guess`]: a description of files that nobody has described yet
 
@@ -27,7 +27,6 @@ pub mod clock;
 mod corrections;
 pub mod dataset_diagnostic;
 mod declared;
-mod detected_faults;
 mod diagnosing;
 pub mod diagnostic;
 mod document;
@@ -38,6 +37,7 @@ mod fault_unit;
 mod forces;
 pub mod guess;
 mod header;
+mod judge;
 mod lines;
 pub mod manifest;
 mod motion;

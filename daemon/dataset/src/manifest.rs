@@ -40,7 +40,7 @@ pub struct ColumnMapping {
     pub quantity: Quantity,
     /// Its name in the header, without surrounding spaces.
     pub column: String,
-    /// The unit of `cell * scale + offset`.
+    /// The unit of [`scaled`](Self::scaled) cells.
     pub unit: Unit,
     /// How the cells are written, where they are times and no numbers.
     pub format: Option<TimeFormat>,
@@ -53,9 +53,14 @@ pub struct ColumnMapping {
 }
 
 impl ColumnMapping {
-    /// A cell's number in a unit, as that of the quantity.
-    pub fn convert(&self, cell: f64, to: &Unit) -> f64 {
-        self.unit.convert(cell * self.scale + self.offset, to)
+    /// A cell's number in [`unit`](Self::unit).
+    pub fn scaled(&self, cell: f64) -> f64 {
+        cell * self.scale + self.offset
+    }
+
+    /// The quantity's unit, where the cells are in another.
+    pub fn converted_to(&self) -> Option<Unit> {
+        Some(self.quantity.unit()).filter(|unit| unit.name() != self.unit.name())
     }
 }
 

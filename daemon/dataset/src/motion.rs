@@ -89,12 +89,11 @@ impl Placement {
     /// speeds and spikes too. Without a declared start, the centre starts at 0. Rows out of
     /// order, and rows before the first speed or after the last one, get none.
     pub fn integrate(self, times_s: &[f64], speeds: &Speeds, order: &TimeOrder) -> Vec<f64> {
-        let ordered = (0..times_s.len()).filter(|&row| order.in_order[row]);
         let mut position_m = vec![f64::NAN; times_s.len()];
         let mut centre_m = self.start_m.map_or(0.0, |start| start + self.to_centre_m());
         let mut last: Option<usize> = None;
         let mut skipped: Vec<usize> = Vec::new();
-        for row in ordered {
+        for row in order.rows() {
             let speed = speeds.speed_mps[row];
             if speed.is_nan() || speeds.is_spike[row] {
                 skipped.push(row);
@@ -139,7 +138,7 @@ mod tests {
     }
 
     fn integrated(placement: Placement, times: &[f64], column: &[f64]) -> Vec<f64> {
-        let order = TimeOrder::of(times, &vec![0; times.len()]);
+        let order = TimeOrder::of(times, vec![0; times.len()]);
         placement.integrate(times, &Speeds::of(column, &order), &order)
     }
 
@@ -172,7 +171,7 @@ mod tests {
 
     #[test]
     fn only_the_noise_of_standstill_is_set_to_zero() {
-        let order = TimeOrder::of(&[0.0, 1.0, 2.0], &[0; 3]);
+        let order = TimeOrder::of(&[0.0, 1.0, 2.0], vec![0; 3]);
         let speeds = Speeds::of(&[-0.05, -3.0, 1.0], &order);
         assert_eq!(speeds.speed_mps, [0.0, -3.0, 1.0]);
         assert_eq!((speeds.zeroed, speeds.negative), (1, 1));

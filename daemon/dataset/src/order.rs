@@ -46,47 +46,68 @@ pub struct OrderCounts {
 impl TimeOrder {
     /// Looks at the rows' times in s, all finite; `timeless_before` counts the rows without a
     /// time that stood before each of them in the file.
-    pub fn of(times_s: &[f64], timeless_before: &[u64]) -> Self {
+    pub fn of(times_s: &[f64], timeless_before: Vec<u64>) -> Self {
         let in_order = longest_increasing(times_s);
-        let ordered: Vec<usize> = (0..times_s.len()).filter(|&row| in_order[row]).collect();
         let mut counts = OrderCounts::default();
-        let mut displaced_s: Vec<f64> = Vec::new();
-        for (row, time) in times_s.iter().enumerate().filter(|(row, _)| !in_order[*row]) {
-            match ordered.binary_search_by(|&other| times_s[other].total_cmp(time)) {
-                Ok(_) => counts.repeated += 1,
-                Err(_) => displaced_s.push(times_s[row]),
-            }
-        }
-        counts.out_of_order = displaced_s.len();
-        displaced_s.sort_unstable_by(f64::total_cmp);
-        let steps = ordered.windows(2).map(|pair| times_s[pair[1]] - times_s[pair[0]]);
+        let displaced_s = counts.count_displaced(times_s, &in_order);
+        let steps = pairs(marked(&in_order)).map(|(from, to)| times_s[to] - times_s[from]);
         counts.judge_steps(steps.collect());
-        let mut lost_before = timeless_before.to_vec();
-        for pair in ordered.windows(2) {
-            let (from_s, to_s) = (times_s[pair[0]], times_s[pair[1]]);
+        let mut lost_before = timeless_before;
+        for (from, to) in pairs(marked(&in_order)) {
+            let step_s = times_s[to] - times_s[from];
+            if !counts.is_gap(step_s) {
+                continue;
+            }
             let until = |time: f64| displaced_s.partition_point(|&displaced| displaced < time);
-            let displaced = (until(to_s) - until(from_s)) as u64;
-            let timeless = timeless_before[pair[0] + 1..=pair[1]].iter().sum();
-            lost_before[pair[1]] += counts.count_gap(to_s - from_s, displaced, timeless);
+            let displaced = (until(times_s[to]) - until(times_s[from])) as u64;
+            let timeless = lost_before[from + 1..=to].iter().sum();
+            lost_before[to] += counts.count_gap(step_s, displaced, timeless);
         }
         TimeOrder { in_order, lost_before, counts }
     }
+
+    /// The rows in order.
+    pub fn rows(&self) -> impl DoubleEndedIterator<Item = usize> + Clone {
+        marked(&self.in_order)
+    }
+}
+
+fn marked(marks: &[bool]) -> impl DoubleEndedIterator<Item = usize> + Clone {
+    (0..marks.len()).filter(|&row| marks[row])
+}
+
+/// Each row with the one after it.
+pub(super) fn pairs(mut rows: impl Iterator<Item = usize>) -> impl Iterator<Item = (usize, usize)> {
+    let mut last = rows.next();
+    rows.map(move |row| (last.replace(row).unwrap_or(row), row))
 }
 
 impl OrderCounts {
-    fn judge_steps(&mut self, steps_s: Vec<f64>) {
-        self.step_s = quantile(steps_s.clone(), 0.5).unwrap_or(0.0);
+    /// Counts the rows that are not in order, and gives the times of those not repeated, sorted.
+    fn count_displaced(&mut self, times_s: &[f64], in_order: &[bool]) -> Vec<f64> {
+        if !in_order.contains(&false) {
+            return Vec::new();
+        }
+        let ordered_s: Vec<f64> = marked(in_order).map(|row| times_s[row]).collect();
+        let others = times_s.iter().zip(in_order).filter(|(_, is_ordered)| !**is_ordered);
+        let (repeated, mut displaced_s): (Vec<f64>, Vec<f64>) = others
+            .map(|(&time, _)| time)
+            .partition(|time| ordered_s.binary_search_by(|other| other.total_cmp(time)).is_ok());
+        displaced_s.sort_unstable_by(f64::total_cmp);
+        (self.repeated, self.out_of_order) = (repeated.len(), displaced_s.len());
+        displaced_s
+    }
+
+    fn judge_steps(&mut self, mut steps_s: Vec<f64>) {
+        self.step_s = quantile(&mut steps_s, 0.5).unwrap_or(0.0);
         let is_alike = |step: &&f64| (**step - self.step_s).abs() <= 0.25 * self.step_s;
         let alike = steps_s.iter().filter(is_alike).count();
         self.is_regular = alike as f64 >= REGULAR_SHARE * steps_s.len() as f64;
     }
 
-    /// Counts a step, when it is a gap, and gives the rows missing in it. Rows `displaced` out
+    /// Counts a gap, when rows are missing in it, and gives how many. Rows `displaced` out
     /// of it and rows without a time that stand in it are not missing.
     fn count_gap(&mut self, step_s: f64, displaced: u64, timeless: u64) -> u64 {
-        if !self.is_gap(step_s) {
-            return 0;
-        }
         let is_counted = self.is_regular && step_s <= CLOCK_JUMP_S;
         let absent = match is_counted {
             true => ((step_s / self.step_s).round() as u64).saturating_sub(1 + displaced),
@@ -139,8 +160,8 @@ fn longest_increasing(values: &[f64]) -> Vec<bool> {
     marks
 }
 
-/// The value below which a share of the values lies, 0 to 1; `None` for nothing.
-pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+/// The value below which a share of the values lies, 0 to 1, which change places; `None` for nothing.
+pub(super) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
     let rank = (share * values.len() as f64) as usize;
     let rank = rank.min(values.len().checked_sub(1)?);
     Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1)
@@ -151,7 +172,7 @@ mod tests {
     use super::*;
 
     fn order_of(times_s: &[f64]) -> TimeOrder {
-        TimeOrder::of(times_s, &vec![0; times_s.len()])
+        TimeOrder::of(times_s, vec![0; times_s.len()])
     }
 
     #[test]
@@ -184,7 +205,7 @@ mod tests {
     #[test]
     fn a_row_without_a_time_is_lost_once() {
         let times = [0.0, 1.0, 2.0, 5.0, 6.0, 7.0, 8.0];
-        let order = TimeOrder::of(&times, &[0, 0, 0, 1, 0, 0, 0]);
+        let order = TimeOrder::of(&times, vec![0, 0, 0, 1, 0, 0, 0]);
         assert_eq!((order.counts.gaps, order.counts.missing_rows), (1, 1));
         assert_eq!(order.lost_before[3], 2, "one without a time, one not there");
     }

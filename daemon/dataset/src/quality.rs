@@ -1,14 +1,14 @@
 //! What the data of a run are like: counts, ranges and what the train did.
 
 use dynocar_model::terms::wheel::STILL_MPS;
-use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};
 use serde::Serialize;
 
 use super::forces::Force;
-use super::order::OrderCounts;
+use super::judge::Judge;
+use super::order::{OrderCounts, pairs};
 use super::quantity::Quantity;
-use super::resolved::{Context, DATASET_TRAIN, Resolved};
+use super::resolved::Resolved;
 use super::table::LineCounts;
 
 /// A force below this share of the greatest one counts as none.
@@ -129,13 +129,16 @@ fn count_of(counts: &[QuantityCount], quantity: Quantity) -> usize {
     counts.iter().find(|count| count.quantity == quantity).map_or(0, |count| count.count)
 }
 
-/// Looks at a run that is read.
-pub(super) fn assess(context: Context, run: &Resolved, samples: &[TrainSample]) -> RunQuality {
-    let ordered: Vec<usize> = (0..samples.len()).filter(|&row| run.order.in_order[row]).collect();
-    let time = |place: Option<&usize>| place.map_or(0.0, |&row| run.times_s[row]);
-    let (start_s, end_s) = (time(ordered.first()), time(ordered.last()));
-    let is_good = |row: &usize| !run.speeds.is_spike[*row];
-    let speeds = (0..samples.len()).filter(is_good).map(|row| run.speeds.speed_mps[row]);
+/// Looks at a run that is read, whose samples were judged.
+pub(super) fn assess(run: &Resolved, samples: &[TrainSample], judge: &Judge) -> RunQuality {
+    let time = |row: Option<usize>| row.map_or(0.0, |row| run.times_s[row]);
+    let (start_s, end_s) = (time(run.order.rows().next()), time(run.order.rows().next_back()));
+    let speeds = run.speeds.speed_mps.iter().zip(&run.speeds.is_spike);
+    let speeds = speeds.filter(|(_, is_spike)| !**is_spike).map(|(speed, _)| *speed);
+    let refused = |(reason, count, row): (_, _, usize)| {
+        let (first_line, first_s) = (run.table.line(row), run.times_s[row]);
+        ReasonCount { reason, count, first_line, first_s }
+    };
     RunQuality {
         lines: run.table.lines,
         rows_without_time: run.rows_without_time,
@@ -145,12 +148,12 @@ pub(super) fn assess(context: Context, run: &Resolved, samples: &[TrainSample]) 
         missing: missing(run),
         outliers: outliers(run),
         noise_below_zero: noise_below_zero(run),
-        refused: refused(context, run, samples),
+        refused: judge.refused().map(refused).collect(),
         speed_range_mps: range(speeds),
         position_range_m: range(run.position_m.iter().copied()),
         mass_kg: spread(samples.iter().filter_map(|sample| sample.get(SampleField::Mass))),
-        distance_m: distance_m(run, &ordered),
-        phases: phases(run, &ordered),
+        distance_m: distance_m(run),
+        phases: phases(run),
     }
 }
 
@@ -204,27 +207,12 @@ fn noise_below_zero(run: &Resolved) -> Vec<QuantityCount> {
     counts(all)
 }
 
-/// What the validation in front of every pipeline refuses of these samples.
-fn refused(context: Context, run: &Resolved, samples: &[TrainSample]) -> Vec<ReasonCount> {
-    let nominal_mass_kg = context.train.mass_kg;
-    let limits = ValidationLimits::for_train(nominal_mass_kg);
-    let mut validator = Validator::new(DATASET_TRAIN, nominal_mass_kg, limits);
-    let mut counts: Vec<Option<ReasonCount>> = vec![None; RejectionReason::ALL.len()];
-    for (row, sample) in samples.iter().enumerate() {
-        let Err(reason) = validator.check(sample) else { continue };
-        let first = || {
-            let (first_line, first_s) = (run.table.line(row), run.times_s[row]);
-            ReasonCount { reason, count: 0, first_line, first_s }
-        };
-        counts[reason as usize].get_or_insert_with(first).count += 1;
+fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
+    let (mut low, mut high, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
+    for value in values {
+        (low, high, sum, count) = (low.min(value), high.max(value), sum + value, count + 1.0);
     }
-    counts.into_iter().flatten().collect()
-}
-
-fn spread(values: impl Iterator<Item = f64> + Clone) -> Option<Spread> {
-    let (low, high) = range(values.clone())?;
-    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
-    Some(Spread { mean: sum / count, low, high })
+    (count > 0.0).then_some(Spread { mean: sum / count, low, high })
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
@@ -235,23 +223,22 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// The integral of the speed over the rows in order, by trapezoids between good speeds.
-fn distance_m(run: &Resolved, ordered: &[usize]) -> f64 {
+fn distance_m(run: &Resolved) -> f64 {
     let is_good = |row: &usize| !run.speeds.speed_mps[*row].is_nan() && !run.speeds.is_spike[*row];
-    let good: Vec<usize> = ordered.iter().copied().filter(is_good).collect();
-    good.windows(2)
-        .map(|pair| {
-            let mean_mps = 0.5 * (run.speeds.speed_mps[pair[0]] + run.speeds.speed_mps[pair[1]]);
-            mean_mps * (run.times_s[pair[1]] - run.times_s[pair[0]])
+    pairs(run.order.rows().filter(is_good))
+        .map(|(from, to)| {
+            let mean_mps = 0.5 * (run.speeds.speed_mps[from] + run.speeds.speed_mps[to]);
+            mean_mps * (run.times_s[to] - run.times_s[from])
         })
         .sum()
 }
 
 /// Each step counts for what the row at its start says.
-fn phases(run: &Resolved, ordered: &[usize]) -> Phases {
+fn phases(run: &Resolved) -> Phases {
     let mut phases = Phases::default();
     let least_n = COASTING_SHARE * run.forces.greatest_n;
-    for pair in ordered.windows(2) {
-        let (row, step_s) = (pair[0], run.times_s[pair[1]] - run.times_s[pair[0]]);
+    for (row, next) in pairs(run.order.rows()) {
+        let step_s = run.times_s[next] - run.times_s[row];
         let speed_mps = run.speeds.speed_mps[row];
         let control_n = run.forces.traction.force_n[row] - run.forces.brake.force_n[row];
         let phase = if run.order.counts.is_gap(step_s) || speed_mps.is_nan() {

@@ -65,7 +65,7 @@ impl<'d> Resolved<'d> {
         table.hold_last(Quantity::Passengers);
         let column = |quantity| table.column(quantity).unwrap_or_default();
         let times_s = column(Quantity::Time).to_vec();
-        let order = TimeOrder::of(&times_s, &timeless_before);
+        let order = TimeOrder::of(&times_s, timeless_before);
         let speeds = Speeds::of(column(Quantity::Speed), &order);
         let forces = Forces::of(&table, &speeds.speed_mps, context.train, &order);
         let placement = Placement {
@@ -98,13 +98,13 @@ impl<'d> Resolved<'d> {
         }
     }
 
-    /// The samples, one for each row.
+    /// The samples, one for each row, as they are made.
     ///
     /// The mass is the row's, else the run's declared one, else that of the empty train and its
     /// counted passengers.
-    pub fn samples(&self, number: u32, train: &TrainModel) -> Vec<TrainSample> {
+    pub fn samples(&self, number: u32, train: &TrainModel) -> impl Iterator<Item = TrainSample> {
         let column = |quantity| self.table.column(quantity).unwrap_or_default();
-        let fields: [(SampleField, &[f64]); 10] = [
+        let mut fields: Vec<(SampleField, &[f64])> = vec![
             (SampleField::Position, &self.position_m),
             (SampleField::Speed, &self.speeds.speed_mps),
             (SampleField::TractionForce, &self.forces.traction.force_n),
@@ -116,39 +116,38 @@ impl<'d> Resolved<'d> {
             (SampleField::AmbientTemperature, column(Quantity::AmbientTemperature)),
             (SampleField::Gradient, self.gradient_permille.as_deref().unwrap_or_default()),
         ];
+        fields.retain(|(_, values)| !values.is_empty());
         let radius_m = column(Quantity::CurveRadius);
         let passengers = column(Quantity::Passengers);
         let wheel_slide = column(Quantity::WheelSlide);
         let is_there =
             |values: &[f64], row: usize| values.get(row).copied().filter(|v| v.is_finite());
         let mut sequence = 0;
-        (0..self.times_s.len())
-            .map(|row| {
-                sequence += 1 + self.order.lost_before[row];
-                let mut sample = TrainSample::empty(DATASET_TRAIN);
-                sample.time_ns = (self.times_s[row] * 1e9).round() as i64;
-                sample.sequence = sequence;
-                sample.run = number;
-                sample.direction = self.entry.direction;
-                let counted = is_there(passengers, row)
-                    .map(|count| train.mass_kg + count * train.passenger_mass_kg);
-                if let Some(mass_kg) = self.entry.mass_kg.or(counted) {
-                    sample.set(SampleField::Mass, mass_kg);
+        (0..self.times_s.len()).map(move |row| {
+            sequence += 1 + self.order.lost_before[row];
+            let mut sample = TrainSample::empty(DATASET_TRAIN);
+            sample.time_ns = (self.times_s[row] * 1e9).round() as i64;
+            sample.sequence = sequence;
+            sample.run = number;
+            sample.direction = self.entry.direction;
+            let counted = is_there(passengers, row)
+                .map(|count| train.mass_kg + count * train.passenger_mass_kg);
+            if let Some(mass_kg) = self.entry.mass_kg.or(counted) {
+                sample.set(SampleField::Mass, mass_kg);
+            }
+            for &(field, values) in &fields {
+                if let Some(value) = is_there(values, row) {
+                    sample.set(field, value);
                 }
-                for (field, values) in fields {
-                    if let Some(value) = is_there(values, row) {
-                        sample.set(field, value);
-                    }
-                }
-                if let Some(radius) = is_there(radius_m, row) {
-                    sample.set(SampleField::CurveRadius, radius.abs());
-                }
-                if is_there(wheel_slide, row).is_some_and(|slide| slide > 0.5) {
-                    sample.flags |= FLAG_WHEEL_SLIDE;
-                }
-                sample
-            })
-            .collect()
+            }
+            if let Some(radius) = is_there(radius_m, row) {
+                sample.set(SampleField::CurveRadius, radius.abs());
+            }
+            if is_there(wheel_slide, row).is_some_and(|slide| slide > 0.5) {
+                sample.flags |= FLAG_WHEEL_SLIDE;
+            }
+            sample
+        })
     }
 }
 

@@ -3,11 +3,11 @@
 use dynocar_model::train::Drive;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::detected_faults;
 use super::diagnosing::diagnostics;
 use super::diagnostic::Diagnostic;
 use super::error::{DatasetError, Problem, SourcePosition};
 use super::forces::ForceSource;
+use super::judge::Judge;
 use super::manifest::{Manifest, Role, RunEntry};
 use super::motion::PositionSource;
 use super::power;
@@ -167,12 +167,11 @@ pub(super) fn read(
     if rows > 1 && resolved.times_s.iter().all(|&other| other == time_s) {
         return refuse(Problem::OneTime { column: column(Quantity::Time), time_s, rows });
     }
-    let samples = resolved.samples(number, context.train);
-    let quality = quality::assess(context, &resolved, &samples);
-    let is_position_recorded = resolved.position_source == PositionSource::Column;
-    let detected =
-        detected_faults::of_samples(context.train, context.track, &samples, is_position_recorded);
-    let diagnostics = diagnostics(context, &resolved, &quality, &detected);
+    let mut judge = Judge::new(context, resolved.position_source == PositionSource::Column);
+    let samples: Vec<TrainSample> =
+        resolved.samples(number, context.train).inspect(|sample| judge.take(sample)).collect();
+    let quality = quality::assess(&resolved, &samples, &judge);
+    let diagnostics = diagnostics(context, &resolved, &quality, judge.detected());
     Ok(Run {
         file: entry.file.clone(),
         number,

@@ -1,7 +1,5 @@
 //! Values that stick out from their neighbours.
 
-use super::order::quantile;
-
 /// The spread of a run's values around their neighbours is this quantile of the differences:
 /// above the median, since a centre that is itself the median differs by nothing, and
 /// low enough for one value in ten, with its neighbours, to be an outlier.
@@ -17,23 +15,49 @@ const SPIKE_SPREADS: f64 = 8.0;
 /// neighbours to be detected. `least` is the difference below which nothing is a spike.
 pub(super) fn spikes<const N: usize>(values: &[f64], usable: &[bool], least: f64) -> Vec<bool> {
     let mut marks = vec![false; values.len()];
-    let rows: Vec<usize> =
-        (0..values.len()).filter(|&row| usable[row] && !values[row].is_nan()).collect();
-    let difference = |window: &[usize]| {
-        let mut around = [0.0; N];
-        for (slot, &row) in around.iter_mut().zip(window) {
-            *slot = values[row];
+    let rows = (0..values.len()).filter(|&row| usable[row] && !values[row].is_nan());
+    // Differences up to this neither are spikes nor raise the bound.
+    let small = least / SPIKE_SPREADS;
+    let mut large: Vec<(usize, f64)> = Vec::new();
+    let mut window = [(0, 0.0); N];
+    let mut windows = 0_usize;
+    for (count, row) in rows.enumerate() {
+        window.copy_within(1.., 0);
+        window[N - 1] = (row, values[row]);
+        if count + 1 < N {
+            continue;
         }
-        around.sort_unstable_by(f64::total_cmp);
-        (values[window[N / 2]] - around[N / 2]).abs()
+        windows += 1;
+        let (centre, value) = window[N / 2];
+        let difference = (value - median(window.map(|(_, value)| value))).abs();
+        if difference > small {
+            large.push((centre, difference));
+        }
+    }
+    let rank = (SPREAD_QUANTILE * windows as f64) as usize + large.len();
+    let spread = match rank.checked_sub(windows).filter(|&rank| rank < large.len()) {
+        Some(rank) => {
+            large.select_nth_unstable_by(rank, |one, other| one.1.total_cmp(&other.1)).1.1
+        }
+        None => 0.0,
     };
-    let differences: Vec<f64> = rows.windows(N).map(difference).collect();
-    let spread = quantile(differences.clone(), SPREAD_QUANTILE).unwrap_or(0.0);
     let bound = least.max(SPIKE_SPREADS * spread);
-    for (difference, window) in differences.iter().zip(rows.windows(N)) {
-        marks[window[N / 2]] = *difference > bound;
+    for (row, difference) in large {
+        marks[row] = difference > bound;
     }
     marks
+}
+
+/// The median of numbers, sorted by exchanging neighbours, without a branch.
+fn median<const N: usize>(mut values: [f64; N]) -> f64 {
+    for end in (1..N).rev() {
+        for place in 0..end {
+            let (one, other) = (values[place], values[place + 1]);
+            values[place] = if one < other { one } else { other };
+            values[place + 1] = if one < other { other } else { one };
+        }
+    }
+    values[N / 2]
 }
 
 #[cfg(test)]

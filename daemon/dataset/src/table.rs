@@ -143,8 +143,8 @@ struct Rows<'m> {
 struct Column<'m> {
     mapping: &'m ColumnMapping,
     index: usize,
-    /// The quantity's unit.
-    unit: Unit,
+    /// The quantity's unit, where the cells are in another.
+    converted_to: Option<Unit>,
     /// Reads the cells that are times and no numbers.
     clock: Option<DayClock>,
     values: Vec<f64>,
@@ -167,8 +167,8 @@ impl<'m> Rows<'m> {
         for mapping in mappings {
             let index = find_column(mapping, header, layout)?;
             let clock = mapping.format.as_ref().map(DayClock::new);
-            let unit = mapping.quantity.unit();
-            columns.push(Column { mapping, index, unit, clock, values: Vec::new() });
+            let converted_to = mapping.converted_to();
+            columns.push(Column { mapping, index, converted_to, clock, values: Vec::new() });
         }
         Ok(Rows {
             label,
@@ -230,9 +230,9 @@ impl<'m> Rows<'m> {
                 Some(_) if row.trimmed(column.index).is_empty() => Some(f64::NAN),
                 Some(clock) => clock.seconds(row.trimmed(column.index)),
             };
-            column
-                .values
-                .push(value.map_or(f64::NAN, |value| held(column.mapping, &column.unit, value)));
+            column.values.push(value.map_or(f64::NAN, |value| {
+                held(column.mapping, column.converted_to.as_ref(), value)
+            }));
             if value.is_some() {
                 continue;
             }

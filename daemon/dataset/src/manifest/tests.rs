@@ -1,6 +1,7 @@
 //! What `dataset.toml` may hold, and every refusal with its words.
 
 use super::*;
+use crate::cell::held;
 
 const FULL: &str = r#"[dataset]
 name = "line-01"
@@ -42,7 +43,7 @@ fn every_key_is_read() {
         FileEntry { path: "track.toml".into(), place: SourcePosition::line("dataset.toml", 10) };
     assert_eq!(manifest.track_file, Some(track));
     let time = manifest.mapping(Quantity::Time).unwrap();
-    assert_eq!((time.column.as_str(), time.convert(200.0, &time.quantity.unit())), ("t", 0.2));
+    assert_eq!((time.column.as_str(), held(time, time.converted_to().as_ref(), 200.0)), ("t", 0.2));
     let runs = &manifest.runs;
     assert_eq!((runs[0].role, runs[0].direction), (Role::Holdout, -1));
     assert_eq!((runs[0].mass_kg, runs[0].start_m), (Some(114_500.0), None));
@@ -62,7 +63,7 @@ fn keys_of_other_text_and_times_are_read() {
     assert_eq!((layout.skip_rows, layout.units_row, layout.lines_above()), (4, true, 6));
     let time = manifest.mapping(Quantity::Time).unwrap();
     assert_eq!(
-        (time.format.as_ref(), time.convert(3.5, &time.quantity.unit())),
+        (time.format.as_ref(), held(time, time.converted_to().as_ref(), 3.5)),
         (Some(&TimeFormat::Clock), 3.5)
     );
     assert_eq!(manifest.runs[0].date_unix_s, Some(20_530 * 86_400));
@@ -127,9 +128,9 @@ fn wrong_keys_of_other_text_and_times_are_named_with_their_choices() {
 fn scale_and_offset_act_in_the_columns_unit() {
     let manifest = Manifest::parse("dataset.toml", FULL).unwrap();
     let speed = manifest.mapping(Quantity::Speed).unwrap();
-    assert_eq!(speed.convert(36.5, &speed.quantity.unit()), 20.0, "36.5 * 2 - 1 = 72 km/h");
+    assert_eq!(held(speed, speed.converted_to().as_ref(), 36.5), 20.0, "36.5 * 2 - 1 = 72 km/h");
     let gradient = manifest.mapping(Quantity::Gradient).unwrap();
-    assert!((gradient.convert(1.2, &gradient.quantity.unit()) - 12.0).abs() < 1e-12);
+    assert!((held(gradient, gradient.converted_to().as_ref(), 1.2) - 12.0).abs() < 1e-12);
 }
 
 #[test]
