@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, UInt32Array};
-use arrow_buffer::{NullBuffer, ScalarBuffer};
+use arrow_buffer::{BooleanBuffer, NullBuffer, ScalarBuffer};
 use dynocar_analysis::dataset::{Extras, Run};
 use dynocar_shared::SampleField;
 use pyo3::exceptions::PyRuntimeError;
@@ -83,17 +83,17 @@ impl Table {
     /// The table of each run, and of all of them with a column that numbers the runs. They hold the
     /// quantities of which any run has a value.
     pub(crate) fn of_runs(runs: &[Run]) -> PyResult<(Vec<Self>, Self)> {
-        let mut read: Vec<Columns> = runs.iter().map(quantities).collect();
-        let is_there = |index: usize| {
-            read.iter().any(|columns| columns[index].1.iter().any(|value| !value.is_nan()))
+        let samples = runs.iter().flat_map(|run| &run.samples);
+        let fields = samples.fold(0, |fields, sample| fields | sample.valid);
+        let fields = SampleField::ALL.into_iter().filter(|field| fields & field.bit() != 0);
+        let fields: Vec<SampleField> = fields.collect();
+        let is_known = |extra: &usize| {
+            let mut values = runs.iter().flat_map(|run| extras(&run.extras)[*extra].1).flatten();
+            values.any(Option::is_some)
         };
-        let kept: Vec<bool> = (0..read.first().map_or(0, Vec::len)).map(is_there).collect();
-        for columns in &mut read {
-            let mut kept = kept.iter();
-            columns.retain(|_| kept.next() == Some(&true));
-        }
-        let numbered = |(run, columns): (&Run, Columns)| batch(Some(run.number), columns);
-        let all = runs.iter().zip(read).map(numbered).collect::<PyResult<Vec<_>>>()?;
+        let known: Vec<usize> = (0..EXTRAS).filter(is_known).collect();
+        let numbered = |run: &Run| batch(Some(run.number), quantities(run, &fields, &known));
+        let all = runs.iter().map(numbered).collect::<PyResult<Vec<_>>>()?;
         // The columns after the run's number, in the same memory.
         let alone = |whole: &RecordBatch| -> PyResult<Self> {
             let indices: Vec<usize> = (1..whole.num_columns()).collect();
@@ -103,23 +103,32 @@ impl Table {
     }
 }
 
-/// What a run holds: its times, the quantities of its samples, and those beyond them.
-fn quantities(run: &Run) -> Columns {
-    let samples = &run.samples;
-    let mut columns = vec![("time_s", samples.iter().map(|it| it.time_ns as f64 / 1e9).collect())];
-    for field in SampleField::ALL {
-        let values = samples.iter().map(|sample| sample.get(field).unwrap_or(f64::NAN));
-        columns.push((field.name(), values.collect()));
+/// So many samples are in the processor's cache while one column after the other is taken from them.
+const SAMPLES_AT_ONCE: usize = 512;
+/// Number of [`extras`].
+const EXTRAS: usize = 11;
+
+/// What a run holds: its times, these quantities of its samples, and of those beyond them.
+fn quantities(run: &Run, fields: &[SampleField], known: &[usize]) -> Columns {
+    let column = |name| (name, Vec::with_capacity(run.samples.len()));
+    let mut times = column("time_s");
+    let mut columns: Columns = fields.iter().map(|field| column(field.name())).collect();
+    for samples in run.samples.chunks(SAMPLES_AT_ONCE) {
+        times.1.extend(samples.iter().map(|it| it.time_ns as f64 / 1e9));
+        for (field, (_, values)) in fields.iter().zip(&mut columns) {
+            values.extend(samples.iter().map(|it| it.get(*field).unwrap_or(f64::NAN)));
+        }
     }
-    for (name, values) in extras(&run.extras) {
+    columns.insert(0, times);
+    for (name, values) in known.iter().map(|extra| extras(&run.extras)[*extra]) {
         let known = values.iter().flatten().map(|value| value.unwrap_or(f64::NAN));
-        columns
-            .push((name, known.chain(std::iter::repeat(f64::NAN)).take(samples.len()).collect()));
+        let whole = known.chain(std::iter::repeat(f64::NAN)).take(run.samples.len());
+        columns.push((name, whole.collect()));
     }
     columns
 }
 
-fn extras(extras: &Extras) -> [(&'static str, &Option<Vec<Option<f64>>>); 11] {
+fn extras(extras: &Extras) -> [(&'static str, &Option<Vec<Option<f64>>>); EXTRAS] {
     [
         ("relative_humidity", &extras.relative_humidity),
         ("wind_speed_mps", &extras.wind_speed_mps),
@@ -140,8 +149,9 @@ fn batch(run: Option<u32>, columns: Columns) -> PyResult<RecordBatch> {
     let rows = columns.first().map_or(0, |(_, values)| values.len());
     let number = run.map(|run| (RUN, Arc::new(UInt32Array::from(vec![run; rows])) as ArrayRef));
     let numbers = columns.into_iter().map(|(name, values)| {
-        let known: NullBuffer = values.iter().map(|it| !it.is_nan()).collect::<Vec<_>>().into();
-        let nulls = (known.null_count() > 0).then_some(known);
+        let is_known = |row: usize| !values[row].is_nan();
+        let known = BooleanBuffer::collect_bool(values.len(), is_known);
+        let nulls = Some(NullBuffer::new(known)).filter(|it| it.null_count() > 0);
         (name, Arc::new(Float64Array::new(values.into(), nulls)) as ArrayRef)
     });
     let all = number.into_iter().chain(numbers).map(|(name, array)| (name, array, true));

@@ -210,16 +210,21 @@ impl DatasetHead {
     ///
     /// The first mistake in one of their files, with line and column.
     pub fn read(self, files: &(impl DatasetFiles + ?Sized)) -> Result<Dataset, DatasetError> {
-        let count = self.manifest.runs.len();
-        #[cfg(feature = "parallel")]
-        let places = (0..count).into_par_iter();
-        #[cfg(not(feature = "parallel"))]
-        let places = 0..count;
-        let runs = places.map(|index| self.read_run(files, index));
         // The first mistake is that of the first run, whichever was read first.
-        let runs = runs.collect::<Vec<_>>().into_iter().collect::<Result<_, _>>()?;
+        let runs = self.read_each(files).into_iter().collect::<Result<_, _>>()?;
         let Manifest { name, description, .. } = self.manifest;
         Ok(Dataset { name, description, train: self.train, track: self.track, runs })
+    }
+
+    /// Reads all runs, in the order of the manifest, each or the first mistake in its file.
+    pub fn read_each(
+        &self,
+        files: &(impl DatasetFiles + ?Sized),
+    ) -> Vec<Result<Run, DatasetError>> {
+        let places = 0..self.manifest.runs.len();
+        #[cfg(feature = "parallel")]
+        let places = places.into_par_iter();
+        places.map(|index| self.read_run(files, index)).collect()
     }
 
     /// Reads one run by its place in the manifest, from 0.

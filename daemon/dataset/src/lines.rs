@@ -178,7 +178,7 @@ mod tests {
     proptest! {
         #[test]
         fn rows_are_those_of_the_crate_for_csv(
-            text in "[\u{feff}]?([-0-9.]{0,4}|[\"]{0,3}|[,;\r\n]|[ aä\"]{0,2}){0,40}",
+            text in "([-0-9.]{0,4}|[\"]{0,3}|[,;\r\n]|[ aä\"]{0,2}){0,40}",
             delimiter in prop::sample::select(&b",;-1"[..]),
         ) {
             prop_assert_eq!(rows(&text, delimiter), rows_of_csv(&text, delimiter), "{:?}", text);

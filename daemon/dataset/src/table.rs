@@ -181,10 +181,12 @@ impl<'m> Rows<'m> {
         })
     }
 
-    /// Makes room for so many more rows.
+    /// Makes room for so many more rows, where there is some: it is a guess.
     fn reserve(&mut self, rows: usize) {
-        self.columns.iter_mut().for_each(|column| column.values.reserve(rows));
-        self.line_of_row.reserve(rows);
+        for column in &mut self.columns {
+            let _ = column.values.try_reserve(rows);
+        }
+        let _ = self.line_of_row.try_reserve(rows);
     }
 
     /// Refuses a row of values in the place of that of units, which would be lost.
