@@ -100,6 +100,6 @@ fn read_dataset(path: &Path) -> Result<Understood, Failure> {
         }
         other => other.into(),
     })?;
-    let runs = (0..head.manifest.runs.len()).map(|index| head.read_run(&folder, index)).collect();
+    let runs = head.read_each(&folder);
     Ok(Understood::Dataset(Box::new(head), runs))
 }
