@@ -66,7 +66,7 @@ fn xml_root(text: &str) -> Option<&str> {
 
 /// The kind of a file by its keys, or of those of one project.
 pub(super) fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, ImportError> {
-    let has = |key: &str| root.get(key).is_some();
+    let has = |key: &str| root.has(key);
     let recognised = if has("schema") {
         Some(Format::Railtoolkit)
     } else if has("rolling_resistance") {

@@ -3,6 +3,7 @@
 use dynocar_model::track::Curve;
 use dynocar_model::train::Davis;
 
+use super::item::Item;
 use crate::dataset::SourcePosition;
 
 /// How a file is to be read where its format leaves a choice.
@@ -72,18 +73,31 @@ impl Account {
         self.say(FieldOutcome::Unknown { key, why: why.into() });
     }
 
-    /// Accounts for the fields of a map that were not taken: those of `without_place` for a reason,
-    /// the others because nobody knows them. `prefix` stands before each name.
-    pub(super) fn rest<'k>(
+    /// A value that a field gives: taken under a key, or not known for a reason.
+    pub(super) fn given<T>(
         &mut self,
-        prefix: &str,
-        keys: impl Iterator<Item = &'k str>,
-        taken: &[&str],
-        without_place: &[(&str, &str)],
-    ) {
-        for key in keys.filter(|key| !taken.contains(key)) {
-            let known = without_place.iter().find(|(name, _)| *name == key);
-            let why = known.map_or("not understood", |(_, why)| why);
+        value: Option<T>,
+        field: &str,
+        (key, how): (&'static str, &str),
+        why: &str,
+    ) -> Option<T> {
+        match value {
+            Some(_) => self.taken(field, key, how),
+            None => self.unknown(key, why),
+        }
+        value
+    }
+
+    /// Accounts for the fields of a map that were not taken: those of `without_place`, lists with a reason each,
+    /// and those that nobody has asked for. `prefix` stands before each name.
+    pub(super) fn rest(&mut self, prefix: &str, map: &Item, without_place: &[(&str, &str)]) {
+        for key in map.keys() {
+            let is_listed = |(_, list): &&(&str, &str)| list.split(", ").any(|name| name == key);
+            let why = match without_place.iter().find(is_listed) {
+                Some((why, _)) => why,
+                None if map.is_unread(key) => "not understood",
+                None => continue,
+            };
             self.left(&format!("{prefix}{key}"), why);
         }
     }

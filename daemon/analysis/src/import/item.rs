@@ -1,8 +1,17 @@
 //! A value of a file with the way to it, and what may be expected of it.
 
+use std::ops::{Bound, RangeBounds};
+
+use dynocar_model::units::Unit;
+
 use super::error::{ImportError, ImportProblem};
 use super::tree::{Content, Node};
-use crate::dataset::{Problem, SourcePosition};
+use crate::dataset::{Choices, Problem, SourcePosition};
+
+/// Above 0, up to a bound.
+pub(super) fn above_zero(most: f64) -> (Bound<f64>, Bound<f64>) {
+    (Bound::Excluded(0.0), Bound::Included(most))
+}
 
 /// A value with file and path, for messages.
 #[derive(Clone, Debug)]
@@ -18,19 +27,25 @@ impl<'t> Item<'t> {
         Item { label, path: String::new(), node }
     }
 
-    /// The file.
-    pub fn label(&self) -> &'t str {
-        self.label
-    }
-
-    /// The line in it, from 1.
-    pub fn line(&self) -> usize {
-        self.node.line
+    /// File and line.
+    pub fn place(&self) -> SourcePosition {
+        SourcePosition::line(self.label, self.node.line)
     }
 
     /// A problem with this value.
     pub fn wrong(&self, problem: impl Into<ImportProblem>) -> ImportError {
-        ImportError::new(SourcePosition::line(self.label, self.node.line), problem)
+        ImportError::new(self.place(), problem)
+    }
+
+    /// The error of a name that is none of those which can stand here.
+    pub fn unknown<T: Into<String>>(
+        &self,
+        what: &'static str,
+        name: &str,
+        names: impl IntoIterator<Item = T>,
+    ) -> ImportError {
+        let (choices, context) = (Choices::new(name, names), format!(" in {}", self.path));
+        self.wrong(Problem::UnknownName { what, name: name.into(), context, choices })
     }
 
     /// A path to a key of this map.
@@ -38,20 +53,37 @@ impl<'t> Item<'t> {
         if self.path.is_empty() { key.into() } else { format!("{}.{key}", self.path) }
     }
 
+    fn entries(&self) -> &'t [(String, Node)] {
+        match &self.node.content {
+            Content::Map(entries) => entries,
+            _ => &[],
+        }
+    }
+
     /// The names of this map; none of another value.
     pub fn keys(&self) -> impl Iterator<Item = &'t str> + use<'t> {
-        let entries = match &self.node.content {
-            Content::Map(entries) => &entries[..],
-            _ => &[],
-        };
-        entries.iter().map(|(name, _)| name.as_str())
+        self.entries().iter().map(|(name, _)| name.as_str())
+    }
+
+    /// True for a key of this map whose value nobody has asked for.
+    pub fn is_unread(&self, key: &str) -> bool {
+        self.find(key).is_some_and(|item| !item.node.is_read.get())
+    }
+
+    fn find(&self, key: &str) -> Option<Item<'t>> {
+        let (_, node) = self.entries().iter().find(|(name, _)| name == key)?;
+        Some(Item { label: self.label, path: self.full(key), node })
+    }
+
+    /// True where a key of this map has a value, which is not counted as read.
+    pub fn has(&self, key: &str) -> bool {
+        self.find(key).is_some_and(|item| !item.is_null())
     }
 
     /// The value under a key of this map, unless it is null.
     pub fn get(&self, key: &str) -> Option<Item<'t>> {
-        let Content::Map(entries) = &self.node.content else { return None };
-        let (_, node) = entries.iter().find(|(name, _)| name == key)?;
-        let item = Item { label: self.label, path: self.full(key), node };
+        let item = self.find(key)?;
+        item.node.is_read.set(true);
         (!item.is_null()).then_some(item)
     }
 
@@ -108,8 +140,13 @@ impl<'t> Item<'t> {
         }
     }
 
+    /// The text under a key that must be there.
+    pub fn need_text(&self, key: &str, expected: &str) -> Result<&'t str, ImportError> {
+        self.need(key, expected)?.text(expected)
+    }
+
     /// This number, when it satisfies `is_allowed`; `allowed` says so in words.
-    pub fn number(
+    pub fn checked(
         &self,
         allowed: &str,
         is_allowed: impl Fn(f64) -> bool,
@@ -119,6 +156,22 @@ impl<'t> Item<'t> {
             return Err(self.out_of_range(&number.to_string(), allowed));
         }
         Ok(number)
+    }
+
+    /// This number, within a range.
+    pub fn number(&self, allowed: &str, range: impl RangeBounds<f64>) -> Result<f64, ImportError> {
+        self.checked(allowed, |number| range.contains(&number))
+    }
+
+    /// This number of a unit, in the base unit, within a range in that.
+    pub fn in_unit(
+        &self,
+        unit: &Unit,
+        allowed: &str,
+        range: impl RangeBounds<f64>,
+    ) -> Result<f64, ImportError> {
+        let number = self.checked(allowed, |number| range.contains(&unit.to_base(number)))?;
+        Ok(unit.to_base(number))
     }
 
     /// This number, be it finite or not; `None` for anything else.
@@ -140,9 +193,19 @@ impl<'t> Item<'t> {
         &self,
         key: &str,
         allowed: &str,
-        is_allowed: impl Fn(f64) -> bool,
+        range: impl RangeBounds<f64>,
     ) -> Result<Option<f64>, ImportError> {
-        self.get(key).map(|item| item.number(allowed, is_allowed)).transpose()
+        self.get(key).map(|item| item.number(allowed, range)).transpose()
+    }
+
+    /// The number under a key that must be there.
+    pub fn required(
+        &self,
+        key: &str,
+        allowed: &str,
+        range: impl RangeBounds<f64>,
+    ) -> Result<f64, ImportError> {
+        self.need(key, allowed)?.number(allowed, range)
     }
 
     /// The error of a value outside its range.

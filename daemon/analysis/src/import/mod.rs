@@ -6,13 +6,14 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - `tree`, `item`: YAML and JSON with the line of every value; what may be expected of one
+//! - `tree`, `item`, `effort`: YAML and JSON with the line of every value; what may be expected of one
 //! - [`mod@format`]: which project's file it is, by its content
 //! - `rolling_stock`, `vehicle`, `running_path`: railtoolkit's schemas
 //! - `ttobench`, `ttobench_train`, `ttobench_track`: TTOBench's files
 //! - `osrd`: OSRD's rolling stock
 //! - [`imported`], [`error`]: what comes out, or why nothing does
 
+mod effort;
 pub mod error;
 pub mod format;
 pub mod imported;

@@ -5,84 +5,63 @@
 
 use dynocar_model::train::{Davis, TrainModel};
 
+use super::effort::{Speeds, points};
 use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedTrain, Reading};
-use super::item::Item;
-use crate::dataset::{Choices, Problem, SourcePosition};
+use super::item::{Item, above_zero};
 
-const TAKEN: [&str; 6] =
-    ["name", "mass", "length", "inertia_coefficient", "rolling_resistance", "effort_curves"];
-const BRAKE: &str = "a deceleration, no force: write [brake] by hand";
-const START: &str = "train.toml holds no way of starting up";
-const OWN: &str = "of OSRD's own bookkeeping";
-const WITHOUT_PLACE: [(&str, &str); 24] = [
-    ("const_gamma", BRAKE),
-    ("gamma", BRAKE),
-    ("max_speed", "no limit of speed has a place"),
-    ("startup_time", START),
-    ("startup_acceleration", START),
-    ("comfort_acceleration", "train.toml holds no limit of acceleration"),
-    ("electrical_power_startup_time", START),
-    ("raise_pantograph_time", START),
-    ("etcs_brake_params", BRAKE),
-    ("energy_sources", "train.toml holds no sources of energy"),
-    ("power_restrictions", "train.toml holds no restrictions of power"),
-    ("base_power_class", "train.toml holds no restrictions of power"),
-    ("loading_gauge", "train.toml holds no gauge"),
-    ("supported_signaling_systems", "train.toml holds no signalling"),
-    ("primary_category", OWN),
-    ("other_categories", OWN),
-    ("liveries", OWN),
-    ("metadata", OWN),
-    ("railjson_version", OWN),
-    ("version", OWN),
-    ("locked", OWN),
-    ("id", OWN),
-    ("features", OWN),
-    ("label", OWN),
+/// Why fields have no place, and which.
+const WITHOUT_PLACE: [(&str, &str); 9] = [
+    ("a deceleration, no force: write [brake] by hand", "const_gamma, gamma, etcs_brake_params"),
+    ("no limit of speed has a place", "max_speed"),
+    (
+        "train.toml holds no way of starting up",
+        "startup_time, startup_acceleration, electrical_power_startup_time, raise_pantograph_time",
+    ),
+    ("train.toml holds no limit of acceleration", "comfort_acceleration"),
+    ("train.toml holds no sources of energy", "energy_sources"),
+    ("train.toml holds no restrictions of power", "power_restrictions, base_power_class"),
+    ("train.toml holds no gauge", "loading_gauge"),
+    ("train.toml holds no signalling", "supported_signaling_systems"),
+    (
+        "of OSRD's own bookkeeping",
+        "primary_category, other_categories, liveries, metadata, railjson_version, version, locked, id, features, label",
+    ),
 ];
 /// Resistances in N/kN that a train may have at half of its greatest speed, with room to spare.
 const RESISTANCE_N_PER_KN: (f64, f64) = (0.1, 60.0);
 /// Where a file gives no greatest speed, one that every train reaches.
 const SPEED_MPS: f64 = 20.0;
+const SPEEDS: Speeds =
+    Speeds { allowed: "a speed in m/s from 0 to 200", range: 0.0..=200.0, per_mps: 1.0 };
 
 /// The train of a file.
 pub(super) fn train(root: &Item, reading: &Reading) -> Result<ImportedTrain, ImportError> {
     let mut account = Account::default();
-    let mass = "a mass in kg from 1000 to 1e8";
-    let mass_kg = root.need("mass", mass)?.number(mass, |kg| (1e3..=1e8).contains(&kg))?;
+    let mass_kg = root.required("mass", "a mass in kg from 1000 to 1e8", 1e3..=1e8)?;
     account.taken("mass", "mass_t", "kg / 1000");
-    let length = "a length in m from 1 to 10000";
-    let length_m = root.optional("length", length, |it| (1.0..=1e4).contains(&it))?;
-    match length_m {
-        Some(_) => account.taken("length", "length_m", "m"),
-        None => account.unknown("length_m", "no length"),
-    }
-    let inertia = "a coefficient from 1 to 2";
-    let inertia = root.optional("inertia_coefficient", inertia, |it| (1.0..=2.0).contains(&it))?;
-    match inertia {
-        Some(_) => account.taken("inertia_coefficient", "rotating_mass_factor", "less 1"),
-        None => account.unknown("rotating_mass_factor", "no inertia_coefficient"),
-    }
+    let length = root.optional("length", "a length in m from 1 to 10000", 1.0..=1e4)?;
+    let length_m = account.given(length, "length", ("length_m", "m"), "no length");
+    let (field, key) = ("inertia_coefficient", "rotating_mass_factor");
+    let inertia = root.optional(field, "a coefficient from 1 to 2", 1.0..=2.0)?;
+    let inertia = account.given(inertia, field, (key, "less 1"), "no inertia_coefficient");
     account.unknown("cars", "the format has none");
     let top = "a speed in m/s above 0, at most 200";
-    let top_mps = root.optional("max_speed", top, |it| it > 0.0 && it <= 200.0)?;
+    let top_mps = root.optional("max_speed", top, above_zero(200.0))?;
     let resistance = resistance(root, mass_kg, top_mps, &mut account)?;
-    let traction = match root.get("effort_curves") {
-        Some(curves) => Some(effort(&curves, reading, &mut account)?),
-        None => {
-            account.unknown("effort", "no effort_curves");
-            None
-        }
-    };
-    account.rest("", root.keys(), &TAKEN, &WITHOUT_PLACE);
+    let curves = root.get("effort_curves");
+    if curves.is_none() {
+        account.unknown("effort", "no effort_curves");
+    }
+    let traction = curves.map(|curves| effort(&curves, reading, &mut account)).transpose()?;
     let name = match root.get("name") {
         Some(name) => name.text("a name")?,
         None => "unnamed train",
     };
+    account.rest("", root, &WITHOUT_PLACE);
     Ok(ImportedTrain {
         id: name.into(),
-        place: SourcePosition::line(root.label(), root.line()),
+        place: root.place(),
         name: name.into(),
         mass_kg,
         length_m,
@@ -105,9 +84,7 @@ fn resistance(
     if kind.text("\"davis\"")? != "davis" {
         return Err(kind.out_of_range(kind.text("")?, "\"davis\""));
     }
-    let allowed = "a number from 0 to 1e7";
-    let number =
-        |key: &str| item.need(key, allowed)?.number(allowed, |value| (0.0..=1e7).contains(&value));
+    let number = |key: &str| item.required(key, "a number from 0 to 1e7", 0.0..=1e7);
     let stated = Davis { a: number("A")?, b: number("B")?, c: number("C")? };
     let weight_kn = TrainModel::weight_kn(mass_kg);
     let times =
@@ -121,13 +98,8 @@ fn resistance(
         (false, true) => (each_kg, "for each kg", by_mass, by_force),
         _ => {
             let key = item.path.clone();
-            return Err(item.wrong(ImportProblem::Davis {
-                key,
-                speed_mps,
-                by_force,
-                by_mass,
-                mass_kg,
-            }));
+            let problem = ImportProblem::Davis { key, speed_mps, by_force, by_mass, mass_kg };
+            return Err(item.wrong(problem));
         }
     };
     let how = format!(
@@ -144,42 +116,25 @@ fn effort(
     account: &mut Account,
 ) -> Result<Vec<(f64, f64)>, ImportError> {
     let modes = item.need("modes", "effort curves by mode")?;
-    let names: Vec<&str> = modes.keys().collect();
     let stated = match &reading.mode {
         Some(wanted) => wanted.as_str(),
-        None => item.need("default_mode", "the name of a mode")?.text("the name of a mode")?,
+        None => item.need_text("default_mode", "the name of a mode")?,
     };
-    let Some(mode) = modes.get(stated) else {
-        let choices = Choices::new(stated, names.iter().copied());
-        let (name, context) = (stated.into(), format!(" in {}", modes.path));
-        return Err(modes.wrong(Problem::UnknownName { what: "mode", name, context, choices }));
-    };
-    let others: Vec<&str> = names.into_iter().filter(|name| *name != stated).collect();
+    let mode = modes.get(stated).ok_or_else(|| modes.unknown("mode", stated, modes.keys()))?;
     let curve = mode.need("default_curve", "speeds and max_efforts")?;
     let speeds = curve.need("speeds", "a list of speeds in m/s")?.list("speeds", 1)?;
-    let forces = curve.need("max_efforts", "a list of forces in N")?;
-    let stated_forces = forces.list("forces", 1)?;
-    if speeds.len() != stated_forces.len() {
-        let found = format!("a list of {}", stated_forces.len());
-        return Err(
-            forces.out_of_range(&found, &format!("one for each of {} speeds", speeds.len()))
-        );
+    let list = curve.need("max_efforts", "a list of forces in N")?;
+    let forces = list.list("forces", 1)?;
+    if speeds.len() != forces.len() {
+        let found = format!("a list of {}", forces.len());
+        return Err(list.out_of_range(&found, &format!("one for each of {} speeds", speeds.len())));
     }
-    let mut points: Vec<(f64, f64)> = Vec::new();
-    for (index, (speed, force)) in speeds.iter().zip(&stated_forces).enumerate() {
-        let speed_mps =
-            speed.number("a speed in m/s from 0 to 200", |it| (0.0..=200.0).contains(&it))?;
-        let force_n = force.number("a force in N from 0 to 1e7", |it| (0.0..=1e7).contains(&it))?;
-        if let Some(&(before, _)) = points.last()
-            && speed_mps <= before
-        {
-            let (key, index, found) = (curve.full("speeds"), index + 1, speed_mps);
-            return Err(speed.wrong(Problem::EffortOrder { key, index, found, before }));
-        }
-        points.push((speed_mps, force_n));
-    }
+    let items =
+        speeds.into_iter().zip(forces).map(|(speed, force)| Ok([speed.clone(), speed, force]));
+    let points = points(&curve.full("speeds"), &SPEEDS, items)?;
     let field = format!("effort_curves.modes.{stated}.default_curve");
     account.taken(&field, "effort", "m/s, N / 1000");
+    let others: Vec<&str> = modes.keys().filter(|name| *name != stated).collect();
     if !others.is_empty() {
         let why = format!("other curves, which --mode takes instead: {}", others.join(", "));
         account.left("effort_curves.modes", why);

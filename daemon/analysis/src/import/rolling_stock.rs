@@ -7,27 +7,12 @@ use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedTrain, Reading};
 use super::item::Item;
 use super::vehicle::{Kind, Vehicle, vehicle};
-use crate::dataset::SourcePosition;
 
-const TAKEN: [&str; 12] = [
-    "air_resistance",
-    "base_resistance",
-    "id",
-    "length",
-    "load_limit",
-    "mass",
-    "mass_traction",
-    "name",
-    "rolling_resistance",
-    "rotation_mass",
-    "tractive_effort",
-    "vehicle_type",
-];
 const WITHOUT_PLACE: [(&str, &str); 4] = [
-    ("UUID", "train.toml holds no identifier"),
-    ("picture", "train.toml holds no picture"),
-    ("power_type", "train.toml holds no kind of propulsion"),
-    ("speed_limit", "train.toml holds no speed limit"),
+    ("train.toml holds no identifier", "UUID"),
+    ("train.toml holds no picture", "picture"),
+    ("train.toml holds no kind of propulsion", "power_type"),
+    ("train.toml holds no speed limit", "speed_limit"),
 ];
 
 /// The trains of files of one schema, whose vehicles may stand in another of the files. Without a
@@ -46,7 +31,7 @@ pub(super) fn trains(roots: &[Item], reading: &Reading) -> Result<Vec<ImportedTr
             vehicles.push(vehicle);
         }
         for item in list(root.get("trains"), "trains")? {
-            let id = item.need("id", "an identifier")?.text("an identifier")?;
+            let id = item.need_text("id", "an identifier")?;
             unique(trains.iter().map(|(id, it)| (*id, it)), id, &item)?;
             trains.push((id, item));
         }
@@ -61,11 +46,10 @@ pub(super) fn trains(roots: &[Item], reading: &Reading) -> Result<Vec<ImportedTr
         return Ok(vehicles.iter().map(alone).collect());
     }
     let described = |(id, item): &(&str, Item)| -> Result<ImportedTrain, ImportError> {
-        let name = item.need("name", "a name")?.text("a name")?;
+        let name = item.need_text("name", "a name")?;
         let mut train = train(item, id, name, &formation(item, &vehicles)?, reading);
-        let known = ["id", "name", "formation"];
         train.account.taken("trains.formation", "cars", "the number of vehicles");
-        train.account.rest("trains.", item.keys(), &known, &WITHOUT_PLACE);
+        train.account.rest("trains.", item, &WITHOUT_PLACE);
         Ok(train)
     };
     trains.iter().map(described).collect()
@@ -75,13 +59,14 @@ fn list<'t>(item: Option<Item<'t>>, what: &str) -> Result<Vec<Item<'t>>, ImportE
     item.map_or(Ok(Vec::new()), |item| item.list(what, 1))
 }
 
-fn unique<'i, 't: 'i>(
+/// Refuses an identifier that another of the same kind has.
+pub(super) fn unique<'i, 't: 'i>(
     mut known: impl Iterator<Item = (&'t str, &'i Item<'t>)>,
     id: &str,
     item: &Item,
 ) -> Result<(), ImportError> {
     let Some((_, first)) = known.find(|(other, _)| *other == id) else { return Ok(()) };
-    let (key, first_line) = (item.full("id"), first.line());
+    let (key, first_line) = (item.full("id"), first.place().line.unwrap_or(1));
     Err(item.wrong(ImportProblem::Repeated { key, id: id.into(), first_line }))
 }
 
@@ -134,11 +119,11 @@ fn train(
     let resistance = resistance(formation, share, mass_kg, &mut account);
     let traction = traction(formation, &mut account);
     for vehicle in formation {
-        account.rest("vehicles.", vehicle.item.keys(), &TAKEN, &WITHOUT_PLACE);
+        account.rest("vehicles.", &vehicle.item, &WITHOUT_PLACE);
     }
     ImportedTrain {
         id: id.into(),
-        place: SourcePosition::line(item.label(), item.line()),
+        place: item.place(),
         name: name.into(),
         mass_kg,
         length_m: Some(sum(&|it| it.length_m)),
@@ -173,13 +158,11 @@ fn resistance(
     account: &mut Account,
 ) -> Option<Davis> {
     // In ‰ of kg: by the whole mass in kg they are N/kN.
-    let mut total = Davis { a: 0.0, b: 0.0, c: 0.0 };
+    let mut total = [0.0; 3];
     for vehicle in formation {
         match vehicle.resistance(share) {
-            Ok(own) => {
-                total.a += own.a;
-                total.b += own.b;
-                total.c += own.c;
+            Ok(Davis { a, b, c }) => {
+                total.iter_mut().zip([a, b, c]).for_each(|(sum, own)| *sum += own);
             }
             Err(field) => {
                 let why = format!("'{}' has no {field}, which its law needs", vehicle.id);
@@ -194,7 +177,8 @@ fn resistance(
     }
     let how = "‰ of weight, by the laws of TrainRuns.jl: v over 100 km/h, head wind 15 km/h";
     account.taken("vehicles.base_, rolling_, air_resistance", "a, b, c", how);
-    Some(Davis { a: total.a / mass_kg, b: total.b / mass_kg, c: total.c / mass_kg })
+    let [a, b, c] = total.map(|sum| sum / mass_kg);
+    Some(Davis { a, b, c })
 }
 
 /// The sum of the units' efforts, as far as all of them have one.

@@ -1,17 +1,17 @@
 //! railtoolkit's running paths: sections of permitted speed and resistance. The schema of 2022.05 writes
 //! a section as a list, the later main as keys and values, of which speed or resistance may be missing.
 
-use super::error::{ImportError, ImportProblem};
+use super::error::ImportError;
 use super::imported::{Account, ImportedLine};
-use super::item::Item;
-use crate::dataset::SourcePosition;
+use super::item::{Item, above_zero};
+use super::rolling_stock::unique;
 
 const SECTIONS: &str = "characteristic_sections";
-/// Reasons for fields that have no place.
+/// Why fields have no place, and which.
 const WITHOUT_PLACE: [(&str, &str); 3] = [
-    ("UUID", "track.toml holds no identifier"),
-    ("description", "track.toml holds no description"),
-    ("points_of_interest", "points where a run is to be measured, no stops"),
+    ("track.toml holds no identifier", "UUID"),
+    ("track.toml holds no description", "description"),
+    ("points where a run is to be measured, no stops", "points_of_interest"),
 ];
 
 /// A section: from `position_m` on, until the next.
@@ -23,37 +23,29 @@ struct Section {
 
 /// The paths of a file.
 pub(super) fn lines(root: &Item) -> Result<Vec<ImportedLine>, ImportError> {
-    let mut seen: Vec<(&str, usize)> = Vec::new();
+    let mut seen: Vec<(&str, Item)> = Vec::new();
     let mut lines = Vec::new();
     for item in root.need("paths", "a list of paths")?.list("paths", 1)? {
-        let id = item.need("id", "an identifier")?.text("an identifier")?;
-        if let Some(&(_, first_line)) = seen.iter().find(|(other, _)| *other == id) {
-            let (key, id) = (item.full("id"), id.into());
-            return Err(item.wrong(ImportProblem::Repeated { key, id, first_line }));
-        }
-        seen.push((id, item.line()));
+        let id = item.need_text("id", "an identifier")?;
+        unique(seen.iter().map(|(id, it)| (*id, it)), id, &item)?;
         lines.push(line(&item, id)?);
+        seen.push((id, item));
     }
     Ok(lines)
 }
 
 fn line(item: &Item, id: &str) -> Result<ImportedLine, ImportError> {
-    let list = item.need(SECTIONS, "a list of sections")?;
-    let items = list.list("sections", 2)?;
+    let items = item.need(SECTIONS, "a list of sections")?.list("sections", 2)?;
     // The names became optional with the keys.
     let name = match (item.get("name"), items[0].is_list()) {
-        (Some(name), _) => name.text("a name")?,
-        (None, true) => item.need("name", "a name")?.text("a name")?,
         (None, false) => id,
+        _ => item.need_text("name", "a name")?,
     };
     let mut account = Account::default();
     let mut sections: Vec<Section> = Vec::new();
     for item in &items {
         let section = if item.is_map() { by_keys(item)? } else { by_place(item)? };
-        if item.is_map() {
-            let known = ["position", "speed", "resistance"];
-            account.rest("paths.characteristic_sections.", item.keys(), &known, &[]);
-        }
+        account.rest("paths.characteristic_sections.", item, &[]);
         let before = sections.last().map(|before| before.position_m);
         if let Some(before_m) = before.filter(|before_m| section.position_m <= *before_m) {
             let allowed = format!("a position above the one before ({before_m} m)");
@@ -64,37 +56,29 @@ fn line(item: &Item, id: &str) -> Result<ImportedLine, ImportError> {
     let (first_m, last_m) = (sections[0].position_m, sections[sections.len() - 1].position_m);
     let positions = "paths.characteristic_sections.position";
     account.taken(positions, "length_m", "m, the last less the first");
-    let resistance = "paths.characteristic_sections.resistance";
+    let mut given = |list: Vec<(f64, f64)>, field: &str, key: &'static str, how: &str| {
+        let how = format!("{how}{}", list.first().map_or("".into(), |it| since(it.0, first_m)));
+        let list = Some(list).filter(|list| !list.is_empty());
+        let name = format!("paths.characteristic_sections.{field}");
+        account.given(list, &name, (key, &how), &format!("no section has a {field}"))
+    };
     let gradient = steps(&sections, |it| it.resistance_permille);
-    match gradient.first() {
-        Some(&(from_m, _)) => {
-            let how = format!("‰, whatever resists{}", since(from_m, first_m));
-            account.taken(resistance, "gradient", how);
-        }
-        None => account.unknown("gradient", "no section has a resistance"),
-    }
+    let gradient = given(gradient, "resistance", "gradient", "‰, whatever resists");
     let permitted = steps(&sections, |it| it.speed_mps);
-    match permitted.first() {
-        Some(&(from_m, _)) => {
-            let how = format!("km/h / 3.6{}", since(from_m, first_m));
-            let speed = "paths.characteristic_sections.speed";
-            account.taken(speed, "permitted_speed", how);
-        }
-        None => account.unknown("permitted_speed", "no section has a speed"),
-    }
+    let permitted_speed = given(permitted, "speed", "permitted_speed", "km/h / 3.6");
     account.unknown("curves", "the format has none: its resistance holds theirs with the gradient");
     account.unknown("tunnels", "the format has none");
     account.unknown("stops", "the format has none");
-    account.rest("paths.", item.keys(), &["id", "name", SECTIONS], &WITHOUT_PLACE);
+    account.rest("paths.", item, &WITHOUT_PLACE);
     Ok(ImportedLine {
         id: id.into(),
-        place: SourcePosition::line(item.label(), item.line()),
+        place: item.place(),
         name: name.into(),
         length_m: last_m - first_m,
-        gradient: Some(gradient).filter(|list| !list.is_empty()),
+        gradient,
         curves: None,
         stops: Vec::new(),
-        permitted_speed: Some(permitted).filter(|list| !list.is_empty()),
+        permitted_speed,
         account,
     })
 }
@@ -124,15 +108,15 @@ const SPEED: &str = "a speed in km/h above 0, at most 720";
 const RESISTANCE: &str = "a resistance in permil from -150 to 150";
 
 fn position_m(item: &Item) -> Result<f64, ImportError> {
-    item.number(POSITION, |it| it.abs() <= 1e9)
+    item.number(POSITION, -1e9..=1e9)
 }
 
 fn speed_mps(item: &Item) -> Result<f64, ImportError> {
-    Ok(item.number(SPEED, |it| it > 0.0 && it <= 720.0)? / 3.6)
+    Ok(item.number(SPEED, above_zero(720.0))? / 3.6)
 }
 
 fn permille(item: &Item) -> Result<f64, ImportError> {
-    item.number(RESISTANCE, |it| it.abs() <= 150.0)
+    item.number(RESISTANCE, -150.0..=150.0)
 }
 
 /// A section as `[m, km/h, ‰]`.

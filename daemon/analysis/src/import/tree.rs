@@ -1,5 +1,7 @@
 //! YAML as a tree whose every node knows its line. JSON is YAML too, so that both are read alike.
 
+use std::cell::Cell;
+
 use granit_parser::{Event, Parser, ScalarStyle};
 
 use super::error::ImportError;
@@ -14,6 +16,8 @@ pub(super) struct Node {
     /// Line, from 1.
     pub line: usize,
     pub content: Content,
+    /// True once somebody has asked for it.
+    pub is_read: Cell<bool>,
 }
 
 #[derive(Debug)]
@@ -35,99 +39,84 @@ pub(super) fn parse(label: &str, text: &str) -> Result<Node, ImportError> {
     // JSON may be indented by tabs, which it allows nowhere else.
     let spaced = if is_json { text.replace('\t', " ") } else { text.into() };
     let language = if is_json { "JSON" } else { "YAML" };
-    let mut builder = Builder { label, language, open: Vec::new(), roots: Vec::new() };
+    let wrong = |line: usize, message: String| {
+        ImportError::new(SourcePosition::line(label, line), Problem::Syntax { language, message })
+    };
     let options = granit_parser::options! { emit_comments: false };
-    for next in Parser::new_from_str_with_options(&spaced, options) {
-        let (event, span) = next.map_err(|error| {
-            builder.wrong(error.marker().line(), error.info().replace('\n', ", "))
-        })?;
-        builder.feed(event, span.start.line())?;
+    let events = Parser::new_from_str_with_options(&spaced, options).map(|next| {
+        let (event, span) =
+            next.map_err(|error| wrong(error.marker().line(), error.info().replace('\n', ", ")))?;
+        Ok((event, span.start.line()))
+    });
+    let mut reader = Reader { events, wrong: &wrong };
+    let mut roots = Vec::new();
+    while let Some(next) = reader.events.next() {
+        roots.extend(reader.node(next?, 0)?);
     }
-    let mut roots = std::mem::take(&mut builder.roots).into_iter();
+    let mut roots = roots.into_iter();
     match (roots.next(), roots.next()) {
         (Some(root), None) => Ok(root),
-        (None, _) => Err(builder.wrong(1, "the file is empty".into())),
-        (_, Some(second)) => {
-            Err(builder.wrong(second.line, "expected one document, found another".into()))
-        }
+        (None, _) => Err(wrong(1, "the file is empty".into())),
+        (_, Some(second)) => Err(wrong(second.line, "expected one document, found another".into())),
     }
 }
 
-/// A list or map that has not ended.
-enum Open {
-    List { line: usize, items: Vec<Node> },
-    Map { line: usize, entries: Vec<(String, Node)>, key: Option<String> },
+/// Makes a tree of a parser's events, each with its line.
+struct Reader<'w, I> {
+    events: I,
+    wrong: &'w dyn Fn(usize, String) -> ImportError,
 }
 
-struct Builder<'l> {
-    label: &'l str,
-    language: &'static str,
-    open: Vec<Open>,
-    roots: Vec<Node>,
-}
-
-impl Builder<'_> {
-    fn wrong(&self, line: usize, message: String) -> ImportError {
-        let problem = Problem::Syntax { language: self.language, message };
-        ImportError::new(SourcePosition::line(self.label, line), problem)
+impl<'e, I: Iterator<Item = Result<(Event<'e>, usize), ImportError>>> Reader<'_, I> {
+    fn next(&mut self, depth: usize) -> Result<Option<Node>, ImportError> {
+        self.events.next().map_or(Ok(None), |event| self.node(event?, depth))
     }
 
-    fn feed(&mut self, event: Event, line: usize) -> Result<(), ImportError> {
-        if self.open.len() > DEPTH_MAX {
-            return Err(self.wrong(line, format!("expected at most {DEPTH_MAX} levels")));
+    /// The value that begins with an event, within so many others; `None` where none begins.
+    fn node(
+        &mut self,
+        (event, line): (Event<'e>, usize),
+        depth: usize,
+    ) -> Result<Option<Node>, ImportError> {
+        if depth > DEPTH_MAX {
+            return Err((self.wrong)(line, format!("expected at most {DEPTH_MAX} levels")));
         }
-        match event {
+        let content = match event {
             Event::Scalar(text, style, ..) => {
                 let is_plain = style == ScalarStyle::Plain;
-                let content = Content::Scalar { text: text.into_owned(), is_plain };
-                self.take(Node { line, content })
+                Content::Scalar { text: text.into_owned(), is_plain }
             }
             Event::SequenceStart(..) => {
-                self.open.push(Open::List { line, items: Vec::new() });
-                Ok(())
-            }
-            Event::MappingStart(..) => {
-                self.open.push(Open::Map { line, entries: Vec::new(), key: None });
-                Ok(())
-            }
-            Event::SequenceEnd | Event::MappingEnd => self.close(),
-            Event::Alias(_) => Err(self.wrong(line, "aliases (*name) are not taken".into())),
-            _ => Ok(()),
-        }
-    }
-
-    fn close(&mut self) -> Result<(), ImportError> {
-        let Some(ended) = self.open.pop() else { return Ok(()) };
-        let node = match ended {
-            Open::List { line, items } => Node { line, content: Content::List(items) },
-            Open::Map { line, entries, .. } => {
-                let mut names: Vec<(&str, usize)> =
-                    entries.iter().map(|(name, value)| (name.as_str(), value.line)).collect();
-                names.sort_unstable();
-                let twice = names.windows(2).find(|pair| pair[0].0 == pair[1].0);
-                if let Some(&[_, (name, line)]) = twice {
-                    return Err(self.wrong(line, format!("the key '{name}' stands twice")));
+                let mut items = Vec::new();
+                while let Some(item) = self.next(depth + 1)? {
+                    items.push(item);
                 }
-                Node { line, content: Content::Map(entries) }
+                Content::List(items)
             }
+            Event::MappingStart(..) => Content::Map(self.entries(depth + 1)?),
+            Event::Alias(_) => {
+                return Err((self.wrong)(line, "aliases (*name) are not taken".into()));
+            }
+            _ => return Ok(None),
         };
-        self.take(node)
+        Ok(Some(Node { line, content, is_read: Cell::new(false) }))
     }
 
-    /// Puts a value where it belongs.
-    fn take(&mut self, node: Node) -> Result<(), ImportError> {
-        match self.open.last_mut() {
-            None => self.roots.push(node),
-            Some(Open::List { items, .. }) => items.push(node),
-            Some(Open::Map { entries, key, .. }) => match (key.take(), node.content) {
-                (Some(name), content) => entries.push((name, Node { line: node.line, content })),
-                (None, Content::Scalar { text, .. }) => *key = Some(text),
-                (None, _) => {
-                    return Err(self.wrong(node.line, "expected a name as key".into()));
-                }
-            },
+    fn entries(&mut self, depth: usize) -> Result<Vec<(String, Node)>, ImportError> {
+        let mut entries = Vec::new();
+        while let Some(key) = self.next(depth)? {
+            let Content::Scalar { text, .. } = key.content else {
+                return Err((self.wrong)(key.line, "expected a name as key".into()));
+            };
+            entries.extend(self.next(depth)?.map(|value| (text, value)));
         }
-        Ok(())
+        let mut names: Vec<(&str, usize)> =
+            entries.iter().map(|(name, value)| (name.as_str(), value.line)).collect();
+        names.sort_unstable();
+        if let Some(&[_, (name, line)]) = names.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            return Err((self.wrong)(line, format!("the key '{name}' stands twice")));
+        }
+        Ok(entries)
     }
 }
 

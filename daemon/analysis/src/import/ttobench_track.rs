@@ -1,17 +1,17 @@
 //! A track of TTOBench: stops, permitted speeds, gradients and curvatures along it.
 
+use std::ops::{Bound, RangeBounds};
+
 use dynocar_model::track::Curve;
 use dynocar_model::units::{Dimension, Unit};
 
 use super::error::ImportError;
 use super::imported::{Account, ImportedLine};
-use super::item::Item;
-use super::ttobench::{METADATA, id, unit};
-use crate::dataset::SourcePosition;
+use super::item::{Item, above_zero};
+use super::ttobench::{id, rest, unit};
 
-const TAKEN: [&str; 5] = ["metadata", "stops", "speed limits", "gradients", "curvatures"];
 const WITHOUT_PLACE: [(&str, &str); 1] =
-    [("altitude", "track.toml holds gradients, no height above the sea")];
+    [("track.toml holds gradients, no height above the sea", "altitude")];
 /// A transition curve becomes pieces of constant radius of this length in m at most.
 const PIECE_M: f64 = 20.0;
 /// A flatter curve than of this radius in m resists by less than 0.03 N/kN: it is straight.
@@ -29,55 +29,28 @@ pub(super) fn line(root: &Item) -> Result<ImportedLine, ImportError> {
     let length_m = stops[stops.len() - 1];
     account.taken("stops", "length_m", "m, the last stop");
     account.taken("stops", "stops", "m; the format has no names");
-    let permitted_speed = match root.get("speed limits") {
-        Some(item) => {
-            let list = pairs(&item, "velocity", Dimension::Speed, "up to 200 m/s", |speed| {
-                speed > 0.0 && speed <= 200.0
-            })?;
-            account.taken("speed limits", "permitted_speed", "to m/s");
-            Some(list)
-        }
-        None => {
-            account.unknown("permitted_speed", "no speed limits");
-            None
-        }
-    };
-    let gradient = match root.get("gradients") {
-        Some(item) => {
-            let list = pairs(&item, "slope", Dimension::Ratio, "within 0.15", |slope| {
-                slope.abs() <= 0.15
-            })?;
-            account.taken("gradients", "gradient", "to ‰, climbing positive");
-            Some(list.into_iter().map(|(at_m, slope)| (at_m, 1000.0 * slope)).collect())
-        }
-        None => {
-            let why =
-                "no gradients; the format means a level line: gradient = [[0.0, 0.0]] says so";
-            account.unknown("gradient", why);
-            None
-        }
-    };
-    let curves = match root.get("curvatures") {
-        Some(item) => {
-            let how = "m, without sign; transitions in pieces of 20 m at most, mean curvature kept";
-            account.taken("curvatures", "curves", how);
-            Some(curves(&item, length_m)?)
-        }
-        None => {
-            let why = "no curvatures; the format means a straight line, but real ones leave them out \
-                       too: curves = [] says that there are none";
-            account.unknown("curves", why);
-            None
-        }
-    };
+    let speeds = root.get("speed limits").map(|item| {
+        pairs(&item, ("velocity", Dimension::Speed), "up to 200 m/s", above_zero(200.0))
+    });
+    let (field, key) = ("speed limits", ("permitted_speed", "to m/s"));
+    let permitted_speed = account.given(speeds.transpose()?, field, key, "no speed limits");
+    let slopes = root.get("gradients").map(|item| {
+        let list = pairs(&item, ("slope", Dimension::Ratio), "within 0.15", -0.15..=0.15)?;
+        Ok(list.into_iter().map(|(at_m, slope)| (at_m, 1000.0 * slope)).collect())
+    });
+    let why = "no gradients; the format means a level line: gradient = [[0.0, 0.0]] says so";
+    let key = ("gradient", "to ‰, climbing positive");
+    let gradient = account.given(slopes.transpose()?, "gradients", key, why);
+    let curves = root.get("curvatures").map(|item| curves(&item, length_m)).transpose()?;
+    let how = "m, without sign; transitions in pieces of 20 m at most, mean curvature kept";
+    let why = "no curvatures; the format means a straight line, but real ones leave them out \
+               too: curves = [] says that there are none";
+    let curves = account.given(curves, "curvatures", ("curves", how), why);
     account.unknown("tunnels", "the format has none");
-    account.rest("", root.keys(), &TAKEN, &WITHOUT_PLACE);
-    if let Some(metadata) = root.get("metadata") {
-        account.rest("metadata.", metadata.keys(), &["id"], &METADATA);
-    }
+    rest(&mut account, root, &WITHOUT_PLACE);
     Ok(ImportedLine {
         id: id.into(),
-        place: SourcePosition::line(root.label(), root.line()),
+        place: root.place(),
         name: id.into(),
         length_m,
         gradient,
@@ -99,24 +72,22 @@ fn stops(root: &Item) -> Result<Vec<f64>, ImportError> {
 }
 
 fn position_m(item: &Item, unit: &Unit, before_m: Option<f64>) -> Result<f64, ImportError> {
-    let allowed = match before_m {
-        Some(before_m) => format!("a position above the one before ({before_m} m)"),
-        None => "a position from 0 to 1e7 m".into(),
+    let (allowed, least) = match before_m {
+        Some(before_m) => {
+            let allowed = format!("a position above the one before ({before_m} m)");
+            (allowed, Bound::Excluded(before_m))
+        }
+        None => ("a position from 0 to 1e7 m".into(), Bound::Included(0.0)),
     };
-    let at = item.number(&allowed, |at| {
-        let at_m = unit.to_base(at);
-        (0.0..=POSITION_MAX_M).contains(&at_m) && before_m.is_none_or(|before_m| at_m > before_m)
-    })?;
-    Ok(unit.to_base(at))
+    item.in_unit(unit, &allowed, (least, Bound::Included(POSITION_MAX_M)))
 }
 
 /// Pairs of position in m and a value in its dimension's base unit.
 fn pairs(
     item: &Item,
-    name: &str,
-    dimension: Dimension,
+    (name, dimension): (&str, Dimension),
     allowed: &str,
-    is_allowed: impl Fn(f64) -> bool,
+    range: impl RangeBounds<f64> + Clone,
 ) -> Result<Vec<(f64, f64)>, ImportError> {
     let units = item.need("units", "the units of the values")?;
     let (along, unit) =
@@ -125,9 +96,7 @@ fn pairs(
     for pair in item.need("values", "a list of pairs")?.list("pairs", 1)? {
         let [at, value] = pair.tuple("[position, value]")?;
         let at_m = position_m(&at, &along, list.last().map(|before| before.0))?;
-        let base = |number: f64| unit.to_base(number);
-        let value = value.number(allowed, |number| is_allowed(base(number)))?;
-        list.push((at_m, base(value)));
+        list.push((at_m, value.in_unit(&unit, allowed, range.clone())?));
     }
     Ok(list)
 }
@@ -172,7 +141,7 @@ fn curvature_per_m(item: &Item, unit: &Unit) -> Result<f64, ImportError> {
     if item.text("a radius").is_ok_and(|text| text == "infinity") {
         return Ok(0.0);
     }
-    let radius = item.number("a radius of 10 m or more, or \"infinity\"", |radius| {
+    let radius = item.checked("a radius of 10 m or more, or \"infinity\"", |radius| {
         unit.to_base(radius).abs() >= RADIUS_MIN_M
     })?;
     Ok(1.0 / unit.to_base(radius))

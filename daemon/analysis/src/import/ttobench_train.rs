@@ -5,32 +5,20 @@ use dynocar_model::units::Dimension;
 
 use super::error::ImportError;
 use super::imported::{Account, ImportedTrain};
-use super::item::Item;
-use super::ttobench::{METADATA, coefficient, id, value};
-use crate::dataset::SourcePosition;
+use super::item::{Item, above_zero};
+use super::ttobench::{coefficient, id, rest, value};
 
-const TAKEN: [&str; 9] = [
-    "metadata",
-    "mass",
-    "rho",
-    "num coaches",
-    "max traction force",
-    "max traction power",
-    "rolling resistance r0",
-    "rolling resistance r1",
-    "rolling resistance r2",
-];
-const BRAKE: &str = "one of two brakes with limits of their own: write [brake] by hand";
-const WITHOUT_PLACE: [(&str, &str); 9] = [
-    ("num seats", "train.toml holds no seats"),
-    ("max reg braking force", BRAKE),
-    ("max reg braking power", BRAKE),
-    ("max pn braking force", BRAKE),
-    ("max acceleration", "train.toml holds no limit of acceleration"),
-    ("max deceleration", "train.toml holds no limit of deceleration"),
-    ("max speed", "no limit of speed has a place; the effort curve ends there"),
-    ("efficiency traction", "train.toml holds no losses"),
-    ("efficiency reg brake", "train.toml holds no losses"),
+/// Why fields have no place, and which.
+const WITHOUT_PLACE: [(&str, &str); 6] = [
+    ("train.toml holds no seats", "num seats"),
+    (
+        "one of two brakes with limits of their own: write [brake] by hand",
+        "max reg braking force, max reg braking power, max pn braking force",
+    ),
+    ("train.toml holds no limit of acceleration", "max acceleration"),
+    ("train.toml holds no limit of deceleration", "max deceleration"),
+    ("no limit of speed has a place; the effort curve ends there", "max speed"),
+    ("train.toml holds no losses", "efficiency traction, efficiency reg brake"),
 ];
 /// The hyperbola of constant power is drawn through points whose speeds grow by this factor: the
 /// straight lines between them lie 0.3 % above it at most.
@@ -40,41 +28,27 @@ const SPEED_RATIO: f64 = 1.12;
 pub(super) fn train(root: &Item) -> Result<ImportedTrain, ImportError> {
     let id = id(root)?;
     let mut account = Account::default();
-    let mass = "a mass from 1000 to 1e8 kg";
-    let is_mass = |kg: f64| (1e3..=1e8).contains(&kg);
     root.need("mass", "a mass with its unit")?;
-    let mass_kg = value(root, "mass", Dimension::Mass, mass, is_mass)?.unwrap_or_default();
+    let mass_kg = value(root, "mass", Dimension::Mass, "a mass from 1000 to 1e8 kg", 1e3..=1e8)?
+        .unwrap_or_default();
     account.taken("mass", "mass_t", "t");
     account.unknown("length_m", "the format has none");
-    let share = "a share from 0 to 1 of the mass";
-    let is_share = |share: f64| (0.0..=1.0).contains(&share);
-    let rotating_mass_factor = value(root, "rho", Dimension::Ratio, share, is_share)?;
-    match rotating_mass_factor {
-        Some(_) => account.taken("rho", "rotating_mass_factor", "as a share of the mass"),
-        None => account.unknown("rotating_mass_factor", "no rho"),
-    }
-    let cars = match root.get("num coaches") {
-        Some(item) => {
-            let count = item.need("value", "a number of coaches")?;
-            let whole = "a whole number from 1 to 1000";
-            let is_whole = |it: f64| (1.0..=1000.0).contains(&it) && it.fract() == 0.0;
-            account.taken("num coaches", "cars", "as it stands");
-            Some(count.number(whole, is_whole)? as u32)
-        }
-        None => {
-            account.unknown("cars", "no num coaches");
-            None
-        }
-    };
+    let rho = value(root, "rho", Dimension::Ratio, "a share from 0 to 1 of the mass", 0.0..=1.0)?;
+    let key = ("rotating_mass_factor", "as a share of the mass");
+    let rotating_mass_factor = account.given(rho, "rho", key, "no rho");
+    let coaches = root.get("num coaches").map(|item| {
+        let is_count = |it: f64| (1.0..=1000.0).contains(&it) && it.fract() == 0.0;
+        let count = item.need("value", "a number of coaches")?;
+        Ok(count.checked("a whole number from 1 to 1000", is_count)? as u32)
+    });
+    let key = ("cars", "as it stands");
+    let cars = account.given(coaches.transpose()?, "num coaches", key, "no num coaches");
     let resistance = resistance(root, mass_kg, &mut account)?;
     let traction = traction(root, &mut account)?;
-    account.rest("", root.keys(), &TAKEN, &WITHOUT_PLACE);
-    if let Some(metadata) = root.get("metadata") {
-        account.rest("metadata.", metadata.keys(), &["id"], &METADATA);
-    }
+    rest(&mut account, root, &WITHOUT_PLACE);
     Ok(ImportedTrain {
         id: id.into(),
-        place: SourcePosition::line(root.label(), root.line()),
+        place: root.place(),
         name: id.into(),
         mass_kg,
         length_m: None,
@@ -92,14 +66,17 @@ fn resistance(
     account: &mut Account,
 ) -> Result<Option<Davis>, ImportError> {
     let keys = ["rolling resistance r0", "rolling resistance r1", "rolling resistance r2"];
+    let items = keys.map(|key| root.get(key));
+    let weight_kn = TrainModel::weight_kn(mass_kg);
     let mut found = [0.0; 3];
-    for (power, key) in keys.into_iter().enumerate() {
-        let Some((value, unit)) = coefficient(root, key, power as i32)? else {
+    for (power, (key, item)) in keys.into_iter().zip(&items).enumerate() {
+        let Some(item) = item else {
             account.unknown("a, b, c", format!("no {key}"));
             return Ok(None);
         };
-        found[power] = value / TrainModel::weight_kn(mass_kg);
-        let how = format!("{unit} by the weight of {:.2} kN", TrainModel::weight_kn(mass_kg));
+        let (value, unit) = coefficient(item, power as i32)?;
+        found[power] = value / weight_kn;
+        let how = format!("{unit} by the weight of {weight_kn:.2} kN");
         account.taken(key, ["a", "b", "c"][power], how);
     }
     let [a, b, c] = found;
@@ -108,15 +85,10 @@ fn resistance(
 
 /// The smaller of force and power / speed, up to the greatest speed.
 fn traction(root: &Item, account: &mut Account) -> Result<Option<Vec<(f64, f64)>>, ImportError> {
-    let force = value(root, "max traction force", Dimension::Force, "from 1 to 1e7 N", |force| {
-        (1.0..=1e7).contains(&force)
-    })?;
-    let power = value(root, "max traction power", Dimension::Power, "from 1 to 1e9 W", |power| {
-        (1.0..=1e9).contains(&power)
-    })?;
-    let top = value(root, "max speed", Dimension::Speed, "a speed up to 200 m/s", |speed| {
-        speed > 0.0 && speed <= 200.0
-    })?;
+    let (force, power, top) = ("max traction force", "max traction power", "max speed");
+    let force = value(root, force, Dimension::Force, "from 1 to 1e7 N", 1.0..=1e7)?;
+    let power = value(root, power, Dimension::Power, "from 1 to 1e9 W", 1.0..=1e9)?;
+    let top = value(root, top, Dimension::Speed, "a speed up to 200 m/s", above_zero(200.0))?;
     let (Some(force_n), Some(power_w), Some(top_mps)) = (force, power, top) else {
         let why = "it needs max traction force, max traction power and max speed";
         account.unknown("effort", why);

@@ -10,14 +10,16 @@
 
 use dynocar_model::train::{Davis, EffortCurve};
 
+use super::effort::{Speeds, points};
 use super::error::ImportError;
-use super::item::Item;
-use crate::dataset::{Choices, Problem};
+use super::item::{Item, above_zero};
 
 /// Speed in m/s at which the coefficients of speed hold.
 const REFERENCE_MPS: f64 = 100.0 / 3.6;
 /// Head wind in m/s.
 const WIND_MPS: f64 = 15.0 / 3.6;
+const SPEEDS: Speeds =
+    Speeds { allowed: "a speed in km/h from 0 to 720", range: 0.0..=720.0, per_mps: 3.6 };
 
 /// Which law a vehicle's resistance follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,22 +70,19 @@ pub(super) struct Vehicle<'t> {
 pub(super) fn vehicle(item: Item) -> Result<Vehicle, ImportError> {
     let kind_item = item.need("vehicle_type", "a type of vehicle")?;
     let kind = kind_item.text("a type of vehicle")?;
-    let Some(&(_, kind)) = KINDS.iter().find(|(name, _)| *name == kind) else {
-        let names = KINDS.map(|(name, _)| name);
-        let choices = Choices::new(kind, names);
-        let (name, context) = (kind.into(), format!(" in {}", kind_item.path));
-        let what = "type of vehicle";
-        return Err(kind_item.wrong(Problem::UnknownName { what, name, context, choices }));
-    };
-    let above = |key: &str, allowed: &str, most: f64| {
-        item.optional(key, allowed, |value| value > 0.0 && value <= most)
-    };
+    let (_, kind) = KINDS
+        .into_iter()
+        .find(|(name, _)| *name == kind)
+        .ok_or_else(|| kind_item.unknown("type of vehicle", kind, KINDS.map(|(name, _)| name)))?;
     let mass = "a mass in t above 0, at most 1000";
     let permille = "a coefficient in permil above 0, at most 100";
-    let tonnes = |key| above(key, mass, 1000.0).map(|tonnes| tonnes.map(|it| it * 1000.0));
-    let is_sized = |size: f64| size > 0.0 && size <= 1000.0;
     let length = "a length in m above 0, at most 1000";
-    let empty_kg = item.need("mass", mass)?.number(mass, is_sized)? * 1000.0;
+    let tonnes = |key: &str| {
+        let tonnes = item.optional(key, mass, above_zero(1000.0))?;
+        Ok(tonnes.map(|it| it * 1000.0))
+    };
+    let resistance = |key: &str| item.optional(key, permille, above_zero(100.0));
+    let empty_kg = item.required("mass", mass, above_zero(1000.0))? * 1000.0;
     let driving_kg = tonnes("mass_traction")?;
     if let (Some(driving_kg), Some(stated)) = (driving_kg, item.get("mass_traction"))
         && driving_kg > empty_kg
@@ -92,19 +91,17 @@ pub(super) fn vehicle(item: Item) -> Result<Vehicle, ImportError> {
         return Err(stated.out_of_range(&(driving_kg / 1000.0).to_string(), allowed));
     }
     Ok(Vehicle {
-        id: item.need("id", "an identifier")?.text("an identifier")?,
-        name: item.need("name", "a name")?.text("a name")?,
+        id: item.need_text("id", "an identifier")?,
+        name: item.need_text("name", "a name")?,
         kind,
-        length_m: item.need("length", length)?.number(length, is_sized)?,
+        length_m: item.required("length", length, above_zero(1000.0))?,
         empty_kg,
         load_kg: tonnes("load_limit")?,
         driving_kg,
-        base: above("base_resistance", permille, 100.0)?,
-        rolling: above("rolling_resistance", permille, 100.0)?,
-        air: above("air_resistance", permille, 100.0)?,
-        rotation: item.optional("rotation_mass", "a factor from 1 to 2", |factor| {
-            (1.0..=2.0).contains(&factor)
-        })?,
+        base: resistance("base_resistance")?,
+        rolling: resistance("rolling_resistance")?,
+        air: resistance("air_resistance")?,
+        rotation: item.optional("rotation_mass", "a factor from 1 to 2", 1.0..=2.0)?,
         effort: item.get("tractive_effort").map(|list| effort(&list)).transpose()?,
         item,
     })
@@ -113,21 +110,11 @@ pub(super) fn vehicle(item: Item) -> Result<Vehicle, ImportError> {
 /// Pairs of km/h and N.
 fn effort(list: &Item) -> Result<EffortCurve, ImportError> {
     const FORM: &str = "pairs of speed in km/h and force in N";
-    let mut points: Vec<(f64, f64)> = Vec::new();
-    for (index, pair) in list.list(FORM, 3)?.into_iter().enumerate() {
+    let pairs = list.list(FORM, 3)?.into_iter().map(|pair| {
         let [speed, force] = pair.tuple(FORM)?;
-        let kmh =
-            speed.number("a speed in km/h from 0 to 720", |it| (0.0..=720.0).contains(&it))?;
-        let force_n = force.number("a force in N from 0 to 1e7", |it| (0.0..=1e7).contains(&it))?;
-        let speed_mps = kmh / 3.6;
-        if let Some(&(before, _)) = points.last()
-            && speed_mps <= before
-        {
-            let (key, index, found) = (list.path.clone(), index + 1, speed_mps);
-            return Err(pair.wrong(Problem::EffortOrder { key, index, found, before }));
-        }
-        points.push((speed_mps, force_n));
-    }
+        Ok([pair, speed, force])
+    });
+    let points = points(&list.path, &SPEEDS, pairs)?;
     Ok(EffortCurve::new(points).expect("three or more finite points of growing speed"))
 }
 

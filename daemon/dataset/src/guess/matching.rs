@@ -4,7 +4,7 @@ use super::facts::Facts;
 use super::name::Name;
 use super::plausible::{UnitChoice, choose_unit};
 use super::spelling::{self, Spelled};
-use super::vocabulary::{ABOUT, NEUTRAL, NOT_MEASURED, OTHER_THINGS, TermWeight, terms};
+use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::{Choices, Quantity};
 
 /// What a name is worth that says the quantity and nothing else.
@@ -183,8 +183,9 @@ fn by_term(words: &[String], strength: TermWeight, term: &str) -> Option<i32> {
     };
     // What was wanted instead of measured is the same quantity, and refused as that later.
     let is_neutral = |word: &&String| {
-        let lists = [NEUTRAL, NOT_MEASURED, ABOUT];
-        lists.iter().any(|list| list.contains(&word.as_str()))
+        let words = &VOCABULARY.words;
+        let lists = [&words.neutral, &words.not_measured, &words.about];
+        lists.into_iter().flat_map(|list| listed(list)).any(|neutral| neutral == *word)
             || word.chars().all(|letter| letter.is_ascii_digit())
     };
     let neutral = extras.iter().filter(|word| is_neutral(word)).count() as i32;
@@ -254,15 +255,16 @@ fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
         .flat_map(|(_, term)| term.split(' '))
         .chain(quantity.name().split('_'))
         .collect();
-    let lists: [(&[&str], &str); 3] = [
-        (NOT_MEASURED, "what was wanted or allowed"),
-        (ABOUT, "something about a measurement"),
-        (OTHER_THINGS, "another thing"),
+    let known = &VOCABULARY.words;
+    let lists = [
+        (&known.not_measured, "what was wanted or allowed"),
+        (&known.about, "something about a measurement"),
+        (&known.other_things, "another thing"),
     ];
     for (list, what) in lists {
         let is_known = |word: &&String| {
-            let is_in = |it: &&str| word == it || (it.len() >= 4 && word.contains(*it));
-            !own.contains(&word.as_str()) && list.iter().any(is_in)
+            let is_in = |it: &str| *word == it || (it.len() >= 4 && word.contains(it));
+            !own.contains(&word.as_str()) && listed(list).any(is_in)
         };
         if let Some(word) = words.iter().find(is_known) {
             return Some(format!("'{word}' names {what}"));

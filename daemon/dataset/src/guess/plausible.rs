@@ -1,9 +1,11 @@
 //! Which unit makes a column's values those of a train.
 
 use dynocar_model::units::Unit;
+use serde::Deserialize;
 
 use super::facts::Facts;
 use super::spelling::Spelled;
+use super::vocabulary::usual;
 use crate::Quantity;
 
 /// Values so many times beyond the usual ones are none of a quantity in a unit.
@@ -23,7 +25,8 @@ pub struct UnitChoice {
 }
 
 /// Which figure of a column reveals its unit.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
 enum Measure {
     /// The greatest magnitude.
     Top,
@@ -37,45 +40,13 @@ enum Measure {
 
 /// What a train's values usually are, in the base unit, and the units that recorders use, the
 /// likeliest first.
-struct Usual {
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Usual {
     measure: Measure,
     low: f64,
     high: f64,
-    units: &'static [&'static str],
-}
-
-/// What is usual of a quantity; `None` where its values reveal no unit.
-fn usual(quantity: Quantity) -> Option<Usual> {
-    use Measure::{Middle, Span, Step, Top};
-    let usual = |measure, low, high, units| Some(Usual { measure, low, high, units });
-    match quantity {
-        Quantity::Time => usual(Step, 0.004, 20.0, &["s", "ms", "us", "ns"]),
-        Quantity::Position => usual(Span, 300.0, 1e6, &["m", "km", "mm"]),
-        Quantity::Speed => usual(Top, 3.0, 45.0, &["m/s", "km/h"]),
-        Quantity::WindSpeed => usual(Top, 0.5, 30.0, &["m/s", "km/h"]),
-        Quantity::Acceleration | Quantity::SpecificForce => usual(Top, 0.05, 3.0, &["m/s2"]),
-        Quantity::TractionForce | Quantity::BrakeForce | Quantity::ControlForce => {
-            usual(Top, 5e3, 3e6, &["N", "kN", "MN"])
-        }
-        Quantity::BrakeCylinderPressure => usual(Top, 0.4e5, 8e5, &["bar", "kPa", "Pa"]),
-        Quantity::TrainMass => usual(Top, 5e3, 1e7, &["t", "kg"]),
-        Quantity::AmbientTemperature => usual(Middle, -45.0, 55.0, &["degC", "K"]),
-        Quantity::Gradient => usual(Top, 0.002, 0.07, &["permille", "%", "1"]),
-        Quantity::TractionHandle | Quantity::BrakeHandle => usual(Top, 0.02, 1.05, &["1", "%"]),
-        Quantity::RelativeHumidity => usual(Top, 0.05, 1.05, &["%", "1"]),
-        Quantity::TractionPower | Quantity::LinePower => usual(Top, 2e4, 3e7, &["kW", "W"]),
-        Quantity::LineVoltage => usual(Middle, 300.0, 3e4, &["V", "kV"]),
-        Quantity::LineCurrent => usual(Top, 20.0, 1e4, &["A", "kA"]),
-        Quantity::Altitude
-        | Quantity::CurveRadius
-        | Quantity::Passengers
-        | Quantity::WheelSlide
-        | Quantity::DoorOpen
-        | Quantity::Latitude
-        | Quantity::Longitude
-        | Quantity::Course
-        | Quantity::Curvature => None,
-    }
+    units: Vec<String>,
 }
 
 impl Usual {
@@ -114,11 +85,11 @@ impl Usual {
 /// The unit of a column: the one that its name gives, else the likeliest by its values.
 pub fn choose_unit(quantity: Quantity, facts: &Facts, named: Option<Spelled>) -> UnitChoice {
     let usual = usual(quantity);
-    let figure = usual.as_ref().and_then(|usual| usual.figure(facts)).filter(|it| *it != 0.0);
+    let figure = usual.and_then(|usual| usual.figure(facts)).filter(|it| *it != 0.0);
     match (named, usual.zip(figure)) {
         (Some(spelled), None) => said(spelled),
-        (Some(spelled), Some((usual, figure))) => judge(spelled, &usual, figure),
-        (None, Some((usual, figure))) => by_values(quantity, &usual, figure),
+        (Some(spelled), Some((usual, figure))) => judge(spelled, usual, figure),
+        (None, Some((usual, figure))) => by_values(quantity, usual, figure),
         (None, None) => {
             let unit = quantity.unit();
             let counts = unit.name() == "1";

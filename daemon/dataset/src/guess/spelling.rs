@@ -11,72 +11,61 @@ pub struct Spelled {
     pub scale: f64,
 }
 
-/// How headers spell a dataset's units besides their names, with or without the marks in them: dimension,
-/// name, spellings in small letters and digits.
-const SPELLINGS: &[(Dimension, &str, &[&str])] = {
+/// How headers spell a dataset's units besides their names, with or without the marks in them, and multiples of these
+/// units: dimension, name, the factor that leads to it, spellings in small letters and digits.
+const SPELLINGS: &[(Dimension, &str, f64, &str)] = {
     use Dimension::*;
     &[
-        (Time, "s", &["sec", "secs", "second", "seconds", "sek", "sekunden", "sekunde"]),
-        (Time, "ms", &["msec", "millis", "millisec", "milliseconds", "millisekunden"]),
-        (Time, "us", &["usec", "micros", "microseconds", "mikrosekunden"]),
-        (Time, "ns", &["nsec", "nanos", "nanoseconds"]),
-        (Time, "min", &["mins", "minute", "minutes", "minuten"]),
-        (Time, "h", &["hr", "hour", "hours", "std", "stunden"]),
-        (Length, "m", &["meter", "meters", "metre", "metres", "mtr"]),
-        (Length, "km", &["kilometer", "kilometers", "kilometre", "kilometres"]),
-        (Length, "mm", &["millimeter", "millimetre", "millimeters"]),
-        (Speed, "m/s", &["mps", "mpers", "ms1", "mpersec", "metrespersecond", "msec"]),
-        (Speed, "km/h", &["kph", "kmph", "kmperh", "kmh1", "kmhr", "kmperhour", "kmstd"]),
-        (Speed, "mph", &["miph", "milesperhour", "mih"]),
-        (Acceleration, "m/s2", &["mps2", "mss", "mpss", "mpers2", "ms", "msec2"]),
-        (Force, "N", &["newton", "newtons"]),
-        (Force, "kN", &["kilonewton", "kilonewtons"]),
-        (Force, "MN", &["meganewton"]),
-        (Force, "lbf", &["lb", "lbs"]),
-        (Pressure, "Pa", &["pascal"]),
-        (Pressure, "kPa", &["kilopascal"]),
-        (Pressure, "bar", &["bars", "barg"]),
-        (Mass, "kg", &["kilogram", "kilograms", "kgs"]),
-        (Mass, "t", &["to", "ton", "tons", "tonne", "tonnes", "tonnen"]),
-        (Temperature, "degC", &["c", "celsius", "gradc", "grad", "cel"]),
-        (Temperature, "K", &["kelvin"]),
-        (Temperature, "degF", &["f", "fahrenheit"]),
-        (Ratio, "permille", &["promille", "permil", "mmm", "mperkm", "mkm"]),
-        (Ratio, "%", &["pct", "percent", "prozent", "perc", "pc"]),
-        (Ratio, "1", &["pu", "ratio", "rad", "mm"]),
-        (Angle, "deg", &["degree", "degrees", "grad"]),
-        (Angle, "rad", &["radian", "radians"]),
-        (Curvature, "1/m", &["perm", "m1"]),
-        (Power, "W", &["watt", "watts"]),
-        (Power, "kW", &["kilowatt"]),
-        (Count, "1", &["bool", "flag", "count", "pax", "persons"]),
-    ]
-};
-
-/// Units of headers that are a multiple of a dataset's: dimension, the dataset's unit, the factor
-/// that leads to it, spellings in small letters and digits.
-const MULTIPLES: &[(Dimension, &str, f64, &[&str])] = {
-    use Dimension::*;
-    &[
-        (Length, "m", 0.01, &["cm"]),
-        (Length, "m", 0.3048, &["ft", "feet", "foot"]),
-        (Length, "km", 1.609344, &["mi", "mile", "miles"]),
-        (Speed, "m/s", 0.01, &["cms", "cmps"]),
-        (Speed, "km/h", 1.852, &["kn", "kt", "kts", "knot", "knots"]),
-        (Acceleration, "m/s2", 9.80665, &["g", "gn"]),
-        (Force, "N", 10.0, &["dan"]),
-        (Pressure, "Pa", 100.0, &["hpa", "mbar"]),
-        (Pressure, "kPa", 1000.0, &["mpa"]),
-        (Pressure, "kPa", 6.894757, &["psi"]),
-        (Power, "kW", 1000.0, &["mw", "megawatt"]),
+        (Time, "s", 1.0, "sec secs second seconds sek sekunden sekunde"),
+        (Time, "ms", 1.0, "msec millis millisec milliseconds millisekunden"),
+        (Time, "us", 1.0, "usec micros microseconds mikrosekunden"),
+        (Time, "ns", 1.0, "nsec nanos nanoseconds"),
+        (Time, "min", 1.0, "mins minute minutes minuten"),
+        (Time, "h", 1.0, "hr hour hours std stunden"),
+        (Length, "m", 1.0, "meter meters metre metres mtr"),
+        (Length, "km", 1.0, "kilometer kilometers kilometre kilometres"),
+        (Length, "mm", 1.0, "millimeter millimetre millimeters"),
+        (Speed, "m/s", 1.0, "mps mpers ms1 mpersec metrespersecond msec"),
+        (Speed, "km/h", 1.0, "kph kmph kmperh kmh1 kmhr kmperhour kmstd"),
+        (Speed, "mph", 1.0, "miph milesperhour mih"),
+        (Acceleration, "m/s2", 1.0, "mps2 mss mpss mpers2 ms msec2"),
+        (Force, "N", 1.0, "newton newtons"),
+        (Force, "kN", 1.0, "kilonewton kilonewtons"),
+        (Force, "MN", 1.0, "meganewton"),
+        (Force, "lbf", 1.0, "lb lbs"),
+        (Pressure, "Pa", 1.0, "pascal"),
+        (Pressure, "kPa", 1.0, "kilopascal"),
+        (Pressure, "bar", 1.0, "bars barg"),
+        (Mass, "kg", 1.0, "kilogram kilograms kgs"),
+        (Mass, "t", 1.0, "to ton tons tonne tonnes tonnen"),
+        (Temperature, "degC", 1.0, "c celsius gradc grad cel"),
+        (Temperature, "K", 1.0, "kelvin"),
+        (Temperature, "degF", 1.0, "f fahrenheit"),
+        (Ratio, "permille", 1.0, "promille permil mmm mperkm mkm"),
+        (Ratio, "%", 1.0, "pct percent prozent perc pc"),
+        (Ratio, "1", 1.0, "pu ratio rad mm"),
+        (Angle, "deg", 1.0, "degree degrees grad"),
+        (Angle, "rad", 1.0, "radian radians"),
+        (Curvature, "1/m", 1.0, "perm m1"),
+        (Power, "W", 1.0, "watt watts"),
+        (Power, "kW", 1.0, "kilowatt"),
+        (Count, "1", 1.0, "bool flag count pax persons"),
+        (Length, "m", 0.01, "cm"),
+        (Length, "m", 0.3048, "ft feet foot"),
+        (Length, "km", 1.609344, "mi mile miles"),
+        (Speed, "m/s", 0.01, "cms cmps"),
+        (Speed, "km/h", 1.852, "kn kt kts knot knots"),
+        (Acceleration, "m/s2", 9.80665, "g gn"),
+        (Force, "N", 10.0, "dan"),
+        (Pressure, "Pa", 100.0, "hpa mbar"),
+        (Pressure, "kPa", 1000.0, "mpa"),
+        (Pressure, "kPa", 6.894757, "psi"),
+        (Power, "kW", 1000.0, "mw megawatt"),
     ]
 };
 
 /// Units of things that a dataset has no quantity for.
-const FOREIGN: [&str; 21] = [
-    "ma", "mv", "hz", "khz", "rpm", "umin", "1min", "nm", "knm", "kwh", "wh", "mwh", "j", "kj",
-    "mj", "l", "lmin", "db", "ppm", "kva", "ohm",
-];
+const FOREIGN: &str = "ma mv hz khz rpm umin 1min nm knm kwh wh mwh j kj mj l lmin db ppm kva ohm";
 
 /// The unit of a dimension that is spelled so. The dataset's own names come first, then case
 /// distinguishes nothing (but mN is no MN).
@@ -109,12 +98,10 @@ pub fn find(dimension: Dimension, text: &str) -> Option<Spelled> {
 }
 
 fn spelled(dimension: Dimension, folded: &str) -> Option<Spelled> {
-    let mut own = SPELLINGS.iter().filter(|(of, ..)| *of == dimension);
-    if let Some((_, name, _)) = own.find(|(.., spellings)| spellings.contains(&folded)) {
-        return Some(Spelled { unit: unit(dimension, name), scale: 1.0 });
-    }
-    let mut multiples = MULTIPLES.iter().filter(|(of, ..)| *of == dimension);
-    let (_, name, scale, _) = multiples.find(|(.., spellings)| spellings.contains(&folded))?;
+    let is_it = |&&(of, .., list): &&(Dimension, &str, f64, &str)| {
+        of == dimension && list.split(' ').any(|spelling| spelling == folded)
+    };
+    let (_, name, scale, _) = SPELLINGS.iter().find(is_it)?;
     Some(Spelled { unit: unit(dimension, name), scale: *scale })
 }
 
@@ -124,7 +111,7 @@ fn unit(dimension: Dimension, name: &str) -> Unit {
 
 /// True for the spelling of any unit, of a dataset's or of another thing's.
 pub fn is_unit(text: &str) -> bool {
-    FOREIGN.contains(&fold(text).as_str())
+    FOREIGN.split(' ').any(|unit| unit == fold(text))
         || Unit::all().any(|unit| find(unit.dimension(), text).is_some())
 }
 
@@ -147,12 +134,11 @@ mod tests {
 
     #[test]
     fn every_entry_leads_to_a_unit_of_its_dimension() {
-        let own = SPELLINGS.iter().map(|&(of, name, spellings)| (of, name, 1.0, spellings));
-        for (dimension, name, scale, spellings) in own.chain(MULTIPLES.iter().copied()) {
+        for &(dimension, name, scale, spellings) in SPELLINGS {
             assert!(Unit::find(dimension, name).is_some(), "{name}");
             assert!(scale > 0.0);
-            for text in spellings {
-                assert_eq!(fold(text), *text, "spellings are folded");
+            for text in spellings.split(' ') {
+                assert_eq!(fold(text), text, "spellings are folded");
                 let found = find(dimension, text).expect(text);
                 assert_eq!((found.unit.name(), found.scale), (name, scale), "{text}");
             }
