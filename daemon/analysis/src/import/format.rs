@@ -95,13 +95,12 @@ fn railtoolkit(root: &Item) -> Result<Kind, ImportError> {
             return Err(schema.out_of_range(other, &format!("{ROLLING_STOCK} or {RUNNING_PATH}")));
         }
     };
-    let version = root.need("schema_version", "2022.05 or 2024.07")?;
-    let found = version.text("2022.05 or 2024.07")?;
-    if !VERSIONS.contains(&found) {
-        let expected = "2022.05 or 2024.07";
-        return Err(version.wrong(ImportProblem::Version { found: found.into(), expected }));
+    let versions = VERSIONS.join(" or ");
+    let version = root.need("schema_version", &versions)?;
+    match version.text(&versions)? {
+        known if VERSIONS.contains(&known) => Ok(kind),
+        other => Err(version.out_of_range(other, &versions)),
     }
-    Ok(kind)
 }
 
 fn found(root: &Item) -> String {

@@ -2,6 +2,7 @@
 
 use dynocar_shared::TrainSample;
 use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
 
 use dynocar_core::filter::fixed_lag::FixedLagSmoother;
 use dynocar_core::filter::{Gaussian, NotPositiveDefinite};
@@ -36,9 +37,10 @@ const BENDS_MPS3: [f64; 4] = [0.0, 0.0007, 0.002, 0.006];
 const TREND_STD_MPS3: f64 = 0.05;
 
 /// A moment of a stop.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Point {
     /// Time in s since the brake was applied.
+    #[serde(skip)]
     pub time_s: f64,
     /// Smoothed speed in m/s.
     pub speed_mps: f64,

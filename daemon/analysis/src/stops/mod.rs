@@ -18,4 +18,4 @@ pub use curve::{Curve, Point};
 pub use find::{FindSettings, FoundBy, Stop, find};
 pub use friction::{FrictionPoint, friction};
 pub use law::{Law, LawPoint, StoppingDistance};
-pub use study::{Manner, RecordedStop, SpeedDeceleration, Study, StudySettings};
+pub use study::{Manner, RecordedStop, Study, StudySettings};

@@ -28,17 +28,6 @@ pub enum Manner {
     Modulated,
 }
 
-/// A deceleration at a speed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SpeedDeceleration {
-    /// Speed in m/s.
-    pub speed_mps: f64,
-    /// Deceleration in m/s².
-    pub deceleration_mps2: f64,
-    /// Its standard deviation in m/s².
-    pub std_mps2: f64,
-}
-
 /// A recorded stop.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordedStop {
@@ -61,7 +50,7 @@ pub struct RecordedStop {
     /// Why it shows no law of the brake; `None` for a stop that does.
     pub no_law: Option<String>,
     /// Deceleration over speed, from fast to slow, of a stop that shows no law.
-    pub decelerations: Vec<SpeedDeceleration>,
+    pub decelerations: Vec<Point>,
     /// For a stop held out: what the law said of it.
     pub predicted: Option<StoppingDistance>,
     /// The friction behind it.
@@ -85,12 +74,12 @@ impl Study {
     /// Studies the stops of a dataset; predicts the next one from some speeds in m/s, or from
     /// steps of 5 m/s and the fastest when there are none.
     pub fn of(dataset: &Dataset, settings: &StudySettings, from_mps: &[f64]) -> Self {
-        let found: Vec<Found> =
-            dataset.runs.iter().flat_map(|run| found_in(dataset, run, settings)).collect();
-        let is_of_law = |it: &&Found| it.stop.role == Role::Fit && it.stop.manner == Manner::Full;
-        let fit = found.iter().filter(is_of_law);
-        let curves: Vec<Curve> = fit.map(|it| it.curve.clone()).collect();
-        let law = Law::of(&curves, settings.repeatability);
+        let found = dataset.runs.iter().flat_map(|run| found_in(dataset, run, settings));
+        let (mut stops, curves): (Vec<RecordedStop>, Vec<Curve>) = found.unzip();
+        let is = |stop: &RecordedStop, role| stop.role == role && stop.manner == Manner::Full;
+        let of_law = stops.iter().zip(curves).filter(|(stop, _)| is(stop, Role::Fit));
+        let of_law: Vec<Curve> = of_law.map(|(_, curve)| curve).collect();
+        let law = Law::of(&of_law, settings.repeatability);
         let speeds = match (&law, from_mps) {
             (Some(law), []) => {
                 let fastest = law.fastest_mps();
@@ -101,22 +90,16 @@ impl Study {
         };
         let predict = |speed_mps: f64| law.as_ref()?.stopping_distance(speed_mps);
         let distances = speeds.into_iter().filter_map(predict).collect();
-        let cannot_tell = cannot_tell(dataset, &found, law.as_ref());
-        let stops = found.into_iter().map(|Found { mut stop, .. }| {
-            let is_predicted = stop.role == Role::Holdout && stop.manner == Manner::Full;
-            stop.predicted = predict(stop.from_mps).filter(|_| is_predicted);
-            stop
-        });
-        Study { stops: stops.collect(), distances, cannot_tell, law }
+        for stop in stops.iter_mut().filter(|stop| is(stop, Role::Holdout)) {
+            stop.predicted = predict(stop.from_mps);
+        }
+        let cannot_tell = cannot_tell(dataset, &stops, law.as_ref());
+        Study { stops, distances, cannot_tell, law }
     }
 }
 
-struct Found {
-    stop: RecordedStop,
-    curve: Curve,
-}
-
-fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<Found> {
+/// The stops of a run, each with its curve.
+fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(RecordedStop, Curve)> {
     let samples = usable(&run.samples);
     let stops = find(&samples, dataset.train.brake.as_ref(), &settings.find);
     let studied = stops.into_iter().filter_map(|stop| {
@@ -147,7 +130,7 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<Found
             predicted: None,
             friction,
         };
-        Some(Found { stop, curve })
+        Some((stop, curve))
     });
     studied.collect()
 }
@@ -174,13 +157,11 @@ fn why_no_law(full: Option<&Curve>, found_by: FoundBy, share_min: f64) -> Option
 }
 
 /// Deceleration at whole m/s that the train passed.
-fn decelerations(curve: &Curve) -> Vec<SpeedDeceleration> {
+fn decelerations(curve: &Curve) -> Vec<Point> {
     let fastest = curve.from_mps().floor() as u32;
     let at = |k: u32| {
         let speed_mps = f64::from(k);
-        let point = curve.at_speed(speed_mps)?;
-        let Point { deceleration_mps2, std_mps2, .. } = *point;
-        Some(SpeedDeceleration { speed_mps, deceleration_mps2, std_mps2 })
+        Some(Point { speed_mps, ..*curve.at_speed(speed_mps)? })
     };
     (1..=fastest).rev().filter_map(at).collect()
 }
@@ -196,17 +177,16 @@ fn usable(samples: &[TrainSample]) -> Vec<TrainSample> {
     samples.iter().filter(is_usable).copied().collect()
 }
 
-fn cannot_tell(dataset: &Dataset, found: &[Found], law: Option<&Law>) -> Vec<String> {
+fn cannot_tell(dataset: &Dataset, found: &[RecordedStop], law: Option<&Law>) -> Vec<String> {
     let mut said = Vec::new();
-    let gradient_unknown = |run: &Run| run.gradient_source == GradientSource::Unknown;
-    if dataset.runs.iter().any(gradient_unknown) {
+    if dataset.runs.iter().any(|run| run.gradient_source == GradientSource::Unknown) {
         said.push(
             "the gradient is unknown: 1 permille along a whole stop is 0.01 m/s² of its \
              deceleration, and of its friction"
                 .into(),
         );
     }
-    let without = found.iter().filter(|it| it.stop.no_law.is_some()).count();
+    let without = found.iter().filter(|it| it.no_law.is_some()).count();
     if without > 0 {
         said.push(format!(
             "the law of the brake in {without} of {} stops: how hard it was applied there is the driver's",
@@ -219,7 +199,7 @@ fn cannot_tell(dataset: &Dataset, found: &[Found], law: Option<&Law>) -> Vec<Str
             "how stops differ: one stop was recorded, and the repeatability is assumed".into(),
         );
     }
-    if found.iter().any(|it| it.stop.found_by == FoundBy::Speed) {
+    if found.iter().any(|it| it.found_by == FoundBy::Speed) {
         said.push("how long the brake takes to build up: its command is not recorded".into());
     }
     said

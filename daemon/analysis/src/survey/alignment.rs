@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::recording_parts::distance_squared;
+use super::geodesy::{between, distance_squared};
 
 /// Distance in m between the nodes of an alignment.
 pub const NODE_STEP_M: f64 = 10.0;
@@ -133,10 +133,6 @@ impl Alignment {
     fn segment(&self, chainage_m: f64) -> usize {
         ((chainage_m / self.step_m).max(0.0) as usize).min(self.nodes_m.len() - 2)
     }
-}
-
-fn between(from: [f64; 2], to: [f64; 2], share: f64) -> [f64; 2] {
-    [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])]
 }
 
 fn cell(point_m: [f64; 2]) -> (i64, i64) {

@@ -8,6 +8,7 @@
 //! acceleration weighted by a triangle over both, and so are the forces.
 
 use super::chainage::Chained;
+use super::quantile::middle;
 use super::recording::RawRecording;
 
 /// Below this speed in m/s holding brakes and stiction act.
@@ -72,11 +73,7 @@ pub fn observations(
 
 fn period(time_s: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() {
-        return 1.0;
-    }
-    steps.select_nth_unstable_by(middle, f64::total_cmp).1.max(1e-3)
+    middle(&mut steps).map_or(1.0, |step_s| step_s.max(1e-3))
 }
 
 /// The difference of the two blocks of a window; `None` where the vehicle stands or values are

@@ -18,23 +18,25 @@ const BEND_M: f64 = 0.02;
 /// Rounds of placing the fixes and moving the alignment.
 const ROUNDS: usize = 4;
 
-/// Rows of a recording that run along an alignment in its direction.
+/// Rows of a recording that run along an alignment.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PassRows {
+pub struct Pass {
     /// Number of the recording.
     pub recording: usize,
     /// The rows.
     pub rows: std::ops::Range<usize>,
+    /// 1 along it, while the chainage grows, -1 against it.
+    pub direction: i8,
 }
 
-/// Moves a first alignment into the middle of the passes, each with its direction along it: 1 or -1.
-pub fn align(first: Alignment, passes: &[(PassRows, i8)], recordings: &[Recording]) -> Alignment {
+/// Moves a first alignment into the middle of the passes.
+pub fn align(first: Alignment, passes: &[Pass], recordings: &[Recording]) -> Alignment {
     let mut alignment = first;
     for _ in 0..ROUNDS {
         let Some(back) = alignment.reversed() else { return alignment };
-        let place = |(pass, direction): &(PassRows, i8)| {
+        let place = |pass: &Pass| {
             let recording = &recordings[pass.recording];
-            if *direction > 0 {
+            if pass.direction > 0 {
                 return follow(recording, pass.rows.clone(), &alignment);
             }
             let mut placed = follow(recording, pass.rows.clone(), &back);
@@ -54,9 +56,9 @@ pub fn align(first: Alignment, passes: &[(PassRows, i8)], recordings: &[Recordin
 }
 
 /// Mean speed in m/s while moving.
-fn mean_speed(passes: &[(PassRows, i8)], recordings: &[Recording]) -> f64 {
+fn mean_speed(passes: &[Pass], recordings: &[Recording]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
-    for (pass, _) in passes {
+    for pass in passes {
         let speeds = &recordings[pass.recording].raw.speed_mps[pass.rows.clone()];
         for &speed in speeds.iter().filter(|speed| **speed > 1.0) {
             sum += speed;

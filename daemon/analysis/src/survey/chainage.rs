@@ -6,6 +6,7 @@
 //! 1965) over [offset, scale, error of the fix, lag] takes them apart, robust to single wild fixes.
 
 use nalgebra::{SMatrix, SVector};
+use serde::Serialize;
 
 use super::centring::{FIX_FADING_S, FIX_STD_M};
 use super::recording::Recording;
@@ -24,7 +25,7 @@ type State = SVector<f64, 4>;
 type Covariance = SMatrix<f64, 4, 4>;
 
 /// A value with its standard deviation.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     /// The value.
     pub value: f64,

@@ -33,9 +33,7 @@ pub fn curves(alignment: &Alignment) -> Vec<FoundCurve> {
             // Near an end the turning is that of the part that is there.
             let (first, last) = (node.saturating_sub(reach), (node + reach - 1).min(count - 2));
             let (from, to) = (direction(first), direction(last));
-            let cross = from[0] * to[1] - from[1] * to[0];
-            let dot = from[0] * to[0] + from[1] * to[1];
-            cross.atan2(dot) / ((last - first).max(1) as f64 * step_m)
+            turned_rad(from, to) / ((last - first).max(1) as f64 * step_m)
         })
         .collect();
     let mut found = Vec::new();
@@ -51,14 +49,11 @@ pub fn curves(alignment: &Alignment) -> Vec<FoundCurve> {
         if side != 0 && length_m >= LENGTH_MIN_M {
             let turned: f64 = curvature[first..end].iter().sum::<f64>() * step_m;
             let radius_m = length_m / turned.abs();
-            let (mut from_m, mut to_m) =
-                ((first as f64 - 0.5) * step_m, (end as f64 - 0.5) * step_m);
-            if first == 0 {
-                from_m = -BEYOND_M;
-            }
-            if end == count {
-                to_m = alignment.length_m() + BEYOND_M;
-            }
+            let from_m = if first == 0 { -BEYOND_M } else { (first as f64 - 0.5) * step_m };
+            let to_m = match end == count {
+                true => alignment.length_m() + BEYOND_M,
+                false => (end as f64 - 0.5) * step_m,
+            };
             found.push(FoundCurve { from_m, to_m, radius_m });
         }
         first = end;
@@ -70,12 +65,12 @@ pub fn curves(alignment: &Alignment) -> Vec<FoundCurve> {
 pub fn turning_rad(alignment: &Alignment) -> f64 {
     let nodes = alignment.nodes_m().len();
     let at = |node: usize| alignment.direction((node as f64 + 0.5) * alignment.step_m());
-    (1..nodes.saturating_sub(1))
-        .map(|node| {
-            let (from, to) = (at(node - 1), at(node));
-            (from[0] * to[1] - from[1] * to[0]).atan2(from[0] * to[0] + from[1] * to[1]).abs()
-        })
-        .sum()
+    (1..nodes.saturating_sub(1)).map(|node| turned_rad(at(node - 1), at(node)).abs()).sum()
+}
+
+/// How far one direction is turned from another, to the left.
+fn turned_rad(from: [f64; 2], to: [f64; 2]) -> f64 {
+    (from[0] * to[1] - from[1] * to[0]).atan2(from[0] * to[0] + from[1] * to[1])
 }
 
 #[cfg(test)]

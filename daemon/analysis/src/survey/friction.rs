@@ -1,6 +1,8 @@
 //! The friction brake's force from its pressure, from what the balance lacks under it.
 
 use super::chainage::Estimate;
+use super::quantile::middle;
+use super::recording::RawRecording;
 
 /// Fewer observations under pressure say nothing.
 const OBSERVATIONS_MIN: usize = 30;
@@ -18,13 +20,23 @@ pub struct FoundBrake {
     pub release_pa: f64,
 }
 
-/// The pressure in Pa above which a brake may act, from pressures under strong traction.
-pub fn released_pa(pressures_under_traction: &mut [f64]) -> f64 {
-    if pressures_under_traction.is_empty() {
+/// The pressure in Pa above which a friction brake may act in some recordings: by those under strong traction.
+pub fn acting_from_pa<'r>(raws: impl Iterator<Item = &'r RawRecording>) -> f64 {
+    let mut under_traction = Vec::new();
+    for raw in raws.filter(|raw| !raw.friction_pa.is_empty()) {
+        let most_n = raw.control_n.iter().copied().fold(0.0, f64::max);
+        for row in 0..raw.time_s.len() {
+            let pulls = raw.control_n[row] > 0.2 * most_n && raw.speed_mps[row] > 1.0;
+            if pulls && raw.friction_pa[row].is_finite() {
+                under_traction.push(raw.friction_pa[row]);
+            }
+        }
+    }
+    if under_traction.is_empty() {
         return MARGIN_PA;
     }
-    let rank = (0.95 * (pressures_under_traction.len() - 1) as f64) as usize;
-    let (_, level, _) = pressures_under_traction.select_nth_unstable_by(rank, f64::total_cmp);
+    let rank = (0.95 * (under_traction.len() - 1) as f64) as usize;
+    let (_, level, _) = under_traction.select_nth_unstable_by(rank, f64::total_cmp);
     level.max(0.0) + MARGIN_PA
 }
 
@@ -55,8 +67,7 @@ pub fn found_brake(points: &[(f64, f64)]) -> Option<FoundBrake> {
         offset = force - gain * pressure;
         let mut sizes: Vec<f64> =
             points.iter().map(|(p, f)| (f - gain * p - offset).abs()).collect();
-        let middle = sizes.len() / 2;
-        let scale = (1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-9);
+        let scale = (1.4826 * middle(&mut sizes)?).max(1e-9);
         std = scale / bottom.sqrt();
         for ((p, f), weight) in points.iter().zip(&mut weights) {
             let ratio = (f - gain * p - offset) / scale;

@@ -1,4 +1,4 @@
-//! Geographical positions as metres on a plane.
+//! Geographical positions as metres on a plane, and points there.
 
 /// Semi-major axis in m of the ellipsoid of WGS 84.
 const SEMI_MAJOR_M: f64 = 6_378_137.0;
@@ -54,6 +54,17 @@ impl LocalPlane {
         let up_m = (normal_m * (1.0 - squeeze) + self.height_m) * sin_lat;
         [across_m * cos_lon, across_m * sin_lon, up_m]
     }
+}
+
+/// Squared distance in m² of two points of a plane.
+pub fn distance_squared(one: [f64; 2], other: [f64; 2]) -> f64 {
+    let [x, y] = [one[0] - other[0], one[1] - other[1]];
+    x * x + y * y
+}
+
+/// The point that lies so much of the way between two points.
+pub fn between(from: [f64; 2], to: [f64; 2], share: f64) -> [f64; 2] {
+    [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])]
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! Where the unknown heights of a line's alignments lie, and what a gradient under a vehicle is of them.
 
-use super::banded::Factor;
-use super::bordered::{Columns, CommonCovariance};
 use super::common::Common;
+use super::normal::Solution;
 
 /// Distance in m between heights.
 pub const HEIGHT_STEP_M: f64 = 10.0;
@@ -104,20 +103,16 @@ impl Layout {
 
     /// Variance of the mean gradient over 100 m around each piece between neighbouring
     /// heights: between two heights alone the forces show little, and nobody feels it.
-    pub fn gradient_variances(
-        &self,
-        factor: &Factor,
-        columns: &Columns,
-        common: &CommonCovariance,
-    ) -> Vec<Vec<f64>> {
-        let inverse = factor.inverse_band();
+    pub fn gradient_variances(&self, solution: &Solution) -> Vec<Vec<f64>> {
+        let Solution { columns, covariance, .. } = solution;
+        let inverse = solution.factor.inverse_band();
         let of_steps = |from: usize, to: usize| {
             let per_m = 1.0 / ((to - from) as f64 * HEIGHT_STEP_M);
             let row = [(from, -per_m), (to, per_m)];
             let slopes = nalgebra::SVector::<f64, { Common::COUNT }>::from_fn(|index, _| {
                 per_m * (columns[to][index] - columns[from][index])
             });
-            inverse.variance_of(&row).max(0.0) + slopes.dot(&(common * slopes)).max(0.0)
+            inverse.variance_of(&row).max(0.0) + slopes.dot(&(covariance * slopes)).max(0.0)
         };
         let block = |&(first, count): &(usize, usize)| {
             let around = |node: usize| {

@@ -4,9 +4,8 @@ use rayon::prelude::*;
 
 use super::balance::Observation;
 use super::banded::NotPositive;
-use super::friction::{FoundBrake, found_brake, released_pa};
+use super::friction::{FoundBrake, found_brake};
 use super::profile::{Evidence, Profile};
-use super::recording::RawRecording;
 
 /// Variances per m of the gradient's random walk that are tried: from a main line to a street.
 const WALKS_PER_M: [f64; 9] = [1e-9, 1e-8, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4];
@@ -30,21 +29,6 @@ pub struct Learned {
     pub left_out_n: Vec<f64>,
     /// The friction brake, where it shows.
     pub brake: Option<FoundBrake>,
-}
-
-/// The pressure in Pa above which a friction brake may act in some recordings.
-pub fn acting_from_pa<'r>(raws: impl Iterator<Item = &'r RawRecording>) -> f64 {
-    let mut under_traction = Vec::new();
-    for raw in raws.filter(|raw| !raw.friction_pa.is_empty()) {
-        let most_n = raw.control_n.iter().copied().fold(0.0, f64::max);
-        for row in 0..raw.time_s.len() {
-            let pulls = raw.control_n[row] > 0.2 * most_n && raw.speed_mps[row] > 1.0;
-            if pulls && raw.friction_pa[row].is_finite() {
-                under_traction.push(raw.friction_pa[row]);
-            }
-        }
-    }
-    released_pa(&mut under_traction)
 }
 
 /// Learns profile and friction brake. `evidence` holds all observations; those under a pressure

@@ -4,9 +4,10 @@ use rayon::prelude::*;
 
 use super::alignment::Alignment;
 use super::both_directions::{Compared, compare};
-use super::centring::{PassRows, align};
+use super::centring::{Pass, align};
+use super::geodesy::distance_squared;
 use super::recording::Recording;
-use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M, distance_squared};
+use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M};
 use super::silence::{TracePoint, filled, trace};
 use super::tracking::follow;
 
@@ -72,19 +73,15 @@ impl Alignments {
         }
     }
 
+    /// Length in m of the line by its chainage.
+    pub fn length_m(&self) -> f64 {
+        self.chainage_per_m * self.growing.length_m()
+    }
+
     /// True when both directions share one profile.
     pub fn is_one_track(&self) -> bool {
         self.falling.as_ref().is_none_or(|falling| falling.is_same)
     }
-}
-
-/// A part that runs along the line.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Pass {
-    /// Its rows, as far as they are on the line.
-    pub rows: PassRows,
-    /// 1 while the chainage grows, -1 while it falls.
-    pub direction: i8,
 }
 
 /// Finds the line among the parts of the fit runs; `None` when there is none.
@@ -96,10 +93,10 @@ pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
     let fit = thinned(&pairs, SOUGHT_MAX / 2).concat();
     let template = template(&fit, recordings)?;
     let back = template.reversed()?;
-    let growing = along(&template, &fit, recordings);
-    let falling = along(&back, &fit, recordings);
+    let growing = along(&template, 1, &fit, recordings);
+    let falling = along(&back, 1, &fit, recordings);
     // The line's chainage grows in the direction in which it was first driven.
-    let first = |along: &[(RecordingPart, PassRows)]| {
+    let first = |along: &[(RecordingPart, Pass)]| {
         along.iter().map(|(_, pass)| (pass.recording, pass.rows.start)).min()
     };
     let is_backward = match (first(&growing), first(&falling)) {
@@ -111,38 +108,34 @@ pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
         false => [(template, growing), (back, falling)],
     };
     let growing = alignment_of(&template, &ahead, recordings);
-    let chainage_per_m = 1.0;
+    let alone = |growing| Alignments { growing, falling: None, chainage_per_m: 1.0 };
     if back.is_empty() {
-        return Some(Alignments { growing, falling: None, chainage_per_m });
+        return Some(alone(growing));
     }
     let alignment = alignment_of(&reversed_template, &back, recordings);
     let Some(Compared { start_chainage_m, joined }) = compare(&growing, &alignment) else {
-        return Some(Alignments { growing, falling: None, chainage_per_m });
+        return Some(alone(growing));
     };
     let Some(joined) = joined else {
         let falling = Some(FallingAlignment { alignment, start_chainage_m, is_same: false });
-        return Some(Alignments { growing, falling, chainage_per_m });
+        return Some(Alignments { falling, ..alone(growing) });
     };
     // One track has one alignment and one chainage, and the passes of both directions show it.
-    let passes = [(joined.clone(), 1), (joined.reversed()?, -1)].into_iter().flat_map(
-        |(alignment, direction)| {
-            let along = self::along(&alignment, &fit, recordings);
-            let passes: Vec<PassRows> = along.into_iter().map(|(_, pass)| pass).collect();
-            thinned(&passes, ALIGNED_MAX).into_iter().map(move |pass| (pass, direction))
-        },
-    );
-    let growing = align(joined, &passes.collect::<Vec<_>>(), recordings);
+    let reversed = joined.reversed()?;
+    let passes = [(&joined, 1), (&reversed, -1)]
+        .map(|(alignment, direction)| passes(alignment, direction, &fit, recordings));
+    let growing = align(joined, &passes.concat(), recordings);
     let alignment = growing.reversed()?;
     let start_chainage_m = alignment.length_m();
     let falling = Some(FallingAlignment { alignment, start_chainage_m, is_same: true });
-    Some(Alignments { growing, falling, chainage_per_m })
+    Some(Alignments { falling, ..alone(growing) })
 }
 
 /// The alignment of a direction from its own parts: where they differ from the other direction's,
 /// they know better. A single part cannot say what of it is the line.
 fn alignment_of(
     template: &Alignment,
-    along: &[(RecordingPart, PassRows)],
+    along: &[(RecordingPart, Pass)],
     recordings: &[Recording],
 ) -> Alignment {
     let own: Vec<RecordingPart> = along.iter().map(|(part, _)| *part).collect();
@@ -150,10 +143,19 @@ fn alignment_of(
         0 | 1 => template.clone(),
         _ => self::template(&own, recordings).unwrap_or_else(|| template.clone()),
     };
-    let passes: Vec<PassRows> =
-        self::along(&first, &own, recordings).into_iter().map(|(_, pass)| pass).collect();
-    let passes: Vec<_> = thinned(&passes, ALIGNED_MAX).into_iter().map(|pass| (pass, 1)).collect();
+    let passes = passes(&first, 1, &own, recordings);
     align(first, &passes, recordings)
+}
+
+/// The passes that an alignment is laid through.
+fn passes(
+    alignment: &Alignment,
+    direction: i8,
+    recording_parts: &[RecordingPart],
+    recordings: &[Recording],
+) -> Vec<Pass> {
+    let along = along(alignment, direction, recording_parts, recordings).into_iter();
+    thinned(&along.map(|(_, pass)| pass).collect::<Vec<_>>(), ALIGNED_MAX)
 }
 
 /// So many of them at most, evenly chosen, with the first.
@@ -170,12 +172,9 @@ fn rows_of(part: &RecordingPart, recordings: &[Recording]) -> std::ops::Range<us
 
 /// The part that the others follow furthest, cut to what at least one other drives too.
 fn template(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Alignment> {
-    let thinned: Vec<&RecordingPart> = {
-        let mut long: Vec<&RecordingPart> = recording_parts.iter().collect();
-        long.retain(|part| part.to_m - part.from_m > 100.0);
-        let step = long.len().div_ceil(TRIED_MAX).max(1);
-        long.into_iter().step_by(step).collect()
-    };
+    let mut long = recording_parts.to_vec();
+    long.retain(|part| part.to_m - part.from_m > 100.0);
+    let thinned = thinned(&long, TRIED_MAX);
     let traces: Vec<Vec<TracePoint>> =
         thinned.iter().map(|part| trace(part, recordings, POINT_STEP_M)).collect();
     let points: Vec<Vec<[f64; 2]>> = (0..traces.len()).map(|one| filled(one, &traces)).collect();
@@ -222,28 +221,31 @@ fn covered(alignment: &Alignment, own: usize, recording_parts: &[Vec<[f64; 2]>])
     counts
 }
 
-/// The parts that run along an alignment in its direction, with their rows on it.
+/// The parts that run along an alignment driven in its direction, with their rows on it.
 fn along(
     alignment: &Alignment,
+    direction: i8,
     recording_parts: &[RecordingPart],
     recordings: &[Recording],
-) -> Vec<(RecordingPart, PassRows)> {
-    let pass = |part: &RecordingPart| Some((*part, pass_along(alignment, part, recordings)?));
+) -> Vec<(RecordingPart, Pass)> {
+    let pass =
+        |part: &RecordingPart| Some((*part, pass_along(alignment, direction, part, recordings)?));
     recording_parts.par_iter().filter_map(pass).collect()
 }
 
 fn pass_along(
     alignment: &Alignment,
+    direction: i8,
     part: &RecordingPart,
     recordings: &[Recording],
-) -> Option<PassRows> {
+) -> Option<Pass> {
     let rows = rows_of(part, recordings);
-    let placed = follow(&recordings[part.recording], rows.clone(), alignment);
+    let placed = follow(&recordings[part.recording], rows, alignment);
     let (first, last) = (placed.first()?, placed.last()?);
     let covered_m = last.chainage_m - first.chainage_m;
     let least_m = (PASS_SHARE_MIN * alignment.length_m()).min(PASS_MIN_M);
-    let on_line = PassRows { recording: part.recording, rows: first.row..last.row + 1 };
-    (covered_m >= least_m).then_some(on_line)
+    let pass = Pass { recording: part.recording, rows: first.row..last.row + 1, direction };
+    (covered_m >= least_m).then_some(pass)
 }
 
 /// The pass that a part of any role is, if it is one.
@@ -252,10 +254,6 @@ pub fn pass_of(
     part: &RecordingPart,
     recordings: &[Recording],
 ) -> Option<Pass> {
-    let along = |direction: i8| {
-        let rows = pass_along(alignments.of(direction)?, part, recordings)?;
-        Some(Pass { rows, direction })
-    };
-    let length = |pass: &Pass| pass.rows.rows.len();
-    [along(1), along(-1)].into_iter().flatten().max_by_key(length)
+    let along = |direction: i8| pass_along(alignments.of(direction)?, direction, part, recordings);
+    [along(1), along(-1)].into_iter().flatten().max_by_key(|pass| pass.rows.len())
 }

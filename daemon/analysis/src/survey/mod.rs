@@ -13,13 +13,12 @@
 //! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
 //! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
-//!   `normal`, [`banded`], `bordered`: its equations and their solver
+//!   `normal`, [`banded`]: its equations and their solver
 //! - [`survey()`]: all of it in turn
 
 pub mod alignment;
 pub mod balance;
 pub mod banded;
-mod bordered;
 mod both_directions;
 mod centring;
 pub mod chainage;
@@ -32,6 +31,7 @@ pub mod learn;
 pub mod line;
 mod normal;
 pub mod profile;
+mod quantile;
 pub mod recording;
 mod recording_parts;
 mod silence;
@@ -40,6 +40,5 @@ mod surveying;
 mod tracking;
 pub mod trips;
 
-pub use centring::PassRows;
 pub use surveying::{KnownLine, Survey, SurveyError, SurveyedProfile, Vehicle, survey};
 pub use trips::{NotUsed, Trip};

@@ -1,12 +1,17 @@
-//! The normal equations of heights and common unknowns, which observations add to.
+//! The normal equations of heights and common unknowns, which observations add to: the heights make a
+//! band, what all passes share its border.
 
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 use super::banded::{Banded, Factor, NotPositive};
-use super::bordered::{Bordered, Columns, CommonCovariance, Solution};
 use super::common::Common;
 
 const COUNT: usize = Common::COUNT;
+
+/// Covariance of the common unknowns, or their normal matrix.
+pub type CommonCovariance = SMatrix<f64, COUNT, COUNT>;
+/// A value for each node and common unknown.
+pub type Columns = Vec<[f64; COUNT]>;
 
 /// What some observations, or what is known beforehand, say of the unknowns.
 pub struct Normal {
@@ -75,18 +80,63 @@ impl Normal {
         self.sizes_n.extend(other.sizes_n);
     }
 
-    /// What solves them, with the factor of the heights' matrix.
+    /// Eliminates the heights, solves for the common unknowns and puts them in.
     ///
     /// # Errors
     ///
     /// When they have no solution.
-    pub fn solve(self) -> Result<(Factor, Solution), NotPositive> {
-        let mut corner = self.corner;
+    pub fn solve(self) -> Result<Solution, NotPositive> {
+        let Normal { matrix, right: mut heights_m, border, mut corner, mut corner_right, .. } =
+            self;
         corner.fill_upper_triangle_with_lower_triangle();
-        let factor = self.matrix.factor()?;
-        let border = &self.border;
-        let system = Bordered { factor: &factor, border, corner, corner_right: self.corner_right };
-        let solution = system.solve(self.right);
-        Ok((factor, solution))
+        let factor = matrix.factor()?;
+        let size = heights_m.len();
+        factor.solve(&mut heights_m);
+        let mut columns = vec![[0.0; COUNT]; size];
+        for index in 0..COUNT {
+            let mut column: Vec<f64> = border.iter().map(|entries| entries[index]).collect();
+            factor.solve(&mut column);
+            for (entries, value) in columns.iter_mut().zip(&column) {
+                entries[index] = *value;
+            }
+        }
+        for node in 0..size {
+            for one in 0..COUNT {
+                corner_right[one] -= border[node][one] * heights_m[node];
+                for other in 0..COUNT {
+                    corner[(one, other)] -= border[node][one] * columns[node][other];
+                }
+            }
+        }
+        // The prior keeps the corner positive definite.
+        let covariance = corner.try_inverse().unwrap_or_else(CommonCovariance::zeros);
+        let common = covariance * corner_right;
+        for (height, column) in heights_m.iter_mut().zip(&columns) {
+            for index in 0..COUNT {
+                *height -= column[index] * common[index];
+            }
+        }
+        Ok(Solution { heights_m, common: Common(common), covariance, columns, factor })
+    }
+}
+
+/// What solves the equations.
+pub struct Solution {
+    /// Change of each height in m.
+    pub heights_m: Vec<f64>,
+    /// Change of the common unknowns.
+    pub common: Common,
+    /// Covariance of the common unknowns, with the heights' noise let in.
+    pub covariance: CommonCovariance,
+    /// Inverse of the heights' matrix times what they share with the common unknowns.
+    pub columns: Columns,
+    /// Factor of the heights' matrix.
+    pub factor: Factor,
+}
+
+impl Solution {
+    /// Standard deviations of the common unknowns.
+    pub fn common_std(&self) -> Common {
+        Common(self.covariance.diagonal().map(|variance| variance.max(0.0).sqrt()))
     }
 }

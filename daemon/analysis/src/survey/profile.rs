@@ -12,6 +12,7 @@ use super::banded::NotPositive;
 use super::common::{Common, Prior};
 use super::layout::{Course, HEIGHT_STEP_M, Layout};
 use super::normal::Normal;
+use super::quantile::middle;
 
 /// Standard deviation in m of a row of GNSS altitude: far more than it errs, since its errors
 /// last for minutes.
@@ -129,7 +130,8 @@ impl Evidence {
             common: self.prior.start(),
             common_std: self.prior.start(),
             pass_mass: vec![0.0; self.courses.len()],
-            residual_n: self.first_scale(),
+            // Before anything is known, a gradient of 2 % is noise.
+            residual_n: 0.02 * GRAVITY_MPS2 * self.prior.mass_kg,
             autocorrelation: 0.0,
             gradient_var: Vec::new(),
         };
@@ -140,11 +142,6 @@ impl Evidence {
         }
         state.autocorrelation = self.autocorrelation(&state, counts);
         Ok(state)
-    }
-
-    /// Before anything is known, a gradient of 2 % is noise.
-    fn first_scale(&self) -> f64 {
-        0.02 * GRAVITY_MPS2 * self.prior.mass_kg
     }
 
     /// One step of Gauss and Newton over heights and common unknowns.
@@ -179,21 +176,18 @@ impl Evidence {
         let chunks: Vec<Normal> = self.observations.par_chunks(CHUNK).map(of_chunk).collect();
         chunks.into_iter().for_each(|chunk| normal.add(chunk));
         let mut sizes_n = std::mem::take(&mut normal.sizes_n);
-        let (factor, step) = normal.solve()?;
+        let step = normal.solve()?;
         for (height, change) in state.heights_m.iter_mut().zip(&step.heights_m) {
             *height += change;
         }
         state.common.add(&step.common);
         state.common_std = step.common_std();
         if wants_std {
-            state.gradient_var =
-                self.layout.gradient_variances(&factor, &step.columns, &step.covariance);
+            state.gradient_var = self.layout.gradient_variances(&step);
         }
-        if !sizes_n.is_empty() {
-            let middle = sizes_n.len() / 2;
-            let scale = 1.4826 * *sizes_n.select_nth_unstable_by(middle, f64::total_cmp).1;
+        if let Some(middle_n) = middle(&mut sizes_n) {
             // The first residuals hold the whole profile and say little of the noise.
-            state.residual_n = scale.max(0.3 * state.residual_n);
+            state.residual_n = (1.4826 * middle_n).max(0.3 * state.residual_n);
         }
         Ok(())
     }
@@ -239,7 +233,9 @@ impl Evidence {
             let pass = observations[0].pass as usize;
             let mut row = Vec::with_capacity(16);
             let (mut top, mut bottom) = (0.0, 1.0 / (PASS_MASS_STD * PASS_MASS_STD));
-            for observation in observations.iter().filter(|it| counts(it)) {
+            let mut counted = observations.iter().filter(|it| counts(it)).peekable();
+            counted.peek()?;
+            for observation in counted {
                 let Observation { along_m, reach_m, .. } = *observation;
                 self.layout.gradient(self.courses[pass], along_m, reach_m, &mut row);
                 let (residual_n, _, unit) = state.residual(observation, &row, &self.prior);
@@ -248,17 +244,14 @@ impl Evidence {
                 top += weight * slope * (residual_n + slope * state.pass_mass[pass]);
                 bottom += weight * slope * slope;
             }
-            (pass, top / bottom)
+            Some((pass, top / bottom))
         };
         let by_pass = self.observations.par_chunk_by(|one, next| one.pass == next.pass);
-        let masses: Vec<(usize, f64)> = by_pass.map(of_pass).collect();
-        state.pass_mass.fill(0.0);
-        masses.into_iter().for_each(|(pass, mass)| state.pass_mass[pass] = mass);
+        let masses: Vec<(usize, f64)> = by_pass.filter_map(of_pass).collect();
         // What all passes share is the vehicle's, and moves there at once.
-        let driven: Vec<usize> = state.driven(&self.observations, counts);
-        let mean = driven.iter().map(|&pass| state.pass_mass[pass]).sum::<f64>()
-            / driven.len().max(1) as f64;
-        state.pass_mass.iter_mut().for_each(|mass| *mass -= mean);
+        let mean = masses.iter().map(|it| it.1).sum::<f64>() / masses.len().max(1) as f64;
+        state.pass_mass.fill(-mean);
+        masses.into_iter().for_each(|(pass, mass)| state.pass_mass[pass] = mass - mean);
         state.common.0[3] += mean;
     }
 
@@ -299,15 +292,6 @@ impl Profile {
         (TAIL + 1.0) / (TAIL + ratio * ratio) / self.residual_n.powi(2)
     }
 
-    /// Passes with observations that count.
-    fn driven(&self, observations: &[Observation], counts: Fold) -> Vec<usize> {
-        let mut has = vec![false; self.pass_mass.len()];
-        for observation in observations.iter().filter(|it| counts(it)) {
-            has[observation.pass as usize] = true;
-        }
-        (0..has.len()).filter(|&pass| has[pass]).collect()
-    }
-
     /// Recorded less modelled force in N, the mass in kg, and the force in N for each kg.
     fn residual(
         &self,
@@ -334,12 +318,5 @@ impl Profile {
                 (at_m, 1000.0 * rise / HEIGHT_STEP_M, 1000.0 * variance.sqrt())
             })
             .collect()
-    }
-
-    /// Height in m at a place along a block.
-    pub fn height_m(&self, block: usize, at_m: f64) -> f64 {
-        let mut row = Vec::with_capacity(2);
-        self.layout.push(block, at_m, 1.0, &mut row);
-        row.iter().map(|&(node, value)| value * self.heights_m[node]).sum()
     }
 }

@@ -1,6 +1,7 @@
 //! A raw recording, and what is computed from it once.
 
-use super::geodesy::LocalPlane;
+use super::geodesy::{LocalPlane, between};
+use super::quantile::middle;
 
 /// Fixes closer in time than this many s say the same: their errors fade over seconds.
 const FIX_STEP_MIN_S: f64 = 0.95;
@@ -105,10 +106,7 @@ impl<'r> Recording<'r> {
             let (from_m, to_m) = (self.travelled_m[pair[0].row], self.travelled_m[pair[1].row]);
             while next_m < to_m {
                 let share = (next_m - from_m) / (to_m - from_m);
-                let between = |axis: usize| {
-                    pair[0].at_m[axis] + share * (pair[1].at_m[axis] - pair[0].at_m[axis])
-                };
-                points.push((next_m, [between(0), between(1)]));
+                points.push((next_m, between(pair[0].at_m, pair[1].at_m, share)));
                 next_m += step_m;
             }
         }
@@ -121,8 +119,7 @@ pub fn plane_of(recordings: &[RawRecording]) -> Option<LocalPlane> {
     let median = |values: fn(&RawRecording) -> &Vec<f64>| {
         let all = recordings.iter().flat_map(values);
         let mut all: Vec<f64> = all.copied().filter(|value| value.is_finite()).collect();
-        let middle = all.len() / 2;
-        (!all.is_empty()).then(|| *all.select_nth_unstable_by(middle, f64::total_cmp).1)
+        middle(&mut all)
     };
     let height_m = median(|recording| &recording.altitude_m).unwrap_or(0.0);
     Some(LocalPlane::around(

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use dynocar_model::terms::wheel::STILL_MPS;
 
+use super::geodesy::distance_squared;
 use super::recording::Recording;
 
 /// Distance in m between the points that are looked at.
@@ -129,10 +130,4 @@ fn longest_stand(recording: &Recording, from_m: f64, to_m: f64) -> Option<f64> {
 
 fn step_after(time_s: &[f64], row: usize) -> f64 {
     time_s.get(row + 1).map_or(0.0, |next| next - time_s[row])
-}
-
-/// Squared distance in m² of two points.
-pub fn distance_squared(one: [f64; 2], other: [f64; 2]) -> f64 {
-    let [x, y] = [one[0] - other[0], one[1] - other[1]];
-    x * x + y * y
 }

@@ -1,7 +1,8 @@
 //! Where a receiver was silent, the path of one pass is that of another.
 
+use super::geodesy::distance_squared;
 use super::recording::Recording;
-use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M, distance_squared};
+use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M};
 
 /// Fixes further apart along the path than this many m leave it open in between.
 pub const GAP_MAX_M: f64 = 150.0;
@@ -43,6 +44,7 @@ pub fn filled(one: usize, traces: &[Vec<TracePoint>]) -> Vec<[f64; 2]> {
     let mut next = 0;
     while next < own.len() {
         let end = (next..own.len()).find(|&at| !own[at].is_open).unwrap_or(own.len());
+        let straight = own[next..end].iter().map(|point| point.at_m);
         if end > next && next > 0 && end < own.len() {
             let ends = [own[next - 1].at_m, own[end].at_m];
             let others = traces.iter().enumerate().filter(|(other, _)| *other != one);
@@ -50,10 +52,10 @@ pub fn filled(one: usize, traces: &[Vec<TracePoint>]) -> Vec<[f64; 2]> {
             let shortest = paths.min_by(|one, other| one.0.total_cmp(&other.0));
             match shortest {
                 Some((_, inside)) => path.extend(inside),
-                None => path.extend(own[next..end].iter().map(|point| point.at_m)),
+                None => path.extend(straight),
             }
         } else {
-            path.extend(own[next..end].iter().map(|point| point.at_m));
+            path.extend(straight);
         }
         path.extend(own.get(end).map(|point| point.at_m));
         next = end + 1;

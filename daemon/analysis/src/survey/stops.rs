@@ -1,8 +1,8 @@
 //! Where the passes stand.
 
 use dynocar_model::terms::wheel::STILL_MPS;
+use serde::Serialize;
 
-use super::chainage::Estimate;
 use super::recording::RawRecording;
 
 /// A shorter stand in s without open doors is no stop.
@@ -13,16 +13,18 @@ const SAME_STOP_M: f64 = 25.0;
 const SHARE_MIN: f64 = 0.5;
 
 /// A stop of the line.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stop {
-    /// Mean chainage in m, and how the passes scatter around it.
-    pub chainage_m: Estimate,
+    /// Mean chainage in m.
+    pub chainage_m: f64,
+    /// Name, empty where not known.
+    pub name: String,
+    /// How stands scatter in m; absent for one.
+    pub std_m: Option<f64>,
     /// Direction of travel.
     pub direction: i8,
     /// Number of stands.
     pub stands: usize,
-    /// Name, where known.
-    pub name: String,
 }
 
 /// Chainages in m at which a trip stands: for some seconds, or with a door open where doors are
@@ -73,13 +75,9 @@ pub fn stops(direction: i8, passes: &[Vec<f64>]) -> Vec<Stop> {
         let count = cluster.len() as f64;
         let mean = cluster.iter().map(|stand| stand.0).sum::<f64>() / count;
         let squares: f64 = cluster.iter().map(|stand| (stand.0 - mean).powi(2)).sum();
-        let std = if count > 1.0 { (squares / (count - 1.0)).sqrt() } else { f64::NAN };
-        stops.push(Stop {
-            chainage_m: Estimate { value: mean, std },
-            direction,
-            stands: cluster.len(),
-            name: String::new(),
-        });
+        let std_m = (count > 1.0).then(|| (squares / (count - 1.0)).sqrt());
+        let (name, stands) = (String::new(), cluster.len());
+        stops.push(Stop { chainage_m: mean, name, std_m, direction, stands });
     }
     stops
 }
@@ -92,8 +90,8 @@ mod tests {
     fn a_stop_is_where_most_passes_stand() {
         let passes = [vec![100.0, 500.0], vec![101.0, 340.0], vec![99.0, 503.0]];
         let stops = stops(1, &passes);
-        let at: Vec<f64> = stops.iter().map(|stop| stop.chainage_m.value).collect();
+        let at: Vec<f64> = stops.iter().map(|stop| stop.chainage_m).collect();
         assert_eq!(at, [100.0, 501.5]);
-        assert!((stops[0].chainage_m.std - 1.0).abs() < 1e-12);
+        assert!((stops[0].std_m.unwrap() - 1.0).abs() < 1e-12);
     }
 }

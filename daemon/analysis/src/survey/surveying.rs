@@ -7,9 +7,10 @@ use super::banded::NotPositive;
 use super::chainage::WheelsAndLag;
 use super::common::Prior;
 use super::curves::{FoundCurve, curves, turning_rad};
+use super::friction::acting_from_pa;
 use super::geodesy::LocalPlane;
 use super::layout::{Course, Layout};
-use super::learn::{Learned, acting_from_pa, learn};
+use super::learn::{Learned, learn};
 use super::line::{Alignments, find, pass_of};
 use super::profile::{Altitude, Evidence, is_one_of_few};
 use super::recording::{RawRecording, Recording, plane_of};
@@ -78,10 +79,6 @@ pub struct SurveyedProfile {
     pub curves: Vec<FoundCurve>,
     /// Numbers of the trips that took part, in the order of the passes.
     pub trips: Vec<usize>,
-    /// Length in s of the blocks.
-    pub block_s: f64,
-    /// Seconds of motion that took part.
-    pub observed: usize,
 }
 
 /// A surveyed line.
@@ -144,10 +141,10 @@ pub fn survey(
     }
     let profile = match known {
         Some(_) => None,
-        None => Some(profile(raws, &recordings, vehicle, &alignments, &trips, &wheels)?),
+        None => Some(profile(&recordings, vehicle, &alignments, &trips, &wheels)?),
     };
     let not_used = not_used(&trips, &recordings);
-    let stops = found_stops(raws, &alignments, &trips, known.is_some());
+    let stops = found_stops(&recordings, &alignments, &trips, known.is_some());
     Ok(Survey { plane, alignments, trips, not_used, stops, wheels, scale_std, profile })
 }
 
@@ -157,7 +154,7 @@ fn length_std(alignments: &Alignments) -> f64 {
 }
 
 fn found_stops(
-    raws: &[RawRecording],
+    recordings: &[Recording],
     alignments: &Alignments,
     trips: &[Trip],
     of_all: bool,
@@ -173,7 +170,7 @@ fn found_stops(
                     .iter()
                     .map(|&along_m| alignments.chainage_m(direction, along_m))
                     .collect();
-                stands(&raws[trip.recording], trip.along.first_row, &chainage_m)
+                stands(recordings[trip.recording].raw, trip.along.first_row, &chainage_m)
             })
             .collect();
         found.extend(stops(direction, &passes));
@@ -183,7 +180,6 @@ fn found_stops(
 
 /// The profile from the fit trips.
 fn profile(
-    raws: &[RawRecording],
     recordings: &[Recording],
     vehicle: &Vehicle,
     alignments: &Alignments,
@@ -216,19 +212,16 @@ fn profile(
         altitudes: altitudes.collect(),
         prior: vehicle.prior,
     };
-    let released_pa = acting_from_pa(raws.iter().filter(|raw| raw.is_fit));
+    let released_pa = acting_from_pa(recordings.iter().map(|it| it.raw).filter(|raw| raw.is_fit));
     let observe = |block_s: f64, of: &(dyn Fn(usize) -> bool + Sync)| {
         let of_pass = |(pass, &number): (usize, &usize)| {
             let trip = &trips[number];
-            let raw = &raws[trip.recording];
+            let raw = recordings[trip.recording].raw;
             let seen = observations(raw, &trip.along, pass as u32, block_s, speed_factor);
             let limit_m =
                 alignments.of(trip.direction).map_or(0.0, |alignment| alignment.length_m());
             let on_line = |mut it: Observation| {
-                let at_m = match courses[pass].against_from_m {
-                    Some(length_m) => length_m - it.along_m,
-                    None => it.along_m,
-                };
+                let at_m = courses[pass].in_block(it.along_m);
                 let k = vehicle.curve_constant_n_per_kn_m;
                 it.curve_n_per_kn = k * curvature(curves.iter(), at_m, vehicle.length_m);
                 (-ENDS_M..=limit_m + ENDS_M).contains(&it.along_m).then_some(it)
@@ -246,8 +239,7 @@ fn profile(
     }
     evidence.prior.speed_mps = typical_speed(&evidence.observations);
     let learned = learn(&mut evidence, released_pa)?;
-    let observed = evidence.observations.len();
-    Ok(SurveyedProfile { learned, curves, trips: fit, block_s, observed })
+    Ok(SurveyedProfile { learned, curves, trips: fit })
 }
 
 /// Length in s of the shortest blocks of which residuals do not alternate.

@@ -1,8 +1,9 @@
 //! Following a recording along an alignment: a chainage for each fix.
 
 use super::alignment::{Alignment, Beside};
+use super::geodesy::distance_squared;
 use super::recording::{Fix, Recording};
-use super::recording_parts::{SAME_ALIGNMENT_M, distance_squared};
+use super::recording_parts::SAME_ALIGNMENT_M;
 
 /// Window in m around the expected chainage in which a fix is placed.
 const WINDOW_M: f64 = 60.0;

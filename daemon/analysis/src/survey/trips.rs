@@ -1,9 +1,11 @@
 //! One-way trips along the line, and what of the recordings is none.
 
 use rayon::prelude::*;
+use serde::Serialize;
 
+use super::centring::Pass;
 use super::chainage::{Chained, Estimate, WheelsAndLag, chain};
-use super::line::{Alignments, Pass};
+use super::line::Alignments;
 use super::recording::Recording;
 use super::tracking::follow;
 
@@ -41,10 +43,10 @@ impl Trip {
 }
 
 /// A part of a recording that is no trip.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NotUsed {
-    /// Number of the recording.
-    pub recording: usize,
+    /// The recording.
+    pub source: String,
     /// Time in s where it starts.
     pub from_s: f64,
     /// Time in s where it ends.
@@ -62,15 +64,15 @@ pub fn trips(
     let placed: Vec<_> = passes
         .par_iter()
         .map(|pass| {
-            let recording = &recordings[pass.rows.recording];
+            let recording = &recordings[pass.recording];
             let alignment = alignments.of(pass.direction)?;
-            let placed = follow(recording, pass.rows.rows.clone(), alignment);
-            let rows = with_stands(recording, pass.rows.rows.clone());
+            let placed = follow(recording, pass.rows.clone(), alignment);
+            let rows = with_stands(recording, pass.rows.clone());
             let alone = chain(recording, rows.clone(), &placed, WheelsAndLag::UNKNOWN)?;
             Some((rows, placed, alone.learned))
         })
         .collect();
-    let is_fit = |pass: &Pass| recordings[pass.rows.recording].raw.is_fit;
+    let is_fit = |pass: &Pass| recordings[pass.recording].raw.is_fit;
     let has_fit = passes.iter().any(is_fit);
     let learned: Vec<WheelsAndLag> = passes
         .iter()
@@ -81,7 +83,7 @@ pub fn trips(
     let together = WheelsAndLag::together(&learned, SCALE_SPREAD).unwrap_or(WheelsAndLag::UNKNOWN);
     let of_pass = |(pass, placed): (&Pass, Option<(_, Vec<_>, _)>)| {
         let (rows, placed, _) = placed?;
-        let recording = &recordings[pass.rows.recording];
+        let recording = &recordings[pass.recording];
         let is_fit = recording.raw.is_fit;
         // Another day's wheels may be worn or new.
         let scale = match is_fit || !has_fit {
@@ -90,7 +92,7 @@ pub fn trips(
         };
         let lag_s = Estimate { std: together.lag_s.std.max(0.05), ..together.lag_s };
         let along = chain(recording, rows, &placed, WheelsAndLag { scale, lag_s })?;
-        Some(Trip { recording: pass.rows.recording, is_fit, direction: pass.direction, along })
+        Some(Trip { recording: pass.recording, is_fit, direction: pass.direction, along })
     };
     let mut trips: Vec<Trip> = passes.par_iter().zip(placed).filter_map(of_pass).collect();
     trips.sort_by_key(|trip| (trip.recording, trip.along.first_row));
@@ -137,7 +139,8 @@ pub fn not_used(trips: &[Trip], recordings: &[Recording]) -> Vec<NotUsed> {
                     (recording.raw.time_s[from], recording.raw.time_s[trip.start - 1]);
                 if to_s - from_s >= NOT_USED_MIN_S {
                     let reason = reason(recording, from..trip.start);
-                    found.push(NotUsed { recording: number, from_s, to_s, reason });
+                    let source = recording.raw.source.clone();
+                    found.push(NotUsed { source, from_s, to_s, reason });
                 }
             }
             from = trip.end;

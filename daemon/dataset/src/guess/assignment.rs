@@ -5,11 +5,21 @@ use std::cmp::Reverse;
 use super::columns::{Column, Columns};
 use super::facts::Facts;
 use super::guessed::{GivenColumn, GuessResult, GuessedColumn, Unmapped};
-use super::matching::{Candidate, can_hold, consider, named_unit};
-use super::plausible::{UnitChoice, choose_unit};
+use super::matching::{can_hold, consider};
+use super::name::named_unit;
 use super::problem::{GuessError, GuessProblem};
-use super::spelling::Spelled;
 use crate::{Quantity, SourcePosition};
+
+/// A column that may hold a quantity.
+#[derive(Clone)]
+struct Candidate {
+    /// Index of the column.
+    column: usize,
+    /// The greater the likelier.
+    score: i32,
+    /// What it would be; the first reason is what in the name speaks for it.
+    guessed: GuessedColumn,
+}
 
 /// What the columns are taken for.
 pub struct Assignment<'c> {
@@ -37,17 +47,20 @@ impl<'c> Assignment<'c> {
         };
         for it in given {
             let problem = assignment.take_given(it, columns);
-            let place = || SourcePosition::line(label, columns.skip_rows + 1);
+            let place = || SourcePosition::line(label, columns.layout.skip_rows + 1);
             problem.map_err(|problem| GuessError::new(place(), problem))?;
         }
         for (index, column) in columns.columns.iter().enumerate() {
             if column.unusable.is_some() || assignment.is_taken(index) {
                 continue;
             }
-            for quantity in Quantity::ALL.into_iter().filter(|it| !is_given(given, *it)) {
-                match consider(index, &column.name, &column.all, quantity) {
+            let is_given = |quantity: &Quantity| given.iter().any(|it| it.quantity == *quantity);
+            for quantity in Quantity::ALL.into_iter().filter(|it| !is_given(it)) {
+                match consider(&column.name, &column.all, quantity) {
                     None => {}
-                    Some(Ok(candidate)) => assignment.candidates.push(candidate),
+                    Some(Ok((score, guessed))) => {
+                        assignment.candidates.push(Candidate { column: index, score, guessed });
+                    }
                     Some(Err(reason)) => assignment.refused.push((index, quantity, reason)),
                 }
             }
@@ -70,46 +83,21 @@ impl<'c> Assignment<'c> {
         if let Err(reason) = reason {
             return Err(GuessProblem::Unfit { name, quantity, reason });
         }
-        let unit = match given.unit {
-            Some(unit) => UnitChoice {
-                spelled: Spelled { unit, scale: 1.0 },
-                reason: "the unit as given".into(),
-                doubt: None,
-            },
-            None => choose_unit(quantity, &column.all, named_unit(&column.name, quantity)),
-        };
-        let is_unit_open = given.unit.is_none() && named_unit(&column.name, quantity).is_none();
-        let mut guessed = self.guessed(index, quantity, unit);
-        guessed.reasons.insert(0, "given on the command line".into());
-        guessed.is_unit_open = is_unit_open && guessed.format.is_none();
+        let unit = (given.unit, named_unit(&column.name, quantity));
+        let reason = "given on the command line".into();
+        let guessed = GuessedColumn::new((&column.name, &column.all), quantity, reason, unit);
         self.taken.push((index, guessed, true));
         Ok(())
-    }
-
-    fn guessed(&self, index: usize, quantity: Quantity, unit: UnitChoice) -> GuessedColumn {
-        let column = &self.columns[index];
-        let middle = column.all.middle().unwrap_or(f64::NAN);
-        let guessed = GuessedColumn::new(quantity, column.name.clone(), unit, middle);
-        match quantity {
-            Quantity::Time => guessed.written_as(&column.all.formats()),
-            _ => guessed,
-        }
     }
 
     /// The best candidate first, then the best of those that are left.
     fn take_best(&mut self) {
         let mut candidates = self.candidates.clone();
-        candidates.sort_by_key(|it| (Reverse(it.score), it.quantity, it.column));
-        for Candidate { column, quantity, reason, unit, doubt, .. } in candidates {
-            if self.is_taken(column) || self.has(quantity) {
-                continue;
+        candidates.sort_by_key(|it| (Reverse(it.score), it.guessed.quantity, it.column));
+        for Candidate { column, guessed, .. } in candidates {
+            if !self.is_taken(column) && !self.has(guessed.quantity) {
+                self.taken.push((column, guessed, false));
             }
-            let is_unit_open = named_unit(&self.columns[column].name, quantity).is_none();
-            let mut guessed = self.guessed(column, quantity, unit);
-            guessed.reasons.insert(0, reason);
-            guessed.doubts.splice(0..0, doubt);
-            guessed.is_unit_open = is_unit_open && guessed.format.is_none();
-            self.taken.push((column, guessed, false));
         }
     }
 
@@ -183,15 +171,16 @@ impl<'c> Assignment<'c> {
     /// What a column was not taken for, and which columns were not taken for its quantity.
     fn not_taken(&self, index: usize, quantity: Quantity) -> Vec<String> {
         let others = self.candidates.iter().filter(|it| it.column == index);
+        let others = others.map(|it| &it.guessed).filter(|it| it.quantity != quantity);
         let others = others
-            .filter(|it| it.quantity != quantity)
-            .map(|it| format!("not {}, for which less speaks ({})", it.quantity, it.reason));
+            .map(|it| format!("not {}, for which less speaks ({})", it.quantity, it.reasons[0]));
         let refused = self.refused.iter().filter(|(of, ..)| *of == index);
         let refused = refused.map(|(_, quantity, reason)| format!("not {quantity}: {reason}"));
-        let columns = self.candidates.iter().filter(|it| it.quantity == quantity);
-        let columns = columns
-            .filter(|it| it.column != index && !self.is_taken(it.column))
-            .map(|it| format!("'{}' could be it, too ({})", self.shown(it.column), it.reason));
+        let columns = self.candidates.iter().filter(|it| it.guessed.quantity == quantity);
+        let columns = columns.filter(|it| it.column != index && !self.is_taken(it.column));
+        let columns = columns.map(|Candidate { column, guessed, .. }| {
+            format!("'{}' could be it, too ({})", self.shown(*column), guessed.reasons[0])
+        });
         others.chain(refused).chain(columns).chain(self.near(quantity)).collect()
     }
 
@@ -203,7 +192,7 @@ impl<'c> Assignment<'c> {
         let reason = match (&column.unusable, dropped, candidate, refused) {
             (Some(reason), ..) => reason.clone(),
             (_, Some((_, reason)), ..) => reason.clone(),
-            (_, _, Some(it), _) => {
+            (_, _, Some(Candidate { guessed: it, .. }), _) => {
                 let taken = self.taken.iter().find(|(_, other, _)| other.quantity == it.quantity);
                 let by = taken.map_or_else(String::new, |(_, other, _)| {
                     format!(", for which '{}' is taken", other.name.shown())
@@ -215,8 +204,4 @@ impl<'c> Assignment<'c> {
         };
         Unmapped { name: column.name.clone(), reason }
     }
-}
-
-fn is_given(given: &[GivenColumn], quantity: Quantity) -> bool {
-    given.iter().any(|it| it.quantity == quantity)
 }

@@ -23,14 +23,10 @@ pub struct Column {
 /// All files, read through.
 #[derive(Clone, Debug)]
 pub struct Columns {
-    /// Between the cells of a row.
-    pub delimiter: u8,
+    /// How the first file's text falls into cells, as that of all.
+    pub layout: Layout,
     /// Between a number and its fraction.
     pub decimal: u8,
-    /// Lines above the names.
-    pub skip_rows: usize,
-    /// True where a line of units stands below the names.
-    pub units_row: bool,
     /// The columns, in the order of the first file's header.
     pub columns: Vec<Column>,
     /// Rows of values in each file.
@@ -81,8 +77,7 @@ impl Columns {
             }
             rows.push(count);
         }
-        let &Layout { delimiter, skip_rows, units_row, .. } = first;
-        Ok(Columns { delimiter, decimal, skip_rows, units_row, columns, rows })
+        Ok(Columns { layout: first.clone(), decimal, columns, rows })
     }
 
     /// Every column's name, for messages.
@@ -116,28 +111,19 @@ fn require_alike(
 ) -> GuessResult<()> {
     let mark = |mark: u8| format!("{:?}", char::from(mark).to_string());
     let own_decimal = layout.decimal.unwrap_or(decimal);
+    let shown = |is_there: bool| String::from(if is_there { "there" } else { "not there" });
+    let above = |layout: &Layout| layout.skip_rows.to_string();
     let all = [
         ("the delimiter", mark(layout.delimiter), mark(first.delimiter)),
         ("the decimal mark", mark(own_decimal), mark(decimal)),
-        (
-            "the number of lines above the names",
-            layout.skip_rows.to_string(),
-            first.skip_rows.to_string(),
-        ),
+        ("the number of lines above the names", above(layout), above(first)),
         ("a line of units", shown(layout.units_row), shown(first.units_row)),
     ];
-    match all.into_iter().find(|(_, found, expected)| found != expected) {
-        None => Ok(()),
-        Some((what, found, expected)) => {
-            let first = label.to_string();
-            let problem = GuessProblem::OtherLayout { what, found, expected, first };
-            Err(GuessError::new(SourcePosition::whole(file.label), problem))
-        }
-    }
-}
-
-fn shown(is_there: bool) -> String {
-    if is_there { "there".into() } else { "not there".into() }
+    let Some((what, found, expected)) = all.into_iter().find(|(_, one, other)| one != other) else {
+        return Ok(());
+    };
+    let problem = GuessProblem::OtherLayout { what, found, expected, first: label.into() };
+    Err(GuessError::new(SourcePosition::whole(file.label), problem))
 }
 
 /// What the values of every column are like, and the number of rows.

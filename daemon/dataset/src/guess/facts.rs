@@ -8,30 +8,22 @@ use crate::clock::{DayClock, day_of_cell};
 const KEPT_MAX: usize = 4096;
 
 /// Values spread evenly over all that came.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 struct Spread {
     values: Vec<f64>,
-    every: usize,
+    halved: u32,
     seen: usize,
 }
 
 impl Spread {
-    fn new() -> Self {
-        Spread { values: Vec::new(), every: 1, seen: 0 }
-    }
-
     pub fn push(&mut self, value: f64) {
-        if self.seen.is_multiple_of(self.every) {
+        if self.seen.is_multiple_of(1 << self.halved) {
             self.values.push(value);
         }
         self.seen += 1;
         if self.values.len() > KEPT_MAX {
-            let mut index = 0;
-            self.values.retain(|_| {
-                index += 1;
-                index % 2 == 1
-            });
-            self.every *= 2;
+            self.values = self.values.iter().step_by(2).copied().collect();
+            self.halved += 1;
         }
     }
 
@@ -54,7 +46,7 @@ pub struct Text {
 }
 
 /// What was seen of a column's values, cell by cell.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
     /// Cells with a finite number.
     pub numbers: usize,
@@ -79,20 +71,8 @@ pub struct Facts {
 impl Facts {
     /// Nothing seen yet.
     pub fn new() -> Self {
-        Facts {
-            numbers: 0,
-            text: None,
-            min: f64::INFINITY,
-            max: f64::NEG_INFINITY,
-            day: None,
-            clocks: Vec::new(),
-            first: f64::NAN,
-            last: f64::NAN,
-            growing: 0,
-            pairs: 0,
-            values: Spread::new(),
-            steps: Spread::new(),
-        }
+        let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
+        Facts { min, max, first: f64::NAN, last: f64::NAN, ..Facts::default() }
     }
 
     /// Takes in a trimmed cell of a line: a number, a time, or text.
@@ -175,12 +155,8 @@ impl Facts {
         self.max = self.max.max(other.max);
         self.growing += other.growing;
         self.pairs += other.pairs;
-        for &value in &other.values.values {
-            self.values.push(value);
-        }
-        for &step in &other.steps.values {
-            self.steps.push(step);
-        }
+        other.values.values.iter().for_each(|&value| self.values.push(value));
+        other.steps.values.iter().for_each(|&step| self.steps.push(step));
     }
 
     /// The greatest magnitude, single spikes left out; `None` without a number.
@@ -216,11 +192,11 @@ impl Facts {
     /// The shares of the values that are above and below zero by more than noise.
     pub fn signs(&self) -> (f64, f64) {
         let least = 0.02 * self.top().unwrap_or(0.0);
-        let share = |is_it: &dyn Fn(f64) -> bool| {
-            let count = self.values.values.iter().filter(|&&value| is_it(value)).count();
+        let share = |sign: f64| {
+            let count = self.values.values.iter().filter(|&&value| sign * value > least).count();
             count as f64 / self.values.values.len().max(1) as f64
         };
-        (share(&|value| value > least), share(&|value| value < -least))
+        (share(1.0), share(-1.0))
     }
 }
 

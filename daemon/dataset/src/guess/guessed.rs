@@ -2,9 +2,11 @@
 
 use dynocar_model::units::Unit;
 
-use super::name::Name;
-use super::plausible::UnitChoice;
+use super::facts::Facts;
+use super::name::{Name, named_unit};
+use super::plausible::{UnitChoice, choose_unit};
 use super::problem::GuessError;
+use super::spelling::Spelled;
 use crate::{Quantity, TimeFormat};
 
 /// A recording's file.
@@ -101,35 +103,48 @@ impl Guess {
 }
 
 impl GuessedColumn {
-    /// A column with a unit and without a doubt.
-    pub(super) fn new(quantity: Quantity, name: Name, unit: UnitChoice, middle: f64) -> Self {
-        GuessedColumn {
+    /// A column by its name and what its values are like, in a unit that is given, or by the one that its name says.
+    pub(super) fn new(
+        (name, facts): (&Name, &Facts),
+        quantity: Quantity,
+        reason: String,
+        (given, named): (Option<Unit>, Option<Spelled>),
+    ) -> Self {
+        let unit = match given {
+            Some(unit) => {
+                UnitChoice { spelled: unit.into(), reason: "the unit as given".into(), doubt: None }
+            }
+            None => choose_unit(quantity, facts, named),
+        };
+        let guessed = GuessedColumn {
             quantity,
-            name,
+            name: name.clone(),
             unit: unit.spelled.unit,
             scale: unit.spelled.scale,
             format: None,
-            reasons: vec![unit.reason],
+            reasons: vec![reason, unit.reason],
             doubts: unit.doubt.into_iter().collect(),
             rejected: Vec::new(),
-            is_unit_open: false,
-            middle,
+            is_unit_open: given.is_none() && named_unit(name, quantity).is_none(),
+            middle: facts.middle().unwrap_or(f64::NAN),
+        };
+        match (quantity, &facts.formats()[..]) {
+            (Quantity::Time, [format, others @ ..]) => guessed.written_as(format, others),
+            _ => guessed,
         }
     }
 
-    /// The same, its cells times in the first of these formats; in the others they could be, too.
-    pub(super) fn written_as(self, formats: &[&TimeFormat]) -> Self {
-        let [format, others @ ..] = formats else { return self };
-        let unit = Unit::base_of(self.quantity.dimension());
-        let reason = format!("its cells are times as {}", format.example());
-        let names: Vec<&str> = others.iter().map(|it| it.name()).collect();
+    /// The same, its cells times in a format; in others they could be, too.
+    fn written_as(mut self, format: &TimeFormat, others: &[&TimeFormat]) -> Self {
+        self.reasons[1] = format!("its cells are times as {}", format.example());
         // A day without a leading zero is read where one stands, too.
-        let is_other = |name: &str| name.replace('-', "") != format.name().replace('-', "");
-        let others: Vec<&str> = names.into_iter().filter(|name| is_other(name)).collect();
-        let doubt = format!("they could be {}, too", others.join(" or "));
-        let doubts = if others.is_empty() { Vec::new() } else { vec![doubt] };
-        let format = Some((*format).clone());
-        GuessedColumn { unit, scale: 1.0, format, reasons: vec![reason], doubts, ..self }
+        let plain = |format: &TimeFormat| format.name().replace('-', "");
+        let others = others.iter().filter(|other| plain(other) != plain(format));
+        let others: Vec<&str> = others.map(|it| it.name()).collect();
+        let doubt = || format!("they could be {}, too", others.join(" or "));
+        let doubts = (!others.is_empty()).then(doubt).into_iter().collect();
+        let (unit, format) = (Unit::base_of(self.quantity.dimension()), Some(format.clone()));
+        GuessedColumn { unit, scale: 1.0, format, doubts, is_unit_open: false, ..self }
     }
 }
 

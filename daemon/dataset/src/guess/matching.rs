@@ -1,8 +1,8 @@
 //! Which quantity a column's name and values speak for.
 
 use super::facts::Facts;
-use super::name::Name;
-use super::plausible::{UnitChoice, choose_unit};
+use super::guessed::GuessedColumn;
+use super::name::{Name, readings};
 use super::spelling::{self, Spelled};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::{Choices, Quantity};
@@ -16,23 +16,6 @@ const SURE: i32 = 65;
 /// Terms of so many letters are found within a longer word, too.
 const WITHIN_MIN: usize = 6;
 
-/// A column that may hold a quantity.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
-    /// Index of the column.
-    pub column: usize,
-    /// The quantity.
-    pub quantity: Quantity,
-    /// The greater the likelier.
-    pub score: i32,
-    /// What in the name speaks for it.
-    pub reason: String,
-    /// The unit.
-    pub unit: UnitChoice,
-    /// What makes the quantity doubtful.
-    pub doubt: Option<String>,
-}
-
 /// What a name says of a quantity.
 struct Match {
     score: i32,
@@ -40,14 +23,13 @@ struct Match {
     unit: Option<Spelled>,
 }
 
-/// Whether a column may hold a quantity: `None` where nothing speaks for it, an error where the
-/// name does but something else speaks against it.
+/// Whether a column may hold a quantity, and its score, the greater the likelier: `None` where nothing speaks for
+/// it, an error where the name does but something else speaks against it.
 pub fn consider(
-    column: usize,
     name: &Name,
     facts: &Facts,
     quantity: Quantity,
-) -> Option<Result<Candidate, String>> {
+) -> Option<Result<(i32, GuessedColumn), String>> {
     let by_name = match quantity {
         // What stands in brackets behind the name may be the times' form.
         Quantity::Time if !facts.formats().is_empty() => {
@@ -55,17 +37,13 @@ pub fn consider(
         }
         _ => by_name(name, quantity),
     };
-    let matched = match by_name? {
-        Ok(matched) => matched,
-        Err(reason) => return Some(Err(reason)),
-    };
-    if let Err(reason) = can_hold(facts, quantity) {
-        return Some(Err(reason));
-    }
-    let Match { score, reason, unit } = matched;
-    let unit = choose_unit(quantity, facts, unit);
-    let doubt = (score < SURE).then(|| format!("little speaks for it but {reason}"));
-    Some(Ok(Candidate { column, quantity, score, reason, unit, doubt }))
+    let matched = by_name?.and_then(|matched| can_hold(facts, quantity).map(|()| matched));
+    Some(matched.map(|Match { score, reason, unit }| {
+        let doubt = (score < SURE).then(|| format!("little speaks for it but {reason}"));
+        let mut guessed = GuessedColumn::new((name, facts), quantity, reason, (None, unit));
+        guessed.doubts.splice(0..0, doubt);
+        (score, guessed)
+    }))
 }
 
 /// Whether a column's values can be the quantity's.
@@ -106,14 +84,6 @@ fn by_cells() -> Match {
     Match { score: SURE, reason: "what it holds".into(), unit: None }
 }
 
-/// The unit that a column's name gives for a quantity.
-pub fn named_unit(name: &Name, quantity: Quantity) -> Option<Spelled> {
-    if let Some(text) = &name.unit {
-        return spelling::find(quantity.dimension(), text);
-    }
-    readings(name, quantity).into_iter().rev().find_map(|(_, unit)| unit)
-}
-
 /// The best that a name says of a quantity, or what in it speaks against it.
 fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
     let best = readings(name, quantity)
@@ -138,33 +108,12 @@ fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
     (best.score >= ENOUGH).then_some(Ok(best))
 }
 
-/// The words of a name and, for each way to see a unit in its last words, what is left of them.
-fn readings(name: &Name, quantity: Quantity) -> Vec<(&[String], Option<Spelled>)> {
-    let words = &name.words[..];
-    let mut readings = vec![(words, None)];
-    if name.unit.is_none() {
-        for count in 1..words.len().min(4) {
-            let (rest, unit) = words.split_at(words.len() - count);
-            if let Some(unit) = spelling::find(quantity.dimension(), &unit.concat()) {
-                readings.push((rest, Some(unit)));
-            }
-        }
-    }
-    readings
-}
-
 /// What the words say of a quantity.
 fn by_words(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
-    let own = quantity.name().replace('_', " ");
-    let is_listed = terms(quantity).any(|(_, term)| term == own);
-    let score = |(strength, term): (TermWeight, &str)| {
-        let score = by_term(words, strength, term)?;
-        Some((score, format!("'{term}' in the name")))
-    };
-    let by_own = Some((TermWeight::Named, own.as_str())).filter(|_| !is_listed).and_then(score);
-    let matches = by_own.into_iter().chain(terms(quantity).filter_map(score));
-    let best = matches.max_by_key(|(score, _)| *score);
-    best.or_else(|| by_likeness(words, quantity))
+    let matches = terms(quantity).filter_map(|(strength, term)| {
+        Some((by_term(words, strength, term)?, format!("'{term}' in the name")))
+    });
+    matches.max_by_key(|(score, _)| *score).or_else(|| by_likeness(words, quantity))
 }
 
 /// What a name is worth that holds a term.
@@ -210,22 +159,20 @@ fn within(words: &[String], strength: TermWeight, joined: &str) -> Option<i32> {
 /// A name that was mistyped.
 fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     let joined = words.concat();
-    let is_known = |it: &Quantity| {
-        let listed = terms(*it).map(|(_, term)| term);
-        listed.chain([it.name()]).any(|term| joined == term.replace([' ', '_'], ""))
+    let all = || {
+        let terms_of = |it: Quantity| terms(it).map(move |(weight, term)| (it, weight, term));
+        Quantity::ALL.into_iter().flat_map(terms_of)
     };
-    if joined.chars().count() < WITHIN_MIN || Quantity::ALL.iter().any(is_known) {
+    let is_known = || all().any(|(.., term)| joined == term.replace(' ', ""));
+    if joined.chars().count() < WITHIN_MIN || is_known() {
         return None;
     }
-    let named = |it: Quantity| {
-        let listed = terms(it).filter(|(strength, _)| *strength == TermWeight::Named);
-        let listed = listed.map(|(_, term)| term);
-        let own = std::iter::once(it.name());
-        own.chain(listed)
-            .filter(|term| term.len() >= WITHIN_MIN - 1)
-            .map(move |term| (it, term.replace([' ', '_'], "")))
+    let is_named = |(it, weight, term): &(Quantity, TermWeight, &str)| {
+        let is_own = *term == it.name().replace('_', " ");
+        (*weight == TermWeight::Named || is_own) && term.len() >= WITHIN_MIN - 1
     };
-    let names: Vec<(Quantity, String)> = Quantity::ALL.into_iter().flat_map(named).collect();
+    let names: Vec<(Quantity, String)> =
+        all().filter(is_named).map(|(it, _, term)| (it, term.replace(' ', ""))).collect();
     let choices = Choices::new(&joined, names.iter().map(|(_, term)| term.clone()));
     let nearest = choices.nearest()?;
     let is_meant = names.iter().any(|(of, term)| *of == quantity && term == nearest);
@@ -251,10 +198,7 @@ fn by_unit_alone(name: &Name, quantity: Quantity) -> Option<Match> {
 
 /// What in a name speaks against what was measured of the train.
 fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
-    let own: Vec<&str> = terms(quantity)
-        .flat_map(|(_, term)| term.split(' '))
-        .chain(quantity.name().split('_'))
-        .collect();
+    let own: Vec<&str> = terms(quantity).flat_map(|(_, term)| term.split(' ')).collect();
     let known = &VOCABULARY.words;
     let lists = [
         (&known.not_measured, "what was wanted or allowed"),

@@ -52,16 +52,17 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, GuessE
     for quantity in [Quantity::Time, Quantity::Speed] {
         if !assignment.has(quantity) {
             let (reasons, columns) = (assignment.near(quantity), read.names());
+            let place = SourcePosition::line(label, read.layout.skip_rows + 1);
             let problem = GuessProblem::Missing { quantity, reasons, columns };
-            return Err(GuessError::new(SourcePosition::line(label, read.skip_rows + 1), problem));
+            return Err(GuessError::new(place, problem));
         }
     }
     let (columns, unmapped) = assignment.finish();
-    let position = columns.iter().find(|column| column.quantity == Quantity::Position);
-    let position =
-        position.and_then(|it| read.columns.iter().find(|column| column.name == it.name));
-    let time = columns.iter().find(|column| column.quantity == Quantity::Time);
-    let lacks_date = time.is_some_and(|it| it.format.as_ref().is_some_and(|it| !it.has_date()));
+    let guessed = |quantity| columns.iter().find(|column| column.quantity == quantity);
+    let position = guessed(Quantity::Position)
+        .and_then(|it| read.columns.iter().find(|column| column.name == it.name));
+    let format = guessed(Quantity::Time).and_then(|it| it.format.as_ref());
+    let lacks_date = format.is_some_and(|it| !it.has_date());
     let dates = read.columns.iter().filter(|_| lacks_date);
     let runs = files.iter().zip(&read.rows).enumerate().map(|(index, (file, &rows))| GuessedRun {
         label: file.label.into(),
@@ -70,6 +71,6 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, GuessE
         day: dates.clone().find_map(|column| column.facts[index].day),
     });
     let runs = runs.collect();
-    let columns::Columns { delimiter, decimal, skip_rows, units_row, .. } = read;
-    Ok(Guess { delimiter, decimal, skip_rows, units_row, columns, unmapped, runs })
+    let layout::Layout { delimiter, skip_rows, units_row, .. } = read.layout;
+    Ok(Guess { delimiter, decimal: read.decimal, skip_rows, units_row, columns, unmapped, runs })
 }

@@ -1,6 +1,7 @@
 //! A column's name in words.
 
-use super::spelling;
+use super::spelling::{self, Spelled};
+use crate::Quantity;
 
 /// A column's name, taken apart.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,6 +32,29 @@ impl Name {
         let letters = self.text.chars().take(60);
         letters.map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
     }
+}
+
+/// The unit that a column's name gives for a quantity.
+pub fn named_unit(name: &Name, quantity: Quantity) -> Option<Spelled> {
+    if let Some(text) = &name.unit {
+        return spelling::find(quantity.dimension(), text);
+    }
+    readings(name, quantity).into_iter().rev().find_map(|(_, unit)| unit)
+}
+
+/// The words of a name and, for each way to see a unit in its last words, what is left of them.
+pub fn readings(name: &Name, quantity: Quantity) -> Vec<(&[String], Option<Spelled>)> {
+    let words = &name.words[..];
+    let mut readings = vec![(words, None)];
+    if name.unit.is_none() {
+        for count in 1..words.len().min(4) {
+            let (rest, unit) = words.split_at(words.len() - count);
+            if let Some(unit) = spelling::find(quantity.dimension(), &unit.concat()) {
+                readings.push((rest, Some(unit)));
+            }
+        }
+    }
+    readings
 }
 
 /// The name without its unit, and the unit: in brackets, behind ` / ` as DIN 461 writes axes, or

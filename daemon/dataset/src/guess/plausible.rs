@@ -1,11 +1,10 @@
 //! Which unit makes a column's values those of a train.
 
 use dynocar_model::units::Unit;
-use serde::Deserialize;
 
 use super::facts::Facts;
 use super::spelling::Spelled;
-use super::vocabulary::usual;
+use super::vocabulary::{Measure, Usual, usual};
 use crate::Quantity;
 
 /// Values so many times beyond the usual ones are none of a quantity in a unit.
@@ -22,31 +21,6 @@ pub struct UnitChoice {
     pub reason: String,
     /// What makes it doubtful; `None` where the header says it and the values agree.
     pub doubt: Option<String>,
-}
-
-/// Which figure of a column reveals its unit.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Measure {
-    /// The greatest magnitude.
-    Top,
-    /// The middle value.
-    Middle,
-    /// The middle of the steps.
-    Step,
-    /// From the least to the greatest.
-    Span,
-}
-
-/// What a train's values usually are, in the base unit, and the units that recorders use, the
-/// likeliest first.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Usual {
-    measure: Measure,
-    low: f64,
-    high: f64,
-    units: Vec<String>,
 }
 
 impl Usual {
@@ -94,8 +68,7 @@ pub fn choose_unit(quantity: Quantity, facts: &Facts, named: Option<Spelled>) ->
             let unit = quantity.unit();
             let counts = unit.name() == "1";
             let doubt = (!counts).then(|| format!("the name gives no unit; {}", unit.name()));
-            let reason = String::from("the unit that is usual");
-            UnitChoice { spelled: Spelled { unit, scale: 1.0 }, reason, doubt }
+            UnitChoice { spelled: unit.into(), reason: "the unit that is usual".into(), doubt }
         }
     }
 }
@@ -111,8 +84,7 @@ fn judge(spelled: Spelled, usual: &Usual, figure: f64) -> UnitChoice {
     if distance <= FAR.ln() {
         return said(spelled);
     }
-    let words = usual.words(figure);
-    let name = spelled.unit.name();
+    let (words, name) = (usual.words(figure), spelled.unit.name());
     if distance > 100.0_f64.ln() && usual.distance(base(RAW_COUNT)) == 0.0 {
         let doubt = format!("{words} are no {name} of a train; read as thousandths of {name}");
         let spelled = Spelled { scale: spelled.scale * RAW_COUNT, ..spelled };
@@ -146,7 +118,7 @@ fn by_values(quantity: Quantity, usual: &Usual, figure: f64) -> UnitChoice {
         ),
     };
     let reason = format!("{words} are usual in {name}");
-    UnitChoice { spelled: Spelled { unit, scale: 1.0 }, reason, doubt: Some(doubt) }
+    UnitChoice { spelled: unit.into(), reason, doubt: Some(doubt) }
 }
 
 /// A number in few letters.

@@ -11,6 +11,12 @@ pub struct Spelled {
     pub scale: f64,
 }
 
+impl From<Unit> for Spelled {
+    fn from(unit: Unit) -> Self {
+        Spelled { unit, scale: 1.0 }
+    }
+}
+
 /// How headers spell a dataset's units besides their names, with or without the marks in them, and multiples of these
 /// units: dimension, name, the factor that leads to it, spellings in small letters and digits.
 const SPELLINGS: &[(Dimension, &str, f64, &str)] = {
@@ -71,7 +77,7 @@ const FOREIGN: &str = "ma mv hz khz rpm umin 1min nm knm kwh wh mwh j kj mj l lm
 /// distinguishes nothing (but mN is no MN).
 pub fn find(dimension: Dimension, text: &str) -> Option<Spelled> {
     let text = text.trim();
-    let plain = |unit: Unit| Some(Spelled { unit, scale: 1.0 });
+    let plain = |unit: Unit| Some(Spelled::from(unit));
     match (dimension, text) {
         (Dimension::Ratio, "‰" | "0/00" | "o/oo") => return plain(unit(dimension, "permille")),
         (Dimension::Ratio | Dimension::Count, "-" | "") => return plain(unit(dimension, "1")),

@@ -6,7 +6,6 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::plausible::Usual;
 use crate::Quantity;
 
 /// How far a term can be trusted.
@@ -56,6 +55,34 @@ struct Entry {
     usual: Option<Usual>,
 }
 
+/// Which figure of a column reveals its unit.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Measure {
+    /// The greatest magnitude.
+    Top,
+    /// The middle value.
+    Middle,
+    /// The middle of the steps.
+    Step,
+    /// From the least to the greatest.
+    Span,
+}
+
+/// What a train's values usually are, and the units that recorders use, the likeliest first.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Usual {
+    /// Which figure shows it.
+    pub measure: Measure,
+    /// The least that is usual, in the base unit.
+    pub low: f64,
+    /// The greatest.
+    pub high: f64,
+    /// The units.
+    pub units: Vec<String>,
+}
+
 /// All that is known of names.
 pub static VOCABULARY: LazyLock<Vocabulary> = LazyLock::new(|| {
     toml::from_str(include_str!("vocabulary.toml"))
@@ -67,14 +94,27 @@ pub fn listed(list: &str) -> impl Iterator<Item = &str> {
     list.split(", ").filter(|term| !term.is_empty())
 }
 
-/// What a quantity is called besides its name, and what each term is worth.
-pub fn terms(quantity: Quantity) -> impl Iterator<Item = (TermWeight, &'static str)> {
+static TERMS: LazyLock<BTreeMap<Quantity, Vec<(TermWeight, String)>>> =
+    LazyLock::new(|| Quantity::ALL.map(|quantity| (quantity, terms_of(quantity))).into());
+
+fn terms_of(quantity: Quantity) -> Vec<(TermWeight, String)> {
     use TermWeight::{Alone, Named, Symbol, Weak};
-    let entry = VOCABULARY.quantities.get(quantity.name());
-    let lists = entry.into_iter().flat_map(|it| {
+    let own = quantity.name().replace('_', " ");
+    let lists = VOCABULARY.quantities.get(quantity.name()).into_iter().flat_map(|it| {
         [(Named, &it.named), (Alone, &it.alone), (Symbol, &it.symbol), (Weak, &it.weak)]
     });
-    lists.flat_map(|(weight, list)| listed(list).map(move |term| (weight, term)))
+    let mut terms: Vec<(TermWeight, String)> = lists
+        .flat_map(|(weight, list)| listed(list).map(move |term| (weight, term.to_string())))
+        .collect();
+    if terms.iter().all(|(_, term)| *term != own) {
+        terms.insert(0, (Named, own));
+    }
+    terms
+}
+
+/// What a quantity is called, and what each term is worth.
+pub fn terms(quantity: Quantity) -> impl Iterator<Item = (TermWeight, &'static str)> {
+    TERMS[&quantity].iter().map(|(weight, term)| (*weight, term.as_str()))
 }
 
 /// What is usual of a quantity; `None` where its values reveal no unit.

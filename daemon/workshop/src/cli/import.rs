@@ -98,31 +98,21 @@ fn chosen<'i, T>(
     wanted: Option<&str>,
     what: &str,
 ) -> Result<Option<&'i T>, Failure> {
-    let ids = || all.iter().map(|it| format!("'{}'", id(it))).collect::<Vec<_>>().join(", ");
-    match (wanted, all) {
-        (None, []) => Ok(None),
-        (None, [only]) => Ok(Some(only)),
-        (None, _) => Err(Failure::Input(format!(
-            "the files hold {} {what}s; say which: --{what} ID, of {}",
-            all.len(),
-            ids()
-        ))),
-        (Some(wanted), []) => {
-            Err(Failure::Input(format!("--{what} {wanted}: the files hold no {what}")))
+    let ids: Vec<String> = all.iter().map(|it| format!("'{}'", id(it))).collect();
+    let ids = ids.join(", ");
+    let is_wanted = |it: &&T| wanted.is_none_or(|wanted| id(it) == wanted);
+    let found: Vec<&T> = all.iter().filter(is_wanted).collect();
+    let option = format!("--{what} {}", wanted.unwrap_or("ID"));
+    Err(Failure::Input(match (wanted, all.len(), &found[..]) {
+        (None, 0, _) => return Ok(None),
+        (_, _, [only]) => return Ok(Some(only)),
+        (None, count, _) => {
+            format!("the files hold {count} {what}s; say which: {option}, of {ids}")
         }
-        (Some(wanted), _) => {
-            let mut found = all.iter().filter(|it| id(it) == wanted);
-            match (found.next(), found.next()) {
-                (Some(only), None) => Ok(Some(only)),
-                (None, _) => {
-                    Err(Failure::Input(format!("--{what} {wanted}: expected one of {}", ids())))
-                }
-                (Some(_), Some(_)) => Err(Failure::Input(format!(
-                    "--{what} {wanted}: it stands in several files; give one of them at a time"
-                ))),
-            }
-        }
-    }
+        (_, 0, _) => format!("{option}: the files hold no {what}"),
+        (_, _, []) => format!("{option}: expected one of {ids}"),
+        _ => format!("{option}: it stands in several files; give one of them at a time"),
+    }))
 }
 
 fn failure(error: ImportError) -> Failure {

@@ -21,11 +21,10 @@ use super::train_text::{Found, TRAIN_FILE, TrainText};
 use crate::track_text::TRACK_FILE;
 pub use arguments::InitArguments;
 use described::{DAEMON_FILE, Described};
-use draft::Draft;
+use draft::{Draft, DraftFile};
 use dynocar::cli::Failure;
 use dynocar::dataset::{file_error, read_text};
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
-use letters::Letters;
 
 const WRITER: &str = "dynocar init";
 /// Units that the values did not reveal are set right so many times at most.
@@ -69,7 +68,7 @@ fn describe(
     train: &mut TrainText,
     has_track: bool,
 ) -> Result<Described, Failure> {
-    let Letters { files: texts, encoding } = letters::texts(&arguments.csv)?;
+    let (texts, encoding) = letters::texts(&arguments.csv)?;
     let files = paths::from_folder(arguments.folder(), &arguments.csv)?;
     let recordings: Vec<Recording> =
         texts.iter().map(|(label, text)| Recording { label, text }).collect();
@@ -84,25 +83,26 @@ fn describe(
         *train = arguments.train.text(WRITER, &Found { figures, traction: None })?;
     }
     let name = dataset_text::name_of(arguments.folder());
+    let folder = arguments.folder();
     let mut corrections = 0;
     loop {
         let text = dataset_text::dataset(&guess, &name, (&files, encoding), has_track);
-        let csv = files.iter().map(String::as_str).zip(recordings.iter().copied());
-        let draft = Draft {
-            folder: arguments.folder(),
-            dataset: &text,
-            train: &train.text,
-            track: track.as_deref(),
-            csv: csv.collect(),
-        };
-        let (head, runs) = draft.read()?;
-        let is_corrected = corrections < CORRECTIONS_MAX
-            && guess.correct(&runs, arguments.train.knows_mass()).is_some();
-        corrections += 1;
-        if !is_corrected {
+        let own = |path, text| DraftFile { path, label: None, text };
+        let mut draft = vec![own(MANIFEST_FILE, &text[..]), own(TRAIN_FILE, &train.text)];
+        draft.extend(track.as_deref().map(|track| own(TRACK_FILE, track)));
+        let runs = files.iter().zip(&recordings);
+        draft.extend(runs.map(|(path, &Recording { label, text })| DraftFile {
+            path,
+            label: Some(label),
+            text,
+        }));
+        let (head, runs) = Draft { folder, files: draft }.read()?;
+        let knows_mass = arguments.train.knows_mass();
+        if corrections == CORRECTIONS_MAX || guess.correct(&runs, knows_mass).is_none() {
             let diagnostics = diagnostics(&head.train, head.track.as_deref(), &runs);
             return Ok(Described { guess, encoding, files, diagnostics, text });
         }
+        corrections += 1;
     }
 }
 

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_analysis::dataset::{DatasetDiagnostic, Role};
-use dynocar_analysis::stops::{FindSettings, Law, RecordedStop, Study, StudySettings};
+use dynocar_analysis::dataset::DatasetDiagnostic;
+use dynocar_analysis::stops::{
+    FindSettings, FrictionPoint, LawPoint, RecordedStop, StoppingDistance, Study, StudySettings,
+};
 use serde::Serialize;
 
 use super::text::{TextTable, diagnostics};
@@ -38,19 +40,17 @@ pub struct StopsArguments {
 const SHOWN_MPS: [f64; 6] = [25.0, 20.0, 15.0, 10.0, 5.0, 3.0];
 
 fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().map_err(|_| String::from("expected a number"))?;
-    if (0.0..=200.0).contains(&number) && number > 0.0 {
-        return Ok(number);
-    }
-    Err("expected a speed above 0 and up to 200 m/s".into())
+    above_zero(text, 200.0, "expected a speed above 0 and up to 200 m/s")
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    let number = text.parse().map_err(|_| String::from("expected a number"))?;
-    if number > 0.0 && number <= 1.0 {
-        return Ok(number);
-    }
-    Err("expected a share above 0 and up to 1".into())
+    above_zero(text, 1.0, "expected a share above 0 and up to 1")
+}
+
+fn above_zero(text: &str, most: f64, expected: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| String::from("expected a number"))?;
+    let is_allowed = number > 0.0 && number <= most;
+    is_allowed.then_some(number).ok_or_else(|| expected.into())
 }
 
 #[derive(Debug, Serialize)]
@@ -100,58 +100,83 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
 }
 
+/// Head and cells of a table's columns.
+type Columns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
+
+/// A table of some rows; `left` are the columns of words.
+fn table<'t, T: 't>(
+    columns: Columns<T>,
+    left: &[usize],
+    rows: impl Iterator<Item = &'t T>,
+) -> TextTable {
+    let head: Vec<&str> = columns.iter().map(|column| column.0).collect();
+    let mut table = TextTable::new(&head, left);
+    rows.for_each(|row| table.push(columns.iter().map(|column| column.1(row)).collect()));
+    table
+}
+
+const STOPS: Columns<RecordedStop> = &[
+    ("run", |it| it.file.clone()),
+    ("role", |it| it.role.name().into()),
+    ("from s", |it| format!("{:.1}", it.from_s)),
+    ("m/s", |it| format!("{:.1}", it.from_mps)),
+    ("s", |it| format!("{:.1}", it.time_s)),
+    ("m", |it| format!("{:.0}", it.distance_m)),
+    ("brake", |it| format!("{:?}", it.manner).to_lowercase()),
+    ("found by", |it| format!("{:?}", it.found_by).to_lowercase()),
+    ("predicted m", |it| it.predicted.map_or("-".into(), |it| format!("{:.0}", it.distance_m))),
+    ("bound m", |it| it.predicted.map_or("-".into(), |it| format!("{:.0}", it.distance_bound_m))),
+];
+
+const LAW: Columns<LawPoint> = &[
+    ("m/s", |it| format!("{:.0}", it.speed_mps)),
+    ("m/s²", |it| format!("{:.3}", it.deceleration_mps2)),
+    ("±", |it| format!("{:.3}", HALF_95 * it.std_mps2)),
+    ("± next stop", |it| format!("{:.3}", HALF_95 * it.next_std_mps2)),
+    ("stops", |it| it.stops.to_string()),
+];
+
+const DISTANCES: Columns<StoppingDistance> = &[
+    ("from m/s", |it| format!("{:.1}", it.from_mps)),
+    ("s", |it| format!("{:.1}", it.time_s)),
+    ("m", |it| format!("{:.0}", it.distance_m)),
+    ("95 % within m", |it| format!("{:.0}", it.distance_bound_m)),
+];
+
+const FRICTION: Columns<FrictionPoint> = &[
+    ("m/s", |it| format!("{:.0}", it.speed_mps)),
+    ("friction", |it| format!("{:.2}", it.share)),
+    ("±", |it| format!("{:.2}", HALF_95 * it.share_std)),
+    ("adhesion ≥", |it| it.adhesion_at_least.map_or("-".into(), |it| format!("{it:.3}"))),
+];
+
 fn text(answer: &StopsAnswer) -> String {
     let study = &answer.study;
     let mut text = format!(
-        "{}\n{}\n{}",
+        "{}\n{}\n{}{}",
         answer.dataset,
         diagnostics(&answer.diagnostics),
-        stops(&study.stops)
+        table(STOPS, &[0, 1, 6, 7], study.stops.iter()),
+        modulated(&study.stops)
     );
-    text += &modulated(&study.stops);
     if let Some(law) = &study.law {
-        text += &of_the_brake(study, law);
+        let step = (law.points.len() / 12).max(1);
+        text += &format!(
+            "\ndeceleration over speed, the mean of the stops by all of the brake\n{}builds up in \
+             {:.2} s; stops repeat within {:.1} % (standard deviation)\n\nthe next stop, from command \
+             to standstill\n{}{}",
+            table(LAW, &[], law.points.iter().rev().step_by(step)),
+            law.response_s,
+            100.0 * law.repeatability,
+            table(DISTANCES, &[], study.distances.iter()),
+            friction(&study.stops)
+        );
     }
     text += "\nnot determined by these data\n";
     for line in &study.cannot_tell {
         text += &format!("  {line}\n");
     }
     text + "\n± is the half width of the 95 % interval\n"
-}
-
-/// What the stops by all of the brake say of it.
-fn of_the_brake(study: &Study, law: &Law) -> String {
-    let mut text =
-        String::from("\ndeceleration over speed, the mean of the stops by all of the brake\n");
-    let mut table = TextTable::new(&["m/s", "m/s²", "±", "± next stop", "stops"], &[]);
-    let step = (law.points.len() / 12).max(1);
-    for point in law.points.iter().rev().step_by(step) {
-        table.push(vec![
-            format!("{:.0}", point.speed_mps),
-            format!("{:.3}", point.deceleration_mps2),
-            format!("{:.3}", HALF_95 * point.std_mps2),
-            format!("{:.3}", HALF_95 * point.next_std_mps2),
-            format!("{}", point.stops),
-        ]);
-    }
-    text += &table.to_string();
-    text += &format!(
-        "builds up in {:.2} s; stops repeat within {:.1} % (standard deviation)\n",
-        law.response_s,
-        100.0 * law.repeatability
-    );
-    text += "\nthe next stop, from command to standstill\n";
-    let mut table = TextTable::new(&["from m/s", "s", "m", "95 % within m"], &[]);
-    for it in &study.distances {
-        table.push(vec![
-            format!("{:.1}", it.from_mps),
-            format!("{:.1}", it.time_s),
-            format!("{:.0}", it.distance_m),
-            format!("{:.0}", it.distance_bound_m),
-        ]);
-    }
-    text += &table.to_string();
-    text + &friction(&study.stops)
 }
 
 /// What the others hold: the driver's deceleration at some speeds, and why it is no law.
@@ -181,28 +206,6 @@ fn modulated(stops: &[RecordedStop]) -> String {
     format!("\nstops with a modulated brake: deceleration in m/s² over speed\n{table}")
 }
 
-fn stops(stops: &[RecordedStop]) -> String {
-    let header =
-        ["run", "role", "from s", "m/s", "s", "m", "brake", "found by", "predicted m", "bound m"];
-    let mut table = TextTable::new(&header, &[0, 1, 6, 7]);
-    for stop in stops {
-        let shown = |number: Option<f64>| number.map_or("-".into(), |it| format!("{it:.0}"));
-        table.push(vec![
-            stop.file.clone(),
-            if stop.role == Role::Fit { "fit".into() } else { "holdout".into() },
-            format!("{:.1}", stop.from_s),
-            format!("{:.1}", stop.from_mps),
-            format!("{:.1}", stop.time_s),
-            format!("{:.0}", stop.distance_m),
-            format!("{:?}", stop.manner).to_lowercase(),
-            format!("{:?}", stop.found_by).to_lowercase(),
-            shown(stop.predicted.map(|it| it.distance_m)),
-            shown(stop.predicted.map(|it| it.distance_bound_m)),
-        ]);
-    }
-    table.to_string()
-}
-
 /// The friction behind the longest stop.
 fn friction(stops: &[RecordedStop]) -> String {
     let by_length =
@@ -210,16 +213,8 @@ fn friction(stops: &[RecordedStop]) -> String {
     let Some(stop) = stops.iter().max_by(by_length).filter(|it| !it.friction.is_empty()) else {
         return String::new();
     };
-    let mut table = TextTable::new(&["m/s", "friction", "±", "adhesion ≥"], &[]);
     let step = (stop.friction.len() / 8).max(1);
-    for point in stop.friction.iter().step_by(step) {
-        table.push(vec![
-            format!("{:.0}", point.speed_mps),
-            format!("{:.2}", point.share),
-            format!("{:.2}", HALF_95 * point.share_std),
-            point.adhesion_at_least.map_or("-".into(), |it| format!("{it:.3}")),
-        ]);
-    }
+    let table = table(FRICTION, &[], stop.friction.iter().step_by(step));
     format!(
         "\nfriction over its mean in the stop of {} at {:.1} s, by brake_smoother and \
          adhesion_smoother\n{table}",

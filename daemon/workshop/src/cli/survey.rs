@@ -9,6 +9,7 @@ use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 use dynocar::cli::Failure;
 use dynocar::output::{give, report_line, require_file, require_folder, write_file};
+use dynocar_analysis::survey::chainage::Estimate;
 use dynocar_shared::HALF_95;
 
 /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
@@ -81,7 +82,7 @@ fn summary(answer: &SurveyAnswer) -> String {
         );
     }
     if let Some(learned) = &answer.learned {
-        let mut row = |name: &str, it: &crate::survey::answer::Value, unit: &str| {
+        let mut row = |name: &str, it: &Estimate, unit: &str| {
             text +=
                 &format!("    {name:<22} {:>10.4} ± {:.4} {unit}\n", it.value, HALF_95 * it.std);
         };

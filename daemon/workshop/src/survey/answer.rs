@@ -1,9 +1,12 @@
 //! The result of a survey for machines.
 
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::survey::{Survey, Vehicle};
+use dynocar_analysis::survey::chainage::Estimate;
+use dynocar_analysis::survey::stops::Stop;
+use dynocar_analysis::survey::{NotUsed, Survey, Trip, Vehicle};
 use serde::Serialize;
 
+use super::read::rows_in_order;
 use super::trip_rows::late_s;
 use super::write::{gradient_entries, trip_file};
 
@@ -15,7 +18,7 @@ pub struct SurveyAnswer {
     /// The trips, in the order of the written dataset.
     pub trips: Vec<TripAnswer>,
     /// What is no trip.
-    pub not_used: Vec<NotUsedAnswer>,
+    pub not_used: Vec<NotUsed>,
     /// What was learned jointly with the line; absent on a known line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned: Option<LearnedAnswer>,
@@ -29,28 +32,13 @@ pub struct SurveyedLine {
     /// Length in m.
     pub length_m: f64,
     /// Its stops.
-    pub stops: Vec<StopAnswer>,
+    pub stops: Vec<Stop>,
     /// Median standard deviation in ‰ of the mean gradient over 100 m; absent on a known line.
     pub gradient_std_permille: Option<f64>,
     /// Passes that it was learned from.
     pub passes: usize,
     /// True when both directions take the same way.
     pub is_one_way_for_both: bool,
-}
-
-/// A stop.
-#[derive(Debug, Serialize)]
-pub struct StopAnswer {
-    /// Chainage in m.
-    pub chainage_m: f64,
-    /// Name, empty where not known.
-    pub name: String,
-    /// How stands scatter in m; absent for one.
-    pub std_m: Option<f64>,
-    /// Direction of travel.
-    pub direction: i8,
-    /// Number of stands.
-    pub stands: usize,
 }
 
 /// A trip.
@@ -75,51 +63,29 @@ pub struct TripAnswer {
     pub left_out_residual_n: Option<f64>,
 }
 
-/// A part that is no trip.
-#[derive(Debug, Serialize)]
-pub struct NotUsedAnswer {
-    /// The recording.
-    pub source: String,
-    /// Time in s where it starts.
-    pub from_s: f64,
-    /// Time in s where it ends.
-    pub to_s: f64,
-    /// Why it is not used.
-    pub reason: &'static str,
-}
-
-/// A value and its standard deviation.
-#[derive(Debug, Serialize)]
-pub struct Value {
-    /// The value.
-    pub value: f64,
-    /// Its standard deviation.
-    pub std: f64,
-}
-
 /// What was learned of the vehicle and its recorder.
 #[derive(Debug, Serialize)]
 pub struct LearnedAnswer {
     /// Nominal or empty mass in t, without rotating parts.
-    pub mass_t: Value,
+    pub mass_t: Estimate,
     /// The same with rotating parts, which is what the balance of forces shows.
-    pub inertial_mass_t: Value,
+    pub inertial_mass_t: Estimate,
     /// Mass of a passenger in kg, where they are counted.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub passenger_mass_kg: Option<Value>,
+    pub passenger_mass_kg: Option<Estimate>,
     /// a, b, c in N/kN.
-    pub resistance: [Value; 3],
+    pub resistance: [Estimate; 3],
     /// Recorded over true speed.
-    pub speed_scale: Value,
+    pub speed_scale: Estimate,
     /// Seconds by which forces are stamped late; negative where they act late.
-    pub force_late_s: Value,
+    pub force_late_s: Estimate,
     /// Seconds by which the written forces were moved.
     pub force_moved_s: f64,
     /// Age of a position at its stamp in s.
-    pub position_late_s: Value,
+    pub position_late_s: Estimate,
     /// Friction brake in N/Pa, where it shows.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub friction_brake_n_per_pa: Option<Value>,
+    pub friction_brake_n_per_pa: Option<Estimate>,
     /// Pressure in Pa from which on it acts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub release_pressure_pa: Option<f64>,
@@ -132,36 +98,30 @@ pub struct LearnedAnswer {
 impl SurveyAnswer {
     /// The answer to a survey.
     pub fn of(dataset: &Dataset, vehicle: &Vehicle, survey: &Survey) -> Self {
-        let raw = |recording: usize| &dataset.runs[recording];
-        let time_s = |recording: usize, row: usize| {
-            let run = raw(recording);
-            run.samples[super::read::rows_in_order(run)[row]].time_ns as f64 * 1e-9
-        };
         let left_out = |number: usize| {
             let profile = survey.profile.as_ref()?;
             let pass = profile.trips.iter().position(|trip| *trip == number)?;
             Some(profile.learned.left_out_n[pass]).filter(|value| value.is_finite())
         };
-        let trips = survey.trips.iter().enumerate().map(|(number, trip)| TripAnswer {
-            file: trip_file(number),
-            source: raw(trip.recording).file.clone(),
-            role: raw(trip.recording).role.name(),
-            direction: trip.direction,
-            from_s: time_s(trip.recording, trip.rows().start),
-            to_s: time_s(trip.recording, trip.rows().end - 1),
-            length_m: survey.alignments.chainage_per_m * trip.length_m(),
-            left_out_residual_n: left_out(number),
-        });
-        let not_used = survey.not_used.iter().map(|it| NotUsedAnswer {
-            source: raw(it.recording).file.clone(),
-            from_s: it.from_s,
-            to_s: it.to_s,
-            reason: it.reason,
-        });
+        let trip = |(number, trip): (usize, &Trip)| {
+            let run = &dataset.runs[trip.recording];
+            let rows = rows_in_order(run);
+            let time_s = |row: usize| run.samples[rows[row]].time_ns as f64 * 1e-9;
+            TripAnswer {
+                file: trip_file(number),
+                source: run.file.clone(),
+                role: run.role.name(),
+                direction: trip.direction,
+                from_s: time_s(trip.rows().start),
+                to_s: time_s(trip.rows().end - 1),
+                length_m: survey.alignments.chainage_per_m * trip.length_m(),
+                left_out_residual_n: left_out(number),
+            }
+        };
         SurveyAnswer {
             line: SurveyedLine::of(survey),
-            trips: trips.collect(),
-            not_used: not_used.collect(),
+            trips: survey.trips.iter().enumerate().map(trip).collect(),
+            not_used: survey.not_used.clone(),
             learned: LearnedAnswer::of(vehicle, survey),
             cannot_tell: cannot_tell(survey),
         }
@@ -170,13 +130,6 @@ impl SurveyAnswer {
 
 impl SurveyedLine {
     fn of(survey: &Survey) -> Self {
-        let stops = survey.stops.iter().map(|stop| StopAnswer {
-            chainage_m: stop.chainage_m.value,
-            name: stop.name.clone(),
-            std_m: Some(stop.chainage_m.std).filter(|std| std.is_finite()),
-            direction: stop.direction,
-            stands: stop.stands,
-        });
         let median = survey.profile.as_ref().map(|profile| {
             let entries = gradient_entries(survey, profile, 1);
             let mut stds: Vec<f64> = entries.iter().map(|entry| entry.2).collect();
@@ -184,8 +137,8 @@ impl SurveyedLine {
             *stds.select_nth_unstable_by(middle, f64::total_cmp).1
         });
         SurveyedLine {
-            length_m: survey.alignments.chainage_per_m * survey.alignments.growing.length_m(),
-            stops: stops.collect(),
+            length_m: survey.alignments.length_m(),
+            stops: survey.stops.clone(),
             gradient_std_permille: median,
             passes: survey.profile.as_ref().map_or(0, |profile| profile.trips.len()),
             is_one_way_for_both: survey.alignments.is_one_track(),
@@ -196,29 +149,26 @@ impl SurveyedLine {
 impl LearnedAnswer {
     fn of(vehicle: &Vehicle, survey: &Survey) -> Option<Self> {
         let profile = survey.profile.as_ref()?;
-        let fitted = &profile.learned.profile;
+        let (fitted, brake) = (&profile.learned.profile, profile.learned.brake.as_ref());
         let (common, std, prior) = (&fitted.common, &fitted.common_std, &vehicle.prior);
-        let value = |value: f64, std: f64| Value { value, std };
-        let declared_t = prior.mass_kg / 1e3;
-        let (mass_t, std_t) =
-            (declared_t * (1.0 + common.mass_share()), declared_t * std.mass_share());
-        let inertia = 1.0 + prior.rotating_mass_factor;
-        let wheels = &survey.wheels;
-        let brake = profile.learned.brake.as_ref();
-        let ([a, b, c], [a_std, b_std, c_std]) = (common.davis(), std.davis());
+        let estimate = |value: f64, std: f64| Estimate { value, std };
+        let mass = |factor: f64| {
+            let value = factor * (prior.mass_kg / 1e3 * (1.0 + common.mass_share()));
+            estimate(value, factor * (prior.mass_kg / 1e3 * std.mass_share()))
+        };
+        let (davis, davis_std) = (common.davis(), std.davis());
         Some(LearnedAnswer {
-            mass_t: value(mass_t, std_t),
-            inertial_mass_t: value(inertia * mass_t, inertia * std_t),
+            mass_t: mass(1.0),
+            inertial_mass_t: mass(1.0 + prior.rotating_mass_factor),
             passenger_mass_kg: prior
                 .has_passengers
-                .then(|| value(common.passenger_kg(), std.passenger_kg())),
-            resistance: [value(a, a_std), value(b, b_std), value(c, c_std)],
-            speed_scale: value(1.0 / (1.0 + wheels.scale.value), survey.scale_std),
-            force_late_s: value(common.delay_s(), std.delay_s()),
+                .then(|| estimate(common.passenger_kg(), std.passenger_kg())),
+            resistance: std::array::from_fn(|power| estimate(davis[power], davis_std[power])),
+            speed_scale: estimate(1.0 / (1.0 + survey.wheels.scale.value), survey.scale_std),
+            force_late_s: estimate(common.delay_s(), std.delay_s()),
             force_moved_s: late_s(survey),
-            position_late_s: value(wheels.lag_s.value, wheels.lag_s.std),
-            friction_brake_n_per_pa: brake
-                .map(|brake| value(brake.gain_n_per_pa.value, brake.gain_n_per_pa.std)),
+            position_late_s: survey.wheels.lag_s,
+            friction_brake_n_per_pa: brake.map(|brake| brake.gain_n_per_pa),
             release_pressure_pa: brake.map(|brake| brake.release_pa),
             gradient_walk_per_m: profile.learned.walk_per_m,
             residual_n: fitted.residual_n,
@@ -230,25 +180,22 @@ impl LearnedAnswer {
 fn cannot_tell(survey: &Survey) -> Vec<String> {
     let Some(profile) = &survey.profile else { return Vec::new() };
     let mut open = vec![
-        "the scale of the forces against the mass: both scale alike, gravity too".to_string(),
-        "the rotating mass: it stays as declared until a line is surveyed from outside".to_string(),
+        "the scale of the forces against the mass: both scale alike, gravity too",
+        "the rotating mass: it stays as declared until a line is surveyed from outside",
     ];
-    let trips = |direction: i8| {
-        profile.trips.iter().filter(|trip| survey.trips[**trip].direction == direction).count()
-    };
-    if trips(1) == 0 || trips(-1) == 0 || !survey.alignments.is_one_track() {
+    let is_driven =
+        |direction: i8| profile.trips.iter().any(|trip| survey.trips[*trip].direction == direction);
+    if !is_driven(1) || !is_driven(-1) || !survey.alignments.is_one_track() {
         open.push(
             "a mean gradient against a constant resistance: no place is driven in both \
              directions, so that only GNSS altitude and what is declared part them; curves and \
-             tunnels are held by the gradient"
-                .to_string(),
+             tunnels are held by the gradient",
         );
     }
     if profile.trips.len() < 2 {
         open.push(
-            "how well the profile repeats: one pass cannot be left out and predicted by others"
-                .to_string(),
+            "how well the profile repeats: one pass cannot be left out and predicted by others",
         );
     }
-    open
+    open.into_iter().map(Into::into).collect()
 }

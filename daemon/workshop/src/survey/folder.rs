@@ -55,7 +55,7 @@ pub fn survey_folder(
 /// Stops of a known line keep their names.
 fn name_stops(stops: &mut [Stop], known: &[(f64, String)]) {
     for stop in stops {
-        let away = |known: &&(f64, String)| (known.0 - stop.chainage_m.value).abs();
+        let away = |known: &&(f64, String)| (known.0 - stop.chainage_m).abs();
         let nearest = known.iter().min_by(|one, other| away(one).total_cmp(&away(other)));
         if let Some(nearest) = nearest.filter(|nearest| away(nearest) < SAME_STOP_M) {
             stop.name.clone_from(&nearest.1);

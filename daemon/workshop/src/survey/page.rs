@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::report::words::number;
-use dynocar_analysis::survey::Survey;
+use dynocar_analysis::survey::stops::Stop;
+use dynocar_analysis::survey::{NotUsed, Survey};
 use dynocar_shared::HALF_95;
 
-use super::answer::SurveyAnswer;
+use super::answer::{SurveyAnswer, TripAnswer};
 use super::write::gradient_entries;
 use crate::report::document::document;
 use crate::report::html::{Column, Table, escape};
@@ -53,9 +54,12 @@ pub fn html(
         section("profile", "Gradient every 10 m, with the 95 % band of its mean over 100 m", body);
     }
     section("learned", "What was learned jointly with it", learned(answer));
-    section("stops", "Stops, and how they repeat", stops(answer));
-    section("trips", "Trips", trips(answer));
-    section("not-used", "Not used", not_used(answer));
+    let stops = table("Stops", STOPS, &answer.line.stops);
+    section("stops", "Stops, and how they repeat", stops);
+    let caption = "Trips, and how far the others predict the forces of each";
+    section("trips", "Trips", table(caption, TRIPS, &answer.trips));
+    let caption = "Parts of the recordings that are no trip";
+    section("not-used", "Not used", table(caption, NOT_USED, &answer.not_used));
     section("open", "What these recordings do not determine", open(answer));
     Ok(document(&format!("{name} – survey"), &header, &main, made))
 }
@@ -148,103 +152,72 @@ fn learned(answer: &SurveyAnswer) -> String {
     let Some(learned) = &answer.learned else {
         return "<p>The line was known: nothing was learned.</p>\n".into();
     };
-    let head = [("quantity", Column::Words), ("value", Column::Numbers), ("±", Column::Numbers)];
-    let mut table = Table::new("Learned, with 95 % intervals", &head);
-    let mut row = |name: &str, it: &super::answer::Value| {
-        let half = HALF_95 * it.std;
-        table.push(vec![name.into(), number(it.value, Some(half)), number(half, Some(half))]);
-    };
-    row("mass, t", &learned.mass_t);
-    row("mass with rotating parts, t", &learned.inertial_mass_t);
-    if let Some(mass) = &learned.passenger_mass_kg {
-        row("mass of a passenger, kg", mass);
-    }
-    for (name, value) in
-        ["a, N/kN", "b, N/kN per m/s", "c, N/kN per (m/s)²"].into_iter().zip(&learned.resistance)
-    {
-        row(name, value);
-    }
-    row("recorded over true speed", &learned.speed_scale);
-    row("forces stamped late, s", &learned.force_late_s);
-    row("positions late, s", &learned.position_late_s);
-    if let Some(gain) = &learned.friction_brake_n_per_pa {
-        row("friction brake, N/Pa", gain);
+    let [a, b, c] = &learned.resistance;
+    let rows = [
+        ("mass, t", Some(&learned.mass_t)),
+        ("mass with rotating parts, t", Some(&learned.inertial_mass_t)),
+        ("mass of a passenger, kg", learned.passenger_mass_kg.as_ref()),
+        ("a, N/kN", Some(a)),
+        ("b, N/kN per m/s", Some(b)),
+        ("c, N/kN per (m/s)²", Some(c)),
+        ("recorded over true speed", Some(&learned.speed_scale)),
+        ("forces stamped late, s", Some(&learned.force_late_s)),
+        ("positions late, s", Some(&learned.position_late_s)),
+        ("friction brake, N/Pa", learned.friction_brake_n_per_pa.as_ref()),
+    ];
+    let rows: Vec<(&str, f64, f64)> = rows
+        .into_iter()
+        .filter_map(|(name, it)| it.map(|it| (name, it.value, HALF_95 * it.std)))
+        .collect();
+    let columns: Columns<(&str, f64, f64)> = &[
+        ("quantity", Column::Words, |it| it.0.into()),
+        ("value", Column::Numbers, |it| number(it.1, Some(it.2))),
+        ("±", Column::Numbers, |it| number(it.2, Some(it.2))),
+    ];
+    table("Learned, with 95 % intervals", columns, &rows)
+}
+
+/// Head, setting and cells of a table's columns.
+type Columns<'c, T> = &'c [(&'c str, Column, fn(&T) -> String)];
+
+fn table<T>(caption: &str, columns: Columns<T>, rows: &[T]) -> String {
+    let head: Vec<(&str, Column)> = columns.iter().map(|it| (it.0, it.1)).collect();
+    let mut table = Table::new(caption, &head);
+    for row in rows {
+        table.push(columns.iter().map(|it| it.2(row)).collect());
     }
     table.html()
 }
 
-fn stops(answer: &SurveyAnswer) -> String {
-    let head = [
-        ("chainage, m", Column::Numbers),
-        ("name", Column::Names),
-        ("direction", Column::Numbers),
-        ("stands", Column::Numbers),
-        ("scatter, m", Column::Numbers),
-    ];
-    let mut table = Table::new("Stops", &head);
-    for stop in &answer.line.stops {
-        let scatter = stop.std_m.map_or("–".into(), |std| format!("{std:.1}"));
-        table.push(vec![
-            format!("{:.1}", stop.chainage_m),
-            escape(&stop.name),
-            stop.direction.to_string(),
-            stop.stands.to_string(),
-            scatter,
-        ]);
-    }
-    table.html()
-}
+const STOPS: Columns<Stop> = &[
+    ("chainage, m", Column::Numbers, |it| format!("{:.1}", it.chainage_m)),
+    ("name", Column::Names, |it| escape(&it.name)),
+    ("direction", Column::Numbers, |it| it.direction.to_string()),
+    ("stands", Column::Numbers, |it| it.stands.to_string()),
+    ("scatter, m", Column::Numbers, |it| it.std_m.map_or("–".into(), |it| format!("{it:.1}"))),
+];
 
-fn trips(answer: &SurveyAnswer) -> String {
-    let head = [
-        ("file", Column::Names),
-        ("recording", Column::Names),
-        ("role", Column::Words),
-        ("direction", Column::Numbers),
-        ("from, s", Column::Numbers),
-        ("to, s", Column::Numbers),
-        ("length, m", Column::Numbers),
-        ("residual left out, N", Column::Numbers),
-    ];
-    let mut table = Table::new("Trips, and how far the others predict the forces of each", &head);
-    for trip in &answer.trips {
-        table.push(vec![
-            escape(&trip.file),
-            escape(&trip.source),
-            trip.role.into(),
-            trip.direction.to_string(),
-            format!("{:.0}", trip.from_s),
-            format!("{:.0}", trip.to_s),
-            format!("{:.0}", trip.length_m),
-            trip.left_out_residual_n.map_or("–".into(), |value| format!("{value:.0}")),
-        ]);
-    }
-    table.html()
-}
+const TRIPS: Columns<TripAnswer> = &[
+    ("file", Column::Names, |it| escape(&it.file)),
+    ("recording", Column::Names, |it| escape(&it.source)),
+    ("role", Column::Words, |it| it.role.into()),
+    ("direction", Column::Numbers, |it| it.direction.to_string()),
+    ("from, s", Column::Numbers, |it| format!("{:.0}", it.from_s)),
+    ("to, s", Column::Numbers, |it| format!("{:.0}", it.to_s)),
+    ("length, m", Column::Numbers, |it| format!("{:.0}", it.length_m)),
+    ("residual left out, N", Column::Numbers, |it| {
+        it.left_out_residual_n.map_or("–".into(), |value| format!("{value:.0}"))
+    }),
+];
 
-fn not_used(answer: &SurveyAnswer) -> String {
-    let head = [
-        ("recording", Column::Names),
-        ("from, s", Column::Numbers),
-        ("to, s", Column::Numbers),
-        ("why", Column::Words),
-    ];
-    let mut table = Table::new("Parts of the recordings that are no trip", &head);
-    for part in &answer.not_used {
-        table.push(vec![
-            escape(&part.source),
-            format!("{:.0}", part.from_s),
-            format!("{:.0}", part.to_s),
-            part.reason.into(),
-        ]);
-    }
-    table.html()
-}
+const NOT_USED: Columns<NotUsed> = &[
+    ("recording", Column::Names, |it| escape(&it.source)),
+    ("from, s", Column::Numbers, |it| format!("{:.0}", it.from_s)),
+    ("to, s", Column::Numbers, |it| format!("{:.0}", it.to_s)),
+    ("why", Column::Words, |it| it.reason.into()),
+];
 
 fn open(answer: &SurveyAnswer) -> String {
-    let mut html = String::from("<ul>\n");
-    for open in &answer.cannot_tell {
-        let _ = writeln!(html, "<li>{}</li>", escape(open));
-    }
-    html + "</ul>\n"
+    let items = answer.cannot_tell.iter().map(|open| format!("<li>{}</li>\n", escape(open)));
+    format!("<ul>\n{}</ul>\n", items.collect::<String>())
 }

@@ -120,35 +120,32 @@ pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
         return Err(wrong(path, problem));
     };
     let folder = path.parent().unwrap_or(Path::new("."));
-    let file = folder.join(alignment);
-    let growing = alignment_points(&file).map_err(|problem| wrong(&file, problem))?;
+    let points = |name: &str| {
+        let file = folder.join(name);
+        alignment_points(&file).map_err(|problem| wrong(&file, problem))
+    };
+    let growing = points(alignment)?;
     let middle = growing[growing.len() / 2];
     let plane = LocalPlane::around(middle[1], middle[2], 0.0);
-    let alignment = |points: &[[f64; 3]]| {
+    let through = |points: &[[f64; 3]]| {
         let projected: Vec<_> = points.iter().map(|it| plane.project(it[1], it[2])).collect();
-        Alignment::through(&projected)
+        let problem = || "expected a line of some length, got one place".into();
+        Alignment::through(&projected).ok_or_else(|| wrong(&folder.join(alignment), problem()))
     };
-    let short = || wrong(&file, "expected a line of some length, got one place".into());
-    let one = alignment(&growing).ok_or_else(short)?;
+    let one = through(&growing)?;
     let chained_m = growing[growing.len() - 1][0] - growing[0][0];
     let chainage_per_m = chained_m / one.length_m();
     let falling = match &track.survey.alignment_falling {
         None => {
-            let mut back = growing.clone();
-            back.reverse();
-            let alignment = alignment(&back).ok_or_else(short)?;
+            let back: Vec<[f64; 3]> = growing.iter().rev().copied().collect();
+            let alignment = through(&back)?;
             let start_chainage_m = alignment.length_m();
             FallingAlignment { alignment, start_chainage_m, is_same: true }
         }
         Some(name) => {
-            let file = folder.join(name);
-            let points = alignment_points(&file).map_err(|problem| wrong(&file, problem))?;
-            let alignment = alignment(&points).ok_or_else(short)?;
-            FallingAlignment {
-                alignment,
-                start_chainage_m: points[0][0] / chainage_per_m,
-                is_same: false,
-            }
+            let points = points(name)?;
+            let (alignment, start_chainage_m) = (through(&points)?, points[0][0] / chainage_per_m);
+            FallingAlignment { alignment, start_chainage_m, is_same: false }
         }
     };
     let alignments = Alignments { growing: one, falling: Some(falling), chainage_per_m };

@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use dynocar_analysis::dataset::DatasetFiles;
+use dynocar_analysis::survey::curves::FoundCurve;
 use dynocar_analysis::survey::layout::HEIGHT_STEP_M;
+use dynocar_analysis::survey::stops::Stop;
 use dynocar_analysis::survey::{Survey, SurveyedProfile};
 use toml::{Table, Value};
 
@@ -181,11 +183,10 @@ fn track_toml(material: &Material) -> String {
     let survey = material.survey;
     let Some(profile) = &survey.profile else { return String::new() };
     let alignments = &survey.alignments;
-    let length_m = alignments.chainage_per_m * alignments.growing.length_m();
     let name = Value::String(format!("{}, surveyed", material.dataset.name));
     let mut text = TrackText::new(&format!("{MARK} from {} passes.\n", profile.trips.len()));
     text.value("name", name);
-    text.value("length_m", format!("{length_m:.1}"));
+    text.value("length_m", format!("{:.1}", alignments.length_m()));
     text.value("alignment", "\"alignment.csv\"");
     let growing = gradient_entries(survey, profile, 1);
     let bounded = |gradient: f64| gradient.clamp(-149.0, 149.0);
@@ -196,19 +197,16 @@ fn track_toml(material: &Material) -> String {
     if !alignments.is_one_track() {
         let falling = gradient_entries(survey, profile, -1);
         text.list("gradient_falling", falling.iter().map(entry));
-    }
-    if alignments.is_one_track() {
+    } else {
         let per_m = alignments.chainage_per_m;
-        let entry = |curve: &dynocar_analysis::survey::curves::FoundCurve| {
+        let entry = |curve: &FoundCurve| {
             let (from_m, to_m) = (per_m * curve.from_m, per_m * curve.to_m);
             format!("{from_m:.1}, {to_m:.1}, {:.1}", curve.radius_m)
         };
         text.list("curves", profile.curves.iter().map(entry));
     }
-    let stop = |stop: &dynocar_analysis::survey::stops::Stop| {
-        let name = Value::String(stop.name.clone()).to_string();
-        format!("{:.1}, {name}", stop.chainage_m.value)
-    };
+    let stop =
+        |stop: &Stop| format!("{:.1}, {}", stop.chainage_m, Value::String(stop.name.clone()));
     text.list("stops", survey.stops.iter().map(stop));
     if !alignments.is_one_track() {
         text.value("alignment_falling", "\"alignment_falling.csv\"");

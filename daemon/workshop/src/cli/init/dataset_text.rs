@@ -26,29 +26,28 @@ pub fn dataset(
     (files, encoding): (&[String], &'static Encoding),
     has_track: bool,
 ) -> String {
-    let mut text = comment(
+    let head = comment(
         "",
         "Recorded runs of one train. Written by dynocar init: every line under [columns] is a guess \
          from header and values, with what speaks for it and what was not taken. Set right what is \
          wrong; `dynocar check` then says what it understood.",
     );
-    text += &format!("[dataset]\nname = {}\n", quoted(name));
-    text += &layout_text(guess, encoding);
-    text += "# position_reference = \"head\"    # where the recorded position is the head's, not the \
-             centre's\n";
-    text += &format!("\n[train]\nfile = {}\n\n", quoted(TRAIN_FILE));
-    text += &match has_track {
-        true => format!("[track]\nfile = {}\n", quoted(TRACK_FILE)),
-        false => format!(
+    let track = match has_track {
+        true => "[track]\nfile = ",
+        false => {
             "# Without a line, gradients must come with the recordings, or are unknown.\n\
-             # [track]\n# file = {}\n",
-            quoted(TRACK_FILE)
-        ),
+             # [track]\n# file = "
+        }
     };
-    text += "\n[columns]\n";
-    for column in &guess.columns {
-        text += &column_text(column);
-    }
+    let mut text = format!(
+        "{head}[dataset]\nname = {}\n{}# position_reference = \"head\"    # where the recorded \
+         position is the head's, not the centre's\n\n[train]\nfile = {}\n\n{track}{}\n\n[columns]\n",
+        quoted(name),
+        layout_text(guess, encoding),
+        quoted(TRAIN_FILE),
+        quoted(TRACK_FILE)
+    );
+    text.extend(guess.columns.iter().map(column_text));
     if !guess.unmapped.is_empty() {
         text += "\n# Taken for nothing:\n";
         for column in &guess.unmapped {

@@ -2,49 +2,42 @@
 
 use std::path::Path;
 
-use dynocar_analysis::dataset::guess::Recording;
-use dynocar_analysis::dataset::{DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Run};
+use dynocar_analysis::dataset::{DatasetFiles, DatasetHead, FileProblem, Run};
 
-use crate::cli::train_text::TRAIN_FILE;
-use crate::track_text::TRACK_FILE;
 use dynocar::cli::Failure;
 
-/// The texts of a dataset's files.
+/// A file of the dataset.
+pub struct DraftFile<'t> {
+    /// Path as the dataset names it.
+    pub path: &'t str,
+    /// Name in messages, where it is not the path from the dataset's folder.
+    pub label: Option<&'t str>,
+    /// What it will hold, or holds.
+    pub text: &'t str,
+}
+
+/// The dataset's files.
 pub struct Draft<'t> {
-    /// Where it will be.
+    /// Where they will be.
     pub folder: &'t Path,
-    /// `dataset.toml`.
-    pub dataset: &'t str,
-    /// `train.toml`.
-    pub train: &'t str,
-    /// `track.toml`, where there is one.
-    pub track: Option<&'t str>,
-    /// The runs: path as the dataset names it, and the file as it was given.
-    pub csv: Vec<(&'t str, Recording<'t>)>,
+    /// The files.
+    pub files: Vec<DraftFile<'t>>,
 }
 
 impl DatasetFiles for Draft<'_> {
     fn read(&self, path: &str) -> Result<String, FileProblem> {
-        let text = match path {
-            MANIFEST_FILE => Some(self.dataset),
-            TRAIN_FILE => Some(self.train),
-            TRACK_FILE => self.track,
-            path => self.recording(path).map(|recording| recording.text),
-        };
-        text.map(Into::into).ok_or(FileProblem::Missing)
+        self.file(path).map(|file| file.text.into()).ok_or(FileProblem::Missing)
     }
 
     fn label(&self, path: &str) -> String {
-        match self.recording(path) {
-            Some(recording) => recording.label.into(),
-            None => self.folder.join(path).display().to_string(),
-        }
+        let label = self.file(path).and_then(|file| file.label);
+        label.map_or_else(|| self.folder.join(path).display().to_string(), Into::into)
     }
 }
 
-impl<'t> Draft<'t> {
-    fn recording(&self, path: &str) -> Option<Recording<'t>> {
-        self.csv.iter().find(|(name, _)| *name == path).map(|(_, recording)| *recording)
+impl Draft<'_> {
+    fn file(&self, path: &str) -> Option<&DraftFile<'_>> {
+        self.files.iter().find(|file| file.path == path)
     }
 
     /// Reads the dataset with all its runs.

@@ -10,20 +10,12 @@ use dynocar::cli::Failure;
 use dynocar::dataset::file_error;
 use dynocar::text_file::{read_beginning, read_bytes};
 
-/// Files as text.
-pub struct Letters {
-    /// Name and text of each.
-    pub files: Vec<(String, String)>,
-    /// The encoding that they share.
-    pub encoding: &'static Encoding,
-}
-
-/// Reads files in the encoding that they share.
+/// Name and text of files in the encoding that they share, and that.
 ///
 /// # Errors
 ///
 /// When one cannot be read, or is written in other letters than the others.
-pub fn texts(paths: &[PathBuf]) -> Result<Letters, Failure> {
+pub fn texts(paths: &[PathBuf]) -> Result<(Vec<(String, String)>, &'static Encoding), Failure> {
     let mut files = Vec::new();
     for path in paths {
         let label = path.display().to_string();
@@ -53,5 +45,5 @@ pub fn texts(paths: &[PathBuf]) -> Result<Letters, Failure> {
         let text = decoded(bytes, encoding).map_err(|problem| file_error(&label, problem))?;
         texts.push((label, text));
     }
-    Ok(Letters { files: texts, encoding })
+    Ok((texts, encoding))
 }
