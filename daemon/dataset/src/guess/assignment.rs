@@ -105,15 +105,18 @@ impl<'c> Assignment<'c> {
         self.taken.iter().any(|(other, ..)| *other == index)
     }
 
+    fn taken_for(&self, quantity: Quantity) -> Option<&(usize, GuessedColumn, bool)> {
+        self.taken.iter().find(|(_, guessed, _)| guessed.quantity == quantity)
+    }
+
     /// True where a column is taken for the quantity.
     pub fn has(&self, quantity: Quantity) -> bool {
-        self.taken.iter().any(|(_, guessed, _)| guessed.quantity == quantity)
+        self.taken_for(quantity).is_some()
     }
 
     /// What the values are like of the column that is taken for a quantity.
     pub fn facts(&self, quantity: Quantity) -> Option<&'c Facts> {
-        let found = self.taken.iter().find(|(_, guessed, _)| guessed.quantity == quantity);
-        found.map(|(index, ..)| &self.columns[*index].all)
+        self.taken_for(quantity).map(|(index, ..)| &self.columns[*index].all)
     }
 
     /// Takes a quantity's column for another quantity instead, with a doubt; what was declared stays.
@@ -193,8 +196,7 @@ impl<'c> Assignment<'c> {
             (Some(reason), ..) => reason.clone(),
             (_, Some((_, reason)), ..) => reason.clone(),
             (_, _, Some(Candidate { guessed: it, .. }), _) => {
-                let taken = self.taken.iter().find(|(_, other, _)| other.quantity == it.quantity);
-                let by = taken.map_or_else(String::new, |(_, other, _)| {
+                let by = self.taken_for(it.quantity).map_or_else(String::new, |(_, other, _)| {
                     format!(", for which '{}' is taken", other.name.shown())
                 });
                 format!("could be {}{by}", it.quantity)

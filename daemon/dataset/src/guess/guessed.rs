@@ -85,8 +85,6 @@ pub struct Unmapped {
 /// A file and what it holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GuessedRun {
-    /// The file, as the user would find it.
-    pub label: String,
     /// Rows of values.
     pub rows: usize,
     /// -1 where the position falls, else 1.

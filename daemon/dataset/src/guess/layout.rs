@@ -39,12 +39,6 @@ struct Block {
     units: Option<usize>,
 }
 
-impl Block {
-    fn first_values(self) -> usize {
-        self.units.unwrap_or(self.header) + 1
-    }
-}
-
 /// Recognises the layout of a file.
 ///
 /// # Errors
@@ -56,6 +50,7 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
         let rows = first_rows(text, delimiter);
         (delimiter, block(&rows), rows)
     });
+    let wrong = |line: usize, problem| GuessError::new(SourcePosition::line(label, line), problem);
     let [(.., rows), ..] = &readings;
     if rows.iter().all(|row| row.filled().next().is_none()) {
         return Err(SourcePosition::whole(label).problem(Problem::NoHeader).into());
@@ -66,31 +61,31 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
         best.filter(|(.., rows)| rows.iter().any(|row| row.cells.len() > 1))
     else {
         let found = Name::parse(&rows[0].cells.join(",")).shown();
-        return Err(GuessError::new(
-            SourcePosition::line(label, 1),
-            GuessProblem::OneColumn { found },
-        ));
+        return Err(wrong(1, GuessProblem::OneColumn { found }));
     };
-    let Some(block) = *block else {
-        let (line, found) = (rows[0].line, rows[0].cells[0].trim().to_string());
-        return Err(GuessError::new(
-            SourcePosition::line(label, line),
-            GuessProblem::NoNames { found },
-        ));
+    let Some(Block { header, units }) = *block else {
+        let found = rows[0].cells[0].trim().to_string();
+        return Err(wrong(rows[0].line, GuessProblem::NoNames { found }));
     };
-    let decimal = decimal(&rows[block.first_values().min(rows.len())..]);
-    judge_header(label, rows, block)?;
-    let (named, units) = (&rows[block.header], block.units.map(|units| &rows[units]));
+    let (names, values) = (&rows[header], &rows[units.unwrap_or(header) + 1..]);
+    if values.is_empty() {
+        return Err(SourcePosition::whole(label).problem(Problem::NoRows).into());
+    }
+    let (found, usual) = (names.cells.len(), usual_width(values).unwrap_or(0));
+    if found < usual {
+        return Err(wrong(names.line, GuessProblem::FewNames { found, usual }));
+    }
+    let units = units.map(|units| &rows[units]);
     let name = |(index, cell): (usize, &String)| {
         let unit = units.and_then(|row| row.cells.get(index)).map(|cell| without_brackets(cell));
         Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && spelling::is_unit(unit)))
     };
     Ok(Layout {
         delimiter: *delimiter,
-        decimal,
-        skip_rows: named.line - 1,
+        decimal: decimal(values),
+        skip_rows: names.line - 1,
         units_row: units.is_some(),
-        header: named.cells.iter().enumerate().map(name).collect(),
+        header: names.cells.iter().enumerate().map(name).collect(),
     })
 }
 
@@ -162,10 +157,7 @@ fn block(rows: &[Row]) -> Option<Block> {
             && names.is_of_words()
             && names.filled().count() >= units.filled().count()
     });
-    match above {
-        Some(header) => Some(Block { header, units: Some(words) }),
-        None => Some(Block { header: words, units: None }),
-    }
+    Some(Block { header: above.unwrap_or(words), units: above.map(|_| words) })
 }
 
 /// How well the rows fall into columns: the more columns the better, where rows agree on them with
@@ -198,20 +190,6 @@ fn decimal(rows: &[Row]) -> Option<u8> {
         _ if commas > points => Some(b','),
         _ => Some(b'.'),
     }
-}
-
-fn judge_header(label: &str, rows: &[Row], block: Block) -> Result<(), GuessError> {
-    let values = &rows[block.first_values().min(rows.len())..];
-    if values.is_empty() {
-        return Err(SourcePosition::whole(label).problem(Problem::NoRows).into());
-    }
-    let (header, usual) = (&rows[block.header], usual_width(values).unwrap_or(0));
-    let found = header.cells.len();
-    if found < usual {
-        let place = SourcePosition::line(label, header.line);
-        return Err(GuessError::new(place, GuessProblem::FewNames { found, usual }));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -64,8 +64,7 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, GuessE
     let format = guessed(Quantity::Time).and_then(|it| it.format.as_ref());
     let lacks_date = format.is_some_and(|it| !it.has_date());
     let dates = read.columns.iter().filter(|_| lacks_date);
-    let runs = files.iter().zip(&read.rows).enumerate().map(|(index, (file, &rows))| GuessedRun {
-        label: file.label.into(),
+    let runs = read.rows.iter().enumerate().map(|(index, &rows)| GuessedRun {
         rows,
         direction: position.map_or(1, |column| column.facts[index].direction()),
         day: dates.clone().find_map(|column| column.facts[index].day),

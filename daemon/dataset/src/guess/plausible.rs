@@ -24,23 +24,16 @@ pub struct UnitChoice {
 }
 
 impl Usual {
-    fn figure(&self, facts: &Facts) -> Option<f64> {
-        match self.measure {
-            Measure::Top => facts.top(),
-            Measure::Middle => facts.middle(),
-            Measure::Step => facts.step(),
-            Measure::Span => facts.span(),
-        }
-    }
-
-    fn words(&self, figure: f64) -> String {
-        let figure = number(figure);
-        match self.measure {
-            Measure::Top => format!("values up to {figure}"),
-            Measure::Middle => format!("values about {figure}"),
-            Measure::Step => format!("steps of {figure}"),
-            Measure::Span => format!("values over {figure}"),
-        }
+    /// The figure that reveals a column's unit, and what it is in words; `None` where it reveals nothing.
+    fn figure(&self, facts: &Facts) -> Option<(f64, String)> {
+        let (words, figure) = match self.measure {
+            Measure::Top => ("values up to", facts.top()),
+            Measure::Middle => ("values about", facts.middle()),
+            Measure::Step => ("steps of", facts.step()),
+            Measure::Span => ("values over", facts.span()),
+        };
+        let figure = figure.filter(|figure| *figure != 0.0)?;
+        Some((figure, format!("{words} {}", number(figure))))
     }
 
     /// How far a value in the base unit is from what is usual, as a factor's logarithm; 0 within.
@@ -58,9 +51,8 @@ impl Usual {
 
 /// The unit of a column: the one that its name gives, else the likeliest by its values.
 pub fn choose_unit(quantity: Quantity, facts: &Facts, named: Option<Spelled>) -> UnitChoice {
-    let usual = usual(quantity);
-    let figure = usual.and_then(|usual| usual.figure(facts)).filter(|it| *it != 0.0);
-    match (named, usual.zip(figure)) {
+    let shown = usual(quantity).and_then(|usual| Some((usual, usual.figure(facts)?)));
+    match (named, shown) {
         (Some(spelled), None) => said(spelled),
         (Some(spelled), Some((usual, figure))) => judge(spelled, usual, figure),
         (None, Some((usual, figure))) => by_values(quantity, usual, figure),
@@ -78,13 +70,13 @@ fn said(spelled: Spelled) -> UnitChoice {
 }
 
 /// Whether values can be in the unit that the name gives.
-fn judge(spelled: Spelled, usual: &Usual, figure: f64) -> UnitChoice {
+fn judge(spelled: Spelled, usual: &Usual, (figure, words): (f64, String)) -> UnitChoice {
     let base = |scale: f64| spelled.unit.to_base(figure * spelled.scale * scale);
     let distance = usual.distance(base(1.0));
     if distance <= FAR.ln() {
         return said(spelled);
     }
-    let (words, name) = (usual.words(figure), spelled.unit.name());
+    let name = spelled.unit.name();
     if distance > 100.0_f64.ln() && usual.distance(base(RAW_COUNT)) == 0.0 {
         let doubt = format!("{words} are no {name} of a train; read as thousandths of {name}");
         let spelled = Spelled { scale: spelled.scale * RAW_COUNT, ..spelled };
@@ -95,14 +87,13 @@ fn judge(spelled: Spelled, usual: &Usual, figure: f64) -> UnitChoice {
 }
 
 /// The likeliest unit where the name gives none.
-fn by_values(quantity: Quantity, usual: &Usual, figure: f64) -> UnitChoice {
+fn by_values(quantity: Quantity, usual: &Usual, (figure, words): (f64, String)) -> UnitChoice {
     let units = usual.units.iter().filter_map(|name| Unit::find(quantity.dimension(), name));
     let mut fits: Vec<(f64, Unit)> =
         units.map(|unit| (usual.distance(unit.to_base(figure)), unit)).collect();
     // Stable: of units that fit alike, the likelier comes first.
     fits.sort_by(|one, other| one.0.total_cmp(&other.0));
     let (distance, unit) = fits.first().copied().unwrap_or((0.0, quantity.unit()));
-    let words = usual.words(figure);
     let others: Vec<&str> = fits[1.min(fits.len())..]
         .iter()
         .filter(|(distance, _)| *distance <= 3.0_f64.ln())

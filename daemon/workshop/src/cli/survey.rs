@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use super::threads::Threads;
 use crate::report::provenance::{Provenance, own_command_line};
-use crate::survey::answer::SurveyAnswer;
+use crate::survey::answer::{LearnedAnswer, SurveyAnswer};
 use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 use dynocar::cli::Failure;
 use dynocar::output::{give, report_line, require_file, require_folder, write_file};
-use dynocar_analysis::survey::chainage::Estimate;
 use dynocar_shared::HALF_95;
 
 /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
@@ -81,21 +80,10 @@ fn summary(answer: &SurveyAnswer) -> String {
             HALF_95 * std
         );
     }
-    if let Some(learned) = &answer.learned {
-        let mut row = |name: &str, it: &Estimate, unit: &str| {
-            text +=
-                &format!("    {name:<22} {:>10.4} ± {:.4} {unit}\n", it.value, HALF_95 * it.std);
-        };
-        row("mass", &learned.mass_t, "t");
-        row("with rotating parts", &learned.inertial_mass_t, "t");
-        if let Some(mass) = &learned.passenger_mass_kg {
-            row("passenger", mass, "kg");
-        }
-        row("recorded / true speed", &learned.speed_scale, "");
-        row("forces stamped late", &learned.force_late_s, "s");
-        row("positions late", &learned.position_late_s, "s");
-        if let Some(gain) = &learned.friction_brake_n_per_pa {
-            row("friction brake", gain, "N/Pa");
+    for (name, unit, _, it) in answer.learned.iter().flat_map(LearnedAnswer::rows) {
+        if !name.is_empty() {
+            let half = HALF_95 * it.std;
+            text += &format!("    {name:<22} {:>10.4} ± {half:.4} {unit}\n", it.value);
         }
     }
     for open in &answer.cannot_tell {

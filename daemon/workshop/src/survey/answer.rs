@@ -147,6 +147,25 @@ impl SurveyedLine {
 }
 
 impl LearnedAnswer {
+    /// What was learned, for people: in few words where a terminal shows it, its unit, in all words, and the value.
+    pub fn rows(&self) -> Vec<(&'static str, &'static str, &'static str, Estimate)> {
+        let [a, b, c] = self.resistance.map(Some);
+        let rows = [
+            ("mass", "t", "mass, t", Some(self.mass_t)),
+            ("with rotating parts", "t", "mass with rotating parts, t", Some(self.inertial_mass_t)),
+            ("passenger", "kg", "mass of a passenger, kg", self.passenger_mass_kg),
+            ("", "", "a, N/kN", a),
+            ("", "", "b, N/kN per m/s", b),
+            ("", "", "c, N/kN per (m/s)²", c),
+            ("recorded / true speed", "", "recorded over true speed", Some(self.speed_scale)),
+            ("forces stamped late", "s", "forces stamped late, s", Some(self.force_late_s)),
+            ("positions late", "s", "positions late, s", Some(self.position_late_s)),
+            ("friction brake", "N/Pa", "friction brake, N/Pa", self.friction_brake_n_per_pa),
+        ];
+        let known = rows.into_iter().map(|(short, unit, long, it)| Some((short, unit, long, it?)));
+        known.flatten().collect()
+    }
+
     fn of(vehicle: &Vehicle, survey: &Survey) -> Option<Self> {
         let profile = survey.profile.as_ref()?;
         let (fitted, brake) = (&profile.learned.profile, profile.learned.brake.as_ref());

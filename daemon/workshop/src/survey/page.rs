@@ -152,23 +152,8 @@ fn learned(answer: &SurveyAnswer) -> String {
     let Some(learned) = &answer.learned else {
         return "<p>The line was known: nothing was learned.</p>\n".into();
     };
-    let [a, b, c] = &learned.resistance;
-    let rows = [
-        ("mass, t", Some(&learned.mass_t)),
-        ("mass with rotating parts, t", Some(&learned.inertial_mass_t)),
-        ("mass of a passenger, kg", learned.passenger_mass_kg.as_ref()),
-        ("a, N/kN", Some(a)),
-        ("b, N/kN per m/s", Some(b)),
-        ("c, N/kN per (m/s)²", Some(c)),
-        ("recorded over true speed", Some(&learned.speed_scale)),
-        ("forces stamped late, s", Some(&learned.force_late_s)),
-        ("positions late, s", Some(&learned.position_late_s)),
-        ("friction brake, N/Pa", learned.friction_brake_n_per_pa.as_ref()),
-    ];
-    let rows: Vec<(&str, f64, f64)> = rows
-        .into_iter()
-        .filter_map(|(name, it)| it.map(|it| (name, it.value, HALF_95 * it.std)))
-        .collect();
+    let rows = learned.rows().into_iter();
+    let rows: Vec<_> = rows.map(|(.., name, it)| (name, it.value, HALF_95 * it.std)).collect();
     let columns: Columns<(&str, f64, f64)> = &[
         ("quantity", Column::Words, |it| it.0.into()),
         ("value", Column::Numbers, |it| number(it.1, Some(it.2))),

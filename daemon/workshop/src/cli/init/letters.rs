@@ -10,12 +10,15 @@ use dynocar::cli::Failure;
 use dynocar::dataset::file_error;
 use dynocar::text_file::{read_beginning, read_bytes};
 
-/// Name and text of files in the encoding that they share, and that.
+/// Name and text of a file.
+pub type NamedText = (String, String);
+
+/// Files in the encoding that they share, and that.
 ///
 /// # Errors
 ///
 /// When one cannot be read, or is written in other letters than the others.
-pub fn texts(paths: &[PathBuf]) -> Result<(Vec<(String, String)>, &'static Encoding), Failure> {
+pub fn texts(paths: &[PathBuf]) -> Result<(Vec<NamedText>, &'static Encoding), Failure> {
     let mut files = Vec::new();
     for path in paths {
         let label = path.display().to_string();
