@@ -43,6 +43,24 @@ pub enum ImportProblem {
         /// What the file holds.
         found: String,
     },
+    /// A version of a schema that is not known.
+    #[error("schema_version = {found}: expected {expected}")]
+    Version {
+        /// The file's.
+        found: String,
+        /// Those that are known.
+        expected: String,
+    },
+    /// An identifier that is taken.
+    #[error("{key} = '{id}': expected another than in line {first_line}, which is the same")]
+    Repeated {
+        /// The key.
+        key: String,
+        /// The identifier.
+        id: String,
+        /// Line, from 1, where it stands first.
+        first_line: usize,
+    },
     /// A vehicle of a formation that nobody describes.
     #[error("{key}: the vehicle '{id}' is described in none of the files; give its file too")]
     NoVehicle {

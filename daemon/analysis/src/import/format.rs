@@ -99,7 +99,10 @@ fn railtoolkit(root: &Item) -> Result<Kind, ImportError> {
     let version = root.need("schema_version", &versions)?;
     match version.text(&versions)? {
         known if VERSIONS.contains(&known) => Ok(kind),
-        other => Err(version.out_of_range(other, &versions)),
+        other => {
+            let problem = ImportProblem::Version { found: other.into(), expected: versions };
+            Err(version.wrong(problem))
+        }
     }
 }
 

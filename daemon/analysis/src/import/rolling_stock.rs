@@ -7,7 +7,6 @@ use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedTrain, Reading};
 use super::item::Item;
 use super::vehicle::{Kind, Vehicle, vehicle};
-use crate::dataset::Problem;
 
 const WITHOUT_PLACE: [(&str, &str); 4] = [
     ("train.toml holds no identifier", "UUID"),
@@ -67,10 +66,8 @@ pub(super) fn unique<'i, 't: 'i>(
     item: &Item,
 ) -> Result<(), ImportError> {
     let Some((_, first)) = known.find(|(other, _)| *other == id) else { return Ok(()) };
-    let line = first.place().line.unwrap_or(1);
-    let allowed = format!("another than in line {line}, which is the same");
-    let (key, value) = (item.full("id"), format!("'{id}'"));
-    Err(item.wrong(Problem::OutOfRange { key, value, allowed }))
+    let (key, first_line) = (item.full("id"), first.place().line.unwrap_or(1));
+    Err(item.wrong(ImportProblem::Repeated { key, id: id.into(), first_line }))
 }
 
 fn formation<'v, 't>(

@@ -102,17 +102,22 @@ fn chosen<'i, T>(
     let ids = ids.join(", ");
     let is_wanted = |it: &&T| wanted.is_none_or(|wanted| id(it) == wanted);
     let found: Vec<&T> = all.iter().filter(is_wanted).collect();
-    let option = format!("--{what} {}", wanted.unwrap_or("ID"));
-    Err(Failure::Input(match (wanted, all.len(), &found[..]) {
-        (None, 0, _) => return Ok(None),
-        (_, _, [only]) => return Ok(Some(only)),
-        (None, count, _) => {
-            format!("the files hold {count} {what}s; say which: {option}, of {ids}")
+    match (wanted, all.len(), &found[..]) {
+        (None, 0, _) => Ok(None),
+        (_, _, [only]) => Ok(Some(only)),
+        (None, count, _) => Err(Failure::Input(format!(
+            "the files hold {count} {what}s; say which: --{what} ID, of {ids}"
+        ))),
+        (Some(wanted), 0, _) => {
+            Err(Failure::Input(format!("--{what} {wanted}: the files hold no {what}")))
         }
-        (_, 0, _) => format!("{option}: the files hold no {what}"),
-        (_, _, []) => format!("{option}: expected one of {ids}"),
-        _ => format!("{option}: it stands in several files; give one of them at a time"),
-    }))
+        (Some(wanted), _, []) => {
+            Err(Failure::Input(format!("--{what} {wanted}: expected one of {ids}")))
+        }
+        (Some(wanted), ..) => Err(Failure::Input(format!(
+            "--{what} {wanted}: it stands in several files; give one of them at a time"
+        ))),
+    }
 }
 
 fn failure(error: ImportError) -> Failure {
