@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use dynocar_dataset::encoding::decoded;
 use dynocar_dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest,
-    Problem, SourcePosition, is_parquet, parse_track, parse_train, top_keys,
+    Problem, RunContent, SourcePosition, is_parquet, parse_track, parse_train, top_keys,
 };
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
@@ -14,7 +14,7 @@ use dynocar_model::units::Unit;
 pub use crate::text_file::read_text;
 use crate::text_file::{read_bytes, require_regular};
 pub use crate::unpacking::is_recording;
-use crate::unpacking::{UnpackError, Unpacked, rows_of};
+use crate::unpacking::{UnpackError, Unpacked, columns_of};
 
 /// Why a path leads to no dataset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -105,14 +105,15 @@ impl DatasetFiles for DatasetFolder {
         read_text(&self.path_of(path))
     }
 
-    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<String, FileProblem> {
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
         let file = self.path_of(path);
-        if !is_parquet(path) {
-            let encoding = manifest.layout.encoding;
-            return decoded(read_bytes(&file, encoding)?, encoding);
+        if is_parquet(path) {
+            require_regular(&file)?;
+            let columns = columns_of(&file, &manifest.columns);
+            return columns.map(RunContent::Columns).map_err(FileProblem::Table);
         }
-        require_regular(&file)?;
-        rows_of(&file, &manifest.columns).map_err(FileProblem::Table)
+        let encoding = manifest.layout.encoding;
+        decoded(read_bytes(&file, encoding)?, encoding).map(RunContent::Text)
     }
 
     fn label(&self, path: &str) -> String {

@@ -3,10 +3,13 @@
 //! # Layout
 //!
 //! - [`cli`]: the commands of `dynocar`, one file each
+//! - [`columns_stream`]: columns of numbers from one program to another
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
+//! - [`error_document`]: a failure for machines
 //! - [`ending`]: when a long-running program ends
 //! - [`models`]: a store of models
+//! - [`observing`]: what an observer of trains sees, in one vocabulary
 //! - [`operator`]: what an operator reads, in one place
 //! - [`output`]: where results go
 //! - [`pipelines`]: the pipelines that a configuration asks for
@@ -24,11 +27,14 @@
 //! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
+pub mod columns_stream;
 pub mod config;
 pub mod dataset;
 pub mod demo;
 pub mod ending;
+pub mod error_document;
 pub mod models;
+pub mod observing;
 pub mod operator;
 pub mod output;
 pub mod pipelines;

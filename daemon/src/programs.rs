@@ -6,6 +6,8 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::error_document::ErrorDocument;
+
 /// The program of what is done away from the controller.
 pub const WORKSHOP: &str = "dynocar-workshop";
 /// The program of everything about recordings.
@@ -58,21 +60,25 @@ impl CallFailure {
     }
 }
 
-/// Calls a program and waits for its end; gives its standard output and its diagnostics.
+/// Calls a program that reports failures as [`ErrorDocument`], and waits for its end; gives its standard output
+/// and its diagnostics.
 ///
 /// # Errors
 ///
 /// In words when it does not start or does not end with 0.
 pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, String), CallFailure> {
-    let output =
-        command.output().map_err(|error| CallFailure::Work(not_started(package, &error)))?;
+    let output = command.args(["--json", "-"]).output();
+    let output = output.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
     let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-    let problem = || words.strip_prefix("dynocar: ").unwrap_or(&words).to_owned();
-    match output.status.code() {
-        Some(0) => Ok((output.stdout, words)),
-        Some(2) => Err(CallFailure::Input(problem())),
-        _ => Err(CallFailure::Work(problem())),
+    if output.status.success() {
+        return Ok((output.stdout, words));
     }
+    Err(match serde_json::from_slice(&output.stdout) {
+        Ok(ErrorDocument { error }) if error.exit_status == 2 => CallFailure::Input(error.message),
+        Ok(ErrorDocument { error }) => CallFailure::Work(error.message),
+        // It was killed.
+        Err(_) => CallFailure::Work(format!("{package}: {}: {words}", output.status)),
+    })
 }
 
 fn beside_this(package: &str) -> Option<OsString> {

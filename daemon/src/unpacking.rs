@@ -5,10 +5,11 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use dynocar_dataset::ColumnMapping;
+use dynocar_dataset::{ColumnMapping, RunColumn};
 use dynocar_shared::TrainId;
 use tempfile::TempDir;
 
+use crate::columns_stream;
 use crate::output::report_line;
 use crate::programs::{CallFailure, PARQUET, RECORDING, call, output_of};
 
@@ -34,22 +35,19 @@ pub fn program_for<'w>(words: impl IntoIterator<Item = &'w OsStr>) -> &'static s
     if words.into_iter().any(is_parquet) { PARQUET } else { RECORDING }
 }
 
-/// The rows of a Parquet file as CSV: all its columns by name, and what the mapped ones hold.
+/// All columns of a Parquet file, with what the mapped ones hold.
 ///
 /// # Errors
 ///
 /// In words, without the file's name.
-pub fn rows_of(file: &Path, columns: &[ColumnMapping]) -> Result<String, String> {
+pub fn columns_of(file: &Path, mappings: &[ColumnMapping]) -> Result<Vec<RunColumn>, String> {
     let mut command = call(PARQUET);
-    command.arg("rows").arg(file);
-    for it in columns {
+    command.arg("columns").arg(file);
+    for it in mappings {
         command.arg("--column").arg(&it.column).arg(it.unit.name());
     }
-    let (rows, _) = output_of(PARQUET, &mut command).map_err(|failure| {
-        let words = failure.words();
-        words.strip_prefix(&format!("{}: ", file.display())).unwrap_or(&words).to_owned()
-    })?;
-    String::from_utf8(rows).map_err(|error| error.to_string())
+    let (bytes, _) = output_of(PARQUET, &mut command).map_err(CallFailure::words)?;
+    columns_stream::read(&bytes).ok_or_else(|| format!("{PARQUET}: hands over no columns"))
 }
 
 /// Why a recording is not unpacked.

@@ -8,11 +8,11 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
 use dynocar::storage::{Disk, Rights, Storage};
+use dynocar_recording::copying::recover_on;
 use dynocar_recording::event::{Event, EventKind};
 use dynocar_recording::reading::{Ending, read};
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation};
 use dynocar_recording::recording::Recording;
-use dynocar_recording::recover::recover_on;
 use dynocar_shared::{TrainId, TrainSample};
 use dynocar_tests::power_cut::{Left, LossyDisk, Neglect, NotedDisk};
 

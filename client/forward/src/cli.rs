@@ -5,9 +5,10 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{CommandFactory, Parser};
-use dynocar::cli::{Failure, parse};
+use dynocar::cli::{Failure, carry_out};
 use dynocar::dataset::read_text;
 use dynocar::ending;
+use dynocar::observing::Wanted;
 use dynocar::output::report_line;
 use dynocar_client::{ChannelError, Host};
 use dynocar_shared::TrainId;
@@ -58,14 +59,7 @@ pub fn command() -> clap::Command {
 
 /// Parses the command line, forwards until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse::<Arguments>("dynocar forward") {
-        Ok(arguments) => arguments,
-        Err(status) => return status,
-    };
-    match execute(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report("dynocar forward", None),
-    }
+    carry_out("dynocar forward", |_| None, execute)
 }
 
 fn execute(arguments: &Arguments) -> Result<(), Failure> {
@@ -84,8 +78,10 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
     };
     let work = |error: ChannelError| Failure::Work(error.to_string());
     let settings = Settings {
-        host: Host::from_environment().map_err(work)?,
-        trains: arguments.trains.iter().map(|&id| TrainId(id)).collect(),
+        wanted: Wanted {
+            host: Host::from_environment().map_err(work)?,
+            trains: arguments.trains.iter().map(|&id| TrainId(id)).collect(),
+        },
         login,
         name,
         every: Duration::from_millis(arguments.every_ms),

@@ -9,9 +9,7 @@ use std::sync::LazyLock;
 use dynocar_client::Reading;
 use dynocar_shared::schema::{Field, snapshot_fields, unit_of};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{
-    Manoeuvre, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason,
-};
+use dynocar_shared::{Manoeuvre, MassSource, Parameter, Quantity, Reason, RejectionReason};
 
 use crate::payload::Value;
 
@@ -125,9 +123,4 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Metr
     let missing = missing.map(|a| a.name()).collect::<Vec<_>>().join(",");
     let meaning = "Manoeuvres that would show what the data do not, with commas between";
     put("", "missing_manoeuvres", meaning, Value::words(missing));
-}
-
-/// The folder of a pipeline's metrics: its number and kind.
-pub fn folder(pipeline_index: u32, kind: Option<PipelineKind>) -> String {
-    format!("{pipeline_index}_{}", kind.map_or("unknown", PipelineKind::name))
 }

@@ -4,15 +4,14 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use dynocar::observing::Wanted;
 use dynocar::output::report_line;
-use dynocar_client::Host;
-use dynocar_shared::TrainId;
 
 use crate::broker::{Broker, BrokerError, BrokerEvent, Login, PATIENCE};
 use crate::node::{Known, Message, NodeName, Session, is_rebirth, locked};
 use crate::payload::utc_ms;
 use crate::queue::Counts;
-use crate::watcher::Watcher;
+use crate::watcher::watch;
 
 /// How long the broker's words are waited for, before the queue is looked at again.
 const PAUSE: Duration = Duration::from_millis(20);
@@ -30,10 +29,8 @@ const REPORT_DROPS: Duration = Duration::from_secs(10);
 /// What is forwarded, and where to.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The run-time directory.
-    pub host: Host,
-    /// The trains; every train that is served, when empty.
-    pub trains: Vec<TrainId>,
+    /// The trains.
+    pub wanted: Wanted,
     /// The broker.
     pub login: Login,
     /// The edge node.
@@ -51,9 +48,7 @@ pub fn forward(settings: &Settings, must_end: &AtomicBool) -> Counts {
     std::thread::scope(|scope| {
         scope.spawn(|| {
             let reported = ReportAtEnd(&is_all_made);
-            let (host, trains) = (settings.host.clone(), settings.trains.clone());
-            let mut watcher = Watcher::new(host, trains, settings.every, &known);
-            watcher.run(must_end);
+            watch(&settings.wanted, settings.every, &known, must_end);
             // The farewell need not wait until many readers are closed.
             drop(reported);
         });

@@ -10,7 +10,7 @@
 //! - [`payload`]: Sparkplug's payload as protobuf messages
 //! - [`fields`]: what of a snapshot becomes which metric
 //! - [`train`]: a train's metrics as they are now, and which of them have changed
-//! - [`watcher`]: readers of snapshots, daemons that come and go, events
+//! - [`watcher`]: trains that are observed, and what is made of it
 //! - [`queue`]: publications that wait for the broker
 //! - [`node`]: topics, births, deaths and sequence numbers of the edge node, without any socket
 //! - [`broker`]: one connection to the broker

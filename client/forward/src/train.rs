@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 
+use dynocar::operator::pipeline_name;
 use dynocar_client::Reading;
 use dynocar_shared::{PipelineKind, Quantity, TrainId};
 use prost::Message;
 
-use crate::fields::{MetricIndex, MetricMeta, each_metric, folder};
+use crate::fields::{MetricIndex, MetricMeta, each_metric};
 use crate::payload::{Metric, Payload, Value};
 use crate::queue::Publication;
 
@@ -93,7 +94,8 @@ impl Train {
         }
         for &quantity in Quantity::ALL {
             let answer: Option<(u32, Option<PipelineKind>)> = answers[quantity as usize];
-            let answer = Value::Words(answer.map(|(index, kind)| folder(index, kind).into()));
+            let answer =
+                Value::Words(answer.map(|(index, kind)| pipeline_name(index, kind).into()));
             let meaning = "Folder of the pipeline that answers the quantity of this name";
             self.set_of_train("answers", quantity.name(), meaning, answer, now_ms);
         }
@@ -130,7 +132,7 @@ impl Train {
         }
         let mut name = String::new();
         if pipeline != OF_TRAIN {
-            name = folder(pipeline.0, PipelineKind::from_number(pipeline.1)) + "/";
+            name = pipeline_name(pipeline.0, PipelineKind::from_number(pipeline.1)) + "/";
         }
         for part in [meta.place.folder, "/"].iter().filter(|_| !meta.place.folder.is_empty()) {
             name += part;

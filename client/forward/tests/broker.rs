@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use dynocar::observing::Wanted;
 use dynocar_client::Host;
 use dynocar_forward::broker::{Broker, BrokerError, BrokerEvent, Login};
 use dynocar_forward::forwarder::{Settings, forward, send};
@@ -141,8 +142,7 @@ impl Drop for Ended<'_> {
 
 fn settings(login: Login, queue: usize, folder: &tempfile::TempDir) -> Settings {
     Settings {
-        host: Host::at(folder.path()).unwrap(),
-        trains: Vec::new(),
+        wanted: Wanted { host: Host::at(folder.path()).unwrap(), trains: Vec::new() },
         login,
         name: NodeName { group: "depot".into(), node: "host".into() },
         every: Duration::from_millis(100),

@@ -4,7 +4,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
-use dynocar::cli::{Failure, parse};
+use dynocar::cli::{Failure, carry_out};
 use dynocar::ending;
 use dynocar_recording::cli::WantedArguments;
 
@@ -39,14 +39,7 @@ pub fn command() -> clap::Command {
 
 /// Parses the command line, serves until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse::<Arguments>("dynocar live") {
-        Ok(arguments) => arguments,
-        Err(status) => return status,
-    };
-    match execute(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report("dynocar live", None),
-    }
+    carry_out("dynocar live", |_| None, execute)
 }
 
 fn execute(arguments: &Arguments) -> Result<(), Failure> {

@@ -2,35 +2,27 @@
 
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dynocar::storage::{Disk, settle};
 use dynocar_recording::columns::Row;
+use dynocar_recording::error::WriteError;
 use dynocar_recording::writing::{McapError, RecordingWriter};
 
 use crate::reading::Content;
-
-/// A recording that cannot be written.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: cannot be written: {source}", path.display())]
-pub struct BackError {
-    path: PathBuf,
-    source: McapError,
-}
 
 /// Writes a recording; its messages are those from which the Parquet was made.
 ///
 /// # Errors
 ///
 /// When it cannot be written; then there is no file.
-pub fn write_mcap(content: &Content, path: &Path) -> Result<(), BackError> {
-    let failed = |source| BackError { path: path.into(), source };
-    let file = File::create_new(path).map_err(|error| failed(error.into()))?;
+pub fn write_mcap(content: &Content, path: &Path) -> Result<(), WriteError> {
+    let file = File::create_new(path).map_err(WriteError::of(path))?;
     let done = write(content, file).and_then(|()| Ok(settle(&Disk, path)?));
     if done.is_err() {
         let _ = std::fs::remove_file(path);
     }
-    done.map_err(failed)
+    done.map_err(WriteError::of(path))
 }
 
 fn write(content: &Content, file: File) -> Result<(), McapError> {

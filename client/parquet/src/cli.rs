@@ -1,24 +1,25 @@
 //! The command line: `dynocar convert` and `replay --verify` become this program where Parquet is named, and
 //! the daemon's commands read by it.
 
-use std::io::BufWriter;
+use std::io::{BufWriter, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
-use dynocar::cli::{Failure, parse};
+use dynocar::cli::{Failure, carry_out};
+use dynocar::columns_stream;
 use dynocar::output::{OutputError, report_line, require_new};
 use dynocar::programs::{PARQUET, called_as};
 use dynocar_recording::cli::{
-    ConvertArguments, VerifyArguments, dataset_failure, from_dataset_failure,
+    ConvertArguments, VerifyArguments, copy_failure, dataset_failure, from_dataset_failure,
 };
 use dynocar_recording::convert::{from_dataset, unpack};
 
 use crate::back::write_mcap;
 use crate::error::TableError;
+use crate::numbers::{Wanted, columns};
 use crate::reading::{Content, read};
-use crate::rows::{RowsError, Wanted, write_rows};
-use crate::writing::{WriteError, Written, write_folder};
+use crate::writing::{Written, write_folder};
 
 /// Recordings as Parquet and back.
 #[derive(Debug, Parser)]
@@ -26,6 +27,9 @@ use crate::writing::{WriteError, Written, write_folder};
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Report a failure to another program, in this file
+    #[arg(long, global = true, hide = true)]
+    json: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -34,12 +38,12 @@ enum Command {
     #[command(hide = true)]
     Verify(VerifyArguments),
     #[command(hide = true)]
-    Rows(RowsArguments),
+    Columns(ColumnsArguments),
 }
 
-/// Print a Parquet file as CSV.
+/// Hand over a Parquet file's columns to another program.
 #[derive(Debug, Args)]
-struct RowsArguments {
+struct ColumnsArguments {
     /// The file
     file: PathBuf,
     /// A column whose cells are wanted, and the unit of its numbers
@@ -49,20 +53,15 @@ struct RowsArguments {
 
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let program = called_as(PARQUET);
-    let arguments = match parse::<Arguments>(program) {
-        Ok(arguments) => arguments,
-        Err(status) => return status,
-    };
-    let result = match &arguments.command {
-        Command::Convert(arguments) => convert(arguments),
-        Command::Verify(arguments) => verify(arguments),
-        Command::Rows(arguments) => rows(arguments),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(program, None),
-    }
+    carry_out(
+        called_as(PARQUET),
+        |it: &Arguments| it.json.as_deref(),
+        |arguments| match &arguments.command {
+            Command::Convert(arguments) => convert(arguments),
+            Command::Verify(arguments) => verify(arguments),
+            Command::Columns(arguments) => hand_over(arguments),
+        },
+    )
 }
 
 fn is_parquet(path: &Path) -> bool {
@@ -117,10 +116,7 @@ fn to_parquet(arguments: &ConvertArguments) -> Result<(), Failure> {
             write_folder(&[recording], output)
         }
     };
-    let written = written.map_err(|error| match error {
-        WriteError::Read(error) => Failure::Input(error.to_string()),
-        error => Failure::Work(error.to_string()),
-    })?;
+    let written = written.map_err(copy_failure)?;
     let Written { samples, snapshots, events, left_out, broken } = written;
     for it in broken {
         report_line(&format!("{}: {it}; `dynocar recover` makes it whole", called_as(PARQUET)));
@@ -142,19 +138,16 @@ fn verify(arguments: &VerifyArguments) -> Result<(), Failure> {
     arguments.verify(&one(&arguments.recording)?.into_recording())
 }
 
-fn rows(arguments: &RowsArguments) -> Result<(), Failure> {
-    let wanted = arguments
-        .columns
-        .chunks(2)
-        .map(|pair| Wanted { column: pair[0].clone(), unit: pair[1].clone() });
-    let output = BufWriter::new(std::io::stdout().lock());
-    match write_rows(&arguments.file, &wanted.collect::<Vec<_>>(), output) {
-        Ok(()) => Ok(()),
-        Err(RowsError::Table(error)) => Err(table_failure(error)),
-        Err(RowsError::Output(error)) => match error.into_kind() {
-            csv::ErrorKind::Io(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-            csv::ErrorKind::Io(error) => Err(OutputError::StandardOutput(error).into()),
-            other => Err(Failure::Work(format!("{other:?}"))),
-        },
+fn hand_over(arguments: &ColumnsArguments) -> Result<(), Failure> {
+    let wanted = |pair: &[String]| Wanted { column: pair[0].clone(), unit: pair[1].clone() };
+    let wanted: Vec<Wanted> = arguments.columns.chunks(2).map(wanted).collect();
+    // Whoever calls has named the file.
+    let columns = columns(&arguments.file, &wanted)
+        .map_err(|error| Failure::Input(error.problem.to_string()))?;
+    match columns_stream::write(&columns, BufWriter::new(std::io::stdout().lock())) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(OutputError::StandardOutput(error).into())
+        }
+        _ => Ok(()),
     }
 }

@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::Path;
 use std::sync::Once;
 
-use crate::error::TableError;
+use crate::error::{TableError, TableProblem};
 
 thread_local! {
     /// True while this thread reads a file: then a panic is no news.
@@ -19,10 +19,10 @@ thread_local! {
 /// # Errors
 ///
 /// As the work, and where the file makes the library panic.
-pub fn guarded<T, E: From<TableError>>(
+pub fn guarded<T>(
     path: &Path,
-    work: impl FnOnce() -> Result<T, E>,
-) -> Result<T, E> {
+    work: impl FnOnce() -> Result<T, TableProblem>,
+) -> Result<T, TableError> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let former_hook = take_hook();
@@ -36,10 +36,10 @@ pub fn guarded<T, E: From<TableError>>(
     // What the work has half done is dropped with the error.
     let done = catch_unwind(AssertUnwindSafe(work));
     IS_READING.set(false);
-    done.unwrap_or_else(|panic| {
-        let problem = format!("damaged: {}", words(panic.as_ref()));
-        Err(TableError::NotParquet { path: path.into(), problem }.into())
-    })
+    let done = done.unwrap_or_else(|panic| {
+        Err(TableProblem::NotParquet(format!("damaged: {}", words(panic.as_ref()))))
+    });
+    done.map_err(TableError::of(path))
 }
 
 fn words(panic: &(dyn Any + Send)) -> &str {

@@ -1,4 +1,4 @@
-//! Recordings as Parquet, without loss and back; and Parquet files of anybody as CSV.
+//! Recordings as Parquet, without loss and back; and Parquet files of anybody as columns of numbers.
 //!
 //! A recording is a folder: one file of samples for each train, one of snapshots for each pipeline, one
 //! of events, one each of what an MCAP file has attached and as metadata. `message_number` says in which order
@@ -11,7 +11,7 @@
 //! - [`guarded`]: what a damaged file does to the library that reads it
 //! - [`writing`]: MCAP to Parquet
 //! - [`reading`], [`table`]: Parquet to what a recording holds, [`back`]: and to MCAP
-//! - [`rows`]: a Parquet file of anybody as CSV
+//! - [`numbers`]: a Parquet file of anybody as columns of numbers
 //! - [`cli`]: the command line
 
 pub mod back;
@@ -19,7 +19,7 @@ pub mod cells;
 pub mod cli;
 pub mod error;
 pub mod guarded;
+pub mod numbers;
 pub mod reading;
-pub mod rows;
 pub mod table;
 pub mod writing;

@@ -5,20 +5,18 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use arrow_array::{Array, RecordBatch};
-use arrow_schema::{DataType, Schema};
-use dynocar_recording::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS, Source};
-use dynocar_recording::event::Event;
-use dynocar_recording::reading::ReadError;
+use arrow_schema::{ArrowError, DataType, Schema};
+use dynocar_recording::columns::{Column, Row, Source};
+use dynocar_recording::reading::ReadProblem;
 use dynocar_recording::recording::{Metadata, Recording};
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::cells::{Cells, cells_of, data_type};
-use crate::error::TableError;
+use crate::error::{TableError, TableProblem};
 use crate::guarded::guarded;
 use crate::table::{
-    ATTACHMENTS, Attached, KIND, LAYOUT, METADATA, add_metadata, attachments_batch, attachments_of,
-    metadata_batch,
+    ATTACHMENTS, Attached, KIND, LAYOUT, METADATA, TABLES, TableKind, add_metadata,
+    attachments_batch, attachments_of, metadata_batch,
 };
 
 /// A message with its place in the recording and when it was recorded.
@@ -58,29 +56,34 @@ pub fn read(path: &Path) -> Result<Content, TableError> {
     content.messages.sort_by_key(|it| it.number);
     if !content.messages.iter().any(|it| matches!(it.row, Row::Sample(_))) {
         let found = if content.messages.is_empty() { "no message" } else { "snapshots and events" };
-        return Err(ReadError::NoSamples { path: path.into(), found: found.into() }.into());
+        let problem = ReadProblem::NoSamples { found: found.into() };
+        return Err(TableError::of(path)(problem));
     }
     Ok(content)
 }
 
 /// The Parquet files of a recording.
 fn files(path: &Path) -> Result<Vec<PathBuf>, TableError> {
-    let unreadable = |source| TableError::Unreadable { path: path.into(), source };
-    if !std::fs::metadata(path).map_err(unreadable)?.is_dir() {
-        return Ok(vec![path.into()]);
-    }
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(path).map_err(unreadable)? {
-        let file = entry.map_err(unreadable)?.path();
-        if file.extension().is_some_and(|it| it == "parquet") {
-            files.push(file);
+    let listed = || {
+        if !std::fs::metadata(path)?.is_dir() {
+            return Ok(vec![path.into()]);
         }
-    }
-    files.sort();
-    if files.is_empty() {
-        return Err(TableError::NotOurs { path: path.into() });
-    }
-    Ok(files)
+        let entries = std::fs::read_dir(path)?.map(|it| Ok(it?.path()));
+        let mut files = entries.collect::<std::io::Result<Vec<PathBuf>>>()?;
+        files.retain(|it| it.extension().is_some_and(|it| it == "parquet"));
+        files.sort();
+        if files.is_empty() { Err(TableProblem::NotOurs) } else { Ok(files) }
+    };
+    listed().map_err(TableError::of(path))
+}
+
+/// Opens a file of anybody.
+///
+/// # Errors
+///
+/// When the system does not give it, or it is no Parquet.
+pub fn open(path: &Path) -> Result<ParquetRecordBatchReaderBuilder<File>, TableProblem> {
+    ParquetRecordBatchReaderBuilder::try_new(File::open(path)?).map_err(TableProblem::not_parquet)
 }
 
 fn read_file(
@@ -88,44 +91,34 @@ fn read_file(
     is_of_folder: bool,
     content: &mut Content,
     metadata: &mut BTreeMap<u64, Metadata>,
-) -> Result<(), TableError> {
-    let file =
-        File::open(path).map_err(|source| TableError::Unreadable { path: path.into(), source })?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file)
-        .map_err(|it| TableError::not_parquet(path, it))?;
+) -> Result<(), TableProblem> {
+    let builder = open(path)?;
     let said = builder.metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default();
     let value = |key: &str| said.iter().find(|it| it.key == key).and_then(|it| it.value.clone());
-    let not_ours = || TableError::NotOurs { path: path.into() };
-    let kind = value(KIND).ok_or_else(not_ours)?;
+    let kind = value(KIND).ok_or(TableProblem::NotOurs)?;
     let schema = builder.schema().clone();
-    let batches = builder.build().map_err(|it| TableError::not_parquet(path, it))?;
-    let batches = batches.map(|it| it.map_err(|error| TableError::not_parquet(path, error)));
-    let (columns, layout): (&[Column], _) = match kind.as_str() {
-        "samples" => (&SAMPLES, Some(TrainSample::WIRE_NAME)),
-        "snapshots" => (&SNAPSHOTS, Some(ParameterSnapshot::WIRE_NAME)),
-        "events" => (&EVENTS, None),
+    let batches = builder.build().map_err(TableProblem::not_parquet)?;
+    let batches = batches.map(|it| it.map_err(TableProblem::not_parquet));
+    let table = match kind.as_str() {
         ATTACHMENTS => {
-            require_same(path, attachments_batch(&[]).map(|it| it.schema()), &schema)?;
+            require_same(attachments_batch(&[]), &schema)?;
             for batch in batches {
                 content.attached.extend(attachments_of(&batch?));
             }
             return Ok(());
         }
         METADATA => {
-            require_same(path, metadata_batch(&[]).map(|it| it.schema()), &schema)?;
+            require_same(metadata_batch(&[]), &schema)?;
             for batch in batches {
                 add_metadata(&batch?, metadata);
             }
             return Ok(());
         }
-        _ => return Err(not_ours()),
+        name => TABLES.iter().find(|it| it.name == name).ok_or(TableProblem::NotOurs)?,
     };
-    if let Some(expected) = layout
-        && value(LAYOUT).as_deref() != Some(expected)
-    {
-        let (path, topic) = (path.into(), kind);
-        let found = value(LAYOUT).unwrap_or("none".into());
-        return Err(ReadError::OtherSchema { path, topic, expected, found }.into());
+    let (expected, found) = (table.layout, value(LAYOUT).unwrap_or("none".into()));
+    if found != expected {
+        return Err(ReadProblem::OtherSchema { topic: kind, expected, found }.into());
     }
     if kind == "samples" && !is_of_folder {
         let texts = said.iter().filter(|it| it.key.starts_with("configuration-"));
@@ -133,98 +126,73 @@ fn read_file(
             texts.filter_map(|it| Some((it.key.clone(), 0, it.value.clone()?.into_bytes())));
         content.attached.extend(texts);
     }
-    let indices = indices(path, columns, &schema)?;
+    let indices = indices(table.columns, &schema)?;
     let mut rows_before = 0;
     for batch in batches {
         let batch = batch?;
-        take_rows(path, columns, &indices, &batch, rows_before, &mut content.messages)?;
+        take_rows(table, &indices, &batch, rows_before, &mut content.messages)?;
         rows_before += batch.num_rows();
     }
     Ok(())
 }
 
 /// Refuses a table whose columns are others than those of a batch of ours.
-fn require_same(
-    path: &Path,
-    ours: Result<arrow_schema::SchemaRef, arrow_schema::ArrowError>,
-    found: &Schema,
-) -> Result<(), TableError> {
-    let ours = ours.map_err(|it| TableError::not_parquet(path, it))?;
-    for (index, field) in ours.fields().iter().enumerate() {
-        let expected = field.data_type();
-        match found.fields().get(index).filter(|it| it.name() == field.name()) {
-            None => return Err(no_column(path, field.name(), expected)),
-            Some(it) if it.data_type() != expected => {
-                return Err(other_type(path, field.name(), expected, it.data_type()));
-            }
-            Some(_) => {}
-        }
+fn require_same(ours: Result<RecordBatch, ArrowError>, found: &Schema) -> Result<(), TableProblem> {
+    let ours = ours.map_err(TableProblem::not_parquet)?;
+    for (index, field) in ours.schema().fields().iter().enumerate() {
+        let found = found.fields().get(index).filter(|it| it.name() == field.name());
+        require(field.name(), field.data_type(), found.map(|it| it.data_type()))?;
     }
     Ok(())
 }
 
-fn no_column(path: &Path, column: &str, expected: &DataType) -> TableError {
-    TableError::NoColumn {
-        path: path.into(),
-        column: column.into(),
-        expected: expected.to_string(),
-    }
-}
-
-fn other_type(path: &Path, column: &str, expected: &DataType, found: &DataType) -> TableError {
-    TableError::OtherType {
-        path: path.into(),
-        column: column.into(),
-        expected: expected.to_string(),
-        found: found.to_string(),
+/// Refuses a column that is not there or of another type.
+fn require(
+    column: &str,
+    expected: &DataType,
+    found: Option<&DataType>,
+) -> Result<(), TableProblem> {
+    let (column, words) = (column.to_owned(), expected.to_string());
+    match found {
+        None => Err(TableProblem::NoColumn { column, expected: words }),
+        Some(it) if it != expected => {
+            Err(TableProblem::OtherType { column, expected: words, found: it.to_string() })
+        }
+        Some(_) => Ok(()),
     }
 }
 
 /// Where the columns stand in a file; `None` for one that only repeats others.
-fn indices(
-    path: &Path,
-    columns: &[Column],
-    schema: &Schema,
-) -> Result<Vec<Option<usize>>, TableError> {
+fn indices(columns: &[Column], schema: &Schema) -> Result<Vec<Option<usize>>, TableProblem> {
     let index = |column: &Column| {
         if column.is_repetition() {
             return Ok(None);
         }
-        let expected = data_type(column);
-        let index =
-            schema.index_of(&column.name).map_err(|_| no_column(path, &column.name, &expected))?;
-        let found = schema.field(index).data_type();
-        if *found != expected {
-            return Err(other_type(path, &column.name, &expected, found));
-        }
-        Ok(Some(index))
+        let index = schema.index_of(&column.name).ok();
+        let found = index.map(|it| schema.field(it).data_type());
+        require(&column.name, &data_type(column), found)?;
+        Ok(index)
     };
     columns.iter().map(index).collect()
 }
 
 fn take_rows(
-    path: &Path,
-    columns: &[Column],
+    table: &TableKind,
     indices: &[Option<usize>],
     batch: &RecordBatch,
     rows_before: usize,
     messages: &mut Vec<Logged>,
-) -> Result<(), TableError> {
-    let row = match columns.last().map(|it| it.source) {
-        Some(Source::Event(_)) => Row::Event(Event::default()),
-        Some(Source::Rejected(_)) => Row::Snapshot(ParameterSnapshot::empty().into()),
-        _ => Row::Sample(TrainSample::empty(TrainId(0))),
-    };
+) -> Result<(), TableProblem> {
     let first = messages.len();
-    let none = Logged { number: 0, log_time: 0, row };
+    let none = Logged { number: 0, log_time: 0, row: (table.empty)() };
     messages.resize(first + batch.num_rows(), none);
-    for (column, index) in columns.iter().zip(indices) {
+    for (column, index) in table.columns.iter().zip(indices) {
         let Some(index) = index else { continue };
         let array = batch.column(*index);
         if !column.is_nullable && array.null_count() > 0 {
             let row = (0..array.len()).find(|&row| array.is_null(row)).unwrap_or(0);
-            let (path, column, row) = (path.into(), column.name.clone(), rows_before + row + 1);
-            return Err(TableError::NoValue { path, column, row });
+            let (column, row) = (column.name.clone(), rows_before + row + 1);
+            return Err(TableProblem::NoValue { column, row });
         }
         let Cells { words, mut texts, is_there } = cells_of(column, array);
         let width = column.list.unwrap_or(1);

@@ -2,7 +2,7 @@
 //! metadata.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{TimestampNanosecondType, UInt64Type};
@@ -10,7 +10,11 @@ use arrow_array::{
     Array, ArrayRef, BinaryArray, RecordBatch, StringArray, TimestampNanosecondArray, UInt64Array,
 };
 use arrow_schema::ArrowError;
+use dynocar_recording::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS};
+use dynocar_recording::event::Event;
 use dynocar_recording::recording::Metadata;
+use dynocar_recording::schema::EVENT;
+use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 
 use crate::cells::ZONE;
 
@@ -18,6 +22,40 @@ use crate::cells::ZONE;
 pub const KIND: &str = "dynocar.table";
 /// Key of a file's metadata: the layout of its messages.
 pub const LAYOUT: &str = "dynocar.layout";
+/// A table of messages.
+pub struct TableKind {
+    /// What it says of itself under [`KIND`].
+    pub name: &'static str,
+    /// Its columns.
+    pub columns: &'static LazyLock<Vec<Column>>,
+    /// The layout of its messages.
+    pub layout: &'static str,
+    /// A message of it without content.
+    pub empty: fn() -> Row,
+}
+
+/// The tables of messages.
+pub static TABLES: [TableKind; 3] = [
+    TableKind {
+        name: "samples",
+        columns: &SAMPLES,
+        layout: TrainSample::WIRE_NAME,
+        empty: || Row::Sample(TrainSample::empty(TrainId(0))),
+    },
+    TableKind {
+        name: "snapshots",
+        columns: &SNAPSHOTS,
+        layout: ParameterSnapshot::WIRE_NAME,
+        empty: || Row::Snapshot(ParameterSnapshot::empty().into()),
+    },
+    TableKind {
+        name: "events",
+        columns: &EVENTS,
+        layout: EVENT,
+        empty: || Row::Event(Event::default()),
+    },
+];
+
 /// The table of attached files.
 pub const ATTACHMENTS: &str = "attachments";
 /// The table of metadata.

@@ -9,19 +9,22 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use dynocar::cli::{Failure, parse};
+use dynocar::cli::{Failure, carry_out};
 use dynocar::config::DaemonConfig;
 use dynocar::output::{print, report_line, require_new};
 use dynocar::programs::{RECORDING, called_as};
 
-use crate::convert::{ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset};
+use crate::convert::{ModelFiles, Unpacked, from_dataset, to_dataset};
+use crate::copying::recover;
+use crate::error::{AtPath, CopyError};
 use crate::page::page;
-use crate::reading::{Ending, ReadError};
+use crate::reading::Ending;
 use crate::recording::Recording;
-use crate::recover::{RecoverError, recover};
-use crate::verify::{Configurations, Outcome, overlay, overlay_text, text, verify};
+use crate::verify::{
+    ConfigurationProblem, Configurations, Outcome, overlay, overlay_text, text, verify,
+};
 
-pub use failure::from_dataset_failure;
+pub use failure::{copy_failure, dataset_failure, from_dataset_failure};
 pub use record::WantedArguments;
 
 /// Recordings of what a controller and the daemon write, as MCAP.
@@ -30,6 +33,9 @@ pub use record::WantedArguments;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Report a failure to another program, in this file
+    #[arg(long, global = true, hide = true)]
+    json: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -137,32 +143,25 @@ pub fn command() -> clap::Command {
 
 /// Parses the command line, runs the command, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse::<Arguments>(program()) {
-        Ok(arguments) => arguments,
-        Err(status) => return status,
-    };
-    let result = match &arguments.command {
-        Command::Record(arguments) => record::execute(arguments),
-        Command::FlightRecorder(arguments) => flight_recorder::execute(arguments),
-        Command::Keep(arguments) => flight_recorder::execute_keep(arguments),
-        Command::Recover(arguments) => execute_recover(arguments),
-        Command::Convert(arguments) => execute_convert(arguments),
-        Command::Annotate(arguments) => annotate::execute(arguments),
-        Command::Verify(arguments) => execute_verify(arguments),
-        Command::Fields => print(&page()).map_err(Failure::from),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(program(), None),
-    }
+    carry_out(
+        program(),
+        |it: &Arguments| it.json.as_deref(),
+        |arguments| match &arguments.command {
+            Command::Record(arguments) => record::execute(arguments),
+            Command::FlightRecorder(arguments) => flight_recorder::execute(arguments),
+            Command::Keep(arguments) => flight_recorder::execute_keep(arguments),
+            Command::Recover(arguments) => execute_recover(arguments),
+            Command::Convert(arguments) => execute_convert(arguments),
+            Command::Annotate(arguments) => annotate::execute(arguments),
+            Command::Verify(arguments) => execute_verify(arguments),
+            Command::Fields => print(&page()).map_err(Failure::from),
+        },
+    )
 }
 
 fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
     require_new(&arguments.output)?;
-    let recovered = recover(&arguments.broken, &arguments.output).map_err(|error| match error {
-        RecoverError::Read(error) => read_failure(error),
-        error => Failure::Work(error.to_string()),
-    })?;
+    let recovered = recover(&arguments.broken, &arguments.output).map_err(copy_failure)?;
     let lost: Vec<String> =
         arguments.broken.iter().zip(&recovered.endings).filter_map(lost).collect();
     let lost =
@@ -186,11 +185,6 @@ fn lost((path, ending): (&PathBuf, &Ending)) -> Option<String> {
     ))
 }
 
-/// A file that is no recording is wrong input; one that the system does not give is not there.
-fn read_failure(error: ReadError) -> Failure {
-    Failure::Input(error.to_string())
-}
-
 fn execute_convert(arguments: &ConvertArguments) -> Result<(), Failure> {
     let ConvertArguments { from, output, train, quiet, .. } = arguments;
     require_new(output)?;
@@ -205,14 +199,6 @@ fn execute_convert(arguments: &ConvertArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A recording that makes no dataset is wrong input; a dataset that cannot be written is not.
-pub fn dataset_failure(error: ToDatasetError) -> Failure {
-    match error {
-        ToDatasetError::Output(error) => error.into(),
-        error => Failure::Input(error.to_string()),
-    }
-}
-
 fn execute_from_dataset(from: &Path, output: &Path, is_quiet: bool) -> Result<(), Failure> {
     let samples = from_dataset(from, output).map_err(from_dataset_failure)?;
     if !is_quiet {
@@ -222,7 +208,8 @@ fn execute_from_dataset(from: &Path, output: &Path, is_quiet: bool) -> Result<()
 }
 
 fn execute_verify(arguments: &VerifyArguments) -> Result<(), Failure> {
-    arguments.verify(&Recording::load_all(&arguments.recording).map_err(read_failure)?)
+    let loaded = Recording::load_all(&arguments.recording).map_err(CopyError::from);
+    arguments.verify(&loaded.map_err(copy_failure)?)
 }
 
 impl VerifyArguments {
@@ -240,7 +227,9 @@ impl VerifyArguments {
         if recording.snapshots.is_empty() {
             return Err(wrong(&format!("{}: no snapshots: nothing to verify", path.display())));
         }
-        let configurations = Configurations::of(path, recording).map_err(|error| wrong(&error))?;
+        let configurations = Configurations::of(recording).map_err(AtPath::of(path));
+        let configurations =
+            configurations.map_err(|it: AtPath<ConfigurationProblem>| wrong(&it))?;
         let other = self.with.as_deref().map(DaemonConfig::load).transpose()?;
         let verified = verify(recording, &configurations);
         let (samples, snapshots) = (recording.samples.len(), recording.snapshots.len());

@@ -8,7 +8,8 @@ use std::sync::LazyLock;
 use dynocar_shared::schema::{Field, Missing, unit_of};
 use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot, RejectionReason, TrainSample};
 
-use crate::event::{EVENT_FIELDS, Event, EventField};
+use crate::event::Event;
+use crate::message::MessageField;
 use crate::schema::{
     SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, members_of, suffixed_name, vocabulary_of,
     vocabulary_of_type,
@@ -89,10 +90,10 @@ pub static SNAPSHOTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
 
 /// The columns of events.
 pub static EVENTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
-    let fields = EVENT_FIELDS.iter().enumerate().map(|(index, it)| {
+    let fields = Event::FIELDS.iter().enumerate().map(|(index, it)| {
         let vocabulary = vocabulary_of_type(it.type_name);
         let type_name = if vocabulary.is_some() { "i32" } else { it.type_name };
-        let EventField { name, meaning, is_optional, .. } = it;
+        let MessageField { name, meaning, is_optional, .. } = it;
         let column = plain((*name).to_owned(), type_name, meaning, Source::Event(index));
         Column { is_nullable: *is_optional, vocabulary, ..column }
     });

@@ -4,27 +4,19 @@ use std::collections::{HashMap, HashSet};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use dynocar::storage::{Storage, settle};
+use dynocar::storage::{Disk, Storage, settle};
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 
+use crate::error::{CopyError, WriteError};
 use crate::joining::read_among;
-use crate::reading::{ChannelInfo, Ending, Item, Raw, ReadError, Visitor};
+use crate::reading::{ChannelInfo, Ending, Item, Raw, Visitor};
 
 type Output = BufWriter<Box<dyn Write + Send>>;
 
 /// The writer of a copy.
 pub type CopyWriter = Writer<NoSeek<Output>>;
-
-/// Why a file is not copied.
-#[derive(Debug)]
-pub enum CopyError {
-    /// It cannot be read at all.
-    Read(ReadError),
-    /// The copy cannot be written.
-    Write(McapError),
-}
 
 /// What was copied.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,24 +29,65 @@ pub struct Copied {
     pub endings: Vec<Ending>,
 }
 
-/// Copies what can be read of files, in their order, into a new one, ours or not; `watcher` is given what
-/// they hold, and `add` writes what is to follow. A file that is attached to several is so once. When it has
-/// returned, the new one is on the disk.
+/// Copies what can be read of files, in their order, into a new one, ours or not, and brings it to the disk. A
+/// file that is attached to several is so once; one of several of which a power cut left nothing takes nothing
+/// from the others.
 ///
 /// # Errors
 ///
 /// When one is no MCAP file, or the new one cannot be written; then there is none.
-pub fn copy<V: Visitor>(
+pub fn recover(from: &[PathBuf], to: &Path) -> Result<Copied, CopyError> {
+    recover_on(&Disk, from, to)
+}
+
+/// The same on any storage.
+///
+/// # Errors
+///
+/// As [`recover`].
+pub fn recover_on(storage: &dyn Storage, from: &[PathBuf], to: &Path) -> Result<Copied, CopyError> {
+    copy(storage, from, to, &mut (), |_, ()| Ok(()))
+}
+
+/// The same; `watcher` is given what the files hold, and `add` writes what is to follow.
+///
+/// # Errors
+///
+/// As [`recover`], and those of `add`.
+pub fn copy<V: Visitor<Error = CopyError>, E: From<CopyError>>(
     storage: &dyn Storage,
     from: &[PathBuf],
     to: &Path,
     watcher: &mut V,
-    add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), McapError>,
-) -> Result<Copied, CopyError> {
-    let file = storage.create(to).map_err(|error| CopyError::Write(error.into()))?;
-    let done = copy_into(from, BufWriter::new(file), watcher, add).and_then(|copied| {
-        settle(storage, to).map_err(|error| CopyError::Write(error.into()))?;
-        Ok(copied)
+    add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), E>,
+) -> Result<Copied, E> {
+    let failed = |error| CopyError::from(WriteError::of::<McapError>(to)(error));
+    let file = storage.create(to).map_err(|error| failed(error.into()))?;
+    let options = WriteOptions::new().profile("dynocar").disable_seeking(true);
+    let writer = options.create(NoSeek::new(BufWriter::new(file))).map_err(failed)?;
+    let mut copier = Copier {
+        writer,
+        to,
+        channels: HashMap::new(),
+        carried: HashSet::new(),
+        messages: 0,
+        attachments: 0,
+        watcher,
+    };
+    let read = from.iter().map(|path| read_among(from.len(), path, &mut copier));
+    let read: Result<Vec<Ending>, CopyError> = read.collect();
+    let Copier { mut writer, messages, attachments, watcher, .. } = copier;
+    let filled = read.map_err(E::from).and_then(|endings| {
+        add(&mut writer, watcher)?;
+        writer.finish().map_err(failed)?;
+        Ok(endings)
+    });
+    // A writer that is not finished is taken apart, for it would finish when it is dropped.
+    let written = writer.into_inner().into_inner().into_inner();
+    let done = filled.and_then(|endings| {
+        written.map_err(|error| failed(error.into_error().into()))?;
+        settle(storage, to).map_err(|error| failed(error.into()))?;
+        Ok(Copied { messages, attachments, endings })
     });
     if done.is_err() {
         // It holds nothing that the first does not.
@@ -63,60 +96,22 @@ pub fn copy<V: Visitor>(
     done
 }
 
-fn copy_into<V: Visitor>(
-    from: &[PathBuf],
-    file: Output,
-    watcher: &mut V,
-    add: impl FnOnce(&mut CopyWriter, &mut V) -> Result<(), McapError>,
-) -> Result<Copied, CopyError> {
-    let options = WriteOptions::new().profile("dynocar").disable_seeking(true);
-    let writer = options.create(NoSeek::new(file)).map_err(CopyError::Write)?;
-    let mut copier = Copier {
-        writer,
-        channels: HashMap::new(),
-        carried: HashSet::new(),
-        messages: 0,
-        attachments: 0,
-        failed: None,
-        watcher,
-    };
-    let read: Result<Vec<Ending>, ReadError> =
-        from.iter().map(|path| read_among(from.len(), path, &mut copier)).collect();
-    let Copier { mut writer, messages, attachments, mut failed, watcher, .. } = copier;
-    if read.is_ok() && failed.is_none() {
-        failed = add(&mut writer, watcher).err();
-    }
-    // A writer that is not to be finished is taken apart, for it would finish when it is dropped.
-    match (read, failed) {
-        (_, Some(error)) => {
-            writer.into_inner();
-            Err(CopyError::Write(error))
-        }
-        (Err(error), None) => {
-            writer.into_inner();
-            Err(CopyError::Read(error))
-        }
-        (Ok(endings), None) => {
-            writer.finish().map_err(CopyError::Write)?;
-            let written = writer.into_inner().into_inner().into_inner();
-            written.map_err(|error| CopyError::Write(error.into_error().into()))?;
-            Ok(Copied { messages, attachments, endings })
-        }
-    }
-}
-
 struct Copier<'v, V> {
     writer: CopyWriter,
+    to: &'v Path,
     channels: HashMap<u16, (ChannelInfo, u16)>,
     /// Attached files and metadata that were written, as they were.
     carried: HashSet<Vec<u8>>,
     messages: u64,
     attachments: u64,
-    failed: Option<McapError>,
     watcher: &'v mut V,
 }
 
 impl<V> Copier<'_, V> {
+    fn checked(&self, written: Result<(), McapError>) -> Result<(), CopyError> {
+        Ok(written.map_err(WriteError::of(self.to))?)
+    }
+
     fn message(&mut self, raw: &Raw<'_>) -> Result<(), McapError> {
         let known = self.channels.get(&raw.header.channel_id);
         let channel_id = match known.filter(|it| it.0 == *raw.channel) {
@@ -159,28 +154,20 @@ impl<V> Copier<'_, V> {
             _ => Ok(()),
         }
     }
-
-    fn note(&mut self, done: Result<(), McapError>) {
-        if let Err(error) = done {
-            self.failed.get_or_insert(error);
-        }
-    }
 }
 
-impl<V: Visitor> Visitor for Copier<'_, V> {
-    fn item(&mut self, item: Item<'_>) {
-        self.watcher.item(item.clone());
-        if self.failed.is_none() {
-            let done = self.other(item);
-            self.note(done);
-        }
+impl<V: Visitor<Error = CopyError>> Visitor for Copier<'_, V> {
+    type Error = CopyError;
+
+    fn item(&mut self, item: Item<'_>) -> Result<(), CopyError> {
+        self.watcher.item(item.clone())?;
+        let written = self.other(item);
+        self.checked(written)
     }
 
-    fn raw(&mut self, raw: &Raw<'_>) {
-        self.watcher.raw(raw);
-        if self.failed.is_none() {
-            let done = self.message(raw);
-            self.note(done);
-        }
+    fn raw(&mut self, raw: &Raw<'_>) -> Result<(), CopyError> {
+        self.watcher.raw(raw)?;
+        let written = self.message(raw);
+        self.checked(written)
     }
 }

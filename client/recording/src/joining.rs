@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::Metadata;
 
-use crate::reading::{Ending, Item, Raw, ReadError, Visitor, read};
+use crate::error::ReadError;
+use crate::reading::{Ending, Item, Raw, ReadProblem, Visitor, read};
 
 /// Reads the files of a recording that rotated, in order, as if they were one: what each repeats is given
 /// once. Gives how each ends.
@@ -15,21 +16,20 @@ use crate::reading::{Ending, Item, Raw, ReadError, Visitor, read};
 /// # Errors
 ///
 /// As [`read_among`], and when they are not the files of one recording in its order.
-pub fn read_all(paths: &[PathBuf], visitor: &mut impl Visitor) -> Result<Vec<Ending>, ReadError> {
-    let mut joined =
-        Joined { visitor, attached: HashMap::new(), seen: vec![], begins: None, other: None };
+pub fn read_all<V: Visitor>(paths: &[PathBuf], visitor: &mut V) -> Result<Vec<Ending>, V::Error> {
+    let (attached, seen) = (HashMap::new(), Vec::new());
+    let path = PathBuf::new();
+    let mut joined = Joined { visitor, attached, seen, path, before: None, begins: None };
     let mut endings = Vec::new();
     let mut newest: Option<(&PathBuf, u64)> = None;
-    for (index, path) in paths.iter().enumerate() {
-        (joined.begins, joined.other) = (None, None);
+    for path in paths {
+        joined.before = Some(std::mem::replace(&mut joined.path, path.clone()));
+        joined.begins = None;
         endings.push(read_among(paths.len(), path, &mut joined)?);
-        if let Some(name) = joined.other.take() {
-            let (path, before) = (path.clone(), paths[index - 1].clone());
-            return Err(ReadError::OtherRecording { path, before, name });
-        }
         let Some(begins) = joined.begins else { continue };
         if let Some((before, _)) = newest.filter(|it| begins < it.1) {
-            return Err(ReadError::OutOfOrder { path: path.clone(), before: before.clone() });
+            let problem = ReadProblem::OutOfOrder { before: before.clone() };
+            return Err(ReadError::of(path)(problem).into());
         }
         newest = Some((path, begins));
     }
@@ -42,19 +42,17 @@ pub fn read_all(paths: &[PathBuf], visitor: &mut impl Visitor) -> Result<Vec<End
 /// # Errors
 ///
 /// As [`read`].
-pub fn read_among(
+pub fn read_among<V: Visitor>(
     count: usize,
     path: &Path,
-    visitor: &mut impl Visitor,
-) -> Result<Ending, ReadError> {
-    match read(path, visitor) {
-        Err(ReadError::NotMcap { .. }) if count > 1 && is_nothing(path) => {
-            let file_bytes = std::fs::metadata(path).map_or(0, |it| it.len());
-            let reason = "nothing of it was brought to the disk".to_owned();
-            Ok(Ending::Broken { read_bytes: 0, file_bytes, reason })
-        }
-        read => read,
+    visitor: &mut V,
+) -> Result<Ending, V::Error> {
+    if count > 1 && is_nothing(path) {
+        let file_bytes = std::fs::metadata(path).map_or(0, |it| it.len());
+        let reason = "nothing of it was brought to the disk".to_owned();
+        return Ok(Ending::Broken { read_bytes: 0, file_bytes, reason });
     }
+    read(path, visitor)
 }
 
 /// True for a file without a byte other than 0, and for one that ends within the first bytes of MCAP.
@@ -72,31 +70,38 @@ struct Joined<'v, V> {
     visitor: &'v mut V,
     attached: HashMap<String, Vec<u8>>,
     seen: Vec<Metadata>,
+    path: PathBuf,
+    /// The file before it.
+    before: Option<PathBuf>,
     /// When the file's first message was recorded.
     begins: Option<u64>,
-    /// A file that is attached with other content than before.
-    other: Option<String>,
 }
 
 impl<V: Visitor> Visitor for Joined<'_, V> {
-    fn item(&mut self, item: Item<'_>) {
+    type Error = V::Error;
+
+    fn item(&mut self, item: Item<'_>) -> Result<(), V::Error> {
         match &item {
             Item::Attachment { name, content, .. } => match self.attached.get(name) {
-                Some(known) if known == content => return,
-                Some(_) => self.other = Some(name.clone()),
+                Some(known) if known == content => return Ok(()),
+                Some(_) => {
+                    let before = self.before.take().unwrap_or_default();
+                    let problem = ReadProblem::OtherRecording { before, name: name.clone() };
+                    return Err(ReadError::of(&self.path)(problem).into());
+                }
                 None => {
                     self.attached.insert(name.clone(), content.to_vec());
                 }
             },
-            Item::Metadata(it) if self.seen.contains(it) => return,
+            Item::Metadata(it) if self.seen.contains(it) => return Ok(()),
             Item::Metadata(it) => self.seen.push((*it).clone()),
             _ => {}
         }
-        self.visitor.item(item);
+        self.visitor.item(item)
     }
 
-    fn raw(&mut self, raw: &Raw<'_>) {
+    fn raw(&mut self, raw: &Raw<'_>) -> Result<(), V::Error> {
         self.begins.get_or_insert(raw.header.log_time);
-        self.visitor.raw(raw);
+        self.visitor.raw(raw)
     }
 }

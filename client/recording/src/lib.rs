@@ -11,14 +11,15 @@
 //! - [`page`]: the reference page of the recorded fields
 //! - [`codec`]: samples and snapshots as messages, and back, to the bit
 //! - [`event`]: what happens around them
+//! - [`message`]: messages that are declared once
 //! - [`topic`]: the streams of messages
 //! - [`train_channels`]: what a recorder and a live view read of the trains' channels
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`joining`]: the files of a recording that rotated, read as one
 //! - [`recording`]: a recording in memory
 //! - [`record`]: the recorder
-//! - [`copying`]: copies of recordings, ours or not
-//! - [`recover`]: a broken file made whole
+//! - [`copying`]: copies of recordings, ours or not: a broken file made whole
+//! - [`error`]: what is wrong with a file, and which
 //! - [`annotate`]: an explanation beside the data
 //! - [`convert`]: recordings to datasets and back
 //! - [`verify`]: every recorded snapshot computed again
@@ -30,13 +31,14 @@ pub mod codec;
 pub mod columns;
 pub mod convert;
 pub mod copying;
+pub mod error;
 pub mod event;
 pub mod joining;
+pub mod message;
 pub mod page;
 pub mod reading;
 pub mod record;
 pub mod recording;
-pub mod recover;
 pub mod schema;
 pub mod topic;
 pub mod train_channels;

@@ -8,7 +8,8 @@ use dynocar_shared::{PipelineKind, Reason, Status};
 
 use crate::annotate::schema::MESSAGES;
 use crate::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
-use crate::event::{EVENT_FIELDS, EventField, EventKind};
+use crate::event::{Event, EventKind};
+use crate::message::MessageField;
 use crate::schema::{
     ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, number, parameter_number,
     rejection_number, vocabulary_of_type,
@@ -48,7 +49,7 @@ pub fn page() -> String {
     let nested = [("estimate", ESTIMATE, "Estimate"), ("rejected", REJECTED, "Rejected")];
     for (name, number, of_type) in nested {
         let row = Row { name, number: Some(number), of_type, ..Row::default() };
-        row.put(&mut page, Columns::ALL, &format!("By name, see `dynocar.{of_type}`."));
+        row.put(&mut page, ALL, &format!("By name, see `dynocar.{of_type}`."));
     }
     table(
         &mut page,
@@ -59,23 +60,23 @@ pub fn page() -> String {
              their number higher by so much: {}.",
             SUFFIXES.map(|(offset, word, _)| format!("`_{word}` {offset}")).join(", ")
         ),
-        Columns::PARQUET,
+        PARQUET,
     );
     for column in SNAPSHOTS.iter() {
         let Source::Value(it) = column.source else { continue };
         let row = Row::of(column, parameter_number(it), "double");
-        Row { name: it.full_name(), ..row }.put(&mut page, Columns::PARQUET, &column.meaning);
+        Row { name: it.full_name(), ..row }.put(&mut page, PARQUET, &column.meaning);
     }
     let what = "How many samples a pipeline refused, by reason; columns of the snapshots, under `rejected_` and \
                 the name.";
-    table(&mut page, "dynocar.Rejected", what, Columns::PARQUET);
+    table(&mut page, "dynocar.Rejected", what, PARQUET);
     for column in SNAPSHOTS.iter() {
         let Source::Rejected(it) = column.source else { continue };
         let row = Row::of(column, rejection_number(it), "uint32");
-        Row { name: it.name(), ..row }.put(&mut page, Columns::PARQUET, &column.meaning);
+        Row { name: it.name(), ..row }.put(&mut page, PARQUET, &column.meaning);
     }
     let columns: Vec<&Column> = EVENTS.iter().collect();
-    listed(&mut page, "Event", "What happened around them.", &EVENT_FIELDS, &columns[STAMPS..]);
+    listed(&mut page, Event::NAME, Event::MEANING, Event::FIELDS, &columns[STAMPS..]);
     page.push_str(EXPLANATION);
     for (name, what, fields) in MESSAGES {
         listed(&mut page, name, what, fields, &[]);
@@ -84,29 +85,18 @@ pub fn page() -> String {
     page
 }
 
-/// The columns of a table that not every table has.
-#[derive(Clone, Copy)]
-struct Columns {
-    has_column: bool,
-    has_numpy: bool,
+/// How many of the columns `column` and `NumPy` a table has.
+type Shown = usize;
+const ALL: Shown = 2;
+const PARQUET: Shown = 1;
+
+/// The cells of these columns.
+fn cells(shown: Shown, column: &str, numpy: &str) -> String {
+    [column, numpy][..shown].iter().map(|text| format!(" {text} |")).collect()
 }
 
-impl Columns {
-    const ALL: Self = Columns { has_column: true, has_numpy: true };
-    const PARQUET: Self = Columns { has_column: true, has_numpy: false };
-    const NONE: Self = Columns { has_column: false, has_numpy: false };
-
-    /// The cells of these columns.
-    fn cells(self, column: &str, numpy: &str) -> String {
-        let cell = |is_there: bool, text: &str| {
-            if is_there { format!(" {text} |") } else { String::new() }
-        };
-        cell(self.has_column, column) + &cell(self.has_numpy, numpy)
-    }
-}
-
-fn table(page: &mut String, name: &str, what: &str, columns: Columns) {
-    let (title, line) = (columns.cells("column", "NumPy"), columns.cells("---", "---"));
+fn table(page: &mut String, name: &str, what: &str, shown: Shown) {
+    let (title, line) = (cells(shown, "column", "NumPy"), cells(shown, "---", "---"));
     let _ = write!(
         page,
         "\n## `{name}`\n\n{what}\n\n| field | number | type |{title} unit | meaning |\n\
@@ -115,12 +105,12 @@ fn table(page: &mut String, name: &str, what: &str, columns: Columns) {
 }
 
 /// A message by the table of its fields, and the columns that they are where they are any.
-fn listed(page: &mut String, name: &str, what: &str, fields: &[EventField], columns: &[&Column]) {
-    let shown = if columns.is_empty() { Columns::NONE } else { Columns::PARQUET };
+fn listed(page: &mut String, name: &str, what: &str, fields: &[MessageField], columns: &[&Column]) {
+    let shown = if columns.is_empty() { 0 } else { PARQUET };
     table(page, &format!("dynocar.{name}"), &plain(what), shown);
     for (index, it) in fields.iter().enumerate() {
         let of_type = vocabulary_of_type(it.type_name).unwrap_or_else(|| protobuf(it.type_name));
-        let (number, unit) = (it.number as u32, unit_of(it.name));
+        let (number, unit) = (it.number, unit_of(it.name));
         let row = match columns.get(index) {
             Some(column) => Row::of(column, number, of_type),
             None => Row { name: it.name, number: Some(number), of_type, unit, ..Row::default() },
@@ -153,10 +143,10 @@ impl<'a> Row<'a> {
         }
     }
 
-    fn put(&self, page: &mut String, shown: Columns, meaning: &str) {
+    fn put(&self, page: &mut String, shown: Shown, meaning: &str) {
         let Row { name, of_type, unit, .. } = self;
         let number = self.number.map_or("".to_owned(), |it| it.to_string());
-        let cells = shown.cells(&self.column, &self.numpy);
+        let cells = cells(shown, &self.column, &self.numpy);
         let meaning = plain(meaning);
         let _ = writeln!(page, "| `{name}` | {number} | {of_type} |{cells} {unit} | {meaning} |");
     }
@@ -184,17 +174,13 @@ fn protobuf(type_name: &str) -> &'static str {
 }
 
 fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field], &[Column])) {
-    table(page, name, what, Columns::ALL);
+    table(page, name, what, ALL);
     for field in fields {
         let shape = if field.is_array() { format!("({},)", field.entries()) } else { "".into() };
         let numpy = format!("`{shape}{}` at {}", field.numpy_type(), field.layout.offset);
         let Some(column) = columns.iter().find(|it| it.name == field.layout.name) else {
             let row = Row { name: field.layout.name, numpy, ..Row::default() };
-            row.put(
-                page,
-                Columns::ALL,
-                &format!("{} Elsewhere a value is there or not.", field.meaning),
-            );
+            row.put(page, ALL, &format!("{} Elsewhere a value is there or not.", field.meaning));
             continue;
         };
         let of_type = column.vocabulary.unwrap_or_else(|| protobuf(field.entry_type()));
@@ -202,7 +188,7 @@ fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field
             if field.is_array() { format!("repeated {of_type}") } else { of_type.to_owned() };
         let missing = if column.is_nullable { " Missing unless measured." } else { "" };
         let row = Row::of(column, number(field), &of_type);
-        Row { numpy, ..row }.put(page, Columns::ALL, &format!("{}{missing}", field.meaning));
+        Row { numpy, ..row }.put(page, ALL, &format!("{}{missing}", field.meaning));
     }
 }
 

@@ -12,34 +12,25 @@ use mcap::{McapError, parse_record};
 use prost::Message;
 
 use crate::codec::{CodecError, decode_sample, decode_snapshot};
+use crate::error::{CopyError, ReadError};
 use crate::event::Event;
 use crate::schema::{EVENT, SAMPLE, SNAPSHOT};
 
-/// Why a file is no recording that can be read.
+/// What is wrong with a file that is to be a recording.
 #[derive(Debug, thiserror::Error)]
-pub enum ReadError {
+pub enum ReadProblem {
     /// The system does not give it.
-    #[error("{}: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The system's answer.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Unreadable(#[from] std::io::Error),
     /// It is of another format.
-    #[error("{}: not an MCAP file: expected one that begins with the bytes of MCAP, version 0", path.display())]
-    NotMcap {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("not an MCAP file: expected one that begins with the bytes of MCAP, version 0")]
+    NotMcap,
     /// Its messages are of another release.
     #[error(
-        "{}: {topic}: recorded with another schema: expected {expected}, found {found}; read it with \
-         the release of dynocar that recorded it", path.display()
+        "{topic}: recorded with another schema: expected {expected}, found {found}; read it with the release \
+         of dynocar that recorded it"
     )]
     OtherSchema {
-        /// The file.
-        path: PathBuf,
         /// The channel.
         topic: String,
         /// This release's layout.
@@ -48,10 +39,8 @@ pub enum ReadError {
         found: String,
     },
     /// A message is not what its channel says.
-    #[error("{}: {topic}, message {number}: {source}", path.display())]
+    #[error("{topic}, message {number}: {source}")]
     Malformed {
-        /// The file.
-        path: PathBuf,
         /// The channel.
         topic: String,
         /// The message's place in the file, counted from 1.
@@ -61,33 +50,24 @@ pub enum ReadError {
     },
     /// Several files are not given in the order in which they were recorded.
     #[error(
-        "{}: begins before {}: expected a recording's files in the order in which they were recorded",
-        path.display(), before.display()
+        "begins before {}: expected a recording's files in the order in which they were recorded",
+        before.display()
     )]
     OutOfOrder {
-        /// The file.
-        path: PathBuf,
         /// The one given before it.
         before: PathBuf,
     },
     /// Several files are not of one recording.
-    #[error(
-        "{}: {name} is another than in {}: expected files of one recording",
-        path.display(), before.display()
-    )]
+    #[error("{name} is another than in {}: expected files of one recording", before.display())]
     OtherRecording {
-        /// The file.
-        path: PathBuf,
         /// One given before it.
         before: PathBuf,
         /// The attached file.
         name: String,
     },
     /// There is no sample.
-    #[error("{}: no samples: expected a channel of {SAMPLE} messages, found {found}", path.display())]
+    #[error("no samples: expected a channel of {SAMPLE} messages, found {found}")]
     NoSamples {
-        /// The file.
-        path: PathBuf,
         /// The channels that there are, in words.
         found: String,
     },
@@ -170,40 +150,60 @@ pub struct ChannelInfo {
 
 /// Who is given what a file holds.
 pub trait Visitor {
-    /// Something of ours.
-    fn item(&mut self, item: Item<'_>);
-    /// Every message, ours or not, before it is read.
-    fn raw(&mut self, _: &Raw<'_>) {}
+    /// Why nothing more is taken.
+    type Error: From<ReadError>;
+
+    /// Takes something of ours.
+    ///
+    /// # Errors
+    ///
+    /// When nothing more is taken.
+    fn item(&mut self, item: Item<'_>) -> Result<(), Self::Error>;
+
+    /// Takes every message, ours or not, before it is read.
+    ///
+    /// # Errors
+    ///
+    /// When nothing more is taken.
+    fn raw(&mut self, _: &Raw<'_>) -> Result<(), Self::Error> {
+        Ok(())
+    }
 }
 
 /// Nobody.
 impl Visitor for () {
-    fn item(&mut self, _: Item<'_>) {}
+    type Error = CopyError;
+
+    fn item(&mut self, _: Item<'_>) -> Result<(), CopyError> {
+        Ok(())
+    }
 }
 
 /// Reads a file, and gives what it holds as far as it is whole.
 ///
 /// # Errors
 ///
-/// When it is no recording that can be read; a file that breaks off is one.
-pub fn read(path: &Path, visitor: &mut impl Visitor) -> Result<Ending, ReadError> {
-    let unreadable = |source| ReadError::Unreadable { path: path.into(), source };
-    let mut file = File::open(path).map_err(unreadable)?;
-    let file_bytes = file.metadata().map_err(unreadable)?.len();
+/// When it is no recording that can be read, or nothing more is taken; a file that breaks off is one.
+pub fn read<V: Visitor>(path: &Path, visitor: &mut V) -> Result<Ending, V::Error> {
+    let unreadable = ReadError::of::<std::io::Error>(path);
+    let not_mcap = || ReadError::of(path)(ReadProblem::NotMcap).into();
+    let mut file = File::open(path).map_err(&unreadable)?;
+    let file_bytes = file.metadata().map_err(&unreadable)?.len();
     // A damaged length asks for no more memory than the file has bytes.
     let limit = usize::try_from(file_bytes).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(limit);
     let mut reader = LinearReader::new_with_options(options);
-    let mut records = Records::new(path);
+    let mut records =
+        Records { path, schemas: HashMap::new(), channels: HashMap::new(), messages: 0 };
     let mut given = 0;
     let mut good = 0;
     let reason = loop {
         match reader.next_event() {
             None => return Ok(Ending::Whole),
             Some(Ok(LinearReadEvent::ReadRequest(need))) => {
-                let read = file.read(reader.insert(need)).map_err(unreadable)?;
+                let read = file.read(reader.insert(need)).map_err(&unreadable)?;
                 reader.notify_read(read);
                 given += read as u64;
             }
@@ -214,12 +214,8 @@ pub fn read(path: &Path, visitor: &mut impl Visitor) -> Result<Ending, ReadError
                     Err(Stop::Broken(error)) => break error,
                 }
             }
-            Some(Err(McapError::BadMagic)) if good == 0 => {
-                return Err(ReadError::NotMcap { path: path.into() });
-            }
-            Some(Err(McapError::UnexpectedEof)) if given < 8 => {
-                return Err(ReadError::NotMcap { path: path.into() });
-            }
+            Some(Err(McapError::BadMagic)) if good == 0 => return Err(not_mcap()),
+            Some(Err(McapError::UnexpectedEof)) if given < 8 => return Err(not_mcap()),
             Some(Err(error)) => break error,
         }
     };
@@ -228,14 +224,14 @@ pub fn read(path: &Path, visitor: &mut impl Visitor) -> Result<Ending, ReadError
 }
 
 /// Why reading stops.
-enum Stop {
+enum Stop<E> {
     /// The file is damaged from here on.
     Broken(McapError),
-    /// It is none that can be read.
-    Refused(ReadError),
+    /// It is none that can be read, or nothing more is taken.
+    Refused(E),
 }
 
-impl From<McapError> for Stop {
+impl<E> From<McapError> for Stop<E> {
     fn from(error: McapError) -> Self {
         Stop::Broken(error)
     }
@@ -248,90 +244,90 @@ struct Records<'p> {
     messages: u64,
 }
 
-impl<'p> Records<'p> {
-    fn new(path: &'p Path) -> Self {
-        Records { path, schemas: HashMap::new(), channels: HashMap::new(), messages: 0 }
-    }
-
-    fn take(&mut self, opcode: u8, data: &[u8], visitor: &mut impl Visitor) -> Result<(), Stop> {
+impl Records<'_> {
+    fn take<V: Visitor>(
+        &mut self,
+        opcode: u8,
+        data: &[u8],
+        visitor: &mut V,
+    ) -> Result<(), Stop<V::Error>> {
         if opcode == op::ATTACHMENT && !has_room_for_its_parts(data) {
             return Err(Stop::Broken(McapError::UnexpectedEof));
         }
-        match parse_record(opcode, data)? {
+        let given = match parse_record(opcode, data)? {
             Record::Schema { header, data } => {
                 self.schemas.insert(header.id, (header.name, header.encoding, data.into_owned()));
+                Ok(())
             }
             Record::Channel(it) => {
                 let schema = self.schemas.get(&it.schema_id).cloned();
                 let (topic, encoding) = (it.topic, it.message_encoding);
                 let known = ChannelInfo { topic, encoding, metadata: it.metadata, schema };
-                self.require_our_layout(&known).map_err(Stop::Refused)?;
+                let required = require_our_layout(&known);
                 self.channels.insert(it.id, known);
+                required.map_err(|problem| ReadError::of(self.path)(problem).into())
             }
             Record::Message { header, data } => {
                 self.messages += 1;
-                self.message(header, &data, visitor)?;
+                return self.message(header, &data, visitor);
             }
             Record::Metadata(metadata) => visitor.item(Item::Metadata(&metadata)),
             Record::Attachment { header, data, .. } => {
                 let (name, log_time) = (header.name, header.log_time);
                 let media_type = header.media_type;
-                visitor.item(Item::Attachment { name, log_time, media_type, content: &data });
+                visitor.item(Item::Attachment { name, log_time, media_type, content: &data })
             }
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn require_our_layout(&self, channel: &ChannelInfo) -> Result<(), ReadError> {
-        let expected = match channel.schema.as_ref().map(|it| it.0.as_str()) {
-            Some(SAMPLE) => TrainSample::WIRE_NAME,
-            Some(SNAPSHOT) => ParameterSnapshot::WIRE_NAME,
-            _ => return Ok(()),
+            _ => Ok(()),
         };
-        match channel.metadata.get("layout") {
-            Some(found) if found == expected => Ok(()),
-            found => Err(ReadError::OtherSchema {
-                path: self.path.into(),
-                topic: channel.topic.clone(),
-                expected,
-                found: found.cloned().unwrap_or("none".into()),
-            }),
-        }
+        given.map_err(Stop::Refused)
     }
 
-    fn message(
+    fn message<V: Visitor>(
         &self,
         header: MessageHeader,
         data: &[u8],
-        visitor: &mut impl Visitor,
-    ) -> Result<(), Stop> {
+        visitor: &mut V,
+    ) -> Result<(), Stop<V::Error>> {
         let Some(channel) = self.channels.get(&header.channel_id) else {
-            return Err(Stop::Broken(McapError::UnknownChannel(
-                header.sequence,
-                header.channel_id,
-            )));
+            let unknown = McapError::UnknownChannel(header.sequence, header.channel_id);
+            return Err(Stop::Broken(unknown));
         };
-        visitor.raw(&Raw { channel, header, data });
-        let malformed = |source| {
-            let (path, topic) = (self.path.into(), channel.topic.clone());
-            Stop::Refused(ReadError::Malformed { path, topic, number: self.messages, source })
+        let mut give = || {
+            visitor.raw(&Raw { channel, header, data })?;
+            let malformed = |source| {
+                let (topic, number) = (channel.topic.clone(), self.messages);
+                ReadError::of(self.path)(ReadProblem::Malformed { topic, number, source })
+            };
+            match channel.schema.as_ref().map(|it| it.0.as_str()) {
+                Some(SAMPLE) => {
+                    visitor.item(Item::Sample(&decode_sample(data).map_err(malformed)?))
+                }
+                Some(SNAPSHOT) => {
+                    visitor.item(Item::Snapshot(&decode_snapshot(data).map_err(malformed)?))
+                }
+                Some(EVENT) => {
+                    let event = Event::decode(data).map_err(|error| malformed(error.into()))?;
+                    visitor.item(Item::Event(&event))
+                }
+                _ => Ok(()),
+            }
         };
-        match channel.schema.as_ref().map(|it| it.0.as_str()) {
-            Some(SAMPLE) => {
-                visitor.item(Item::Sample(&decode_sample(data).map_err(malformed)?));
-            }
-            Some(SNAPSHOT) => {
-                visitor.item(Item::Snapshot(&decode_snapshot(data).map_err(malformed)?));
-            }
-            Some(EVENT) => {
-                let event = Event::decode(data).map_err(|error| malformed(error.into()))?;
-                visitor.item(Item::Event(&event));
-            }
-            _ => {}
-        }
-        Ok(())
+        give().map_err(Stop::Refused)
     }
+}
+
+fn require_our_layout(channel: &ChannelInfo) -> Result<(), ReadProblem> {
+    let expected = match channel.schema.as_ref().map(|it| it.0.as_str()) {
+        Some(SAMPLE) => TrainSample::WIRE_NAME,
+        Some(SNAPSHOT) => ParameterSnapshot::WIRE_NAME,
+        _ => return Ok(()),
+    };
+    let found = channel.metadata.get("layout").map_or("none", String::as_str);
+    if found == expected {
+        return Ok(());
+    }
+    let (topic, found) = (channel.topic.clone(), found.to_owned());
+    Err(ReadProblem::OtherSchema { topic, expected, found })
 }
 
 /// True when an attachment's record holds its two times, its two texts, its length and its checksum:

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 pub use mcap::records::Metadata;
 
+use crate::error::ReadError;
 use crate::event::Event;
 use crate::joining::read_all;
-use crate::reading::{Item, Raw, ReadError, Visitor};
+use crate::reading::{Item, Raw, ReadProblem, Visitor};
 
 /// What a recording holds, each kind in the order in which it was written.
 #[derive(Debug, Default)]
@@ -29,7 +30,9 @@ pub struct Recording {
 }
 
 impl Visitor for Recording {
-    fn item(&mut self, item: Item<'_>) {
+    type Error = ReadError;
+
+    fn item(&mut self, item: Item<'_>) -> Result<(), ReadError> {
         match item {
             Item::Metadata(it) => self.metadata.push(it.clone()),
             Item::Attachment { name, content, .. } => {
@@ -39,14 +42,16 @@ impl Visitor for Recording {
             Item::Snapshot(it) => self.snapshots.push(*it),
             Item::Event(it) => self.events.push(it.clone()),
         }
+        Ok(())
     }
 
-    fn raw(&mut self, raw: &Raw<'_>) {
+    fn raw(&mut self, raw: &Raw<'_>) -> Result<(), ReadError> {
         if self.topics.last() != Some(&raw.channel.topic)
             && !self.topics.contains(&raw.channel.topic)
         {
             self.topics.push(raw.channel.topic.clone());
         }
+        Ok(())
     }
 }
 
@@ -75,24 +80,14 @@ impl Recording {
         let broken: Vec<String> =
             endings.iter().zip(paths).filter_map(|(ending, path)| ending.words(path)).collect();
         recording.broken = (!broken.is_empty()).then(|| broken.join("; "));
-        recording.require_samples(&paths[0])?;
-        Ok(recording)
-    }
-
-    /// Refuses a recording without samples.
-    ///
-    /// # Errors
-    ///
-    /// Says what there is.
-    pub fn require_samples(&self, path: &Path) -> Result<(), ReadError> {
-        if !self.samples.is_empty() {
-            return Ok(());
+        if recording.samples.is_empty() {
+            let found = match recording.topics.as_slice() {
+                [] => "no message".to_owned(),
+                topics => topics.join(", "),
+            };
+            return Err(ReadError::of(&paths[0])(ReadProblem::NoSamples { found }));
         }
-        let found = match self.topics.as_slice() {
-            [] => "no message".to_owned(),
-            topics => topics.join(", "),
-        };
-        Err(ReadError::NoSamples { path: path.into(), found })
+        Ok(recording)
     }
 
     /// The trains that there are samples of, in order.

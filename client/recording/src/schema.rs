@@ -17,7 +17,8 @@ use prost_types::{
     FileDescriptorProto, FileDescriptorSet, OneofDescriptorProto,
 };
 
-use crate::event::{EVENT_FIELDS, EventField, EventKind};
+use crate::event::{Event, EventKind};
+use crate::message::MessageField;
 
 /// Name of the message of a sample.
 pub const SAMPLE: &str = "dynocar.TrainSample";
@@ -102,7 +103,7 @@ fn descriptors() -> FileDescriptorSet {
             message("ParameterSnapshot", snapshot_message()),
             message("Estimate", estimate_message()),
             message("Rejected", rejected_message()),
-            message("Event", fields_of(&EVENT_FIELDS)),
+            message(Event::NAME, fields_of(Event::FIELDS)),
         ],
         enum_type: enums(),
         ..Default::default()
@@ -194,9 +195,9 @@ fn rejected_message() -> Vec<FieldDescriptorProto> {
 }
 
 /// The fields of a message by its table.
-pub(crate) fn fields_of(table: &[EventField]) -> Vec<FieldDescriptorProto> {
-    let of = |it: &EventField| {
-        let made = field(it.name, it.number as u32, scalar(it.type_name), it.is_optional);
+pub(crate) fn fields_of(table: &[MessageField]) -> Vec<FieldDescriptorProto> {
+    let of = |it: &MessageField| {
+        let made = field(it.name, it.number, scalar(it.type_name), it.is_optional);
         match vocabulary_of_type(it.type_name) {
             Some(vocabulary) => typed(made, Type::Enum, vocabulary),
             None => made,

@@ -1,5 +1,6 @@
 //! The streams of messages, of recordings and of what is served live.
 
+use dynocar::operator::pipeline_name;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 
 use crate::schema::{EVENT, SAMPLE, SNAPSHOT};
@@ -29,8 +30,7 @@ impl Topic {
 
     /// The snapshots of one pipeline.
     pub fn of_snapshots(train: TrainId, index: u32, kind: Option<PipelineKind>) -> Self {
-        let kind = kind.map_or("unknown", PipelineKind::name);
-        let name = format!("/train/{train}/{index}_{kind}");
+        let name = format!("/train/{train}/{}", pipeline_name(index, kind));
         Topic { name, schema: SNAPSHOT, layout: ParameterSnapshot::WIRE_NAME }
     }
 

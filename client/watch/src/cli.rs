@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{CommandFactory, Parser};
-use dynocar::cli::{Failure, parse};
+use dynocar::cli::{Failure, carry_out};
 use dynocar::config::DaemonConfig;
 use dynocar::ending::Ending;
+use dynocar::observing::Wanted;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
@@ -42,20 +43,13 @@ pub fn command() -> clap::Command {
 
 /// Parses the command line, watches until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    let arguments = match parse::<Arguments>("dynocar watch") {
-        Ok(arguments) => arguments,
-        Err(status) => return status,
-    };
-    match execute(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report("dynocar watch", None),
-    }
+    carry_out("dynocar watch", |_| None, execute)
 }
 
 fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let work = |error: dynocar_client::ChannelError| Failure::Work(error.to_string());
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
-    let wanted = wanted(arguments, config.as_ref())?;
+    let trains = wanted(arguments, config.as_ref())?;
     let host = match config.as_ref().and_then(|config| config.root.as_ref()) {
         Some(root) => Host::at(root).map_err(work)?,
         None => Host::from_environment().map_err(work)?,
@@ -63,7 +57,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let ending = Ending::begin().map_err(|error| Failure::Work(error.to_string()))?;
     terminal::end_though_stuck(Arc::clone(&ending.flag))
         .map_err(|error| Failure::Work(format!("watching for the end: {error}")))?;
-    let mut watcher = Watcher::new(host, wanted, config);
+    let mut watcher = Watcher::new(Wanted { host, trains }, config);
     if arguments.plain || !std::io::stdout().is_terminal() {
         return plain::run(&mut watcher, &ending);
     }

@@ -6,7 +6,7 @@
 //! # Layout
 //!
 //! - [`cli`]: the command line
-//! - [`watcher`]: readers of snapshots, daemons that come and go
+//! - [`watcher`]: trains that are observed, and what is shown of them
 //! - [`state`]: a train as it is shown, without any clock or channel
 //! - [`history`]: the last minutes, for plots
 //! - [`advisor`]: what to drive next, now and then

@@ -1,9 +1,10 @@
-//! Readers of snapshots, and daemons that come and go.
+//! Trains that are observed, and what is shown of them.
 
 use std::time::{Duration, Instant};
 
 use dynocar::config::{DaemonConfig, PipelineConfig};
-use dynocar_client::{Host, Peer, Role, SnapshotReader, monotonic_now_ns};
+use dynocar::observing::{ObservedTrain, Wanted};
+use dynocar_client::{Host, Role, monotonic_now_ns};
 use dynocar_shared::TrainId;
 
 use crate::advisor::Advisor;
@@ -16,40 +17,33 @@ const ADVISE_EVERY: Duration = Duration::from_secs(5);
 
 /// Watches trains.
 pub struct Watcher {
-    host: Host,
-    /// Empty for every train that is served.
-    wanted: Vec<TrainId>,
+    wanted: Wanted,
     config: Option<DaemonConfig>,
     watched: Vec<Watched>,
     last_look: Option<Instant>,
     last_advice: Option<Instant>,
 }
 
-/// One train with the one reader of its snapshots.
+/// One train.
 struct Watched {
     state: TrainState,
-    reader: Option<SnapshotReader>,
+    observed: ObservedTrain,
     advisor: Advisor,
 }
 
 impl Watcher {
-    /// A watcher of these trains; of all that are served, when none is named.
-    pub fn new(host: Host, wanted: Vec<TrainId>, config: Option<DaemonConfig>) -> Self {
-        let mut watcher = Watcher {
-            host,
-            wanted: wanted.clone(),
-            config,
-            watched: Vec::new(),
-            last_look: None,
-            last_advice: None,
-        };
-        wanted.into_iter().for_each(|train| watcher.add(train));
+    /// A watcher of these trains.
+    pub fn new(wanted: Wanted, config: Option<DaemonConfig>) -> Self {
+        let named = wanted.trains.clone();
+        let watched = Vec::new();
+        let mut watcher = Watcher { wanted, config, watched, last_look: None, last_advice: None };
+        named.into_iter().for_each(|train| watcher.add(train));
         watcher
     }
 
     /// Where daemons are looked for, in words.
     pub fn place(&self) -> String {
-        self.host.root().display().to_string()
+        self.wanted.host.root().display().to_string()
     }
 
     /// The trains as they are now.
@@ -68,7 +62,7 @@ impl Watcher {
         let pipelines = self.config.as_ref().map_or(&[][..], |config| &config.pipelines);
         for watched in &mut self.watched {
             if is_second {
-                watched.look_up(&self.host);
+                watched.look_up(&self.wanted.host);
             }
             watched.poll(pipelines, is_second);
         }
@@ -81,16 +75,13 @@ impl Watcher {
     }
 
     fn find_trains(&mut self) {
-        if !self.wanted.is_empty() {
-            return;
-        }
+        let is_known = |train| self.watched.iter().any(|it| it.state.id == train);
         // A directory that cannot be read now may be read in a second.
-        for train in Peer::trains(&self.host, Role::Daemon).unwrap_or_default() {
-            if self.watched.iter().all(|it| it.state.id != train) {
-                self.add(train);
-            }
+        let newcomers = self.wanted.newcomers(&[Role::Daemon], is_known).unwrap_or_default();
+        newcomers.into_iter().for_each(|train| self.add(train));
+        if self.wanted.trains.is_empty() {
+            self.watched.sort_by_key(|it| it.state.id);
         }
-        self.watched.sort_by_key(|it| it.state.id);
     }
 
     fn add(&mut self, train: TrainId) {
@@ -99,7 +90,7 @@ impl Watcher {
         let name = model.as_ref().map(|model| model.name.clone());
         self.watched.push(Watched {
             state: TrainState::new(train, name),
-            reader: None,
+            observed: ObservedTrain::new(train, None),
             advisor: Advisor::new(model),
         });
     }
@@ -110,36 +101,23 @@ impl Watched {
         !self.state.pipelines.is_empty()
     }
 
-    /// Looks who serves the train, and opens the reader when it can be opened.
+    /// Looks who serves the train.
     fn look_up(&mut self, host: &Host) {
-        let train = self.state.id;
-        self.state.daemon = match Peer::look_up(host, train, Role::Daemon) {
-            Ok(Peer::Absent) if self.is_heard() => Daemon::Gone,
-            Ok(Peer::Absent) => Daemon::Absent,
-            Ok(Peer::Compatible(it)) => {
-                Daemon::Serving { version: it.version, process_id: it.process_id }
+        let looked = self.observed.look(host, &mut Vec::new());
+        self.state.daemon = match (looked, self.observed.daemon()) {
+            (Err(error), _) => Daemon::Unreadable(error.to_string()),
+            (Ok(()), Some(it)) => {
+                Daemon::Serving { version: it.version.clone(), process_id: it.process_id }
             }
-            Ok(peer @ Peer::Incompatible(_)) => {
-                // Its place in the channel is of no use; a daemon that fits gets a new reader.
-                self.reader = None;
-                let refused = peer.require_compatible(train, Role::Controller).err();
-                Daemon::Unreadable(refused.map_or_else(String::new, |error| error.to_string()))
-            }
-            Err(error) => Daemon::Unreadable(error.to_string()),
+            (Ok(()), None) if self.is_heard() => Daemon::Gone,
+            (Ok(()), None) => Daemon::Absent,
         };
-        if self.reader.is_none() && matches!(self.state.daemon, Daemon::Serving { .. }) {
-            match SnapshotReader::open(host, train) {
-                Ok(reader) => self.reader = Some(reader),
-                Err(error) => self.state.daemon = Daemon::Unreadable(error.to_string()),
-            }
-        }
     }
 
     fn poll(&mut self, names: &[PipelineConfig], is_second: bool) {
-        let Some(reader) = &mut self.reader else { return };
-        reader.poll();
+        self.observed.poll();
         let now_ns = monotonic_now_ns();
-        for reading in reader.readings(now_ns) {
+        for reading in self.observed.readings(now_ns) {
             let index = reading.snapshot.pipeline_index;
             let pipelines = &mut self.state.pipelines;
             let place = pipelines.iter().position(|it| it.snapshot.pipeline_index >= index);

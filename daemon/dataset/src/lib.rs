@@ -100,21 +100,37 @@ pub trait DatasetFiles: Sync {
     /// When it cannot be had.
     fn read(&self, path: &str) -> Result<String, FileProblem>;
 
-    /// The text of a run's file as CSV, laid out as the manifest says, of which the columns that it maps
-    /// are read. Of a [`is_parquet`] file it is [plain](TextLayout::PLAIN) CSV, and times are in the unit
-    /// that the mapping declares.
+    /// What a run's file holds, of which the columns that the manifest maps are read.
     ///
     /// # Errors
     ///
     /// When it cannot be had.
-    fn read_run(&self, path: &str, _manifest: &Manifest) -> Result<String, FileProblem> {
-        self.read(path)
+    fn read_run(&self, path: &str, _manifest: &Manifest) -> Result<RunContent, FileProblem> {
+        self.read(path).map(RunContent::Text)
     }
 
     /// The file's name in messages.
     fn label(&self, path: &str) -> String {
         path.into()
     }
+}
+
+/// What a run's file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RunContent {
+    /// Rows of text, laid out as the manifest says.
+    Text(String),
+    /// All columns of an [`is_parquet`] file. Where a mapped one is not there, none has values.
+    Columns(Vec<RunColumn>),
+}
+
+/// A column of a run's file that is no text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunColumn {
+    /// Its name.
+    pub name: String,
+    /// A mapped column's numbers, times in the unit that is declared for them; `NaN` where missing.
+    pub values: Option<Vec<f64>>,
 }
 
 /// A dataset held in memory, as (path, text).
@@ -247,10 +263,10 @@ impl DatasetHead {
             train: &self.train,
             track: self.track.as_ref(),
         };
-        let text = files
+        let content = files
             .read_run(&entry.file, &self.manifest)
             .map_err(|problem| unread(files.label(&entry.file), problem, Some(&entry.place)))?;
-        run::read(context, index as u32 + 1, entry, &files.label(&entry.file), &text)
+        run::read(context, index as u32 + 1, entry, &files.label(&entry.file), &content)
     }
 }
 

@@ -16,7 +16,7 @@ use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
 use super::stamps;
 use super::table::Table;
-use super::text_layout::TextLayout;
+use crate::RunContent;
 
 const DAY_S: i64 = 86_400;
 
@@ -141,15 +141,19 @@ impl Run {
     }
 }
 
-/// Reads one run from the text of its file; `number` is its place in the manifest, from 1.
+/// Reads one run from what its file holds; `number` is its place in the manifest, from 1.
 pub(super) fn read(
     context: Context,
     number: u32,
     entry: &RunEntry,
     label: &str,
-    text: &str,
+    content: &RunContent,
 ) -> Result<Run, DatasetError> {
-    let table = table_of(context.manifest, entry, label, text)?;
+    let Manifest { layout, columns: mappings, .. } = context.manifest;
+    let table = match content {
+        RunContent::Text(text) => Table::parse(label, text, (layout, mappings))?,
+        RunContent::Columns(columns) => Table::of_columns(label, columns, mappings)?,
+    };
     let rows = table.lines.rows;
     let has_speed = table.filled(Quantity::Speed).is_some();
     let resolved = Resolved::of(context, entry, table);
@@ -195,21 +199,6 @@ pub(super) fn read(
     })
 }
 
-/// The text of a run's file as a table; that of Parquet is plain, whatever is declared of the text of others.
-fn table_of(
-    manifest: &Manifest,
-    entry: &RunEntry,
-    label: &str,
-    text: &str,
-) -> Result<Table, DatasetError> {
-    if !is_parquet(&entry.file) {
-        return Table::parse(label, text, (&manifest.layout, &manifest.columns));
-    }
-    let mut columns = manifest.columns.clone();
-    columns.iter_mut().for_each(|it| it.format = None);
-    Table::parse(label, text, (&TextLayout::PLAIN, &columns))
-}
-
 /// When a run was recorded, in s since 1970 UTC, by the beginning of its file or as declared; `None` where
 /// nothing says. The file's text is asked for where its times may hold it, and may break off anywhere.
 pub fn recorded_unix_s(
@@ -223,7 +212,7 @@ pub fn recorded_unix_s(
     let text = beginning()?;
     // What breaks off within a line may break off within a letter.
     let whole = &text[..=text.rfind('\n')?];
-    let table = table_of(manifest, entry, "", whole).ok()?;
+    let table = Table::parse("", whole, (&manifest.layout, &manifest.columns)).ok()?;
     let mut times_s = table.column(Quantity::Time)?.iter().copied();
     recorded(manifest, entry, table.first_day, times_s.find(|time_s| !time_s.is_nan())?)
 }

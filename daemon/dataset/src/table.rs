@@ -10,6 +10,7 @@ use super::lines::{Row, RowReader, below};
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
+use crate::RunColumn;
 
 /// So many rows show how many there will be.
 const ROWS_BEFORE_RESERVE: usize = 1000;
@@ -82,6 +83,33 @@ impl Table {
         }
         let mut row = 0;
         self.line_of_row.retain(|_| kept(&mut row));
+    }
+
+    /// Takes the columns of a run's file that is no text; a row's line is as if their names stood in the first.
+    pub fn of_columns(
+        label: &str,
+        columns: &[RunColumn],
+        mappings: &[ColumnMapping],
+    ) -> Result<Self, DatasetError> {
+        let refuse = |problem| SourcePosition::whole(label).problem(problem);
+        let names: Vec<String> = columns.iter().map(|it| it.name.trim().into()).collect();
+        if names.is_empty() {
+            return Err(refuse(Problem::NoHeader));
+        }
+        let held_by = |mapping: &ColumnMapping| {
+            let index = find_column(mapping, &names, &TextLayout::PLAIN)
+                .map_err(|problem| SourcePosition::line(label, 1).problem(problem))?;
+            let (values, unit) = (columns[index].values.iter().flatten(), mapping.quantity.unit());
+            Ok((mapping.quantity, values.map(|&value| held(mapping, &unit, value)).collect()))
+        };
+        let columns: Vec<(Quantity, Vec<f64>)> =
+            mappings.iter().map(held_by).collect::<Result<_, DatasetError>>()?;
+        let rows = columns.first().map_or(0, |(_, values)| values.len());
+        if rows == 0 {
+            return Err(refuse(Problem::NoRows));
+        }
+        let lines = LineCounts { rows, ..LineCounts::default() };
+        Ok(Table { columns, line_of_row: (2..rows + 2).collect(), first_day: None, lines })
     }
 
     /// Reads a run's file.

@@ -10,10 +10,11 @@ use serde::Serialize;
 
 pub use daemon::{DaemonAnswer, answer, read, report};
 
+use super::Failure;
 use super::companion::{become_it, words_of_command};
-use super::{ErrorAnswer, Failure};
 use crate::config::DaemonConfig;
 use crate::dataset::{FileKind, file_error, is_recording, kind_of, read_text};
+use crate::error_document::ErrorAnswer;
 use crate::output::{give, report_line, require_file, write_json};
 use crate::programs::WORKSHOP;
 

@@ -4,10 +4,10 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use dynocar_dataset::{DatasetError, SourcePosition};
-use serde::Serialize;
 
 use crate::config::ConfigError;
 use crate::dataset::LoadError;
+use crate::error_document::{ErrorAnswer, ErrorDocument};
 use crate::output::{OutputError, report_line, require_file, write_json};
 use crate::unpacking::UnpackError;
 
@@ -24,26 +24,6 @@ pub enum Failure {
     Output(OutputError),
     /// The result, already reported, is bad news: this exit status.
     Verdict(u8),
-}
-
-/// A failure for machines.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct ErrorAnswer {
-    /// As on standard error.
-    pub message: String,
-    /// The file where it is, when one is wrong.
-    pub file: Option<String>,
-    /// Line in the file, from 1.
-    pub line: Option<usize>,
-    /// Exit status of the command.
-    pub exit_status: u8,
-}
-
-/// What stands in the place of a result.
-#[derive(Serialize)]
-pub struct ErrorDocument {
-    /// Why there is none.
-    pub error: ErrorAnswer,
 }
 
 impl Failure {

@@ -21,9 +21,10 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-pub use failure::{ErrorAnswer, Failure};
+pub use failure::Failure;
 
 use self::companion::{Passed, become_it};
+use crate::error_document::ErrorDocument;
 use crate::output::{OutputError, write_json};
 use crate::programs::{FORWARD, LIVE, RECORDING, WATCH, WORKSHOP};
 use crate::unpacking::program_for;
@@ -145,6 +146,23 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Parses the command line of a program of the project, carries it out, and reports a failure to people, and to
+/// machines where they wanted the result.
+pub fn carry_out<A: Parser>(
+    program: &str,
+    json: impl FnOnce(&A) -> Option<&Path>,
+    execute: impl FnOnce(&A) -> Result<(), Failure>,
+) -> ExitCode {
+    let arguments = match parse::<A>(program) {
+        Ok(arguments) => arguments,
+        Err(status) => return status,
+    };
+    match execute(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(program, json(&arguments)),
+    }
+}
+
 /// The command line of a program of the project; where it asks for help or is wrong, the exit
 /// status after that was reported.
 ///
@@ -183,7 +201,7 @@ fn parse_by<A: Parser>(
         let message = message.trim().trim_start_matches("error: ").to_string();
         if let (true, Some(error)) = (wants_json, Failure::Input(message).answer()) {
             // People know already; that machines cannot be informed changes no status.
-            let _ = write_json(Path::new("-"), &failure::ErrorDocument { error });
+            let _ = write_json(Path::new("-"), &ErrorDocument { error });
         }
         return Err(ExitCode::from(2));
     }

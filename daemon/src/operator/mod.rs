@@ -7,8 +7,13 @@
 
 pub mod suspicion;
 
-use dynocar_shared::RejectionReason;
 use dynocar_shared::snapshot::REJECTION_REASONS;
+use dynocar_shared::{PipelineKind, RejectionReason};
+
+/// What a pipeline is called where no configuration names it: its number there and its kind.
+pub fn pipeline_name(index: u32, kind: Option<PipelineKind>) -> String {
+    format!("{index}_{}", kind.map_or("unknown", PipelineKind::name))
+}
 
 /// A duration as people say it.
 pub fn duration(seconds: f64) -> String {

@@ -5,26 +5,29 @@ use std::sync::Arc;
 
 use arrow_array::{
     ArrayRef, BooleanArray, Decimal128Array, DurationMillisecondArray, Float32Array, Float64Array,
-    Int16Array, StringArray, TimestampMicrosecondArray, UInt64Array,
+    Int16Array, StringArray, Time32MillisecondArray, TimestampMicrosecondArray, UInt64Array,
 };
+use dynocar::error_document::ErrorDocument;
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, FileProblem, Manifest, is_parquet};
-use dynocar_parquet::rows::{Wanted, write_rows};
+use dynocar_dataset::{RunColumn, RunContent};
+use dynocar_parquet::numbers::{Wanted, columns};
 
-use crate::support::{program, said, shared, table};
+use crate::support::{program, shared, table};
 
-fn wanted(columns: &[(&str, &str)]) -> Vec<Wanted> {
-    let wanted = |it: &(&str, &str)| Wanted { column: it.0.into(), unit: it.1.into() };
-    columns.iter().map(wanted).collect()
+fn read(path: &Path, wanted: &[(&str, &str)]) -> Vec<RunColumn> {
+    let wanted = wanted.iter().map(|it| Wanted { column: it.0.into(), unit: it.1.into() });
+    columns(path, &wanted.collect::<Vec<_>>()).unwrap()
 }
 
-fn rows(path: &Path, columns: &[(&str, &str)]) -> String {
-    let mut text = Vec::new();
-    write_rows(path, &wanted(columns), &mut text).unwrap();
-    String::from_utf8(text).unwrap()
+/// The numbers of one column, `None` where missing.
+fn numbers(columns: &[RunColumn], name: &str) -> Vec<Option<f64>> {
+    let column = columns.iter().find(|it| it.name == name).expect(name);
+    let values = column.values.as_ref().expect(name).iter();
+    values.map(|&it| (!it.is_nan()).then_some(it)).collect()
 }
 
 #[test]
-fn numbers_truths_and_times_of_every_kind_become_cells_and_what_is_missing_is_empty() {
+fn numbers_truths_and_times_of_every_kind_become_numbers_and_what_is_missing_is_none() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("own.parquet");
     let at = vec![Some(1_700_000_000_000_001), Some(1_700_000_000_500_000), None];
@@ -34,6 +37,7 @@ fn numbers_truths_and_times_of_every_kind_become_cells_and_what_is_missing_is_em
         vec![
             ("at", shared(TimestampMicrosecondArray::from(at).with_timezone("+02:00"))),
             ("since", shared(DurationMillisecondArray::from(vec![-1500, 0, 250]))),
+            ("clock", shared(Time32MillisecondArray::from(vec![1, 86_399_999, 0]))),
             ("note", shared(StringArray::from(vec!["a", "b", "c"]))),
             ("v, km/h", shared(Float32Array::from(vec![Some(0.1), None, Some(f32::NAN)]))),
             ("force", shared(Int16Array::from(vec![-3, 0, 7]))),
@@ -42,28 +46,28 @@ fn numbers_truths_and_times_of_every_kind_become_cells_and_what_is_missing_is_em
             ("dec", shared(decimals.with_precision_and_scale(9, 2).unwrap())),
         ],
     );
-    let all = [
-        ("at", "s"),
-        ("v, km/h", "km/h"),
-        ("force", "kN"),
-        ("slides", "1"),
-        ("big", "1"),
-        ("dec", "1"),
+    let some = |values: [f64; 3]| values.map(Some);
+    let cases = [
+        ("at", "s", [Some(1_700_000_000.000_001), Some(1_700_000_000.5), None]),
+        ("since", "ms", some([-1500.0, 0.0, 250.0])),
+        ("clock", "s", some([0.001, 86_399.999, 0.0])),
+        // As the file means it: a tenth, not the nearest number of 32 bits.
+        ("v, km/h", "km/h", [Some(0.1), None, None]),
+        ("force", "kN", some([-3.0, 0.0, 7.0])),
+        ("slides", "1", [Some(1.0), Some(0.0), None]),
+        ("big", "1", some([u64::MAX as f64, 0.0, 1.0])),
+        ("dec", "1", [Some(-12.34), Some(0.05), None]),
     ];
-    let expected = "at,since,note,\"v, km/h\",force,slides,big,dec\n\
-                    1700000000.000001000,,,0.1,-3,1,18446744073709551615,-12.34\n\
-                    1700000000.500000000,,,,0,0,0,0.05\n,,,NaN,7,,1,\n";
-    assert_eq!(rows(&path, &all), expected);
+    let all = read(&path, &cases.map(|(name, unit, _)| (name, unit)));
+    for (name, _, expected) in cases {
+        assert_eq!(numbers(&all, name), expected, "{name}");
+    }
+    assert!(all.iter().any(|it| it.name == "note" && it.values.is_none()));
     // Times are given in the unit that is declared, whatever the file counts in.
-    let text = rows(&path, &[("since", "ms")]);
-    assert!(text.contains("\n,-1500,") && text.ends_with("\n,250,,,,,,\n"), "{text}");
-    let text = rows(&path, &[("since", "s")]);
-    assert!(text.contains("\n,-1.500000000,"), "{text}");
-    assert_eq!(
-        rows(&path, &[("speed", "m/s")]).lines().count(),
-        1,
-        "the header states the choices"
-    );
+    assert_eq!(numbers(&read(&path, &[("since", "s")]), "since"), some([-1.5, 0.0, 0.25]));
+    let without = read(&path, &[("speed", "m/s"), ("force", "kN")]);
+    assert!(without.iter().all(|it| it.values.is_none()), "the names state the choices");
+    assert_eq!(without.len(), 9);
 }
 
 /// The demo's files, its runs as Parquet.
@@ -80,11 +84,11 @@ impl DatasetFiles for AsParquet {
         Ok(text.replace("[dataset]\n", "[dataset]\ndelimiter = \";\"\ndecimal = \",\"\n"))
     }
 
-    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<String, FileProblem> {
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
         assert!(is_parquet(path));
         let columns = manifest.columns.iter();
         let pairs: Vec<_> = columns.map(|it| (it.column.as_str(), it.unit.name())).collect();
-        Ok(rows(&self.tables.join(path), &pairs))
+        Ok(RunContent::Columns(read(&self.tables.join(path), &pairs)))
     }
 }
 
@@ -139,8 +143,9 @@ fn columns_that_hold_no_numbers_are_named_with_what_they_hold() {
         (["t", "m/s"], "column t: expected numbers in m/s, found Timestamp(µs)"),
     ];
     for ([column, unit], expected) in cases {
-        let output = program(&["rows", &shown, "--column", column, unit]);
+        let output = program(&["columns", &shown, "--column", column, unit, "--json", "-"]);
         assert_eq!(output.status.code(), Some(2));
-        assert_eq!(said(&output), format!("dynocar-parquet: {shown}: {expected}\n"));
+        let answer: ErrorDocument = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!((answer.error.message.as_str(), answer.error.exit_status), (expected, 2));
     }
 }

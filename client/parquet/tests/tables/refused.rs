@@ -159,7 +159,7 @@ fn a_closed_pipe_is_no_failure_and_a_full_disk_is_reported() {
     let from = recording(folder.path());
     let program = env!("CARGO_BIN_EXE_dynocar-parquet");
     let own = [from.to_str().unwrap(), "--column", "speed_mps", "m/s"];
-    for arguments in [&["--help"][..], &[&["rows"][..], &own].concat()] {
+    for arguments in [&["--help"][..], &[&["columns"][..], &own].concat()] {
         let (_, closed) = std::io::pipe().unwrap();
         let mut command = std::process::Command::new(program);
         let output = command.args(arguments).stdout(closed).output().unwrap();

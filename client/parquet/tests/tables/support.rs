@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use arrow_array::{ArrayRef, RecordBatch};
 use dynocar_recording::columns::Row;
+use dynocar_recording::error::ReadError;
 use dynocar_recording::reading::{Item, Raw, Visitor, read};
 use dynocar_recording::recording::Metadata;
 use dynocar_recording::writing::RecordingWriter;
@@ -32,7 +33,9 @@ impl Everything {
 }
 
 impl Visitor for Everything {
-    fn item(&mut self, item: Item<'_>) {
+    type Error = ReadError;
+
+    fn item(&mut self, item: Item<'_>) -> Result<(), ReadError> {
         match item {
             Item::Metadata(it) => self.metadata.push(it.clone()),
             Item::Attachment { name, log_time, content, .. } => {
@@ -40,12 +43,14 @@ impl Visitor for Everything {
             }
             _ => {}
         }
+        Ok(())
     }
 
-    fn raw(&mut self, raw: &Raw<'_>) {
+    fn raw(&mut self, raw: &Raw<'_>) -> Result<(), ReadError> {
         let (topic, header) = (raw.channel.topic.clone(), &raw.header);
         let times = (header.log_time, header.publish_time);
         self.messages.push((topic, header.sequence, times.0, times.1, raw.data.into()));
+        Ok(())
     }
 }
 

@@ -1,54 +1,6 @@
 //! What an explanation adds to a recording, as messages.
 
-use crate::event::EventField;
-
-/// A message with the table of its fields from one list: number, name, type and what protobuf calls it.
-macro_rules! message {
-    (
-        #[doc = $what:literal]
-        $name:ident {
-            $( #[doc = $meaning:literal] $number:literal $field:ident: $type:ty = $kind:ident $($optional:ident)?; )*
-        }
-    ) => {
-        #[doc = $what]
-        #[derive(Clone, PartialEq, prost::Message)]
-        pub struct $name {
-            $(
-                #[doc = $meaning]
-                #[prost($kind, $($optional,)? tag = $number)]
-                pub $field: $type,
-            )*
-        }
-
-        impl $name {
-            /// Its name in the package.
-            pub const NAME: &str = stringify!($name);
-            /// What it is.
-            pub const MEANING: &str = $what;
-            /// Its fields, in order.
-            pub const FIELDS: &[EventField] = &[ $(
-                EventField {
-                    name: stringify!($field),
-                    number: $number,
-                    type_name: type_name(stringify!($kind)),
-                    is_optional: !stringify!($($optional)?).is_empty(),
-                    meaning: $meaning,
-                },
-            )* ];
-        }
-    };
-}
-
-/// Rust's name of a protobuf type.
-const fn type_name(kind: &str) -> &'static str {
-    match kind.as_bytes() {
-        b"double" => "f64",
-        b"int64" => "i64",
-        b"uint64" => "u64",
-        b"uint32" => "u32",
-        _ => "string",
-    }
-}
+use crate::message::message;
 
 message! {
     /// What `explain` says of a recording.

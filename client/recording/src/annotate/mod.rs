@@ -6,7 +6,7 @@ mod moments;
 pub mod schema;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dynocar::storage::Disk;
 use dynocar_analysis::explain::report::timeline::{RunTimeline, Timeline};
@@ -14,48 +14,34 @@ use mcap::McapError;
 use mcap::records::MessageHeader;
 use prost::Message;
 
-use crate::copying::{CopyError, CopyWriter, copy};
-use crate::reading::ReadError;
+use crate::copying::{CopyWriter, copy};
+use crate::error::{AtPath, CopyError, WriteError};
 use messages::{Effect, PredictedSpeed, Residual, Verdict};
 use moments::{Moments, RunMoments};
 
 /// Why a recording is not annotated.
 #[derive(Debug, thiserror::Error)]
 pub enum AnnotateError {
-    /// It cannot be read.
+    /// It cannot be copied.
     #[error(transparent)]
-    Read(#[from] ReadError),
-    /// The copy cannot be written.
-    #[error("{}: cannot be written: {source}", path.display())]
-    Write {
-        /// The copy.
-        path: PathBuf,
-        /// What stopped it.
-        source: McapError,
-    },
-    /// What is to be added is no explanation.
-    #[error("{}: no explanation in time: {source}", path.display())]
-    Timeline {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
+    Copy(#[from] CopyError),
     /// The explanation is of other data.
-    #[error(
-        "{}: holds {trains} trains and {runs} runs, the explanation is of one train and {explained} runs",
-        path.display()
-    )]
-    OtherRuns {
-        /// The recording.
-        path: PathBuf,
-        /// The trains in it.
-        trains: usize,
-        /// The runs in it.
-        runs: usize,
-        /// The number of the last run that was explained.
-        explained: usize,
-    },
+    #[error(transparent)]
+    OtherRuns(#[from] AtPath<OtherRuns>),
+}
+
+/// Runs of a recording that are not those of an explanation.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "holds {trains} trains and {runs} runs, the explanation is of one train and {explained} runs"
+)]
+pub struct OtherRuns {
+    /// The trains in the recording.
+    pub trains: usize,
+    /// The runs in it.
+    pub runs: usize,
+    /// The number of the last run that was explained.
+    pub explained: usize,
 }
 
 /// What was added.
@@ -74,40 +60,30 @@ pub struct Annotated {
 /// See [`AnnotateError`]; then there is no new file.
 pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<Annotated, AnnotateError> {
     let mut added = Annotated::default();
-    let mut refused = None;
-    let copied = copy(&Disk, &[from.into()], to, &mut Moments::default(), |writer, moments| {
-        match runs_of(moments, timeline) {
-            Ok((train, runs)) => {
-                added = Annotations::new(writer, train)?.write(timeline, &runs)?;
-                Ok(())
-            }
-            Err((trains, runs)) => {
-                refused = Some((trains, runs));
-                Err(McapError::UnexpectedEof)
-            }
-        }
-    });
-    if let Some((trains, runs)) = refused {
-        let explained = timeline.runs.last().map_or(0, |it| it.number as usize);
-        return Err(AnnotateError::OtherRuns { path: from.into(), trains, runs, explained });
-    }
-    match copied {
-        Ok(_) => Ok(added),
-        Err(CopyError::Read(error)) => Err(error.into()),
-        Err(CopyError::Write(source)) => Err(AnnotateError::Write { path: to.into(), source }),
-    }
+    copy(&Disk, &[from.into()], to, &mut Moments::default(), |writer, moments| {
+        let (train, runs) = runs_of(moments, timeline).map_err(AtPath::of(from))?;
+        let annotations = Annotations::new(writer, train);
+        let written = annotations.and_then(|it| it.write(timeline, &runs));
+        added = written.map_err(WriteError::of(to)).map_err(CopyError::from)?;
+        Ok::<(), AnnotateError>(())
+    })?;
+    Ok(added)
 }
 
-/// The train and its runs; else how many trains and runs there are.
-fn runs_of(
-    moments: &Moments,
-    timeline: &Timeline,
-) -> Result<(u64, Vec<RunMoments>), (usize, usize)> {
+/// The train and its runs.
+fn runs_of(moments: &Moments, timeline: &Timeline) -> Result<(u64, Vec<RunMoments>), OtherRuns> {
+    let explained = timeline.runs.last().map_or(0, |it| it.number as usize);
     let trains = moments.trains();
-    let [train] = trains[..] else { return Err((trains.len(), 0)) };
+    let [train] = trains[..] else {
+        return Err(OtherRuns { trains: trains.len(), runs: 0, explained });
+    };
     let runs = moments.runs(train);
     let has_all = timeline.runs.iter().all(|it| (1..=runs.len()).contains(&(it.number as usize)));
-    if has_all { Ok((train, runs)) } else { Err((1, runs.len())) }
+    if has_all {
+        Ok((train, runs))
+    } else {
+        Err(OtherRuns { trains: 1, runs: runs.len(), explained })
+    }
 }
 
 /// Where annotations go.

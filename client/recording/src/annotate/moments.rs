@@ -1,5 +1,6 @@
 //! When the moments of a dataset's runs were, as a recording logs them.
 
+use crate::error::CopyError;
 use crate::reading::{Item, Raw, Visitor};
 
 /// The samples of a recording with their moments, run by run as a dataset of it has them.
@@ -19,16 +20,20 @@ struct Moment {
 }
 
 impl Visitor for Moments {
-    fn item(&mut self, item: Item<'_>) {
+    type Error = CopyError;
+
+    fn item(&mut self, item: Item<'_>) -> Result<(), CopyError> {
         if let Item::Sample(it) = item {
             let (run, logged_ns) = ((it.run, it.direction), self.logged_ns);
             let time_ns = it.time_ns;
             self.samples.push(Moment { train: it.train_id, run, time_ns, logged_ns });
         }
+        Ok(())
     }
 
-    fn raw(&mut self, raw: &Raw<'_>) {
+    fn raw(&mut self, raw: &Raw<'_>) -> Result<(), CopyError> {
         self.logged_ns = raw.header.log_time;
+        Ok(())
     }
 }
 

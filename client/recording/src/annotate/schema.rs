@@ -6,11 +6,11 @@ use prost::Message;
 use prost_types::{FileDescriptorProto, FileDescriptorSet};
 
 use super::messages::{Effect, PredictedSpeed, Residual, Verdict};
-use crate::event::EventField;
+use crate::message::MessageField;
 use crate::schema::{fields_of, message};
 
 /// The messages with their names, what they are and their fields.
-pub const MESSAGES: [(&str, &str, &[EventField]); 4] = [
+pub const MESSAGES: [(&str, &str, &[MessageField]); 4] = [
     (Verdict::NAME, Verdict::MEANING, Verdict::FIELDS),
     (Effect::NAME, Effect::MEANING, Effect::FIELDS),
     (Residual::NAME, Residual::MEANING, Residual::FIELDS),

@@ -12,6 +12,7 @@ use dynocar_analysis::explain::report::timeline::Timeline;
 use super::failure::from_dataset_failure;
 use crate::annotate::{AnnotateError, annotate};
 use crate::convert::from_dataset;
+use crate::error::CopyError;
 
 /// Add an explanation to a copy of the recording that it explains.
 #[derive(Debug, Args)]
@@ -34,8 +35,8 @@ pub struct AnnotateArguments {
 pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
     let AnnotateArguments { from, timeline, output } = arguments;
     require_new(output)?;
-    let wrong = |source| {
-        Failure::Input(AnnotateError::Timeline { path: timeline.clone(), source }.to_string())
+    let wrong = |error: serde_json::Error| {
+        Failure::Input(format!("{}: no explanation in time: {error}", timeline.display()))
     };
     let file = File::open(timeline).map_err(|error| wrong(serde_json::Error::io(error)))?;
     let read: Timeline = serde_json::from_reader(BufReader::new(file)).map_err(wrong)?;
@@ -49,7 +50,7 @@ pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
         annotate(from, &read, output)
     };
     let added = added.map_err(|error| match error {
-        AnnotateError::Write { .. } => Failure::Work(error.to_string()),
+        AnnotateError::Copy(CopyError::Write(_)) => Failure::Work(error.to_string()),
         error => Failure::Input(error.to_string()),
     })?;
     report_line(&format!(

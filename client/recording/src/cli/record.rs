@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::{ArgGroup, Args};
 use dynocar::cli::Failure;
 use dynocar::ending;
+use dynocar::observing;
 use dynocar::output::report_line;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
@@ -64,9 +65,10 @@ impl WantedArguments {
             Some(root) => Host::at(root),
             None => Host::from_environment(),
         };
+        let host = host.map_err(|error| Failure::Work(error.to_string()))?;
+        let trains = self.trains.iter().copied().map(TrainId).collect();
         Ok(Wanted {
-            host: host.map_err(|error| Failure::Work(error.to_string()))?,
-            trains: self.trains.iter().copied().map(TrainId).collect(),
+            trains: observing::Wanted { host, trains },
             snapshot_interval: Duration::from_millis(self.snapshots_ms),
         })
     }

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 
 use dynocar::dataset::{self, LoadError};
 use dynocar::storage::{Disk, settle};
@@ -13,6 +13,7 @@ use mcap::McapError;
 
 use super::DATASET_FOLDER;
 use super::rows::{RowError, from_rows, is_rows};
+use crate::error::WriteError;
 use crate::writing::{RecordingWriter, WallClock};
 
 /// Between two runs of a dataset, for nobody knows the time that passed, in ns.
@@ -36,13 +37,8 @@ pub enum FromDatasetError {
         file: String,
     },
     /// The recording cannot be written.
-    #[error("{}: cannot be written: {source}", path.display())]
-    Write {
-        /// The recording.
-        path: PathBuf,
-        /// What stopped it.
-        source: McapError,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }
 
 /// Writes a dataset as a new recording; gives the number of samples.
@@ -68,8 +64,7 @@ pub fn from_dataset(folder: &Path, path: &Path) -> Result<usize, FromDatasetErro
         .map(|name| (name.clone(), std::fs::read(files.path_of(&name)).unwrap_or_default()))
         .collect();
     let samples = samples(&dataset, &contents)?;
-    write(path, &contents, &samples)
-        .map_err(|source| FromDatasetError::Write { path: path.into(), source })?;
+    write(path, &contents, &samples).map_err(WriteError::of(path))?;
     Ok(samples.len())
 }
 

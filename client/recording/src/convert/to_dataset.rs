@@ -10,7 +10,7 @@ use dynocar_shared::{SampleField, TrainSample};
 
 use super::DATASET_FOLDER;
 use super::rows::{WHEEL_SLIDE, to_rows};
-use crate::reading::ReadError;
+use crate::error::{AtPath, ReadError};
 use crate::recording::Recording;
 
 /// Files of the train and the line for a recording to which none are attached.
@@ -25,53 +25,43 @@ pub struct ModelFiles {
 /// Why a recording becomes no dataset.
 #[derive(Debug, thiserror::Error)]
 pub enum ToDatasetError {
-    /// It cannot be read.
+    /// It, or a file that was given beside it, cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// A file of the dataset cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// It holds another thing than a dataset of one train.
+    #[error(transparent)]
+    Content(#[from] AtPath<NoDataset>),
+}
+
+/// What is wrong with a recording that is to become a dataset.
+#[derive(Debug, thiserror::Error)]
+pub enum NoDataset {
     /// It holds several trains.
-    #[error("{}: holds trains {trains}; a dataset is of one: choose it by --train", path.display())]
+    #[error("holds trains {trains}; a dataset is of one: choose it by --train")]
     SeveralTrains {
-        /// The recording.
-        path: PathBuf,
         /// Their numbers.
         trains: String,
     },
     /// It holds another train.
-    #[error("{}: expected samples of train {wanted}, found trains {trains}", path.display())]
+    #[error("expected samples of train {wanted}, found trains {trains}")]
     NoSuchTrain {
-        /// The recording.
-        path: PathBuf,
         /// The train asked for.
         wanted: u64,
         /// Those that there are.
         trains: String,
     },
     /// Nobody names the train.
-    #[error(
-        "{}: the file of train {train} is not attached: give it by --train-file", path.display()
-    )]
+    #[error("the file of train {train} is not attached: give it by --train-file")]
     NoTrainFile {
-        /// The recording.
-        path: PathBuf,
         /// The train.
         train: u64,
     },
-    /// A file that was given cannot be read.
-    #[error("{}: {source}", path.display())]
-    ModelFile {
-        /// The file.
-        path: PathBuf,
-        /// The system's answer.
-        source: std::io::Error,
-    },
     /// An attached file would be written outside the folder.
-    #[error("{}: attached file {name:?}: expected a path below the dataset's folder", path.display())]
+    #[error("attached file {name:?}: expected a path below the dataset's folder")]
     Outside {
-        /// The recording.
-        path: PathBuf,
         /// The attached name.
         name: String,
     },
@@ -117,7 +107,7 @@ pub fn unpack(
     train: Option<u64>,
     files: &ModelFiles,
 ) -> Result<Unpacked, ToDatasetError> {
-    let train = chosen(path, &recording, train)?;
+    let train = chosen(&recording, train).map_err(AtPath::<NoDataset>::of(path))?;
     let attached: Vec<(&str, &Vec<u8>)> = recording
         .attachments
         .iter()
@@ -131,8 +121,8 @@ pub fn unpack(
     if attached.iter().any(|(name, _)| *name == MANIFEST_FILE) {
         for (name, content) in attached {
             if !is_below(name) {
-                let (path, name) = (path.into(), name.into());
-                return Err(ToDatasetError::Outside { path, name });
+                let outside = NoDataset::Outside { name: name.into() };
+                return Err(AtPath::<NoDataset>::of(path)(outside).into());
             }
             unpacked.runs += usize::from(!name.ends_with(".toml"));
             write(folder, name, content)?;
@@ -159,15 +149,14 @@ pub fn unpack(
     Ok(unpacked)
 }
 
-fn chosen(path: &Path, recording: &Recording, train: Option<u64>) -> Result<u64, ToDatasetError> {
+fn chosen(recording: &Recording, train: Option<u64>) -> Result<u64, NoDataset> {
     let all = recording.trains();
     let trains = all.iter().map(u64::to_string).collect::<Vec<_>>().join(", ");
-    let path = path.into();
     match (train, all.as_slice()) {
         (Some(wanted), all) if all.contains(&wanted) => Ok(wanted),
-        (Some(wanted), _) => Err(ToDatasetError::NoSuchTrain { path, wanted, trains }),
+        (Some(wanted), _) => Err(NoDataset::NoSuchTrain { wanted, trains }),
         (None, [only]) => Ok(*only),
-        (None, _) => Err(ToDatasetError::SeveralTrains { path, trains }),
+        (None, _) => Err(NoDataset::SeveralTrains { trains }),
     }
 }
 
@@ -181,10 +170,7 @@ fn models(
     train: u64,
     files: &ModelFiles,
 ) -> Result<Models, ToDatasetError> {
-    let read = |path: &PathBuf| {
-        std::fs::read(path)
-            .map_err(|source| ToDatasetError::ModelFile { path: path.clone(), source })
-    };
+    let read = |path: &PathBuf| std::fs::read(path).map_err(ReadError::of(path));
     let attached = |name: String| {
         let end = format!("/{name}");
         let found = recording.attachments.iter().rev().find(|it| it.0.ends_with(&end));
@@ -194,7 +180,7 @@ fn models(
         Some(file) => (read(file)?, true),
         None => {
             let found = attached(format!("train-{train}.toml"));
-            let missing = || ToDatasetError::NoTrainFile { path: path.into(), train };
+            let missing = || AtPath::<NoDataset>::of(path)(NoDataset::NoTrainFile { train });
             (found.ok_or_else(missing)?, false)
         }
     };

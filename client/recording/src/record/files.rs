@@ -18,7 +18,6 @@ use super::keeping::{self, Keeper};
 use super::rotation::{Rotation, next};
 use super::{RecordError, Recorded, SYNC};
 use crate::event::{Event, EventKind};
-use crate::train_channels::event;
 use crate::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 
 /// A file, with the bytes that were handed to the system.
@@ -156,7 +155,7 @@ impl Files {
     /// As above.
     pub fn event(&mut self, event: &Event) -> Result<(), RecordError> {
         self.recorded.events += 1;
-        if event.kind == EventKind::SamplesLost as i32 {
+        if event.kind() == EventKind::SamplesLost {
             self.recorded.lost += event.count.unwrap_or(0);
         }
         let written = self.writer.event(event);
@@ -196,7 +195,7 @@ impl Files {
     /// As above.
     pub fn flush(&mut self) -> Result<(), RecordError> {
         if let Some(text) = self.ring.as_deref().and_then(keeping::requested) {
-            self.event(&event(TrainId(0), EventKind::KeepRequested, text))?;
+            self.event(&Event::now(TrainId(0), EventKind::KeepRequested, text))?;
         }
         self.writer.set_clock(WallClock::now());
         let written = self.writer.flush();

@@ -92,15 +92,13 @@ impl std::fmt::Debug for Keeper {
 
 /// True for an event around which a flight recorder keeps what it has: a suspicion, a fault, a request.
 pub fn is_reason(event: &Event) -> bool {
-    match EventKind::try_from(event.kind) {
-        Ok(
-            EventKind::SuspicionRaised
-            | EventKind::KeepRequested
-            | EventKind::DaemonSilent
-            | EventKind::DaemonGone
-            | EventKind::SamplesLost,
-        ) => true,
-        Ok(EventKind::StatusChanged) => event.status == Some(Status::Invalid as i32),
+    match event.kind() {
+        EventKind::SuspicionRaised
+        | EventKind::KeepRequested
+        | EventKind::DaemonSilent
+        | EventKind::DaemonGone
+        | EventKind::SamplesLost => true,
+        EventKind::StatusChanged => event.status == Some(Status::Invalid as i32),
         _ => false,
     }
 }

@@ -59,11 +59,10 @@ impl KeptEvent {
 impl Reason {
     /// The reason that an event is.
     pub fn of(event: &Event, now: SystemTime) -> Self {
-        let kind = EventKind::try_from(event.kind).unwrap_or(EventKind::Unknown);
         Reason {
             at: Moment::of(now).to_string(),
             train: event.train_id,
-            kind: kind.name().to_owned(),
+            kind: event.kind().name().to_owned(),
             text: event.text.clone(),
         }
     }

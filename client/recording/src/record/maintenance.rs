@@ -8,7 +8,6 @@ use dynocar_shared::TrainId;
 
 use super::configuration::Configuration;
 use crate::event::{Event, EventKind};
-use crate::train_channels::event;
 
 /// How often it is looked for new ones.
 const EVERY: Duration = Duration::from_secs(5);
@@ -42,7 +41,7 @@ impl Maintenance {
             let events = models.events().unwrap_or_default();
             for (number, found) in events.iter().filter(|(number, _)| number > known) {
                 let text = format!("maintenance event {number}: {}", found.sentence);
-                news.push(event(*train, EventKind::MaintenanceFound, text));
+                news.push(Event::now(*train, EventKind::MaintenanceFound, text));
             }
             *known = events.last().map_or(*known, |(number, _)| *number);
         }

@@ -21,7 +21,7 @@ use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use mcap::McapError;
 
 use crate::event::{Event, EventKind};
-use crate::train_channels::{PAUSE, Sink, TrainChannels, Wanted, event};
+use crate::train_channels::{PAUSE, Sink, TrainChannels, Wanted};
 use configuration::Configuration;
 use maintenance::Maintenance;
 
@@ -144,7 +144,7 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     }
     channels.take(&mut recorder)?;
     for train in channels.trains() {
-        recorder.event(&event(train, EventKind::RecordingEnded, format!("train {train}")))?;
+        recorder.event(&Event::now(train, EventKind::RecordingEnded, format!("train {train}")))?;
     }
     recorder.files.finish()
 }
@@ -173,7 +173,7 @@ impl Sink for Recorder {
     }
 
     fn opened(&mut self, train: TrainId) -> Result<(), RecordError> {
-        self.event(&event(train, EventKind::RecordingBegan, format!("train {train}")))
+        self.event(&Event::now(train, EventKind::RecordingBegan, format!("train {train}")))
     }
 
     fn daemon_came(&mut self, train: TrainId, process: u32) -> Result<(), RecordError> {

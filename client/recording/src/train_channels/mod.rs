@@ -9,10 +9,11 @@ mod train_channel;
 
 use std::time::{Duration, Instant};
 
-use dynocar_client::{Host, Peer, Role};
+use dynocar::observing;
+use dynocar_client::Role;
 use dynocar_shared::TrainId;
 
-pub use sink::{Sink, event};
+pub use sink::Sink;
 use train_channel::TrainChannel;
 
 /// How long a reader sleeps between two looks at the channels: at 1 kHz a buffer of 512 samples
@@ -24,10 +25,8 @@ const LOOK: Duration = Duration::from_millis(200);
 /// What is to be read.
 #[derive(Clone, Debug)]
 pub struct Wanted {
-    /// The run-time directory.
-    pub host: Host,
-    /// The trains; every train that is there or comes, when empty.
-    pub trains: Vec<TrainId>,
+    /// The trains.
+    pub trains: observing::Wanted,
     /// A pipeline's snapshot is taken when the last is so old, or its status is another.
     pub snapshot_interval: Duration,
 }
@@ -51,7 +50,7 @@ impl TrainChannels {
         name: &'static str,
         sink: &mut S,
     ) -> Result<Self, S::Error> {
-        let named = wanted.trains.clone();
+        let named = wanted.trains.trains.clone();
         let mut channels = TrainChannels { wanted, name, channels: Vec::new(), looked: None };
         named.into_iter().try_for_each(|train| channels.add(train, sink))?;
         Ok(channels)
@@ -72,30 +71,21 @@ impl TrainChannels {
         if self.looked.is_some_and(|it| it.elapsed() < LOOK) {
             return Ok(());
         }
-        if self.wanted.trains.is_empty() {
-            self.add_newcomers(sink)?;
+        let is_known = |train| self.trains().any(|known| known == train);
+        let roles = [Role::Daemon, Role::Controller];
+        for train in self.wanted.trains.newcomers(&roles, is_known)? {
+            self.add(train, sink)?;
         }
-        let host = &self.wanted.host;
+        let host = &self.wanted.trains.host;
         self.channels.iter_mut().try_for_each(|channel| channel.look(host, sink))?;
         self.looked = Some(Instant::now());
         Ok(())
     }
 
-    /// Opens the trains that a daemon serves or a controller drives by now.
-    fn add_newcomers<S: Sink>(&mut self, sink: &mut S) -> Result<(), S::Error> {
-        for role in [Role::Daemon, Role::Controller] {
-            for train in Peer::trains(&self.wanted.host, role)? {
-                if self.trains().all(|known| known != train) {
-                    self.add(train, sink)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
     fn add<S: Sink>(&mut self, train: TrainId, sink: &mut S) -> Result<(), S::Error> {
-        let Wanted { host, snapshot_interval, .. } = &self.wanted;
-        self.channels.push(TrainChannel::open(host, train, *snapshot_interval, self.name)?);
+        let Wanted { trains, snapshot_interval } = &self.wanted;
+        let channel = TrainChannel::open(&trains.host, train, *snapshot_interval, self.name)?;
+        self.channels.push(channel);
         sink.opened(train)
     }
 }

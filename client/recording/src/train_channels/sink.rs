@@ -1,9 +1,9 @@
 //! Who takes what is read.
 
-use dynocar_client::{ChannelError, monotonic_now_ns};
+use dynocar_client::ChannelError;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 
-use crate::event::{Event, EventKind};
+use crate::event::Event;
 
 /// Where that goes what is read: into a recording, to viewers.
 pub trait Sink {
@@ -47,16 +47,5 @@ pub trait Sink {
     /// As above.
     fn daemon_came(&mut self, _train: TrainId, _process: u32) -> Result<(), Self::Error> {
         Ok(())
-    }
-}
-
-/// An event of a train, seen now.
-pub fn event(train: TrainId, kind: EventKind, text: String) -> Event {
-    Event {
-        monotonic_ns: monotonic_now_ns(),
-        train_id: train.0,
-        kind: kind as i32,
-        text,
-        ..Default::default()
     }
 }

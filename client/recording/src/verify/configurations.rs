@@ -1,7 +1,5 @@
 //! The configurations that are attached to a recording.
 
-use std::path::{Path, PathBuf};
-
 use dynocar::config::{ConfigError, DaemonConfig};
 use toml::{Table, Value};
 
@@ -10,41 +8,24 @@ use crate::writing::{CONFIGURATION, folder_of_configuration};
 
 /// Why an attached configuration cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum ConfigurationError {
+pub enum ConfigurationProblem {
     /// There is none.
-    #[error("{}: no daemon's configuration is attached: there is nothing to verify by", path.display())]
-    None {
-        /// The recording.
-        path: PathBuf,
-    },
+    #[error("no daemon's configuration is attached: there is nothing to verify by")]
+    None,
     /// It cannot be unpacked.
-    #[error("{}: {folder}: {source}", path.display())]
-    Unpacking {
-        /// The recording.
-        path: PathBuf,
-        /// The folder of the attached files.
-        folder: String,
-        /// The system's answer.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Unpacking(#[from] std::io::Error),
     /// It is none.
-    #[error("{}: {folder}/daemon.toml: {problem}", path.display())]
+    #[error("{folder}/daemon.toml: {problem}")]
     Malformed {
-        /// The recording.
-        path: PathBuf,
         /// The folder of the attached files.
         folder: String,
         /// What is wrong.
         problem: String,
     },
     /// The daemon of this release refuses it.
-    #[error("{}: attached {source}", path.display())]
-    Refused {
-        /// The recording.
-        path: PathBuf,
-        /// What is wrong.
-        source: ConfigError,
-    },
+    #[error("attached {0}")]
+    Refused(#[from] ConfigError),
 }
 
 /// A configuration with when it was seen.
@@ -64,8 +45,8 @@ impl Configurations {
     ///
     /// # Errors
     ///
-    /// See [`ConfigurationError`].
-    pub fn of(path: &Path, recording: &Recording) -> Result<Self, ConfigurationError> {
+    /// See [`ConfigurationProblem`].
+    pub fn of(recording: &Recording) -> Result<Self, ConfigurationProblem> {
         let mut seen: Vec<SeenConfiguration> = Vec::new();
         for metadata in recording.metadata.iter().filter(|it| it.name == CONFIGURATION) {
             let number = |key| metadata.metadata.get(key).and_then(|it| it.parse::<i64>().ok());
@@ -76,12 +57,12 @@ impl Configurations {
             // Every file of a rotating recording has the same one once more.
             if seen.iter().all(|it| it.monotonic_ns != monotonic_ns) {
                 let folder = folder_of_configuration(index as u32);
-                let (config, keeps_state) = load(path, recording, folder)?;
+                let (config, keeps_state) = load(recording, &folder)?;
                 seen.push(SeenConfiguration { monotonic_ns, config, keeps_state });
             }
         }
         if seen.is_empty() {
-            return Err(ConfigurationError::None { path: path.into() });
+            return Err(ConfigurationProblem::None);
         }
         seen.sort_by_key(|it| it.monotonic_ns);
         Ok(Configurations { seen })
@@ -99,27 +80,19 @@ impl Configurations {
 }
 
 /// Unpacks a configuration with its files under the names they were attached by, and reads it.
-fn load(
-    path: &Path,
-    recording: &Recording,
-    folder: String,
-) -> Result<(DaemonConfig, bool), ConfigurationError> {
-    let unpacking = |source| {
-        let (path, folder) = (path.into(), folder.clone());
-        ConfigurationError::Unpacking { path, folder, source }
-    };
+fn load(recording: &Recording, folder: &str) -> Result<(DaemonConfig, bool), ConfigurationProblem> {
     let malformed = |problem: String| {
-        let (path, folder) = (path.into(), folder.clone());
-        ConfigurationError::Malformed { path, folder, problem }
+        let folder = folder.to_owned();
+        ConfigurationProblem::Malformed { folder, problem }
     };
-    let place = tempfile::tempdir().map_err(unpacking)?;
+    let place = tempfile::tempdir()?;
     let mut text = None;
     for (name, content) in &recording.attachments {
         let Some(name) = name.strip_prefix(&format!("{folder}/")) else { continue };
         if name == "daemon.toml" {
             text = Some(String::from_utf8_lossy(content).into_owned());
         } else if !name.contains('/') {
-            std::fs::write(place.path().join(name), content).map_err(unpacking)?;
+            std::fs::write(place.path().join(name), content)?;
         }
     }
     let text = text.ok_or_else(|| malformed("not attached".into()))?;
@@ -138,7 +111,6 @@ fn load(
     let keeps_state = table.remove("state").is_some();
     // The models that were in force are attached in place of those declared.
     table.remove("models");
-    let config = DaemonConfig::from_text(&place.path().join("daemon.toml"), &table.to_string())
-        .map_err(|source| ConfigurationError::Refused { path: path.into(), source })?;
+    let config = DaemonConfig::from_text(&place.path().join("daemon.toml"), &table.to_string())?;
     Ok((config, keeps_state))
 }

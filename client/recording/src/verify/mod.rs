@@ -9,7 +9,7 @@ mod overlay;
 mod pipelines;
 mod report;
 
-pub use configurations::{ConfigurationError, Configurations};
+pub use configurations::{ConfigurationProblem, Configurations};
 pub use overlay::{QuantityAnswer, overlay};
 pub use pipelines::{Difference, Outcome, Verified, verify};
 pub use report::{overlay_text, text};

@@ -7,7 +7,8 @@ use dynocar_analysis::explain::report::timeline::{
     ActingEffect, ResidualWindow, RunTimeline, SpeedPoint, Timeline,
 };
 use dynocar_recording::annotate::messages::{Effect, PredictedSpeed, Residual};
-use dynocar_recording::annotate::{AnnotateError, annotate};
+use dynocar_recording::annotate::{AnnotateError, OtherRuns, annotate};
+use dynocar_recording::error::ReadError;
 use dynocar_recording::reading::{Item, Raw, Visitor, read};
 use dynocar_recording::recording::Recording;
 use dynocar_shared::TrainSample;
@@ -20,11 +21,16 @@ use crate::support::{samples, snapshots, write};
 struct Logged(HashMap<String, Vec<(u64, Vec<u8>)>>);
 
 impl Visitor for Logged {
-    fn item(&mut self, _: Item<'_>) {}
+    type Error = ReadError;
 
-    fn raw(&mut self, raw: &Raw<'_>) {
+    fn item(&mut self, _: Item<'_>) -> Result<(), ReadError> {
+        Ok(())
+    }
+
+    fn raw(&mut self, raw: &Raw<'_>) -> Result<(), ReadError> {
         let of_topic = self.0.entry(raw.channel.topic.clone()).or_default();
         of_topic.push((raw.header.log_time, raw.data.to_vec()));
+        Ok(())
     }
 }
 
@@ -118,6 +124,7 @@ fn an_explanation_of_other_runs_is_refused_and_nothing_is_left_behind() {
     let runs: Vec<&[TrainSample]> = samples.chunk_by(|one, next| one.run == next.run).collect();
     let other = timeline(&[runs[0], runs[1], runs[1]]);
     let refused = annotate(&plain, &other, &annotated).unwrap_err();
-    assert!(matches!(refused, AnnotateError::OtherRuns { runs: 2, explained: 3, .. }), "{refused}");
+    let AnnotateError::OtherRuns(refused) = refused else { panic!("{refused}") };
+    assert_eq!(refused.problem, OtherRuns { trains: 1, runs: 2, explained: 3 }, "{refused}");
     assert!(!annotated.exists());
 }

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use dynocar_recording::columns::{EVENTS, SAMPLES, SNAPSHOTS};
-use dynocar_recording::event::{EVENT_FIELDS, Event, EventKind};
+use dynocar_recording::event::{Event, EventKind};
 use dynocar_recording::page::page;
 use dynocar_recording::schema::{DESCRIPTORS, SUFFIXES, suffixed_name};
 use dynocar_shared::Parameter;
@@ -29,14 +29,14 @@ fn the_table_of_fields_is_that_of_the_message() {
     while !rest.is_empty() {
         let (number, wire_type) = decode_key(&mut rest).unwrap();
         skip_field(wire_type, number, &mut rest, DecodeContext::default()).unwrap();
-        numbers.push(number as i32);
+        numbers.push(number);
     }
-    assert_eq!(numbers, EVENT_FIELDS.map(|it| it.number));
+    assert_eq!(numbers, Event::FIELDS.iter().map(|it| it.number).collect::<Vec<_>>());
     for (index, kind) in EventKind::ALL.iter().enumerate() {
         assert_eq!(*kind as usize, index);
     }
     let shown = format!("{event:?}");
-    assert!(EVENT_FIELDS.iter().all(|it| shown.contains(&format!("{}:", it.name))), "{shown}");
+    assert!(Event::FIELDS.iter().all(|it| shown.contains(&format!("{}:", it.name))), "{shown}");
 }
 
 #[test]
@@ -113,10 +113,10 @@ fn columns_are_the_fields_of_the_messages_with_their_numbers_names_and_types() {
 fn numbers_of_an_event_are_set_as_they_are_read() {
     let mut event =
         Event { kind: EventKind::DaemonGone as i32, text: "x".into(), ..Event::default() };
-    for index in 0..EVENT_FIELDS.len() - 1 {
+    for index in 0..Event::FIELDS.len() - 1 {
         event.set_word(index, Some(index as u64 + 1));
-        assert_eq!(event.word(index), Some(index as u64 + 1), "{}", EVENT_FIELDS[index].name);
-        if EVENT_FIELDS[index].is_optional {
+        assert_eq!(event.word(index), Some(index as u64 + 1), "{}", Event::FIELDS[index].name);
+        if Event::FIELDS[index].is_optional {
             event.set_word(index, None);
             assert_eq!(event.word(index), None);
         }

@@ -5,17 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::support::{samples, snapshots, write};
-use dynocar_recording::reading::{Ending, Item, Visitor, read};
+use dynocar_recording::copying::recover;
+use dynocar_recording::reading::{Ending, read};
 use dynocar_recording::recording::Recording;
-use dynocar_recording::recover::recover;
 use dynocar_shared::TrainSample;
 use proptest::prelude::*;
-
-struct Nobody;
-
-impl Visitor for Nobody {
-    fn item(&mut self, _: Item<'_>) {}
-}
 
 fn program(arguments: &[&str]) -> Output {
     let program = env!("CARGO_BIN_EXE_dynocar-recording");
@@ -173,7 +167,7 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("damaged.mcap");
         std::fs::write(&path, &bytes).unwrap();
-        let _ = read(&path, &mut Nobody);
+        let _ = read(&path, &mut ());
         let _ = Recording::load(&path);
     }
 }

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
+use dynocar_recording::copying::recover;
 use dynocar_recording::event::{Event, EventKind};
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation, request_keeping};
 use dynocar_recording::recording::Recording;
-use dynocar_recording::recover::recover;
 use dynocar_shared::{Status, TrainId, TrainSample};
 
 const HOUR: Duration = Duration::from_secs(3600);

@@ -13,7 +13,7 @@ fn verified(samples: &[TrainSample], snapshots: &[ParameterSnapshot]) -> Vec<Ver
     let path = folder.path().join("run.mcap");
     write(&path, samples, snapshots);
     let recording = Recording::load(&path).unwrap();
-    verify(&recording, &Configurations::of(&path, &recording).unwrap())
+    verify(&recording, &Configurations::of(&recording).unwrap())
 }
 
 #[test]
@@ -46,12 +46,12 @@ fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_o
     }
     let whole = Recording::load_all(&files).unwrap();
     assert_eq!((whole.samples.len(), whole.attachments.len()), (samples.len(), 3));
-    for it in verify(&whole, &Configurations::of(&files[0], &whole).unwrap()) {
+    for it in verify(&whole, &Configurations::of(&whole).unwrap()) {
         assert_eq!((it.same, &it.outcome), (it.recorded, &Outcome::Same), "{}", it.name);
         assert!(it.recorded > 30, "{}: {} snapshots", it.name, it.recorded);
     }
     let last = Recording::load(&files[2]).unwrap();
-    let late = verify(&last, &Configurations::of(&files[2], &last).unwrap());
+    let late = verify(&last, &Configurations::of(&last).unwrap());
     assert!(late.iter().all(|it| matches!(it.outcome, Outcome::BeginsLate { .. })));
 
     let error = Recording::load_all(&[files[1].clone(), files[0].clone()]).unwrap_err().to_string();

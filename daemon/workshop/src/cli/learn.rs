@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::SystemTime;
 
 use clap::Args;
-use dynocar_client::{Host, SnapshotReader};
+use dynocar_client::Host;
 
 use super::threads::Threads;
 use crate::learn::watch::{Suspicions, TimeOfDay, watch};
@@ -16,6 +16,7 @@ use dynocar::cli::Failure;
 use dynocar::cli::run::start_log;
 use dynocar::config::DaemonConfig;
 use dynocar::ending;
+use dynocar::observing::ObservedTrain;
 use dynocar::output::{OutputError, print, require_file, write_file};
 use dynocar::unpacking::UnpackError;
 
@@ -91,8 +92,8 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
     };
     let host = host.map_err(|error| work(&error))?;
     let suspicions = config.trains.iter().map(|train| {
-        let reader = SnapshotReader::open(&host, train.id).map_err(|error| work(&error))?;
-        Ok(Suspicions::new(train.id, reader))
+        let observed = ObservedTrain::open(&host, train.id).map_err(|error| work(&error))?;
+        Ok(Suspicions::new(observed))
     });
     let mut suspicions = suspicions.collect::<Result<Vec<_>, Failure>>()?;
     watch(&mut learner, &mut suspicions, arguments.at, &stop, &mut |learner, round| {

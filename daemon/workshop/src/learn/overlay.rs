@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE, Manifest};
+use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE, Manifest, RunContent};
 use toml::{Table, Value};
 
 use dynocar::dataset::{DatasetFolder, LoadError};
@@ -49,7 +49,7 @@ impl DatasetFiles for Overlay<'_> {
         }
     }
 
-    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<String, FileProblem> {
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
         self.dataset.read_run(path, manifest)
     }
 

@@ -4,8 +4,7 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use dynocar_client::{SnapshotReader, monotonic_now_ns};
-use dynocar_shared::TrainId;
+use dynocar::observing::{EventKind, ObservedTrain};
 use dynocar_shared::vocabulary::EffectKind;
 use tracing::{info, warn};
 
@@ -57,31 +56,28 @@ impl TimeOfDay {
 
 /// What a train's snapshots suspect.
 pub struct Suspicions {
-    train: TrainId,
-    reader: SnapshotReader,
+    observed: ObservedTrain,
     /// The newest effect that was suspected.
     known: Option<EffectKind>,
 }
 
 impl Suspicions {
     /// Those of a train.
-    pub fn new(train: TrainId, reader: SnapshotReader) -> Self {
-        Suspicions { train, reader, known: None }
+    pub fn new(observed: ObservedTrain) -> Self {
+        Suspicions { observed, known: None }
     }
 
     /// True when another effect is suspected than before.
     fn is_new(&mut self) -> bool {
-        self.reader.poll();
-        let suspected = self.reader.readings(monotonic_now_ns()).find_map(|reading| {
-            let kind = EffectKind::from_number(reading.snapshot.suspected_effect)?;
-            (kind != EffectKind::None).then_some(kind)
-        });
-        let is_new = suspected.is_some() && suspected != self.known;
-        self.known = suspected.or(self.known);
-        if let (true, Some(kind)) = (is_new, suspected) {
-            info!(train = self.train.0, "suspected: {}", kind.name());
+        let changes = self.observed.poll().into_iter();
+        let raised = changes.filter(|it| it.kind == EventKind::SuspicionRaised);
+        let newest =
+            raised.filter_map(|it| it.effect).next_back().filter(|it| self.known != Some(*it));
+        if let Some(effect) = newest {
+            self.known = newest;
+            info!(train = self.observed.id.0, "suspected: {effect}");
         }
-        is_new
+        newest.is_some()
     }
 }
 

@@ -1,0 +1,48 @@
+//! What an observer of trains sees, in one vocabulary for all of them: who has come and who has gone, and what has
+//! changed about what the pipelines say. An observer is one reader of each train's snapshots, as every client is.
+//!
+//! - `event`: the kinds of events
+//! - `train`: one train
+
+mod event;
+mod train;
+
+use dynocar_client::{ChannelError, Host, Peer, Role};
+use dynocar_shared::TrainId;
+
+pub use event::{Change, EventKind};
+pub use train::ObservedTrain;
+
+/// What is to be observed.
+#[derive(Clone, Debug)]
+pub struct Wanted {
+    /// The run-time directory.
+    pub host: Host,
+    /// The trains; every train that is there or comes, when empty.
+    pub trains: Vec<TrainId>,
+}
+
+impl Wanted {
+    /// The trains beside those that are known for which somebody holds one of these roles by now; none where
+    /// trains were named.
+    ///
+    /// # Errors
+    ///
+    /// When the run-time directory cannot be read.
+    pub fn newcomers(
+        &self,
+        roles: &[Role],
+        is_known: impl Fn(TrainId) -> bool,
+    ) -> Result<Vec<TrainId>, ChannelError> {
+        let mut newcomers = Vec::new();
+        if self.trains.is_empty() {
+            for &role in roles {
+                newcomers.extend(Peer::trains(&self.host, role)?);
+            }
+        }
+        newcomers.retain(|&train| !is_known(train));
+        newcomers.sort_unstable();
+        newcomers.dedup();
+        Ok(newcomers)
+    }
+}

@@ -1,0 +1,182 @@
+//! One train: who serves and drives it, the reader of its snapshots, and what was seen of its pipelines.
+
+use dynocar_client::{
+    Announcement, ChannelError, Host, Peer, Reading, Role, SnapshotReader, monotonic_now_ns,
+};
+use dynocar_shared::services::PIPELINES_MAX;
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{Reason, TrainId};
+
+use super::event::{Change, EventKind};
+use crate::operator::pipeline_name;
+use crate::operator::suspicion::Suspicion;
+
+/// What was last seen of a pipeline.
+#[derive(Clone, Copy, Debug, Default)]
+struct SeenPipeline {
+    epoch: u64,
+    status: (u32, u32),
+    /// The number of the effect that is suspected.
+    suspect: u32,
+    /// The model's hash.
+    model: u64,
+    is_silent: bool,
+}
+
+/// A train that is observed.
+#[derive(Debug)]
+pub struct ObservedTrain {
+    /// The train.
+    pub id: TrainId,
+    reader: Option<SnapshotReader>,
+    /// The age in ns from which a pipeline counts as silent; `None` for that of every reader.
+    silent_after_ns: Option<i64>,
+    daemon: Option<Announcement>,
+    controller: Option<Announcement>,
+    pipelines: [Option<SeenPipeline>; PIPELINES_MAX],
+}
+
+impl ObservedTrain {
+    /// A train whose snapshots are read as soon as a daemon serves it; its pipelines count as silent after so
+    /// many ns, or as every reader has it.
+    pub fn new(id: TrainId, silent_after_ns: Option<i64>) -> Self {
+        let pipelines = [None; PIPELINES_MAX];
+        ObservedTrain {
+            id,
+            reader: None,
+            silent_after_ns,
+            daemon: None,
+            controller: None,
+            pipelines,
+        }
+    }
+
+    /// A train whose snapshots are read from now on.
+    ///
+    /// # Errors
+    ///
+    /// When the channel cannot be opened.
+    pub fn open(host: &Host, id: TrainId) -> Result<Self, ChannelError> {
+        let reader = Some(SnapshotReader::open(host, id)?);
+        Ok(ObservedTrain { reader, ..ObservedTrain::new(id, None) })
+    }
+
+    /// Who served the train at the last look.
+    pub fn daemon(&self) -> Option<&Announcement> {
+        self.daemon.as_ref()
+    }
+
+    /// Who drove it.
+    pub fn controller(&self) -> Option<&Announcement> {
+        self.controller.as_ref()
+    }
+
+    /// True when a pipeline was heard of.
+    pub fn is_heard(&self) -> bool {
+        self.pipelines.iter().any(Option::is_some)
+    }
+
+    /// Looks who serves and who drives the train, and opens the reader when it can be opened. Opens files: once in
+    /// a while is enough.
+    ///
+    /// # Errors
+    ///
+    /// When an announcement cannot be read, the daemon is incompatible or its channel cannot be opened; the
+    /// changes seen before are noted all the same.
+    pub fn look(&mut self, host: &Host, changes: &mut Vec<Change>) -> Result<(), ChannelError> {
+        let daemon = Peer::look_up(host, self.id, Role::Daemon)?;
+        note_peer(&daemon, &mut self.daemon, Role::Daemon, changes);
+        let controller = Peer::look_up(host, self.id, Role::Controller)?;
+        note_peer(&controller, &mut self.controller, Role::Controller, changes);
+        match daemon {
+            Peer::Incompatible(_) => {
+                // Its place in the channel is of no use; a daemon that fits gets a new reader.
+                self.reader = None;
+                daemon.require_compatible(self.id, Role::Controller)?;
+            }
+            Peer::Compatible(_) if self.reader.is_none() => {
+                let reader = self.reader.insert(SnapshotReader::open(host, self.id)?);
+                self.silent_after_ns.into_iter().for_each(|it| reader.set_stale_after_ns(it));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The newest snapshot of every pipeline at a moment of the host's monotonic clock.
+    pub fn readings(&self, now_ns: i64) -> impl Iterator<Item = Reading<'_>> {
+        self.reader.iter().flat_map(move |reader| reader.readings(now_ns))
+    }
+
+    /// Takes what has come; gives what has changed about the pipelines.
+    pub fn poll(&mut self) -> Vec<Change> {
+        let mut changes = Vec::new();
+        let Some(reader) = &mut self.reader else { return changes };
+        reader.poll();
+        for reading in reader.readings(monotonic_now_ns()) {
+            let seen = &mut self.pipelines[reading.snapshot.pipeline_index as usize];
+            note_pipeline(&reading, seen, &mut changes);
+        }
+        changes
+    }
+}
+
+fn note_peer(peer: &Peer, known: &mut Option<Announcement>, role: Role, changes: &mut Vec<Change>) {
+    let (now, text) = match peer {
+        Peer::Absent => (None, format!("no {role}")),
+        Peer::Compatible(it) => (Some(it.clone()), it.to_string()),
+        Peer::Incompatible(it) => (Some(it.clone()), format!("incompatible: {it}")),
+    };
+    let process = |it: &Option<Announcement>| it.as_ref().map(|it| it.process_id);
+    if process(&now) != process(known) {
+        let kind = match (role, &now) {
+            (Role::Daemon, Some(_)) => EventKind::DaemonCame,
+            (Role::Daemon, None) => EventKind::DaemonGone,
+            (Role::Controller, Some(_)) => EventKind::ControllerCame,
+            (Role::Controller, None) => EventKind::ControllerGone,
+        };
+        changes.push(Change::new(kind, text));
+        *known = now;
+    }
+}
+
+fn note_pipeline(
+    reading: &Reading<'_>,
+    seen: &mut Option<SeenPipeline>,
+    changes: &mut Vec<Change>,
+) {
+    let it = reading.snapshot;
+    let name = || pipeline_name(it.pipeline_index, it.pipeline_kind());
+    let of_pipeline =
+        |kind, text| Change { pipeline: Some(it.pipeline_index), ..Change::new(kind, text) };
+    let now = SeenPipeline {
+        epoch: it.epoch,
+        status: (it.status, it.reason),
+        suspect: it.suspected_effect,
+        model: it.model_hash,
+        is_silent: reading.is_stale,
+    };
+    let known = seen.replace(now);
+    if known.is_none_or(|known| (known.status, known.epoch) != (now.status, now.epoch)) {
+        let (status, reason) = (it.status(), it.reason().map_or("unknown", Reason::name));
+        let text = format!("{}: {status} ({reason}) at sample {}", name(), it.sample_sequence);
+        let change = of_pipeline(EventKind::StatusChanged, text);
+        changes.push(Change { status: Some(now.status), ..change });
+    }
+    if known.unwrap_or_default().suspect != now.suspect {
+        let (kind, text) = match Suspicion::of(it) {
+            None => (EventKind::SuspicionEnded, "nothing is suspected".to_owned()),
+            Some(suspicion) => (EventKind::SuspicionRaised, suspicion.to_string()),
+        };
+        let effect = EffectKind::from_number(now.suspect);
+        changes.push(Change { effect, ..of_pipeline(kind, text) });
+    }
+    if known.is_some_and(|known| known.model != now.model) {
+        let text = format!("{}: model {:016x} is in force", name(), now.model);
+        changes.push(of_pipeline(EventKind::ModelChanged, text));
+    }
+    if now.is_silent && known.is_none_or(|known| !known.is_silent) {
+        let text = format!("{}: silent for {} ms", name(), reading.age_ns / 1_000_000);
+        changes.push(of_pipeline(EventKind::DaemonSilent, text));
+    }
+}
