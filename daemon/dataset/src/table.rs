@@ -99,8 +99,9 @@ impl Table {
         let held_by = |mapping: &ColumnMapping| {
             let index = find_column(mapping, &names, &TextLayout::PLAIN)
                 .map_err(|problem| SourcePosition::line(label, 1).problem(problem))?;
-            let (values, unit) = (columns[index].values.iter().flatten(), mapping.quantity.unit());
-            Ok((mapping.quantity, values.map(|&value| held(mapping, &unit, value)).collect()))
+            let (values, to) = (columns[index].values.iter().flatten(), mapping.converted_to());
+            let values = values.map(|&value| held(mapping, to.as_ref(), value));
+            Ok((mapping.quantity, values.collect()))
         };
         let columns: Vec<(Quantity, Vec<f64>)> =
             mappings.iter().map(held_by).collect::<Result<_, DatasetError>>()?;
