@@ -1,7 +1,7 @@
 //! Why a Parquet file is none that can be read.
 
 use dynocar_recording::error::AtPath;
-use dynocar_recording::reading::ReadProblem;
+use dynocar_recording::error::ReadProblem;
 
 /// Why a Parquet file, or a folder of them, cannot be read.
 pub type TableError = AtPath<TableProblem>;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Schema};
 use dynocar_recording::columns::{Column, Row, Source};
-use dynocar_recording::reading::ReadProblem;
+use dynocar_recording::error::ReadProblem;
 use dynocar_recording::recording::{Metadata, Recording};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 

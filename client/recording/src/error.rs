@@ -4,7 +4,8 @@ use std::error::Error;
 use std::fmt::{Debug, Display, Formatter};
 use std::path::{Path, PathBuf};
 
-use crate::reading::ReadProblem;
+use crate::codec::CodecError;
+use crate::schema::SAMPLE;
 
 /// What is wrong with a file or a folder.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +22,63 @@ impl<P> AtPath<P> {
     pub fn of<T: Into<P>>(path: &Path) -> impl Fn(T) -> Self {
         move |problem| AtPath { path: path.into(), problem: problem.into() }
     }
+}
+
+/// What is wrong with a file that is to be a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadProblem {
+    /// The system does not give it.
+    #[error(transparent)]
+    Unreadable(#[from] std::io::Error),
+    /// It is of another format.
+    #[error("not an MCAP file: expected one that begins with the bytes of MCAP, version 0")]
+    NotMcap,
+    /// Its messages are of another release.
+    #[error(
+        "{topic}: recorded with another schema: expected {expected}, found {found}; read it with the release \
+         of dynocar that recorded it"
+    )]
+    OtherSchema {
+        /// The channel.
+        topic: String,
+        /// This release's layout.
+        expected: &'static str,
+        /// The file's.
+        found: String,
+    },
+    /// A message is not what its channel says.
+    #[error("{topic}, message {number}: {source}")]
+    Malformed {
+        /// The channel.
+        topic: String,
+        /// The message's place in the file, counted from 1.
+        number: u64,
+        /// What is wrong.
+        source: CodecError,
+    },
+    /// Several files are not given in the order in which they were recorded.
+    #[error(
+        "begins before {}: expected a recording's files in the order in which they were recorded",
+        before.display()
+    )]
+    OutOfOrder {
+        /// The one given before it.
+        before: PathBuf,
+    },
+    /// Several files are not of one recording.
+    #[error("{name} is another than in {}: expected files of one recording", before.display())]
+    OtherRecording {
+        /// One given before it.
+        before: PathBuf,
+        /// The attached file.
+        name: String,
+    },
+    /// There is no sample.
+    #[error("no samples: expected a channel of {SAMPLE} messages, found {found}")]
+    NoSamples {
+        /// The channels that there are, in words.
+        found: String,
+    },
 }
 
 /// Why a file is no recording that can be read.

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::Metadata;
 
-use crate::error::ReadError;
-use crate::reading::{Ending, Item, Raw, ReadProblem, Visitor, read};
+use crate::error::{ReadError, ReadProblem};
+use crate::reading::{Ending, Item, Raw, Visitor, read};
 
 /// Reads the files of a recording that rotated, in order, as if they were one: what each repeats is given
 /// once. Gives how each ends.

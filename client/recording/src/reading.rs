@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 use mcap::records::{MessageHeader, Record, op};
@@ -11,67 +11,10 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use mcap::{McapError, parse_record};
 use prost::Message;
 
-use crate::codec::{CodecError, decode_sample, decode_snapshot};
-use crate::error::{CopyError, ReadError};
+use crate::codec::{decode_sample, decode_snapshot};
+use crate::error::{CopyError, ReadError, ReadProblem};
 use crate::event::Event;
 use crate::schema::{EVENT, SAMPLE, SNAPSHOT};
-
-/// What is wrong with a file that is to be a recording.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadProblem {
-    /// The system does not give it.
-    #[error(transparent)]
-    Unreadable(#[from] std::io::Error),
-    /// It is of another format.
-    #[error("not an MCAP file: expected one that begins with the bytes of MCAP, version 0")]
-    NotMcap,
-    /// Its messages are of another release.
-    #[error(
-        "{topic}: recorded with another schema: expected {expected}, found {found}; read it with the release \
-         of dynocar that recorded it"
-    )]
-    OtherSchema {
-        /// The channel.
-        topic: String,
-        /// This release's layout.
-        expected: &'static str,
-        /// The file's.
-        found: String,
-    },
-    /// A message is not what its channel says.
-    #[error("{topic}, message {number}: {source}")]
-    Malformed {
-        /// The channel.
-        topic: String,
-        /// The message's place in the file, counted from 1.
-        number: u64,
-        /// What is wrong.
-        source: CodecError,
-    },
-    /// Several files are not given in the order in which they were recorded.
-    #[error(
-        "begins before {}: expected a recording's files in the order in which they were recorded",
-        before.display()
-    )]
-    OutOfOrder {
-        /// The one given before it.
-        before: PathBuf,
-    },
-    /// Several files are not of one recording.
-    #[error("{name} is another than in {}: expected files of one recording", before.display())]
-    OtherRecording {
-        /// One given before it.
-        before: PathBuf,
-        /// The attached file.
-        name: String,
-    },
-    /// There is no sample.
-    #[error("no samples: expected a channel of {SAMPLE} messages, found {found}")]
-    NoSamples {
-        /// The channels that there are, in words.
-        found: String,
-    },
-}
 
 /// How a file ends.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 pub use mcap::records::Metadata;
 
-use crate::error::ReadError;
+use crate::error::{ReadError, ReadProblem};
 use crate::event::Event;
 use crate::joining::read_all;
-use crate::reading::{Item, Raw, ReadProblem, Visitor};
+use crate::reading::{Item, Raw, Visitor};
 
 /// What a recording holds, each kind in the order in which it was written.
 #[derive(Debug, Default)]
