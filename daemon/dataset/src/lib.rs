@@ -14,6 +14,7 @@
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
+//! - `run_content`: what a run's file holds, text or columns
 //! - `plain_number`, `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
@@ -49,6 +50,7 @@ pub mod quality;
 pub mod quantity;
 mod resolved;
 pub mod run;
+mod run_content;
 mod spikes;
 pub mod stamps;
 mod table;
@@ -73,6 +75,7 @@ pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use resolved::{DATASET_TRAIN, GradientSource};
 pub use run::{Extras, Run, is_parquet, recorded_unix_s};
+pub use run_content::{RunColumn, RunContent};
 pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
@@ -113,24 +116,6 @@ pub trait DatasetFiles: Sync {
     fn label(&self, path: &str) -> String {
         path.into()
     }
-}
-
-/// What a run's file holds.
-#[derive(Clone, Debug, PartialEq)]
-pub enum RunContent {
-    /// Rows of text, laid out as the manifest says.
-    Text(String),
-    /// All columns of an [`is_parquet`] file. Where a mapped one is not there, none has values.
-    Columns(Vec<RunColumn>),
-}
-
-/// A column of a run's file that is no text.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RunColumn {
-    /// Its name.
-    pub name: String,
-    /// A mapped column's numbers, times in the unit that is declared for them; `NaN` where missing.
-    pub values: Option<Vec<f64>>,
 }
 
 /// A dataset held in memory, as (path, text).

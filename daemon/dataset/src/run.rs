@@ -14,9 +14,9 @@ use super::power;
 use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
+use super::run_content::RunContent;
 use super::stamps;
 use super::table::Table;
-use crate::RunContent;
 
 const DAY_S: i64 = 86_400;
 

@@ -9,8 +9,8 @@ use super::header::{find_column, misplaced, names_of};
 use super::lines::{Row, RowReader, below};
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
+use super::run_content::RunColumn;
 use super::text_layout::TextLayout;
-use crate::RunColumn;
 
 /// So many rows show how many there will be.
 const ROWS_BEFORE_RESERVE: usize = 1000;
