@@ -1,5 +1,5 @@
 //! Recordings as datasets: unpacked into a folder for as long as it is needed, by the program that
-//! knows their format; and Parquet files of a dataset as CSV.
+//! knows their format; and Parquet files of a dataset as columns of numbers.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
