@@ -157,15 +157,7 @@ fn braking_sample(index: u64) -> TrainSample {
 
 #[test]
 fn a_braking_pipeline_allocates_only_while_it_is_built() {
-    for kind in [
-        PipelineKind::AdhesionEm,
-        PipelineKind::AdhesionEkf,
-        PipelineKind::AdhesionSmoother,
-        PipelineKind::AdhesionLaw,
-        PipelineKind::BrakeEm,
-        PipelineKind::BrakeEkf,
-        PipelineKind::BrakeSmoother,
-    ] {
+    for kind in simulation::KINDS {
         let settings = EstimatorSettings::default_of(kind).expect("a braking pipeline");
         let mut pipeline = simulation::pipeline(&settings);
         let before = ALLOCATIONS.with(Cell::get);

@@ -86,8 +86,15 @@ impl ObservedTrain {
     pub fn look(&mut self, host: &Host, changes: &mut Vec<Change>) -> Result<(), ChannelError> {
         let daemon = Peer::look_up(host, self.id, Role::Daemon)?;
         note_peer(&daemon, &mut self.daemon, Role::Daemon, changes);
+        // What is wrong with one of the two keeps nobody from seeing the other.
+        let opened = self.open_reader(host, daemon);
         let controller = Peer::look_up(host, self.id, Role::Controller)?;
         note_peer(&controller, &mut self.controller, Role::Controller, changes);
+        opened
+    }
+
+    /// Opens the reader of a daemon that fits, drops that of one that does not.
+    fn open_reader(&mut self, host: &Host, daemon: Peer) -> Result<(), ChannelError> {
         match daemon {
             Peer::Incompatible(_) => {
                 // Its place in the channel is of no use; a daemon that fits gets a new reader.

@@ -8,18 +8,8 @@ use dynocar_shared::{
 };
 
 use crate::simulation::{
-    FULL_BRAKING, Run, after, assert_finite, pipeline, pipeline_for, train, wet,
+    FULL_BRAKING, KINDS, Run, after, assert_finite, pipeline, pipeline_for, train, wet,
 };
-
-const KINDS: [PipelineKind; 7] = [
-    PipelineKind::AdhesionEm,
-    PipelineKind::AdhesionEkf,
-    PipelineKind::AdhesionSmoother,
-    PipelineKind::AdhesionLaw,
-    PipelineKind::BrakeEm,
-    PipelineKind::BrakeEkf,
-    PipelineKind::BrakeSmoother,
-];
 
 const WET: Run = Run { adhesion: |_, speed_mps| wet(speed_mps), ..FULL_BRAKING };
 

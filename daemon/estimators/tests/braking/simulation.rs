@@ -5,9 +5,20 @@ use std::sync::Arc;
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
-use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, SampleField, TrainId, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+/// The braking pipelines.
+pub const KINDS: [PipelineKind; 7] = [
+    PipelineKind::AdhesionEm,
+    PipelineKind::AdhesionEkf,
+    PipelineKind::AdhesionSmoother,
+    PipelineKind::AdhesionLaw,
+    PipelineKind::BrakeEm,
+    PipelineKind::BrakeEkf,
+    PipelineKind::BrakeSmoother,
+];
 
 pub const TRAIN: TrainId = TrainId(1);
 pub const FULL_PRESSURE_PA: f64 = 410_000.0;
