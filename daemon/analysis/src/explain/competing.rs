@@ -4,7 +4,7 @@ use dynocar_model::terms::{self, speed_delay};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::evidence::{EQUAL, Fit};
-use super::selection::{Outcome, Search, Trial, is_certain_beside};
+use super::selection::{Outcome, Refusal, Search, Trial};
 
 /// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error.
 const ERROR_REDUCTION_SHARE: f64 = 0.7;
@@ -21,7 +21,7 @@ pub struct CompetingHypotheses {
 /// For each accepted effect that has some, the kinds that could stand in its place.
 ///
 /// Beside those that the runs could not distinguish from it whatever they showed, a competing hypothesis explains the data as
-/// well, would be accepted itself, takes away about as much of the open-loop error, and has nothing left to explain once the effect
+/// well, may be what its kind says, takes away about as much of the open-loop error, and has nothing left to explain once the effect
 /// is in: what keeps its evidence acts beside the effect and not in its place.
 pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
     let effects = &outcome.fit.model.effects;
@@ -61,13 +61,10 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
 fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
     let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
-    let would_be_accepted = if outcome.is_certain(accepted.kind) {
-        is_certain_beside(trial, trial.bic_gain)
-    } else {
-        Search::refusal(trial).is_none()
-    };
+    // What is as strong as the accepted one is strong enough, on whichever side of the least strength it lies.
+    let may_be = matches!(Search::refusal(trial), None | Some(Refusal::Weak(_)));
     trial.kind != EffectKind::Unknown
-        && would_be_accepted
+        && may_be
         && trial.bic_gain > accepted.bic_gain - EQUAL
         && trial.reduction > ERROR_REDUCTION_SHARE * accepted.reduction.max(0.0)
         && left < 0.5 * trial.evidence

@@ -20,6 +20,7 @@
 
 pub mod answer;
 mod bootstrap;
+mod caveats;
 pub mod competing;
 pub mod described;
 pub mod drive;

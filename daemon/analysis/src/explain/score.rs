@@ -4,7 +4,7 @@ use dynocar_model::simulate::{Prediction, Restart, SpeedError};
 use rayon::prelude::*;
 
 use super::bootstrap::intervals_95;
-use super::evidence::{Fit, FitProblem, RunData, UpdatedForces};
+use super::evidence::{Fit, FitProblem, RunData, RunFactors, UpdatedForces};
 use super::judged::Judged;
 use super::selection::without_each_run;
 use super::stop_runs::stop_runs;
@@ -47,8 +47,18 @@ fn errors_at<const N: usize>(
     run: &RunData,
     restarts: [Restart; N],
 ) -> [SpeedError; N] {
+    errors_on_day(fit, theta, (run, &RunFactors::zeros()), restarts)
+}
+
+/// The same with what differs from run to run.
+fn errors_on_day<const N: usize>(
+    fit: &Fit,
+    theta: &[f64],
+    (run, own): (&RunData, &RunFactors),
+    restarts: [Restart; N],
+) -> [SpeedError; N] {
     let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
-    fit.model.forces(run, theta, &mut forces);
+    fit.model.forces_on_day(run, theta, own, &mut forces);
     restarts.map(|restart| {
         prediction.simulate(&run.recording, &forces, restart);
         SpeedError::of(&run.recording, &prediction)
@@ -76,8 +86,8 @@ pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopT
 #[derive(Clone, Copy, Debug)]
 pub struct FitErrors {
     /// Root mean squares in m/s as fitted and left out, each over whole runs and with restarts
-    /// every 60 s.
-    speed_mps: [[f64; 2]; 2],
+    /// every 60 s, and over whole runs with each run's own load and wind where they stand beside the model.
+    speed_mps: [[f64; 3]; 2],
     /// Share by which the integrated speed misses the measured distance, with what that is known to.
     distance: f64,
     /// Whether the model looks for the scale of the speeds: nothing else is judged by the way.
@@ -90,10 +100,20 @@ impl FitErrors {
         let fitted = vec![fit.theta.clone(); problem.runs.len()];
         let speed_mps = [fitted, without_each_run(problem, fit)].map(|theta| {
             let restarts = [Restart::FullRun, Restart::WINDOW_60];
-            let each = problem.runs.par_iter().zip(&theta);
-            let each: Vec<[SpeedError; 2]> =
-                each.map(|(run, theta)| errors_at(fit, theta, run, restarts)).collect();
-            [0, 1].map(|restart| {
+            let each = problem.runs.par_iter().zip(&theta).enumerate();
+            let each: Vec<[SpeedError; 3]> = each
+                .map(|(index, (run, theta))| {
+                    let [full, window] = errors_at(fit, theta, run, restarts);
+                    let on_day = || {
+                        let own = fit.own_factors(index);
+                        let [error] = errors_on_day(fit, theta, (run, own), [Restart::FullRun]);
+                        error
+                    };
+                    let is_beside = fit.is_beside_loads_and_winds();
+                    [full, window, if is_beside { on_day() } else { full }]
+                })
+                .collect();
+            [0, 1, 2].map(|restart| {
                 let errors = each.iter().map(|of_run| of_run[restart]);
                 errors.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
             })
@@ -118,7 +138,7 @@ impl FitErrors {
         } else {
             share(before.distance, self.distance)
         };
-        let most = |before: &[f64; 2], after: &[f64; 2]| {
+        let most = |before: &[f64; 3], after: &[f64; 3]| {
             let of_speed = before.iter().zip(after).map(|(before, after)| share(*before, *after));
             of_speed.fold(of_distance, f64::max)
         };

@@ -1,7 +1,7 @@
 //! What is left when the search is done: whether noise explains it, and where it lives.
 
 use super::answer::Location;
-use super::selection::{Outcome, Refusal, Search, Trial};
+use super::selection::{Outcome, Refusal, Search};
 use dynocar_shared::vocabulary::EffectKind;
 
 /// Time in s over which the force that is left is averaged: gusts and joints of rails are gone.
@@ -12,27 +12,33 @@ const OVER_S: f64 = 60.0;
 const NOISE_SHARE_MAX: f64 = 0.3;
 
 /// What the finished model leaves.
-pub struct Unexplained<'o> {
+pub struct Unexplained {
     /// Standard deviation in N/kN of the force that is left, on average over a minute.
     pub n_per_kn: f64,
     /// The same over the declared basic resistance.
     pub share: f64,
-    /// Trials of the last round that all but a bound speaks for, with that; the strongest first.
-    pub refused: Vec<(&'o Trial, Refusal)>,
+    /// What all but a bound speaks for, with that: trials of the last round, the strongest first, and where nothing
+    /// is found, what was found before the usual errors stood beside it.
+    pub refused: Vec<(EffectKind, Refusal)>,
     /// Where a force outside the library explains most.
     pub place: Option<Location>,
 }
 
-impl<'o> Unexplained<'o> {
+impl Unexplained {
     /// What a finished search leaves; `None` without motion.
-    pub fn of(search: &Search, outcome: &'o Outcome) -> Option<Self> {
+    pub fn of(search: &Search, outcome: &Outcome) -> Option<Self> {
         let (n_per_kn, share) = search.problem.noise_n_per_kn(outcome.fit.noise, OVER_S)?;
         let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
-        let refused = last
-            .clone()
-            .filter_map(|trial| Some((trial, Search::refusal(trial)?)))
-            .filter(|(_, refusal)| refusal.leaves_a_residual())
-            .collect();
+        let tried = last.clone().filter_map(|trial| Some((trial.kind, Search::refusal(trial)?)));
+        let is_nothing_found = outcome.fit.model.effects.is_empty();
+        let fallen = outcome.fallen.iter().filter(|_| is_nothing_found).copied();
+        let leaves = |(_, refusal): &(EffectKind, Refusal)| refusal.leaves_a_residual();
+        let mut refused: Vec<_> = tried.filter(leaves).collect();
+        for fallen in fallen.filter(leaves) {
+            if refused.iter().all(|(kind, _)| *kind != fallen.0) {
+                refused.push(fallen);
+            }
+        }
         let outside = last.clone().find(|trial| trial.kind == EffectKind::Unknown);
         let place = outside.map(|trial| trial.fit.model.effects[trial.last()].place());
         Some(Unexplained { n_per_kn, share, refused, place })
@@ -55,8 +61,8 @@ impl<'o> Unexplained<'o> {
 
     /// What explains the residual but is not determined, in words; empty for nothing.
     pub fn undetermined(&self) -> String {
-        let one = |(trial, refusal): &(&Trial, Refusal)| {
-            format!(" Not determined is {}: {refusal}.", trial.kind.name())
+        let one = |(kind, refusal): &(EffectKind, Refusal)| {
+            format!(" Not determined is {}: {refusal}.", kind.name())
         };
         self.refused.iter().map(one).collect()
     }

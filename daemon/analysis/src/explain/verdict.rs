@@ -7,17 +7,18 @@ use dynocar_model::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
-    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Identifiability,
-    Location, Meaning, PlaceUncertainty, Verdict,
+    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location, Meaning,
+    PlaceUncertainty, Verdict,
 };
+use super::caveats::{caveats, trimmed};
 use super::competing::{
     CompetingHypotheses, competing_hypotheses, is_in, kinds_of, separating_run,
 };
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
-use super::identifiability::{identifiability, not_held};
-use super::informed::{told_by_data, undetermined};
+use super::identifiability::identifiability;
+use super::informed::told_by_data;
 use super::runners_up::runners_up;
 use super::score::{self, Score};
 use super::selection::{
@@ -100,27 +101,6 @@ pub fn answer(
     }
 }
 
-/// What limits a verdict.
-fn caveats(
-    search: &Search,
-    outcome: &Outcome,
-    effects: &[EffectAnswer],
-    score: &Score,
-    std: &[f64],
-    identifiability: &[Identifiability],
-) -> Vec<String> {
-    let mut caveats = vec![worse_held_out(effects, score), small_beside(outcome, effects)];
-    caveats.push(undetermined(search.problem, &outcome.fit, std));
-    caveats.extend(not_held(identifiability));
-    caveats
-}
-
-/// Sentences without the space before them, and none that is empty.
-fn trimmed(sentences: &[String]) -> Vec<String> {
-    let trimmed = sentences.iter().map(|it| it.trim().to_owned());
-    trimmed.filter(|it| !it.is_empty()).collect()
-}
-
 /// What the verdict is in words.
 struct Words {
     verdict_words: String,
@@ -137,37 +117,6 @@ fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
         caveats: Vec::new(),
         experiment: Some("Set right what is named and run this again.".into()),
     })
-}
-
-/// What is certain and small in the model beside the effects that are named; empty without either.
-fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
-    let small: Vec<String> = outcome.small_trials().map(small).collect();
-    if small.is_empty() || effects.is_empty() {
-        return String::new();
-    }
-    format!(" Certain, small, and part of the updated model: {}.", small.join(", "))
-}
-
-/// That the runs held out are predicted worse with what was found; empty when they are not.
-fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
-    let Some(judged) = score.judged() else { return String::new() };
-    let [before, after] = judged.error_mps;
-    let [shown_before, shown_after] = [before, after].map(|error| format!("{error:.3}"));
-    if effects.is_empty() || after <= before || shown_after == shown_before {
-        return String::new();
-    }
-    let acts_in_runs = |it: &EffectAnswer| it.place.runs.is_some() || it.place.windows.is_some();
-    let why = if effects.iter().all(acts_in_runs) {
-        "it was found in single runs, and is not looked for in those held out. Where they err most, it may \
-         act too: fit them (role = \"fit\") to find out."
-    } else {
-        "it holds for the runs that were fitted, not for those."
-    };
-    format!(
-        " The runs held out are predicted worse with it{}, {shown_before} m/s before and \
-         {shown_after} after: {why}",
-        judged.predicted()
-    )
 }
 
 /// Why nothing was scored, and what is known instead; `None` when something was.
@@ -285,8 +234,11 @@ fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Consi
     let mut list: Vec<Considered> = Vec::new();
     if let Some(last) = outcome.rounds.last() {
         for trial in last.iter() {
+            let fallen = outcome.fallen.iter().find(|(kind, _)| *kind == trial.kind);
             let reason = if is_in(&outcome.fit, trial.kind) {
                 "found".into()
+            } else if let Some((_, refusal)) = fallen {
+                format!("found, but beside the usual errors: {refusal}")
             } else if competing.iter().any(|it| it.kinds.contains(&trial.kind)) {
                 "explains the data as well".into()
             } else {

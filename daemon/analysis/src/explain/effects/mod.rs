@@ -58,4 +58,4 @@ pub const LIBRARY: [&dyn Effect; 17] = [
 ];
 /// What is in no library, by its form: tried where the library leaves a force.
 pub const UNKNOWN: &dyn Effect = &unknown::Forms;
-pub use unknown::{OUTSIDE_COST, a_form_explains_more, leaves_a_force};
+pub use unknown::{a_form_explains_more, leaves_a_force};

@@ -35,7 +35,7 @@ pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RunScatter};
 pub use run_data::{RunData, RunDataError, RunPower, prepare};
-pub use run_scatter::{PRIOR_RUNS, WeightedFilter};
+pub use run_scatter::{PRIOR_RUNS, RunFactors, WeightedFilter};
 pub use sample_forces::SampleForces;
 #[cfg(test)]
 pub use test_runs::coasting;

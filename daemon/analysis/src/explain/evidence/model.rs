@@ -8,6 +8,7 @@ use super::bins::Bin;
 use super::pass::{Acting, Pass, blocks};
 use super::response::Response;
 use super::run_data::RunData;
+use super::run_scatter::{RunFactors, of_day};
 use super::sample_forces::SampleForces;
 use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
 
@@ -119,17 +120,31 @@ impl UpdatedModel {
 
     /// The forces on a run for given parameters; `theta` starts with a, b, c.
     pub fn forces(&self, run: &RunData, theta: &[f64], forces: &mut UpdatedForces) {
+        self.forces_on_day(run, theta, &RunFactors::zeros(), forces);
+    }
+
+    /// The same with what differs from run to run: factors less 1 on the control force and on the basic
+    /// resistance, and a headwind in m/s.
+    pub fn forces_on_day(
+        &self,
+        run: &RunData,
+        theta: &[f64],
+        own: &RunFactors,
+        forces: &mut UpdatedForces,
+    ) {
         let all = |_: usize| true;
-        let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
+        let davis = of_day(Davis { a: theta[0], b: theta[1], c: theta[2] }, own);
         let scale = self.speed_scale(theta, &all);
         let (pass, acting) = (self.pass(&all), &mut forces.acting);
         let polynomials = blocks(run).flat_map(|block| {
             pass.on_declared((run, theta), block.clone(), acting);
-            let own = acting.samples.iter().zip(&run.smooth_mps[block]);
+            let each = acting.samples.iter().zip(&run.smooth_mps[block]);
             let polynomial = |(state, &speed_mps): (&SampleForces, &f64)| {
+                let own_n = -own[0] * (state.traction_n - state.brake_n);
+                let state = SampleForces { extra_n: state.extra_n + own_n, ..*state };
                 state.polynomial(davis, wheel::true_speed_mps(speed_mps, scale))
             };
-            own.map(polynomial).collect::<Vec<Polynomial>>()
+            each.map(polynomial).collect::<Vec<Polynomial>>()
         });
         forces.quadratic.set(polynomials, scale);
     }

@@ -95,6 +95,12 @@ pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
     columns
 }
 
+/// Coefficients on the day of a run, open track.
+pub fn of_day(Davis { a, b, c }: Davis, own: &RunFactors) -> Davis {
+    let factor = 1.0 + own[1];
+    Davis { a: factor * a, b: factor * b + 2.0 * c * own[2], c: factor * c }
+}
+
 /// A series less what deviations explain by their columns.
 pub fn remove(columns: &Columns, series: &[f64], deviations: &RunFactors) -> Vec<f64> {
     let explained = |i: usize| (0..DEVIATIONS).map(|k| deviations[k] * columns[k][i]).sum::<f64>();

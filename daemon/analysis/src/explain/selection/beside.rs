@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{is_material, is_possible};
+use super::acceptance::{Refusal, is_material, is_possible};
 use super::certainty::{CERTAIN_RUNS_MIN, is_certain};
 use super::outcome::{Beside, Outcome, Round, Trial};
 use super::price::{at_bound, penalty};
@@ -28,7 +28,7 @@ fn last_parts(trial: &Trial) -> (SharedHypothesis, Vec<f64>) {
 }
 
 /// Whether some evidence makes the last effect of a trial certain beside the usual errors.
-pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
+fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
     is_material(trial)
         && is_possible(trial)
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
@@ -93,24 +93,21 @@ impl Search<'_> {
     pub(super) fn take_certain_beside(&self, outcome: &mut Outcome) -> bool {
         let beside = &self.beside_usual_errors(outcome).fit;
         if outcome.is_full() || self.problem.runs.len() < CERTAIN_RUNS_MIN {
-            self.drop_what_does_not_stand(beside, outcome);
             return false;
         }
         let looked = self.with_map_as_fitted(&outcome.fit, beside);
+        let fallen = outcome.fallen_kinds();
         let tried = self.round_of(
             &looked,
             &mut Vec::new(),
-            Asked { is_asked: &is_sought, rivals_of: None },
+            Asked { is_asked: &|kind| is_sought(kind) && !fallen.contains(&kind), rivals_of: None },
         );
         let may_be = |trial: &&Trial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
         let may_be_certain = tried.iter().filter(may_be);
         let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
         let best = certain.max_by(|one, other| one.evidence.total_cmp(&other.evidence));
-        let Some(found) = best else {
-            self.drop_what_does_not_stand(beside, outcome);
-            return false;
-        };
+        let Some(found) = best else { return false };
         let grown = self.problem.grown(&outcome.fit, [last_parts(&found)]);
         outcome.fit = self.problem.with_own_noise(&grown);
         outcome.certain.push((found.kind, Round::from(tried)));
@@ -144,19 +141,26 @@ impl Search<'_> {
     }
 
     /// Drops what does not stand beside the usual errors: a force outside the library that explains no more than
-    /// chance there, and an effect that runs to a bound of what is looked for.
-    fn drop_what_does_not_stand(&self, beside: &Fit, outcome: &mut Outcome) {
-        let is_form = |kind: EffectKind| kind == EffectKind::Unknown && !outcome.is_certain(kind);
-        let is_chance =
-            |index: usize| self.without(beside, index).cost - beside.cost <= penalty(beside, index);
-        let falls = |index: &usize| {
-            let kind = outcome.fit.model.effects[*index].kind();
-            let runs_to_bound =
-                || at_bound(beside, *index).is_some() && at_bound(&outcome.fit, *index).is_none();
-            outcome.is_named(kind) && (is_form(kind) && is_chance(*index) || runs_to_bound())
+    /// chance there, and an effect that runs to a bound of what is looked for. False for nothing.
+    pub(super) fn drop_fallen(&self, outcome: &mut Outcome) -> bool {
+        let beside = &self.beside_usual_errors(outcome).fit;
+        let effects = &outcome.fit.model.effects;
+        let refusal = |index: usize| {
+            let kind = effects[index].kind();
+            if !outcome.is_named(kind) {
+                return None;
+            }
+            let is_form = kind == EffectKind::Unknown && !outcome.is_certain(kind);
+            let decrease = || self.without(beside, index).cost - beside.cost;
+            if is_form && decrease() <= penalty(beside, index) {
+                return Some((index, Refusal::Chance));
+            }
+            let bound = at_bound(beside, index).filter(|_| at_bound(&outcome.fit, index).is_none());
+            Some((index, Refusal::AtBound(bound?)))
         };
-        if let Some(index) = (0..outcome.fit.model.effects.len()).find(falls) {
-            outcome.fit = self.without(&outcome.fit, index);
-        }
+        let Some((index, refusal)) = (0..effects.len()).find_map(refusal) else { return false };
+        outcome.fallen.push((effects[index].kind(), refusal));
+        outcome.fit = self.without(&outcome.fit, index);
+        true
     }
 }

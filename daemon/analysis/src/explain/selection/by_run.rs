@@ -109,6 +109,13 @@ pub fn deviations(fit: &Fit) -> Deviations {
     deviations_of_first(fit, fit.theta.len())
 }
 
+/// By how much the scatter between the runs enlarges the likelihood's standard deviation of a parameter.
+pub fn scatter_factor(fit: &Fit, parameter: usize) -> f64 {
+    let likelihood = Cholesky::new(fit.free_information()).map(|factor| factor.inverse());
+    let variance = likelihood.map_or(f64::NAN, |covariance| covariance[(parameter, parameter)]);
+    deviations(fit).std[parameter] / variance.sqrt()
+}
+
 /// The same of the first so many parameters beside the last so many: errors that all runs share, of which
 /// the scatter between the runs shows nothing.
 pub fn deviations_beside(fit: &Fit, count: usize, shared: usize) -> Deviations {

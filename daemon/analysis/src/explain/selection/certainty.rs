@@ -2,16 +2,16 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::by_run::deviations;
-use super::price::at_bound;
-use crate::explain::effects::OUTSIDE_COST;
+use super::by_run::scatter_factor;
+use super::price::{at_bound, penalty};
 use crate::explain::evidence::{CERTAIN_STDS, Fit, SCORE_MIN, acceptance_score};
 
 /// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
 /// where everything declared is a little off, at most 26 for what is not in that world; beside the usual errors 8.
 pub(super) const CERTAIN: f64 = 30.0;
 /// Evidence times the share that it takes from the error, with which it is certain too, and which is asked of what is
-/// chosen among many places, runs or forms: at most 2.3 where nothing acts; beside the usual errors 0.3 for a brake.
+/// chosen among many places, runs or forms: at most 2.3 where nothing acts; beside the usual errors 2.0 for a brake,
+/// 0.3 for a form.
 const CERTAIN_WITH_SHARE: f64 = 6.0;
 /// Fewer runs agree on nothing.
 pub(super) const CERTAIN_RUNS_MIN: usize = 3;
@@ -61,14 +61,13 @@ pub(super) fn is_certain(
         // What acts where the map has its tunnels and curves is one number of the line.
         _ => !effect.ends().is_empty(),
     };
+    let size = fit.model.ranges()[index].start;
     let runs_agree = || {
-        let std = deviations(fit).std[fit.model.ranges()[index].start];
-        let size = effect.size(fit.effect_parameters(index)).abs();
-        size > CERTAIN_STDS * std
+        // So many of the likelihood's standard deviations is the whole effect from none, whatever its form.
+        let deviations = (evidence + penalty(fit, index)).max(0.0).sqrt();
+        deviations > CERTAIN_STDS * scatter_factor(fit, size)
     };
-    // A force outside the library pays for that here too.
-    let price = if effect.kind() == Unknown { OUTSIDE_COST } else { 0.0 };
-    let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE + price;
+    let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE;
     // Runs are independent as samples are not.
     let is_by_run = is_beside_usual_errors && effect.is_one_number_a_run();
     let least = if is_by_run { CERTAIN_WITH_SHARE } else { CERTAIN };
@@ -77,7 +76,19 @@ pub(super) fn is_certain(
     } else {
         evidence > least || takes_enough
     };
-    is_sure && !needs_the_score && fit.runs.len() >= CERTAIN_RUNS_MIN && runs_agree()
+    // What has no name must show in several runs: one of them has some form of its own.
+    let least_runs = CERTAIN_RUNS_MIN as f64 - 1.0;
+    let is_shown = effect.kind() != Unknown || runs_that_show(fit, size) > least_runs;
+    let has_runs = fit.runs.len() >= CERTAIN_RUNS_MIN;
+    is_sure && !needs_the_score && has_runs && is_shown && runs_agree()
+}
+
+/// How many runs show a parameter: as many as would with the same information each.
+fn runs_that_show(fit: &Fit, parameter: usize) -> f64 {
+    let each = fit.runs.iter().map(|run| run.information[(parameter, parameter)]);
+    let (sum, squares) =
+        each.fold((0.0, 0.0), |(sum, squares), own| (sum + own, squares + own * own));
+    if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }
 
 /// Why an effect of a fitted model is not what its kind says.

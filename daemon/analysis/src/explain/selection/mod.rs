@@ -14,7 +14,6 @@ mod steps;
 mod trying;
 
 pub use acceptance::Refusal;
-pub use beside::is_certain_beside;
 pub use by_run::{Deviations, deviations, deviations_beside, few_runs_factor, without_each_run};
 pub use certainty::deciding_score;
 pub use outcome::{Outcome, Trial};

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::acceptance::Refusal;
 use crate::explain::evidence::{Fit, acceptance_score};
 
 /// Named effects at most.
@@ -78,6 +79,8 @@ pub struct Outcome {
     pub small: Vec<EffectKind>,
     /// Kinds that are certain beside the usual errors, with what was tried beside them.
     pub certain: Vec<(EffectKind, Round)>,
+    /// Kinds that were found and did not stand beside the usual errors, and why; not looked for again.
+    pub fallen: Vec<(EffectKind, Refusal)>,
     /// The parameters of a model that was fitted beside the usual errors last, and what came of it.
     pub(super) beside: Option<(Vec<f64>, Arc<Beside>)>,
 }
@@ -106,6 +109,11 @@ impl Outcome {
     /// Whether an effect of the model is certain beside the usual errors, whatever it takes from the error.
     pub fn is_certain(&self, kind: EffectKind) -> bool {
         self.certain.iter().any(|(certain, _)| *certain == kind)
+    }
+
+    /// Kinds that are not looked for again.
+    pub(super) fn fallen_kinds(&self) -> Vec<EffectKind> {
+        self.fallen.iter().map(|(kind, _)| *kind).collect()
     }
 
     /// The trials of what is certain and small, as they were when it was taken in.

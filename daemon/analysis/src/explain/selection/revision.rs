@@ -24,7 +24,7 @@ impl Search<'_> {
             let rest = self.without(&outcome.fit, index);
             let trials = self.rivals(&rest, *kind);
             let mut stands = *kind;
-            if let Some(best) = self.best(&trials, &[])
+            if let Some(best) = self.best(&trials, &outcome.fallen_kinds())
                 && Self::total(&best.fit) < Self::total(&outcome.fit) - EQUAL
                 && all_may_be(&best.fit)
             {

@@ -48,6 +48,7 @@ impl Search<'_> {
             not_testable: Vec::new(),
             small: Vec::new(),
             certain: Vec::new(),
+            fallen: Vec::new(),
             beside: None,
         }
     }
@@ -59,7 +60,7 @@ impl Search<'_> {
             return outcome;
         }
         self.take_what_scores(&mut outcome);
-        while self.take_certain_beside(&mut outcome) {
+        while self.take_certain_beside(&mut outcome) || self.drop_fallen(&mut outcome) {
             self.take_what_scores(&mut outcome);
         }
         // What was certain and small has joined since.
@@ -72,8 +73,8 @@ impl Search<'_> {
     /// that does.
     fn take_what_scores(&self, outcome: &mut Outcome) {
         let most = outcome.rounds.len() + ROUNDS_MAX;
-        // Kinds that others took the place of at once.
-        let mut fruitless: Vec<EffectKind> = Vec::new();
+        // And kinds that others took the place of at once.
+        let mut fruitless = outcome.fallen_kinds();
         while !outcome.is_full() && outcome.rounds.len() < most {
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
             let next = self.best(&trials, &fruitless).map(|trial| (trial.kind, trial.fit.clone()));

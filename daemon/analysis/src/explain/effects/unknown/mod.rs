@@ -20,7 +20,6 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::{Candidate, Effect, Proposal};
 use crate::explain::evidence::SCORE_MIN;
 use crate::explain::scan::Scan;
-pub use outside::OUTSIDE_COST;
 
 /// Bands and forms that are worth a fit.
 const BANDS_MAX: usize = 2;

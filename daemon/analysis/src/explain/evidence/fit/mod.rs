@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::late_speed;
 use super::model::{UpdatedForces, UpdatedModel};
-use super::noise::Noise;
+use super::noise::{Noise, RunScatter};
 use super::response::Response;
 use super::run_data::RunData;
 use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns};
@@ -136,6 +136,16 @@ impl Fit {
     /// The filter of a run, by number.
     pub fn whitener(&self, index: usize) -> &Whitener {
         &self.run_filters[index].whitener
+    }
+
+    /// Whether loads and winds of each run stand beside it.
+    pub fn is_beside_loads_and_winds(&self) -> bool {
+        self.noise.scatter_most == RunScatter::MOST_BESIDE
+    }
+
+    /// What differs from run to run, of one.
+    pub fn own_factors(&self, index: usize) -> &RunFactors {
+        &self.factors[index].0
     }
 
     /// Measured over true speed.
