@@ -1,8 +1,9 @@
 //! Fits that go on from another, and effects that act block by block, against the same from the start and at once.
 
 use dynocar_analysis::explain::effects::{Candidate, LIBRARY, Proposal};
-use dynocar_analysis::explain::evidence::{SampleForces, Whitener};
+use dynocar_analysis::explain::evidence::SampleForces;
 use dynocar_analysis::explain::hypothesis::Past;
+use dynocar_analysis::explain::scan::Scan;
 use dynocar_analysis::explain::selection::Search;
 use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
@@ -10,7 +11,7 @@ use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{Deviations, EffectRequest, SimulatorSettings, simulate};
 
 /// What the library proposes for a train with late forces beside a, b and c alone.
-fn proposed(look: impl Fn(&Explanation, Vec<Candidate>)) {
+fn proposed(look: impl Fn(&Explanation, &Scan, Vec<Candidate>)) {
     let simulated = simulate(&SimulatorSettings {
         deviations: Deviations::ROUGH,
         ..SimulatorSettings::new(77_001, EffectRequest::Kinds(vec![EffectKind::ActuatorDelay]))
@@ -29,12 +30,12 @@ fn proposed(look: impl Fn(&Explanation, Vec<Candidate>)) {
         Proposal::Candidates(candidates) => candidates,
         Proposal::NotTestable(_) => Vec::new(),
     });
-    look(&explanation, candidates.collect());
+    look(&explanation, &scan, candidates.collect());
 }
 
 #[test]
 fn a_fit_that_goes_on_from_another_ends_where_one_from_the_start_does() {
-    proposed(|Explanation { problem, base, .. }, candidates| {
+    proposed(|Explanation { problem, base, .. }, _, candidates| {
         let mut compared = 0;
         for candidate in candidates {
             let kind = candidate.hypothesis.kind().name();
@@ -59,7 +60,7 @@ fn a_fit_that_goes_on_from_another_ends_where_one_from_the_start_does() {
 
 #[test]
 fn what_looks_back_does_the_same_block_by_block() {
-    proposed(|Explanation { problem, .. }, candidates| {
+    proposed(|Explanation { problem, .. }, _, candidates| {
         let looking_back: Vec<Candidate> =
             candidates.into_iter().filter(|it| it.hypothesis.looks_back()).collect();
         assert_eq!(looking_back.len(), 2, "late forces and a late speed");
@@ -85,20 +86,33 @@ fn what_looks_back_does_the_same_block_by_block() {
 }
 
 #[test]
-fn what_is_local_is_whitened_until_it_is_forgotten() {
-    proposed(|Explanation { problem, base, .. }, _| {
-        let run = &problem.runs[0];
-        let whitener = Whitener::new(run, base.noise);
-        let gained_mps = |bin: usize| 0.01 * bin.saturating_sub(49).min(10) as f64;
-        let series: Vec<f64> = (0..run.bins.len()).map(gained_mps).collect();
-        let (mut all, mut local) = (Vec::new(), Vec::new());
-        whitener.whiten(&series, &mut all);
-        whitener.whiten_local(50..60, gained_mps, &mut local);
-        let until = 50 + local.len();
-        assert!(until > 60 && until < all.len(), "{until} of {}", all.len());
-        assert_eq!(local, all[50..until]);
-        let most = local.iter().fold(0.0_f64, |most, it| most.max(it.abs()));
-        let forgotten = all[until..].iter().all(|it| it.abs() < 1e-4 * most);
-        assert!(all[..50].iter().all(|it| *it == 0.0) && forgotten);
+fn a_local_force_is_weighed_as_all_that_the_filter_makes_of_it() {
+    proposed(|Explanation { problem, .. }, scan, _| {
+        let (run, fit) = (&problem.runs[0], scan.fit);
+        let shape: Vec<f64> = (0..10).map(|bin| 0.02 + 0.01 * f64::from(bin).cos()).collect();
+        let mut mps2 = vec![0.0; run.bins.len()];
+        mps2[50..60].copy_from_slice(&shape);
+        let mut gained_mps = vec![0.0; mps2.len()];
+        for (k, bins) in run.bins.windows(2).enumerate() {
+            if bins[0].segment == bins[1].segment {
+                let step_s = bins[1].time_s - bins[0].time_s;
+                gained_mps[k + 1] = gained_mps[k] + 0.5 * step_s * (mps2[k] + mps2[k + 1]);
+            }
+        }
+        let mut innovations = Vec::new();
+        fit.whitener(0).whiten(&gained_mps, &mut innovations);
+        let filter = &fit.filters[0];
+        let with = |other: &[f64]| -> f64 {
+            let rows = innovations.iter().zip(other).zip(filter.weights());
+            rows.map(|((own, other), weight)| weight * own * other).sum()
+        };
+        let is_near = |one: f64, other: f64| (one - other).abs() < 1e-9 * (1.0 + other.abs());
+        let tuple = scan.local_tuple(0, 50, &shape);
+        let explained = filter.explained(filter.columns().each_ref().map(|column| with(column)));
+        assert!(with(&innovations) > 1.0 && is_near(tuple.square, with(&innovations) - explained));
+        assert!(is_near(tuple.score, with(&fit.innovations[0])));
+        for (cross, column) in tuple.cross.iter().zip(&fit.columns[0]) {
+            assert!(is_near(*cross, with(column)));
+        }
     });
 }

@@ -5,15 +5,15 @@
 //! with the innovations, with itself and with the other regressors. They add up over runs, so that
 //! thousands of places, windows and sets of runs can be compared.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use dynocar_core::filter::lanes::dot;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
-use super::evidence::{Bin, Fit, FitProblem, RunData, SampleForces};
+use super::evidence::{Adjoint, Bin, Fit, FitProblem, RUNS_A_TASK, RunData, SampleForces};
 use super::hypothesis::{Hypothesis, Past};
 
 /// Inner products of a whitened regressor.
@@ -61,6 +61,8 @@ pub struct Scan<'a> {
     /// The fitted model.
     pub fit: &'a Fit,
     covariance: DMatrix<f64>,
+    /// By run, once it is asked for.
+    adjoints: Vec<OnceLock<Adjoint>>,
 }
 
 impl<'a> Scan<'a> {
@@ -73,7 +75,8 @@ impl<'a> Scan<'a> {
         fit: &'a Fit,
     ) -> Option<Self> {
         let covariance = fit.factor()?.inverse();
-        Some(Scan { problem, holdout, train, track, fit, covariance })
+        let adjoints = problem.runs.iter().map(|_| OnceLock::new()).collect();
+        Some(Scan { problem, holdout, train, track, fit, covariance, adjoints })
     }
 
     /// Acceleration in m/s² that 1 N/kN of force gives.
@@ -102,11 +105,16 @@ impl<'a> Scan<'a> {
     }
 
     /// The tuple of a force shape over all runs: `acceleration(run, sample)` in m/s² per unit.
-    pub fn tuple(&self, acceleration: impl Fn(&RunData, usize) -> f64) -> Tuple {
+    pub fn tuple(&self, acceleration: impl Fn(&RunData, usize) -> f64 + Sync) -> Tuple {
+        self.over_runs(|index, _| self.run_tuple(index, &acceleration))
+    }
+
+    /// The sum of a tuple of each run.
+    fn over_runs(&self, of_run: impl Fn(usize, &RunData) -> Tuple + Sync) -> Tuple {
+        let each = self.problem.runs.par_iter().enumerate().with_min_len(RUNS_A_TASK);
+        let each: Vec<Tuple> = each.map(|(index, run)| of_run(index, run)).collect();
         let mut sum = Tuple::zero(self.fit.theta.len());
-        for index in 0..self.problem.runs.len() {
-            sum.add(&self.run_tuple(index, &acceleration));
-        }
+        each.iter().for_each(|own| sum.add(own));
         sum
     }
 
@@ -128,32 +136,12 @@ impl<'a> Scan<'a> {
         let acts = |mps2: &f64| *mps2 != 0.0;
         let Some(first) = shape.iter().position(acts) else { return tuple };
         let last = shape.iter().rposition(acts).unwrap_or(first);
-        let acting = from + first..from + last + 1;
-        let (bins, start) = (&self.problem.runs[index].bins, acting.start);
-        let (mut speed_mps, mut before_mps2) = (0.0, 0.0);
-        let gained = |k: usize| {
-            let mps2 = if k < acting.end { shape[k - from] } else { 0.0 };
-            if k > 0 && bins[k - 1].segment == bins[k].segment {
-                let step_s = bins[k].time_s - bins[k - 1].time_s;
-                speed_mps += 0.5 * step_s * (before_mps2 + mps2);
-            } else {
-                speed_mps = 0.0;
-            }
-            before_mps2 = mps2;
-            speed_mps
-        };
-        let mut column = Vec::with_capacity(2 * acting.len());
-        self.fit.whitener(index).whiten_local(acting.clone(), gained, &mut column);
-        let (filter, until) = (&self.fit.filters[index], start + column.len());
-        let weights = &filter.weights()[start..until];
-        let weighted: Vec<f64> = column.iter().zip(weights).map(|(v, w)| v * w).collect();
-        let with = |series: &[f64]| dot(&weighted, &series[start..until]);
-        tuple.score = with(&self.fit.innovations[index]);
-        tuple.square = dot(&weighted, &column) - filter.explained(with);
-        let columns = &self.fit.columns[index];
-        for (cross, other) in tuple.cross.iter_mut().zip(columns).filter(|(_, o)| !o.is_empty()) {
-            *cross = with(other);
-        }
+        let (start, shape) = (from + first, &shape[first..=last]);
+        let run = &self.problem.runs[index];
+        let adjoint = self.adjoints[index].get_or_init(|| Adjoint::of(run, self.fit, index));
+        let products = adjoint.products(start, shape, tuple.cross.as_mut_slice());
+        tuple.score = products.innovations;
+        tuple.square = products.square - self.fit.filters[index].explained(products.factors);
         tuple
     }
 
@@ -163,10 +151,9 @@ impl<'a> Scan<'a> {
         &self,
         effect: &dyn Hypothesis,
         parameters: &[f64],
-        change_mps2: impl Fn(&RunData, usize, [&SampleForces; 2]) -> f64,
+        change_mps2: impl Fn(&RunData, usize, [&SampleForces; 2]) -> f64 + Sync,
     ) -> f64 {
-        let mut sum = Tuple::zero(self.fit.theta.len());
-        for (index, run) in self.problem.runs.iter().enumerate() {
+        let sum = self.over_runs(|index, run| {
             let (mut past, mut middles) = (Past::default(), run.bins.iter().map(Bin::middle));
             let (mut shape, mut middle) = (Vec::with_capacity(run.bins.len()), middles.next());
             for (i, declared) in run.declared.all().enumerate() {
@@ -177,8 +164,8 @@ impl<'a> Scan<'a> {
                     middle = middles.next();
                 }
             }
-            sum.add(&self.shape_tuple(index, &shape));
-        }
+            self.shape_tuple(index, &shape)
+        });
         self.decrease_at_one(&sum)
     }
 

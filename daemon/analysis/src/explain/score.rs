@@ -40,7 +40,7 @@ pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
     error
 }
 
-/// Errors with other parameters, restarted in some ways.
+/// Errors with some parameters, restarted in some ways.
 fn errors_at<const N: usize>(
     fit: &Fit,
     theta: &[f64],
@@ -57,12 +57,12 @@ fn errors_on_day<const N: usize>(
     (run, own): (&RunData, &RunFactors),
     restarts: [Restart; N],
 ) -> [SpeedError; N] {
-    let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
+    let (mut forces, mut ways) =
+        (UpdatedForces::default(), restarts.map(|it| (Prediction::new(), it)));
     fit.model.forces_on_day(run, theta, own, &mut forces);
-    restarts.map(|restart| {
-        prediction.simulate(&run.recording, &forces, restart);
-        SpeedError::of(&run.recording, &prediction)
-    })
+    let each = ways.each_mut().map(|(prediction, restart)| (prediction, *restart));
+    Prediction::simulate_beside(&run.recording, &forces, each);
+    ways.map(|(prediction, _)| SpeedError::of(&run.recording, &prediction))
 }
 
 /// Errors of recorded runs from stop to stop, by the models without and with the effects; `None`

@@ -37,9 +37,9 @@ impl SpeedError {
         assert_eq!(recording.samples().len(), prediction.speed_mps().len());
         let mut error = SpeedError::default();
         for i in samples {
-            let sample = &recording.samples()[i];
-            if sample.speed_mps > MOVING_SPEED_MPS && recording.is_simulated(i) {
-                let difference = prediction.speed_mps()[i] - sample.speed_mps;
+            let measured_mps = recording.speed_mps()[i];
+            if measured_mps > MOVING_SPEED_MPS && recording.is_simulated(i) {
+                let difference = prediction.speed_mps()[i] - measured_mps;
                 error.sum_of_squares += difference * difference;
                 error.count += 1;
             }

@@ -23,18 +23,20 @@ impl Restart {
     /// The metric `window60`.
     pub const WINDOW_60: Restart = Restart::EverySeconds(Restart::WINDOW_S);
 
-    /// True where a measured speed is taken up again.
-    #[inline]
-    fn restarts(self, samples: &[ResolvedSample], index: usize) -> bool {
+    /// The number of the first sample behind another at which a measured speed is taken up again; that of none where
+    /// there is none.
+    fn next_behind(self, samples: &[ResolvedSample], index: usize) -> usize {
         match self {
-            Restart::FullRun => false,
-            Restart::AtDepartures => departs(samples, index),
+            Restart::FullRun => samples.len(),
+            Restart::AtDepartures => {
+                let mut behind = index + 1..samples.len();
+                behind.find(|at| departs(samples, *at)).unwrap_or(samples.len())
+            }
             Restart::EverySeconds(seconds) => {
-                let window = |at: usize| {
-                    let since_ns = samples[at].time_ns - samples[0].time_ns;
-                    since_ns / ((seconds * 1e9) as i64).max(1)
-                };
-                window(index) != window(index.saturating_sub(1))
+                let window_ns = ((seconds * 1e9) as i64).max(1);
+                let since_ns = |sample: &ResolvedSample| sample.time_ns - samples[0].time_ns;
+                let window = since_ns(&samples[index]) / window_ns;
+                samples.partition_point(|sample| since_ns(sample) / window_ns <= window)
             }
         }
     }
@@ -70,24 +72,39 @@ impl Prediction {
     /// The start is the measured speed, unless the samples after it show it to be an outlier:
     /// then it is the median of the starts that they would have given.
     pub fn simulate(&mut self, recording: &Recording, model: &impl ForceModel, restart: Restart) {
+        Prediction::simulate_beside(recording, model, [(self, restart)]);
+    }
+
+    /// Simulates a run in some ways at once: a processor works on one while the other waits for its last speed.
+    pub fn simulate_beside<const N: usize>(
+        recording: &Recording,
+        model: &impl ForceModel,
+        mut ways: [(&mut Prediction, Restart); N],
+    ) {
         let (samples, time_s, roles) = (recording.samples(), recording.time_s(), recording.roles());
         let scale = model.speed_scale();
-        let mut speed_mps = 0.0;
-        self.speed_mps.clear();
+        let mut at = ways.each_ref().map(|(_, restart)| (0.0, restart.next_behind(samples, 0)));
+        ways.iter_mut().for_each(|(own, _)| own.speed_mps.clear());
         for (i, role) in roles.iter().enumerate() {
-            match role {
-                SampleRole::Unknown => {
-                    self.speed_mps.push(samples[i].speed_mps);
-                    continue;
+            for ((own, restart), (speed_mps, next)) in ways.iter_mut().zip(&mut at) {
+                let restarts = i == *next;
+                if restarts {
+                    *next = restart.next_behind(samples, i);
                 }
-                SampleRole::Starts => speed_mps = start_speed(recording, model, i),
-                _ if restart.restarts(samples, i) => speed_mps = start_speed(recording, model, i),
-                SampleRole::HeldAtRest if speed_mps == 0.0 => {}
-                SampleRole::HeldAtRest | SampleRole::Follows => {
-                    speed_mps = step(model, i - 1, speed_mps, time_s[i] - time_s[i - 1]);
+                match role {
+                    SampleRole::Unknown => {
+                        own.speed_mps.push(samples[i].speed_mps);
+                        continue;
+                    }
+                    SampleRole::Starts => *speed_mps = start_speed(recording, model, i),
+                    _ if restarts => *speed_mps = start_speed(recording, model, i),
+                    SampleRole::HeldAtRest if *speed_mps == 0.0 => {}
+                    SampleRole::HeldAtRest | SampleRole::Follows => {
+                        *speed_mps = step(model, i - 1, *speed_mps, time_s[i] - time_s[i - 1]);
+                    }
                 }
+                own.speed_mps.push(scale * *speed_mps);
             }
-            self.speed_mps.push(scale * speed_mps);
         }
     }
 }

@@ -54,6 +54,8 @@ pub struct Recording {
     samples: Vec<ResolvedSample>,
     /// Time in s from the run's first sample.
     time_s: Vec<f64>,
+    /// Measured speeds in m/s, near each other in memory.
+    speed_mps: Vec<f64>,
     roles: Vec<SampleRole>,
     knows_gradient: bool,
     bridged: usize,
@@ -109,7 +111,8 @@ impl Recording {
         if !roles.contains(&SampleRole::Starts) {
             return Err(SimulateError::NoForces { samples: samples.len() });
         }
-        Ok(Recording { samples, time_s, roles, knows_gradient, bridged })
+        let speed_mps = samples.iter().map(|sample| sample.speed_mps).collect();
+        Ok(Recording { samples, time_s, speed_mps, roles, knows_gradient, bridged })
     }
 
     /// The samples, missing forces bridged where they could be.
@@ -154,6 +157,10 @@ impl Recording {
     /// When the run has no sample of this index.
     pub fn starts(&self, index: usize) -> bool {
         self.roles[index] == SampleRole::Starts
+    }
+
+    pub(super) fn speed_mps(&self) -> &[f64] {
+        &self.speed_mps
     }
 
     pub(super) fn roles(&self) -> &[SampleRole] {

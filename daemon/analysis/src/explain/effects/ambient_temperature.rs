@@ -1,5 +1,6 @@
 //! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
 
+use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Entry, Parameter, ambient};
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -76,8 +77,7 @@ impl Hypothesis for Linear {
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-            let degc = sample.ambient_temperature_degc;
+        for (force, degc) in forces.iter_mut().zip(run.known(Covariate::Temperature, first)) {
             ambient::act(parameters[0], ambient::REFERENCE_K, degc, &mut force.resistance);
         }
     }

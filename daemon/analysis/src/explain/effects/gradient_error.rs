@@ -9,6 +9,7 @@
 //! of a map's errors or, where a level line is declared, of a line that nobody surveyed: their
 //! evidence decides.
 
+use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::gradient;
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_model::track::{self, LinearProfile};
@@ -205,9 +206,10 @@ impl Hypothesis for Profile {
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let Some(error) = self.error(parameters) else { return };
-        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
-            if let Some(position_m) = sample.position_m {
-                let at = (position_m, sample.direction);
+        let places = run.known(Covariate::Chainage, first).zip(&run.directions[first..]);
+        for (force, (position_m, direction)) in forces.iter_mut().zip(places) {
+            if let Some(position_m) = position_m {
+                let at = (position_m, *direction);
                 gradient::err(&error, at, &mut force.gradient_permille);
             }
         }
@@ -228,9 +230,10 @@ impl Hypothesis for Profile {
             (1.0 - (inside_m - at_m).abs() / apart_m).max(0.0)
         };
         permille.clear();
-        permille.extend(run.samples().iter().map(|sample| match sample.position_m {
-            Some(_) if has_two_directions && is_growing != (sample.direction > 0.0) => 0.0,
-            Some(position_m) => sample.direction * share(position_m),
+        let places = run.known(Covariate::Chainage, 0).zip(&run.directions);
+        permille.extend(places.map(|(position_m, direction)| match position_m {
+            Some(_) if has_two_directions && is_growing != (*direction > 0.0) => 0.0,
+            Some(position_m) => direction * share(position_m),
             None => 0.0,
         }));
     }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Entry, Parameter, place};
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -105,8 +106,8 @@ impl Local {
             return;
         }
         let Ok(profile) = place::profile(&self.sections.intervals_m, n_per_kn) else { return };
-        for (own, sample) in of_samples.iter_mut().zip(&run.samples()[first..]) {
-            if let Some(position_m) = sample.position_m {
+        for (own, position_m) in of_samples.iter_mut().zip(run.known(Covariate::Chainage, first)) {
+            if let Some(position_m) = position_m {
                 act(own, profile.mean_around(position_m, self.length_m));
             }
         }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::{Parameter, adhesion};
 use dynocar_shared::vocabulary::EffectKind;
+use rayon::prelude::*;
 
 use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
 use crate::explain::answer::Location;
@@ -64,13 +65,16 @@ impl Effect for LowAdhesion {
             .flat_map(|run| run.bins.iter().map(|bin| braking(&run.samples()[bin.middle()])))
             .fold(0.0, f64::max);
         let mut candidates = Vec::new();
-        for cap in CAP_SHARES.map(|share| share * strongest) {
+        let of_cap = |share: &f64| {
+            let cap = share * strongest;
             let shape = |run: &RunData, i: usize| {
                 let sample = &run.samples()[i];
                 (braking(sample) - cap).max(0.0) * weight_n(sample) / sample.inertial_mass_kg
             };
-            candidates.extend(places(scan, &shape, Form::Cap, cap));
-        }
+            places(scan, &shape, Form::Cap, cap)
+        };
+        let of_caps: Vec<_> = CAP_SHARES.par_iter().map(of_cap).collect();
+        candidates.extend(of_caps.into_iter().flatten());
         let shape = |run: &RunData, i: usize| {
             let sample = &run.samples()[i];
             sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg

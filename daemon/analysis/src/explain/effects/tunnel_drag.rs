@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Entry, Parameter, place, tunnel};
 use dynocar_model::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
@@ -110,18 +111,18 @@ impl Hypothesis for Tunnels {
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
         let found = self.found.as_ref().map(|found| place::profile(&found.intervals_m, 1.0));
-        for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
+        let places = run.known(Covariate::Chainage, first).zip(&run.tunnel_share[first..]);
+        for (force, (position_m, &mapped)) in forces.iter_mut().zip(places) {
             let share = match &found {
-                None => sample.tunnel_share,
+                None => mapped,
                 Some(profile) => profile
                     .as_ref()
                     .ok()
-                    .zip(sample.position_m)
-                    .map(|(profile, position_m)| profile.mean_around(position_m, self.length_m)),
+                    .zip(position_m)
+                    .map_or(0.0, |(profile, at_m)| profile.mean_around(at_m, self.length_m)),
             };
-            tunnel::act(parameters[0], share, &mut force.resistance);
-            let sheltered = share.unwrap_or(0.0).max(sample.tunnel_share.unwrap_or(0.0));
-            tunnel::enter(Some(sheltered), &mut force.resistance);
+            tunnel::act(parameters[0], Some(share), &mut force.resistance);
+            tunnel::enter(Some(share.max(mapped)), &mut force.resistance);
         }
     }
 

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::{Entry, Parameter, wind};
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -69,9 +68,9 @@ fn of_another_run(winds_mps: &[f64]) -> f64 {
     mean * (1.0 - variance_of_mean / (mean * mean).max(f64::MIN_POSITIVE)).max(0.0)
 }
 
-fn blow(wind_plus_mps: f64, samples: &[ResolvedSample], forces: &mut [SampleForces]) {
-    for (force, sample) in forces.iter_mut().zip(samples) {
-        wind::act(wind_plus_mps, sample.direction, &mut force.resistance);
+fn blow(wind_plus_mps: f64, directions: &[f64], forces: &mut [SampleForces]) {
+    for (force, direction) in forces.iter_mut().zip(directions) {
+        wind::act(wind_plus_mps, *direction, &mut force.resistance);
     }
 }
 
@@ -89,7 +88,7 @@ impl Hypothesis for Steady {
     }
 
     fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        blow(parameters[0], &run.samples()[first..], forces);
+        blow(parameters[0], &run.directions[first..], forces);
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
@@ -138,7 +137,7 @@ impl Hypothesis for ByRun {
         let own = self.runs.iter().position(|(file, _)| *file == run.file);
         let wind_plus_mps =
             own.map_or_else(|| of_another_run(parameters), |index| parameters[index]);
-        blow(wind_plus_mps, &run.samples()[first..], forces);
+        blow(wind_plus_mps, &run.directions[first..], forces);
     }
 
     fn report(&self, context: &ReportContext) -> Reported {

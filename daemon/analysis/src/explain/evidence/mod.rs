@@ -7,6 +7,7 @@
 //! differences into white innovations, for residuals and regressors alike, so that the fit is a
 //! least-squares problem whatever the noise.
 
+mod adjoint;
 mod bins;
 mod cleaning;
 mod criterion;
@@ -26,6 +27,7 @@ mod sample_forces;
 mod test_runs;
 mod whitener;
 
+pub use adjoint::Adjoint;
 pub use bins::Bin;
 pub use criterion::{
     CERTAIN_STDS, EQUAL, NULL_SCORE, NullScore, SCORE_MIN, acceptance_score, p_value,
@@ -34,6 +36,7 @@ pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RunScatter};
+pub use noise_search::RUNS_A_TASK;
 pub use run_data::{RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::{PRIOR_RUNS, RunFactors, WeightedFilter};
 pub use sample_forces::SampleForces;

@@ -87,8 +87,10 @@ impl UpdatedModel {
         let davis = Davis { a: theta[0], b: theta[1], c: theta[2] };
         let pass = self.pass(&acts);
         let [before, moved] = forces.each_mut().map(|forces| &mut forces.acting);
-        let (mut elsewhere, mut base_mps2) = (theta.to_vec(), Vec::new());
-        let mut moved_mps2 = vec![Vec::new(); moves.len()];
+        let mut elsewhere = theta.to_vec();
+        let room = || Vec::with_capacity(run.samples().len());
+        let mut base_mps2 = room();
+        let mut moved_mps2: Vec<Vec<f64>> = moves.iter().map(|_| room()).collect();
         for block in blocks(run) {
             let first = block.start;
             let push = |forces: &[SampleForces], scale: f64, mps2: &mut Vec<f64>| {

@@ -9,7 +9,7 @@ use super::whitener::Whitener;
 /// What is tried for the noise at changes of the control force, in s.
 const JUMPS_S: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// Runs that one thread takes at a time: less work is not worth handing out.
-const RUNS_A_TASK: usize = 8;
+pub const RUNS_A_TASK: usize = 8;
 
 impl Noise {
     /// The noise under which the differences of the fit runs from a model are likeliest, robust

@@ -36,6 +36,10 @@ pub struct RunData {
     pub span_m: Option<[f64; 2]>,
     /// What a force may depend on, by the number of the covariate, at each sample; `NaN` where unknown.
     covariates: Vec<Vec<f64>>,
+    /// Direction of travel at each sample, as `direction` of the run.
+    pub directions: Vec<f64>,
+    /// Share of the train inside mapped tunnels at each sample; none where it is not known.
+    pub tunnel_share: Vec<f64>,
     /// Time in ns and motion segment of each sample.
     pub stamps: Vec<(i64, u32)>,
     /// The bins of all segments of motion, in order of time.
@@ -107,6 +111,12 @@ impl RunData {
         &self.covariates[of as usize]
     }
 
+    /// The same at the samples from number `first` on; `None` where it is not known. Near each other in memory, as
+    /// the samples themselves are not.
+    pub fn known(&self, of: Covariate, first: usize) -> impl Iterator<Item = Option<f64>> + '_ {
+        self.covariate(of)[first..].iter().map(|it| Some(*it).filter(|it| !it.is_nan()))
+    }
+
     /// Time in s of moving, used motion.
     pub fn moving_s(&self) -> f64 {
         let time_s = self.recording.time_s();
@@ -155,6 +165,9 @@ fn prepare_run(
         recording.samples().iter().map(|sample| sample.covariate(*of).unwrap_or(f64::NAN)).collect()
     };
     let covariates = Covariate::ALL.iter().map(of_samples).collect();
+    let directions = recording.samples().iter().map(|sample| sample.direction).collect();
+    let shares = recording.samples().iter().map(|sample| sample.tunnel_share.unwrap_or(0.0));
+    let tunnel_share = shares.collect();
     let stamps =
         recording.samples().iter().map(|sample| (sample.time_ns, sample.segment)).collect();
     let positions_m = recording.samples().iter().filter_map(|sample| sample.position_m);
@@ -180,6 +193,8 @@ fn prepare_run(
         smooth_mps,
         span_m,
         covariates,
+        directions,
+        tunnel_share,
         stamps,
         bins,
         distance_ratio,

@@ -19,7 +19,7 @@ use super::whitener::Whitener;
 
 /// A run's own deviations: of the factors on the control force and on the basic resistance from
 /// 1, the headwind in m/s, and the delay of the force in s.
-const DEVIATIONS: usize = 4;
+pub const DEVIATIONS: usize = 4;
 /// The deviations of a run, and their covariance or its inverse.
 pub type RunFactors = SVector<f64, DEVIATIONS>;
 pub type FactorMatrix = SMatrix<f64, DEVIATIONS, DEVIATIONS>;
@@ -101,10 +101,16 @@ pub fn of_day(Davis { a, b, c }: Davis, own: &RunFactors) -> Davis {
     Davis { a: factor * a, b: factor * b + 2.0 * c * own[2], c: factor * c }
 }
 
+/// What all columns say of each bin, in their order.
+fn rows([c0, c1, c2, c3]: &Columns) -> impl Iterator<Item = [f64; DEVIATIONS]> {
+    c0.iter().zip(c1).zip(c2).zip(c3).map(|(((c0, c1), c2), c3)| [*c0, *c1, *c2, *c3])
+}
+
 /// A series less what deviations explain by their columns.
 pub fn remove(columns: &Columns, series: &[f64], deviations: &RunFactors) -> Vec<f64> {
-    let explained = |i: usize| (0..DEVIATIONS).map(|k| deviations[k] * columns[k][i]).sum::<f64>();
-    series.iter().enumerate().map(|(i, value)| value - explained(i)).collect()
+    let [d0, d1, d2, d3] = (*deviations).into();
+    let rows = series.iter().zip(rows(columns));
+    rows.map(|(value, [c0, c1, c2, c3])| value - (d0 * c0 + d1 * c1 + d2 * c2 + d3 * c3)).collect()
 }
 
 /// Removes the runs' own factors from whitened series of one run.
@@ -128,23 +134,25 @@ pub struct WeightedFilter {
 impl ScatterFilter {
     /// The filter of a run from its columns under a noise.
     pub fn new(columns: &Columns, whitener: &Whitener, scatter: RunScatter) -> Self {
-        let mut whitened = Columns::default();
-        for (column, out) in columns.iter().zip(&mut whitened) {
-            whitener.whiten(column, out);
-        }
+        let mut whitened = columns.clone();
+        whitener.whiten_all(&mut whitened);
         ScatterFilter { columns: whitened.into(), precision: scatter.precision() }
     }
 
     /// The filter with given weights of the innovations.
     pub fn weighted(&self, weights: Vec<f64>) -> WeightedFilter {
-        let product = |i: usize, j: usize| -> f64 {
-            let pairs = self.columns[i].iter().zip(&self.columns[j]).zip(&weights);
-            pairs.map(|((one, other), weight)| weight * one * other).sum()
-        };
+        let mut products = [[0.0; DEVIATIONS]; DEVIATIONS];
+        for (row, weight) in rows(&self.columns).zip(&weights) {
+            for i in 0..DEVIATIONS {
+                for j in 0..=i {
+                    products[i][j] += weight * row[i] * row[j];
+                }
+            }
+        }
         let mut information = self.precision;
         for i in 0..DEVIATIONS {
             for j in 0..=i {
-                let sum = self.precision[(i, j)] + product(i, j);
+                let sum = self.precision[(i, j)] + products[i][j];
                 (information[(i, j)], information[(j, i)]) = (sum, sum);
             }
         }
@@ -164,17 +172,24 @@ impl ScatterFilter {
 impl WeightedFilter {
     /// The factors, less 1, and the delay that fit a whitened series best.
     pub fn factors(&self, series: &[f64]) -> RunFactors {
-        let product = |column: &[f64]| -> f64 {
-            column.iter().zip(series).zip(&self.weights[..]).map(|((c, s), w)| w * c * s).sum()
-        };
-        self.covariance * RunFactors::from_fn(|k, _| product(&self.columns[k]))
+        let mut products = RunFactors::zeros();
+        for ((row, value), weight) in rows(&self.columns).zip(series).zip(&self.weights[..]) {
+            for k in 0..DEVIATIONS {
+                products[k] += weight * row[k] * value;
+            }
+        }
+        self.covariance * products
     }
 
-    /// What the factors explain of the square of a series, given its weighted product with each of
-    /// their columns.
-    pub fn explained(&self, product: impl Fn(&[f64]) -> f64) -> f64 {
-        let products = RunFactors::from_fn(|k, _| product(&self.columns[k]));
+    /// What the factors explain of the square of a series, given its weighted products with their columns.
+    pub fn explained(&self, products: [f64; DEVIATIONS]) -> f64 {
+        let products = RunFactors::from(products);
         products.dot(&(self.covariance * products))
+    }
+
+    /// The whitened columns of the factors.
+    pub fn columns(&self) -> &Columns {
+        &self.columns
     }
 
     /// The series less what the factors explain.

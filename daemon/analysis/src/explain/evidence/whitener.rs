@@ -1,6 +1,6 @@
 //! Whitening of the noise, and Huber's loss of what it leaves.
 
-use std::ops::Range;
+use std::array;
 use std::sync::Arc;
 
 use nalgebra::{Matrix2, Vector2};
@@ -12,8 +12,8 @@ use super::run_data::RunData;
 use dynocar_core::filter::Gaussian;
 
 /// Places in the belief: the level of the speed difference in m/s, the fading acceleration in m/s².
-const LEVEL: usize = 0;
-const FADING: usize = 1;
+pub(super) const LEVEL: usize = 0;
+pub(super) const FADING: usize = 1;
 
 /// Innovations beyond this many standard deviations count linearly (Huber).
 const HUBER: f64 = 3.0;
@@ -32,11 +32,6 @@ pub(super) fn robust_weight(nu: f64) -> f64 {
     if size <= HUBER { 1.0 } else { HUBER / size }
 }
 
-/// Innovations behind a local series that are, two in a row, no more than this share of its greatest are none; so are
-/// all after so many bins.
-const FORGOTTEN_SHARE: f64 = 1e-6;
-const MEMORY_BINS: usize = 200;
-
 /// Turns bin differences of one run into white innovations of unit variance.
 #[derive(Clone, Debug)]
 pub struct Whitener {
@@ -45,14 +40,19 @@ pub struct Whitener {
     log_determinant: f64,
 }
 
+/// One step of the filter.
 #[derive(Clone, Copy, Debug)]
-struct Step {
-    starts: bool,
-    fade: f64,
-    carry_s: f64,
-    /// What the level and the fading acceleration take of an innovation.
-    gain: Vector2<f64>,
-    per_deviation: f64,
+pub(super) struct Step {
+    /// Whether a segment of motion starts.
+    pub starts: bool,
+    /// Share of the fading acceleration that is left.
+    pub fade: f64,
+    /// By how much it moves the level, per unit.
+    pub carry_s: f64,
+    /// What the level and the fading acceleration take of a difference.
+    pub gain: Vector2<f64>,
+    /// Innovation by difference.
+    pub per_deviation: f64,
 }
 
 /// Covariance that an acceleration of unit variance which fades in `fading_s` gains over a step
@@ -74,6 +74,8 @@ struct Walk {
     by_step: Fade,
     /// The step made last within a segment.
     last: Option<Settling>,
+    /// Whether the belief is what it led to.
+    follows: bool,
 }
 
 /// A step from one belief to the next: from the same belief the same step leads to the same.
@@ -85,22 +87,28 @@ struct Settling {
     to: Matrix2<f64>,
     step: Step,
     variance: f64,
+    /// Whether it leads to where it comes from.
+    is_settled: bool,
 }
 
 impl Settling {
-    fn is_from(&self, belief: &Matrix2<f64>, time_s: f64, bin_var: f64) -> bool {
-        let is_near = |one: f64, other: f64| (one - other).abs() <= SETTLED_SHARE * other.abs();
-        self.bin_var == bin_var
-            && (self.time_s - time_s).abs() <= SAME_STEP_S
-            && self.from.iter().zip(belief.iter()).all(|(from, now)| is_near(*from, *now))
+    fn is_of(&self, time_s: f64, bin_var: f64) -> bool {
+        self.bin_var == bin_var && (self.time_s - time_s).abs() <= SAME_STEP_S
     }
+}
+
+/// Whether two beliefs are one.
+fn are_one(from: &Matrix2<f64>, now: &Matrix2<f64>) -> bool {
+    let is_near = |one: f64, other: f64| (one - other).abs() <= SETTLED_SHARE * other.abs();
+    from.iter().zip(now.iter()).all(|(from, now)| is_near(*from, *now))
 }
 
 impl Walk {
     fn new(noise: Noise) -> Self {
         let std = Vector2::new(0.0, noise.fading_var.sqrt());
         let belief = Gaussian::<2>::independent(Vector2::zeros(), std);
-        Walk { noise, belief, before: None, by_step: Fade::new(noise.fading_s), last: None }
+        let by_step = Fade::new(noise.fading_s);
+        Walk { noise, belief, before: None, by_step, last: None, follows: false }
     }
 
     /// The step to the next bin and the variance of the innovation there, 1 where there is none.
@@ -112,8 +120,11 @@ impl Walk {
         let starts = self.before.is_none_or(|(segment, _)| segment != bin.segment);
         self.before = Some((bin.segment, bin.time_s));
         let belief = &mut self.belief;
-        if let Some(last) = self.last.filter(|_| !starts)
-            && last.is_from(&belief.covariance, step_s, bin_var)
+        let follows = std::mem::replace(&mut self.follows, !starts);
+        if let Some(last) = &self.last
+            && !starts
+            && last.is_of(step_s, bin_var)
+            && (if follows { last.is_settled } else { are_one(&last.from, &belief.covariance) })
         {
             belief.covariance = last.to;
             return (last.step, last.variance);
@@ -133,11 +144,16 @@ impl Walk {
         let white = Matrix2::new(self.noise.white_density * step_s, 0.0, 0.0, 0.0);
         belief.predict(Vector2::zeros(), &moved, &(added + white));
         // Without mean and observation only the variances are known.
-        let Ok(innovation) = belief.innovation(LEVEL, 0.0, bin_var) else { return (step, 1.0) };
+        let Ok(innovation) = belief.innovation(LEVEL, 0.0, bin_var) else {
+            self.follows = false;
+            return (step, 1.0);
+        };
         step.gain = belief.take(LEVEL, &innovation, bin_var);
         step.per_deviation = innovation.inverse_variance.sqrt();
         let (to, variance) = (belief.covariance, innovation.variance);
-        self.last = Some(Settling { time_s: step_s, bin_var, from, to, step, variance });
+        let is_settled = are_one(&from, &to);
+        self.last =
+            Some(Settling { time_s: step_s, bin_var, from, to, step, variance, is_settled });
         (step, variance)
     }
 }
@@ -220,27 +236,44 @@ impl Whitener {
         innovations.extend(steps.map(|(step, &value)| tracked.innovation(step, value)));
     }
 
-    /// Innovations of a series that is zero before the first of some bins and starts there: of these, and of those
-    /// behind them until what they left is forgotten.
-    pub fn whiten_local(
-        &self,
-        bins: Range<usize>,
-        mut series: impl FnMut(usize) -> f64,
-        innovations: &mut Vec<f64>,
-    ) {
-        innovations.clear();
-        let mut tracked = Tracked::default();
-        let until = (bins.end + MEMORY_BINS).min(self.steps.len());
-        let (mut most, mut small) = (0.0_f64, 0);
-        for (bin, step) in (bins.start..until).zip(&self.steps[bins.start..until]) {
-            let innovation = tracked.innovation(step, series(bin));
-            innovations.push(innovation);
-            most = most.max(innovation.abs());
-            small = if innovation.abs() <= FORGOTTEN_SHARE * most { small + 1 } else { 0 };
-            if bin >= bins.end && small == 2 {
-                break;
+    /// Puts in the place of some series their innovations; those that are empty stay.
+    pub fn whiten_all(&self, series: &mut [Vec<f64>]) {
+        let mut left: Vec<&mut [f64]> =
+            series.iter_mut().filter(|it| !it.is_empty()).map(|it| &mut it[..]).collect();
+        let mut left = &mut left[..];
+        loop {
+            left = match left {
+                [a, b, c, d, left @ ..] => {
+                    self.whiten_beside([a, b, c, d]);
+                    left
+                }
+                [a, b, left @ ..] => {
+                    self.whiten_beside([a, b]);
+                    left
+                }
+                [a, left @ ..] => {
+                    self.whiten_beside([a]);
+                    left
+                }
+                [] => break,
+            };
+        }
+    }
+
+    /// The same of a few beside each other, which do not wait for each other.
+    fn whiten_beside<const N: usize>(&self, series: [&mut [f64]; N]) {
+        let mut series = series.map(|it| &mut it[..self.steps.len()]);
+        let mut tracked: [Tracked; N] = array::from_fn(|_| Tracked::default());
+        for (k, step) in self.steps.iter().enumerate() {
+            for (tracked, series) in tracked.iter_mut().zip(&mut series) {
+                series[k] = tracked.innovation(step, series[k]);
             }
         }
+    }
+
+    /// The steps of the filter.
+    pub(super) fn steps(&self) -> &[Step] {
+        &self.steps
     }
 
     /// Robust -2 log likelihood of the innovations, up to a constant.

@@ -44,6 +44,8 @@ struct Places<'s, 'a> {
     blocks: Vec<Vec<[f64; 2]>>,
 }
 
+/// Tuples of runs that one thread takes at a time at least: less work is not worth handing out.
+const TUPLES_A_TASK: usize = 64;
 /// Bins that are looked at together.
 const BLOCK: usize = 16;
 
@@ -248,17 +250,17 @@ impl Places<'_, '_> {
         sum
     }
 
-    fn with_another(&self, cells: &[Cell], found: &Found) -> Option<Found> {
+    fn with_another<'c>(&self, cells: &'c [Cell], found: &Found) -> Option<Found> {
         let base = self.over(&found.intervals_m, &found.runs);
-        let (cell, gain) = cells
-            .iter()
-            .filter(|cell| apart(cell.interval_m, &found.intervals_m))
-            .map(|cell| {
-                let mut sum = self.summed(&cell.runs, &found.runs);
-                sum.add(&base);
-                (cell, self.scan.gain(&sum).0)
-            })
-            .max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let gain = |cell: &'c Cell| {
+            let mut sum = self.summed(&cell.runs, &found.runs);
+            sum.add(&base);
+            (cell, self.scan.gain(&sum).0)
+        };
+        let free = cells.par_iter().filter(|cell| apart(cell.interval_m, &found.intervals_m));
+        let gains: Vec<(&Cell, f64)> = free.map(gain).collect();
+        let most = gains.into_iter().max_by(|one, other| one.1.total_cmp(&other.1));
+        let (cell, gain) = most?;
         let mut grown = found.clone();
         grown.intervals_m.push(cell.interval_m);
         grown.gain = gain;
@@ -275,6 +277,7 @@ impl Places<'_, '_> {
             let (gain, estimate) = self.scan.gain(&self.over(&together, &found.runs));
             if self.positive && estimate <= 0.0 { (0.0, estimate) } else { (gain, estimate) }
         };
+        let tries_a_task = TUPLES_A_TASK.div_ceil(self.bins.len());
         let mut best = (own, value(own));
         let mut step_m = 0.5 * (best.0[1] - best.0[0]);
         while step_m > FINEST_M {
@@ -287,11 +290,11 @@ impl Places<'_, '_> {
                 [from - step_m, to - step_m],
                 [from + step_m, to + step_m],
             ];
-            let better = tries
-                .into_iter()
-                .filter(|&it| it[1] - it[0] >= 100.0 && apart(it, &others))
-                .map(|interval| (interval, value(interval)))
-                .max_by(|one, other| one.1.0.total_cmp(&other.1.0));
+            let possible = |it: &[f64; 2]| it[1] - it[0] >= 100.0 && apart(*it, &others);
+            let tries: Vec<[f64; 2]> = tries.into_iter().filter(possible).collect();
+            let tried = tries.into_par_iter().with_min_len(tries_a_task);
+            let values: Vec<_> = tried.map(|interval| (interval, value(interval))).collect();
+            let better = values.into_iter().max_by(|one, other| one.1.0.total_cmp(&other.1.0));
             match better {
                 Some(better) if better.1.0 > best.1.0 => best = better,
                 _ => step_m *= 0.5,

@@ -1,5 +1,6 @@
 //! Where a mass holds: it changes only while the train stands.
 
+use dynocar_model::terms::extra::Covariate;
 use dynocar_model::track::MassSection;
 
 use crate::explain::evidence::RunData;
@@ -42,11 +43,11 @@ impl Part {
     pub fn holds(&self, run: &RunData, index: usize) -> bool {
         match self {
             Part::Section { from_m, to_m, direction } => {
-                let sample = &run.samples()[index];
-                let (from_m, to_m) = (*from_m, *to_m);
-                let direction = direction.unwrap_or(sample.direction);
+                let (from_m, to_m, towards) = (*from_m, *to_m, run.directions[index]);
+                let direction = direction.unwrap_or(towards);
                 let section = MassSection { from_m, to_m, direction, mass_factor: 1.0 };
-                sample.position_m.is_some_and(|at_m| section.holds(at_m, sample.direction))
+                let at_m = run.covariate(Covariate::Chainage)[index];
+                !at_m.is_nan() && section.holds(at_m, towards)
             }
             Part::Window { from_s, to_s, .. } => {
                 (*from_s..=*to_s).contains(&run.recording.time_s()[index])

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use dynocar_model::terms::Parameter;
 use dynocar_model::terms::extra::Covariate;
 use dynocar_shared::vocabulary::EffectKind;
+use rayon::prelude::*;
 
 use super::band_axis::{AXES, BandAxis};
 use super::outside::OUTSIDE_COST;
@@ -38,7 +39,7 @@ struct Band {
 /// the best first.
 pub fn bands(scan: &Scan) -> Vec<(f64, Candidate)> {
     let mut bands: Vec<(f64, Candidate)> =
-        AXES.iter().filter_map(|&axis| best_band(scan, axis)).collect();
+        AXES.par_iter().filter_map(|&axis| best_band(scan, axis)).collect();
     bands.sort_by(|one, other| other.0.total_cmp(&one.0));
     bands
 }
@@ -185,7 +186,7 @@ impl Hypothesis for Band {
             }
             match self.axis {
                 BandAxis::Of(Covariate::Chainage) => {
-                    force.gradient_permille += run.samples()[i].direction * parameters[0];
+                    force.gradient_permille += run.directions[i] * parameters[0];
                 }
                 BandAxis::Of(Covariate::TractionForce) => force.traction_n *= 1.0 + parameters[0],
                 BandAxis::Of(Covariate::BrakeForce) => force.brake_n *= 1.0 + parameters[0],
@@ -206,7 +207,7 @@ impl Hypothesis for Band {
         let number = self.number(run);
         let unit = |i: usize| match self.axis {
             _ if !self.holds(run, number, i) => 0.0,
-            BandAxis::Of(Covariate::Chainage) => run.samples()[i].direction,
+            BandAxis::Of(Covariate::Chainage) => run.directions[i],
             _ => 1.0,
         };
         n_per_kn.clear();

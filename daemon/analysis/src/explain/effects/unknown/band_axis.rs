@@ -43,7 +43,9 @@ impl BandAxis {
         match self {
             BandAxis::Of(Covariate::Speed) => Some(run.smooth_mps[index]),
             BandAxis::Of(Covariate::TimeSinceStart) => Some(run.recording.time_s()[index]),
-            BandAxis::Of(covariate) => run.samples()[index].covariate(covariate),
+            BandAxis::Of(covariate) => {
+                Some(run.covariate(covariate)[index]).filter(|value| !value.is_nan())
+            }
             BandAxis::Run => number.map(|number| number as f64),
         }
     }

@@ -198,11 +198,7 @@ impl Fit {
 
 /// Whitens columns; what of them the run's own factors would not explain.
 fn whiten(whitener: &Whitener, own: &WeightedFilter, columns: &mut [Vec<f64>]) -> Vec<Column> {
-    let mut whitened = Vec::new();
-    for column in &mut *columns {
-        whitener.whiten(column, &mut whitened);
-        std::mem::swap(column, &mut whitened);
-    }
+    whitener.whiten_all(columns);
     let free = columns.iter().map(|column| own.remove(column, &own.factors(column)));
     free.map(Arc::new).collect()
 }
