@@ -45,6 +45,10 @@ macro_rules! vocabulary {
     };
 }
 
+// Behind the macro, which it uses.
+mod effects;
+pub use effects::{EffectKind, KINDS, KindRow, separating_run};
+
 vocabulary! {
     /// The kind of estimator behind a snapshot.
     PipelineKind: u32 {
@@ -293,55 +297,6 @@ impl Manoeuvre {
     /// The manoeuvre's bit in [`crate::ParameterSnapshot::missing_manoeuvres`].
     pub const fn bit(self) -> u32 {
         1 << self as u32
-    }
-}
-
-impl EffectKind {
-    /// The effect's bit in [`crate::ParameterSnapshot::suspected_alternatives`].
-    pub const fn bit(self) -> u32 {
-        1 << self as u32
-    }
-}
-
-vocabulary! {
-    /// An effect that a model may lack, as in the answers of `dynocar explain`.
-    EffectKind: u32 {
-        /// No suspicion.
-        None = 0 "none",
-        /// Air drag in tunnels.
-        TunnelDrag = 1 "tunnel_drag",
-        /// Resistance in curves.
-        CurveResistance = 2 "curve_resistance",
-        /// Wind along the line.
-        Wind = 3 "wind",
-        /// A brake that does not release.
-        DraggingBrake = 4 "dragging_brake",
-        /// A wrong wheel diameter, hence a wrong speed scale.
-        WheelDiameter = 5 "wheel_diameter",
-        /// A gradient profile moved along the line.
-        GradientShift = 6 "gradient_shift",
-        /// Another mass than declared.
-        MassChange = 7 "mass_change",
-        /// A reported force that is not the true one.
-        TractionGain = 8 "traction_gain",
-        /// Forces that act later than reported.
-        ActuatorDelay = 9 "actuator_delay",
-        /// Another rotating mass than declared.
-        RotatingMass = 10 "rotating_mass",
-        /// Cold bearings that warm up.
-        BearingTemperature = 11 "bearing_temperature",
-        /// Resistance that follows the outside temperature.
-        AmbientTemperature = 12 "ambient_temperature",
-        /// Extra resistance at a place.
-        LocalResistance = 13 "local_resistance",
-        /// A brake force that the rail does not carry.
-        LowAdhesion = 14 "low_adhesion",
-        /// A real residual that no known effect explains.
-        Unknown = 15 "unknown",
-        /// A declared gradient that is wrong by a smooth function of the chainage.
-        GradientError = 16 "gradient_error",
-        /// A measured speed that is late.
-        SpeedDelay = 17 "speed_delay",
     }
 }
 

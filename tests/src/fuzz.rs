@@ -17,7 +17,8 @@ use dynocar_analysis::import::{Reading, Source, import};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::{PipelineKind, TrainId, TrainSample};
+use dynocar_shared::layout::Words;
+use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -226,57 +227,40 @@ fn good_samples() -> Vec<u8> {
     (0..50).flat_map(sample).collect()
 }
 
+/// The place of the first measured quantity among the fields of a sample.
+const FIRST_MEASURED: usize = TrainSample::LAYOUT.len() - SampleField::ALL.len();
+
 fn bytes_of(it: &TrainSample) -> Vec<u8> {
     let integers = [it.time_ns as u64, it.published_ns as u64, it.sequence, it.train_id];
     let small = u64::from(it.valid)
         | u64::from(it.flags) << 16
         | u64::from(it.direction as u8) << 24
         | u64::from(it.run) << 32;
-    let floats = [
-        it.position_m,
-        it.speed_mps,
-        it.traction_force_n,
-        it.brake_force_n,
-        it.brake_cylinder_pressure_pa,
-        it.acceleration_mps2,
-        it.specific_force_mps2,
-        it.mass_kg,
-        it.ambient_temperature_degc,
-        it.gradient_permille,
-        it.curve_radius_m,
-    ];
-    let words = integers.into_iter().chain([small]).chain(floats.map(f64::to_bits));
+    let measured = (FIRST_MEASURED..TrainSample::LAYOUT.len()).map(|index| it.word(index));
+    let words = integers.into_iter().chain([small]).chain(measured);
     words.flat_map(u64::to_le_bytes).collect()
 }
 
 fn samples_of(bytes: &[u8]) -> impl Iterator<Item = TrainSample> + '_ {
-    bytes.chunks_exact(128).map(|chunk| {
+    bytes.chunks_exact(size_of::<TrainSample>()).map(|chunk| {
         let word = |index: usize| {
             let bytes: [u8; 8] = std::array::from_fn(|i| chunk[8 * index + i]);
             u64::from_le_bytes(bytes)
         };
-        let float = |index: usize| f64::from_bits(word(5 + index));
-        TrainSample {
+        let mut sample = TrainSample {
             time_ns: word(0) as i64,
             published_ns: word(1) as i64,
             sequence: word(2),
-            train_id: word(3),
             valid: word(4) as u16,
             flags: (word(4) >> 16) as u8,
             direction: (word(4) >> 24) as i8,
             run: (word(4) >> 32) as u32,
-            position_m: float(0),
-            speed_mps: float(1),
-            traction_force_n: float(2),
-            brake_force_n: float(3),
-            brake_cylinder_pressure_pa: float(4),
-            acceleration_mps2: float(5),
-            specific_force_mps2: float(6),
-            mass_kg: float(7),
-            ambient_temperature_degc: float(8),
-            gradient_permille: float(9),
-            curve_radius_m: float(10),
+            ..TrainSample::empty(TrainId(word(3)))
+        };
+        for k in 0..SampleField::ALL.len() {
+            sample.set_word(FIRST_MEASURED + k, word(5 + k));
         }
+        sample
     })
 }
 

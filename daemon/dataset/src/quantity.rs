@@ -2,11 +2,13 @@
 
 use dynocar_model::named;
 use dynocar_model::units::{Dimension, Unit};
+use dynocar_shared::SampleField;
 use serde::Serialize;
 
-/// Declares the quantities: what each is, its name in a dataset, what its units measure.
+/// Declares the quantities: what each is, its name in a dataset, what its units measure, and the field of a sample
+/// that it fills, if any.
 macro_rules! quantities {
-    ($( #[doc = $doc:literal] $item:ident $name:literal $dimension:ident; )*) => {
+    ($( #[doc = $doc:literal] $item:ident $name:literal $dimension:ident $(=> $field:ident)?; )*) => {
         named! {
             /// What a column of a run may hold; in the order of the documentation.
             #[derive(Hash, PartialOrd, Ord, Serialize)]
@@ -19,6 +21,11 @@ macro_rules! quantities {
             pub const fn dimension(self) -> Dimension {
                 match self { $( Quantity::$item => Dimension::$dimension ),* }
             }
+
+            /// The field of a sample that it fills.
+            pub fn field(self) -> Option<SampleField> {
+                match self { $( Quantity::$item => None$(.or(Some(SampleField::$field)))? ),* }
+            }
         }
     };
 }
@@ -27,17 +34,17 @@ quantities! {
     /// Time of the measurement, from any origin.
     Time "time" Time;
     /// Chainage of the train.
-    Position "position" Length;
+    Position "position" Length => Position;
     /// Speed in the direction of travel, never negative.
-    Speed "speed" Speed;
+    Speed "speed" Speed => Speed;
     /// dv/dt.
-    Acceleration "acceleration" Acceleration;
+    Acceleration "acceleration" Acceleration => Acceleration;
     /// What an accelerometer reads along the track: dv/dt + g * gradient.
-    SpecificForce "specific_force" Acceleration;
+    SpecificForce "specific_force" Acceleration => SpecificForce;
     /// Traction force, never negative.
-    TractionForce "traction_force" Force;
+    TractionForce "traction_force" Force => TractionForce;
     /// Retarding force of the brakes, never negative.
-    BrakeForce "brake_force" Force;
+    BrakeForce "brake_force" Force => BrakeForce;
     /// Traction minus brake force.
     ControlForce "control_force" Force;
     /// Share of the traction effort curve, 0 to 1.
@@ -45,21 +52,21 @@ quantities! {
     /// Share of the brake effort curve, 0 to 1.
     BrakeHandle "brake_handle" Ratio;
     /// Brake-cylinder pressure.
-    BrakeCylinderPressure "brake_cylinder_pressure" Pressure;
+    BrakeCylinderPressure "brake_cylinder_pressure" Pressure => BrakeCylinderPressure;
     /// The train's gross mass.
-    TrainMass "train_mass" Mass;
+    TrainMass "train_mass" Mass => Mass;
     /// Number of passengers.
     Passengers "passengers" Count;
     /// Outside temperature.
-    AmbientTemperature "ambient_temperature" Temperature;
+    AmbientTemperature "ambient_temperature" Temperature => AmbientTemperature;
     /// Relative humidity of the air.
     RelativeHumidity "relative_humidity" Ratio;
     /// Gradient, climbing positive as the chainage grows.
-    Gradient "gradient" Ratio;
+    Gradient "gradient" Ratio => Gradient;
     /// Height of the track.
     Altitude "altitude" Length;
     /// Radius of the curve; 0 or infinite on straight track, the sign does not count.
-    CurveRadius "curve_radius" Length;
+    CurveRadius "curve_radius" Length => CurveRadius;
     /// Speed of the wind.
     WindSpeed "wind_speed" Speed;
     /// 1 while the wheel-slide protection is active, else 0.
@@ -85,6 +92,11 @@ quantities! {
 }
 
 impl Quantity {
+    /// The quantity that fills a field of a sample; `None` for a field that no column holds.
+    pub fn of_field(field: SampleField) -> Option<Self> {
+        Self::ALL.into_iter().find(|it| it.field() == Some(field))
+    }
+
     /// The unit in which it is held once read: the base unit of its dimension, but ‰ for the
     /// gradient.
     pub fn unit(self) -> Unit {

@@ -104,20 +104,17 @@ impl<'d> Resolved<'d> {
     /// counted passengers.
     pub fn samples(&self, number: u32, train: &TrainModel) -> impl Iterator<Item = TrainSample> {
         let column = |quantity| self.table.column(quantity).unwrap_or_default();
-        let mut fields: Vec<(SampleField, &[f64])> = vec![
-            (SampleField::Position, &self.position_m),
-            (SampleField::Speed, &self.speeds.speed_mps),
-            (SampleField::TractionForce, &self.forces.traction.force_n),
-            (SampleField::BrakeForce, &self.forces.brake.force_n),
-            (SampleField::BrakeCylinderPressure, column(Quantity::BrakeCylinderPressure)),
-            (SampleField::Acceleration, column(Quantity::Acceleration)),
-            (SampleField::SpecificForce, column(Quantity::SpecificForce)),
-            (SampleField::Mass, column(Quantity::TrainMass)),
-            (SampleField::AmbientTemperature, column(Quantity::AmbientTemperature)),
-            (SampleField::Gradient, self.gradient_permille.as_deref().unwrap_or_default()),
-        ];
-        fields.retain(|(_, values)| !values.is_empty());
-        let radius_m = column(Quantity::CurveRadius);
+        let source = |quantity| match quantity {
+            Quantity::Position => &self.position_m,
+            Quantity::Speed => &self.speeds.speed_mps,
+            Quantity::TractionForce => &self.forces.traction.force_n,
+            Quantity::BrakeForce => &self.forces.brake.force_n,
+            Quantity::Gradient => self.gradient_permille.as_deref().unwrap_or_default(),
+            other => column(other),
+        };
+        let filled = Quantity::ALL.into_iter().filter_map(|it| Some((it.field()?, source(it))));
+        let fields: Vec<(SampleField, &[f64])> =
+            filled.filter(|(_, values)| !values.is_empty()).collect();
         let passengers = column(Quantity::Passengers);
         let wheel_slide = column(Quantity::WheelSlide);
         let is_there =
@@ -137,11 +134,9 @@ impl<'d> Resolved<'d> {
             }
             for &(field, values) in &fields {
                 if let Some(value) = is_there(values, row) {
-                    sample.set(field, value);
+                    let is_signed = field != SampleField::CurveRadius;
+                    sample.set(field, if is_signed { value } else { value.abs() });
                 }
-            }
-            if let Some(radius) = is_there(radius_m, row) {
-                sample.set(SampleField::CurveRadius, radius.abs());
             }
             if is_there(wheel_slide, row).is_some_and(|slide| slide > 0.5) {
                 sample.flags |= FLAG_WHEEL_SLIDE;

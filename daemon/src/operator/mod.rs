@@ -3,7 +3,7 @@
 //!
 //! - [`suspicion`]: the effect that the model may lack, with its force and what else it could be
 //!
-//! What to do about it is in [`dynocar_core::remedy`] and [`dynocar_model::terms::KINDS`].
+//! What to do about it is in [`dynocar_core::remedy`] and [`dynocar_shared::vocabulary::KINDS`].
 
 pub mod suspicion;
 

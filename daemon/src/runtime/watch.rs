@@ -9,9 +9,8 @@ use dynocar_client::channel::SampleCount;
 use dynocar_client::{Announcement, ChannelError, Host, Peer, Role};
 use dynocar_core::plausibility::InputFault;
 use dynocar_core::remedy::{of_reason, of_refusal};
-use dynocar_model::terms::KindRow;
 use dynocar_shared::snapshot::REJECTION_REASONS;
-use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::vocabulary::{EffectKind, KindRow};
 use dynocar_shared::{Reason, RejectionReason, Status, TrainId};
 use tracing::{info, warn};
 

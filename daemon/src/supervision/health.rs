@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_core::remedy::{of_reason, of_refusal};
-use dynocar_model::terms::KindRow;
+use dynocar_shared::vocabulary::KindRow;
 use dynocar_shared::{PipelineKind, Reason, RejectionReason, Status, TrainId};
 
 use crate::operator::refusals;

@@ -207,21 +207,6 @@ fn run_file(index: usize) -> String {
     format!("runs/{:03}.csv", index + 1)
 }
 
-/// The quantity of a dataset that a field of a sample is.
-const QUANTITIES: [(Quantity, SampleField); 11] = [
-    (Quantity::Position, SampleField::Position),
-    (Quantity::Speed, SampleField::Speed),
-    (Quantity::TractionForce, SampleField::TractionForce),
-    (Quantity::BrakeForce, SampleField::BrakeForce),
-    (Quantity::BrakeCylinderPressure, SampleField::BrakeCylinderPressure),
-    (Quantity::Acceleration, SampleField::Acceleration),
-    (Quantity::SpecificForce, SampleField::SpecificForce),
-    (Quantity::TrainMass, SampleField::Mass),
-    (Quantity::AmbientTemperature, SampleField::AmbientTemperature),
-    (Quantity::Gradient, SampleField::Gradient),
-    (Quantity::CurveRadius, SampleField::CurveRadius),
-];
-
 fn manifest(
     path: &Path,
     runs: &[&[TrainSample]],
@@ -239,7 +224,8 @@ fn manifest(
         let unit = quantity.unit().name();
         text += &format!("{quantity} = {{ column = \"{column}\", unit = \"{unit}\" }}\n");
     };
-    for (quantity, field) in QUANTITIES {
+    for field in SampleField::ALL {
+        let Some(quantity) = Quantity::of_field(field) else { continue };
         let is_there = samples.iter().any(|it| it.valid & field.bit() != 0);
         if is_there || quantity == Quantity::Speed {
             column(quantity, field.name());

@@ -1,7 +1,7 @@
 //! Kinds that could stand in the place of an accepted effect.
 
-use dynocar_model::terms::{self, speed_delay};
-use dynocar_shared::vocabulary::EffectKind;
+use dynocar_model::terms::speed_delay;
+use dynocar_shared::vocabulary::{self, EffectKind};
 
 use super::evidence::{EQUAL, Fit};
 use super::selection::{Outcome, Refusal, Search, Trial};
@@ -88,7 +88,7 @@ pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
 
 /// What is known to separate the kinds that are easily confused.
 pub fn separating_run(kind: EffectKind, competing: &[EffectKind]) -> &'static str {
-    terms::separating_run(kind, competing)
+    vocabulary::separating_run(kind, competing)
         .unwrap_or("Drive again with other speeds, loads, directions and weather.")
 }
 

@@ -4,9 +4,8 @@
 //! model, at no effect, and what the data say of it there is read from the information matrix: how
 //! surely it is none, and whether it is distinguishable from each of the others.
 
-use dynocar_model::terms::KindRow;
 use dynocar_shared::HALF_95;
-use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::vocabulary::{EffectKind, KindRow};
 use nalgebra::{Cholesky, DMatrix};
 
 use super::answer::Identifiability;

@@ -15,7 +15,6 @@ pub mod delay;
 pub mod extra;
 pub mod gradient;
 mod key;
-mod kinds;
 pub mod masses;
 mod parameter;
 pub mod place;
@@ -30,7 +29,6 @@ pub mod wheel;
 pub mod wind;
 
 pub use key::{Entry, Joined, Key};
-pub use kinds::{KINDS, KindRow, separating_run};
 pub use parameter::Parameter;
 pub use resistance::Resistance;
 pub use suspect::{Least, Suspect, SuspectInput};

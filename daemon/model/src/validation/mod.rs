@@ -243,15 +243,10 @@ impl Validator {
                 return Err(RejectionReason::ForceOutOfRange);
             }
         }
-        let within = |field, low: f64, high: f64| {
+        let plausible = SampleField::ALL.into_iter().all(|field| {
+            let (low, high) = field.range();
             sample.get(field).is_none_or(|value| (low..=high).contains(&value))
-        };
-        let plausible = within(SampleField::BrakeCylinderPressure, -5e4, 2e6)
-            && within(SampleField::AmbientTemperature, -80.0, 80.0)
-            && within(SampleField::Gradient, -150.0, 150.0)
-            && within(SampleField::CurveRadius, 0.0, f64::INFINITY)
-            && within(SampleField::Acceleration, -20.0, 20.0)
-            && within(SampleField::SpecificForce, -20.0, 20.0);
+        });
         if plausible { Ok(()) } else { Err(RejectionReason::OutOfRange) }
     }
 

@@ -1,7 +1,6 @@
 //! What else was considered, and why it lost.
 
-use dynocar_model::terms::KindRow;
-use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use super::words;
 use crate::explain::Explanation;

@@ -1,8 +1,7 @@
 //! What the residual is plotted against.
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_model::terms::KindRow;
-use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use super::windows::Window;
 use crate::explain::evidence::RunData;
@@ -176,7 +175,7 @@ impl Covariate {
 
 #[cfg(test)]
 mod tests {
-    use dynocar_model::terms::KINDS;
+    use dynocar_shared::vocabulary::KINDS;
 
     use super::*;
 

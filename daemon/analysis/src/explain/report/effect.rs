@@ -1,8 +1,7 @@
 //! An effect in words: kind, size, location, what it means, how sure it is, and what to do.
 
-use dynocar_model::terms::KindRow;
 use dynocar_shared::HALF_95;
-use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use super::words::{self, joined, kind_name, number};
 use crate::explain::answer::{EffectAnswer, Location, Meaning, ParameterValue};

@@ -1,7 +1,6 @@
 //! Names and units for people.
 
-use dynocar_model::terms::KindRow;
-use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 /// Name of a kind as the answer writes it, for a running text.
 pub fn kind_name(name: &str) -> &str {

@@ -6,10 +6,11 @@ use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetHead, Diagnostic, ForceSource, GradientSource, Manifest,
     PositionSource, Quantity, Role, Run, RunEntry, RunQuality, TimeFormat,
 };
+use dynocar_model::terms::CORRECTIONS;
 use dynocar_model::terms::extra::Extra;
 use dynocar_model::track::{LinearProfile, Track};
 use dynocar_model::train::{Corrections, EffortCurve, TrainModel};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::Understood;
 use crate::run_facts::recorded;
@@ -97,27 +98,20 @@ struct TrainAnswer<'a> {
     traction_effort: Option<&'a [(f64, f64)]>,
     brake_effort: Option<&'a [(f64, f64)]>,
     /// As in `train.toml`; `null` when nothing is corrected.
-    corrections: Option<CorrectionsAnswer>,
+    corrections: Option<CorrectionsAnswer<'a>>,
     /// Formulas of the resistances of forms of their own.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     extra: Vec<String>,
 }
 
-#[derive(Debug, Serialize)]
-struct CorrectionsAnswer {
-    speed_scale: f64,
-    speed_delay_s: f64,
-    speed_lag_s: f64,
-    traction_gain: f64,
-    actuator_delay_s: f64,
-    actuator_lag_s: f64,
-    tunnel_c_factor: f64,
-    tunnel_dc_n_per_kn_per_mps2: f64,
-    wind_plus_mps: f64,
-    bearing_delta_a_n_per_kn: f64,
-    bearing_tau_s: f64,
-    ambient_w0_per_k: f64,
-    ambient_reference_k: f64,
+/// Every correction of a train, by its key and in the order of the table.
+#[derive(Debug)]
+struct CorrectionsAnswer<'a>(&'a TrainModel);
+
+impl Serialize for CorrectionsAnswer<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(CORRECTIONS.iter().map(|key| (key.name, key.declared(self.0))))
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -223,28 +217,9 @@ fn train_answer(train: &TrainModel) -> TrainAnswer<'_> {
         tunnel_constant_n_per_kn_m: train.tunnel_constant_n_per_kn_m,
         traction_effort: train.traction.as_ref().map(EffortCurve::points),
         brake_effort: train.brake.as_ref().map(EffortCurve::points),
-        corrections: corrections_answer(train.corrections),
+        corrections: (train.corrections != Corrections::NONE).then_some(CorrectionsAnswer(train)),
         extra: train.extra.iter().map(Extra::law).collect(),
     }
-}
-
-fn corrections_answer(known: Corrections) -> Option<CorrectionsAnswer> {
-    let answer = CorrectionsAnswer {
-        speed_scale: known.speed_scale,
-        speed_delay_s: known.speed_delay_s,
-        speed_lag_s: known.speed_lag_s,
-        traction_gain: known.traction_gain,
-        actuator_delay_s: known.actuator_delay_s,
-        actuator_lag_s: known.actuator_lag_s,
-        tunnel_c_factor: known.tunnel_c_factor,
-        tunnel_dc_n_per_kn_per_mps2: known.tunnel_dc_n_per_kn_per_mps2,
-        wind_plus_mps: known.wind_plus_mps,
-        bearing_delta_a_n_per_kn: known.bearing_delta_a_n_per_kn,
-        bearing_tau_s: known.bearing_tau_s,
-        ambient_w0_per_k: known.ambient_w0_per_k,
-        ambient_reference_k: known.ambient_reference_k,
-    };
-    (known != Corrections::NONE).then_some(answer)
 }
 
 fn track_answer(track: &Track) -> TrackAnswer<'_> {

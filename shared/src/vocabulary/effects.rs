@@ -1,6 +1,5 @@
-//! Each kind of effect in words: one row, from which report, log, watch and the answer of `explain` take theirs.
-
-use dynocar_shared::vocabulary::EffectKind;
+//! Each kind of effect: one row with its number, its name, and the words that report, log, watch and the answer of
+//! `explain` have for it.
 
 /// A kind of effect in words.
 #[derive(Debug)]
@@ -19,6 +18,20 @@ pub struct KindRow {
     pub separated_from: &'static [(EffectKind, &'static str)],
 }
 
+/// Lists every kind once.
+macro_rules! effects {
+    ($( #[doc = $doc:literal] $kind:ident = $number:literal $name:literal { $($words:tt)* } )*) => {
+        vocabulary! {
+            /// An effect that a model may lack, as in the answers of `dynocar explain`.
+            EffectKind: u32 { $( #[doc = $doc] $kind = $number $name ),* }
+        }
+
+        /// Every kind in words, in the order of its number.
+        pub const KINDS: [KindRow; EffectKind::ALL.len()] =
+            [ $( KindRow { kind: EffectKind::$kind, $($words)* } ),* ];
+    };
+}
+
 const MORE_RUNS: &str = "more runs";
 const LET_EXPLAIN: &str = "record a run and let `dynocar explain` say which force the model lacks";
 const DECLARE_IT: &str =
@@ -27,18 +40,18 @@ const WEATHER: &str = "nothing on the train: the weather passes; keep it apart f
 const CHECK_PROFILE: &str = "check the line's gradient profile and where it begins";
 const HARDER: &str = "harder accelerating and braking";
 
-/// A pair of kinds stands in the row of the first of them.
-pub const KINDS: [KindRow; 18] = [
-    KindRow {
-        kind: EffectKind::None,
+// A pair of kinds stands in the row of the first of them.
+effects! {
+    /// No suspicion.
+    None = 0 "none" {
         title: "nothing undeclared",
         to_do: LET_EXPLAIN,
         seen_over: None,
         determined_by: MORE_RUNS,
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::TunnelDrag,
+    }
+    /// Air drag in tunnels.
+    TunnelDrag = 1 "tunnel_drag" {
         title: "tunnel drag",
         to_do: DECLARE_IT,
         seen_over: Some("chainage_m"),
@@ -47,9 +60,9 @@ pub const KINDS: [KindRow; 18] = [
             (EffectKind::Wind, "Pass the portals in both directions and on another day."),
             (EffectKind::LocalResistance, "Pass the place at clearly different speeds."),
         ],
-    },
-    KindRow {
-        kind: EffectKind::CurveResistance,
+    }
+    /// Resistance in curves.
+    CurveResistance = 2 "curve_resistance" {
         title: "curve resistance",
         to_do: DECLARE_IT,
         seen_over: Some("curvature_per_m"),
@@ -58,17 +71,17 @@ pub const KINDS: [KindRow; 18] = [
             EffectKind::GradientShift,
             "Pass the curves in both directions: a gradient changes its sign.",
         )],
-    },
-    KindRow {
-        kind: EffectKind::Wind,
+    }
+    /// Wind along the line.
+    Wind = 3 "wind" {
         title: "wind along the line",
         to_do: WEATHER,
         seen_over: Some("direction"),
         determined_by: "fast runs in both directions on one day",
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::DraggingBrake,
+    }
+    /// A brake that does not release.
+    DraggingBrake = 4 "dragging_brake" {
         title: "a dragging brake",
         to_do: "at the next stop check that every brake releases, and feel every vehicle's wheels for heat",
         seen_over: Some("run"),
@@ -87,25 +100,25 @@ pub const KINDS: [KindRow; 18] = [
                 "Read the brake-cylinder pressure while released, and record runs on a mild day.",
             ),
         ],
-    },
-    KindRow {
-        kind: EffectKind::WheelDiameter,
+    }
+    /// A wrong wheel diameter, hence a wrong speed scale.
+    WheelDiameter = 5 "wheel_diameter" {
         title: "a wrong wheel diameter",
         to_do: "measure the wheels, and set the diameter measured in the speed sensor",
         seen_over: Some("speed_mps"),
         determined_by: "positions over several kilometres",
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::GradientShift,
+    }
+    /// A gradient profile moved along the line.
+    GradientShift = 6 "gradient_shift" {
         title: "a gradient profile shifted along the line",
         to_do: CHECK_PROFILE,
         seen_over: Some("chainage_m"),
         determined_by: "more passes of the steepest changes of gradient",
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::MassChange,
+    }
+    /// Another mass than declared.
+    MassChange = 7 "mass_change" {
         title: "a changed mass",
         to_do: "check the declared mass against the load",
         seen_over: Some("acceleration_mps2"),
@@ -120,17 +133,17 @@ pub const KINDS: [KindRow; 18] = [
                 "Pass a steep gradient at other loads: the rotating mass does not feel it.",
             ),
         ],
-    },
-    KindRow {
-        kind: EffectKind::TractionGain,
+    }
+    /// A reported force that is not the true one.
+    TractionGain = 8 "traction_gain" {
         title: "a wrong scale of the reported traction force",
         to_do: "check the scale of the reported forces",
         seen_over: Some("traction_force_n"),
         determined_by: HARDER,
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::ActuatorDelay,
+    }
+    /// Forces that act later than reported.
+    ActuatorDelay = 9 "actuator_delay" {
         title: "delayed forces",
         to_do: "check how late forces act after they are reported",
         seen_over: Some("force_change_n_per_s"),
@@ -140,9 +153,9 @@ pub const KINDS: [KindRow; 18] = [
             "Record a position of its own (GNSS, balises) on steep and changing gradients: the line acts at \
              once on a train, a late speed shows it late.",
         )],
-    },
-    KindRow {
-        kind: EffectKind::RotatingMass,
+    }
+    /// Another rotating mass than declared.
+    RotatingMass = 10 "rotating_mass" {
         title: "another rotating mass than declared",
         to_do: "check the declared rotating mass",
         seen_over: Some("acceleration_mps2"),
@@ -157,17 +170,17 @@ pub const KINDS: [KindRow; 18] = [
                 "Compare the odometer with balises over several kilometres.",
             ),
         ],
-    },
-    KindRow {
-        kind: EffectKind::BearingTemperature,
+    }
+    /// Cold bearings that warm up.
+    BearingTemperature = 11 "bearing_temperature" {
         title: "cold bearings that warm up",
         to_do: WEATHER,
         seen_over: Some("time_since_start_s"),
         determined_by: MORE_RUNS,
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::AmbientTemperature,
+    }
+    /// Resistance that follows the outside temperature.
+    AmbientTemperature = 12 "ambient_temperature" {
         title: "resistance that follows the outside temperature",
         to_do: WEATHER,
         seen_over: Some("ambient_temperature_degc"),
@@ -176,33 +189,33 @@ pub const KINDS: [KindRow; 18] = [
             EffectKind::BearingTemperature,
             "Start warm on a cold day and cold on a warm one.",
         )],
-    },
-    KindRow {
-        kind: EffectKind::LocalResistance,
+    }
+    /// Extra resistance at a place.
+    LocalResistance = 13 "local_resistance" {
         title: "a local resistance",
         to_do: "have the track and the overhead line looked at there; change nothing on the train",
         seen_over: Some("chainage_m"),
         determined_by: MORE_RUNS,
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::LowAdhesion,
+    }
+    /// A brake force that the rail does not carry.
+    LowAdhesion = 14 "low_adhesion" {
         title: "low adhesion",
         to_do: "expect long braking distances: the rail carries less than the brake asks",
         seen_over: Some("traction_force_n"),
         determined_by: MORE_RUNS,
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::Unknown,
+    }
+    /// A real residual that no known effect explains.
+    Unknown = 15 "unknown" {
         title: "something outside the library",
         to_do: LET_EXPLAIN,
         seen_over: None,
         determined_by: MORE_RUNS,
         separated_from: &[],
-    },
-    KindRow {
-        kind: EffectKind::GradientError,
+    }
+    /// A declared gradient that is wrong by a smooth function of the chainage.
+    GradientError = 16 "gradient_error" {
         title: "a gradient that is wrong along the line",
         to_do: CHECK_PROFILE,
         seen_over: Some("chainage_m"),
@@ -211,16 +224,23 @@ pub const KINDS: [KindRow; 18] = [
             EffectKind::LocalResistance,
             "Drive the line in the other direction: a gradient changes its sign there.",
         )],
-    },
-    KindRow {
-        kind: EffectKind::SpeedDelay,
+    }
+    /// A measured speed that is late.
+    SpeedDelay = 17 "speed_delay" {
         title: "a measured speed that is late",
         to_do: "check how old a speed is when the controller reads it",
         seen_over: Some("acceleration_mps2"),
         determined_by: MORE_RUNS,
         separated_from: &[],
-    },
-];
+    }
+}
+
+impl EffectKind {
+    /// The effect's bit in [`crate::ParameterSnapshot::suspected_alternatives`].
+    pub const fn bit(self) -> u32 {
+        1 << self as u32
+    }
+}
 
 impl KindRow {
     /// The row of a kind.
