@@ -39,14 +39,15 @@ fn run(train: &str, number: usize) -> String {
     let begins = Beginning { position_m: 100.0, speed_mps: 5.0, is_held_at_rest: true };
     let mut driven = DrivenTrain::new(train, Some(track), begins);
     let mut noise = 7 + number as u64;
-    let mut text = String::from("t,v,s,traction,brake,wind\n");
-    for step in 0..1600 {
-        noise = noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    let mut text = String::from("t,v,s,traction,brake,wind,rail\n");
+    for step in 0..1000 {
+        noise =
+            noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let error_mps = 0.04 * ((noise >> 40) as f64 / f64::from(1 << 24) - 0.5);
         let speed_mps = (driven.speed_mps() + error_mps).max(0.0);
         let (time_s, position_m) = (STEP_S * f64::from(step), driven.position_m());
         let [now, then] = [step, step + 1].map(|step| forces_n(number, step));
-        text += &format!("{time_s},{speed_mps:.4},{position_m:.2},{},{},0\n", now[0], now[1]);
+        text += &format!("{time_s},{speed_mps:.4},{position_m:.2},{},{},0,21\n", now[0], now[1]);
         driven.drive(STEP_S, |after_s| {
             let at = |k: usize| now[k] + (then[k] - now[k]) * after_s / STEP_S;
             TrainSample::empty(TrainId(1))
@@ -71,6 +72,7 @@ fn dataset() -> Dataset {
     manifest += &column("traction_force", "traction", "N");
     manifest += &column("brake_force", "brake", "N");
     manifest += &column("headwind", "wind", "m/s");
+    manifest += &column("rail_temperature", "rail", "degC");
     let true_train = format!("{TRAIN}{DRAG}");
     let runs: Vec<(String, String)> =
         (0..RUNS).map(|k| (format!("{k}.csv"), run(&true_train, k))).collect();
