@@ -23,8 +23,9 @@ BUILD = {
     "CARGO_INCREMENTAL": "0",
     "DYNOCAR_WRITE_BINDINGS": "1",
 }
-# Written from the Rust types, by tests that otherwise compare.
+# Written from the Rust types, by tests that otherwise compare; with what is added.
 WRITTEN = {"client/include/dynocar.h", "client/python/dynocar/_vocabulary.py"}
+ADDED = ["IDLE_DRAG", "MASS_IMPULSE", "HEADWIND"]
 BLOCK = re.compile(r"```\w+\n(?:// )?(\S+), (new|after|before|last in|in place of)(?:: ([^\n]*))?\n(.*?)```", re.DOTALL)
 
 
@@ -46,7 +47,10 @@ def grown(text: str, how: str, mark: str) -> tuple[int, int]:
 def apply(section: str, copy: Path) -> set[str]:
     """Applies the blocks of a section; gives the files that it changes."""
     changed = set()
-    for name, how, mark, code in BLOCK.findall(section):
+    blocks = BLOCK.findall(section)
+    if 2 * len(blocks) != section.count("```"):
+        sys.exit(f"{PAGE}: a block does not say where it belongs")
+    for name, how, mark, code in blocks:
         path = copy / name
         if how == "new":
             if path.exists():
@@ -83,6 +87,9 @@ def main() -> None:
     differing = {it for it in tracked if (ROOT / it).read_bytes() != (copy / it).read_bytes()}
     if differing - expected != WRITTEN:
         sys.exit(f"{PAGE}: other files differ: {differing - expected ^ WRITTEN}")
+    for name in WRITTEN:
+        if not all(f"{word} = " in (copy / name).read_text() for word in ADDED):
+            sys.exit(f"{name}: expected {', '.join(ADDED)}")
 
 
 main()
