@@ -72,7 +72,8 @@ def main() -> None:
     tracked = subprocess.check_output(["git", "ls-files", "-z"], cwd=ROOT, text=True).split("\0")[:-1]
     for name in tracked:
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, copy / name)
+        # As of now: what an earlier run had added to it is built no more.
+        shutil.copy(ROOT / name, copy / name)
     expected = set()
     for title, section in sections.items():
         changed = apply(section, copy)
@@ -81,7 +82,7 @@ def main() -> None:
             sys.exit(f"{PAGE}: {title}: {len(changed)} files change: {', '.join(sorted(changed))}")
         print(f"{title}: {len(changed)}")
         expected |= changed
-    shutil.copy2(copy / "tests/grown.rs", copy / "daemon/analysis/tests/grown.rs")
+    shutil.copy(copy / "tests/grown.rs", copy / "daemon/analysis/tests/grown.rs")
     packages = ["-p", "dynocar-analysis", "-p", "dynocar-client", "--test", "grown", "--test", "bindings"]
     subprocess.run(["cargo", "test", "--offline", *packages], cwd=copy, env=os.environ | BUILD, check=True)
     differing = {it for it in tracked if (ROOT / it).read_bytes() != (copy / it).read_bytes()}
