@@ -14,6 +14,7 @@ mod criterion;
 mod distance_ratio;
 mod fade;
 mod fit;
+mod integral;
 mod late_speed;
 mod model;
 mod noise;

@@ -8,10 +8,11 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{Refusal, is_material, is_possible};
+use super::acceptance::{is_material, is_possible};
 use super::certainty::{CERTAIN_RUNS_MIN, is_certain};
 use super::outcome::{Beside, Outcome, Round, Trial};
 use super::price::{at_bound, penalty};
+use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{

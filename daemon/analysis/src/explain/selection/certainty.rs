@@ -2,7 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::by_run::scatter_factor;
+use super::by_run::{deviations, scatter_factor};
 use super::price::{at_bound, penalty};
 use crate::explain::evidence::{CERTAIN_STDS, Fit, SCORE_MIN, acceptance_score};
 
@@ -62,10 +62,12 @@ pub(super) fn is_certain(
         _ => !effect.ends().is_empty(),
     };
     let size = fit.model.ranges()[index].start;
+    // By its size, or by all that it explains, which hangs on no shape, whichever is further from none.
     let runs_agree = || {
-        // So many of the likelihood's standard deviations is the whole effect from none, whatever its form.
-        let deviations = (evidence + penalty(fit, index)).max(0.0).sqrt();
-        deviations > CERTAIN_STDS * scatter_factor(fit, size)
+        let std = deviations(fit).std[size];
+        let by_size = effect.size(fit.effect_parameters(index)).abs() / std;
+        let explains = (evidence + penalty(fit, index)).max(0.0).sqrt();
+        by_size.max(explains / scatter_factor(fit, size)) > CERTAIN_STDS
     };
     let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE;
     // Runs are independent as samples are not.

@@ -7,16 +7,17 @@ mod certainty;
 mod outcome;
 mod outside;
 mod price;
+mod refusal;
 mod revision;
 mod search;
 mod small;
 mod steps;
 mod trying;
 
-pub use acceptance::Refusal;
 pub use by_run::{Deviations, deviations, deviations_beside, few_runs_factor, without_each_run};
 pub use certainty::deciding_score;
 pub use outcome::{Outcome, Trial};
 pub use price::{discounted, model_penalty, penalty};
+pub use refusal::Refusal;
 pub use search::{OBSERVATIONS_MIN, Search};
 pub use steps::Progress;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::Refusal;
+use super::refusal::Refusal;
 use crate::explain::evidence::{Fit, acceptance_score};
 
 /// Named effects at most.

@@ -9,7 +9,8 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::super::model::{UpdatedForces, integrate_bins};
+use super::super::integral::integrate_bins;
+use super::super::model::UpdatedForces;
 use super::super::response::Response;
 use super::super::run_data::RunData;
 use super::plan::{At, Handling, Plan};
