@@ -30,7 +30,8 @@ pub struct Grade {
     pub parameters: Vec<ParameterGrade>,
     /// Evidence, error reduction and parameters of the named effects, for people.
     pub details: Vec<String>,
-    /// Share of the attainable reduction of the error on the holdout runs.
+    /// Share of the attainable reduction of the error on the holdout runs; `None` where the true model takes less than
+    /// a sixth of it.
     pub share: Option<f64>,
     /// Error on the holdout runs over that of the true model.
     pub left_ratio: Option<f64>,

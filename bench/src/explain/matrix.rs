@@ -59,6 +59,8 @@ pub struct FalseAlarms {
 pub struct Matrix {
     /// By kind.
     pub kinds: Vec<KindRow>,
+    /// Of the effects that take a sixth of the error on the holdout runs, how many there are and how many are found.
+    pub strong: [usize; 2],
     /// 95 % intervals of parameters over all kinds, those of a profile or a list together as one.
     pub intervals: Intervals,
     /// On nulls.
@@ -79,17 +81,20 @@ impl Matrix {
     pub fn of(grades: &[(Scenario, Vec<Grade>)]) -> Self {
         let nulls = || grades.iter().filter(|(scenario, _)| scenario.is_null());
         let of_nulls = || nulls().flat_map(|(_, grades)| grades);
+        let all = || grades.iter().flat_map(|(_, grades)| grades);
+        let strong = || all().filter(|grade| grade.share.is_some());
         let shares = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0];
         let scores = of_nulls().map(|grade| grade.acceptance_score).collect();
         let strengths = quantiles(scores, shares).map(|values| shares.into_iter().zip(values));
         Matrix {
-            intervals: intervals(grades.iter().flat_map(|(_, grades)| grades)),
+            intervals: intervals(all()),
             false_alarms: FalseAlarms {
                 runs: of_nulls().count(),
                 raised: of_nulls().filter(|grade| !grade.is_right).count(),
                 strength_quantiles: strengths.into_iter().flatten().collect(),
             },
             kinds: grades.iter().map(|(scenario, own)| row(scenario.name(), own)).collect(),
+            strong: [strong().count(), strong().filter(|grade| grade.is_right).count()],
         }
     }
 }
@@ -165,6 +170,11 @@ pub fn table(matrix: &Matrix) -> String {
             .with("named instead", confused.collect::<Vec<_>>().join(", "))
     };
     let mut text = output::table(&matrix.kinds.iter().map(record).collect::<Vec<_>>());
+    let [strong, found] = matrix.strong;
+    if strong > 0 {
+        text +=
+            &format!("effects that make a sixth of the holdout error: {found} of {strong} found\n");
+    }
     let Intervals { all, held } = matrix.intervals;
     if all > 0 {
         let share = 100.0 * held / all as f64;

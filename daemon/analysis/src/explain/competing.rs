@@ -3,8 +3,8 @@
 use dynocar_model::terms::speed_delay;
 use dynocar_shared::vocabulary::{self, EffectKind};
 
-use super::evidence::{EQUAL, Fit};
-use super::selection::{Outcome, Refusal, Search, Trial};
+use super::evidence::{EQUAL, Fit, SCORE_MIN};
+use super::selection::{Outcome, Refusal, Search, Trial, is_certain_beside};
 
 /// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error.
 const ERROR_REDUCTION_SHARE: f64 = 0.7;
@@ -21,7 +21,7 @@ pub struct CompetingHypotheses {
 /// For each accepted effect that has some, the kinds that could stand in its place.
 ///
 /// Beside those that the runs could not distinguish from it whatever they showed, a competing hypothesis explains the data as
-/// well, may be what its kind says, takes away about as much of the open-loop error, and has nothing left to explain once the effect
+/// well, would be accepted as the accepted one was, takes away about as much of the open-loop error, and has nothing left to explain once the effect
 /// is in: what keeps its evidence acts beside the effect and not in its place.
 pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
     let effects = &outcome.fit.model.effects;
@@ -61,8 +61,13 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
 fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
     let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
-    // What is as strong as the accepted one is strong enough, on whichever side of the least strength it lies.
-    let may_be = matches!(Search::refusal(trial), None | Some(Refusal::Weak(_)));
+    let may_be = match Search::refusal(trial) {
+        _ if outcome.is_certain(accepted.kind) => is_certain_beside(trial, trial.bic_gain),
+        None => true,
+        // Beside what the score accepted it is strong enough, on whichever side of the least score it lies.
+        Some(Refusal::Weak(_)) => accepted.acceptance_score() > SCORE_MIN,
+        Some(_) => false,
+    };
     trial.kind != EffectKind::Unknown
         && may_be
         && trial.bic_gain > accepted.bic_gain - EQUAL

@@ -29,7 +29,7 @@ fn last_parts(trial: &Trial) -> (SharedHypothesis, Vec<f64>) {
 }
 
 /// Whether some evidence makes the last effect of a trial certain beside the usual errors.
-fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
+pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
     is_material(trial)
         && is_possible(trial)
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)

@@ -14,6 +14,7 @@ mod small;
 mod steps;
 mod trying;
 
+pub use beside::is_certain_beside;
 pub use by_run::{Deviations, deviations, deviations_beside, few_runs_factor, without_each_run};
 pub use certainty::deciding_score;
 pub use outcome::{Outcome, Trial};
