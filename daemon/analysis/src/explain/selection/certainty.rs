@@ -62,12 +62,14 @@ pub(super) fn is_certain(
         _ => !effect.ends().is_empty(),
     };
     let size = fit.model.ranges()[index].start;
-    // By its size, or by all that it explains, which hangs on no shape, whichever is further from none.
+    // In standard deviations from none; the size of a form hangs on its shape, what it explains does not.
     let runs_agree = || {
-        let std = deviations(fit).std[size];
-        let by_size = effect.size(fit.effect_parameters(index)).abs() / std;
-        let explains = (evidence + penalty(fit, index)).max(0.0).sqrt();
-        by_size.max(explains / scatter_factor(fit, size)) > CERTAIN_STDS
+        let away = if effect.kind() == Unknown {
+            (evidence + penalty(fit, index)).max(0.0).sqrt() / scatter_factor(fit, size)
+        } else {
+            effect.size(fit.effect_parameters(index)).abs() / deviations(fit).std[size]
+        };
+        away > CERTAIN_STDS
     };
     let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE;
     // Runs are independent as samples are not.
