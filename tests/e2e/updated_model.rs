@@ -79,7 +79,7 @@ fn every_kind_written_as_an_updated_model_is_applied_to_the_bit() {
     let track = dataset.track.as_ref();
     let scan = Scan::new(&problem, &[], &dataset.train, track, &base).expect("a sound fit");
     let mut applied = Vec::new();
-    for effect in LIBRARY.into_iter().chain([UNKNOWN]) {
+    for effect in LIBRARY.iter().copied().chain([UNKNOWN]) {
         let Proposal::Candidates(candidates) = effect.propose(&scan) else { continue };
         for Candidate { hypothesis, start } in candidates {
             let theta = base.theta.iter().chain(&start).copied().collect();
@@ -120,7 +120,7 @@ fn what_a_fit_remembers_is_what_all_effects_do_at_the_samples() {
     let track = dataset.track.as_ref();
     let scan = Scan::new(&problem, &[], &dataset.train, track, &base).expect("a sound fit");
     let candidates = |kind: EffectKind| {
-        let mut effects = LIBRARY.into_iter().chain([UNKNOWN]);
+        let mut effects = LIBRARY.iter().copied().chain([UNKNOWN]);
         let effect = effects.find(|effect| effect.kind() == kind).expect("a kind");
         match effect.propose(&scan) {
             Proposal::Candidates(candidates) => candidates,

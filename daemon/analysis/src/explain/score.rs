@@ -128,9 +128,9 @@ impl FitErrors {
         }
     }
 
-    /// Share of the error that a model with these errors takes away from another: over whole runs,
-    /// with restarts or, for the scale of the speeds, of the distance, whichever is most; of runs that were
-    /// fitted or of runs left out, whichever is less.
+    /// Share of the error that a model with these errors takes away from another: over whole runs, with restarts,
+    /// with each run's own load and wind or, for the scale of the speeds, of the distance, whichever is most; of runs
+    /// that were fitted or of runs left out, whichever is less.
     pub fn reduction_from(&self, before: &Self) -> f64 {
         let share = |before: f64, after: f64| if before > 0.0 { 1.0 - after / before } else { 0.0 };
         let of_distance = if self.has_speed_scale == before.has_speed_scale {

@@ -95,10 +95,12 @@ pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
     columns
 }
 
-/// Coefficients on the day of a run, open track.
+/// Coefficients with a run's own resistance and headwind, as outside tunnels.
 pub fn of_day(Davis { a, b, c }: Davis, own: &RunFactors) -> Davis {
-    let factor = 1.0 + own[1];
-    Davis { a: factor * a, b: factor * b + 2.0 * c * own[2], c: factor * c }
+    let [_, resistance, wind_mps, _] = (*own).into();
+    let factor = 1.0 + resistance;
+    let by_wind = wind_mps * wind::slope_n_per_kn(c, 1.0, 0.0);
+    Davis { a: factor * a, b: factor * b + by_wind, c: factor * c }
 }
 
 /// What all columns say of each bin, in their order.

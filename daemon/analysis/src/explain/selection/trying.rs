@@ -147,7 +147,7 @@ impl Search<'_> {
                 && !base.model.effects.iter().any(|own| own.kind() == effect.kind())
         };
         let (outside, library): (Vec<&dyn Effect>, Vec<&dyn Effect>) =
-            LIBRARY.into_iter().filter(is_new).partition(|it| it.kind() == EffectKind::Unknown);
+            LIBRARY.iter().copied().filter(is_new).partition(|it| it.kind() == EffectKind::Unknown);
         let (own, library): (Vec<&dyn Effect>, Vec<&dyn Effect>) =
             library.into_iter().partition(|it| rivals_of == Some(it.kind()));
         let try_kind = |effect, least| {
