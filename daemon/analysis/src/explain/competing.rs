@@ -69,6 +69,7 @@ fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
         Some(_) => false,
     };
     trial.kind != EffectKind::Unknown
+        && trial.fit.model.effects[trial.last()].may_stand_for_others()
         && may_be
         && trial.bic_gain > accepted.bic_gain - EQUAL
         && trial.reduction > ERROR_REDUCTION_SHARE * accepted.reduction.max(0.0)

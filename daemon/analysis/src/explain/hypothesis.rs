@@ -52,12 +52,33 @@ pub struct ReportContext<'a> {
     pub c: f64,
     /// Its standard deviation.
     pub c_deviation: f64,
-    /// Covariance of c with the effect's first parameter.
-    pub c_covariance: f64,
+    /// Covariance of a, b, c and the parameters of all effects, by likelihood and scatter.
+    pub covariance: &'a DMatrix<f64>,
+    /// Number of the effect's first parameter among them.
+    pub first: usize,
     /// Mean weight of the fit runs in kN.
     pub weight_kn: f64,
     /// By how much a standard deviation that comes from the scatter between runs is enlarged.
     pub few_runs_factor: f64,
+}
+
+impl ReportContext<'_> {
+    /// Covariance of c with the effect's first parameter.
+    pub fn c_covariance(&self) -> f64 {
+        self.covariance[(2, self.first)]
+    }
+
+    /// The effect's parameters with their sum, which may be known far better than each.
+    pub fn with_sum(&self, parameters: &[Parameter], sum_name: &str) -> Reported {
+        let count = self.parameters.len();
+        let variance = self.covariance.view((self.first, self.first), (count, count)).sum();
+        let mut reported = Reported::default();
+        reported.push(sum_name, self.parameters.iter().sum(), variance.max(0.0).sqrt());
+        for (i, parameter) in parameters.iter().enumerate() {
+            reported.push(parameter.name, self.parameters[i], self.deviations[i]);
+        }
+        reported
+    }
 }
 
 /// What an effect does to others that only add a resistance or a gradient.
@@ -310,6 +331,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// Kinds that none of the runs at hand could distinguish from it.
     fn twins(&self) -> &[EffectKind] {
         &[]
+    }
+
+    /// Whether it could act in the place of another effect.
+    fn may_stand_for_others(&self) -> bool {
+        true
     }
 
     /// What the effect is in the files of a train and a line; `None` where these cannot hold it.

@@ -175,7 +175,8 @@ fn effect_answers(
                 deviations: &std[range.clone()],
                 c: *c,
                 c_deviation: std[2],
-                c_covariance: covariance[(2, range.start)],
+                covariance,
+                first: range.start,
                 weight_kn,
                 few_runs_factor: few_runs_factor(search.problem.runs.len()),
             });

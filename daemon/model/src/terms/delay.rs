@@ -25,6 +25,8 @@ pub const PARAMETERS: [Parameter; 2] = [
     Parameter::new("delay_s", (0.0, DELAY.range[1]), 0.05),
     Parameter::new("lag_s", (0.0, 8.0), 0.05),
 ];
+/// Name of their sum, which runs show far better than either.
+pub const TOGETHER: &str = "delay_and_lag_s";
 /// A shorter delay and lag together in s are within a cycle of most controllers.
 pub const LEAST_S: f64 = 0.15;
 /// Standard deviation in s of what a force acts behind its report.

@@ -4,7 +4,7 @@ use dynocar_model::terms::delay;
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Past, Proposal, Turn};
+use super::{Candidate, Effect, Hypothesis, Past, Proposal, ReportContext, Reported, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -93,6 +93,10 @@ impl Hypothesis for DelayAndLag {
 
     fn twins(&self) -> &[EffectKind] {
         self.twins
+    }
+
+    fn report(&self, context: &ReportContext) -> Reported {
+        context.with_sum(self.parameters(), delay::TOGETHER)
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {

@@ -197,6 +197,12 @@ impl Hypothesis for Slippery {
         Some(Arc::new(Slippery { runs: Some(runs), ..self.clone() }))
     }
 
+    /// Brakes weaker by one share everywhere, in every run and however gently they are applied, look like a mass
+    /// once the traction's scale changes as much: two coincidences for one cause.
+    fn may_stand_for_others(&self) -> bool {
+        self.form == Form::Cap || self.sections.is_some() || self.runs.is_some()
+    }
+
     fn place(&self) -> Location {
         let intervals_m = self.sections.as_ref().map(|sections| sections.intervals_m.clone());
         Location { runs: self.runs.clone(), intervals_m, ..Location::default() }

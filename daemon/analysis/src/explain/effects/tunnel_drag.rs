@@ -165,7 +165,7 @@ impl Hypothesis for Tunnels {
             let (by_extra, by_c) = (1.0 / c, -extra / (c * c));
             let variance = (by_extra * extra_deviation).powi(2)
                 + (by_c * context.c_deviation).powi(2)
-                + 2.0 * by_extra * by_c * context.c_covariance;
+                + 2.0 * by_extra * by_c * context.c_covariance();
             reported.push("c_factor", 1.0 + extra / c, variance.max(0.0).sqrt());
         }
         reported

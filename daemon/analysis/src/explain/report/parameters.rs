@@ -126,7 +126,7 @@ fn declared(dataset: &Dataset, name: &str) -> Option<f64> {
         "k_n_per_kn_m" => Some(dataset.train.curve_constant_n_per_kn_m),
         "rotating_mass_factor" => Some(dataset.train.rotating_mass_factor),
         "speed_scale" | "gain" | "c_factor" | "mass_factor" | "achieved_ratio" => Some(1.0),
-        "shift_m" | "delay_s" | "lag_s" => Some(0.0),
+        "shift_m" | "delay_and_lag_s" | "delay_s" | "lag_s" => Some(0.0),
         _ => None,
     }
 }

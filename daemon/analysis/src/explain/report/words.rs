@@ -25,6 +25,7 @@ pub fn parameter(name: &str) -> (&str, &'static str) {
         "shift_m" => ("shift towards growing chainage", "m"),
         "mass_factor" => ("true over declared mass", ""),
         "gain" => ("reported over true force", ""),
+        "delay_and_lag_s" => ("dead time and lag together", "s"),
         "delay_s" => ("dead time", "s"),
         "lag_s" => ("lag", "s"),
         "rotating_mass_factor" => ("rotating-mass factor", ""),
@@ -56,6 +57,7 @@ pub fn least(name: &str) -> f64 {
         | "k_n_per_kn_m"
         | "force_n"
         | "mass_factor"
+        | "delay_and_lag_s"
         | "delay_s"
         | "lag_s"
         | "rotating_mass_factor"

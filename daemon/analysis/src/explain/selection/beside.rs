@@ -142,7 +142,7 @@ impl Search<'_> {
     }
 
     /// Drops what does not stand beside the usual errors: a force outside the library that explains no more than
-    /// chance there, and an effect that runs to a bound of what is looked for. False for nothing.
+    /// chance there, and an effect of it that runs to a bound of what is looked for. False for nothing.
     pub(super) fn drop_fallen(&self, outcome: &mut Outcome) -> bool {
         let beside = &self.beside_usual_errors(outcome).fit;
         let effects = &outcome.fit.model.effects;
@@ -156,7 +156,9 @@ impl Search<'_> {
             if is_form && decrease() <= penalty(beside, index) {
                 return Some((index, Refusal::Chance));
             }
-            let bound = at_bound(beside, index).filter(|_| at_bound(&outcome.fit, index).is_none());
+            // A form may be greatest where what it follows ends.
+            let may_fall = kind != EffectKind::Unknown && at_bound(&outcome.fit, index).is_none();
+            let bound = at_bound(beside, index).filter(|_| may_fall);
             Some((index, Refusal::AtBound(bound?)))
         };
         let Some((index, refusal)) = (0..effects.len()).find_map(refusal) else { return false };

@@ -5,14 +5,19 @@
 //! them certain, and they take little from the open-loop error. Left out of the model they would stand in its
 //! noise and hide what matters.
 
+use std::ops::Range;
+
 use dynocar_model::terms::wind;
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::by_run::deviations_beside;
 use super::certainty::{CERTAIN, is_accepted};
 use super::outcome::{Outcome, Trial};
 use super::price::penalty;
 use super::refusal::Refusal;
 use super::search::Search;
+use crate::explain::effects::SharedHypothesis;
 use crate::explain::score::reduction;
 
 /// Kinds by which clocks, wheels and force sensors are always a little off, the most usual first.
@@ -56,6 +61,9 @@ impl Search<'_> {
     pub(super) fn name_or_forget_small(&self, outcome: &mut Outcome) {
         let kinds = outcome.kinds();
         outcome.small.retain(|small| kinds.contains(small));
+        let usual = self.usual_scales(outcome);
+        let named = usual.iter().filter(|kind| outcome.is_named(**kind));
+        outcome.small.extend(named.copied().collect::<Vec<_>>());
         if kinds.len() == outcome.small.len() {
             outcome.fit = outcome.base.clone();
             return;
@@ -69,7 +77,9 @@ impl Search<'_> {
             let effect = &fit.model.effects[index];
             let is_material = effect.is_material(fit.effect_parameters(index), fit.theta[2]);
             let reduction = reduction(self.problem, &rest, fit);
-            let is_effect = is_material && is_accepted(fit, index, evidence, reduction);
+            let is_effect = is_material
+                && !usual.contains(&kind)
+                && is_accepted(fit, index, evidence, reduction);
             if is_effect || evidence <= CERTAIN {
                 outcome.small.retain(|small| *small != kind);
             }
@@ -77,5 +87,24 @@ impl Search<'_> {
                 outcome.fit = rest;
             }
         }
+    }
+
+    /// Everyday scales of which nothing is left beside the usual errors: the 95 % interval there holds none.
+    fn usual_scales(&self, outcome: &mut Outcome) -> Vec<EffectKind> {
+        let is_scale = |effect: &SharedHypothesis| {
+            EVERYDAY.contains(&effect.kind()) && effect.parameters().len() == 1
+        };
+        if !outcome.fit.model.effects.iter().any(is_scale) {
+            return Vec::new();
+        }
+        let beside = self.beside_usual_errors(outcome);
+        let fit = &outcome.fit;
+        let std = deviations_beside(&beside.fit, fit.theta.len(), beside.shared).std;
+        let scales = fit.model.effects.iter().zip(fit.model.ranges());
+        let is_none = |(effect, range): &(&SharedHypothesis, Range<usize>)| {
+            let size = effect.size(&beside.fit.theta[range.clone()]);
+            is_scale(effect) && size.abs() < HALF_95 * std[range.start]
+        };
+        scales.filter(is_none).map(|(effect, _)| effect.kind()).collect()
     }
 }

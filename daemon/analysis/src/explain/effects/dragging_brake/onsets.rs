@@ -1,0 +1,161 @@
+//! Since when a brake drags in each run, by the speeds.
+
+use dynocar_model::terms::brake::{BUILD_UP_S, build_up};
+
+use crate::explain::answer::RunWindow;
+use crate::explain::scan::{Scan, Tuple};
+
+/// Onsets are first looked for at least this far apart in s, and at so many places of a run.
+pub(super) const GRID_MIN_S: f64 = 12.0;
+const GRID_PLACES: f64 = 120.0;
+/// Then each to so many s.
+const FINEST_S: f64 = 2.0;
+/// Motion in s that must follow an onset.
+pub(super) const TAIL_MIN_S: f64 = 40.0;
+/// What a run's taking part must explain beyond the choice of its onset: brakes release in nine
+/// runs of ten, and twice the logarithm of ten is this.
+const RUN_COST: f64 = 4.6;
+/// Onsets are changed so many times more often than there are runs, at most.
+const CHANGES_BESIDE_RUNS: usize = 4;
+
+/// The onsets of one run, by time, with their tuples.
+struct Onsets {
+    /// Distance in s between them.
+    grid_s: f64,
+    times_s: Vec<f64>,
+    tuples: Vec<Tuple>,
+}
+
+pub(super) fn onset_tuple(scan: &Scan, index: usize, onset_s: f64) -> Tuple {
+    scan.run_tuple(index, |run, i| {
+        -build_up(run.recording.time_s()[i] - onset_s) / run.samples()[i].inertial_mass_kg
+    })
+}
+
+impl Onsets {
+    fn of(scan: &Scan, index: usize) -> Self {
+        let run = &scan.problem.runs[index];
+        let last_s = run.duration_s() - TAIL_MIN_S;
+        let grid_s = GRID_MIN_S.max(last_s / GRID_PLACES);
+        let count = (last_s / grid_s).floor().max(0.0) as usize;
+        let first_s = run.bins.first().map_or(0.0, |bin| bin.time_s) - BUILD_UP_S;
+        let times_s: Vec<f64> = std::iter::once(first_s)
+            .chain((1..count).map(|k| grid_s * k as f64).filter(|&time| time > first_s))
+            .collect();
+        let tuples = times_s.iter().map(|&onset_s| onset_tuple(scan, index, onset_s)).collect();
+        Onsets { grid_s, times_s, tuples }
+    }
+
+    /// What the taking part of the run must explain.
+    fn cost(&self) -> f64 {
+        2.0 * (self.times_s.len().max(2) as f64).ln() + RUN_COST
+    }
+}
+
+/// Windows from the speeds of the fit runs: a common force, an onset for each run that takes
+/// part, improved by one run's onset at a time until nothing changes.
+pub(super) fn by_speed(scan: &Scan) -> Option<(Vec<RunWindow>, f64, f64)> {
+    let count = scan.problem.runs.len();
+    let onsets: Vec<Onsets> = (0..count).map(|index| Onsets::of(scan, index)).collect();
+    let mut chosen: Vec<Option<usize>> = vec![None; count];
+    let mut best = 0.0;
+    for _ in 0..CHANGES_BESIDE_RUNS + count {
+        let Some((reached, index, choice)) = best_change(scan, &onsets, &chosen, best) else {
+            break;
+        };
+        best = reached;
+        chosen[index] = choice;
+    }
+    if chosen.iter().all(Option::is_none) {
+        return None;
+    }
+    Some(refined(scan, &onsets, &chosen))
+}
+
+/// The change of one run's onset that brings most, if any brings more than `best`.
+fn best_change(
+    scan: &Scan,
+    onsets: &[Onsets],
+    chosen: &[Option<usize>],
+    mut best: f64,
+) -> Option<(f64, usize, Option<usize>)> {
+    let taking_part = || onsets.iter().zip(chosen).filter_map(|(own, k)| Some((own, (*k)?)));
+    let mut all = Tuple::zero(scan.fit.theta.len());
+    taking_part().for_each(|(own, k)| all.add(&own.tuples[k]));
+    let all_cost: f64 = taking_part().map(|(own, _)| own.cost()).sum();
+    let mut change = None;
+    for (index, own) in onsets.iter().enumerate() {
+        let (mut sum, mut cost) = (all.clone(), all_cost);
+        if let Some(k) = chosen[index] {
+            sum.take_out(&own.tuples[k]);
+            cost -= own.cost();
+        }
+        let mut consider = |sum: &Tuple, cost: f64, choice: Option<usize>| {
+            let (gain, estimate) = scan.gain(sum);
+            if estimate > 0.0 && gain - cost > best + 1e-9 {
+                best = gain - cost;
+                change = Some((best, index, choice));
+            }
+        };
+        if chosen[index].is_some() {
+            consider(&sum, cost, None);
+        }
+        for (k, tuple) in own.tuples.iter().enumerate() {
+            sum.add(tuple);
+            consider(&sum, cost + own.cost(), Some(k));
+            sum.take_out(tuple);
+        }
+    }
+    change
+}
+
+/// Onsets to about a bin, one run after the other.
+fn refined(scan: &Scan, onsets: &[Onsets], chosen: &[Option<usize>]) -> (Vec<RunWindow>, f64, f64) {
+    let mut found: Vec<(usize, f64, Tuple)> = Vec::new();
+    let mut choice_cost = 0.0;
+    for (index, choice) in chosen.iter().enumerate() {
+        if let Some(k) = choice {
+            let onsets = &onsets[index];
+            found.push((index, onsets.times_s[*k], onsets.tuples[*k].clone()));
+            choice_cost += onsets.cost();
+        }
+    }
+    let count = scan.fit.theta.len();
+    for at in 0..found.len() {
+        let mut rest = Tuple::zero(count);
+        for (other, (_, _, tuple)) in found.iter().enumerate() {
+            if other != at {
+                rest.add(tuple);
+            }
+        }
+        let mut step_s = onsets[found[at].0].grid_s;
+        while step_s > FINEST_S {
+            step_s /= 6.0;
+            let (index, middle_s, _) = found[at];
+            let best = (-6..=6)
+                .map(|k| {
+                    let onset_s = middle_s + step_s * f64::from(k);
+                    let own = onset_tuple(scan, index, onset_s);
+                    let mut sum = rest.clone();
+                    sum.add(&own);
+                    (scan.gain(&sum).0, onset_s, own)
+                })
+                .max_by(|one, other| one.0.total_cmp(&other.0));
+            if let Some((_, onset_s, own)) = best {
+                found[at] = (index, onset_s, own);
+            }
+        }
+    }
+    let mut sum = Tuple::zero(count);
+    let mut windows = Vec::new();
+    for (index, onset_s, tuple) in &found {
+        sum.add(tuple);
+        let run = &scan.problem.runs[*index];
+        windows.push(RunWindow {
+            run: run.file.clone(),
+            t_start_s: run.offset_s + onset_s.max(0.0),
+            t_end_s: run.offset_s + run.duration_s(),
+        });
+    }
+    (windows, scan.gain(&sum).1, choice_cost)
+}
