@@ -21,8 +21,11 @@ pub const LIVE: &str = "dynocar-live";
 /// The program that forwards to a broker.
 pub const FORWARD: &str = "dynocar-forward";
 
+/// The program that measures this project, which calls others.
+const BENCH: &str = "dynocar-bench";
+
 /// All of them.
-const PROGRAMS: [&str; 7] = [USUAL, WORKSHOP, RECORDING, PARQUET, WATCH, LIVE, FORWARD];
+const PROGRAMS: [&str; 8] = [USUAL, WORKSHOP, RECORDING, PARQUET, WATCH, LIVE, FORWARD, BENCH];
 
 /// What a user calls who calls a program through this one.
 const USUAL: &str = "dynocar";
@@ -113,6 +116,7 @@ mod tests {
     fn programs_of_one_ending_find_each_other() {
         assert_eq!(["dynocar", "dynocar-workshop"].map(ending), ["", ""]);
         assert_eq!(["dynocar-2", "dynocar-workshop-2"].map(ending), ["-2", "-2"]);
+        assert_eq!(ending("dynocar-bench"), "");
         assert_eq!(ending("python3"), "");
     }
 }

@@ -1,5 +1,6 @@
 //! Numbers of an answer against the true ones.
 
+use dynocar_model::terms::delay;
 use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::disturbances::Disturbances;
 use dynocar_tests::simulator::run_maker::RunPlan;
@@ -47,7 +48,12 @@ pub fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec
         Effect::GradientError { profile } => gradient_errors(profile, own, simulated),
         Effect::TractionGain { gain } => vec![one("gain", *gain, 1.0)],
         Effect::ActuatorDelay { delay_s, lag_s } | Effect::SpeedDelay { delay_s, lag_s } => {
-            vec![one("delay_s", *delay_s, 0.0), one("lag_s", *lag_s, 0.0)]
+            let together_s = *delay_s + *lag_s;
+            vec![
+                one(delay::TOGETHER, together_s, 0.0),
+                one("delay_s", *delay_s, 0.0),
+                one("lag_s", *lag_s, 0.0),
+            ]
         }
         Effect::RotatingMass { rotating_mass_factor } => {
             vec![one("rotating_mass_factor", *rotating_mass_factor, declared.rotating_mass_factor)]

@@ -68,16 +68,21 @@ impl ReportContext<'_> {
         self.covariance[(2, self.first)]
     }
 
-    /// The effect's parameters with their sum, which may be known far better than each.
-    pub fn with_sum(&self, parameters: &[Parameter], sum_name: &str) -> Reported {
-        let count = self.parameters.len();
-        let variance = self.covariance.view((self.first, self.first), (count, count)).sum();
+    /// Each of the effect's parameters.
+    pub fn each_of(&self, parameters: &[Parameter]) -> Reported {
         let mut reported = Reported::default();
-        reported.push(sum_name, self.parameters.iter().sum(), variance.max(0.0).sqrt());
         for (i, parameter) in parameters.iter().enumerate() {
             reported.push(parameter.name, self.parameters[i], self.deviations[i]);
         }
         reported
+    }
+
+    /// Standard deviation of the sum of the effect's parameters, which may be far less than that of each.
+    pub fn deviation_of_sum(&self) -> f64 {
+        let count = self.deviations.len();
+        let own = self.covariance.view((self.first, self.first), (count, count));
+        let added: f64 = self.deviations.iter().map(|std| std * std).sum::<f64>() - own.trace();
+        (own.sum() + added.max(0.0)).max(0.0).sqrt()
     }
 }
 
@@ -350,10 +355,6 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
 
     /// Parameters by the names of the answer.
     fn report(&self, context: &ReportContext) -> Reported {
-        let mut reported = Reported::default();
-        for (i, spec) in self.parameters().iter().enumerate() {
-            reported.push(spec.name, context.parameters[i], context.deviations[i]);
-        }
-        reported
+        context.each_of(self.parameters())
     }
 }

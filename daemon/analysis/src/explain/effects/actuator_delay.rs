@@ -96,7 +96,10 @@ impl Hypothesis for DelayAndLag {
     }
 
     fn report(&self, context: &ReportContext) -> Reported {
-        context.with_sum(self.parameters(), delay::TOGETHER)
+        let mut reported = context.each_of(self.parameters());
+        let together_s = context.parameters.iter().sum();
+        reported.push(delay::TOGETHER, together_s, context.deviation_of_sum());
+        reported
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {

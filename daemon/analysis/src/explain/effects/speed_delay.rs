@@ -2,13 +2,12 @@
 //! not: what the line does distinguishes the two, and so does a position that runs ahead of the speed.
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Entry, Parameter, delay, speed_delay};
+use dynocar_model::terms::speed_delay;
+use dynocar_model::terms::{Entry, Parameter};
 use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{
-    Candidate, Effect, Hypothesis, OnOthers, Past, Proposal, ReportContext, Reported, Turn,
-};
+use super::{Candidate, Effect, Hypothesis, OnOthers, Past, Proposal, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -110,10 +109,6 @@ impl Hypothesis for DelayAndLag {
 
     fn turn(&self) -> Turn {
         Turn::Last
-    }
-
-    fn report(&self, context: &ReportContext) -> Reported {
-        context.with_sum(self.parameters(), delay::TOGETHER)
     }
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {

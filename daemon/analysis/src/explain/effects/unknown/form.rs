@@ -242,10 +242,7 @@ impl Hypothesis for FormForce {
     }
 
     fn report(&self, context: &ReportContext) -> Reported {
-        let mut reported = Reported::default();
-        for (i, spec) in self.parameters.iter().enumerate() {
-            reported.push(spec.name, context.parameters[i], context.deviations[i]);
-        }
+        let mut reported = context.each_of(&self.parameters);
         let formula = self.extra(context.parameters).law();
         reported.values.insert("formula".into(), ParameterValue::Formula(formula));
         reported
