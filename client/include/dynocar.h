@@ -46,7 +46,7 @@ extern "C" {
 #endif
 
 /* What stands between generated: and end of generated is written from the library's own types
- * (client/tests/bindings.rs). */
+ * (client/tests/client/bindings.rs). */
 
 /* ---- What this header was written for; see dynocar_header_matches_library() ---- */
 

@@ -1,4 +1,4 @@
-"""The numbers on the channels and their names: written by client/tests/bindings.rs from the Rust types."""
+"""The numbers on the channels and their names: written by client/tests/client/bindings.rs from the Rust types."""
 
 from __future__ import annotations
 

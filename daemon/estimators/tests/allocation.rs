@@ -12,7 +12,7 @@ use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 
 /// The train of the braking tests.
 #[allow(dead_code)]
-#[path = "braking/simulation.rs"]
+#[path = "estimators/braking/simulation.rs"]
 mod simulation;
 
 thread_local! {

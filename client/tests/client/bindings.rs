@@ -1,11 +1,8 @@
 //! What C and Python repeat of the library is written from it, and these tests hold that it still is:
-//! `DYNOCAR_WRITE_BINDINGS=1 cargo test --release -p dynocar-client --test bindings` writes it anew.
+//! `DYNOCAR_WRITE_BINDINGS=1 cargo test --release -p dynocar-client --test client bindings::` writes it anew.
 
-#[path = "bindings/c.rs"]
 mod c;
-#[path = "bindings/python.rs"]
 mod python;
-#[path = "bindings/vocabularies.rs"]
 mod vocabularies;
 
 use std::fmt::Debug;

@@ -1,13 +1,11 @@
 //! Mass by Kalman filters: what is learned, when, and what bad input does.
 
-mod mass_common;
-
+use crate::mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::wang::{MassKalman, MassKalmanSettings};
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
-use mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 
 fn estimator() -> MassKalman {
     MassKalman::new(MassKalmanSettings::default(), &train()).unwrap()

@@ -1,8 +1,6 @@
 //! The live view as a process beside a controller and a daemon, with viewers that come, stall and go.
 
 mod support;
-#[path = "../../../recording/tests/support_site/mod.rs"]
-mod support_site;
 mod viewer;
 
 use std::process::Command;
@@ -11,8 +9,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use dynocar_recording::codec::{decode_sample, decode_snapshot, encode_sample};
 use dynocar_shared::PipelineKind;
 
+use crate::support_site::{Controller, TestSite};
 use support::{Live, PROGRAM, published_sample};
-use support_site::{Controller, TestSite};
 use viewer::Viewer;
 
 const SAMPLES: &str = "/train/1/samples";

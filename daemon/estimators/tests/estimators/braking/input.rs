@@ -7,7 +7,7 @@ use dynocar_shared::{
     Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, SampleField, Status,
 };
 
-use crate::simulation::{
+use super::simulation::{
     FULL_BRAKING, KINDS, Run, after, assert_finite, pipeline, pipeline_for, train, wet,
 };
 

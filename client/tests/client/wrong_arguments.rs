@@ -15,8 +15,7 @@ use dynocar_client::peer::RoleLock;
 use dynocar_client::{Announcement, Role};
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainId, TrainSample};
 
-mod support;
-use support::TestRoot;
+use crate::support::TestRoot;
 
 const TRAIN: u64 = 11;
 

@@ -1,7 +1,6 @@
 //! Resistance and mass by joint least squares.
 
-mod mass_common;
-
+use crate::mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::wang::section::Section;
@@ -9,7 +8,6 @@ use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
-use mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 use std::sync::Arc;
 
 /// A train that declares half the resistance that acts.

@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::process::Command;
 
-mod support;
-use support::{Link, client_directory, compiler, library_directory, must_succeed};
+use crate::support::{self, Link, client_directory, compiler, library_directory, must_succeed};
 
 fn header_text() -> String {
     std::fs::read_to_string(client_directory().join("include/dynocar.h")).unwrap()

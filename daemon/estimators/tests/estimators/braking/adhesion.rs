@@ -5,7 +5,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::xie::{EStep, EmSettings};
 use dynocar_shared::{Parameter, PipelineKind, Reason, Status};
 
-use crate::simulation::{DEMAND, FULL_BRAKING, FULL_PRESSURE_PA, Run, after, dry, pipeline, wet};
+use super::simulation::{DEMAND, FULL_BRAKING, FULL_PRESSURE_PA, Run, after, dry, pipeline, wet};
 
 const WET: Run = Run { adhesion: |_, speed_mps| wet(speed_mps), ..FULL_BRAKING };
 

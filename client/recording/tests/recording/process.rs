@@ -1,13 +1,12 @@
 //! The recorder as a process beside a controller and a daemon: killed, asked to end, out of disk.
 
-mod support_site;
-
 use std::io::Read;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
+use crate::support_site::{Controller, TRAIN, TestSite, await_true};
 use dynocar_client::channel::Transport;
 use dynocar_client::monotonic_now_ns;
 use dynocar_recording::event::EventKind;
@@ -16,7 +15,6 @@ use dynocar_recording::recording::Recording;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use rustix::process::{Pid, Signal, kill_process};
-use support_site::{Controller, TRAIN, TestSite, await_true};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-recording");
 

@@ -1,9 +1,8 @@
 //! Staged learning as Wang 2022 has it.
 
-mod mass_common;
-
 use std::sync::Arc;
 
+use crate::mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 use dynocar_core::pipeline::Estimator;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::wang::line_resistance::LineResistance;
@@ -11,7 +10,6 @@ use dynocar_estimators::wang::{MassRegression, StagedDescent, StagedDescentSetti
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, PipelineKind, Reason, Status};
-use mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 
 fn staged(settings: StagedDescentSettings) -> StagedDescent {
     let resistance = Davis { a: 1.0, b: 0.01, c: 0.0025 };

@@ -5,7 +5,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::xie::{EStep, EmSettings};
 use dynocar_shared::{Parameter, Reason, Status};
 
-use crate::simulation::{FULL_BRAKING, FULL_PRESSURE_PA, Run, after, pipeline};
+use super::simulation::{FULL_BRAKING, FULL_PRESSURE_PA, Run, after, pipeline};
 
 /// The discs give a tenth less than declared.
 const WORN: Run = Run { brake_factor: 0.9, ..FULL_BRAKING };
@@ -98,7 +98,7 @@ fn a_known_friction_curve_is_scaled() {
         ..Default::default()
     };
     let refused = EstimatorSettings::BrakeSmoother(ratio_with_curve)
-        .build(&std::sync::Arc::new(crate::simulation::train()));
+        .build(&std::sync::Arc::new(super::simulation::train()));
     assert_eq!(refused.err().map(|error| error.key), Some("friction_law"));
 }
 

@@ -7,9 +7,8 @@ use std::process::Command;
 use dynocar_shared::services::ROOT_VARIABLE;
 use dynocar_shared::{Parameter, SampleField, TrainSample};
 
-mod support;
-use support::{
-    Link, PIPELINE_INDEX, PlayedDaemon, Program, TRAIN, client_directory, library_directory,
+use crate::support::{
+    self, Link, PIPELINE_INDEX, PlayedDaemon, Program, TRAIN, client_directory, library_directory,
     snapshot_for,
 };
 

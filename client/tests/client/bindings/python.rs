@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::vocabularies::{self as vocabularies, Member, Vocabulary};
 
 /// What stands before the classes.
-const HEAD: &str = r#""""The numbers on the channels and their names: written by client/tests/bindings.rs from the Rust types."""
+const HEAD: &str = r#""""The numbers on the channels and their names: written by client/tests/client/bindings.rs from the Rust types."""
 
 from __future__ import annotations
 

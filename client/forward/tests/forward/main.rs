@@ -1,0 +1,4 @@
+//! What is published of trains, and brokers of every kind.
+
+mod broker;
+mod library;

@@ -1,0 +1,5 @@
+//! Stops against what was simulated, and `explain` on any number of threads.
+
+mod modulated_stops;
+mod stops;
+mod threads;
