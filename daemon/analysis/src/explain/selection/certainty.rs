@@ -40,7 +40,8 @@ pub fn deciding_score(
 /// whole train or line, less of it where it takes more, which the runs agree on. What is chosen among many must take
 /// more from the error; among runs or forms, it is certain only beside the usual errors, which such choices stand for
 /// else. Never certain are loads, winds and slippery rails, which change from run to run, a late speed, which late
-/// forces look like, unmapped tunnels, and a local resistance beside gradients, whose straight pieces leave such.
+/// forces look like, and a local resistance or an unmapped tunnel beside gradients, whose straight pieces leave such;
+/// beside the usual errors no unmapped tunnel at all.
 pub(super) fn is_certain(
     fit: &Fit,
     index: usize,
@@ -49,17 +50,21 @@ pub(super) fn is_certain(
     is_beside_usual_errors: bool,
 ) -> bool {
     use EffectKind::{
-        DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, Unknown, Wind,
+        DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, TunnelDrag, Unknown,
+        Wind,
     };
     let effect = &fit.model.effects[index];
-    let is_chosen_among_many = matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
+    // What acts where the map has its tunnels and curves is one number of the line.
+    let is_unmapped = effect.kind() == TunnelDrag && !effect.ends().is_empty();
+    let is_chosen_among_many =
+        is_unmapped || matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
     let is_beside_a_gradient = fit.model.effects.iter().any(|other| other.is_gradient());
     let needs_the_score = match effect.kind() {
         LowAdhesion | MassChange | SpeedDelay | Wind => true,
         DraggingBrake | Unknown => !is_beside_usual_errors,
         LocalResistance => is_beside_a_gradient,
-        // What acts where the map has its tunnels and curves is one number of the line.
-        _ => !effect.ends().is_empty(),
+        TunnelDrag if is_unmapped => is_beside_a_gradient || is_beside_usual_errors,
+        _ => false,
     };
     let size = fit.model.ranges()[index].start;
     // In standard deviations from none; the size of a form hangs on its shape, what it explains does not.
