@@ -13,10 +13,11 @@ use super::braking_watch::BrakingWatch;
 use super::jump_share::JumpShare;
 use super::learned::Learned;
 use super::load::{Change, LoadWatch};
-use super::motion_filter::{LOAD, SPEED, Step, wind_over};
+use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, Step, wind_over};
 use super::prior::Resistance;
 use super::report::Report;
 use super::settings::TrainKalmanSettings;
+use super::steps::Steps;
 use super::systematic::Systematic;
 use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
 use crate::pipeline::momentum::sample::UnitSample;
@@ -31,15 +32,12 @@ const MOVED_MIN_S: f64 = 20.0;
 const CONFIRMED_S: f64 = 3.0;
 /// Deviations by which a first sample may differ from a kept mass that still counts.
 const KEPT_DEVIATIONS: f64 = 3.0;
-/// How long a change of force is remembered, in s.
-const FORCE_RATE_MEMORY_S: f64 = 0.5;
 
 /// Resistance and mass of a train by Kalman filters over every sample.
 #[derive(Clone, Debug)]
 pub struct TrainKalman {
     settings: TrainKalmanSettings,
     train_kg: f64,
-    train_length_m: f64,
     /// Resistance as declared or kept, scaled, with its covariance.
     first: Resistance,
     gate: SampleGate,
@@ -50,7 +48,7 @@ pub struct TrainKalman {
     last_time_ns: Option<i64>,
     /// True when the speed of the newest sample was at least the lowest that is used.
     is_fast: bool,
-    force_rate: f64,
+    steps: Steps,
     braking: BrakingWatch,
     before_braking: Learned,
     systematic: Systematic,
@@ -85,14 +83,13 @@ impl TrainKalman {
             learned,
             settings,
             train_kg: train.mass_kg,
-            train_length_m: train.length_m,
+            steps: Steps::new(&settings, train.length_m),
             first,
             gate: SampleGate::default(),
             load: LoadWatch::new(&settings),
             last: None,
             last_time_ns: None,
             is_fast: false,
-            force_rate: 0.0,
             systematic: Systematic::new(
                 settings.gradient_std_permille,
                 settings.acceleration_scale_std,
@@ -115,36 +112,16 @@ impl TrainKalman {
         let wind = wind_over(gap_s.max(0.0), self.settings.wind_std_mps);
         self.learned.bank.begin(now.speed_mps, noise_variance, gap_s.max(0.0), wind);
         self.learned.monitor.break_here();
-        self.force_rate = 0.0;
+        self.steps.begin();
         self.last = Some(now);
         Outcome::Used
     }
 
     /// The step to a sample, with what is learned beside the state.
     fn step(&mut self, from: &UnitSample, to: &UnitSample, sample: &ResolvedSample) -> Step {
-        let step = Step::between(from, to);
-        let duration_s = step.duration_s;
-        let faded = self.force_rate * (-duration_s / FORCE_RATE_MEMORY_S).exp();
-        let change = step.traction_change - step.brake_change;
-        self.force_rate = faded.max((change / duration_s).abs());
-        // A change of gradient or curve passes under the train in many steps, all early or all late.
-        let speed_mps = to.speed_mps.max(self.settings.speed_min_mps);
-        let steps = (self.train_length_m / (speed_mps * duration_s)).max(1.0);
-        let place_s = self.settings.position_std_m / speed_mps;
-        let drift = self.settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0;
-        let walk = self.settings.brake_scale_per_sqrt_min.powi(2) * duration_s / 60.0;
-        Step {
-            place_variance: steps * (place_s * (to.known - from.known)).powi(2),
-            jump_share: self.learned.jumps.share(),
-            force_rate: self.force_rate,
-            map_std_permille: sample.gradient_std_permille,
-            drift_variance: drift,
-            by_wind: sample.direction * self.first.by_wind(to.speed_mps),
-            by_wind_square: self.first.by_wind_square(),
-            wind: wind_over(duration_s, self.settings.wind_std_mps),
-            brake_variance: (walk, self.settings.brake_scale_std.powi(2)),
-            ..step
-        }
+        let delay_s = self.learned.bank.likeliest().belief.mean[FORCE_DELAY];
+        let step = self.steps.to((from, to), sample, delay_s, &self.first);
+        Step { jump_share: self.learned.jumps.share(), ..step }
     }
 
     fn advance(&mut self, from: UnitSample, now: UnitSample, sample: &ResolvedSample) -> Outcome {
@@ -268,12 +245,16 @@ impl Gated for TrainKalman {
     }
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
+        let unit = UnitSample::of(sample);
+        if let Ok(unit) = unit {
+            self.steps.see(&unit);
+        }
         if !self.is_under_way(sample) {
             self.last = None;
             self.braking = BrakingWatch::default();
             return Outcome::Used;
         }
-        let now = match UnitSample::of(sample) {
+        let now = match unit {
             Ok(now) => now,
             Err(reason) => {
                 self.last = None;

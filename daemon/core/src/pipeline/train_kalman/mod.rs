@@ -10,6 +10,7 @@
 //! both. Whoever takes the mass for exact puts its error into the resistance, and the other way round;
 //! here each is known as well as the other allows, and their covariance says how they depend.
 
+mod acting_forces;
 mod bank;
 mod behaviour;
 mod braking_watch;
@@ -21,6 +22,7 @@ mod motion_filter;
 mod prior;
 mod report;
 mod settings;
+mod steps;
 mod systematic;
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::acting_forces::Acting;
 use super::behaviour::Behaviour;
 use crate::filter::Gaussian;
 use crate::pipeline::momentum::regressors;
@@ -57,9 +58,11 @@ pub struct Step {
     pub travelled_m: f64,
     /// Momentum per weight and speed: s.
     pub inertia: f64,
-    /// Impulse of the traction force in N/kN s.
+    /// How long in s forces are taken to act behind their report.
+    pub delay_s: f64,
+    /// Impulse of the traction force in N/kN s, if it acts so much later.
     pub traction: f64,
-    /// Impulse of the brake force, retarding.
+    /// Impulse of the brake force, retarding, likewise.
     pub brake: f64,
     /// Impulse of all that is known to retard beyond the basic resistance.
     pub known: f64,
@@ -90,18 +93,19 @@ pub struct Step {
 
 impl Step {
     /// Between two samples of one segment; what is learned on the way is the caller's to fill in.
-    pub fn between(from: &UnitSample, to: &UnitSample) -> Self {
+    pub fn between(from: &UnitSample, to: &UnitSample, acting: &Acting) -> Self {
         let duration_s = to.seconds_since(from);
         let half_s = 0.5 * duration_s;
         Step {
             duration_s,
             travelled_m: half_s * (from.speed_mps + to.speed_mps),
             inertia: to.inertia,
-            traction: half_s * (from.traction + to.traction),
-            brake: half_s * (from.brake + to.brake),
+            delay_s: acting.delay_s,
+            traction: acting.impulses[0],
+            brake: acting.impulses[1],
             known: half_s * (from.known + to.known),
-            traction_change: to.traction - from.traction,
-            brake_change: to.brake - from.brake,
+            traction_change: acting.changes[0],
+            brake_change: acting.changes[1],
             place_variance: 0.0,
             jump_share: 1.0,
             force_rate: 0.0,
@@ -134,10 +138,10 @@ impl MotionFilter {
     /// Work in proportion to the square of [`STATES`], no allocation.
     pub fn predict(&mut self, step: &Step) {
         let state = self.belief.mean;
-        let (load, delay_s) = (state[LOAD], state[FORCE_DELAY]);
+        let (load, later_s) = (state[LOAD], state[FORCE_DELAY] - step.delay_s);
         let (by_traction, by_brake) = (1.0 + state[TRACTION_SCALE], 1.0 + state[BRAKE_SCALE]);
-        let traction = step.traction - delay_s * step.traction_change;
-        let brake = step.brake - delay_s * step.brake_change;
+        let traction = step.traction - later_s * step.traction_change;
+        let brake = step.brake - later_s * step.brake_change;
         let force = by_traction * traction - by_brake * brake;
         let change = by_traction * step.traction_change - by_brake * step.brake_change;
         let impulse = load * force - step.known - step.duration_s * state[DISTURBANCE];
@@ -189,11 +193,11 @@ impl MotionFilter {
         self.belief.disturb(BRAKE_SCALE, walked.min((most - now).max(0.0)));
     }
 
-    /// Variance in (m/s)² of the speed while a force that acts later by d changes: its impulse is
-    /// taken as d times the change at once, and is off by half d² times the rate until then.
+    /// Variance in (m/s)² of the speed while a force changes that acts by d later than the step has it: its
+    /// impulse is taken as d times the change at once, and is off by half d² times the rate until then.
     pub fn transient_variance(&self, step: &Step) -> f64 {
-        let delay_s = self.belief.mean[FORCE_DELAY];
-        let square = delay_s * delay_s + self.belief.covariance[(FORCE_DELAY, FORCE_DELAY)];
+        let later_s = self.belief.mean[FORCE_DELAY] - step.delay_s;
+        let square = later_s * later_s + self.belief.covariance[(FORCE_DELAY, FORCE_DELAY)];
         (0.5 * square * step.force_rate / step.inertia).powi(2)
     }
 }
@@ -208,6 +212,7 @@ mod tests {
             duration_s: 0.2,
             travelled_m: 4.0,
             inertia: 108.0,
+            delay_s: 0.1,
             traction: 11.0,
             brake: 3.0,
             known: 0.9,

@@ -11,10 +11,16 @@ const MASS_MOVED_MIN_S: f64 = 3.0;
 const COMPLETE: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
 /// Innovations before they are judged to be alike.
 const JUDGED_MIN: f64 = 100.0;
+/// Mean square from which on their likeness is judged: of speeds without noise, of which none is taken for
+/// better than [`crate::pipeline::motion::SpeedNoise`] allows, the smallest error of a model is alike.
+const JUDGED_SQUARE_MIN: f64 = 0.1;
 
 impl TrainKalman {
     pub(super) fn long_run(&self) -> f64 {
-        long_run_variance(self.learned.monitor.mean_square(), self.learned.monitor.correlation())
+        let monitor = &self.learned.monitor;
+        let variance = long_run_variance(monitor.mean_square(), monitor.correlation());
+        // Whatever follows what, so many innovations add up to no more.
+        variance.min(monitor.effective_count() * monitor.mean_square())
     }
 
     /// Innovations that are alike are made up for by wider intervals, up to a bound.
@@ -22,8 +28,9 @@ impl TrainKalman {
         if self.learned.monitor.are_too_large() {
             return Some(Reason::InnovationsTooLarge);
         }
-        let is_alike =
-            self.learned.monitor.effective_count() >= JUDGED_MIN && self.long_run() > LONG_RUN_MAX;
+        let is_alike = self.learned.monitor.effective_count() >= JUDGED_MIN
+            && self.learned.monitor.mean_square() >= JUDGED_SQUARE_MIN
+            && self.long_run() > LONG_RUN_MAX;
         is_alike.then_some(Reason::InnovationsNotWhite)
     }
 
