@@ -6,8 +6,9 @@ use dynocar_shared::vocabulary::{self, EffectKind};
 use super::evidence::{EQUAL, Fit, SCORE_MIN};
 use super::selection::{Outcome, Refusal, Search, Trial, is_certain_beside};
 
-/// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error.
-const ERROR_REDUCTION_SHARE: f64 = 0.7;
+/// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error, and has this
+/// share of the least score.
+const COMPETING_SHARE: f64 = 0.7;
 
 /// An accepted effect and the kinds that could stand in its place.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,10 +50,13 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         let kind = effect.kind();
         let swapped = outcome.instead.iter().filter(|_| effects.len() > 1);
         let instead = outcome.certain.iter().chain(swapped).find(|(stands, _)| *stands == kind);
-        let first = outcome.rounds.first().map_or(&[][..], |round| &round[..]);
+        // What was tried when it was taken in.
+        let mut rounds = outcome.rounds.iter().rev();
+        let taken_in = rounds.find(|round| round.iter().any(|trial| trial.kind == kind));
+        let taken_in = taken_in.map_or(&[][..], |round| &round[..]);
         let twins: Vec<EffectKind> =
             effect.twins().iter().copied().filter(is_large(kind)).collect();
-        of(kind, instead.map_or(first, |(_, tried)| tried), &twins)
+        of(kind, instead.map_or(taken_in, |(_, tried)| tried), &twins)
     });
     each.filter(|competing| !competing.kinds.is_empty()).collect()
 }
@@ -65,14 +69,17 @@ fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
         _ if outcome.is_certain(accepted.kind) => is_certain_beside(trial, trial.bic_gain),
         None => true,
         // Beside what the score accepted it is strong enough, on whichever side of the least score it lies.
-        Some(Refusal::Weak(_)) => accepted.acceptance_score() > SCORE_MIN,
+        Some(Refusal::Weak(_)) => {
+            accepted.acceptance_score() > SCORE_MIN
+                && trial.acceptance_score() > COMPETING_SHARE * SCORE_MIN
+        }
         Some(_) => false,
     };
     trial.kind != EffectKind::Unknown
         && trial.fit.model.effects[trial.last()].may_stand_for_others()
         && may_be
         && trial.bic_gain > accepted.bic_gain - EQUAL
-        && trial.reduction > ERROR_REDUCTION_SHARE * accepted.reduction.max(0.0)
+        && trial.reduction > COMPETING_SHARE * accepted.reduction.max(0.0)
         && left < 0.5 * trial.evidence
 }
 

@@ -40,8 +40,8 @@ pub fn deciding_score(
 /// whole train or line, less of it where it takes more, which the runs agree on. What is chosen among many must take
 /// more from the error; among runs or forms, it is certain only beside the usual errors, which such choices stand for
 /// else. Never certain are loads, winds and slippery rails, which change from run to run, a late speed, which late
-/// forces look like, and a local resistance or an unmapped tunnel beside gradients, whose straight pieces leave such;
-/// beside the usual errors no unmapped tunnel at all.
+/// forces look like, a brake beside slippery rails and a local resistance or an unmapped tunnel beside gradients, whose
+/// ends and straight pieces leave such; beside the usual errors no unmapped tunnel at all.
 pub(super) fn is_certain(
     fit: &Fit,
     index: usize,
@@ -59,9 +59,11 @@ pub(super) fn is_certain(
     let is_chosen_among_many =
         is_unmapped || matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
     let is_beside_a_gradient = fit.model.effects.iter().any(|other| other.is_gradient());
+    let is_on_slippery_rails = fit.model.effects.iter().any(|other| other.kind() == LowAdhesion);
     let needs_the_score = match effect.kind() {
         LowAdhesion | MassChange | SpeedDelay | Wind => true,
-        DraggingBrake | Unknown => !is_beside_usual_errors,
+        DraggingBrake => !is_beside_usual_errors || is_on_slippery_rails,
+        Unknown => !is_beside_usual_errors,
         LocalResistance => is_beside_a_gradient,
         TunnelDrag if is_unmapped => is_beside_a_gradient || is_beside_usual_errors,
         _ => false,
