@@ -1,50 +1,119 @@
-//! Columns of numbers from one program to another: a line of JSON with every column's name and the number of
-//! its values, then these values, column after column, each as eight bytes with the lowest first.
+//! Columns of numbers from one program to another, rows after rows, so that neither waits for the other's last: a
+//! line of JSON with the number of rows that are to come and every column's name, then blocks. A block is the
+//! number of its rows and these rows' values, column after column; one without rows is the last. All numbers take
+//! eight bytes with the lowest first.
 
-use std::io::{self, Write};
+use std::io::{self, BufRead, Read, Write};
 
 use dynocar_dataset::RunColumn;
 
-/// Name and number of values of each column; `None` for one whose values are not handed over.
-type Header = Vec<(String, Option<usize>)>;
+/// Rows to come, and name and whether there are values of each column.
+type Header = (usize, Vec<(String, bool)>);
 
 /// Bytes of a value.
 const BYTES: usize = size_of::<f64>();
+/// Bytes that are read at once.
+const CHUNK: usize = 1 << 16;
+/// For so many rows room is made before they come: what promises more may be damaged.
+const ROWS_RESERVED_MAX: usize = 1 << 24;
 
 /// Hands columns over.
-///
-/// # Errors
-///
-/// When the other side does not take them.
-pub fn write(columns: &[RunColumn], mut output: impl Write) -> io::Result<()> {
-    let header: Header =
-        columns.iter().map(|it| (it.name.clone(), it.values.as_ref().map(Vec::len))).collect();
-    serde_json::to_writer(&mut output, &header)?;
-    output.write_all(b"\n")?;
-    for value in columns.iter().filter_map(|it| it.values.as_ref()).flatten() {
-        output.write_all(&value.to_le_bytes())?;
-    }
-    output.flush()
+#[derive(Debug)]
+pub struct Sender<W> {
+    output: W,
+    block: Vec<u8>,
 }
 
-/// The columns that were handed over; `None` for bytes that are none.
-pub fn read(bytes: &[u8]) -> Option<Vec<RunColumn>> {
-    let end = bytes.iter().position(|&byte| byte == b'\n')?;
-    let header: Header = serde_json::from_slice(&bytes[..end]).ok()?;
-    let mut rest = &bytes[end + 1..];
-    let mut columns = Vec::with_capacity(header.len());
-    for (name, count) in header {
-        let values = match count {
-            None => None,
-            Some(count) => {
-                let (numbers, behind) = rest.split_at_checked(count.checked_mul(BYTES)?)?;
-                rest = behind;
-                Some(numbers.as_chunks().0.iter().map(|&it| f64::from_le_bytes(it)).collect())
-            }
-        };
-        columns.push(RunColumn { name, values });
+impl<W: Write> Sender<W> {
+    /// Begins, with the number of rows that are to come and each column's name, and whether it has values.
+    ///
+    /// # Errors
+    ///
+    /// When the other side does not take them.
+    pub fn begin(rows: usize, columns: Vec<(String, bool)>, mut output: W) -> io::Result<Self> {
+        let header: Header = (rows, columns);
+        let mut line = serde_json::to_vec(&header)?;
+        line.push(b'\n');
+        output.write_all(&line)?;
+        Ok(Sender { output, block: Vec::new() })
     }
-    rest.is_empty().then_some(columns)
+
+    /// Hands rows over: as many values for each column that has some, in the order of the columns.
+    ///
+    /// # Errors
+    ///
+    /// When the other side does not take them.
+    pub fn rows(&mut self, columns: &[Vec<f64>]) -> io::Result<()> {
+        let rows = columns.first().map_or(0, Vec::len);
+        if rows == 0 {
+            return Ok(());
+        }
+        self.block.clear();
+        self.block.extend_from_slice(&(rows as u64).to_le_bytes());
+        for values in columns {
+            let start = self.block.len();
+            self.block.resize(start + values.len() * BYTES, 0);
+            let places = self.block[start..].as_chunks_mut().0.iter_mut();
+            places.zip(values).for_each(|(bytes, it)| *bytes = it.to_le_bytes());
+        }
+        self.output.write_all(&self.block)
+    }
+
+    /// Ends the columns; what follows is something else.
+    ///
+    /// # Errors
+    ///
+    /// When the other side does not take it.
+    pub fn end(mut self) -> io::Result<()> {
+        self.output.write_all(&0u64.to_le_bytes())?;
+        self.output.flush()
+    }
+}
+
+/// The columns that are handed over, and nothing of what follows them; `None` where none are, or not to their end.
+pub fn read(mut input: impl BufRead) -> Option<Vec<RunColumn>> {
+    // Where something went wrong before, the input is a document that says so, which is left.
+    if input.fill_buf().ok()?.first() != Some(&b'[') {
+        return None;
+    }
+    let mut line = Vec::new();
+    input.read_until(b'\n', &mut line).ok()?;
+    let (rows, columns): Header = serde_json::from_slice(&line).ok()?;
+    let empty = |has_values: bool| {
+        has_values.then(|| {
+            let mut values = Vec::new();
+            // What does not fit now is asked for again as it comes.
+            let _ = values.try_reserve_exact(rows.min(ROWS_RESERVED_MAX));
+            values
+        })
+    };
+    let columns = columns.into_iter();
+    let mut columns: Vec<RunColumn> =
+        columns.map(|(name, has_values)| RunColumn { name, values: empty(has_values) }).collect();
+    let mut chunk = vec![0; CHUNK];
+    loop {
+        let mut count = [0; BYTES];
+        input.read_exact(&mut count).ok()?;
+        let rows = usize::try_from(u64::from_le_bytes(count)).ok()?;
+        if rows == 0 {
+            return Some(columns);
+        }
+        for values in columns.iter_mut().filter_map(|it| it.values.as_mut()) {
+            take(&mut input, rows, &mut chunk, values)?;
+        }
+    }
+}
+
+/// Takes so many values of a column; `None` where they end before.
+fn take(input: &mut impl Read, rows: usize, chunk: &mut [u8], values: &mut Vec<f64>) -> Option<()> {
+    let mut left = rows.checked_mul(BYTES)?;
+    while left > 0 {
+        let bytes = &mut chunk[..left.min(CHUNK)];
+        input.read_exact(bytes).ok()?;
+        left -= bytes.len();
+        values.extend(bytes.as_chunks().0.iter().map(|&it| f64::from_le_bytes(it)));
+    }
+    Some(())
 }
 
 #[cfg(test)]
@@ -53,18 +122,34 @@ mod tests {
 
     #[test]
     fn columns_arrive_to_the_bit_and_what_is_cut_off_does_not() {
-        let column = |name: &str, values| RunColumn { name: name.into(), values };
-        let columns = [
-            column("v, \"km/h\"\n", Some(vec![0.1, -0.0, f64::MAX])),
-            column("note", None),
-            column("empty", Some(vec![])),
-        ];
+        let names = [("v, \"km/h\"\n", true), ("note", false), ("more than a chunk", true)];
+        let names = names.map(|(name, has_values)| (name.to_owned(), has_values));
+        let many: Vec<f64> = (0..20_000).map(|it| f64::from(it) * 0.1).collect();
         let mut bytes = Vec::new();
-        write(&columns, &mut bytes).unwrap();
-        assert_eq!(read(&bytes).unwrap(), columns);
-        for length in [0, 5, bytes.len() - 1] {
+        let mut sender = Sender::begin(3, names.into(), &mut bytes).unwrap();
+        sender.rows(&[vec![0.1, -0.0, f64::MAX], vec![1.0, f64::INFINITY, -1.0]]).unwrap();
+        sender.rows(&[vec![], vec![]]).unwrap();
+        sender.rows(&[many.clone(), many.clone()]).unwrap();
+        sender.end().unwrap();
+        bytes.extend(b"after");
+        let mut rest = &bytes[..];
+        let columns = read(&mut rest).unwrap();
+        assert_eq!(rest, b"after");
+        let [first, note, last] = &columns[..] else { panic!("{} columns", columns.len()) };
+        assert_eq!((first.name.as_str(), note.values.as_ref()), ("v, \"km/h\"\n", None));
+        let values = |before: [f64; 3]| Some([&before[..], &many].concat());
+        assert_eq!(first.values, values([0.1, -0.0, f64::MAX]));
+        assert!(first.values.as_ref().unwrap()[1].is_sign_negative());
+        assert_eq!(last.values, values([1.0, f64::INFINITY, -1.0]));
+        for length in [0, 5, 70, bytes.len() - "after".len() - 1] {
             assert_eq!(read(&bytes[..length]), None);
         }
-        assert_eq!(read(&[&bytes[..], &[0]].concat()), None);
+    }
+
+    #[test]
+    fn a_document_in_place_of_columns_is_left_as_it_is() {
+        let mut input = &b"{\"error\": 1}"[..];
+        assert_eq!(read(&mut input), None);
+        assert_eq!(input, b"{\"error\": 1}");
     }
 }

@@ -1,10 +1,10 @@
 //! Programs beside this one: what they are built on is nothing that a daemon needs.
 
 use std::ffi::{OsStr, OsString};
-use std::io;
+use std::io::{self, BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output, Stdio};
 
 use crate::error_document::ErrorDocument;
 
@@ -26,6 +26,9 @@ const BENCH: &str = "dynocar-bench";
 
 /// All of them.
 const PROGRAMS: [&str; 8] = [USUAL, WORKSHOP, RECORDING, PARQUET, WATCH, LIVE, FORWARD, BENCH];
+
+/// Bytes of a program's output that are read at once.
+const READ_AT_ONCE: usize = 1 << 16;
 
 /// What a user calls who calls a program through this one.
 const USUAL: &str = "dynocar";
@@ -72,6 +75,49 @@ impl CallFailure {
 pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, String), CallFailure> {
     let output = command.args(["--json", "-"]).output();
     let output = output.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
+    finished(package, output)
+}
+
+/// The same, with what is made of its standard output while it comes; what is left of that may be a failure's
+/// document.
+///
+/// # Errors
+///
+/// As [`output_of`].
+pub fn taken_of<T>(
+    package: &str,
+    command: &mut Command,
+    take: impl FnOnce(&mut dyn BufRead) -> T,
+) -> Result<T, CallFailure> {
+    command
+        .args(["--json", "-"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let program = command.spawn();
+    let mut program = program.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
+    let stdout = program.stdout.take();
+    // Beside what it writes for us it may write on standard error as much as it likes.
+    let (taken, output) = std::thread::scope(|threads| {
+        let end = threads.spawn(move || program.wait_with_output());
+        let mut rest = Vec::new();
+        let taken = stdout.map(|it| {
+            let mut input = BufReader::with_capacity(READ_AT_ONCE, it);
+            let taken = take(&mut input);
+            // A pipe that breaks is told by how the program ended.
+            let _ = input.read_to_end(&mut rest);
+            taken
+        });
+        let end = end.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        (taken, end.map(|it| Output { stdout: rest, ..it }))
+    });
+    let output = output.map_err(|error| CallFailure::Work(format!("{package}: {error}")))?;
+    finished(package, output)?;
+    taken.ok_or_else(|| CallFailure::Work(format!("{package}: no standard output")))
+}
+
+/// The standard output and diagnostics of a program that has ended with 0.
+fn finished(package: &str, output: Output) -> Result<(Vec<u8>, String), CallFailure> {
     let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
     if output.status.success() {
         return Ok((output.stdout, words));

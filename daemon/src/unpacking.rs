@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::columns_stream;
 use crate::output::report_line;
-use crate::programs::{CallFailure, PARQUET, RECORDING, call, output_of};
+use crate::programs::{CallFailure, PARQUET, RECORDING, call, output_of, taken_of};
 
 /// The program that knows a recording's format, by the recording's name; `None` for what is none: a file of
 /// MCAP, and a folder or a file of Parquet.
@@ -46,8 +46,8 @@ pub fn columns_of(file: &Path, mappings: &[ColumnMapping]) -> Result<Vec<RunColu
     for it in mappings {
         command.arg("--column").arg(&it.column).arg(it.unit.name());
     }
-    let (bytes, _) = output_of(PARQUET, &mut command).map_err(CallFailure::words)?;
-    columns_stream::read(&bytes).ok_or_else(|| format!("{PARQUET}: hands over no columns"))
+    let columns = taken_of(PARQUET, &mut command, |it| columns_stream::read(it));
+    columns.map_err(CallFailure::words)?.ok_or_else(|| format!("{PARQUET}: hands over no columns"))
 }
 
 /// Why a recording is not unpacked.

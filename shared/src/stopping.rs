@@ -294,3 +294,6 @@ fn effort_n(points: &[EffortPoint], speed_mps: f64) -> f64 {
     let share = (speed_mps - low.speed_mps) / (high.speed_mps - low.speed_mps);
     low.force_n + share * (high.force_n - low.force_n)
 }
+
+#[cfg(test)]
+mod tests;

@@ -80,16 +80,20 @@ fn a_full_disk_under_standard_output_is_reported_by_every_command() {
 
 #[test]
 fn what_people_read_on_standard_error_survives_its_loss() {
-    let site = Site::new();
     let replay = (DYNOCAR, &["replay", DEMO, "--run", "1", "--rate", "1000"][..]);
     let wrong = (DYNOCAR, &["check", "/nowhere"][..]);
     for it in [replay, wrong] {
-        let expected = command(&site, it).output().unwrap().status;
-        for lost in [closed_pipe(), full_disk()] {
-            let status = command(&site, it).stdout(Stdio::null()).stderr(lost).status().unwrap();
-            assert_eq!(status, expected, "{it:?}");
-        }
+        // Side by side, for a replay waits for a daemon.
+        let start = |stderr: Stdio| {
+            let site = Site::new();
+            let child = command(&site, it).stdout(Stdio::null()).stderr(stderr).spawn();
+            (child.unwrap(), site)
+        };
+        let started = [Stdio::null(), closed_pipe(), full_disk()].map(start);
+        let [kept, lost @ ..] = started.map(|(mut child, _site)| child.wait().unwrap());
+        assert_eq!(lost, [kept; 2], "{it:?}");
     }
+    let site = Site::new();
     let stock = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/import/rolling_stock.yaml");
     for (number, lost) in [Stdio::null(), closed_pipe(), full_disk()].into_iter().enumerate() {
         let out = format!("imported{number}");

@@ -3,6 +3,7 @@
 mod accounting;
 mod adoption;
 mod daemon;
+mod ending;
 mod faults;
 mod golden;
 mod hostile;
@@ -15,3 +16,4 @@ mod restart;
 mod state;
 mod supervision;
 mod wake_model;
+mod watch;

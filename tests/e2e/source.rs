@@ -7,3 +7,4 @@ mod layering;
 mod promises;
 mod sizes;
 mod troubles;
+mod unrun;

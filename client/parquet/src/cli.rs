@@ -1,13 +1,14 @@
 //! The command line: `dynocar convert` and `replay --verify` become this program where Parquet is named, and
 //! the daemon's commands read by it.
 
-use std::io::{BufWriter, ErrorKind};
+use std::fs::File;
+use std::io::ErrorKind;
+use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use dynocar::cli::{Failure, carry_out};
-use dynocar::columns_stream;
 use dynocar::output::{OutputError, report_line, require_new};
 use dynocar::programs::{PARQUET, called_as};
 use dynocar_recording::cli::{
@@ -17,7 +18,7 @@ use dynocar_recording::convert::{from_dataset, unpack};
 
 use crate::back::write_mcap;
 use crate::error::TableError;
-use crate::numbers::{Wanted, columns};
+use crate::numbers::{Wanted, send_columns};
 use crate::reading::{Content, read};
 use crate::writing::{Written, write_folder};
 
@@ -141,10 +142,13 @@ fn verify(arguments: &VerifyArguments) -> Result<(), Failure> {
 fn hand_over(arguments: &ColumnsArguments) -> Result<(), Failure> {
     let wanted = |pair: &[String]| Wanted { column: pair[0].clone(), unit: pair[1].clone() };
     let wanted: Vec<Wanted> = arguments.columns.chunks(2).map(wanted).collect();
+    // As a file it takes whole blocks at once.
+    let output = std::io::stdout().as_fd().try_clone_to_owned();
+    let output = output.map_err(OutputError::StandardOutput)?;
     // Whoever calls has named the file.
-    let columns = columns(&arguments.file, &wanted)
+    let handed_over = send_columns(&arguments.file, &wanted, File::from(output))
         .map_err(|error| Failure::Input(error.problem.to_string()))?;
-    match columns_stream::write(&columns, BufWriter::new(std::io::stdout().lock())) {
+    match handed_over {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(OutputError::StandardOutput(error).into())
         }

@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
+use std::io::{self, Write};
 use std::path::Path;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Decimal32Type, Decimal64Type, Decimal128Type, Decimal256Type, DecimalType, Float16Type,
-    Float32Type, Float64Type, Int32Type, Int64Type,
+    ArrowPrimitiveType, Decimal32Type, Decimal64Type, Decimal128Type, Decimal256Type, DecimalType,
+    Float16Type, Float32Type, Float64Type, Int32Type, Int64Type,
 };
-use arrow_array::{Array, downcast_integer, make_array, new_empty_array};
+use arrow_array::{Array, PrimitiveArray, downcast_integer, make_array, new_empty_array};
 use arrow_schema::{DataType, TimeUnit};
-use dynocar_dataset::RunColumn;
+use dynocar::columns_stream::Sender;
 use dynocar_model::units::{Dimension, Unit};
 use parquet::arrow::ProjectionMask;
 
@@ -28,42 +29,72 @@ pub struct Wanted {
     pub unit: String,
 }
 
-/// All columns of a file, with the numbers in the wanted ones: what is missing is `NaN`, true is 1 and false 0.
-/// Where a wanted column is not there, none has numbers.
+/// So many rows are decoded at once: enough that little is done for each batch, and few enough that a column's
+/// numbers stay in the processor's memory until they are on their way.
+const BATCH_ROWS: usize = 8192;
+
+/// Hands over all columns of a file, with the numbers in the wanted ones, batch after batch: what is missing is
+/// `NaN`, true is 1 and false 0. Where a wanted column is not there, none has numbers.
 ///
 /// # Errors
 ///
-/// When the file cannot be read, or a wanted column holds neither numbers nor truths nor times.
-pub fn columns(path: &Path, wanted: &[Wanted]) -> Result<Vec<RunColumn>, TableError> {
-    guarded(path, || read(path, wanted))
+/// When the file cannot be read, or a wanted column holds neither numbers nor truths nor times; within, when the
+/// other side does not take them.
+pub fn send_columns(
+    path: &Path,
+    wanted: &[Wanted],
+    output: impl Write,
+) -> Result<io::Result<()>, TableError> {
+    guarded(path, || {
+        let mut sender = None;
+        let sent = send(path, wanted, output, &mut sender);
+        // What went wrong is said behind the columns.
+        let ended = sender.map_or(Ok(()), Sender::end);
+        sent.map(|it| it.and(ended))
+    })
 }
 
-fn read(path: &Path, wanted: &[Wanted]) -> Result<Vec<RunColumn>, TableProblem> {
+/// Leaves the sender in its place once it has begun.
+fn send<W: Write>(
+    path: &Path,
+    wanted: &[Wanted],
+    output: W,
+    sender: &mut Option<Sender<W>>,
+) -> Result<io::Result<()>, TableProblem> {
     let builder = open(path)?;
     let fields = builder.schema().fields().clone();
-    let unread = fields.iter().map(|it| RunColumn { name: it.name().clone(), values: None });
-    let mut columns: Vec<RunColumn> = unread.collect();
     let index = |it: &Wanted| {
         let mut found = (0..fields.len()).filter(|&index| *fields[index].name() == it.column);
         found.next().filter(|_| found.next().is_none())
     };
     let places = wanted.iter().map(|it| Some((index(it)?, it)));
-    let Some(places) = places.collect::<Option<BTreeMap<usize, &Wanted>>>() else {
-        return Ok(columns);
-    };
+    let places: BTreeMap<usize, &Wanted> = places.collect::<Option<_>>().unwrap_or_default();
     // What holds no numbers is refused without rows too.
     for (&index, wanted) in &places {
-        let none = new_empty_array(fields[index].data_type());
-        columns[index].values = Some(numbers(&none, wanted)?);
+        numbers(&new_empty_array(fields[index].data_type()), wanted)?;
+    }
+    let rows = builder.metadata().file_metadata().num_rows().try_into().unwrap_or(0);
+    let columns = fields.iter().enumerate();
+    let columns = columns.map(|(index, it)| (it.name().clone(), places.contains_key(&index)));
+    let sender = match Sender::begin(rows, columns.collect(), output) {
+        Ok(it) => sender.insert(it),
+        Err(error) => return Ok(Err(error)),
+    };
+    if places.is_empty() {
+        return Ok(Ok(()));
     }
     let mask = ProjectionMask::roots(builder.parquet_schema(), places.keys().copied());
-    for batch in builder.with_projection(mask).build().map_err(TableProblem::not_parquet)? {
+    let batches = builder.with_projection(mask).with_batch_size(BATCH_ROWS).build();
+    for batch in batches.map_err(TableProblem::not_parquet)? {
         let batch = batch.map_err(TableProblem::not_parquet)?;
-        for ((&index, wanted), array) in places.iter().zip(batch.columns()) {
-            columns[index].values.get_or_insert_default().extend(numbers(array, wanted)?);
+        let arrays = places.values().zip(batch.columns());
+        let block: Vec<Vec<f64>> =
+            arrays.map(|(wanted, array)| numbers(array, wanted)).collect::<Result<_, _>>()?;
+        if let Err(error) = sender.rows(&block) {
+            return Ok(Err(error));
         }
     }
-    Ok(columns)
+    Ok(Ok(()))
 }
 
 /// The numbers in an array.
@@ -81,16 +112,16 @@ fn numbers(array: &dyn Array, wanted: &Wanted) -> Result<Vec<f64>, TableProblem>
     }
     macro_rules! integers {
         ($of:ty, $array:ident) => {
-            each($array.as_primitive::<$of>(), |it| it as f64)
+            primitives($array.as_primitive::<$of>(), |it| it as f64)
         };
     }
     Ok(downcast_integer! {
         found => (integers, array),
         DataType::Boolean => each(array.as_boolean(), |it| f64::from(u8::from(it))),
-        DataType::Float64 => each(array.as_primitive::<Float64Type>(), |it| it),
+        DataType::Float64 => primitives(array.as_primitive::<Float64Type>(), |it| it),
         // As they are written: 0.1 is a tenth.
-        DataType::Float32 => each(array.as_primitive::<Float32Type>(), as_written),
-        DataType::Float16 => each(array.as_primitive::<Float16Type>(), as_written),
+        DataType::Float32 => primitives(array.as_primitive::<Float32Type>(), as_written),
+        DataType::Float16 => primitives(array.as_primitive::<Float16Type>(), as_written),
         DataType::Decimal32(..) => decimals::<Decimal32Type>(array),
         DataType::Decimal64(..) => decimals::<Decimal64Type>(array),
         DataType::Decimal128(..) => decimals::<Decimal128Type>(array),
@@ -103,6 +134,16 @@ fn numbers(array: &dyn Array, wanted: &Wanted) -> Result<Vec<f64>, TableProblem>
 
 fn each<T>(values: impl IntoIterator<Item = Option<T>>, number: impl Fn(T) -> f64) -> Vec<f64> {
     values.into_iter().map(|it| it.map_or(f64::NAN, &number)).collect()
+}
+
+fn primitives<T: ArrowPrimitiveType>(
+    array: &PrimitiveArray<T>,
+    number: impl Fn(T::Native) -> f64,
+) -> Vec<f64> {
+    match array.null_count() {
+        0 => array.values().iter().map(|&it| number(it)).collect(),
+        _ => each(array, number),
+    }
 }
 
 /// The number whose shortest text this is.
@@ -148,7 +189,7 @@ fn times(array: &dyn Array, per_second: u64, unit: &Unit) -> Result<Vec<f64>, Ta
         if unit.name() == seconds.name() { time_s } else { seconds.convert(time_s, unit) }
     };
     Ok(match is_short {
-        true => each(counts.as_primitive::<Int32Type>(), |it| time(it.into())),
-        false => each(counts.as_primitive::<Int64Type>(), time),
+        true => primitives(counts.as_primitive::<Int32Type>(), |it| time(it.into())),
+        false => primitives(counts.as_primitive::<Int64Type>(), time),
     })
 }

@@ -251,7 +251,7 @@ impl DatasetHead {
         let content = files
             .read_run(&entry.file, &self.manifest)
             .map_err(|problem| unread(files.label(&entry.file), problem, Some(&entry.place)))?;
-        run::read(context, index as u32 + 1, entry, &files.label(&entry.file), &content)
+        run::read(context, index as u32 + 1, entry, &files.label(&entry.file), content)
     }
 }
 

@@ -147,11 +147,11 @@ pub(super) fn read(
     number: u32,
     entry: &RunEntry,
     label: &str,
-    content: &RunContent,
+    content: RunContent,
 ) -> Result<Run, DatasetError> {
     let Manifest { layout, columns: mappings, .. } = context.manifest;
     let table = match content {
-        RunContent::Text(text) => Table::parse(label, text, (layout, mappings))?,
+        RunContent::Text(text) => Table::parse(label, &text, (layout, mappings))?,
         RunContent::Columns(columns) => Table::of_columns(label, columns, mappings)?,
     };
     let rows = table.lines.rows;

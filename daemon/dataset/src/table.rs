@@ -88,7 +88,7 @@ impl Table {
     /// Takes the columns of a run's file that is no text; a row's line is as if their names stood in the first.
     pub fn of_columns(
         label: &str,
-        columns: &[RunColumn],
+        mut columns: Vec<RunColumn>,
         mappings: &[ColumnMapping],
     ) -> Result<Self, DatasetError> {
         let refuse = |problem| SourcePosition::whole(label).problem(problem);
@@ -96,15 +96,23 @@ impl Table {
         if names.is_empty() {
             return Err(refuse(Problem::NoHeader));
         }
-        let held_by = |mapping: &ColumnMapping| {
-            let index = find_column(mapping, &names, &TextLayout::PLAIN)
-                .map_err(|problem| SourcePosition::line(label, 1).problem(problem))?;
-            let (values, to) = (columns[index].values.iter().flatten(), mapping.converted_to());
-            let values = values.map(|&value| held(mapping, to.as_ref(), value));
-            Ok((mapping.quantity, values.collect()))
+        let index = |mapping| {
+            find_column(mapping, &names, &TextLayout::PLAIN)
+                .map_err(|problem| SourcePosition::line(label, 1).problem(problem))
         };
-        let columns: Vec<(Quantity, Vec<f64>)> =
-            mappings.iter().map(held_by).collect::<Result<_, DatasetError>>()?;
+        let indices: Vec<usize> = mappings.iter().map(index).collect::<Result<_, _>>()?;
+        let held_by = |(at, mapping): (usize, &ColumnMapping)| {
+            let values = &mut columns[indices[at]].values;
+            // Its numbers stay where they are, unless another quantity needs them, too.
+            let is_last = !indices[at + 1..].contains(&indices[at]);
+            let values = if is_last { values.take() } else { values.clone() };
+            let (mut values, to) = (values.unwrap_or_default(), mapping.converted_to());
+            for value in &mut values {
+                *value = held(mapping, to.as_ref(), *value);
+            }
+            (mapping.quantity, values)
+        };
+        let columns: Vec<(Quantity, Vec<f64>)> = mappings.iter().enumerate().map(held_by).collect();
         let rows = columns.first().map_or(0, |(_, values)| values.len());
         if rows == 0 {
             return Err(refuse(Problem::NoRows));

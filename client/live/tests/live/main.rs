@@ -4,3 +4,4 @@ mod layouts;
 mod process;
 #[path = "../../../recording/tests/recording/support_site.rs"]
 mod support_site;
+mod thinning;

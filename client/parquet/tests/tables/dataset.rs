@@ -7,16 +7,19 @@ use arrow_array::{
     ArrayRef, BooleanArray, Decimal128Array, DurationMillisecondArray, Float32Array, Float64Array,
     Int16Array, StringArray, Time32MillisecondArray, TimestampMicrosecondArray, UInt64Array,
 };
+use dynocar::columns_stream;
 use dynocar::error_document::ErrorDocument;
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, FileProblem, Manifest, is_parquet};
 use dynocar_dataset::{RunColumn, RunContent};
-use dynocar_parquet::numbers::{Wanted, columns};
+use dynocar_parquet::numbers::{Wanted, send_columns};
 
 use crate::support::{program, shared, table};
 
 fn read(path: &Path, wanted: &[(&str, &str)]) -> Vec<RunColumn> {
     let wanted = wanted.iter().map(|it| Wanted { column: it.0.into(), unit: it.1.into() });
-    columns(path, &wanted.collect::<Vec<_>>()).unwrap()
+    let mut bytes = Vec::new();
+    send_columns(path, &wanted.collect::<Vec<_>>(), &mut bytes).unwrap().unwrap();
+    columns_stream::read(&bytes[..]).unwrap()
 }
 
 /// The numbers of one column, `None` where missing.

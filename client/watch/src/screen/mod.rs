@@ -111,3 +111,6 @@ fn keys(frame: &mut Frame<'_>, area: Rect, trains: usize, palette: Palette) {
     }
     frame.render_widget(Paragraph::new(words).style(palette.faint()), area);
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,8 +1,8 @@
 //! Stopping distances against closed forms, the papers' figures and sampled stops.
 
-use dynocar_shared::quantile::normal_quantile;
-use dynocar_shared::snapshot::packed_index;
-use dynocar_shared::{
+use crate::quantile::normal_quantile;
+use crate::snapshot::packed_index;
+use crate::{
     EffortPoint, Parameter, ParameterSnapshot, RailAdhesion, RailCondition, Stop, StoppingError,
     StoppingEstimate, Uncertain,
 };

@@ -1,16 +1,16 @@
 //! The screen, cell by cell, from a state without any clock.
 //!
-//! The screens lie in `tests/screens`; a test that fails prints the one it has drawn.
+//! The screens lie in `drawn`; a test that fails prints the one it has drawn.
 
+use crate::history::History;
+use crate::plain;
+use crate::screen::{Choice, Palette, View, draw};
+use crate::state::{Daemon, PipelineState, TrainState};
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason, RejectionReason, Status, TrainId,
 };
-use dynocar_watch::history::History;
-use dynocar_watch::plain;
-use dynocar_watch::screen::{Choice, Palette, View, draw};
-use dynocar_watch::state::{Daemon, PipelineState, TrainState};
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Buffer;
@@ -122,13 +122,13 @@ fn assert_screen(drawn: &str, expected: &str) {
 #[test]
 fn all_of_a_train_is_on_80_by_24() {
     let drawn = screen(&[&train()], Choice::default(), (80, 24));
-    assert_screen(&drawn, include_str!("screens/overview_80x24.txt"));
+    assert_screen(&drawn, include_str!("drawn/overview_80x24.txt"));
 }
 
 #[test]
 fn a_larger_terminal_gets_more_speeds_and_plots() {
     let drawn = screen(&[&train()], Choice::default(), (160, 50));
-    assert_screen(&drawn, include_str!("screens/overview_160x50.txt"));
+    assert_screen(&drawn, include_str!("drawn/overview_160x50.txt"));
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn a_suspect_is_reported_with_what_is_hardly_distinguished_from_it() {
 fn the_pipelines_show_their_samples() {
     let choice = Choice { view: View::Pipelines, ..Choice::default() };
     let drawn = screen(&[&train(), &suspected()], choice, (80, 24));
-    assert_screen(&drawn, include_str!("screens/pipelines_80x24.txt"));
+    assert_screen(&drawn, include_str!("drawn/pipelines_80x24.txt"));
 }
 
 #[test]
