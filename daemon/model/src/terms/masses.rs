@@ -11,6 +11,8 @@ pub const LIST: &str = "masses";
 pub const PARAMETER: Parameter = Parameter::new("mass_factor", (0.5, 2.0), 0.005);
 /// A smaller share of the mass is not worth a word.
 pub const LEAST_SHARE: f64 = 0.012;
+/// Standard deviation of a mass that was weighed, or otherwise said of a run, as a share of it.
+pub const WEIGHED_STD: f64 = 0.03;
 
 /// Unit: the share of the mass that is added.
 pub const SUSPECT: Suspect = Suspect {

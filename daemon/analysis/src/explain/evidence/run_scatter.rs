@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use dynocar_model::terms::wind;
+use dynocar_model::terms::{masses, wind};
 use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
 
@@ -33,6 +33,9 @@ const DELAY_S: f64 = 0.02;
 
 /// What is known beforehand of the scatter between runs counts as so many of them.
 pub const PRIOR_RUNS: f64 = 4.0;
+/// The same of loads and winds, where they stand beside a finished model: the runs show these themselves.
+const PRIOR_RUNS_BESIDE: f64 = 0.5;
+
 impl RunScatter {
     /// Beyond these a factor is an effect and no scatter.
     pub(super) const MOST: RunScatter =
@@ -49,11 +52,15 @@ impl RunScatter {
     /// The scatter under which the factors of the runs are likeliest (one step of expectation
     /// maximisation), shrunk towards the usual one and no more than the most.
     pub fn updated(factors: &[(RunFactors, FactorMatrix)], most: RunScatter) -> Self {
-        let usual = RunScatter::USUAL;
-        let count = factors.len() as f64 + PRIOR_RUNS;
+        let (usual, prior_runs) = if most == RunScatter::MOST_BESIDE {
+            (RunScatter { force: masses::WEIGHED_STD, ..RunScatter::USUAL }, PRIOR_RUNS_BESIDE)
+        } else {
+            (RunScatter::USUAL, PRIOR_RUNS)
+        };
+        let count = factors.len() as f64 + prior_runs;
         let mean_square = |k: usize, usual: f64| {
             let seen: f64 = factors.iter().map(|(u, m)| u[k] * u[k] + m[(k, k)]).sum();
-            ((seen + PRIOR_RUNS * usual * usual) / count).sqrt()
+            ((seen + prior_runs * usual * usual) / count).sqrt()
         };
         RunScatter {
             force: mean_square(0, usual.force).min(most.force),

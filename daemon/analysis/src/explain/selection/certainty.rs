@@ -4,15 +4,11 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::{deviations, scatter_factor};
 use super::price::{at_bound, penalty};
-use crate::explain::evidence::{CERTAIN_STDS, Fit, SCORE_MIN, acceptance_score};
+use crate::explain::evidence::{CERTAIN_STDS, EQUAL, Fit, SCORE_MIN, acceptance_score};
 
 /// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
 /// where everything declared is a little off, at most 26 for what is not in that world; beside the usual errors 8.
 pub(super) const CERTAIN: f64 = 30.0;
-/// Evidence times the share that it takes from the error, with which it is certain too, and which is asked of what is
-/// chosen among many places, runs or forms: at most 2.3 where nothing acts; beside the usual errors 2.0 for a brake,
-/// 0.3 for a form.
-const CERTAIN_WITH_SHARE: f64 = 6.0;
 /// Fewer runs agree on nothing.
 pub(super) const CERTAIN_RUNS_MIN: usize = 3;
 
@@ -78,10 +74,11 @@ pub(super) fn is_certain(
         };
         away > CERTAIN_STDS
     };
-    let takes_enough = evidence * reduction > CERTAIN_WITH_SHARE;
+    // At most 2.3 where nothing acts; beside the usual errors 2.0 for a brake, 0.3 for a form.
+    let takes_enough = evidence * reduction > EQUAL;
     // Runs are independent as samples are not.
     let is_by_run = is_beside_usual_errors && effect.is_one_number_a_run();
-    let least = if is_by_run { CERTAIN_WITH_SHARE } else { CERTAIN };
+    let least = if is_by_run { EQUAL } else { CERTAIN };
     let is_sure = if is_chosen_among_many {
         evidence > least && takes_enough
     } else {

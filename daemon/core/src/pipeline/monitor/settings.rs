@@ -1,6 +1,6 @@
 //! Settings of the residual monitor.
 
-use dynocar_model::terms::{bearings, curve};
+use dynocar_model::terms::{bearings, curve, masses};
 
 use crate::pipeline::momentum::settings::DataSettings;
 use crate::settings;
@@ -26,7 +26,7 @@ settings! {
         force_std_percent: f64 = 0.6 => (0.0001 to 50 "%");
         /// Standard deviation in % of the mass that samples or the train's file give, from run to run and
         /// at every stop where another is given.
-        mass_std_percent: f64 = 3.0 => (0.01 to 50 "%");
+        mass_std_percent: f64 = 100.0 * masses::WEIGHED_STD => (0.01 to 50 "%");
         /// Standard deviation in m/s of the wind from run to run; gusts have half of it.
         wind_std_mps: f64 = 1.5 => (0.01 to 20 "m/s");
         /// Standard deviation in permille of the map's gradient, smooth over some hundred metres.

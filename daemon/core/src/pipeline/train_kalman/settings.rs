@@ -1,6 +1,6 @@
 //! Settings of [`super::TrainKalman`].
 
-use dynocar_model::terms::{delay, traction};
+use dynocar_model::terms::{delay, masses, traction};
 
 use crate::pipeline::braking::DECLARED_BRAKE_STD;
 use crate::pipeline::motion::MOVING_MPS;
@@ -11,7 +11,7 @@ settings! {
     #[derive(Copy)]
     TrainKalmanSettings {
         /// Standard deviation in % of a mass that the samples carry, as weighed; 0 where it is exact.
-        mass_std_percent: f64 = 3.0 => (0 to 50);
+        mass_std_percent: f64 = 100.0 * masses::WEIGHED_STD => (0 to 50);
         /// Standard deviation in % of the train's declared mass where the samples carry none: from
         /// empty to full.
         load_std_percent: f64 = 15.0 => (0 to 50);
