@@ -11,6 +11,8 @@ pub const CAP: [Parameter; 1] = [Parameter::new("adhesion", (0.005, 0.5), 0.0005
 pub const RATIO: [Parameter; 1] = [Parameter::new("achieved_ratio", (0.05, 1.0), 0.005)];
 /// A brake that achieves more of its force is as good as declared.
 pub const RATIO_LEAST: f64 = 0.97;
+/// Standard deviation, as a share of it, of a brake force that pressure and disc should exert: few exert it.
+pub const DECLARED_BRAKE_STD: f64 = 0.05;
 
 /// The brake force in N that the rail carries.
 #[inline]

@@ -23,5 +23,3 @@ pub mod motion;
 pub mod report;
 pub mod settings;
 pub mod tracker;
-
-pub(in crate::pipeline) use settings::DECLARED_BRAKE_STD;

@@ -1,8 +1,7 @@
 //! Settings of [`super::TrainKalman`].
 
-use dynocar_model::terms::{delay, masses, traction};
+use dynocar_model::terms::{adhesion, delay, masses, traction};
 
-use crate::pipeline::braking::DECLARED_BRAKE_STD;
 use crate::pipeline::motion::MOVING_MPS;
 use crate::settings;
 
@@ -27,7 +26,7 @@ settings! {
         force_scale_std: f64 = traction::USUAL_STD => (0.000001 to 0.5);
         /// Standard deviation of the scale of the brake force, which with friction is what pressure and
         /// disc should exert, rarely what they do.
-        brake_scale_std: f64 = DECLARED_BRAKE_STD => (0.000001 to 0.5);
+        brake_scale_std: f64 = adhesion::DECLARED_BRAKE_STD => (0.000001 to 0.5);
         /// Random walk of that scale over a minute: friction goes with heat, moisture and wear.
         brake_scale_per_sqrt_min: f64 = 0.015 => (0 to 0.5);
         /// Standard deviation in m/s of the wind of the day along the line.

@@ -8,6 +8,7 @@ pub use ekf::EkfSettings;
 pub use law::LawSettings;
 pub use smoother::{SmootherSettings, WalkSettings};
 
+use dynocar_model::terms::adhesion;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::PipelineKind;
 use serde::Deserialize;
@@ -54,16 +55,13 @@ settings! {
         /// slide.
         position_is_wheel_independent: bool = false;
         /// Standard deviation over value of the declared brake force.
-        demand_relative_std: f64 = DECLARED_BRAKE_STD => (above 0);
+        demand_relative_std: f64 = adhesion::DECLARED_BRAKE_STD => (above 0);
         /// Greatest standard deviation over value of an estimate that counts.
         relative_std_max: f64 = 0.15 => (above 0);
         /// Age in s at which an estimate is stale.
         stale_after_s: f64 = 300.0 => (above 0);
     }
 }
-
-/// Standard deviation over value of a brake force that pressure and disc should exert: few exert it.
-pub(in crate::pipeline) const DECLARED_BRAKE_STD: f64 = 0.05;
 
 /// Standard deviation that comes in 1 s from steps of 0.2 s, uniform within a half width, each of
 /// variance w²/3.
