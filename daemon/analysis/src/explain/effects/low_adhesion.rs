@@ -128,6 +128,13 @@ fn places(
     candidates
 }
 
+impl Slippery {
+    /// At all places, in all runs.
+    fn is_everywhere(&self) -> bool {
+        self.sections.is_none() && self.runs.is_none()
+    }
+}
+
 impl Hypothesis for Slippery {
     fn kind(&self) -> EffectKind {
         EffectKind::LowAdhesion
@@ -154,9 +161,8 @@ impl Hypothesis for Slippery {
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
         // Everywhere in every run it is what the declared brake force is good for.
-        let is_somewhere = self.sections.is_some() || self.runs.is_some();
         let usual = 1.0 - adhesion::DECLARED_BRAKE_STD;
-        let least = if is_somewhere { adhesion::RATIO_LEAST } else { usual };
+        let least = if self.is_everywhere() { usual } else { adhesion::RATIO_LEAST };
         self.form == Form::Cap || parameters[0] < least
     }
 
@@ -204,11 +210,30 @@ impl Hypothesis for Slippery {
     /// Brakes weaker by one share everywhere, in every run and however gently they are applied, look like a mass
     /// once the traction's scale changes as much: two coincidences for one cause.
     fn may_stand_for_others(&self) -> bool {
-        self.form == Form::Cap || self.sections.is_some() || self.runs.is_some()
+        self.form == Form::Cap || !self.is_everywhere()
     }
 
     fn place(&self) -> Location {
         let intervals_m = self.sections.as_ref().map(|sections| sections.intervals_m.clone());
         Location { runs: self.runs.clone(), intervals_m, ..Location::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_little_weaker_everywhere_is_the_declared_brake_and_in_some_runs_is_not() {
+        let of = |runs: Option<Vec<String>>| Slippery {
+            form: Form::Ratio,
+            sections: None,
+            runs,
+            choice_cost: 0.0,
+            map_error: 0.0,
+        };
+        assert!(!of(None).is_material(&[0.96], 0.0));
+        assert!(of(None).is_material(&[0.94], 0.0));
+        assert!(of(Some(vec!["runs/01.csv".into()])).is_material(&[0.96], 0.0));
     }
 }
