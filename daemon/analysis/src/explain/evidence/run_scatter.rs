@@ -52,20 +52,20 @@ impl RunScatter {
     /// The scatter under which the factors of the runs are likeliest (one step of expectation
     /// maximisation), shrunk towards the usual one and no more than the most.
     pub fn updated(factors: &[(RunFactors, FactorMatrix)], most: RunScatter) -> Self {
-        let (usual, prior_runs) = if most == RunScatter::MOST_BESIDE {
-            (RunScatter { force: masses::WEIGHED_STD, ..RunScatter::USUAL }, PRIOR_RUNS_BESIDE)
-        } else {
-            (RunScatter::USUAL, PRIOR_RUNS)
-        };
-        let count = factors.len() as f64 + prior_runs;
-        let mean_square = |k: usize, usual: f64| {
+        let (usual, count) = (RunScatter::USUAL, factors.len() as f64);
+        let mean_square = |k: usize, (usual, prior_runs): (f64, f64), most: f64| {
             let seen: f64 = factors.iter().map(|(u, m)| u[k] * u[k] + m[(k, k)]).sum();
-            ((seen + prior_runs * usual * usual) / count).sqrt()
+            ((seen + prior_runs * usual * usual) / (count + prior_runs)).sqrt().min(most)
+        };
+        let (load, wind) = if most == RunScatter::MOST_BESIDE {
+            ((masses::WEIGHED_STD, PRIOR_RUNS_BESIDE), (usual.wind_mps, PRIOR_RUNS_BESIDE))
+        } else {
+            ((usual.force, PRIOR_RUNS), (usual.wind_mps, PRIOR_RUNS))
         };
         RunScatter {
-            force: mean_square(0, usual.force).min(most.force),
-            resistance: mean_square(1, usual.resistance).min(most.resistance),
-            wind_mps: mean_square(2, usual.wind_mps).min(most.wind_mps),
+            force: mean_square(0, load, most.force),
+            resistance: mean_square(1, (usual.resistance, PRIOR_RUNS), most.resistance),
+            wind_mps: mean_square(2, wind, most.wind_mps),
         }
     }
 }
