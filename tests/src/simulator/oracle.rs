@@ -150,7 +150,8 @@ pub fn oracle_forces(
         let stands = sample.speed_mps <= STANDING_MPS;
         late.acting_unless(at, Some(now), |net_mps2| stands && net_mps2[0] <= 0.0).unwrap_or(now)
     });
-    quadratic.set(behind, disturbances.speed_scale);
+    quadratic.restart(disturbances.speed_scale);
+    quadratic.extend(behind);
     let first = &recording.samples()[0];
     OracleForces {
         quadratic,

@@ -16,6 +16,9 @@ use rayon::prelude::*;
 use super::evidence::{Adjoint, Bin, Fit, FitProblem, RUNS_A_TASK, RunData, SampleForces};
 use super::hypothesis::{Hypothesis, Past};
 
+/// So many runs at most show where a fit may start from.
+const COARSE_RUNS_MAX: usize = 32;
+
 /// Inner products of a whitened regressor.
 #[derive(Clone, Debug)]
 pub struct Tuple {
@@ -109,10 +112,36 @@ impl<'a> Scan<'a> {
         self.over_runs(|index, _| self.run_tuple(index, &acceleration))
     }
 
+    /// Where a fit may start from: the tuple of a force shape over some of many runs, as if over all.
+    pub fn coarse_tuple(&self, acceleration: impl Fn(&RunData, usize) -> f64 + Sync) -> Tuple {
+        self.over_some_runs(|index, _| self.run_tuple(index, &acceleration))
+    }
+
     /// The sum of a tuple of each run.
     fn over_runs(&self, of_run: impl Fn(usize, &RunData) -> Tuple + Sync) -> Tuple {
-        let each = self.problem.runs.par_iter().enumerate().with_min_len(RUNS_A_TASK);
-        let each: Vec<Tuple> = each.map(|(index, run)| of_run(index, run)).collect();
+        self.over_each_run(1, of_run)
+    }
+
+    /// The same over some of many runs, evenly chosen, as if over all.
+    fn over_some_runs(&self, of_run: impl Fn(usize, &RunData) -> Tuple + Sync) -> Tuple {
+        let runs = self.problem.runs.len();
+        let step = runs.div_ceil(COARSE_RUNS_MAX).max(1);
+        let mut sum = self.over_each_run(step, of_run);
+        let times = runs as f64 / runs.div_ceil(step).max(1) as f64;
+        sum.score *= times;
+        sum.square *= times;
+        sum.cross *= times;
+        sum
+    }
+
+    fn over_each_run(
+        &self,
+        step: usize,
+        of_run: impl Fn(usize, &RunData) -> Tuple + Sync,
+    ) -> Tuple {
+        let each = self.problem.runs.par_iter().enumerate().step_by(step);
+        let each = each.with_min_len(RUNS_A_TASK).map(|(index, run)| of_run(index, run));
+        let each: Vec<Tuple> = each.collect();
         let mut sum = Tuple::zero(self.fit.theta.len());
         each.iter().for_each(|own| sum.add(own));
         sum
@@ -146,14 +175,14 @@ impl<'a> Scan<'a> {
     }
 
     /// Decrease of the cost when an effect acts, by what it changes at a sample in m/s²: from what is declared
-    /// to what acts.
+    /// to what acts. Some of many runs stand for all: it chooses where a fit starts.
     pub fn decrease_by(
         &self,
         effect: &dyn Hypothesis,
         parameters: &[f64],
         change_mps2: impl Fn(&RunData, usize, [&SampleForces; 2]) -> f64 + Sync,
     ) -> f64 {
-        let sum = self.over_runs(|index, run| {
+        let sum = self.over_some_runs(|index, run| {
             let (mut past, mut middles) = (Past::default(), run.bins.iter().map(Bin::middle));
             let (mut shape, mut middle) = (Vec::with_capacity(run.bins.len()), middles.next());
             for (i, declared) in run.declared.all().enumerate() {

@@ -97,27 +97,7 @@ pub struct FitErrors {
 impl FitErrors {
     /// Those of a fitted model.
     pub fn of(problem: &FitProblem, fit: &Fit) -> Self {
-        let fitted = vec![fit.theta.clone(); problem.runs.len()];
-        let speed_mps = [fitted, without_each_run(problem, fit)].map(|theta| {
-            let restarts = [Restart::FullRun, Restart::WINDOW_60];
-            let each = problem.runs.par_iter().zip(&theta).enumerate();
-            let each: Vec<[SpeedError; 3]> = each
-                .map(|(index, (run, theta))| {
-                    let [full, window] = errors_at(fit, theta, run, restarts);
-                    let on_day = || {
-                        let own = fit.own_factors(index);
-                        let [error] = errors_on_day(fit, theta, (run, own), [Restart::FullRun]);
-                        error
-                    };
-                    let is_beside = fit.is_beside_loads_and_winds();
-                    [full, window, if is_beside { on_day() } else { full }]
-                })
-                .collect();
-            [0, 1, 2].map(|restart| {
-                let errors = each.iter().map(|of_run| of_run[restart]);
-                errors.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
-            })
-        });
+        let speed_mps = fit.open_loop_mps(|| open_loop_mps(problem, fit));
         let missed =
             |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
         let has_speed_scale = fit.model.effects.iter().any(|it| it.changes_speed_scale());
@@ -145,6 +125,31 @@ impl FitErrors {
         let each = before.speed_mps.iter().zip(&self.speed_mps);
         each.map(|(before, after)| most(before, after)).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// Root mean squares in m/s of the open-loop errors as fitted and left out, in the three ways.
+fn open_loop_mps(problem: &FitProblem, fit: &Fit) -> [[f64; 3]; 2] {
+    let fitted = vec![fit.theta.clone(); problem.runs.len()];
+    [fitted, without_each_run(problem, fit)].map(|theta| {
+        let restarts = [Restart::FullRun, Restart::WINDOW_60];
+        let each = problem.runs.par_iter().zip(&theta).enumerate();
+        let each: Vec<[SpeedError; 3]> = each
+            .map(|(index, (run, theta))| {
+                let [full, window] = errors_at(fit, theta, run, restarts);
+                let on_day = || {
+                    let own = fit.own_factors(index);
+                    let [error] = errors_on_day(fit, theta, (run, own), [Restart::FullRun]);
+                    error
+                };
+                let is_beside = fit.is_beside_loads_and_winds();
+                [full, window, if is_beside { on_day() } else { full }]
+            })
+            .collect();
+        [0, 1, 2].map(|restart| {
+            let errors = each.iter().map(|of_run| of_run[restart]);
+            errors.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)
+        })
+    })
 }
 
 /// Share of the open-loop error of the fit runs that the larger model takes away.

@@ -46,15 +46,20 @@ impl QuadraticForces {
     pub fn declared(recording: &Recording, resistance: Davis) -> Self {
         let mut forces = QuadraticForces::default();
         let polynomial = |sample| declared_polynomial(sample, resistance);
-        forces.set(recording.samples().iter().map(polynomial), 1.0);
+        forces.restart(1.0);
+        forces.extend(recording.samples().iter().map(polynomial));
         forces
     }
 
-    /// Becomes the model of these polynomials, one for each sample, and of a measured over true
-    /// speed; keeps its memory, so that an optimiser allocates only once.
-    pub fn set(&mut self, polynomials: impl Iterator<Item = Polynomial>, speed_scale: f64) {
+    /// Becomes the model of no sample yet, and of a measured over true speed; keeps its memory, so that an
+    /// optimiser allocates only once.
+    pub fn restart(&mut self, speed_scale: f64) {
         self.speed_scale = speed_scale;
         self.polynomials.clear();
+    }
+
+    /// Goes on with these polynomials, one for each sample.
+    pub fn extend(&mut self, polynomials: impl Iterator<Item = Polynomial>) {
         self.polynomials.extend(polynomials);
     }
 }

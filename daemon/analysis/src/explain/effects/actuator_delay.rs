@@ -4,6 +4,7 @@ use dynocar_model::terms::delay;
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::proposal::late_from;
 use super::{Candidate, Effect, Hypothesis, Past, Proposal, ReportContext, Reported, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -28,17 +29,12 @@ impl Effect for ActuatorDelay {
     }
 
     fn propose(&self, scan: &Scan) -> Proposal {
-        let best = STARTS
-            .into_iter()
-            .map(|start| (decrease(scan, start), start))
-            .max_by(|one, other| one.0.total_cmp(&other.0));
+        let start = late_from(&STARTS, |start| decrease(scan, start));
         let is_any_recorded = scan.problem.runs.iter().any(|run| run.is_position_recorded);
         let is_level = scan.track.is_none_or(|track| track.is_level());
         let is_known = is_any_recorded && !is_level || scan.problem.is_position_ahead();
         let twins: &[EffectKind] = if is_known { &[] } else { &NEVER_REPORTED };
-        let candidate =
-            |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag { twins }, start.to_vec());
-        Proposal::Candidates(best.map(candidate).into_iter().collect())
+        Proposal::Candidates(vec![Candidate::new(DelayAndLag { twins }, start)])
     }
 }
 

@@ -35,7 +35,7 @@ impl Effect for GradientShift {
         let count = (gradient::SHIFT_MAX_M / GRID_M) as i32;
         for k in (-count..=count).filter(|&k| k != 0) {
             let shift_m = GRID_M * f64::from(k);
-            let tuple = scan.tuple(|run, i| {
+            let tuple = scan.coarse_tuple(|run, i| {
                 let sample = &run.samples()[i];
                 let Some(shifted) = hypothesis.gradient_permille(run, i, shift_m) else {
                     return 0.0;

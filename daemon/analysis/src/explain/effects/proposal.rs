@@ -66,6 +66,17 @@ impl Proposal {
     }
 }
 
+/// Delay and lag in s near none: where a fit begins whose other starts are all worse than none.
+const NEAR_NONE_S: [f64; 2] = [0.05, 0.05];
+
+/// The delay and lag in s that a fit begins from: of some starts the one that explains most, given by how much each
+/// decreases the cost.
+pub fn late_from(starts_s: &[[f64; 2]], decrease: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
+    let each = starts_s.iter().map(|start_s| (decrease(*start_s), *start_s));
+    let best = each.max_by(|one, other| one.0.total_cmp(&other.0));
+    best.filter(|(decrease, _)| *decrease > 0.0).map_or(NEAR_NONE_S, |(_, start_s)| start_s).into()
+}
+
 /// A kind of effect.
 pub trait Effect: Send + Sync {
     /// Its name.

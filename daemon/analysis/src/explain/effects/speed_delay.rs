@@ -7,6 +7,7 @@ use dynocar_model::terms::{Entry, Parameter};
 use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::proposal::late_from;
 use super::{Candidate, Effect, Hypothesis, OnOthers, Past, Proposal, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -33,12 +34,8 @@ impl Effect for SpeedDelay {
                     .into(),
             );
         }
-        let best = STARTS
-            .into_iter()
-            .map(|start| (decrease(scan, start), start))
-            .max_by(|one, other| one.0.total_cmp(&other.0));
-        let candidate = |(_, start): (f64, [f64; 2])| Candidate::new(DelayAndLag, start.to_vec());
-        Proposal::Candidates(best.map(candidate).into_iter().collect())
+        let start = late_from(&STARTS, |start| decrease(scan, start));
+        Proposal::Candidates(vec![Candidate::new(DelayAndLag, start)])
     }
 }
 

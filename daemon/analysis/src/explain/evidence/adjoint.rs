@@ -20,9 +20,12 @@ pub struct Adjoint {
     added: Vec<f64>,
     /// The numbers of these regressors.
     regressors: Vec<usize>,
+    walk: Vec<Walked>,
     steps: Vec<Step>,
 }
 
+/// So many columns are summed beside each other.
+const WIDE: usize = 4;
 /// Products before those with the regressors.
 const OWN_PRODUCTS: usize = 1 + DEVIATIONS;
 
@@ -55,6 +58,38 @@ struct Step {
     behind: [f64; 3],
 }
 
+/// What a step makes of the difference and the fading acceleration of the bin before: all that a square needs, in the
+/// order in which the next step waits for it.
+#[derive(Clone, Copy, Debug)]
+struct Walked {
+    /// Half of the time in s from the bin before; 0 where a segment starts.
+    half_s: f64,
+    /// Weight of a squared difference.
+    weight: f64,
+    /// Of the difference and the fading acceleration before, what is in the difference.
+    to_difference: [f64; 2],
+    /// The same in the fading acceleration.
+    to_fading: [f64; 2],
+}
+
+impl Walked {
+    /// All steps, each behind the one before.
+    fn all(steps: &[Step]) -> Vec<Self> {
+        let mut before = [0.0; 3];
+        let walked = |step: &Step| {
+            let [left, gain, fade] = before;
+            before = [step.left, step.gain, step.fade];
+            Walked {
+                half_s: step.half_s,
+                weight: step.weight,
+                to_difference: [left - step.carry_s * gain, -step.carry_s * fade],
+                to_fading: [gain, fade],
+            }
+        };
+        steps.iter().map(walked).collect()
+    }
+}
+
 impl Adjoint {
     /// Of run number `index` of a fit.
     pub fn of(run: &RunData, fit: &Fit, index: usize) -> Self {
@@ -71,7 +106,7 @@ impl Adjoint {
             let added = added[number..].iter_mut().step_by(series.len());
             back(&steps, filter.weights(), own, added);
         }
-        Adjoint { added, regressors, steps }
+        Adjoint { added, regressors, walk: Walked::all(&steps), steps }
     }
 
     /// Products of what the filter makes of accelerations in m/s² at the bins from one on; those with the regressors
@@ -79,8 +114,14 @@ impl Adjoint {
     pub fn products(&self, from: usize, shape: &[f64], cross: &mut [f64]) -> Products {
         let width = OWN_PRODUCTS + self.regressors.len();
         let mut sums = vec![0.0; width];
-        for (row, mps2) in self.added[width * from..].chunks_exact(width).zip(shape) {
-            sums.iter_mut().zip(row).for_each(|(sum, added)| *sum += mps2 * added);
+        let rows = || self.added[width * from..].chunks_exact(width).zip(shape);
+        let mut column = 0;
+        while column + WIDE <= width {
+            sums[column..column + WIDE].copy_from_slice(&columns_sum::<WIDE>(rows(), column));
+            column += WIDE;
+        }
+        for (column, sum) in sums.iter_mut().enumerate().skip(column) {
+            [*sum] = columns_sum(rows(), column);
         }
         for (number, sum) in self.regressors.iter().zip(&sums[OWN_PRODUCTS..]) {
             cross[*number] = *sum;
@@ -94,26 +135,40 @@ impl Adjoint {
 
     /// Weighted square of what the filter makes of accelerations in m/s² at the bins from one on.
     fn square(&self, from: usize, shape: &[f64]) -> f64 {
-        let (mut sum, mut before_mps2, [mut left, mut fading]) = (0.0, 0.0, [0.0; 2]);
-        let mut act = |step: &Step, mps2: f64| {
+        let (mut sum, mut before_mps2, [mut difference, mut fading]) = (0.0, 0.0, [0.0; 2]);
+        let mut act = |step: &Walked, mps2: f64| {
             let gained_mps = step.half_s * (before_mps2 + mps2);
-            let difference = left + (gained_mps - step.carry_s * fading);
             before_mps2 = mps2;
+            let ([by_difference, by_fading], [gain, fade]) = (step.to_difference, step.to_fading);
+            let waited = difference;
+            difference = by_difference * waited + (by_fading * fading + gained_mps);
+            fading = gain * waited + fade * fading;
             sum += step.weight * difference * difference;
-            left = step.left * difference;
-            fading = step.fade * fading + step.gain * difference;
-            (sum, left, fading)
+            (sum, difference, fading)
         };
         let end = from + shape.len();
-        for (step, &mps2) in self.steps[from..end].iter().zip(shape) {
+        for (step, &mps2) in self.walk[from..end].iter().zip(shape) {
             act(step, mps2);
         }
         // The last acceleration lasts until the bin behind.
         let Some(next) = self.steps.get(end) else { return sum };
-        let (sum, left, fading) = act(next, 0.0);
+        let (sum, difference, fading) = act(&self.walk[end], 0.0);
+        let left = next.left * difference;
+        let fading = next.fade * fading + next.gain * difference;
         let [by_left, by_both, by_fading] = next.behind;
         sum + left * (by_left * left + 2.0 * by_both * fading) + by_fading * fading * fading
     }
+}
+
+/// Of some columns of rows what they sum to with a factor on each row.
+fn columns_sum<'a, const N: usize>(
+    rows: impl Iterator<Item = (&'a [f64], &'a f64)>,
+    first: usize,
+) -> [f64; N] {
+    rows.fold([0.0; N], |sums, (row, factor)| {
+        let row = &row[first..first + N];
+        array::from_fn(|k| sums[k] + factor * row[k])
+    })
 }
 
 /// The steps of a filter over bins at these times in s, with these weights of the innovations.
@@ -229,7 +284,8 @@ mod tests {
         for number in [0, OWN_PRODUCTS] {
             back(&steps, &weights, &series, added[number..].iter_mut().step_by(OWN_PRODUCTS + 1));
         }
-        let adjoint = Adjoint { added, regressors: vec![2], steps };
+        let walk = Walked::all(&steps);
+        let adjoint = Adjoint { added, regressors: vec![2], walk, steps };
         for (from, to) in [(0, 3), (1, 2), (3, 8), (4, 7), (7, BINS), (0, BINS)] {
             let shape: Vec<f64> = (from..to).map(|k| 0.3 + (0.7 * k as f64).cos()).collect();
             let mut mps2 = vec![0.0; BINS];

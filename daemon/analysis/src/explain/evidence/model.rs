@@ -1,6 +1,6 @@
 //! The declared model with effects added, as acceleration at each sample.
 
-use dynocar_model::simulate::{ForceModel, Polynomial, QuadraticForces};
+use dynocar_model::simulate::{ForceModel, QuadraticForces};
 use dynocar_model::terms::wheel;
 use dynocar_model::train::Davis;
 
@@ -138,17 +138,16 @@ impl UpdatedModel {
         let davis = of_day(Davis { a: theta[0], b: theta[1], c: theta[2] }, own);
         let scale = self.speed_scale(theta, &all);
         let (pass, acting) = (self.pass(&all), &mut forces.acting);
-        let polynomials = blocks(run).flat_map(|block| {
+        forces.quadratic.restart(scale);
+        for block in blocks(run) {
             pass.on_declared((run, theta), block.clone(), acting);
             let each = acting.samples.iter().zip(&run.smooth_mps[block]);
-            let polynomial = |(state, &speed_mps): (&SampleForces, &f64)| {
+            forces.quadratic.extend(each.map(|(state, &speed_mps)| {
                 let own_n = -own[0] * (state.traction_n - state.brake_n);
                 let state = SampleForces { extra_n: state.extra_n + own_n, ..*state };
                 state.polynomial(davis, wheel::true_speed_mps(speed_mps, scale))
-            };
-            each.map(polynomial).collect::<Vec<Polynomial>>()
-        });
-        forces.quadratic.set(polynomials, scale);
+            }));
+        }
     }
 
     /// Modelled measured speed at each bin, each segment starting from zero: the integral of the

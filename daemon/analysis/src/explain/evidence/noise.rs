@@ -1,5 +1,10 @@
 //! The process that is left when the model is right.
 
+/// Shares of the slow part of a noise under which a kind looks again.
+const STIFF_SHARES: [f64; 2] = [0.01, 1e-4];
+/// Least variance in (m/s²)² of a fading force.
+const FADING_VAR_MIN: f64 = 1e-10;
+
 /// Noise of the bins: white measurement noise, a white force, and a force that fades with a time
 /// constant (Ornstein-Uhlenbeck), as gusts or a rough map leave it. Where the control force changes,
 /// the car with the tacho moves against the others on its couplings: more measurement noise there.
@@ -34,10 +39,16 @@ impl Noise {
         scatter_most: RunScatter::MOST,
     };
 
-    /// The same with a share of the fading force only: under it a lasting force counts in full, which a
-    /// noise estimated beside an undeclared force takes for noise.
-    pub fn stiff(self, share: f64) -> Noise {
-        Noise { fading_var: (share * self.fading_var).max(1e-10), ..self }
+    /// The same with a small and a smaller share of the fading force only: under it a lasting force counts in full,
+    /// which a noise estimated beside an undeclared force takes for noise. One where the smaller is no less.
+    pub fn stiffer(self) -> Vec<Noise> {
+        let stiff = |share: f64| Noise {
+            fading_var: (share * self.fading_var).max(FADING_VAR_MIN),
+            ..self
+        };
+        let mut both: Vec<Noise> = STIFF_SHARES.map(stiff).into();
+        both.dedup();
+        both
     }
 
     /// Standard deviation in m/s² of what the force does on average over some seconds.

@@ -11,29 +11,41 @@ const JUMPS_S: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// Runs that one thread takes at a time: less work is not worth handing out.
 pub const RUNS_A_TASK: usize = 8;
 
+/// So many runs at most are looked at first.
+const COARSE_RUNS_MAX: usize = 32;
+/// How far around a start in logarithms a search begins, and around what some of the runs show.
+const FAR: f64 = 1.2;
+const NEAR: f64 = 0.1;
+
 impl Noise {
     /// The noise under which the differences of the fit runs from a model are likeliest, robust
     /// to outliers. `residuals` holds one vector of bin differences per run.
     pub fn estimate(runs: &[RunData], residuals: &[Vec<f64>], start: Noise) -> Noise {
-        let cost = |noise: Noise| -> f64 {
-            let each = runs.par_iter().zip(residuals).with_min_len(RUNS_A_TASK);
-            let costs: Vec<f64> =
-                each.map(|(run, residual)| Whitener::cost(run, noise, residual)).collect();
-            costs.iter().sum()
-        };
-        let smooth = likeliest(start, &cost);
+        let every = runs.len().div_ceil(COARSE_RUNS_MAX).max(1);
+        let some = |noise: Noise| cost_of(runs, residuals, every, noise);
+        let cost = |noise: Noise| cost_of(runs, residuals, 1, noise);
+        let near = if every > 1 { likeliest((start, FAR), &some) } else { start };
+        let smooth = likeliest((near, if every > 1 { NEAR } else { FAR }), &cost);
         let with = |jump_s: &f64| Noise { jump_s: *jump_s, ..smooth };
         let ragged = JUMPS_S.iter().map(with).map(|noise| (noise, cost(noise)));
         let best = ragged.min_by(|one, other| one.1.total_cmp(&other.1));
         match best {
-            Some((noise, _)) if noise.jump_s != smooth.jump_s => likeliest(noise, &cost),
+            Some((noise, _)) if noise.jump_s != smooth.jump_s => likeliest((noise, FAR), &cost),
             _ => smooth,
         }
     }
 }
 
-/// The likeliest noise with the jumps of `start`.
-fn likeliest(start: Noise, cost: &impl Fn(Noise) -> f64) -> Noise {
+/// The cost of differences under a noise, of every so manieth run.
+fn cost_of(runs: &[RunData], residuals: &[Vec<f64>], every: usize, noise: Noise) -> f64 {
+    let each = runs.par_iter().zip(residuals).step_by(every).with_min_len(RUNS_A_TASK);
+    let costs: Vec<f64> =
+        each.map(|(run, residual)| Whitener::cost(run, noise, residual)).collect();
+    costs.iter().sum()
+}
+
+/// The likeliest noise with the jumps of `start`, looked for so far around its logarithms.
+fn likeliest((start, around): (Noise, f64), cost: &impl Fn(Noise) -> f64) -> Noise {
     let bounded_cost = |logs: [f64; 4]| {
         let noise = start.with_logs(logs);
         let kept = noise.to_logs();
@@ -41,17 +53,17 @@ fn likeliest(start: Noise, cost: &impl Fn(Noise) -> f64) -> Noise {
             logs.iter().zip(kept).map(|(log, kept)| (log - kept) * (log - kept)).sum();
         10.0 * outside + cost(noise)
     };
-    start.with_logs(nelder_mead(start.to_logs(), &bounded_cost))
+    start.with_logs(nelder_mead((start.to_logs(), around), &bounded_cost))
 }
 
 /// Nelder and Mead's simplex search in four dimensions, bounded work.
-fn nelder_mead(start: [f64; 4], cost: &impl Fn([f64; 4]) -> f64) -> [f64; 4] {
+fn nelder_mead((start, around): ([f64; 4], f64), cost: &impl Fn([f64; 4]) -> f64) -> [f64; 4] {
     const STEPS: usize = 90;
     let mut simplex: Vec<([f64; 4], f64)> = (0..5)
         .map(|vertex| {
             let mut point = start;
             if vertex > 0 {
-                point[vertex - 1] += 1.2;
+                point[vertex - 1] += around;
             }
             (point, cost(point))
         })

@@ -15,18 +15,10 @@ use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
-use crate::explain::effects::{
-    Candidate, SharedHypothesis, map_error, map_error_as_fitted, usual_errors,
-};
+use crate::explain::effects::{Candidate, map_error, map_error_as_fitted, usual_errors};
 use crate::explain::evidence::Fit;
 use crate::explain::gradient_prior::SURVEYED;
 use crate::explain::places::span_m;
-
-/// The last effect of a trial, and its parameters.
-fn last_parts(trial: &Trial) -> (SharedHypothesis, Vec<f64>) {
-    let last = trial.last();
-    (trial.fit.model.effects[last].clone(), trial.fit.effect_parameters(last).to_vec())
-}
 
 /// Whether some evidence makes the last effect of a trial certain beside the usual errors.
 pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
@@ -109,7 +101,7 @@ impl Search<'_> {
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
         let best = certain.max_by(|one, other| one.evidence.total_cmp(&other.evidence));
         let Some(found) = best else { return false };
-        let grown = self.problem.grown(&outcome.fit, [last_parts(&found)]);
+        let grown = self.problem.grown(&outcome.fit, [found.last_parts()]);
         outcome.fit = self.problem.with_own_noise(&grown);
         outcome.certain.push((found.kind, Round::from(tried)));
         true
@@ -132,7 +124,7 @@ impl Search<'_> {
     /// A trial with every number of the map's error free; its evidence is the least under the noise that is left
     /// with it and without it. What all runs share of the map's error is in the model.
     fn with_map_free(&self, beside: &Fit, trial: &Trial) -> Trial {
-        let grown = self.problem.grown(beside, [last_parts(trial)]);
+        let grown = self.problem.grown(beside, [trial.last_parts()]);
         let free = Self::trial(beside, self.problem.with_own_noise(&grown), trial.kind);
         let (with, last) = (&free.fit, free.last());
         let alike = self.problem.again(beside, with.noise).cost - with.cost - penalty(with, last);

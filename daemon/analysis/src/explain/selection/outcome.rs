@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::refusal::Refusal;
+use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::{Fit, acceptance_score};
 
 /// Named effects at most.
@@ -32,6 +33,12 @@ impl Trial {
     /// The number of the candidate among the effects of its model.
     pub fn last(&self) -> usize {
         self.fit.model.effects.len() - 1
+    }
+
+    /// The candidate and its parameters.
+    pub(super) fn last_parts(&self) -> (SharedHypothesis, Vec<f64>) {
+        let last = self.last();
+        (self.fit.model.effects[last].clone(), self.fit.effect_parameters(last).to_vec())
     }
 
     /// What decides.

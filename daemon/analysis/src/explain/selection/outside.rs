@@ -7,7 +7,6 @@ use super::acceptance::is_possible;
 use super::outcome::{Outcome, Trial};
 use super::price::penalty;
 use super::search::Search;
-use super::trying::STIFF;
 use crate::explain::effects::{Effect, UNKNOWN, a_form_explains_more, leaves_a_force};
 use crate::explain::evidence::{EQUAL, Fit, SCORE_MIN};
 use crate::explain::scan::Scan;
@@ -59,7 +58,7 @@ impl Search<'_> {
         if share < HOLDS_A_FORCE {
             return None;
         }
-        let noise = base.noise.stiff(STIFF[0]);
+        let noise = *base.noise.stiffer().first()?;
         let onto = self.problem.again(base, noise);
         let explained = best_possible(trials).map_or(0.0, |best| {
             let with = self.problem.again(&best.fit, noise);
@@ -81,8 +80,7 @@ impl Search<'_> {
                 continue;
             }
             let before = FitErrors::of(self.problem, base);
-            for share in STIFF {
-                let noise = base.noise.stiff(share);
+            for noise in base.noise.stiffer() {
                 let Some((mut trial, _)) = self.look_again(base, noise, UNKNOWN) else { continue };
                 trial.reduction = FitErrors::of(self.problem, &trial.fit).reduction_from(&before);
                 let is_better = Self::total(&trial.fit) < Self::total(&outcome.fit) - EQUAL;

@@ -78,12 +78,11 @@ impl Search<'_> {
         while !outcome.is_full() && outcome.rounds.len() < most {
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
             let next = self.best(&trials, &fruitless).map(|trial| (trial.kind, trial.fit.clone()));
-            let small = Self::certain_and_small(&trials).filter(|_| next.is_none());
-            let small = small.map(|trial| (trial.kind, trial.fit.clone()));
+            let small = next.is_none().then(|| self.with_certain_and_small(&trials)).flatten();
             let round = Round::from(trials);
             outcome.rounds.push(round.clone());
-            if let Some((kind, fit)) = small {
-                outcome.small.push(kind);
+            if let Some((kinds, fit)) = small {
+                outcome.small.extend(kinds);
                 outcome.fit = fit;
                 continue;
             }

@@ -18,6 +18,7 @@ use super::price::penalty;
 use super::refusal::Refusal;
 use super::search::Search;
 use crate::explain::effects::SharedHypothesis;
+use crate::explain::evidence::Fit;
 use crate::explain::score::reduction;
 
 /// Kinds by which clocks, wheels and force sensors are always a little off, the most usual first.
@@ -39,21 +40,41 @@ fn is_everyday_wind(trial: &Trial) -> bool {
     square.sqrt() <= wind::EVERYDAY_MPS
 }
 
+/// Whether an everyday kind is certain, and only for its size no effect.
+fn is_certain_and_small(trial: &Trial) -> bool {
+    let refusal = Search::refusal(trial);
+    let late = trial.fit.model.effects.iter().filter(|it| LATE.contains(&it.kind())).count();
+    trial.evidence > CERTAIN
+        && (trial.kind != EffectKind::Wind || is_everyday_wind(trial))
+        && late < LATE.len()
+        && matches!(refusal, Some(Refusal::Immaterial | Refusal::Weak(_)))
+}
+
 impl Search<'_> {
-    /// The trial of the most usual everyday kind that is certain, and only for its size no effect. Late forces and a
-    /// late speed look alike: one of them is enough.
-    pub(super) fn certain_and_small(trials: &[Trial]) -> Option<&Trial> {
-        let is_small = |trial: &&Trial| {
-            let refusal = Self::refusal(trial);
-            let effects = &trial.fit.model.effects;
-            let late = effects.iter().filter(|it| LATE.contains(&it.kind())).count();
-            trial.evidence > CERTAIN
-                && (trial.kind != EffectKind::Wind || is_everyday_wind(trial))
-                && late < LATE.len()
-                && matches!(refusal, Some(Refusal::Immaterial | Refusal::Weak(_)))
-        };
+    /// The model with all everyday kinds among the trials that are certain, and only for their size no effects, beside
+    /// each other, the most usual first; `None` without one. Late forces and a late speed look alike: one of them is
+    /// enough.
+    pub(super) fn with_certain_and_small(
+        &self,
+        trials: &[Trial],
+    ) -> Option<(Vec<EffectKind>, Fit)> {
         let of = |kind: &EffectKind| trials.iter().find(|trial| trial.kind == *kind);
-        EVERYDAY.iter().filter_map(of).find(is_small)
+        let mut taken: Option<(Vec<EffectKind>, Fit)> = None;
+        for alone in EVERYDAY.iter().filter_map(of).filter(|trial| is_certain_and_small(trial)) {
+            let Some((kinds, fit)) = &mut taken else {
+                taken = Some((vec![alone.kind], alone.fit.clone()));
+                continue;
+            };
+            let grown = self.problem.grown(fit, [alone.last_parts()]);
+            let grown = self.problem.with_own_noise(&grown);
+            let beside =
+                Trial { reduction: alone.reduction, ..Self::trial(fit, grown, alone.kind) };
+            if is_certain_and_small(&beside) {
+                kinds.push(beside.kind);
+                *fit = beside.fit;
+            }
+        }
+        taken
     }
 
     /// Names what has turned out to matter beside the effects that were found, and forgets what is small
@@ -76,10 +97,9 @@ impl Search<'_> {
             let evidence = rest.cost - fit.cost - penalty(fit, index);
             let effect = &fit.model.effects[index];
             let is_material = effect.is_material(fit.effect_parameters(index), fit.theta[2]);
-            let reduction = reduction(self.problem, &rest, fit);
-            let is_effect = is_material
-                && !usual.contains(&kind)
-                && is_accepted(fit, index, evidence, reduction);
+            let is_effect = is_material && !usual.contains(&kind) && {
+                is_accepted(fit, index, evidence, reduction(self.problem, &rest, fit))
+            };
             if is_effect || evidence <= CERTAIN {
                 outcome.small.retain(|small| *small != kind);
             }

@@ -25,8 +25,6 @@ const FINALIST_ERROR_REDUCTION: f64 = 0.02;
 const MANY_OBSERVATIONS: usize = 5_000;
 /// How often a finalist looks again at most.
 const ATTEMPTS: usize = 3;
-/// Shares of the slow part of a noise under which a kind looks again.
-pub(super) const STIFF: [f64; 2] = [0.01, 1e-4];
 /// What would not pay its price with so many times the decrease that its start promises is not fitted;
 /// what would not be certain with so many times its evidence is not judged.
 pub(super) const PROMISE_TIMES: f64 = 2.0;
@@ -64,6 +62,13 @@ impl<'e> Tried<'e> {
             }
         }
     }
+}
+
+/// Whether a trial would be more than chance with so many times the evidence: what errors that all runs share hold
+/// most of does not become so by another place or noise.
+fn may_be_evident(trial: &Trial) -> bool {
+    let price = penalty(&trial.fit, trial.last());
+    trial.evidence > FINALIST_MIN || PROMISE_TIMES * (trial.evidence + price) > price
 }
 
 impl Search<'_> {
@@ -120,8 +125,10 @@ impl Search<'_> {
             .into_par_iter()
             .enumerate()
             .map(|(rank, (trial, effect))| {
-                let is_finalist =
-                    rank < FINALISTS && trial.bic_gain > least && (helps(&trial) || !is_long);
+                let is_finalist = rank < FINALISTS
+                    && trial.bic_gain > least
+                    && (helps(&trial) || !is_long)
+                    && may_be_evident(&trial);
                 if !is_finalist {
                     return trial;
                 }
@@ -240,9 +247,9 @@ impl Search<'_> {
             } else {
                 look(own).map_or((None, false), |(trial, many)| (Some(trial), many))
             };
-            let shares = if attempt == 0 && many { &STIFF[..] } else { &[] };
-            let stiff: Vec<_> =
-                shares.par_iter().filter_map(|share| look(own.stiff(*share))).collect();
+            let is_first_of_many = attempt == 0 && many;
+            let noises = if is_first_of_many { own.stiffer() } else { Vec::new() };
+            let stiff: Vec<_> = noises.into_par_iter().filter_map(look).collect();
             let mut is_better = false;
             for again in again.into_iter().chain(stiff.into_iter().map(|it| it.0)) {
                 if again.bic_gain > best.bic_gain + 1.0 {

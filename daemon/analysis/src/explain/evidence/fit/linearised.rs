@@ -1,7 +1,7 @@
 //! Cost, residuals, regressors and normal equations at given parameters.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use dynocar_core::filter::lanes::dot;
 use nalgebra::{DMatrix, DVector};
@@ -75,6 +75,7 @@ impl FitProblem {
             filters: Vec::new(),
             factors: Vec::new(),
             memories: Arc::default(),
+            open_loop_mps: OnceLock::new(),
             theta,
         };
         let theta = &fit.theta[..];
@@ -117,10 +118,26 @@ impl FitProblem {
             .collect();
         let (runs, columns) = bordered.into_iter().unzip();
         let model = plan.model.clone();
-        let mut fit =
-            Fit { model, theta, prior_information, prior_score, runs, columns, ..fit.clone() };
-        fit.held_information = self.held_information(&fit.theta, &fit.score());
-        fit
+        let mut grown = Fit {
+            model,
+            theta,
+            noise: fit.noise,
+            cost: fit.cost,
+            runs,
+            prior_information,
+            prior_score,
+            held_information: [0.0; 3],
+            innovations: fit.innovations.clone(),
+            columns,
+            residuals: fit.residuals.clone(),
+            run_filters: fit.run_filters.clone(),
+            filters: fit.filters.clone(),
+            factors: fit.factors.clone(),
+            memories: fit.memories.clone(),
+            open_loop_mps: OnceLock::new(),
+        };
+        grown.held_information = self.held_information(&grown.theta, &grown.score());
+        grown
     }
 
     /// Normal equations of one run, by number.

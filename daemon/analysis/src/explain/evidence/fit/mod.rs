@@ -8,7 +8,7 @@ mod plan;
 mod prior;
 mod robust;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use dynocar_model::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -101,9 +101,16 @@ pub struct Fit {
     factors: Vec<(RunFactors, FactorMatrix)>,
     /// What is known of each run for the model.
     memories: Arc<[RunMemory]>,
+    /// Errors in m/s of what it predicts, once they are asked for.
+    open_loop_mps: OnceLock<[[f64; 3]; 2]>,
 }
 
 impl Fit {
+    /// Errors in m/s of what it predicts, found once.
+    pub fn open_loop_mps(&self, find: impl FnOnce() -> [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+        *self.open_loop_mps.get_or_init(find)
+    }
+
     /// Information matrix of all runs and the prior, with what is held at its bounds.
     pub fn information(&self) -> DMatrix<f64> {
         let mut information = self.free_information();
