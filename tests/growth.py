@@ -82,7 +82,9 @@ def main() -> None:
             sys.exit(f"{PAGE}: {title}: {len(changed)} files change: {', '.join(sorted(changed))}")
         print(f"{title}: {len(changed)}")
         expected |= changed
-    shutil.copy(copy / "tests/grown.rs", copy / "daemon/analysis/tests/grown.rs")
+    grown_test = copy / "daemon/analysis/tests/grown.rs"
+    grown_test.parent.mkdir(exist_ok=True)
+    shutil.copy(copy / "tests/grown.rs", grown_test)
     test = ["cargo", "test", "--offline", "-p", "dynocar-analysis", "-p", "dynocar-client", "--test"]
     for of in [["grown"], ["client", "bindings::"]]:
         subprocess.run([*test, *of], cwd=copy, env=os.environ | BUILD, check=True)

@@ -8,11 +8,14 @@ cd "$(dirname "$0")/.."
 
 command -v valgrind >/dev/null || { apt-get update && apt-get install -y valgrind; }
 # As the workspace's own tests are built, so that nothing is built twice.
-programs=$(cargo test --release --workspace --lib --test client --test no_allocation --no-run \
-  --message-format json | sed -nE 's#.*"executable":"([^"]*/(dynocar_shared|dynocar_client|client|no_allocation)-[0-9a-f]+)".*#\1#p')
+programs=$(cargo test --release --workspace --lib --test client --test hot_path --no-run \
+  --message-format json | sed -nE 's#.*"executable":"([^"]*/(dynocar_shared|dynocar_client|client|hot_path)-[0-9a-f]+)".*#\1#p')
 [ "$(echo "$programs" | wc -l)" = 4 ] || { echo "expected four programs of tests, found: $programs" >&2; exit 1; }
 for program in $programs; do
   only=()
-  case $program in */client-*) only=(wrong_arguments::) ;; esac
+  case $program in
+    */client-*) only=(wrong_arguments::) ;;
+    */hot_path-*) only=(no_allocation::) ;;
+  esac
   valgrind -q --error-exitcode=9 --leak-check=no --undef-value-errors=no "$program" "${only[@]}"
 done

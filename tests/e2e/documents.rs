@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 use std::process::Command;
 
+use clap::CommandFactory;
 use dynocar_tests::documents::{Page, Shown, pages};
+use dynocar_tests::soak::arguments::Arguments;
 use dynocar_tests::sources::workspace;
 
 /// The most words of a paragraph.
@@ -89,6 +91,14 @@ fn every_command_that_a_page_shows_is_one_that_dynocar_takes() {
         it.words.drain(..taken);
         it.refusal(command)
     });
+    assert_none(&refusals.collect::<Vec<_>>());
+}
+
+#[test]
+fn every_soak_that_a_page_shows_is_one_that_this_program_takes() {
+    let shown: Vec<Shown> = pages().iter().flat_map(|it| it.commands("dynocar-soak")).collect();
+    assert!(shown.len() > 5, "the commands are found: {}", shown.len());
+    let refusals = shown.iter().filter_map(|it| it.refusal(Arguments::command()));
     assert_none(&refusals.collect::<Vec<_>>());
 }
 

@@ -3,6 +3,8 @@
 
 use dynocar_tests::process::{Process, Site};
 
+use crate::hold_the_cores;
+
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const PEER: &str = env!("CARGO_BIN_EXE_dynocar-sealed-peer");
 
@@ -28,6 +30,7 @@ fn news(peer: &mut Process) -> u64 {
 #[test]
 fn the_seal_kills_at_a_system_call() {
     use std::os::unix::process::ExitStatusExt;
+    let _cores = hold_the_cores();
     let site = Site::new();
     let (_daemon, mut peer) = sealed(&site, BUSY, "call");
     assert_eq!(peer.wait().signal(), Some(libc::SIGSYS), "{}", peer.errors());
@@ -35,6 +38,7 @@ fn the_seal_kills_at_a_system_call() {
 
 #[test]
 fn a_poll_without_news_makes_no_system_call() {
+    let _cores = hold_the_cores();
     let site = Site::new();
     let (_daemon, mut peer) = sealed(&site, BUSY, "poll");
     // Nothing is published meanwhile; one answer to what was published before may be on its way.
@@ -43,6 +47,7 @@ fn a_poll_without_news_makes_no_system_call() {
 
 #[test]
 fn publish_and_poll_make_no_system_call_while_the_daemon_is_awake() {
+    let _cores = hold_the_cores();
     for idle in [BUSY, ADAPTIVE] {
         let site = Site::new();
         let (_daemon, mut peer) = sealed(&site, idle, "cycle");

@@ -7,6 +7,8 @@ use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
 
+use crate::hold_the_cores;
+
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const TRAIN: TrainId = TrainId(1);
 
@@ -70,6 +72,7 @@ impl Controller {
 
 #[test]
 fn a_thread_at_work_neither_faults_nor_waits_once_it_is_warm() {
+    let _cores = hold_the_cores();
     let site = Site::new();
     let config = site.write_config(1, "lock_memory = true", PIPELINES);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
@@ -91,6 +94,7 @@ fn a_thread_at_work_neither_faults_nor_waits_once_it_is_warm() {
 
 #[test]
 fn missing_privileges_are_named_with_their_price_and_the_daemon_serves() {
+    let _cores = hold_the_cores();
     let site = Site::new();
     let config = site.write_config(1, "lock_memory = true", PIPELINES);
     let arguments = ["run", "--config", config.to_str().unwrap()];

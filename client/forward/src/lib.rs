@@ -17,9 +17,13 @@
 //! - [`forwarder`]: connections one after the other, until asked to end
 
 pub mod broker;
+#[cfg(test)]
+mod broker_tests;
 pub mod cli;
 pub mod fields;
 pub mod forwarder;
+#[cfg(test)]
+mod library_tests;
 pub mod node;
 pub mod payload;
 pub mod queue;

@@ -1,11 +1,12 @@
-//! The library as controllers use it, from Rust, C and C++; what allocates is counted in `real_time`,
-//! whose allocator is its own.
+//! The library as controllers use it, from Rust, C and C++; what allocates is counted in `real_time`, whose
+//! allocator all tests use: it counts by thread.
 
 mod bindings;
 mod channels;
 mod foreign_controllers;
 mod header;
 mod quantities;
+mod real_time;
 #[path = "../support/mod.rs"]
 mod support;
 mod wrong_arguments;

@@ -122,20 +122,3 @@ impl LateForces {
         self.force
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn late_forces_arrive_after_the_delay_and_approach_by_the_lag() {
-        let full = Controls { traction_force_n: 100.0, brake_force_n: 0.0 };
-        let mut late = LateForces::new(0.5, 0.4, 0.05, Controls::default());
-        let forces: Vec<f64> = (0..40).map(|_| late.advance(full).traction_force_n).collect();
-        assert!(forces[..10].iter().all(|&force| force == 0.0));
-        // Half a second after the arrival: 1 - exp(-0.5 / 0.4).
-        assert!((forces[19] - 100.0 * (1.0 - (-0.5_f64 / 0.4).exp())).abs() < 1e-9);
-        let mut prompt = LateForces::new(0.0, 0.0, 0.05, Controls::default());
-        assert_eq!(prompt.advance(full), full);
-    }
-}

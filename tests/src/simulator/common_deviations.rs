@@ -79,26 +79,3 @@ pub(super) fn wavy(waves: &[[f64; 3]], length_m: f64) -> Vec<(f64, f64)> {
     let chainages = (0..=count).map(|k| APART_M * k as f64);
     chainages.map(|m| (m, rounded(at(m), 0.001))).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_map_is_off_by_as_much_as_was_asked() {
-        let squares = |seed: u64| {
-            let error = CommonDeviations::draw(&Deviations::ROUGH, seed).map_error(30e3);
-            error.iter().map(|(_, permille)| permille * permille).sum::<f64>() / error.len() as f64
-        };
-        let rms = ((0..20).map(squares).sum::<f64>() / 20.0).sqrt();
-        assert!((0.11..0.13).contains(&rms), "{rms}");
-    }
-
-    #[test]
-    fn nothing_is_off_where_nothing_is_asked() {
-        let none = CommonDeviations::draw(&Deviations::NONE, 7);
-        assert_eq!((none.curve_constant, none.force_gains, none.speed_scale), (1.0, [1.0; 2], 1.0));
-        assert_eq!((none.force_late_s, none.warming.0), (0.0, 0.0));
-        assert!(none.map_error(20e3).is_empty());
-    }
-}

@@ -111,23 +111,3 @@ pub fn move_leading_car(physics: &TruePhysics<'_>, states: &mut [TrueState]) {
         chain.advance(&forces_n);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_pulled_pair_settles_where_the_coupling_carries_the_wagon() {
-        let car = |ahead_m| Car { mass_share: 0.5, length_share: 0.5, length_m: 20.0, ahead_m };
-        let mut chain = Chain::new(TrainType::Regional, &[car(10.0), car(-10.0)], 100e3);
-        let pull_n = 50e3;
-        for _ in 0..400 {
-            chain.advance(&[pull_n, 0.0]);
-        }
-        let stretched_m = chain.ahead_m[0] - chain.ahead_m[1];
-        let expected_m = 0.5 * pull_n / chain.stiffness_n_per_m;
-        assert!((stretched_m - expected_m).abs() < 1e-3 * expected_m, "{stretched_m} m");
-        assert!(chain.speed_mps.iter().all(|speed_mps| speed_mps.abs() < 1e-6));
-        assert!((chain.ahead_m[0] + chain.ahead_m[1]).abs() < 1e-12, "the centre of mass moved");
-    }
-}

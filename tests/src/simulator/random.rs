@@ -124,29 +124,3 @@ impl Random {
         choices[self.integer(0, choices.len() - 1)]
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn streams_differ_and_repeat() {
-        let draw = |seed, stream| {
-            let mut random = Random::new(seed, stream);
-            (0..4).map(|_| random.uniform(0.0, 1.0)).collect::<Vec<_>>()
-        };
-        assert_eq!(draw(7, Stream::Driver(2)), draw(7, Stream::Driver(2)));
-        assert_ne!(draw(7, Stream::Driver(2)), draw(7, Stream::Driver(3)));
-        assert_ne!(draw(7, Stream::Driver(2)), draw(8, Stream::Driver(2)));
-    }
-
-    #[test]
-    fn gaussians_have_unit_variance() {
-        let mut random = Random::new(1, Stream::Train);
-        let draws: Vec<f64> = (0..20_000).map(|_| random.gaussian()).collect();
-        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
-        let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64;
-        // Five standard errors.
-        assert!(mean.abs() < 0.035 && (variance - 1.0).abs() < 0.05, "{mean} {variance}");
-    }
-}

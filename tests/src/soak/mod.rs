@@ -4,6 +4,7 @@
 //!
 //! # Layout
 //!
+//! - [`arguments`]: the command line of `dynocar-soak`
 //! - [`bad_samples`]: every pipeline under every failure of its sensors
 //! - [`day`]: eight trains for a day in accelerated time, with trouble by the quarter of an hour
 //! - [`faults`]: kills, stops and restarts of daemon, controller and client
@@ -12,6 +13,7 @@
 //! - [`months`]: months of one train: learning, trying, adopting, taking back
 //! - [`state_kills`]: `kill -9` while a state file is written
 
+pub mod arguments;
 pub mod bad_samples;
 pub mod day;
 pub mod faults;

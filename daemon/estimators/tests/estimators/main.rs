@@ -1,6 +1,7 @@
-//! Estimators from samples to snapshots; that they allocate nothing is shown in `allocation`, whose
-//! allocator is its own.
+//! Estimators from samples to snapshots, which allocate nothing (`allocation`, whose allocator all tests use: it
+//! counts by thread).
 
+mod allocation;
 mod braking;
 mod mass_common;
 mod mass_joint;

@@ -3,4 +3,4 @@
 mod adhesion;
 mod brake;
 mod input;
-mod simulation;
+pub mod simulation;

@@ -17,7 +17,7 @@ impl DatasetFiles for Folder {
 
 #[test]
 fn the_answer_is_the_same_on_one_two_and_three_threads() {
-    let demo = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../config/demo");
+    let demo = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
     let mut dataset = Dataset::load(&Folder(demo)).expect("the demonstration runs");
     // As if the train were heavier: something is found, and looked for in several rounds.
     for sample in dataset.runs.iter_mut().flat_map(|run| &mut run.samples) {

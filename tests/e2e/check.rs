@@ -85,7 +85,7 @@ fn dataset(run_2: &str) -> tempfile::TempDir {
 }
 
 fn check(folder: &Path, arguments: &[&str]) -> Output {
-    let program = env!("CARGO_BIN_EXE_dynocar-workshop");
+    let program = env!("CARGO_BIN_EXE_dynocar-workshop-under-test");
     Command::new(program).current_dir(folder).arg("check").args(arguments).output().unwrap()
 }
 

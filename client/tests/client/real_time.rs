@@ -15,8 +15,7 @@ use dynocar_client::ffi::snapshot::*;
 use dynocar_client::ffi::{ReadingCopy, Resistance, about, error, names};
 use dynocar_shared::{PipelineKind, Quantity, TrainSample};
 
-mod support;
-use support::{Link, PlayedDaemon, Program, TRAIN, client_directory};
+use crate::support::{Link, PlayedDaemon, Program, TRAIN, client_directory};
 
 struct Counting;
 
@@ -128,7 +127,7 @@ fn a_cycle_makes_no_system_call() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("program");
     let source = client_directory().join("tests/foreign/no_system_call.c");
-    support::build_c(&source, "c11", Link::Static, &path);
+    crate::support::build_c(&source, "c11", Link::Static, &path);
     let clock = Command::new(&path).arg("clock").output().unwrap();
     const SIGNAL_OF_A_FORBIDDEN_CALL: i32 = 31;
     if clock.status.signal() == Some(SIGNAL_OF_A_FORBIDDEN_CALL) || clock.status.code() == Some(1) {

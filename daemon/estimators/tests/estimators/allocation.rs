@@ -10,10 +10,7 @@ use dynocar_model::track::{Curve, Track, Tunnel};
 use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 
-/// The train of the braking tests.
-#[allow(dead_code)]
-#[path = "estimators/braking/simulation.rs"]
-mod simulation;
+use crate::braking::simulation;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };

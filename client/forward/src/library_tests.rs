@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use crate::fields::NUMBERS;
+use crate::node::{Known, Message, NodeName, Session, is_rebirth};
+use crate::payload::{DataType, Metric, MetricValue, Payload, TextValue, Value};
+use crate::queue::Counts;
+use crate::train::Train;
 use dynocar_client::Reading;
-use dynocar_forward::fields::NUMBERS;
-use dynocar_forward::node::{Known, Message, NodeName, Session, is_rebirth};
-use dynocar_forward::payload::{DataType, Metric, MetricValue, Payload, TextValue, Value};
-use dynocar_forward::queue::Counts;
-use dynocar_forward::train::Train;
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason, Status, TrainId,
 };

@@ -73,7 +73,7 @@ fn write_dataset(folder: &Path, manifest: &str, train: &str) {
 
 /// The command over what lies in a folder.
 fn asked(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_dynocar-workshop"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dynocar-workshop-under-test"));
     command.current_dir(folder).args(["identify", "."]).args(arguments).output().unwrap()
 }
 

@@ -7,8 +7,8 @@ use std::process::Command;
 fn every_plot_of_the_report_becomes_a_file_that_stands_alone() {
     let folder = tempfile::tempdir().unwrap();
     let plots = folder.path().join("plots");
-    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/demo");
-    let output = Command::new(env!("CARGO_BIN_EXE_dynocar-workshop"))
+    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
+    let output = Command::new(env!("CARGO_BIN_EXE_dynocar-workshop-under-test"))
         .args(["explain".as_ref(), demo.as_os_str()])
         .args(["--plots".as_ref(), plots.as_os_str()])
         .output()

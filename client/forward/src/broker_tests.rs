@@ -6,13 +6,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::broker::{Broker, BrokerError, BrokerEvent, Login};
+use crate::forwarder::{Settings, forward, send};
+use crate::node::{Known, Message, NodeName, locked};
+use crate::queue::Publication;
+use crate::train::Train;
 use dynocar::observing::Wanted;
 use dynocar_client::Host;
-use dynocar_forward::broker::{Broker, BrokerError, BrokerEvent, Login};
-use dynocar_forward::forwarder::{Settings, forward, send};
-use dynocar_forward::node::{Known, Message, NodeName, locked};
-use dynocar_forward::queue::Publication;
-use dynocar_forward::train::Train;
 use dynocar_shared::TrainId;
 
 const TRAIN: TrainId = TrainId(7);

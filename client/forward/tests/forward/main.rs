@@ -1,4 +1,0 @@
-//! What is published of trains, and brokers of every kind.
-
-mod broker;
-mod library;

@@ -1,0 +1,65 @@
+//! What waits for no controller's cycle: commands as a user runs them, what `explain` finds, the simulator of
+//! trains, the sources and documents as text, and hardship that is counted in samples, however slow the machine.
+
+#[path = "init/commands.rs"]
+mod commands;
+#[path = "init/guide.rs"]
+mod guide;
+#[path = "../simulator/mod.rs"]
+mod simulator;
+#[path = "../../client/tests/support/mod.rs"]
+mod support;
+
+// Commands, and what is shipped with them.
+mod careless;
+mod check;
+mod explain_again;
+mod fmu;
+mod identify;
+mod import;
+mod init;
+mod init_refused;
+mod learn;
+mod learn_page;
+mod logger_files;
+mod output;
+mod own_train;
+mod package;
+mod plots;
+mod report;
+mod report_pointer;
+mod shipped;
+mod stops;
+mod survey_command;
+mod two_programs;
+
+// What `explain` finds, and what it does not.
+mod declared_terms;
+mod every_kind;
+mod explain;
+mod forms;
+mod gradient_error;
+mod late_speed;
+mod told_by_data;
+mod updated_model;
+
+// Bad samples, mutated bytes, power cuts, months of them, and eight trains with faults.
+mod bad_samples;
+mod day;
+mod fuzzing;
+mod load;
+mod months;
+mod power_cut;
+mod power_cut_recordings;
+mod sensor_failures;
+
+// Sources and documents.
+mod circles;
+mod documents;
+mod explain_numbers;
+mod layering;
+mod pages;
+mod promises;
+mod sizes;
+mod troubles;
+mod unrun;
