@@ -154,7 +154,8 @@ fn a_speed_scale_acts_on_what_is_measured_only() {
     let recording = recorded((0..500).map(|k| coasting_sample(k as f64 * 0.2)).collect());
     let mut model = QuadraticForces::default();
     let declared = recording.samples().iter().map(|sample| declared_polynomial(sample, DAVIS));
-    model.set(declared, 1.02);
+    model.restart(1.02);
+    model.extend(declared);
     let mut prediction = Prediction::new();
     prediction.simulate(&recording, &model, Restart::FullRun);
     let start_mps = recording.samples()[0].speed_mps;
