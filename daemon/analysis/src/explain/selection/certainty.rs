@@ -15,7 +15,7 @@ pub(super) const CERTAIN_RUNS_MIN: usize = 3;
 /// Whether an effect of a fitted model is more than chance and more than what declared figures are good for: it
 /// takes much from the error for its evidence, or is certain.
 pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64) -> bool {
-    acceptance_score(evidence, reduction) > SCORE_MIN
+    acceptance_score(evidence, reduction) > SCORE_MIN && is_shown(fit, index)
         || is_certain(fit, index, evidence, reduction, false)
 }
 
@@ -84,11 +84,17 @@ pub(super) fn is_certain(
     } else {
         evidence > least || takes_enough
     };
-    // What has no name must show in several runs: one of them has some form of its own.
-    let least_runs = CERTAIN_RUNS_MIN as f64 - 1.0;
-    let is_shown = effect.kind() != Unknown || runs_that_show(fit, size) > least_runs;
     let has_runs = fit.runs.len() >= CERTAIN_RUNS_MIN;
-    is_sure && !needs_the_score && has_runs && is_shown && runs_agree()
+    is_sure && !needs_the_score && has_runs && is_shown(fit, index) && runs_agree()
+}
+
+/// Whether an effect shows in enough runs: what has no name must show in several where there are several, for one of
+/// them has some form of its own.
+fn is_shown(fit: &Fit, index: usize) -> bool {
+    let size = fit.model.ranges()[index].start;
+    fit.model.effects[index].kind() != EffectKind::Unknown
+        || fit.runs.len() < CERTAIN_RUNS_MIN
+        || runs_that_show(fit, size) > CERTAIN_RUNS_MIN as f64 - 1.0
 }
 
 /// How many runs show a parameter: as many as would with the same information each.
