@@ -13,11 +13,10 @@ use dynocar_model::train::TrainModel;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::evidence::{Adjoint, Bin, Fit, FitProblem, RUNS_A_TASK, RunData, SampleForces};
+use super::evidence::{
+    Adjoint, Bin, Fit, FitProblem, RUNS_A_TASK, RunData, SampleForces, coarse_step,
+};
 use super::hypothesis::{Hypothesis, Past};
-
-/// So many runs at most show where a fit may start from.
-const COARSE_RUNS_MAX: usize = 32;
 
 /// Inner products of a whitened regressor.
 #[derive(Clone, Debug)]
@@ -125,7 +124,7 @@ impl<'a> Scan<'a> {
     /// The same over some of many runs, evenly chosen, as if over all.
     fn over_some_runs(&self, of_run: impl Fn(usize, &RunData) -> Tuple + Sync) -> Tuple {
         let runs = self.problem.runs.len();
-        let step = runs.div_ceil(COARSE_RUNS_MAX).max(1);
+        let step = coarse_step(runs);
         let mut sum = self.over_each_run(step, of_run);
         let times = runs as f64 / runs.div_ceil(step).max(1) as f64;
         sum.score *= times;

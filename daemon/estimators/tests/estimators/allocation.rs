@@ -39,19 +39,15 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 fn train() -> Arc<TrainModel> {
+    let resistance = Davis { a: 1.8, b: 0.03, c: 0.0035 };
     Arc::new(TrainModel {
-        name: "test".into(),
-        mass_kg: 200_000.0,
         length_m: 100.0,
         cars: 4,
-        passenger_mass_kg: 70.0,
         rotating_mass_factor: 0.06,
-        resistance: Davis { a: 1.8, b: 0.03, c: 0.0035 },
         curve_constant_n_per_kn_m: 600.0,
         tunnel_constant_n_per_kn_m: 0.00013,
         traction: EffortCurve::new(vec![(0.0, 60_000.0), (40.0, 30_000.0)]),
         brake: EffortCurve::new(vec![(0.0, 150_000.0)]),
-        drive: None,
         brake_gear: BrakeGear {
             cylinder_diameter_mm: Some(254.0),
             disc_radius_mm: Some(240.0),
@@ -62,8 +58,7 @@ fn train() -> Arc<TrainModel> {
             pads: Some(48.0),
             friction_brake: None,
         },
-        corrections: Default::default(),
-        extra: Vec::new(),
+        ..TrainModel::bare("test", 200_000.0, resistance)
     })
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use dynocar_core::pipeline::Estimator;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::Resistance;
-use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
+use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::ParameterSnapshot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,22 +19,13 @@ pub const DECLARED_KG: f64 = 100_000.0;
 
 /// A train of 100 t with gamma = 0.06.
 pub fn train() -> Arc<TrainModel> {
+    let resistance = Davis { a: 2.0, b: 0.02, c: 0.005 };
     Arc::new(TrainModel {
-        name: "test".into(),
-        mass_kg: DECLARED_KG,
         length_m: 100.0,
         cars: 4,
-        passenger_mass_kg: 70.0,
         rotating_mass_factor: 0.06,
-        resistance: Davis { a: 2.0, b: 0.02, c: 0.005 },
-        curve_constant_n_per_kn_m: 0.0,
-        tunnel_constant_n_per_kn_m: 0.0,
         traction: EffortCurve::new(vec![(0.0, 90_000.0), (30.0, 40_000.0)]),
-        brake: None,
-        drive: None,
-        brake_gear: BrakeGear::default(),
-        corrections: Default::default(),
-        extra: Vec::new(),
+        ..TrainModel::bare("test", DECLARED_KG, resistance)
     })
 }
 

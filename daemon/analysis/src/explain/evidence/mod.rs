@@ -37,7 +37,7 @@ pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};
 pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RunScatter};
-pub use noise_search::RUNS_A_TASK;
+pub use noise_search::{RUNS_A_TASK, coarse_step};
 pub use run_data::{RunData, RunDataError, RunPower, prepare};
 pub use run_scatter::{PRIOR_RUNS, RunFactors, WeightedFilter};
 pub use sample_forces::SampleForces;

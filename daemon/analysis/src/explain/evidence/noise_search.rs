@@ -10,22 +10,26 @@ use super::whitener::Whitener;
 const JUMPS_S: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// Runs that one thread takes at a time: less work is not worth handing out.
 pub const RUNS_A_TASK: usize = 8;
-
-/// So many runs at most are looked at first.
+/// So many runs at most show where a search starts.
 const COARSE_RUNS_MAX: usize = 32;
 /// How far around a start in logarithms a search begins, and around what some of the runs show.
 const FAR: f64 = 1.2;
 const NEAR: f64 = 0.1;
 
+/// One in so many of these runs, evenly chosen, stands for all where a search starts.
+pub fn coarse_step(runs: usize) -> usize {
+    runs.div_ceil(COARSE_RUNS_MAX).max(1)
+}
+
 impl Noise {
     /// The noise under which the differences of the fit runs from a model are likeliest, robust
     /// to outliers. `residuals` holds one vector of bin differences per run.
     pub fn estimate(runs: &[RunData], residuals: &[Vec<f64>], start: Noise) -> Noise {
-        let every = runs.len().div_ceil(COARSE_RUNS_MAX).max(1);
-        let some = |noise: Noise| cost_of(runs, residuals, every, noise);
-        let cost = |noise: Noise| cost_of(runs, residuals, 1, noise);
-        let near = if every > 1 { likeliest((start, FAR), &some) } else { start };
-        let smooth = likeliest((near, if every > 1 { NEAR } else { FAR }), &cost);
+        let step = coarse_step(runs.len());
+        let some = |noise: Noise| cost_of((runs, residuals), step, noise);
+        let cost = |noise: Noise| cost_of((runs, residuals), 1, noise);
+        let near = if step > 1 { (likeliest((start, FAR), &some), NEAR) } else { (start, FAR) };
+        let smooth = likeliest(near, &cost);
         let with = |jump_s: &f64| Noise { jump_s: *jump_s, ..smooth };
         let ragged = JUMPS_S.iter().map(with).map(|noise| (noise, cost(noise)));
         let best = ragged.min_by(|one, other| one.1.total_cmp(&other.1));
@@ -36,9 +40,9 @@ impl Noise {
     }
 }
 
-/// The cost of differences under a noise, of every so manieth run.
-fn cost_of(runs: &[RunData], residuals: &[Vec<f64>], every: usize, noise: Noise) -> f64 {
-    let each = runs.par_iter().zip(residuals).step_by(every).with_min_len(RUNS_A_TASK);
+/// The cost of the differences under a noise, of one run in `step`.
+fn cost_of((runs, residuals): (&[RunData], &[Vec<f64>]), step: usize, noise: Noise) -> f64 {
+    let each = runs.par_iter().zip(residuals).step_by(step).with_min_len(RUNS_A_TASK);
     let costs: Vec<f64> =
         each.map(|(run, residual)| Whitener::cost(run, noise, residual)).collect();
     costs.iter().sum()

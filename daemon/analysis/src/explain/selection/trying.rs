@@ -247,8 +247,7 @@ impl Search<'_> {
             } else {
                 look(own).map_or((None, false), |(trial, many)| (Some(trial), many))
             };
-            let is_first_of_many = attempt == 0 && many;
-            let noises = if is_first_of_many { own.stiffer() } else { Vec::new() };
+            let noises = if attempt == 0 && many { own.stiffer() } else { Vec::new() };
             let stiff: Vec<_> = noises.into_par_iter().filter_map(look).collect();
             let mut is_better = false;
             for again in again.into_iter().chain(stiff.into_iter().map(|it| it.0)) {
