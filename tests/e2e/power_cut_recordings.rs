@@ -18,10 +18,10 @@ use dynocar_tests::power_cut::{Left, LossyDisk, Neglect, NotedDisk};
 
 const HOUR: Duration = Duration::from_secs(3600);
 /// Samples that are recorded, and after how many of them they are handed to the system.
-const SAMPLES: u64 = 480;
+const SAMPLES: u64 = 240;
 const FLUSH: u64 = 40;
 /// The sample after which a suspicion rises.
-const SUSPICION: u64 = 300;
+const SUSPICION: u64 = 150;
 
 fn sample(sequence: u64) -> TrainSample {
     TrainSample { sequence, ..TrainSample::empty(TrainId(1)) }
@@ -53,7 +53,7 @@ impl Run {
         let disk = Arc::new(NotedDisk { notes: notes.clone() });
         let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
         let rotation =
-            Rotation { bytes: Some(9_000), keep_bytes: Some(28_000), ..Rotation::default() };
+            Rotation { bytes: Some(4_500), keep_bytes: Some(14_000), ..Rotation::default() };
         let keeper = Keeper::begin_on(disk.clone(), folder.path(), keeping).unwrap();
         let output = folder.path().join("ring.mcap");
         let mut files = Files::begin_on(disk, &output, rotation, Some(Duration::ZERO)).unwrap();
@@ -214,7 +214,7 @@ fn go_on(left: &Left) -> Result<(), String> {
     let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
     let disk = Arc::new(NotedDisk { notes: LossyDisk::new(Neglect::Nothing) });
     let keeper = Keeper::begin_on(disk.clone(), ring, keeping).map_err(|it| it.to_string())?;
-    let rotation = Rotation { bytes: Some(9_000), ..Rotation::default() };
+    let rotation = Rotation { bytes: Some(4_500), ..Rotation::default() };
     let begun = Files::begin_on(disk, &ring.join("ring.mcap"), rotation, Some(Duration::ZERO));
     let mut files = begun.map_err(|it| it.to_string())?;
     files.set_keeper(keeper);

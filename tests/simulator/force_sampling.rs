@@ -11,7 +11,7 @@ use dynocar_tests::simulator::{
 use dynocar_workshop::survey::survey_folder;
 
 /// Seeds of which none took part in a choice.
-const SEEDS: std::ops::Range<u64> = 65_000..65_004;
+const SEEDS: std::ops::Range<u64> = 65_000..65_002;
 
 /// Largest error in m/s over 60 s on a known line, however forces are recorded.
 const KNOWN_LINE_MAX_MPS: f64 = 0.2;

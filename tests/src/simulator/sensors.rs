@@ -193,12 +193,17 @@ fn shown_speeds_mps(states: &[TrueState], disturbances: &Disturbances) -> Vec<f6
     let late = (disturbances.speed_delay_s / TRUE_STEP_S).max(0.0);
     let share = late.fract();
     let mut shown_mps = states[0].wheel_speed_mps;
+    let mut last_mps = shown_mps;
     (0..states.len())
         .map(|index| {
             let before = |steps: usize| states[index.saturating_sub(steps)].wheel_speed_mps;
             let steps = late as usize;
             let reached_mps = before(steps) + share * (before(steps + 1) - before(steps));
-            shown_mps = lagged(shown_mps, reached_mps, TRUE_STEP_S, disturbances.speed_lag_s);
+            // Over a step a lag follows the mean; none follows at once.
+            let lag_s = disturbances.speed_lag_s;
+            let mean_mps = if lag_s > 0.0 { 0.5 * (last_mps + reached_mps) } else { reached_mps };
+            shown_mps = lagged(shown_mps, mean_mps, TRUE_STEP_S, lag_s);
+            last_mps = reached_mps;
             disturbances.speed_scale * shown_mps
         })
         .collect()

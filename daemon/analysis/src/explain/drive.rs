@@ -17,7 +17,7 @@ use super::effects::{AtBound, Hypothesis};
 use super::evidence::{
     FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,
 };
-use super::selection::{OBSERVATIONS_MIN, deviations};
+use super::selection::{FORM_SHARE, OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
 
 /// Efficiency, and what is fed beside the drive in kW beyond what is fed at rest.
@@ -61,10 +61,8 @@ impl Auxiliaries {
     }
 }
 
-/// One number stands for the map of a drive's efficiencies, which differ between a light and a full
-/// load by some hundredths: standard deviation of what it leaves of the efficiency.
-const EFFICIENCY_FORM_STD: f64 = 0.01;
-/// The same of the auxiliaries, as a share of the drive's root mean square power.
+/// What one number for a drive's efficiency, which differs between a light and a full load by some hundredths, leaves
+/// of the auxiliaries: standard deviation as a share of the drive's root mean square power.
 const AUXILIARIES_FORM_SHARE: f64 = 0.02;
 
 /// Root mean square of the power in kW of moving samples.
@@ -208,7 +206,10 @@ fn reported_by(
     let form_kw = AUXILIARIES_FORM_SHARE * moving_power_kw(problem);
     let at_bound = open.at_bound(found).map(|at| at.name);
     let answer = DriveAnswer {
-        efficiency: WithStd { value: at.efficiency, std: deviation[3].hypot(EFFICIENCY_FORM_STD) },
+        efficiency: WithStd {
+            value: at.efficiency,
+            std: deviation[3].hypot(FORM_SHARE * at.efficiency),
+        },
         auxiliary_power_kw: open.resting.map(|_| WithStd {
             value: 1e-3 * at.auxiliary_power_w,
             std: deviation[4].hypot(form_kw),

@@ -296,6 +296,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         0.0
     }
 
+    /// Standard deviation that a sampling step in s adds to each parameter, which is taken as exact between samples.
+    fn sampling_error(&self, _step_s: f64) -> f64 {
+        0.0
+    }
+
     /// Whether the effect is larger than what declared figures are usually good for.
     fn is_material(&self, _parameters: &[f64], _c: f64) -> bool {
         true

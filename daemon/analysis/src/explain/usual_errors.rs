@@ -5,6 +5,7 @@
 //! finished model is fitted once more with all of it beside it: what the data cannot distinguish from it is
 //! less sure, and what they can is surer.
 
+use super::evidence::RunData;
 use super::selection::{Deviations, Outcome, Search, deviations_beside};
 
 /// Moves the effects that were found to where they fit best beside the usual errors, and a, b and c to where
@@ -19,5 +20,13 @@ pub fn given_usual_errors(search: &Search, outcome: &mut Outcome) -> Deviations 
         let theta = joint.fit.theta[..count].to_vec();
         outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
     }
-    deviations_beside(&joint.fit, count, joint.shared)
+    let mut deviations = deviations_beside(&joint.fit, count, joint.shared);
+    let step_s = search.problem.runs.iter().map(RunData::step_s).fold(0.0, f64::max);
+    let model = &outcome.fit.model;
+    for (effect, range) in model.effects.iter().zip(model.ranges()) {
+        for std in &mut deviations.std[range.clone()] {
+            *std = std.hypot(effect.sampling_error(step_s));
+        }
+    }
+    deviations
 }

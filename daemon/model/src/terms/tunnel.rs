@@ -35,8 +35,8 @@ pub const DC: Key = Key {
 /// Single-track tunnels reach several times c; the bound is in N/kN per (m/s)².
 pub const PARAMETERS: [Parameter; 1] =
     [Parameter::new("dc_n_per_kn_per_mps2", (0.0, DC.range[1]), 1e-5)];
-/// A smaller share of c is not distinguishable from its error.
-pub const LEAST_SHARE_OF_C: f64 = 0.08;
+/// A smaller share of c is within the accuracy of tunnel factors, which are tabulated to one decimal.
+pub const LEAST_SHARE_OF_C: f64 = 0.1;
 
 /// Tunnels of a length, weighted by the share of the train inside, resist.
 #[inline]

@@ -4,7 +4,7 @@ use dynocar_model::terms::delay;
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::proposal::late_from;
+use super::proposal::{late_by_sampling_s, late_from};
 use super::{Candidate, Effect, Hypothesis, Past, Proposal, ReportContext, Reported, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -53,6 +53,10 @@ impl Hypothesis for DelayAndLag {
 
     fn parameters(&self) -> &[Parameter] {
         &delay::PARAMETERS
+    }
+
+    fn sampling_error(&self, step_s: f64) -> f64 {
+        late_by_sampling_s(step_s)
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {

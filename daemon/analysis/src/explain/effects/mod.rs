@@ -59,4 +59,4 @@ pub const LIBRARY: &[&dyn Effect] = &[
 ];
 /// What is in no library, by its form: tried where the library leaves a force.
 pub const UNKNOWN: &dyn Effect = &unknown::Forms;
-pub use unknown::{a_form_explains_more, leaves_a_force};
+pub use unknown::{OUTSIDE_COST, a_form_explains_more, leaves_a_force};

@@ -77,6 +77,12 @@ pub fn late_from(starts_s: &[[f64; 2]], decrease: impl Fn([f64; 2]) -> f64) -> V
     best.filter(|(decrease, _)| *decrease > 0.0).map_or(NEAR_NONE_S, |(_, start_s)| start_s).into()
 }
 
+/// Standard deviation in s of a dead time and of a lag by the sampling step. Between samples forces are taken to change
+/// evenly, so that each of the two may be off by any part of a step; their sum is known better.
+pub fn late_by_sampling_s(step_s: f64) -> f64 {
+    step_s / 12_f64.sqrt()
+}
+
 /// A kind of effect.
 pub trait Effect: Send + Sync {
     /// Its name.

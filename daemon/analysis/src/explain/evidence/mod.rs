@@ -31,7 +31,8 @@ mod whitener;
 pub use adjoint::Adjoint;
 pub use bins::Bin;
 pub use criterion::{
-    CERTAIN_STDS, EQUAL, NULL_SCORE, NullScore, SCORE_MIN, acceptance_score, p_value,
+    CERTAIN_STDS, CERTAIN_STDS_BY_RUN, EQUAL, NULL_SCORE, NullScore, SCORE_MIN, acceptance_score,
+    p_value,
 };
 pub use fade::Fade;
 pub use fit::{Fit, FitProblem, Nearby, RunNormal};

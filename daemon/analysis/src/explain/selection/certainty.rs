@@ -4,7 +4,10 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::{deviations, scatter_factor};
 use super::price::{at_bound, penalty};
-use crate::explain::evidence::{CERTAIN_STDS, EQUAL, Fit, SCORE_MIN, acceptance_score};
+use crate::explain::effects::OUTSIDE_COST;
+use crate::explain::evidence::{
+    CERTAIN_STDS, CERTAIN_STDS_BY_RUN, EQUAL, Fit, SCORE_MIN, acceptance_score,
+};
 
 /// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
 /// where everything declared is a little off, at most 26 for what is not in that world; beside the usual errors 8.
@@ -35,9 +38,10 @@ pub fn deciding_score(
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
 /// whole train or line, less of it where it takes more, which the runs agree on. What is chosen among many must take
 /// more from the error; among runs or forms, it is certain only beside the usual errors, which such choices stand for
-/// else. Never certain are loads, winds and slippery rails, which change from run to run, a late speed, which late
-/// forces look like, a brake beside slippery rails and a local resistance or an unmapped tunnel beside gradients, whose
-/// ends and straight pieces leave such; beside the usual errors no unmapped tunnel at all.
+/// else. One number a run (an outside temperature) is certain only there, too, where each run has its load and wind.
+/// Never certain are loads, winds and slippery rails, which change from run to run, a late speed, which late forces
+/// look like, a brake beside slippery rails and a local resistance or an unmapped tunnel beside gradients, whose ends
+/// and straight pieces leave such; beside the usual errors no unmapped tunnel at all.
 pub(super) fn is_certain(
     fit: &Fit,
     index: usize,
@@ -52,6 +56,7 @@ pub(super) fn is_certain(
     let effect = &fit.model.effects[index];
     // What acts where the map has its tunnels and curves is one number of the line.
     let is_unmapped = effect.kind() == TunnelDrag && !effect.ends().is_empty();
+    let is_by_run = effect.is_one_number_a_run();
     let is_chosen_among_many =
         is_unmapped || matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
     let is_beside_a_gradient = fit.model.effects.iter().any(|other| other.is_gradient());
@@ -60,41 +65,55 @@ pub(super) fn is_certain(
         LowAdhesion | MassChange | SpeedDelay | Wind => true,
         DraggingBrake => !is_beside_usual_errors || is_on_slippery_rails,
         Unknown => !is_beside_usual_errors,
+        _ if is_by_run => !is_beside_usual_errors,
         LocalResistance => is_beside_a_gradient,
         TunnelDrag if is_unmapped => is_beside_a_gradient || is_beside_usual_errors,
         _ => false,
     };
-    let size = fit.model.ranges()[index].start;
     // In standard deviations from none; the size of a form hangs on its shape, what it explains does not.
     let runs_agree = || {
         let away = if effect.kind() == Unknown {
+            let size = fit.model.ranges()[index].start;
             (evidence + penalty(fit, index)).max(0.0).sqrt() / scatter_factor(fit, size)
         } else {
-            effect.size(fit.effect_parameters(index)).abs() / deviations(fit).std[size]
+            stds_from_none(fit, index)
         };
-        away > CERTAIN_STDS
+        is_by_run || away > CERTAIN_STDS
     };
     // At most 2.3 where nothing acts; beside the usual errors 2.0 for a brake, 0.3 for a form.
     let takes_enough = evidence * reduction > EQUAL;
-    // Runs are independent as samples are not.
-    let is_by_run = is_beside_usual_errors && effect.is_one_number_a_run();
-    let least = if is_by_run { EQUAL } else { CERTAIN };
-    let is_sure = if is_chosen_among_many {
-        evidence > least && takes_enough
+    let is_sure = if is_by_run {
+        // What else sets runs apart may follow what is measured: at most 9.6 where nothing acts.
+        evidence > OUTSIDE_COST
+    } else if is_chosen_among_many {
+        evidence > CERTAIN && takes_enough
     } else {
-        evidence > least || takes_enough
+        evidence > CERTAIN || takes_enough
     };
     let has_runs = fit.runs.len() >= CERTAIN_RUNS_MIN;
     is_sure && !needs_the_score && has_runs && is_shown(fit, index) && runs_agree()
 }
 
+/// Size of an effect in standard deviations by the scatter between the runs.
+fn stds_from_none(fit: &Fit, index: usize) -> f64 {
+    let size = fit.model.effects[index].size(fit.effect_parameters(index)).abs();
+    size / deviations(fit).std[fit.model.ranges()[index].start]
+}
+
 /// Whether an effect shows in enough runs: what has no name must show in several where there are several, for one of
-/// them has some form of its own.
+/// them has some form of its own, and the runs agree on what is one number a run, which other numbers of theirs may
+/// happen to follow.
 fn is_shown(fit: &Fit, index: usize) -> bool {
-    let size = fit.model.ranges()[index].start;
-    fit.model.effects[index].kind() != EffectKind::Unknown
-        || fit.runs.len() < CERTAIN_RUNS_MIN
-        || runs_that_show(fit, size) > CERTAIN_RUNS_MIN as f64 - 1.0
+    let effect = &fit.model.effects[index];
+    if fit.runs.len() < CERTAIN_RUNS_MIN {
+        true
+    } else if effect.is_one_number_a_run() {
+        stds_from_none(fit, index) > CERTAIN_STDS_BY_RUN
+    } else {
+        let size = fit.model.ranges()[index].start;
+        effect.kind() != EffectKind::Unknown
+            || runs_that_show(fit, size) > CERTAIN_RUNS_MIN as f64 - 1.0
+    }
 }
 
 /// How many runs show a parameter: as many as would with the same information each.

@@ -15,7 +15,9 @@ mod steps;
 mod trying;
 
 pub use beside::is_certain_beside;
-pub use by_run::{Deviations, deviations, deviations_beside, few_runs_factor, without_each_run};
+pub use by_run::{
+    Deviations, FORM_SHARE, deviations, deviations_beside, few_runs_factor, without_each_run,
+};
 pub use certainty::deciding_score;
 pub use outcome::{Outcome, Trial};
 pub use price::{discounted, model_penalty, penalty};

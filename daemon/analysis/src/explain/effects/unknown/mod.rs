@@ -13,6 +13,7 @@ mod grammar;
 mod known;
 mod numbers;
 mod outside;
+pub use outside::OUTSIDE_COST;
 mod shape;
 
 use dynocar_shared::vocabulary::EffectKind;
