@@ -77,7 +77,7 @@ fn convert(arguments: &ConvertArguments) -> Result<(), Failure> {
     }
     let content = one(from)?;
     if output.extension().is_some_and(|it| it == "mcap") {
-        write_mcap(&content, output).map_err(|error| Failure::Work(error.to_string()))?;
+        write_mcap(&content, output).map_err(Failure::work)?;
         if !arguments.quiet {
             report_line(&format!("{}: {} messages", output.display(), content.messages.len()));
         }
@@ -99,7 +99,7 @@ fn one(paths: &[PathBuf]) -> Result<Content, Failure> {
 }
 
 fn table_failure(error: TableError) -> Failure {
-    Failure::Input(error.to_string())
+    Failure::input(error)
 }
 
 fn to_parquet(arguments: &ConvertArguments) -> Result<(), Failure> {
@@ -111,7 +111,7 @@ fn to_parquet(arguments: &ConvertArguments) -> Result<(), Failure> {
         None => write_folder(from, output),
         Some(dataset) => {
             // A dataset becomes what a controller would have had recorded.
-            let place = tempfile::tempdir().map_err(|error| Failure::Work(error.to_string()))?;
+            let place = tempfile::tempdir().map_err(Failure::work)?;
             let recording = place.path().join("dataset.mcap");
             from_dataset(dataset, &recording).map_err(from_dataset_failure)?;
             write_folder(&[recording], output)

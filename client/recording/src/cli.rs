@@ -220,7 +220,7 @@ impl VerifyArguments {
     /// When it holds none, there is nothing to compute them by, or one is another.
     pub fn verify(&self, recording: &Recording) -> Result<(), Failure> {
         let path = &self.recording[0];
-        let wrong = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
+        let wrong = |error: &dyn std::fmt::Display| Failure::input(error);
         if let Some(broken) = &recording.broken {
             report_line(&format!("{}: {broken}", program()));
         }

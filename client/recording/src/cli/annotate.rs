@@ -41,8 +41,7 @@ pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
     let file = File::open(timeline).map_err(|error| wrong(serde_json::Error::io(error)))?;
     let read: Timeline = serde_json::from_reader(BufReader::new(file)).map_err(wrong)?;
     let added = if from.is_dir() || from.extension().is_some_and(|it| it == "toml") {
-        let folder = tempfile::TempDir::with_prefix("dynocar-")
-            .map_err(|error| Failure::Work(error.to_string()))?;
+        let folder = tempfile::TempDir::with_prefix("dynocar-").map_err(Failure::work)?;
         let recording = folder.path().join("dataset.mcap");
         from_dataset(from, &recording).map_err(from_dataset_failure)?;
         annotate(&recording, &read, output)
@@ -50,8 +49,8 @@ pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
         annotate(from, &read, output)
     };
     let added = added.map_err(|error| match error {
-        AnnotateError::Copy(CopyError::Write(_)) => Failure::Work(error.to_string()),
-        error => Failure::Input(error.to_string()),
+        AnnotateError::Copy(CopyError::Write(_)) => Failure::work(error),
+        error => Failure::input(error),
     })?;
     report_line(&format!(
         "annotated recording: {}: {} intervals in which an effect acts, {} messages in all",

@@ -74,10 +74,8 @@ pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
 
 fn failure(error: FmuError) -> Failure {
     match error {
-        FmuError::Unreadable { .. } | FmuError::OtherLibrary(_) => {
-            Failure::Input(error.to_string())
-        }
-        FmuError::NoLibrary(_) | FmuError::Archive(_) => Failure::Work(error.to_string()),
+        FmuError::Unreadable { .. } | FmuError::OtherLibrary(_) => Failure::input(error),
+        FmuError::NoLibrary(_) | FmuError::Archive(_) => Failure::work(error),
     }
 }
 

@@ -14,6 +14,7 @@ use super::failure::SurveyFailure;
 use super::material::Material;
 use super::trip_rows::{Column, columns, run_csv};
 use crate::track_text::TrackText;
+use crate::updated::set;
 use dynocar::dataset::open;
 use dynocar::output::{require_file, write_in_folder};
 
@@ -97,12 +98,7 @@ fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
     let mut train: Table =
         text.parse().map_err(|error: toml::de::Error| wrong(error.message().to_string()))?;
     let common = &profile.learned.profile.common;
-    let mut set = |section: &str, key: &str, value: f64| {
-        let entry = train.entry(section).or_insert_with(|| Value::Table(Table::new()));
-        if let Value::Table(section) = entry {
-            section.insert(key.into(), Value::Float(value));
-        }
-    };
+    let mut set = |section: &str, key: &str, value| set(&mut train, section, key, value);
     for (key, value) in ["a", "b", "c"].into_iter().zip(common.davis()) {
         set("resistance", key, rounded(value, 1e-6));
     }
