@@ -56,8 +56,8 @@ impl Run {
             Rotation { bytes: Some(9_000), keep_bytes: Some(28_000), ..Rotation::default() };
         let keeper = Keeper::begin_on(disk.clone(), folder.path(), keeping).unwrap();
         let output = folder.path().join("ring.mcap");
-        let mut files = Files::begin_on(disk, &output, rotation, Some(Duration::ZERO)).unwrap();
-        files.set_keeper(keeper);
+        let begun = Files::begin_on(disk, &output, rotation, Some(Duration::ZERO), Some(keeper));
+        let mut files = begun.unwrap();
         let mut run = Run { folder, notes, marks: Vec::new() };
         let mut firsts = BTreeMap::from([(files.path().to_path_buf(), 1)]);
         let mut events = 0;
@@ -215,9 +215,9 @@ fn go_on(left: &Left) -> Result<(), String> {
     let disk = Arc::new(NotedDisk { notes: LossyDisk::new(Neglect::Nothing) });
     let keeper = Keeper::begin_on(disk.clone(), ring, keeping).map_err(|it| it.to_string())?;
     let rotation = Rotation { bytes: Some(9_000), ..Rotation::default() };
-    let begun = Files::begin_on(disk, &ring.join("ring.mcap"), rotation, Some(Duration::ZERO));
+    let (output, sync) = (ring.join("ring.mcap"), Some(Duration::ZERO));
+    let begun = Files::begin_on(disk, &output, rotation, sync, Some(keeper));
     let mut files = begun.map_err(|it| it.to_string())?;
-    files.set_keeper(keeper);
     files.sample(&sample(1_000_000)).map_err(|it| it.to_string())?;
     files.finish().map(|_| ()).map_err(|it| it.to_string())
 }
@@ -338,9 +338,8 @@ fn whoever_records_does_not_wait_for_a_disk_that_stalls() {
     let disk = Arc::new(Stalled::default());
     let output = folder.path().join("run.mcap");
     let rotation = Rotation { bytes: Some(50_000), ..Rotation::default() };
-    let begun = Files::begin_on(disk.clone(), &output, rotation, Some(Duration::ZERO));
-    let mut files = begun.unwrap();
-    files.keep_house_in_parallel().unwrap();
+    let begun = Files::begin_on(disk.clone(), &output, rotation, Some(Duration::ZERO), None);
+    let mut files = begun.unwrap().keep_house_in_parallel().unwrap();
     for sequence in 1..=5000 {
         files.sample(&sample(sequence)).unwrap();
         if sequence % 100 == 0 {

@@ -11,7 +11,7 @@ use dynocar::output::report_line;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
-use crate::record::{KeepError, RecordError, Rotation, SYNC, Settings, record};
+use crate::record::{Rotation, SYNC, Settings, record};
 use crate::train_channels::Wanted;
 
 /// Record what a controller and the daemon write, as MCAP.
@@ -118,12 +118,7 @@ pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
 /// As above.
 pub fn run(settings: &Settings) -> Result<(), Failure> {
     let stop = ending::flag().map_err(Failure::work)?;
-    let recorded = record(settings, &stop).map_err(|error| match error {
-        RecordError::Taken { .. } | RecordError::Ring(KeepError::Taken { .. }) => {
-            Failure::input(error)
-        }
-        error => Failure::work(error),
-    })?;
+    let recorded = record(settings, &stop)?;
     report_line(&format!(
         "{} samples, {} snapshots and {} events recorded, {} samples lost",
         recorded.samples, recorded.snapshots, recorded.events, recorded.lost

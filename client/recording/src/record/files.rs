@@ -67,10 +67,11 @@ impl Files {
     ///
     /// When the name is taken or the file cannot be written.
     pub fn begin(output: &Path, rotation: Rotation) -> Result<Self, RecordError> {
-        Files::begin_on(Arc::new(Disk), output, rotation, Some(SYNC))
+        Files::begin_on(Arc::new(Disk), output, rotation, Some(SYNC), None)
     }
 
-    /// The same on any storage; files are brought to the disk no more often than every `sync`.
+    /// The same on any storage; files are brought to the disk no more often than every `sync`, and a keeper
+    /// keeps for good what lies around the events that are reasons to.
     ///
     /// # Errors
     ///
@@ -80,11 +81,15 @@ impl Files {
         output: &Path,
         rotation: Rotation,
         sync: Option<Duration>,
+        keeper: Option<Keeper>,
     ) -> Result<Self, RecordError> {
         let path = if rotation.is_on() { next(output) } else { output.to_path_buf() };
         let (writer, bytes) = open(&storage, &path)?;
+        let ring = keeper.is_some().then(|| folder_of(output).into());
+        let mut housekeeper = Housekeeper::new(Arc::clone(&storage), output, rotation, keeper);
+        housekeeper.ask(Task::Begun { file: path.clone() });
         Ok(Files {
-            housekeeper: Housekeeper::new(Arc::clone(&storage), output, rotation),
+            housekeeper,
             storage,
             output: output.into(),
             rotation,
@@ -96,15 +101,8 @@ impl Files {
             synced: Instant::now(),
             configuration: None,
             recorded: Recorded::default(),
-            ring: None,
+            ring,
         })
-    }
-
-    /// Keeps for good what lies around the events that are reasons to.
-    pub fn set_keeper(&mut self, keeper: Keeper) {
-        self.housekeeper.set_keeper(keeper);
-        self.ring = Some(folder_of(&self.output).into());
-        self.housekeeper.ask(Task::Begun { file: self.path.clone() });
     }
 
     /// From now on a thread of its own brings files to the disk, keeps and removes them.
@@ -112,8 +110,9 @@ impl Files {
     /// # Errors
     ///
     /// When the system gives no thread.
-    pub fn keep_house_in_parallel(&mut self) -> Result<(), RecordError> {
-        self.housekeeper.go_in_parallel().map_err(RecordError::Thread)
+    pub fn keep_house_in_parallel(self) -> Result<Self, RecordError> {
+        let housekeeper = self.housekeeper.in_parallel().map_err(RecordError::Thread)?;
+        Ok(Files { housekeeper, ..self })
     }
 
     /// Samples, snapshots and events that no power cut takes any more.

@@ -117,13 +117,9 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     let folder = folder_of(&settings.output);
     let keeper = settings.keeping.map(|keeping| Keeper::begin(folder, keeping)).transpose()?;
     let Settings { output, rotation, sync, .. } = settings;
-    let mut files = Files::begin_on(Arc::new(Disk), output, *rotation, *sync)?;
-    if let Some(keeper) = keeper {
-        files.set_keeper(keeper);
-    }
-    files.keep_house_in_parallel()?;
+    let files = Files::begin_on(Arc::new(Disk), output, *rotation, *sync, keeper)?;
     let mut recorder = Recorder {
-        files,
+        files: files.keep_house_in_parallel()?,
         configuration: settings.configuration.clone(),
         maintenance: Maintenance::default(),
     };

@@ -9,7 +9,7 @@ use dynocar_client::{ChannelError, Host, monotonic_now_ns};
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
 use dynocar_shared::{TrainId, TrainSample};
 
-use super::sink::Sink;
+use super::Sink;
 use crate::event::{Event, EventKind};
 
 /// The most samples taken in a row, before the other trains have their turn.

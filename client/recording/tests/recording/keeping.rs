@@ -2,8 +2,10 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
+use dynocar::storage::Disk;
 use dynocar_recording::copying::recover;
 use dynocar_recording::event::{Event, EventKind};
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation, request_keeping};
@@ -37,9 +39,9 @@ fn stretches(ring: &Path) -> Vec<PathBuf> {
 fn ring(folder: &Path, keeping: Keeping) -> Files {
     let rotation = Rotation { bytes: Some(8_000), keep_bytes: Some(30_000), ..Rotation::default() };
     let keeper = Keeper::begin(folder, keeping).unwrap();
-    let mut files = Files::begin(&folder.join("ring.mcap"), rotation).unwrap();
-    files.set_keeper(keeper);
-    files
+    let sync = Some(Duration::from_secs(1));
+    Files::begin_on(Arc::new(Disk), &folder.join("ring.mcap"), rotation, sync, Some(keeper))
+        .unwrap()
 }
 
 fn drive(files: &mut Files, sequences: std::ops::Range<u64>) {
