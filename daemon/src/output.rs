@@ -117,6 +117,15 @@ pub fn require_file(path: &Path, mark: &str) -> Result<(), OutputError> {
     }
 }
 
+/// Refuses a file in a folder for results that is there and is none of this command's.
+///
+/// # Errors
+///
+/// What is there.
+pub fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
+    if file.exists() { require_file(file, mark) } else { Ok(()) }
+}
+
 /// Refuses wrong names of results like [`require_file`]; each with how such a file begins.
 ///
 /// # Errors

@@ -13,6 +13,7 @@ use dynocar_recording::event::{Event, EventKind};
 use dynocar_recording::reading::{Ending, read};
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation};
 use dynocar_recording::recording::Recording;
+use dynocar_recording::topic::Message;
 use dynocar_shared::{TrainId, TrainSample};
 use dynocar_tests::power_cut::{Left, LossyDisk, Neglect, NotedDisk};
 
@@ -62,12 +63,12 @@ impl Run {
         let mut firsts = BTreeMap::from([(files.path().to_path_buf(), 1)]);
         let mut events = 0;
         for sequence in 1..=SAMPLES {
-            files.sample(&sample(sequence)).unwrap();
+            files.write(Message::Sample(&sample(sequence))).unwrap();
             if sequence == SUSPICION {
                 let kind = EventKind::SuspicionRaised;
                 let text = "dragging_brake".into();
                 let event = Event { kind: kind as i32, train_id: 1, text, ..Event::default() };
-                files.event(&event).unwrap();
+                files.write(Message::Event(&event)).unwrap();
                 events = 1;
             }
             if sequence % FLUSH == 0 || sequence == SUSPICION {
@@ -218,7 +219,7 @@ fn go_on(left: &Left) -> Result<(), String> {
     let (output, sync) = (ring.join("ring.mcap"), Some(Duration::ZERO));
     let begun = Files::begin_on(disk, &output, rotation, sync, Some(keeper));
     let mut files = begun.map_err(|it| it.to_string())?;
-    files.sample(&sample(1_000_000)).map_err(|it| it.to_string())?;
+    files.write(Message::Sample(&sample(1_000_000))).map_err(|it| it.to_string())?;
     files.finish().map(|_| ()).map_err(|it| it.to_string())
 }
 
@@ -247,7 +248,7 @@ fn cut_recovery(neglect: Neglect) -> Option<String> {
     let (from, to) = (folder.path().join("run.mcap"), folder.path().join("whole.mcap"));
     let mut files = Files::begin(&from, Rotation::default()).unwrap();
     for sequence in 1..=200 {
-        files.sample(&sample(sequence)).unwrap();
+        files.write(Message::Sample(&sample(sequence))).unwrap();
     }
     files.finish().unwrap();
     let notes = LossyDisk::new(neglect);
@@ -341,7 +342,7 @@ fn whoever_records_does_not_wait_for_a_disk_that_stalls() {
     let begun = Files::begin_on(disk.clone(), &output, rotation, Some(Duration::ZERO), None);
     let mut files = begun.unwrap().keep_house_in_parallel().unwrap();
     for sequence in 1..=5000 {
-        files.sample(&sample(sequence)).unwrap();
+        files.write(Message::Sample(&sample(sequence))).unwrap();
         if sequence % 100 == 0 {
             files.flush().unwrap();
         }

@@ -8,12 +8,11 @@ use dynocar_shared::layout::Words;
 use dynocar_shared::schema::{Field, Missing};
 use dynocar_shared::snapshot::PARAMETERS_MAX;
 use dynocar_shared::{Parameter, ParameterSnapshot, RejectionReason, TrainId, TrainSample};
+use prost::DecodeError;
 use prost::encoding::{
     DecodeContext, WireType, decode_key, decode_varint, encode_key, encode_varint, skip_field,
 };
-use prost::{DecodeError, Message};
 
-use crate::event::Event;
 use crate::schema::{
     ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, number, parameter_number,
     rejection_number,
@@ -91,12 +90,6 @@ pub fn encode_snapshot(snapshot: &ParameterSnapshot, out: &mut Vec<u8>) {
             }
         }
     });
-}
-
-/// Appends an event's message.
-pub fn encode_event(event: &Event, out: &mut Vec<u8>) {
-    // A vector takes any length.
-    let _ = event.encode(out);
 }
 
 /// Reads a sample's message.

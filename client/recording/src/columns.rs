@@ -14,6 +14,7 @@ use crate::schema::{
     SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, members_of, suffixed_name, vocabulary_of,
     vocabulary_of_type,
 };
+use crate::topic::Message;
 
 /// Where a column's values come from.
 #[derive(Clone, Copy, Debug)]
@@ -182,6 +183,15 @@ impl Column {
 }
 
 impl Row {
+    /// The same for whoever writes messages.
+    pub fn message(&self) -> Message<'_> {
+        match self {
+            Row::Sample(it) => Message::Sample(it),
+            Row::Snapshot(it) => Message::Snapshot(it),
+            Row::Event(it) => Message::Event(it),
+        }
+    }
+
     /// Appends the words of a column that is neither text nor a stamp; gives false where the value is
     /// missing, and then appends as many zeros.
     pub fn put_words(&self, column: &Column, words: &mut Vec<u64>) -> bool {

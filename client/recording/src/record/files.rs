@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use dynocar::storage::{Disk, SharedStorage, folder_of};
 use dynocar_client::monotonic_now_ns;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::TrainId;
 use mcap::McapError;
 
 use super::configuration::Configuration;
@@ -18,6 +18,7 @@ use super::keeping::{self, Keeper};
 use super::rotation::{Rotation, next};
 use super::{RecordError, Recorded, SYNC};
 use crate::event::{Event, EventKind};
+use crate::topic::Message;
 use crate::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 
 /// A file, with the bytes that were handed to the system.
@@ -125,41 +126,27 @@ impl Files {
         &self.path
     }
 
-    /// Writes a sample.
+    /// Writes a message.
     ///
     /// # Errors
     ///
-    /// When it cannot be written; so for every other item.
-    pub fn sample(&mut self, sample: &TrainSample) -> Result<(), RecordError> {
-        self.recorded.samples += 1;
-        let written = self.writer.sample(sample, sample.published_ns);
-        self.checked(written)
-    }
-
-    /// Writes a snapshot.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    pub fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), RecordError> {
-        self.recorded.snapshots += 1;
-        let written = self.writer.snapshot(snapshot);
-        self.checked(written)
-    }
-
-    /// Writes an event.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    pub fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.recorded.events += 1;
-        if event.kind() == EventKind::SamplesLost {
-            self.recorded.lost += event.count.unwrap_or(0);
+    /// When it cannot be written; so for all else.
+    pub fn write(&mut self, message: Message<'_>) -> Result<(), RecordError> {
+        match message {
+            Message::Sample(_) => self.recorded.samples += 1,
+            Message::Snapshot(_) => self.recorded.snapshots += 1,
+            Message::Event(event) => {
+                self.recorded.events += 1;
+                if event.kind() == EventKind::SamplesLost {
+                    self.recorded.lost += event.count.unwrap_or(0);
+                }
+            }
         }
-        let written = self.writer.event(event);
+        let written = self.writer.write(message);
         self.checked(written)?;
-        if keeping::is_reason(event) {
+        if let Message::Event(event) = message
+            && keeping::is_reason(event)
+        {
             self.housekeeper.ask(Task::Keep { event: event.clone() });
         }
         Ok(())
@@ -194,7 +181,8 @@ impl Files {
     /// As above.
     pub fn flush(&mut self) -> Result<(), RecordError> {
         if let Some(text) = self.ring.as_deref().and_then(keeping::requested) {
-            self.event(&Event::now(TrainId(0), EventKind::KeepRequested, text))?;
+            let asked = Event::now(TrainId(0), EventKind::KeepRequested, text);
+            self.write(Message::Event(&asked))?;
         }
         self.writer.set_clock(WallClock::now());
         let written = self.writer.flush();

@@ -17,10 +17,11 @@ use std::time::{Duration, Instant};
 use dynocar::output::report_line;
 use dynocar::storage::{Disk, folder_of};
 use dynocar_client::ChannelError;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::TrainId;
 use mcap::McapError;
 
 use crate::event::{Event, EventKind};
+use crate::topic::Message;
 use crate::train_channels::{PAUSE, Sink, TrainChannels, Wanted};
 use configuration::Configuration;
 use maintenance::Maintenance;
@@ -131,7 +132,7 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
         channels.take(&mut recorder)?;
         if flushed.elapsed() >= FLUSH {
             for event in recorder.maintenance.news() {
-                recorder.event(&event)?;
+                recorder.take(Message::Event(&event))?;
             }
             recorder.files.flush()?;
             flushed = Instant::now();
@@ -140,7 +141,8 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     }
     channels.take(&mut recorder)?;
     for train in channels.trains() {
-        recorder.event(&Event::now(train, EventKind::RecordingEnded, format!("train {train}")))?;
+        let ended = Event::now(train, EventKind::RecordingEnded, format!("train {train}"));
+        recorder.take(Message::Event(&ended))?;
     }
     recorder.files.finish()
 }
@@ -156,20 +158,13 @@ struct Recorder {
 impl Sink for Recorder {
     type Error = RecordError;
 
-    fn sample(&mut self, sample: &TrainSample) -> Result<(), RecordError> {
-        self.files.sample(sample)
-    }
-
-    fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), RecordError> {
-        self.files.snapshot(snapshot)
-    }
-
-    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.files.event(event)
+    fn take(&mut self, message: Message<'_>) -> Result<(), RecordError> {
+        self.files.write(message)
     }
 
     fn opened(&mut self, train: TrainId) -> Result<(), RecordError> {
-        self.event(&Event::now(train, EventKind::RecordingBegan, format!("train {train}")))
+        let began = Event::now(train, EventKind::RecordingBegan, format!("train {train}"));
+        self.take(Message::Event(&began))
     }
 
     fn daemon_came(&mut self, train: TrainId, process: u32) -> Result<(), RecordError> {

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 
 use dynocar::observing;
 use dynocar_client::{ChannelError, Role};
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::TrainId;
 
-use crate::event::Event;
+use crate::topic::Message;
 use train_channel::TrainChannel;
 
 /// How long a reader sleeps between two looks at the channels: at 1 kHz a buffer of 512 samples
@@ -94,26 +94,12 @@ pub trait Sink {
     /// Why nothing more is taken.
     type Error: From<ChannelError>;
 
-    /// Takes a sample.
+    /// Takes a message.
     ///
     /// # Errors
     ///
-    /// When nothing more is taken; so for every other item.
-    fn sample(&mut self, sample: &TrainSample) -> Result<(), Self::Error>;
-
-    /// Takes a snapshot.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), Self::Error>;
-
-    /// Takes an event.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn event(&mut self, event: &Event) -> Result<(), Self::Error>;
+    /// When nothing more is taken; so for all else.
+    fn take(&mut self, message: Message<'_>) -> Result<(), Self::Error>;
 
     /// The channels of a train are open.
     ///

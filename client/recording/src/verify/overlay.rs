@@ -53,7 +53,9 @@ fn answers(config: &DaemonConfig, samples: &[TrainSample]) -> BTreeMap<(u64, Qua
             let Some(index) = index else { continue };
             let settings = &config.pipelines[index];
             let Ok(mut pipeline) = build_pipeline(settings, index as u32, train) else { continue };
-            own().for_each(|sample| drop(pipeline.process(sample)));
+            for sample in own() {
+                pipeline.process(sample);
+            }
             answered.insert((id, quantity), (settings.name.clone(), *pipeline.snapshot()));
         }
     }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use dynocar_recording::record::{Files, RecordError, Rotation};
+use dynocar_recording::topic::Message;
 use dynocar_shared::{TrainId, TrainSample};
 
 /// The numbered files of a folder, in order, with their lengths.
@@ -28,7 +29,7 @@ fn files_are_numbered_on_and_the_oldest_go_when_they_take_too_much() {
     assert!(files.path().ends_with("run-000042.mcap"));
     for sequence in 1..=4000 {
         let sample = TrainSample { sequence, ..TrainSample::empty(TrainId(1)) };
-        files.sample(&sample).unwrap();
+        files.write(Message::Sample(&sample)).unwrap();
         if sequence % 100 == 0 {
             files.flush().unwrap();
         }

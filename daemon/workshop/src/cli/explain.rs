@@ -23,8 +23,8 @@ use crate::updated::{UPDATED_FILES, UPDATED_MARK, UpdatedFiles, UpdatedModelErro
 use dynocar::cli::Failure;
 use dynocar::dataset::{self, DatasetFolder};
 use dynocar::output::{
-    OutputError, give, report_line, require_file, require_files, require_folder, require_new,
-    write_file, write_in_folder,
+    OutputError, give, report_line, require_files, require_folder, require_new,
+    require_replaceable, write_file, write_in_folder,
 };
 
 /// First line of a file with predictions.
@@ -152,11 +152,6 @@ fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
         })),
         _ => Ok(()),
     }
-}
-
-/// Refuses a file in a folder for results that is there and is none of ours.
-fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
-    if file.exists() { require_file(file, mark) } else { Ok(()) }
 }
 
 /// The failure of a run that cannot be used, with what may be the matter.
