@@ -55,9 +55,9 @@ impl Run {
         let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
         let rotation =
             Rotation { bytes: Some(9_000), keep_bytes: Some(28_000), ..Rotation::default() };
-        let keeper = Keeper::begin_on(disk.clone(), folder.path(), keeping).unwrap();
+        let keeper = Keeper::begin(disk.clone(), folder.path(), keeping).unwrap();
         let output = folder.path().join("ring.mcap");
-        let begun = Files::begin_on(disk, &output, rotation, Some(Duration::ZERO), Some(keeper));
+        let begun = Files::begin(disk, &output, rotation, Some(Duration::ZERO), Some(keeper));
         let mut files = begun.unwrap();
         let mut run = Run { folder, notes, marks: Vec::new() };
         let mut firsts = BTreeMap::from([(files.path().to_path_buf(), 1)]);
@@ -214,10 +214,10 @@ fn go_on(left: &Left) -> Result<(), String> {
     }
     let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
     let disk = Arc::new(NotedDisk { notes: LossyDisk::new(Neglect::Nothing) });
-    let keeper = Keeper::begin_on(disk.clone(), ring, keeping).map_err(|it| it.to_string())?;
+    let keeper = Keeper::begin(disk.clone(), ring, keeping).map_err(|it| it.to_string())?;
     let rotation = Rotation { bytes: Some(9_000), ..Rotation::default() };
     let (output, sync) = (ring.join("ring.mcap"), Some(Duration::ZERO));
-    let begun = Files::begin_on(disk, &output, rotation, sync, Some(keeper));
+    let begun = Files::begin(disk, &output, rotation, sync, Some(keeper));
     let mut files = begun.map_err(|it| it.to_string())?;
     files.write(Message::Sample(&sample(1_000_000))).map_err(|it| it.to_string())?;
     files.finish().map(|_| ()).map_err(|it| it.to_string())
@@ -246,7 +246,7 @@ fn a_disk_that_keeps_bytes_or_names_of_recordings_back_is_noticed() {
 fn cut_recovery(neglect: Neglect) -> Option<String> {
     let folder = tempfile::tempdir().unwrap();
     let (from, to) = (folder.path().join("run.mcap"), folder.path().join("whole.mcap"));
-    let mut files = Files::begin(&from, Rotation::default()).unwrap();
+    let mut files = Files::begin(Arc::new(Disk), &from, Rotation::default(), None, None).unwrap();
     for sequence in 1..=200 {
         files.write(Message::Sample(&sample(sequence))).unwrap();
     }
@@ -339,7 +339,7 @@ fn whoever_records_does_not_wait_for_a_disk_that_stalls() {
     let disk = Arc::new(Stalled::default());
     let output = folder.path().join("run.mcap");
     let rotation = Rotation { bytes: Some(50_000), ..Rotation::default() };
-    let begun = Files::begin_on(disk.clone(), &output, rotation, Some(Duration::ZERO), None);
+    let begun = Files::begin(disk.clone(), &output, rotation, Some(Duration::ZERO), None);
     let mut files = begun.unwrap().keep_house_in_parallel().unwrap();
     for sequence in 1..=5000 {
         files.write(Message::Sample(&sample(sequence))).unwrap();

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use dynocar::storage::{Disk, SharedStorage, folder_of};
+use dynocar::storage::{SharedStorage, folder_of};
 use dynocar_client::monotonic_now_ns;
 use dynocar_shared::TrainId;
 use mcap::McapError;
@@ -16,7 +16,7 @@ use super::configuration::Configuration;
 use super::housekeeping::{Housekeeper, Task};
 use super::keeping::{self, Keeper};
 use super::rotation::{Rotation, next};
-use super::{RecordError, Recorded, SYNC};
+use super::{RecordError, Recorded};
 use crate::event::{Event, EventKind};
 use crate::topic::Message;
 use crate::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
@@ -62,22 +62,13 @@ pub struct Files {
 
 impl Files {
     /// Begins the first file. With rotation its name is the output's with a number that is greater
-    /// than all that are there.
-    ///
-    /// # Errors
-    ///
-    /// When the name is taken or the file cannot be written.
-    pub fn begin(output: &Path, rotation: Rotation) -> Result<Self, RecordError> {
-        Files::begin_on(Arc::new(Disk), output, rotation, Some(SYNC), None)
-    }
-
-    /// The same on any storage; files are brought to the disk no more often than every `sync`, and a keeper
+    /// than all that are there. Files are brought to the disk no more often than every `sync`, and a keeper
     /// keeps for good what lies around the events that are reasons to.
     ///
     /// # Errors
     ///
-    /// As [`Files::begin`].
-    pub fn begin_on(
+    /// When the name is taken or the file cannot be written.
+    pub fn begin(
         storage: SharedStorage,
         output: &Path,
         rotation: Rotation,

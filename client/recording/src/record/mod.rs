@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar::output::report_line;
-use dynocar::storage::{Disk, folder_of};
+use dynocar::storage::{Disk, SharedStorage, folder_of};
 use dynocar_client::ChannelError;
 use dynocar_shared::TrainId;
 use mcap::McapError;
@@ -116,9 +116,11 @@ impl Recorded {
 /// See [`RecordError`]; what was written by then can be read.
 pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let folder = folder_of(&settings.output);
-    let keeper = settings.keeping.map(|keeping| Keeper::begin(folder, keeping)).transpose()?;
+    let disk: SharedStorage = Arc::new(Disk);
+    let keeper = |keeping| Keeper::begin(Arc::clone(&disk), folder, keeping);
+    let keeper = settings.keeping.map(keeper).transpose()?;
     let Settings { output, rotation, sync, .. } = settings;
-    let files = Files::begin_on(Arc::new(Disk), output, *rotation, *sync, keeper)?;
+    let files = Files::begin(disk, output, *rotation, *sync, keeper)?;
     let mut recorder = Recorder {
         files: files.keep_house_in_parallel()?,
         configuration: settings.configuration.clone(),

@@ -39,10 +39,9 @@ fn stretches(ring: &Path) -> Vec<PathBuf> {
 
 fn ring(folder: &Path, keeping: Keeping) -> Files {
     let rotation = Rotation { bytes: Some(8_000), keep_bytes: Some(30_000), ..Rotation::default() };
-    let keeper = Keeper::begin(folder, keeping).unwrap();
+    let keeper = Keeper::begin(Arc::new(Disk), folder, keeping).unwrap();
     let sync = Some(Duration::from_secs(1));
-    Files::begin_on(Arc::new(Disk), &folder.join("ring.mcap"), rotation, sync, Some(keeper))
-        .unwrap()
+    Files::begin(Arc::new(Disk), &folder.join("ring.mcap"), rotation, sync, Some(keeper)).unwrap()
 }
 
 fn drive(files: &mut Files, sequences: std::ops::Range<u64>) {
@@ -175,7 +174,7 @@ fn a_request_is_kept_and_one_to_nobody_is_refused() {
     assert!(account.contains("the driver felt a jerk"), "{account}");
     files.flush().unwrap();
     assert_eq!(stretches(folder.path()).len(), 1, "asked once");
-    let second = Keeper::begin(folder.path(), keeping()).unwrap_err();
+    let second = Keeper::begin(Arc::new(Disk), folder.path(), keeping()).unwrap_err();
     assert!(second.to_string().contains("another recorder"), "{second}");
     files.finish().unwrap();
     assert!(!request_keeping(folder.path(), "too late").unwrap());

@@ -227,8 +227,8 @@ pub fn page(
 
 fn write_plots(folder: &Path, dataset: &Dataset, explanation: &Explanation) -> Result<(), Failure> {
     let images = report::images::images(dataset, explanation).map_err(Failure::work)?;
-    for image in images {
-        let path = write_in_folder(folder, &image.name, &image.svg)?;
+    for (name, svg) in images {
+        let path = write_in_folder(folder, &name, &svg)?;
         report_line(&format!("plot: {}", path.display()));
     }
     Ok(())

@@ -8,26 +8,20 @@ use super::Subject;
 use super::plots::speeds::Width;
 use super::plots::{Plot, PlotError, as_file, line, panel, runs, speeds};
 
-/// A plot as a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Image {
-    /// Name of the file.
-    pub name: String,
-    /// The SVG.
-    pub svg: String,
-}
-
-/// Every plot of the report: the errors of the runs, the line with what was found along it, the
+/// Names and SVG of every plot of the report: the errors of the runs, the line with what was found along it, the
 /// speeds of runs, the residual against covariates.
 ///
 /// # Errors
 ///
 /// When a plot cannot be drawn.
-pub fn images(dataset: &Dataset, explanation: &Explanation) -> Result<Vec<Image>, PlotError> {
+pub fn images(
+    dataset: &Dataset,
+    explanation: &Explanation,
+) -> Result<Vec<(String, String)>, PlotError> {
     let subject = &Subject::of(dataset, explanation);
     let (data, has_effect) = (&subject.data, subject.has_effect());
     let mut images = Vec::new();
-    let mut keep = |name: String, plot: Plot| images.push(Image { name, svg: as_file(&plot.svg) });
+    let mut keep = |name: String, plot: Plot| images.push((name, as_file(&plot.svg)));
     for role in [Role::Holdout, Role::Fit] {
         let own = subject.errors_of(role);
         if !own.is_empty() {

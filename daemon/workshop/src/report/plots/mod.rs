@@ -61,13 +61,6 @@ type Frame = [f64; 7];
 /// Drawn over nominal size.
 const SCALE: u32 = 2;
 
-/// A colour of the plots.
-struct Ink {
-    colour: RGBColor,
-    /// The page's variable for it.
-    variable: &'static str,
-}
-
 const TEXT: RGBColor = RGBColor(0x54, 0x5B, 0x66);
 const GRID: RGBColor = RGBColor(0xE3, 0xE6, 0xEA);
 const AXIS: RGBColor = RGBColor(0x9A, 0xA1, 0xAC);
@@ -78,22 +71,23 @@ const ACTING: RGBColor = RGBColor(0xE4, 0xEE, 0xF7);
 const BAND: RGBColor = RGBColor(0xD9, 0xC3, 0xAE);
 const TUNNEL: RGBColor = RGBColor(0xE2, 0xE3, 0xE7);
 
-const INKS: [Ink; 9] = [
-    Ink { colour: TEXT, variable: "--muted" },
-    Ink { colour: GRID, variable: "--grid" },
-    Ink { colour: AXIS, variable: "--axis" },
-    Ink { colour: MEASURED, variable: "--measured" },
-    Ink { colour: BEFORE, variable: "--before" },
-    Ink { colour: AFTER, variable: "--after" },
-    Ink { colour: ACTING, variable: "--acting" },
-    Ink { colour: BAND, variable: "--band" },
-    Ink { colour: TUNNEL, variable: "--tunnel" },
+/// The colours with the page's variables for them.
+const INKS: [(RGBColor, &str); 9] = [
+    (TEXT, "--muted"),
+    (GRID, "--grid"),
+    (AXIS, "--axis"),
+    (MEASURED, "--measured"),
+    (BEFORE, "--before"),
+    (AFTER, "--after"),
+    (ACTING, "--acting"),
+    (BAND, "--band"),
+    (TUNNEL, "--tunnel"),
 ];
 
 /// The style rules that give every colour of the plots its variable.
 pub fn colour_rules() -> String {
     let mut rules = String::new();
-    for Ink { colour: RGBColor(r, g, b), variable } in INKS {
+    for (RGBColor(r, g, b), variable) in INKS {
         for property in ["fill", "stroke"] {
             // Writing to a string cannot fail.
             let _ = writeln!(
@@ -195,7 +189,7 @@ mod tests {
         let rules = colour_rules();
         assert_eq!(rules.lines().count(), 2 * INKS.len());
         for (k, ink) in INKS.iter().enumerate() {
-            assert!(INKS[..k].iter().all(|other| other.colour != ink.colour));
+            assert!(INKS[..k].iter().all(|other| other.0 != ink.0));
         }
         assert!(rules.contains("svg.plot [fill=\"#B85C14\"]{fill:var(--before)}"));
     }
