@@ -4,15 +4,16 @@
 //! Samples are taken at least every few milliseconds, for a channel holds the newest 512 of them; what
 //! is passed over is counted and reported.
 
+mod sink;
 mod train_channel;
 
 use std::time::{Duration, Instant};
 
 use dynocar::observing;
-use dynocar_client::{ChannelError, Role};
+use dynocar_client::Role;
 use dynocar_shared::TrainId;
 
-use crate::topic::Message;
+pub use sink::Sink;
 use train_channel::TrainChannel;
 
 /// How long a reader sleeps between two looks at the channels: at 1 kHz a buffer of 512 samples
@@ -86,36 +87,5 @@ impl TrainChannels {
         let channel = TrainChannel::open(&trains.host, train, *snapshot_interval, self.name)?;
         self.channels.push(channel);
         sink.opened(train)
-    }
-}
-
-/// Where that goes what is read: into a recording, to viewers.
-pub trait Sink {
-    /// Why nothing more is taken.
-    type Error: From<ChannelError>;
-
-    /// Takes a message.
-    ///
-    /// # Errors
-    ///
-    /// When nothing more is taken; so for all else.
-    fn take(&mut self, message: Message<'_>) -> Result<(), Self::Error>;
-
-    /// The channels of a train are open.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn opened(&mut self, _train: TrainId) -> Result<(), Self::Error> {
-        Ok(())
-    }
-
-    /// A daemon of this process has come; the event follows.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn daemon_came(&mut self, _train: TrainId, _process: u32) -> Result<(), Self::Error> {
-        Ok(())
     }
 }

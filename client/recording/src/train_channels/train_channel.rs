@@ -9,7 +9,7 @@ use dynocar_client::{ChannelError, Host, monotonic_now_ns};
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
 use dynocar_shared::{TrainId, TrainSample};
 
-use super::Sink;
+use super::sink::Sink;
 use crate::event::{Event, EventKind};
 use crate::topic::Message;
 

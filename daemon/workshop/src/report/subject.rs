@@ -1,0 +1,45 @@
+//! What a page is about.
+
+use dynocar_analysis::dataset::{Dataset, Role};
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::report::ReportData;
+use dynocar_analysis::explain::report::errors::RunErrors;
+
+/// Everything that the page is about.
+pub struct Subject<'a> {
+    /// The dataset.
+    pub dataset: &'a Dataset,
+    /// What was made of it.
+    pub explanation: &'a Explanation,
+    /// The same as numbers and words for the page.
+    pub data: ReportData,
+}
+
+impl<'a> Subject<'a> {
+    /// An explanation of a dataset.
+    pub fn of(dataset: &'a Dataset, explanation: &'a Explanation) -> Self {
+        Subject { dataset, explanation, data: ReportData::of(dataset, explanation) }
+    }
+
+    /// True when an effect was added to the model, so that there is an 'after'.
+    pub fn has_effect(&self) -> bool {
+        !self.explanation.answer.effects.is_empty()
+    }
+
+    /// What the model without effects is called in a key.
+    pub fn before(&self) -> &'static str {
+        if self.has_effect() { "before" } else { "declared model, a, b, c refitted" }
+    }
+
+    /// Number of a run in the dataset, from 1; 0 for one that is not there.
+    pub fn number(&self, file: &str) -> usize {
+        let runs = &self.dataset.runs;
+        runs.iter().find(|run| run.file == file).map_or(0, |run| run.number as usize)
+    }
+
+    /// The errors of the runs of a role, with their numbers.
+    pub fn errors_of(&self, role: Role) -> Vec<(usize, &RunErrors)> {
+        let own = self.data.errors.by_run.iter().filter(|run| run.role == role);
+        own.map(|run| (self.number(&run.file), run)).collect()
+    }
+}
