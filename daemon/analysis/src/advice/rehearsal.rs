@@ -7,7 +7,6 @@
 
 use std::sync::Arc;
 
-use dynocar_core::filter::random::Random;
 use dynocar_core::pipeline::train_kalman::{TrainKalman, TrainKalmanSettings};
 use dynocar_core::pipeline::{Estimator, KeptEstimate, Pipeline};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
@@ -111,7 +110,7 @@ impl<'a> Rehearsal<'a> {
         Some(Rehearsal {
             scene,
             pipeline: Pipeline::new(id, 0, train, None, estimator),
-            random: Random::new(1),
+            random: Random(1),
             step_s,
             measured_mps,
             disturbed_mps: gain * noise.disturbance_n_per_kn_sqrt_s * step_s.sqrt(),
@@ -171,5 +170,22 @@ impl Known {
             return KeptEstimate::new(&ANSWERED, &[a, b, c, 1e-3 * scene.mass_kg], &all).ok();
         }
         KeptEstimate::new(&ANSWERED[..MASS], &[a, b, c], &davis).ok()
+    }
+}
+
+/// Splitmix64 (Steele, Lea, Flood 2014): enough for a rehearsal.
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (bits >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// The sum of twelve uniforms: mean 0, variance 1.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }

@@ -37,7 +37,7 @@ type DrawError = DrawingAreaErrorKind<io::Error>;
 
 /// Why a plot cannot be drawn.
 #[derive(Debug, thiserror::Error)]
-#[error("the plot cannot be drawn: {plot}: {source}")]
+#[error("the plot of {plot} cannot be drawn: {source}")]
 pub struct PlotError {
     /// What it shows.
     plot: String,
