@@ -44,6 +44,15 @@ impl Host {
         }
     }
 
+    /// A root of its own where one is named, else that of the environment.
+    ///
+    /// # Errors
+    ///
+    /// See [`Host::at`].
+    pub fn of(root: Option<&Path>) -> Result<Self, ChannelError> {
+        root.map_or_else(Host::from_environment, Host::at)
+    }
+
     /// A root of its own; the directory is made, for this user only, when it is missing.
     ///
     /// # Errors

@@ -117,6 +117,25 @@ pub fn require_file(path: &Path, mark: &str) -> Result<(), OutputError> {
     }
 }
 
+/// Refuses a file in a folder for results that is there and is none of this command's.
+///
+/// # Errors
+///
+/// What is there.
+pub fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
+    if file.exists() { require_file(file, mark) } else { Ok(()) }
+}
+
+/// Refuses wrong names of results like [`require_file`]; each with how such a file begins.
+///
+/// # Errors
+///
+/// What is wrong with the first that is wrong.
+pub fn require_files(files: &[(&Option<PathBuf>, &str)]) -> Result<(), OutputError> {
+    let named = files.iter().filter_map(|(file, mark)| Some((file.as_ref()?, mark)));
+    named.into_iter().try_for_each(|(file, mark)| require_file(file, mark))
+}
+
 /// Refuses, before the work begins, a name that is taken, be it by a link that leads nowhere.
 ///
 /// # Errors

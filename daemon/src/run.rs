@@ -69,10 +69,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let mut config = config.clone();
     shadow::in_force::settle(&mut config);
     let config = &config;
-    let host = match &config.root {
-        Some(root) => Host::at(root)?,
-        None => Host::from_environment()?,
-    };
+    let host = Host::of(config.root.as_deref())?;
     let stop = ending::flag()?;
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
     let _roles = trains

@@ -13,6 +13,7 @@ use dynocar_recording::event::{Event, EventKind};
 use dynocar_recording::reading::{Ending, read};
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation};
 use dynocar_recording::recording::Recording;
+use dynocar_recording::topic::Message;
 use dynocar_shared::{TrainId, TrainSample};
 use dynocar_tests::power_cut::{Left, LossyDisk, Neglect, NotedDisk};
 
@@ -54,20 +55,20 @@ impl Run {
         let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
         let rotation =
             Rotation { bytes: Some(4_500), keep_bytes: Some(14_000), ..Rotation::default() };
-        let keeper = Keeper::begin_on(disk.clone(), folder.path(), keeping).unwrap();
+        let keeper = Keeper::begin(disk.clone(), folder.path(), keeping).unwrap();
         let output = folder.path().join("ring.mcap");
-        let mut files = Files::begin_on(disk, &output, rotation, Some(Duration::ZERO)).unwrap();
-        files.set_keeper(keeper);
+        let begun = Files::begin(disk, &output, rotation, Some(Duration::ZERO), Some(keeper));
+        let mut files = begun.unwrap();
         let mut run = Run { folder, notes, marks: Vec::new() };
         let mut firsts = BTreeMap::from([(files.path().to_path_buf(), 1)]);
         let mut events = 0;
         for sequence in 1..=SAMPLES {
-            files.sample(&sample(sequence)).unwrap();
+            files.write(Message::Sample(&sample(sequence))).unwrap();
             if sequence == SUSPICION {
                 let kind = EventKind::SuspicionRaised;
                 let text = "dragging_brake".into();
                 let event = Event { kind: kind as i32, train_id: 1, text, ..Event::default() };
-                files.event(&event).unwrap();
+                files.write(Message::Event(&event)).unwrap();
                 events = 1;
             }
             if sequence % FLUSH == 0 || sequence == SUSPICION {
@@ -213,12 +214,12 @@ fn go_on(left: &Left) -> Result<(), String> {
     }
     let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
     let disk = Arc::new(NotedDisk { notes: LossyDisk::new(Neglect::Nothing) });
-    let keeper = Keeper::begin_on(disk.clone(), ring, keeping).map_err(|it| it.to_string())?;
+    let keeper = Keeper::begin(disk.clone(), ring, keeping).map_err(|it| it.to_string())?;
     let rotation = Rotation { bytes: Some(4_500), ..Rotation::default() };
-    let begun = Files::begin_on(disk, &ring.join("ring.mcap"), rotation, Some(Duration::ZERO));
+    let (output, sync) = (ring.join("ring.mcap"), Some(Duration::ZERO));
+    let begun = Files::begin(disk, &output, rotation, sync, Some(keeper));
     let mut files = begun.map_err(|it| it.to_string())?;
-    files.set_keeper(keeper);
-    files.sample(&sample(1_000_000)).map_err(|it| it.to_string())?;
+    files.write(Message::Sample(&sample(1_000_000))).map_err(|it| it.to_string())?;
     files.finish().map(|_| ()).map_err(|it| it.to_string())
 }
 
@@ -245,9 +246,9 @@ fn a_disk_that_keeps_bytes_or_names_of_recordings_back_is_noticed() {
 fn cut_recovery(neglect: Neglect) -> Option<String> {
     let folder = tempfile::tempdir().unwrap();
     let (from, to) = (folder.path().join("run.mcap"), folder.path().join("whole.mcap"));
-    let mut files = Files::begin(&from, Rotation::default()).unwrap();
+    let mut files = Files::begin(Arc::new(Disk), &from, Rotation::default(), None, None).unwrap();
     for sequence in 1..=200 {
-        files.sample(&sample(sequence)).unwrap();
+        files.write(Message::Sample(&sample(sequence))).unwrap();
     }
     files.finish().unwrap();
     let notes = LossyDisk::new(neglect);
@@ -338,11 +339,10 @@ fn whoever_records_does_not_wait_for_a_disk_that_stalls() {
     let disk = Arc::new(Stalled::default());
     let output = folder.path().join("run.mcap");
     let rotation = Rotation { bytes: Some(50_000), ..Rotation::default() };
-    let begun = Files::begin_on(disk.clone(), &output, rotation, Some(Duration::ZERO));
-    let mut files = begun.unwrap();
-    files.keep_house_in_parallel().unwrap();
+    let begun = Files::begin(disk.clone(), &output, rotation, Some(Duration::ZERO), None);
+    let mut files = begun.unwrap().keep_house_in_parallel().unwrap();
     for sequence in 1..=5000 {
-        files.sample(&sample(sequence)).unwrap();
+        files.write(Message::Sample(&sample(sequence))).unwrap();
         if sequence % 100 == 0 {
             files.flush().unwrap();
         }

@@ -2,7 +2,6 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use mqtt_protocol_core::mqtt::common::Cursor;
@@ -88,7 +87,7 @@ impl Broker {
         login: &Login,
         death: Message,
         commands: &str,
-        must_end: &AtomicBool,
+        must_end: &dyn Fn() -> bool,
     ) -> Result<Self, BrokerError> {
         let stream = reach(&login.address)?;
         stream.set_nodelay(true)?;
@@ -110,7 +109,7 @@ impl Broker {
         broker.flush()?;
         let begun = Instant::now();
         while !broker.is_accepted {
-            if begun.elapsed() >= PATIENCE || must_end.load(Ordering::Relaxed) {
+            if begun.elapsed() >= PATIENCE || must_end() {
                 return Err(BrokerError::Silent);
             }
             broker.receive(Duration::from_millis(100))?;

@@ -84,7 +84,7 @@ fn contains(heard: &[u8], wanted: &[u8]) -> bool {
 
 fn connect(login: &Login) -> Result<Broker, BrokerError> {
     let death = Message { topic: "death".into(), payload: b"gone".to_vec() };
-    Broker::connect(login, death, "commands", &AtomicBool::new(false))
+    Broker::connect(login, death, "commands", &|| false)
 }
 
 /// What becomes of a connection to a broker that answers with these bytes and closes.
@@ -127,7 +127,7 @@ fn a_broker_that_takes_the_connection_and_says_nothing_is_given_up() {
     let silent = connect(&login).map(|_| ()).unwrap_err();
     assert!(matches!(silent, BrokerError::Silent), "{silent}");
     let death = Message { topic: "death".into(), payload: Vec::new() };
-    let ended = Broker::connect(&login, death, "commands", &AtomicBool::new(true));
+    let ended = Broker::connect(&login, death, "commands", &|| true);
     assert!(matches!(ended.map(|_| ()), Err(BrokerError::Silent)), "an end is not waited for");
     drop(listener);
 }
@@ -226,7 +226,7 @@ fn while_a_broker_hangs_the_queue_stays_bounded_and_every_publication_is_account
         counts
     };
     std::thread::scope(|scope| {
-        scope.spawn(|| send(&settings, &known, &must_end));
+        scope.spawn(|| send(&settings, &known, &|| must_end.load(Ordering::Relaxed)));
         let _ended = Ended(&must_end);
         let (mut hanging, _) = client(&listener);
         hanging.write_all(ACCEPTED).unwrap();

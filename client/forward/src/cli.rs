@@ -10,7 +10,7 @@ use dynocar::dataset::read_text;
 use dynocar::ending;
 use dynocar::observing::Wanted;
 use dynocar::output::report_line;
-use dynocar_client::{ChannelError, Host};
+use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
 use crate::broker::Login;
@@ -76,10 +76,9 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         client: format!("dynocar-{}-{}", name.group, name.node),
         credentials: arguments.credentials.as_deref().map(credentials).transpose()?,
     };
-    let work = |error: ChannelError| Failure::Work(error.to_string());
     let settings = Settings {
         wanted: Wanted {
-            host: Host::from_environment().map_err(work)?,
+            host: Host::from_environment().map_err(Failure::work)?,
             trains: arguments.trains.iter().map(|&id| TrainId(id)).collect(),
         },
         login,
@@ -87,7 +86,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         every: Duration::from_millis(arguments.every_ms),
         queue: arguments.queue as usize,
     };
-    let must_end = ending::flag().map_err(|error| Failure::Work(error.to_string()))?;
+    let must_end = ending::flag().map_err(Failure::work)?;
     let counts = forward(&settings, &must_end);
     report_line(&format!(
         "dynocar forward: {} publications made: {} taken by the broker, {} dropped, {} not sent",

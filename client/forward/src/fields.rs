@@ -7,35 +7,21 @@
 use std::sync::LazyLock;
 
 use dynocar_client::Reading;
-use dynocar_shared::schema::{Field, snapshot_fields, unit_of};
+use dynocar_shared::schema::{Field, snapshot_fields};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Manoeuvre, MassSource, Parameter, Quantity, Reason, RejectionReason};
 
 use crate::payload::Value;
 
-/// The place of a metric among a pipeline's metrics.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct MetricIndex {
+/// What does not change about a metric of a pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MetricMeta {
     /// The folder within the pipeline's; empty for none.
     pub folder: &'static str,
     /// The name, with its unit.
     pub name: &'static str,
-}
-
-/// What does not change about a metric.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MetricMeta {
-    /// Where it is.
-    pub place: MetricIndex,
     /// Its meaning.
     pub meaning: &'static str,
-}
-
-impl MetricMeta {
-    /// The unit; empty for a count, words or a ratio.
-    pub fn unit(&self) -> &'static str {
-        unit_of(self.place.name)
-    }
 }
 
 /// Fields that words stand for, or that the metric's name says.
@@ -69,7 +55,7 @@ pub static NUMBERS: LazyLock<Vec<Field>> = LazyLock::new(|| {
 pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(MetricMeta, Value)) {
     let it = reading.snapshot;
     let mut put = |folder, name, meaning, value| {
-        give(MetricMeta { place: MetricIndex { folder, name }, meaning }, value);
+        give(MetricMeta { folder, name, meaning }, value);
     };
     let status = Value::words(reading.status().name());
     put("", "status", "What may be done with the estimate", status);
@@ -104,23 +90,24 @@ pub fn each_metric(reading: &Reading<'_>, now_ns: i64, mut give: impl FnMut(Metr
     }
     let suspect = EffectKind::from_number(it.suspected_effect).map_or("unknown", EffectKind::name);
     put("", "suspect", "Suspected effect that the model lacks", Value::words(suspect));
-    let others = it.alternatives().map(EffectKind::name).collect::<Vec<_>>().join(",");
     let meaning = "Other effects that these data hardly distinguish from it, with commas between";
-    put("", "suspect_alternatives", meaning, Value::words(others));
+    put("", "suspect_alternatives", meaning, listed(it.alternatives().map(EffectKind::name)));
     let source = it.mass_source().map_or("unknown", MassSource::name);
     put("", "mass_source", "Where the mass comes from", Value::words(source));
     let usable = Quantity::ALL.iter().filter(|quantity| it.is_usable_for(**quantity));
-    let usable = usable.map(|quantity| quantity.name()).collect::<Vec<_>>().join(",");
     let meaning = "Quantities whose values a controller may use, with commas between";
-    put("", "usable", meaning, Value::words(usable));
+    put("", "usable", meaning, listed(usable.map(|quantity| quantity.name())));
     let is_excited = |index: &usize| it.excited & (1 << index) != 0;
     let excited = (0..it.parameter_count as usize).filter(is_excited);
     let excited = excited.filter_map(|index| Parameter::from_number(it.parameters[index]));
-    let excited = excited.map(Parameter::full_name).collect::<Vec<_>>().join(",");
     let meaning = "Parameters that the data excited, with commas between";
-    put("", "excited", meaning, Value::words(excited));
+    put("", "excited", meaning, listed(excited.map(Parameter::full_name)));
     let missing = Manoeuvre::ALL.iter().filter(|a| it.missing_manoeuvres & a.bit() != 0);
-    let missing = missing.map(|a| a.name()).collect::<Vec<_>>().join(",");
     let meaning = "Manoeuvres that would show what the data do not, with commas between";
-    put("", "missing_manoeuvres", meaning, Value::words(missing));
+    put("", "missing_manoeuvres", meaning, listed(missing.map(|a| a.name())));
+}
+
+/// Names with commas between.
+fn listed(names: impl Iterator<Item = &'static str>) -> Value {
+    Value::words(names.collect::<Vec<_>>().join(","))
 }

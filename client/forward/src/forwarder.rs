@@ -1,7 +1,7 @@
 //! Connections to the broker one after the other, until asked to end.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use dynocar::observing::Wanted;
@@ -44,35 +44,21 @@ pub struct Settings {
 /// Forwards until the flag is set; gives what has become of the publications.
 pub fn forward(settings: &Settings, must_end: &AtomicBool) -> Counts {
     let known = Mutex::new(Known::new(settings.queue));
-    let is_all_made = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        scope.spawn(|| {
-            let reported = ReportAtEnd(&is_all_made);
-            watch(&settings.wanted, settings.every, &known, must_end);
-            // The farewell need not wait until many readers are closed.
-            drop(reported);
-        });
-        send(settings, &known, &is_all_made);
+        let watching = scope.spawn(|| watch(&settings.wanted, settings.every, &known, must_end));
+        // Sending ends after the last publication is made, however that ends.
+        send(settings, &known, &|| watching.is_finished());
     });
     locked(&known).queue.counts()
 }
 
-/// Sets its flag when its thread ends, however that ends: sending ends after the last publication is made.
-struct ReportAtEnd<'a>(&'a AtomicBool);
-
-impl Drop for ReportAtEnd<'_> {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-}
-
-/// Sends what is known over one connection after the other, until the flag is set and nothing waits.
-pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
+/// Sends what is known over one connection after the other, until it must end and nothing waits.
+pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &dyn Fn() -> bool) {
     let (mut attempts, mut connections) = (0, 0);
     let mut reported = String::new();
     let mut retry = RETRY[0];
     let mut drops = Drops::default();
-    while !must_end.load(Ordering::Relaxed) {
+    while !must_end() {
         let session = Session::new(&settings.name, attempts, connections + 1);
         attempts += 1;
         let commands = settings.name.topic("NCMD");
@@ -106,7 +92,7 @@ pub fn send(settings: &Settings, known: &Mutex<Known>, must_end: &AtomicBool) {
             reported = words;
         }
         let begun = Instant::now();
-        while begun.elapsed() < retry && !must_end.load(Ordering::Relaxed) {
+        while begun.elapsed() < retry && !must_end() {
             drops.report(locked(known).queue.counts());
             std::thread::sleep(PAUSE);
         }
@@ -156,7 +142,7 @@ impl<'a> Sending<'a> {
         mut self,
         every: Duration,
         drops: &mut Drops,
-        must_end: &AtomicBool,
+        must_end: &dyn Fn() -> bool,
     ) -> Result<(), BrokerError> {
         self.births()?;
         let mut own_due = Instant::now() + every;
@@ -185,7 +171,7 @@ impl<'a> Sending<'a> {
                     self.own_data()?;
                 }
             }
-            if must_end.load(Ordering::Relaxed) {
+            if must_end() {
                 let begun = *ending.get_or_insert_with(Instant::now);
                 let waiting = locked(self.known).queue.counts().waiting;
                 if waiting == 0 || begun.elapsed() >= FAREWELL {

@@ -150,21 +150,15 @@ impl Value {
         }
     }
 
-    fn datatype(&self) -> DataType {
+    /// Its type, and itself where it is there.
+    fn on_the_wire(&self) -> (DataType, Option<MetricValue>) {
         match self {
-            Value::Count(_) => DataType::UInt64,
-            Value::Number(_) => DataType::Double,
-            Value::Switch(_) => DataType::Boolean,
-            Value::Words(_) => DataType::String,
-        }
-    }
-
-    fn on_the_wire(&self) -> Option<MetricValue> {
-        match self {
-            Value::Count(count) => count.map(MetricValue::Long),
-            Value::Number(number) => number.map(MetricValue::Double),
-            Value::Switch(switch) => Some(MetricValue::Boolean(*switch)),
-            Value::Words(words) => words.as_ref().map(|it| MetricValue::Text(it.to_string())),
+            Value::Count(it) => (DataType::UInt64, it.map(MetricValue::Long)),
+            Value::Number(it) => (DataType::Double, it.map(MetricValue::Double)),
+            Value::Switch(it) => (DataType::Boolean, Some(MetricValue::Boolean(*it))),
+            Value::Words(it) => {
+                (DataType::String, it.as_ref().map(|it| MetricValue::Text(it.to_string())))
+            }
         }
     }
 
@@ -187,7 +181,7 @@ impl Value {
         };
         Metric {
             name: Some(name.into()),
-            datatype: Some(self.datatype() as u32),
+            datatype: Some(self.on_the_wire().0 as u32),
             metadata: text(meaning).map(|it| MetaData { description: Some(it) }),
             properties: text(unit).map(of_unit),
             alias,
@@ -197,7 +191,7 @@ impl Value {
 
     /// A metric of data: alias, time and value.
     pub fn changed(&self, alias: u64, ms: u64) -> Metric {
-        let value = self.on_the_wire();
+        let (_, value) = self.on_the_wire();
         Metric {
             alias: Some(alias),
             timestamp: Some(ms),

@@ -51,37 +51,28 @@ pub struct Counts {
 }
 
 /// The queue.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Queue {
     most: usize,
     waiting: VecDeque<Publication>,
     sent: VecDeque<Publication>,
-    made: u64,
-    taken: u64,
-    dropped: u64,
+    counts: Counts,
 }
 
 impl Queue {
     /// A queue of at most so many publications, at least 2.
     pub fn new(most: usize) -> Self {
-        Queue {
-            most: most.max(2),
-            waiting: VecDeque::new(),
-            sent: VecDeque::new(),
-            made: 0,
-            taken: 0,
-            dropped: 0,
-        }
+        Queue { most: most.max(2), ..Queue::default() }
     }
 
     /// Puts a publication at the end; gives the train of one that had to go.
     pub fn push(&mut self, publication: Publication) -> Option<TrainId> {
-        self.made += 1;
+        self.counts.made += 1;
         let is_full = self.waiting.len() + self.sent.len() >= self.most;
         // What is sent already may have been taken: of two that are not, the older goes.
         let oldest = if is_full { self.waiting.pop_front() } else { None };
         self.waiting.push_back(publication);
-        self.dropped += u64::from(oldest.is_some());
+        self.counts.dropped += u64::from(oldest.is_some());
         oldest.map(|it| it.train)
     }
 
@@ -102,7 +93,7 @@ impl Queue {
 
     /// The broker has taken all that was sent.
     pub fn take_note(&mut self) {
-        self.taken += self.sent.len() as u64;
+        self.counts.taken += self.sent.len() as u64;
         self.sent.clear();
     }
 
@@ -121,11 +112,6 @@ impl Queue {
 
     /// What has become of all.
     pub fn counts(&self) -> Counts {
-        Counts {
-            made: self.made,
-            taken: self.taken,
-            dropped: self.dropped,
-            waiting: (self.waiting.len() + self.sent.len()) as u64,
-        }
+        Counts { waiting: (self.waiting.len() + self.sent.len()) as u64, ..self.counts }
     }
 }

@@ -4,15 +4,18 @@ use std::collections::HashMap;
 
 use dynocar::operator::pipeline_name;
 use dynocar_client::Reading;
+use dynocar_shared::schema::unit_of;
 use dynocar_shared::{PipelineKind, Quantity, TrainId};
 use prost::Message;
 
-use crate::fields::{MetricIndex, MetricMeta, each_metric};
+use crate::fields::{MetricMeta, each_metric};
 use crate::payload::{Metric, Payload, Value};
 use crate::queue::Publication;
 
 /// Aliases of a train's metrics begin at its number among the node's trains times this.
 const ALIASES: u64 = 1 << 20;
+/// What is published of the last event, with its meaning.
+const EVENT: [(&str, &str); 2] = [("kind", "The last event"), ("text", "The last event in words")];
 /// Stands for the train in the place of a pipeline's number and kind.
 const OF_TRAIN: (u32, u32) = (u32::MAX, 0);
 
@@ -38,7 +41,8 @@ pub struct Train {
     pub is_alive: bool,
     first_alias: u64,
     slots: Vec<Slot>,
-    places: HashMap<((u32, u32), MetricIndex), usize>,
+    /// Places of the slots, by pipeline, folder and name.
+    places: HashMap<((u32, u32), &'static str, &'static str), usize>,
     round: u64,
     publications: u64,
     must_publish_all: bool,
@@ -58,8 +62,9 @@ impl Train {
             must_publish_all: true,
         };
         train.set_number(0);
-        train.set_of_train("event", "kind", "The last event", Value::Words(None), 0);
-        train.set_of_train("event", "text", "The last event in words", Value::Words(None), 0);
+        for (name, meaning) in EVENT {
+            train.set_of_train("event", name, meaning, Value::Words(None), 0);
+        }
         train
     }
 
@@ -90,7 +95,9 @@ impl Train {
             for &quantity in Quantity::ALL.iter().filter(|&&quantity| it.answers(quantity)) {
                 answers[quantity as usize] = Some((pipeline.0, it.pipeline_kind()));
             }
-            each_metric(&reading, now_ns, |meta, value| self.set(pipeline, meta, value, now_ms));
+            each_metric(&reading, now_ns, |meta, value| {
+                self.set(pipeline, meta, value, now_ms);
+            });
         }
         for &quantity in Quantity::ALL {
             let answer: Option<(u32, Option<PipelineKind>)> = answers[quantity as usize];
@@ -115,31 +122,44 @@ impl Train {
         meaning: &'static str,
         value: Value,
         now_ms: u64,
-    ) {
-        let meta = MetricMeta { place: MetricIndex { folder, name }, meaning };
-        self.set(OF_TRAIN, meta, value, now_ms);
+    ) -> &mut Slot {
+        self.set(OF_TRAIN, MetricMeta { folder, name, meaning }, value, now_ms)
     }
 
-    fn set(&mut self, pipeline: (u32, u32), meta: MetricMeta, value: Value, now_ms: u64) {
-        let round = if pipeline == OF_TRAIN { 0 } else { self.round };
-        if let Some(&place) = self.places.get(&(pipeline, meta.place)) {
-            let slot = &mut self.slots[place];
-            slot.round = round;
-            if slot.value != value {
-                (slot.value, slot.taken_ms, slot.is_changed) = (value, now_ms, true);
+    fn set(
+        &mut self,
+        pipeline: (u32, u32),
+        meta: MetricMeta,
+        value: Value,
+        now_ms: u64,
+    ) -> &mut Slot {
+        let place = (pipeline, meta.folder, meta.name);
+        let index = *self.places.entry(place).or_insert(self.slots.len());
+        if index == self.slots.len() {
+            let mut name = String::new();
+            if pipeline != OF_TRAIN {
+                name = pipeline_name(pipeline.0, PipelineKind::from_number(pipeline.1)) + "/";
             }
-            return;
+            if !meta.folder.is_empty() {
+                name = name + meta.folder + "/";
+            }
+            name += meta.name;
+            let value = value.clone();
+            self.slots.push(Slot {
+                name,
+                meta,
+                value,
+                taken_ms: now_ms,
+                is_changed: true,
+                round: 0,
+            });
         }
-        let mut name = String::new();
-        if pipeline != OF_TRAIN {
-            name = pipeline_name(pipeline.0, PipelineKind::from_number(pipeline.1)) + "/";
+        let slot = &mut self.slots[index];
+        slot.round = if pipeline == OF_TRAIN { 0 } else { self.round };
+        if slot.value != value {
+            (slot.value, slot.taken_ms, slot.is_changed) = (value, now_ms, true);
         }
-        for part in [meta.place.folder, "/"].iter().filter(|_| !meta.place.folder.is_empty()) {
-            name += part;
-        }
-        name += meta.place.name;
-        self.places.insert((pipeline, meta.place), self.slots.len());
-        self.slots.push(Slot { name, meta, value, taken_ms: now_ms, is_changed: true, round });
+        slot
     }
 
     fn set_number(&mut self, now_ms: u64) {
@@ -174,13 +194,12 @@ impl Train {
 
     /// A publication of an event, with what has changed.
     pub fn event(&mut self, kind: &'static str, text: String, now_ms: u64) -> Option<Publication> {
-        for (name, value) in [("kind", Value::words(kind)), ("text", Value::words(text))] {
-            let place = MetricIndex { folder: "event", name };
-            let slot = self.places.get(&(OF_TRAIN, place)).copied();
-            if let Some(slot) = slot.and_then(|it| self.slots.get_mut(it)) {
-                // An event like the last is one all the same.
-                (slot.value, slot.taken_ms, slot.is_changed) = (value, now_ms, true);
-            }
+        for ((name, meaning), value) in
+            EVENT.into_iter().zip([Value::words(kind), Value::words(text)])
+        {
+            let slot = self.set_of_train("event", name, meaning, value, now_ms);
+            // An event like the last is one all the same.
+            (slot.taken_ms, slot.is_changed) = (now_ms, true);
         }
         self.publication(now_ms)
     }
@@ -193,7 +212,7 @@ impl Train {
     /// Every metric as it is now, with its name, type, unit and meaning.
     pub fn born(&self) -> Vec<Metric> {
         let metric = |(index, slot): (usize, &Slot)| {
-            let (unit, meaning) = (slot.meta.unit(), slot.meta.meaning);
+            let (unit, meaning) = (unit_of(slot.meta.name), slot.meta.meaning);
             let alias = Some(self.first_alias + index as u64);
             slot.value.born(&slot.name, alias, unit, meaning, slot.taken_ms)
         };

@@ -48,6 +48,6 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
         samples_hz: arguments.samples_hz,
         address: SocketAddr::new(arguments.host, arguments.port),
     };
-    let stop = ending::flag().map_err(|error| Failure::Work(error.to_string()))?;
-    live(&settings, &stop).map_err(|error| Failure::Work(error.to_string()))
+    let stop = ending::flag().map_err(Failure::work)?;
+    live(&settings, &stop).map_err(Failure::work)
 }

@@ -5,13 +5,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use dynocar::output::report_line;
 use dynocar_client::ChannelError;
-use dynocar_recording::codec::{encode_event, encode_sample, encode_snapshot};
-use dynocar_recording::event::{Event, EventKind};
+use dynocar_recording::event::EventKind;
 use dynocar_recording::schema::DESCRIPTORS;
-use dynocar_recording::topic::{ENCODING, LAYOUT, Topic};
+use dynocar_recording::topic::{ENCODING, LAYOUT, Message, Topic};
 use dynocar_recording::train_channels::Sink;
 use dynocar_recording::writing::WallClock;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use foxglove::websocket::{ChannelView, Client, ServerListener};
 use foxglove::{ChannelId, Context, PartialMetadata, RawChannel, Schema};
 
@@ -44,17 +42,6 @@ pub enum LiveError {
     },
 }
 
-/// What is written: by whom, and what.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum Key {
-    /// By the controller of a train.
-    Samples(u64),
-    /// By a daemon of a train: pipeline's number and kind.
-    Snapshots(u64, u32, u32),
-    /// By ourselves.
-    Events,
-}
-
 /// The newest snapshot of a channel, for viewers that come later.
 struct Newest {
     channel: Arc<RawChannel>,
@@ -67,7 +54,7 @@ type Snapshots = Arc<Mutex<HashMap<ChannelId, Newest>>>;
 /// What goes to viewers.
 pub struct Viewers {
     context: Arc<Context>,
-    channels: HashMap<Key, Arc<RawChannel>>,
+    channels: HashMap<Topic, Arc<RawChannel>>,
     newest: Snapshots,
     samples_hz: u32,
     thinnings: HashMap<u64, Thinning>,
@@ -91,7 +78,7 @@ impl Viewers {
             clock: WallClock::now(),
             message: Vec::with_capacity(2048),
         };
-        viewers.channel(Key::Events, Topic::of_events)?;
+        viewers.channel(Topic::Events)?;
         Ok(viewers)
     }
 
@@ -110,37 +97,29 @@ impl Viewers {
         self.clock = WallClock::now();
     }
 
-    fn channel(
-        &mut self,
-        key: Key,
-        topic: impl FnOnce() -> Topic,
-    ) -> Result<Arc<RawChannel>, LiveError> {
-        if let Some(known) = self.channels.get(&key) {
+    fn channel(&mut self, topic: Topic) -> Result<Arc<RawChannel>, LiveError> {
+        if let Some(known) = self.channels.get(&topic) {
             return Ok(Arc::clone(known));
         }
-        let topic = topic();
+        let (name, (schema, layout)) = (topic.name(), topic.schema_and_layout());
         let channel = self
             .context
-            .channel_builder(topic.name.as_str())
+            .channel_builder(name.as_str())
             .message_encoding(ENCODING)
-            .schema(Schema::new(topic.schema, ENCODING, DESCRIPTORS.as_slice()))
-            .add_metadata(LAYOUT, topic.layout)
+            .schema(Schema::new(schema, ENCODING, DESCRIPTORS.as_slice()))
+            .add_metadata(LAYOUT, layout)
             .build_raw()
-            .map_err(|error| LiveError::Topic { topic: topic.name, problem: error.to_string() })?;
-        self.channels.insert(key, Arc::clone(&channel));
+            .map_err(|error| LiveError::Topic { topic: name, problem: error.to_string() })?;
+        self.channels.insert(topic, Arc::clone(&channel));
         Ok(channel)
     }
 
     /// Withdraws the channels that one wrote who is gone.
-    fn close(&mut self, is_gone: impl Fn(&Key) -> bool) {
+    fn close(&mut self, is_gone: impl Fn(&Topic) -> bool) {
         for (_, channel) in self.channels.extract_if(|key, _| is_gone(key)) {
             locked(&self.newest).remove(&channel.id());
             channel.close();
         }
-    }
-
-    fn at(&self, monotonic_ns: i64) -> PartialMetadata {
-        PartialMetadata::with_log_time(self.clock.wall_ns(monotonic_ns))
     }
 }
 
@@ -152,47 +131,37 @@ fn locked<T>(of: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 impl Sink for Viewers {
     type Error = LiveError;
 
-    fn sample(&mut self, sample: &TrainSample) -> Result<(), LiveError> {
-        let train = sample.train_id;
-        let new = || Thinning::to(self.samples_hz);
-        let thinning = self.thinnings.entry(train).or_insert_with(new);
-        if !thinning.lets_through(sample.published_ns) {
-            return Ok(());
-        }
-        let channel = self.channel(Key::Samples(train), || Topic::of_samples(TrainId(train)))?;
-        self.message.clear();
-        encode_sample(sample, &mut self.message);
-        channel.log_with_meta(&self.message, self.at(sample.published_ns));
-        Ok(())
-    }
-
-    fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), LiveError> {
-        let (train, index) = (snapshot.train_id, snapshot.pipeline_index);
-        let key = Key::Snapshots(train, index, snapshot.pipeline_kind);
-        let topic = || Topic::of_snapshots(TrainId(train), index, snapshot.pipeline_kind());
-        let channel = self.channel(key, topic)?;
-        let mut message = Vec::with_capacity(2048);
-        encode_snapshot(snapshot, &mut message);
-        let log_time = self.clock.wall_ns(snapshot.published_ns);
-        // Who subscribes meanwhile gets this one once, and none that is older after it.
-        let mut newest = locked(&self.newest);
-        channel.log_with_meta(&message, PartialMetadata::with_log_time(log_time));
-        newest.insert(channel.id(), Newest { channel, message, log_time });
-        Ok(())
-    }
-
-    fn event(&mut self, event: &Event) -> Result<(), LiveError> {
-        let train = event.train_id;
-        let channel = self.channel(Key::Events, Topic::of_events)?;
-        self.message.clear();
-        encode_event(event, &mut self.message);
-        channel.log_with_meta(&self.message, self.at(event.monotonic_ns));
-        match event.kind() {
-            EventKind::ControllerGone => self.close(|key| *key == Key::Samples(train)),
-            EventKind::DaemonGone => {
-                self.close(|key| matches!(key, Key::Snapshots(of, _, _) if *of == train));
+    fn take(&mut self, message: Message<'_>) -> Result<(), LiveError> {
+        if let Message::Sample(it) = message {
+            let new = || Thinning::to(self.samples_hz);
+            let thinning = self.thinnings.entry(it.train_id).or_insert_with(new);
+            if !thinning.lets_through(it.published_ns) {
+                return Ok(());
             }
-            _ => {}
+        }
+        let channel = self.channel(message.topic())?;
+        self.message.clear();
+        message.encode(&mut self.message);
+        let log_time = self.clock.wall_ns(message.number_and_time_ns().1);
+        let logged = PartialMetadata::with_log_time(log_time);
+        if !matches!(message, Message::Snapshot(_)) {
+            channel.log_with_meta(&self.message, logged);
+        } else {
+            // Who subscribes meanwhile gets this one once, and none that is older after it.
+            let mut newest = locked(&self.newest);
+            channel.log_with_meta(&self.message, logged);
+            let message = self.message.clone();
+            newest.insert(channel.id(), Newest { channel, message, log_time });
+        }
+        if let Message::Event(event) = message {
+            let train = event.train_id;
+            match event.kind() {
+                EventKind::ControllerGone => self.close(|it| *it == Topic::Samples(train)),
+                EventKind::DaemonGone => {
+                    self.close(|it| matches!(it, Topic::Snapshots(of, _, _) if *of == train));
+                }
+                _ => {}
+            }
         }
         Ok(())
     }

@@ -5,7 +5,6 @@ use std::io::BufWriter;
 use std::path::Path;
 
 use dynocar::storage::{Disk, settle};
-use dynocar_recording::columns::Row;
 use dynocar_recording::error::WriteError;
 use dynocar_recording::writing::{McapError, RecordingWriter};
 
@@ -37,11 +36,7 @@ fn write(content: &Content, file: File) -> Result<(), McapError> {
     }
     for message in &content.messages {
         writer.log_next_at(message.log_time);
-        match &message.row {
-            Row::Sample(it) => writer.sample(it, 0)?,
-            Row::Snapshot(it) => writer.snapshot(it)?,
-            Row::Event(it) => writer.event(it)?,
-        }
+        writer.write(message.row.message())?;
     }
     writer.finish()?.into_inner().map_err(|error| error.into_error())?;
     Ok(())

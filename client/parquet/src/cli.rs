@@ -11,13 +11,10 @@ use clap::{Args, Parser, Subcommand};
 use dynocar::cli::{Failure, carry_out};
 use dynocar::output::{OutputError, report_line, require_new};
 use dynocar::programs::{PARQUET, called_as};
-use dynocar_recording::cli::{
-    ConvertArguments, VerifyArguments, copy_failure, dataset_failure, from_dataset_failure,
-};
+use dynocar_recording::cli::{ConvertArguments, VerifyArguments};
 use dynocar_recording::convert::{from_dataset, unpack};
 
 use crate::back::write_mcap;
-use crate::error::TableError;
 use crate::numbers::{Wanted, send_columns};
 use crate::reading::{Content, read};
 use crate::writing::{Written, write_folder};
@@ -77,15 +74,14 @@ fn convert(arguments: &ConvertArguments) -> Result<(), Failure> {
     }
     let content = one(from)?;
     if output.extension().is_some_and(|it| it == "mcap") {
-        write_mcap(&content, output).map_err(|error| Failure::Work(error.to_string()))?;
+        write_mcap(&content, output).map_err(Failure::work)?;
         if !arguments.quiet {
             report_line(&format!("{}: {} messages", output.display(), content.messages.len()));
         }
         return Ok(());
     }
     let recording = content.into_recording();
-    let unpacked = unpack(&from[0], recording, output, *train, &arguments.model_files());
-    arguments.report(&unpacked.map_err(dataset_failure)?);
+    arguments.report(&unpack(&from[0], recording, output, *train, &arguments.model_files())?);
     Ok(())
 }
 
@@ -95,11 +91,7 @@ fn one(paths: &[PathBuf]) -> Result<Content, Failure> {
         let words = "expected one recording in Parquet";
         return Err(Failure::Input(format!("{}: {words}", paths[0].display())));
     };
-    read(path).map_err(table_failure)
-}
-
-fn table_failure(error: TableError) -> Failure {
-    Failure::Input(error.to_string())
+    read(path).map_err(Failure::input)
 }
 
 fn to_parquet(arguments: &ConvertArguments) -> Result<(), Failure> {
@@ -111,14 +103,13 @@ fn to_parquet(arguments: &ConvertArguments) -> Result<(), Failure> {
         None => write_folder(from, output),
         Some(dataset) => {
             // A dataset becomes what a controller would have had recorded.
-            let place = tempfile::tempdir().map_err(|error| Failure::Work(error.to_string()))?;
+            let place = tempfile::tempdir().map_err(Failure::work)?;
             let recording = place.path().join("dataset.mcap");
-            from_dataset(dataset, &recording).map_err(from_dataset_failure)?;
+            from_dataset(dataset, &recording)?;
             write_folder(&[recording], output)
         }
     };
-    let written = written.map_err(copy_failure)?;
-    let Written { samples, snapshots, events, left_out, broken } = written;
+    let Written { samples, snapshots, events, left_out, broken } = written?;
     for it in broken {
         report_line(&format!("{}: {it}; `dynocar recover` makes it whole", called_as(PARQUET)));
     }

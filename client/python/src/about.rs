@@ -24,7 +24,7 @@ pub(crate) fn daemon_state(
     root: Option<PathBuf>,
 ) -> PyResult<(i32, String)> {
     let looked_up = py.detach(move || {
-        let host = root.map_or_else(Host::from_environment, |root| Host::at(&root))?;
+        let host = Host::of(root.as_deref())?;
         state_of_daemon(&host, TrainId(train_id))
     });
     let (state, words) = looked_up.map_err(|error| of_channel(py, &error))?;

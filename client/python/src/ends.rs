@@ -76,7 +76,7 @@ impl<E: End> Handle<E> {
         let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
         let opened: Result<(), ChannelError> = py.detach(move || {
             close_what_this_thread_dropped();
-            let host = root.map_or_else(Host::from_environment, |root| Host::at(&root))?;
+            let host = Host::of(root.as_deref())?;
             let end = make(&host, TrainId(train_id))?;
             E::of_this_thread().with_borrow_mut(|ends| ends.insert(number, end));
             Ok(())

@@ -66,9 +66,7 @@ impl Explained {
     /// Names and SVG of the report's plots.
     fn plots(&self, py: Python<'_>) -> PyResult<Vec<(String, String)>> {
         let drawn = py.detach(|| images(&self.dataset, &self.explanation));
-        let drawn =
-            drawn.map_err(|error| of_failure(py, &Failure::Work(error.to_string())))?.into_iter();
-        Ok(drawn.map(|image| (image.name, image.svg)).collect())
+        drawn.map_err(|error| of_failure(py, &Failure::work(error)))
     }
 
     /// Speeds that the updated model predicts, by run.

@@ -72,9 +72,9 @@ pub(crate) fn identify(
     traction_only: bool,
 ) -> PyResult<JsonAndText> {
     let answer = in_background(py, None, move |_| {
-        let asked = identifying::Asked::of(all, &names)?;
-        let question = identifying::Question { dataset: &path, asked, per_run, traction_only };
-        let answer = identifying::answer(question)?;
+        let (dataset, estimator) = (path, names);
+        let question = identifying::Question { dataset, estimator, all, per_run, traction_only };
+        let answer = identifying::answer(&question)?;
         Ok((json(&answer)?, identifying::text(&answer)))
     })?;
     answer.map_err(|failure: Failure| of_failure(py, &failure))

@@ -16,15 +16,12 @@ use dynocar::programs::{RECORDING, called_as};
 
 use crate::convert::{ModelFiles, Unpacked, from_dataset, to_dataset};
 use crate::copying::recover;
-use crate::error::{AtPath, CopyError};
+use crate::error::CopyError;
 use crate::page::page;
 use crate::reading::Ending;
 use crate::recording::Recording;
-use crate::verify::{
-    ConfigurationProblem, Configurations, Outcome, overlay, overlay_text, text, verify,
-};
+use crate::verify::{Configurations, Outcome, overlay, text, verify};
 
-pub use failure::{copy_failure, dataset_failure, from_dataset_failure};
 pub use record::WantedArguments;
 
 /// Recordings of what a controller and the daemon write, as MCAP.
@@ -161,7 +158,7 @@ pub fn main() -> ExitCode {
 
 fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
     require_new(&arguments.output)?;
-    let recovered = recover(&arguments.broken, &arguments.output).map_err(copy_failure)?;
+    let recovered = recover(&arguments.broken, &arguments.output)?;
     let lost: Vec<String> =
         arguments.broken.iter().zip(&recovered.endings).filter_map(lost).collect();
     let lost =
@@ -192,24 +189,18 @@ fn execute_convert(arguments: &ConvertArguments) -> Result<(), Failure> {
         if from.len() > 1 {
             return Err(Failure::Input(format!("{}: expected no file beside", dataset.display())));
         }
-        return execute_from_dataset(dataset, output, *quiet);
+        let samples = from_dataset(dataset, output)?;
+        if !quiet {
+            report_line(&format!("{}: {samples} samples", output.display()));
+        }
+        return Ok(());
     }
-    let unpacked = to_dataset(from, output, *train, &arguments.model_files());
-    arguments.report(&unpacked.map_err(dataset_failure)?);
-    Ok(())
-}
-
-fn execute_from_dataset(from: &Path, output: &Path, is_quiet: bool) -> Result<(), Failure> {
-    let samples = from_dataset(from, output).map_err(from_dataset_failure)?;
-    if !is_quiet {
-        report_line(&format!("{}: {samples} samples", output.display()));
-    }
+    arguments.report(&to_dataset(from, output, *train, &arguments.model_files())?);
     Ok(())
 }
 
 fn execute_verify(arguments: &VerifyArguments) -> Result<(), Failure> {
-    let loaded = Recording::load_all(&arguments.recording).map_err(CopyError::from);
-    arguments.verify(&loaded.map_err(copy_failure)?)
+    arguments.verify(&Recording::load_all(&arguments.recording).map_err(CopyError::from)?)
 }
 
 impl VerifyArguments {
@@ -220,16 +211,16 @@ impl VerifyArguments {
     /// When it holds none, there is nothing to compute them by, or one is another.
     pub fn verify(&self, recording: &Recording) -> Result<(), Failure> {
         let path = &self.recording[0];
-        let wrong = |error: &dyn std::fmt::Display| Failure::Input(error.to_string());
         if let Some(broken) = &recording.broken {
             report_line(&format!("{}: {broken}", program()));
         }
         if recording.snapshots.is_empty() {
-            return Err(wrong(&format!("{}: no snapshots: nothing to verify", path.display())));
+            let words = "no snapshots: nothing to verify";
+            return Err(Failure::Input(format!("{}: {words}", path.display())));
         }
-        let configurations = Configurations::of(recording).map_err(AtPath::of(path));
+        let configurations = Configurations::of(recording);
         let configurations =
-            configurations.map_err(|it: AtPath<ConfigurationProblem>| wrong(&it))?;
+            configurations.map_err(|it| Failure::Input(format!("{}: {it}", path.display())))?;
         let other = self.with.as_deref().map(DaemonConfig::load).transpose()?;
         let verified = verify(recording, &configurations);
         let (samples, snapshots) = (recording.samples.len(), recording.snapshots.len());
@@ -239,9 +230,8 @@ impl VerifyArguments {
         print(&text(&verified))?;
         if let (Some(other), Some(file)) = (&other, &self.with) {
             let newest = verified.last().map_or(0, |it| it.epoch);
-            let recorded = overlay(configurations.of_epoch(newest).0, &recording.samples);
-            let answers = overlay(other, &recording.samples);
-            print(&overlay_text(&recorded, &answers, &file.display().to_string()))?;
+            let recorded = configurations.of_epoch(newest).0;
+            print(&overlay([recorded, other], &recording.samples, &file.display().to_string()))?;
         }
         if verified.iter().all(|it| it.outcome == Outcome::Same) {
             Ok(())

@@ -7,18 +7,15 @@
 use dynocar_shared::layout::Words;
 use dynocar_shared::schema::{Field, Missing};
 use dynocar_shared::snapshot::PARAMETERS_MAX;
-use dynocar_shared::{
-    HALF_95, Parameter, ParameterSnapshot, RejectionReason, TrainId, TrainSample,
-};
+use dynocar_shared::{Parameter, ParameterSnapshot, RejectionReason, TrainId, TrainSample};
+use prost::DecodeError;
 use prost::encoding::{
     DecodeContext, WireType, decode_key, decode_varint, encode_key, encode_varint, skip_field,
 };
-use prost::{DecodeError, Message};
 
-use crate::event::Event;
 use crate::schema::{
-    ESTIMATE, HIGH_OFFSET, LOW_OFFSET, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, STD_OFFSET,
-    number, parameter_number, rejection_number,
+    ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, number, parameter_number,
+    rejection_number,
 };
 
 /// Why bytes are no message of ours.
@@ -79,9 +76,9 @@ pub fn encode_snapshot(snapshot: &ParameterSnapshot, out: &mut Vec<u8>) {
             let (number, value) = (parameter_number(parameter), snapshot.values[index]);
             let std = snapshot.covariance_at(index, index).max(0.0).sqrt();
             put_double(number, value, out);
-            put_double(number + STD_OFFSET, std, out);
-            put_double(number + LOW_OFFSET, value - HALF_95 * std, out);
-            put_double(number + HIGH_OFFSET, value + HALF_95 * std, out);
+            for (offset, .., of) in SUFFIXES {
+                put_double(number + offset, of(value, std), out);
+            }
         }
     });
     put_nested(REJECTED, out, |out| {
@@ -93,12 +90,6 @@ pub fn encode_snapshot(snapshot: &ParameterSnapshot, out: &mut Vec<u8>) {
             }
         }
     });
-}
-
-/// Appends an event's message.
-pub fn encode_event(event: &Event, out: &mut Vec<u8>) {
-    // A vector takes any length.
-    let _ = event.encode(out);
 }
 
 /// Reads a sample's message.

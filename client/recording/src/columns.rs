@@ -6,7 +6,7 @@
 use std::sync::LazyLock;
 
 use dynocar_shared::schema::{Field, Missing, unit_of};
-use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot, RejectionReason, TrainSample};
+use dynocar_shared::{Parameter, ParameterSnapshot, RejectionReason, TrainSample};
 
 use crate::event::Event;
 use crate::message::MessageField;
@@ -14,6 +14,7 @@ use crate::schema::{
     SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, members_of, suffixed_name, vocabulary_of,
     vocabulary_of_type,
 };
+use crate::topic::Message;
 
 /// Where a column's values come from.
 #[derive(Clone, Copy, Debug)]
@@ -76,10 +77,11 @@ pub static SNAPSHOTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
     let parameters = Parameter::ALL.iter().flat_map(|&it| {
         let name = format!("estimate_{}", it.full_name());
         let value = plain(name, "f64", it.meaning(), Source::Value(it));
-        let suffixed = SUFFIXES.into_iter().enumerate().map(move |(index, (_, word, meaning))| {
-            let name = format!("estimate_{}", suffixed_name(it, word));
-            plain(name, "f64", meaning, Source::OfEstimate(it, index))
-        });
+        let suffixed =
+            SUFFIXES.into_iter().enumerate().map(move |(index, (_, word, meaning, _))| {
+                let name = format!("estimate_{}", suffixed_name(it, word));
+                plain(name, "f64", meaning, Source::OfEstimate(it, index))
+            });
         std::iter::once(value).chain(suffixed).map(nullable)
     });
     let rejected = RejectionReason::ALL.iter().map(|&it| {
@@ -181,6 +183,15 @@ impl Column {
 }
 
 impl Row {
+    /// The same for whoever writes messages.
+    pub fn message(&self) -> Message<'_> {
+        match self {
+            Row::Sample(it) => Message::Sample(it),
+            Row::Snapshot(it) => Message::Snapshot(it),
+            Row::Event(it) => Message::Event(it),
+        }
+    }
+
     /// Appends the words of a column that is neither text nor a stamp; gives false where the value is
     /// missing, and then appends as many zeros.
     pub fn put_words(&self, column: &Column, words: &mut Vec<u64>) -> bool {
@@ -203,12 +214,8 @@ impl Row {
             }
             (Row::Snapshot(it), Source::Value(of)) => one(words, it.value(of).map(f64::to_bits)),
             (Row::Snapshot(it), Source::OfEstimate(of, index)) => {
-                let estimate = it.value(of).zip(it.std(of)).map(|(value, std)| match index {
-                    0 => std,
-                    1 => value - HALF_95 * std,
-                    _ => value + HALF_95 * std,
-                });
-                one(words, estimate.map(f64::to_bits))
+                let estimate = it.value(of).zip(it.std(of));
+                one(words, estimate.map(|(value, std)| SUFFIXES[index].3(value, std).to_bits()))
             }
             (Row::Snapshot(it), Source::Rejected(of)) => one(words, Some(it.rejected(of).into())),
             (Row::Event(it), Source::Event(index)) => one(words, it.word(index)),

@@ -12,7 +12,7 @@
 //! - [`codec`]: samples and snapshots as messages, and back, to the bit
 //! - [`event`]: what happens around them
 //! - [`message`]: messages that are declared once
-//! - [`topic`]: the streams of messages
+//! - [`topic`]: the streams of messages, and the messages
 //! - [`train_channels`]: what a recorder and a live view read of the trains' channels
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`joining`]: the files of a recording that rotated, read as one

@@ -12,7 +12,7 @@ use crate::event::{Event, EventKind};
 use crate::message::MessageField;
 use crate::schema::{
     ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, number, parameter_number,
-    rejection_number, vocabulary_of_type,
+    rejection_number, scalar, vocabulary_of_type,
 };
 
 const HEAD: &str = "# Fields of a recording
@@ -58,7 +58,7 @@ pub fn page() -> String {
             "What a pipeline estimates, each missing unless the pipeline estimates it; columns of the \
              snapshots, under `estimate_` and the name. Each has three more, with a word before the unit and \
              their number higher by so much: {}.",
-            SUFFIXES.map(|(offset, word, _)| format!("`_{word}` {offset}")).join(", ")
+            SUFFIXES.map(|(offset, word, ..)| format!("`_{word}` {offset}")).join(", ")
         ),
         PARQUET,
     );
@@ -109,7 +109,7 @@ fn listed(page: &mut String, name: &str, what: &str, fields: &[MessageField], co
     let shown = if columns.is_empty() { 0 } else { PARQUET };
     table(page, &format!("dynocar.{name}"), &plain(what), shown);
     for (index, it) in fields.iter().enumerate() {
-        let of_type = vocabulary_of_type(it.type_name).unwrap_or_else(|| protobuf(it.type_name));
+        let of_type = &type_of(vocabulary_of_type(it.type_name), it.type_name);
         let (number, unit) = (it.number, unit_of(it.name));
         let row = match columns.get(index) {
             Some(column) => Row::of(column, number, of_type),
@@ -162,15 +162,10 @@ fn plain(meaning: &str) -> String {
         .replace("`]", "`")
 }
 
-fn protobuf(type_name: &str) -> &'static str {
-    match type_name {
-        "f64" => "double",
-        "i64" => "int64",
-        "i8" => "int32",
-        "u64" => "uint64",
-        "string" => "string",
-        _ => "uint32",
-    }
+/// The vocabulary, or else protobuf's name of a Rust type.
+fn type_of(vocabulary: Option<&str>, type_name: &str) -> String {
+    let scalar = || scalar(type_name).as_str_name().trim_start_matches("TYPE_").to_lowercase();
+    vocabulary.map_or_else(scalar, str::to_owned)
 }
 
 fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field], &[Column])) {
@@ -183,9 +178,8 @@ fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field
             row.put(page, ALL, &format!("{} Elsewhere a value is there or not.", field.meaning));
             continue;
         };
-        let of_type = column.vocabulary.unwrap_or_else(|| protobuf(field.entry_type()));
-        let of_type =
-            if field.is_array() { format!("repeated {of_type}") } else { of_type.to_owned() };
+        let of_type = type_of(column.vocabulary, field.entry_type());
+        let of_type = if field.is_array() { format!("repeated {of_type}") } else { of_type };
         let missing = if column.is_nullable { " Missing unless measured." } else { "" };
         let row = Row::of(column, number(field), &of_type);
         Row { numpy, ..row }.put(page, ALL, &format!("{}{missing}", field.meaning));

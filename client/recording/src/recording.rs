@@ -1,5 +1,6 @@
 //! A recording in memory.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use dynocar_shared::{ParameterSnapshot, TrainSample};
@@ -92,9 +93,11 @@ impl Recording {
 
     /// The trains that there are samples of, in order.
     pub fn trains(&self) -> Vec<u64> {
-        let mut trains: Vec<u64> = self.samples.iter().map(|it| it.train_id).collect();
-        trains.sort_unstable();
-        trains.dedup();
-        trains
+        trains_of(self.samples.iter().map(|it| it.train_id))
     }
+}
+
+/// The trains of samples, in order, each once.
+pub fn trains_of(samples: impl Iterator<Item = u64>) -> Vec<u64> {
+    samples.collect::<BTreeSet<u64>>().into_iter().collect()
 }

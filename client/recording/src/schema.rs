@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 use dynocar_shared::schema::{Field, Missing, sample_fields, snapshot_fields, unit_end};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{Parameter, PipelineKind, Reason, RejectionReason, Status};
+use dynocar_shared::{HALF_95, Parameter, PipelineKind, Reason, RejectionReason, Status};
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
 use prost_types::{
@@ -31,12 +31,6 @@ pub const EVENT: &str = "dynocar.Event";
 pub const ESTIMATE: u32 = 101;
 /// Number of the field `rejected` of a snapshot: how many samples were refused, by name.
 pub const REJECTED: u32 = 102;
-/// A standard deviation's number in `estimate` is so much greater than the parameter's.
-pub const STD_OFFSET: u32 = 100;
-/// The lower end of its 95 % interval has a number that is so much greater.
-pub const LOW_OFFSET: u32 = 200;
-/// The upper end of its 95 % interval has a number that is so much greater.
-pub const HIGH_OFFSET: u32 = 300;
 /// The fields of a sample, in order.
 pub static SAMPLE_FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| sample_fields().collect());
 /// The fields of a snapshot, in order.
@@ -51,17 +45,20 @@ pub fn number(field: &Field) -> u32 {
 }
 
 /// The number of a parameter's value in `estimate`; those of its standard deviation and of the ends
-/// of its 95 % interval are greater by [`STD_OFFSET`], [`LOW_OFFSET`] and [`HIGH_OFFSET`].
+/// of its 95 % interval are greater, see [`SUFFIXES`].
 pub fn parameter_number(parameter: Parameter) -> u32 {
     parameter as u32
 }
 
+/// What is said of a parameter in addition to its value, of value and standard deviation.
+pub type OfEstimate = fn(f64, f64) -> f64;
+
 /// What `estimate` says of a parameter in addition to its value: how much greater its number is, the word in
-/// its name, and what it is.
-pub const SUFFIXES: [(u32, &str, &str); 3] = [
-    (STD_OFFSET, "std", "Its standard deviation."),
-    (LOW_OFFSET, "low", "The lower end of its 95 % interval."),
-    (HIGH_OFFSET, "high", "The upper end of its 95 % interval."),
+/// its name, what it is, and its value.
+pub const SUFFIXES: [(u32, &str, &str, OfEstimate); 3] = [
+    (100, "std", "Its standard deviation.", |_, std| std),
+    (200, "low", "The lower end of its 95 % interval.", |value, std| value - HALF_95 * std),
+    (300, "high", "The upper end of its 95 % interval.", |value, std| value + HALF_95 * std),
 ];
 
 /// The name of what is said of a parameter in addition to its value: the unit stays last.
@@ -140,7 +137,8 @@ fn typed(mut field: FieldDescriptorProto, of_type: Type, name: &str) -> FieldDes
     field
 }
 
-fn scalar(type_name: &str) -> Type {
+/// The protobuf type of a Rust type.
+pub(crate) fn scalar(type_name: &str) -> Type {
     match type_name {
         "f64" => Type::Double,
         "i64" => Type::Int64,
@@ -181,7 +179,7 @@ fn estimate_message() -> Vec<FieldDescriptorProto> {
     let of = |&it: &Parameter| {
         let number = parameter_number(it);
         let value = field(it.full_name(), number, Type::Double, true);
-        let suffixed = SUFFIXES.map(|(offset, word, _)| {
+        let suffixed = SUFFIXES.map(|(offset, word, ..)| {
             field(&suffixed_name(it, word), number + offset, Type::Double, true)
         });
         std::iter::once(value).chain(suffixed)

@@ -6,16 +6,14 @@ use std::io::Write;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use dynocar_client::monotonic_now_ns;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, TrainSample};
 pub use mcap::McapError;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, WriteOptions, Writer};
 
-use crate::codec::{encode_event, encode_sample, encode_snapshot};
-use crate::event::Event;
-use crate::schema::{DESCRIPTORS, EVENT, SAMPLE, SNAPSHOT};
-use crate::topic::{ENCODING, LAYOUT, Topic};
+use crate::schema::DESCRIPTORS;
+use crate::topic::{ENCODING, LAYOUT, Message, Topic};
 
 /// Name of the metadata record that every recording begins with.
 pub const METADATA: &str = "dynocar";
@@ -59,7 +57,7 @@ impl WallClock {
 pub struct RecordingWriter<W: Write> {
     /// `None` once it is finished or has failed.
     writer: Option<Writer<NoSeek<W>>>,
-    channels: HashMap<(&'static str, u64, u32), u16>,
+    channels: HashMap<Topic, u16>,
     clock: WallClock,
     /// What the next message is logged at, whatever the clock says.
     log_time: Option<u64>,
@@ -156,44 +154,24 @@ impl<W: Write> RecordingWriter<W> {
         })
     }
 
-    /// Writes a sample, logged at a moment of the monotonic clock.
+    /// Writes a message, logged when it was published.
     ///
     /// # Errors
     ///
     /// When it cannot be written.
-    pub fn sample(&mut self, sample: &TrainSample, at_ns: i64) -> Result<(), McapError> {
-        let train = sample.train_id;
-        let channel = self.channel((SAMPLE, train, 0), || Topic::of_samples(TrainId(train)))?;
-        self.message.clear();
-        encode_sample(sample, &mut self.message);
-        self.write(channel, sample.sequence, at_ns)
-    }
-
-    /// Writes a snapshot.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be written.
-    pub fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), McapError> {
-        let (train, index) = (snapshot.train_id, snapshot.pipeline_index);
-        let topic = || Topic::of_snapshots(TrainId(train), index, snapshot.pipeline_kind());
-        let channel =
-            self.channel((SNAPSHOT, train, index << 16 | snapshot.pipeline_kind), topic)?;
-        self.message.clear();
-        encode_snapshot(snapshot, &mut self.message);
-        self.write(channel, snapshot.sequence, snapshot.published_ns)
-    }
-
-    /// Writes an event.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be written.
-    pub fn event(&mut self, event: &Event) -> Result<(), McapError> {
-        let channel = self.channel((EVENT, 0, 0), Topic::of_events)?;
-        self.message.clear();
-        encode_event(event, &mut self.message);
-        self.write(channel, 0, event.monotonic_ns)
+    pub fn write(&mut self, message: Message<'_>) -> Result<(), McapError> {
+        let channel_id = self.channel(message.topic())?;
+        let (sequence, at_ns) = message.number_and_time_ns();
+        let log_time = self.logged(at_ns);
+        // As many bits as the format has room for; the whole number is in the message.
+        let sequence = sequence as u32;
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        let mut encoded = std::mem::take(&mut self.message);
+        encoded.clear();
+        message.encode(&mut encoded);
+        let written = self.carry(|writer| writer.write_to_known_channel(&header, &encoded));
+        self.message = encoded;
+        written
     }
 
     /// Ends the chunk, so that all that was written can be read.
@@ -216,41 +194,20 @@ impl<W: Write> RecordingWriter<W> {
         Ok(writer.into_inner().into_inner())
     }
 
-    fn channel(
-        &mut self,
-        key: (&'static str, u64, u32),
-        topic: impl FnOnce() -> Topic,
-    ) -> Result<u16, McapError> {
-        if let Some(&known) = self.channels.get(&key) {
+    fn channel(&mut self, topic: Topic) -> Result<u16, McapError> {
+        if let Some(&known) = self.channels.get(&topic) {
             return Ok(known);
         }
-        let topic = topic();
-        let metadata: BTreeMap<String, String> =
-            [(LAYOUT.to_owned(), topic.layout.to_owned())].into();
+        let (schema, layout) = topic.schema_and_layout();
+        let metadata = BTreeMap::from([(LAYOUT.to_owned(), layout.to_owned())]);
         let mut id = 0;
         self.carry(|writer| {
-            let schema = writer.add_schema(topic.schema, ENCODING, &DESCRIPTORS)?;
-            id = writer.add_channel(schema, &topic.name, ENCODING, &metadata)?;
+            let schema = writer.add_schema(schema, ENCODING, &DESCRIPTORS)?;
+            id = writer.add_channel(schema, &topic.name(), ENCODING, &metadata)?;
             Ok(())
         })?;
-        self.channels.insert(key, id);
+        self.channels.insert(topic, id);
         Ok(id)
-    }
-
-    fn write(
-        &mut self,
-        channel_id: u16,
-        sequence: u64,
-        monotonic_ns: i64,
-    ) -> Result<(), McapError> {
-        let log_time = self.logged(monotonic_ns);
-        // As many bits as the format has room for; the whole number is in the message.
-        let sequence = sequence as u32;
-        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
-        let message = std::mem::take(&mut self.message);
-        let written = self.carry(|writer| writer.write_to_known_channel(&header, &message));
-        self.message = message;
-        written
     }
 
     fn logged(&mut self, monotonic_ns: i64) -> u64 {

@@ -47,14 +47,11 @@ pub fn main() -> ExitCode {
 }
 
 fn execute(arguments: &Arguments) -> Result<(), Failure> {
-    let work = |error: dynocar_client::ChannelError| Failure::Work(error.to_string());
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
     let trains = wanted(arguments, config.as_ref())?;
-    let host = match config.as_ref().and_then(|config| config.root.as_ref()) {
-        Some(root) => Host::at(root).map_err(work)?,
-        None => Host::from_environment().map_err(work)?,
-    };
-    let ending = Ending::begin().map_err(|error| Failure::Work(error.to_string()))?;
+    let root = config.as_ref().and_then(|config| config.root.as_deref());
+    let host = Host::of(root).map_err(Failure::work)?;
+    let ending = Ending::begin().map_err(Failure::work)?;
     terminal::end_though_stuck(Arc::clone(&ending.flag))
         .map_err(|error| Failure::Work(format!("watching for the end: {error}")))?;
     let mut watcher = Watcher::new(Wanted { host, trains }, config);

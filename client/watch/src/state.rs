@@ -41,39 +41,33 @@ pub struct PipelineState {
 }
 
 impl PipelineState {
-    /// A pipeline that is first heard of.
-    pub fn new(name: String, reading: &Reading<'_>, now_ns: i64) -> Self {
-        let mut state = PipelineState {
-            name,
-            snapshot: *reading.snapshot,
-            status: Status::Unestimated,
-            reason: None,
-            sample_age_s: None,
-            history: History::default(),
-        };
-        state.take(reading, now_ns);
-        state
-    }
-
-    /// Takes what is newest.
-    pub fn take(&mut self, reading: &Reading<'_>, now_ns: i64) {
-        self.snapshot = *reading.snapshot;
-        self.status = reading.status();
-        self.reason = reading.reason();
-        let age_ns = now_ns.saturating_sub(self.snapshot.sample_published_ns);
-        self.sample_age_s =
-            (self.snapshot.sample_sequence > 0).then_some(1e-9 * age_ns.max(0) as f64);
+    /// What is newest of a pipeline, with what its past is; it has its kind's name where it has none.
+    pub fn new(name: Option<String>, history: History, reading: &Reading<'_>, now_ns: i64) -> Self {
+        let snapshot = *reading.snapshot;
+        let age_ns = now_ns.saturating_sub(snapshot.sample_published_ns);
+        PipelineState {
+            name: name.unwrap_or_else(|| kind_of(&snapshot).to_owned()),
+            status: reading.status(),
+            reason: reading.reason(),
+            sample_age_s: (snapshot.sample_sequence > 0).then_some(1e-9 * age_ns.max(0) as f64),
+            snapshot,
+            history,
+        }
     }
 
     /// The kind's name.
     pub fn kind(&self) -> &'static str {
-        self.snapshot.pipeline_kind().map_or("unknown", PipelineKind::name)
+        kind_of(&self.snapshot)
     }
 
     /// The reason's name.
     pub fn reason_name(&self) -> &'static str {
         self.reason.map_or("unknown", Reason::name)
     }
+}
+
+fn kind_of(snapshot: &ParameterSnapshot) -> &'static str {
+    snapshot.pipeline_kind().map_or("unknown", PipelineKind::name)
 }
 
 /// A train.

@@ -1,5 +1,6 @@
 //! Trains that are observed, and what is shown of them.
 
+use std::mem::take;
 use std::time::{Duration, Instant};
 
 use dynocar::config::{DaemonConfig, PipelineConfig};
@@ -8,6 +9,7 @@ use dynocar_client::{Host, Role, monotonic_now_ns};
 use dynocar_shared::TrainId;
 
 use crate::advisor::Advisor;
+use crate::history::History;
 use crate::state::{Daemon, PipelineState, TrainState};
 
 /// How often daemons are looked for, and points of the plots taken.
@@ -123,12 +125,13 @@ impl Watched {
             let place = pipelines.iter().position(|it| it.snapshot.pipeline_index >= index);
             let place = place.unwrap_or(pipelines.len());
             match pipelines.get_mut(place).filter(|it| it.snapshot.pipeline_index == index) {
-                Some(pipeline) => pipeline.take(&reading, now_ns),
+                Some(known) => {
+                    let (name, history) = (take(&mut known.name), take(&mut known.history));
+                    *known = PipelineState::new(Some(name), history, &reading, now_ns);
+                }
                 None => {
-                    let kind = reading.snapshot.pipeline_kind();
-                    let kind = kind.map_or("unknown", dynocar_shared::PipelineKind::name);
-                    let name = names.get(index as usize).map_or(kind, |it| it.name.as_str());
-                    let new = PipelineState::new(name.to_owned(), &reading, now_ns);
+                    let name = names.get(index as usize).map(|it| it.name.clone());
+                    let new = PipelineState::new(name, History::default(), &reading, now_ns);
                     pipelines.insert(place, new);
                 }
             }

@@ -34,7 +34,7 @@ pub fn execute(arguments: &DemoArguments) -> Result<(), Failure> {
     }
     let summary = match play(rate) {
         Err(DemoError::Interrupted) => return Err(Failure::Verdict(130)),
-        played => played.map_err(|error| Failure::Work(error.to_string()))?,
+        played => played.map_err(Failure::work)?,
     };
     let answer = summary.answer();
     give(arguments.json.as_deref(), &answer, || summary.text())?;

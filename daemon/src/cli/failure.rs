@@ -1,5 +1,6 @@
 //! Why a command ends without its result: the words, the place and the exit status.
 
+use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -27,6 +28,16 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// Work that failed, by what went wrong.
+    pub fn work(error: impl Display) -> Self {
+        Failure::Work(error.to_string())
+    }
+
+    /// A wrong input, by what is wrong with it.
+    pub fn input(error: impl Display) -> Self {
+        Failure::Input(error.to_string())
+    }
+
     /// The failure for machines; `None` when the result is reported already.
     pub fn answer(&self) -> Option<ErrorAnswer> {
         let (message, position, exit_status) = match self {

@@ -33,15 +33,12 @@ pub struct HealthArguments {
 /// The worst verdict of all trains unless it is ok; an unusable configuration or directory.
 pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
-    let work = |error: dynocar_client::ChannelError| Failure::Work(error.to_string());
-    let host = match config.as_ref().and_then(|config| config.root.as_ref()) {
-        Some(root) => Host::at(root).map_err(work)?,
-        None => Host::from_environment().map_err(work)?,
-    };
+    let root = config.as_ref().and_then(|config| config.root.as_deref());
+    let host = Host::of(root).map_err(Failure::work)?;
     let trains: Vec<TrainId> = match (arguments.train, &config) {
         (Some(train), _) => vec![TrainId(train)],
         (None, Some(config)) => config.trains.iter().map(|train| train.id).collect(),
-        (None, None) => Peer::trains(&host, Role::Daemon).map_err(work)?,
+        (None, None) => Peer::trains(&host, Role::Daemon).map_err(Failure::work)?,
     };
     let (mut worst, mut text) = (Verdict::Ok, String::new());
     if trains.is_empty() {
@@ -51,7 +48,7 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
         text += &to_do(worst.remedy());
     }
     for train in trains {
-        let health = look_at(&host, train).map_err(work)?;
+        let health = look_at(&host, train).map_err(Failure::work)?;
         text += &lines_of(&health);
         worst = worst.max(health.verdict);
     }

@@ -122,8 +122,8 @@ pub fn execute(arguments: &ModelsArguments) -> Result<(), Failure> {
 
 fn failure(error: ModelsError) -> Failure {
     match error {
-        ModelsError::Storage(_) => Failure::Work(error.to_string()),
-        error => Failure::Input(error.to_string()),
+        ModelsError::Storage(_) => Failure::work(error),
+        error => Failure::input(error),
     }
 }
 

@@ -77,9 +77,9 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
             return Err(Failure::Input(format!("--run {number}: expected 1 to {last}")));
         }
     };
-    let host = Host::from_environment().map_err(|error| Failure::Work(error.to_string()))?;
-    let mut replayer = Replayer::open(&host, TrainId(arguments.train), arguments.rate)
-        .map_err(|error| Failure::Work(error.to_string()))?;
+    let host = Host::from_environment().map_err(Failure::work)?;
+    let mut replayer =
+        Replayer::open(&host, TrainId(arguments.train), arguments.rate).map_err(Failure::work)?;
     let wait = Duration::try_from_secs_f64(arguments.wait).map_err(|_| {
         Failure::Input(format!("--wait {}: expected a time in s from 0", arguments.wait))
     })?;

@@ -28,7 +28,7 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
     start_log(&config)?;
     run(&config).map_err(|error| match error {
         RunError::Setting(_) => Failure::Input(format!("{}: {error}", arguments.config.display())),
-        error => Failure::Work(error.to_string()),
+        error => Failure::work(error),
     })
 }
 

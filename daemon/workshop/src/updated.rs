@@ -23,6 +23,7 @@ use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::write_in_folder;
 
 pub use error::{UPDATED_MARK, UpdatedModelError};
+pub use runs::name_model;
 
 /// The files of an updated model: the train, the line where something is known of it, and the dataset.
 pub const UPDATED_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
@@ -245,7 +246,8 @@ fn number(table: &Table, section: &str, key: &str) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|it| it as f64))
 }
 
-fn set(table: &mut Table, section: &str, key: &str, value: f64) {
+/// Sets a number in a section, which is made when absent.
+pub fn set(table: &mut Table, section: &str, key: &str, value: f64) {
     let entry = table.entry(section).or_insert_with(|| Value::Table(Table::new()));
     if let Value::Table(section) = entry {
         section.insert(key.into(), Value::Float(value));

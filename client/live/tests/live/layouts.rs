@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use dynocar::config::DaemonConfig;
 use dynocar_recording::schema::DESCRIPTORS;
 use dynocar_recording::topic::Topic;
-use dynocar_shared::TrainId;
 use prost::Message;
 use prost_types::field_descriptor_proto::Type;
 use prost_types::{FileDescriptorProto, FileDescriptorSet};
@@ -24,10 +23,9 @@ fn text(name: &str) -> String {
 fn topics() -> Vec<Topic> {
     let shipped = DaemonConfig::load(&config("daemon.toml")).expect("the shipped configuration");
     let snapshots = shipped.pipelines.iter().enumerate();
-    let snapshots = snapshots.map(|(index, it)| {
-        Topic::of_snapshots(TrainId(1), index as u32, Some(it.estimator.kind()))
-    });
-    snapshots.chain([Topic::of_samples(TrainId(1)), Topic::of_events()]).collect()
+    let snapshots =
+        snapshots.map(|(index, it)| Topic::Snapshots(1, index as u32, it.estimator.kind() as u32));
+    snapshots.chain([Topic::Samples(1), Topic::Events]).collect()
 }
 
 fn descriptors() -> FileDescriptorProto {
@@ -48,7 +46,7 @@ fn has_field(file: &FileDescriptorProto, message: &str, path: &[&str]) -> bool {
 
 /// The index of a path among the topics, and the rest of it.
 fn split<'a>(topics: &'a [Topic], path: &'a str) -> Option<(&'a Topic, &'a str)> {
-    topics.iter().find_map(|it| Some((it, path.strip_prefix(it.name.as_str())?)))
+    topics.iter().find_map(|it| Some((it, path.strip_prefix(&it.name()[..])?)))
 }
 
 fn assert_shown(file: &FileDescriptorProto, topics: &[Topic], path: &str, separator: char) {
@@ -56,7 +54,8 @@ fn assert_shown(file: &FileDescriptorProto, topics: &[Topic], path: &str, separa
         split(topics, path).unwrap_or_else(|| panic!("{path}: no topic of {topics:?}"));
     let fields: Vec<&str> =
         rest.strip_prefix(separator).unwrap_or_default().split(separator).collect();
-    assert!(has_field(file, topic.schema, &fields), "{path}: no such field of {}", topic.schema);
+    let (schema, _) = topic.schema_and_layout();
+    assert!(has_field(file, schema, &fields), "{path}: no such field of {schema}");
 }
 
 /// The values of a key, wherever it stands.
@@ -117,7 +116,7 @@ fn a_field_or_topic_that_is_not_there_is_found() {
     let is_shown = |path: &str| {
         split(&topics, path).is_some_and(|(topic, rest)| {
             let fields: Vec<&str> = rest.trim_start_matches('.').split('.').collect();
-            has_field(&file, topic.schema, &fields)
+            has_field(&file, topic.schema_and_layout().0, &fields)
         })
     };
     assert!(is_shown("/train/1/0_train_kalman.estimate.mass_low_t"));

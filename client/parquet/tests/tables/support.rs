@@ -67,11 +67,7 @@ pub fn write(path: &Path, messages: &[(u64, Row)]) {
     writer.metadata("configuration", &[("number", "1".into()), ("seen", "2".into())]).unwrap();
     for (log_time, row) in messages {
         writer.log_next_at(*log_time);
-        match row {
-            Row::Sample(it) => writer.sample(it, 0).unwrap(),
-            Row::Snapshot(it) => writer.snapshot(it).unwrap(),
-            Row::Event(it) => writer.event(it).unwrap(),
-        }
+        writer.write(row.message()).unwrap();
     }
     writer.finish().unwrap();
 }

@@ -2,6 +2,7 @@
 
 use crate::error::CopyError;
 use crate::reading::{Item, Raw, Visitor};
+use crate::recording::trains_of;
 
 /// The samples of a recording with their moments, run by run as a dataset of it has them.
 #[derive(Debug, Default)]
@@ -40,10 +41,7 @@ impl Visitor for Moments {
 impl Moments {
     /// The trains that there are samples of, in order.
     pub fn trains(&self) -> Vec<u64> {
-        let mut trains: Vec<u64> = self.samples.iter().map(|it| it.train).collect();
-        trains.sort_unstable();
-        trains.dedup();
-        trains
+        trains_of(self.samples.iter().map(|it| it.train))
     }
 
     /// The runs of a train.

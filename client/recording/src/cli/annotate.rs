@@ -9,10 +9,8 @@ use dynocar::cli::Failure;
 use dynocar::output::{report_line, require_new};
 use dynocar_analysis::explain::report::timeline::Timeline;
 
-use super::failure::from_dataset_failure;
-use crate::annotate::{AnnotateError, annotate};
+use crate::annotate::annotate;
 use crate::convert::from_dataset;
-use crate::error::CopyError;
 
 /// Add an explanation to a copy of the recording that it explains.
 #[derive(Debug, Args)]
@@ -41,18 +39,13 @@ pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
     let file = File::open(timeline).map_err(|error| wrong(serde_json::Error::io(error)))?;
     let read: Timeline = serde_json::from_reader(BufReader::new(file)).map_err(wrong)?;
     let added = if from.is_dir() || from.extension().is_some_and(|it| it == "toml") {
-        let folder = tempfile::TempDir::with_prefix("dynocar-")
-            .map_err(|error| Failure::Work(error.to_string()))?;
+        let folder = tempfile::TempDir::with_prefix("dynocar-").map_err(Failure::work)?;
         let recording = folder.path().join("dataset.mcap");
-        from_dataset(from, &recording).map_err(from_dataset_failure)?;
-        annotate(&recording, &read, output)
+        from_dataset(from, &recording)?;
+        annotate(&recording, &read, output)?
     } else {
-        annotate(from, &read, output)
+        annotate(from, &read, output)?
     };
-    let added = added.map_err(|error| match error {
-        AnnotateError::Copy(CopyError::Write(_)) => Failure::Work(error.to_string()),
-        error => Failure::Input(error.to_string()),
-    })?;
     report_line(&format!(
         "annotated recording: {}: {} intervals in which an effect acts, {} messages in all",
         output.display(),

@@ -2,30 +2,60 @@
 
 use dynocar::cli::Failure;
 
+use crate::annotate::AnnotateError;
 use crate::convert::{FromDatasetError, ToDatasetError};
 use crate::error::CopyError;
+use crate::record::{KeepError, RecordError};
 
 /// A file that is no recording is wrong input; one that cannot be written is not.
-pub fn copy_failure(error: CopyError) -> Failure {
-    match error {
-        CopyError::Read(error) => Failure::Input(error.to_string()),
-        CopyError::Write(error) => Failure::Work(error.to_string()),
+impl From<CopyError> for Failure {
+    fn from(error: CopyError) -> Self {
+        match error {
+            CopyError::Read(error) => Failure::input(error),
+            CopyError::Write(error) => Failure::work(error),
+        }
     }
 }
 
 /// A dataset that makes no recording is wrong input; a recording that cannot be written is not.
-pub fn from_dataset_failure(error: FromDatasetError) -> Failure {
-    match error {
-        FromDatasetError::Dataset(error) => error.into(),
-        FromDatasetError::Write(_) => Failure::Work(error.to_string()),
-        error => Failure::Input(error.to_string()),
+impl From<FromDatasetError> for Failure {
+    fn from(error: FromDatasetError) -> Self {
+        match error {
+            FromDatasetError::Dataset(error) => error.into(),
+            FromDatasetError::Write(_) => Failure::work(error),
+            error => Failure::input(error),
+        }
     }
 }
 
 /// A recording that makes no dataset is wrong input; a dataset that cannot be written is not.
-pub fn dataset_failure(error: ToDatasetError) -> Failure {
-    match error {
-        ToDatasetError::Output(error) => error.into(),
-        error => Failure::Input(error.to_string()),
+impl From<ToDatasetError> for Failure {
+    fn from(error: ToDatasetError) -> Self {
+        match error {
+            ToDatasetError::Output(error) => error.into(),
+            error => Failure::input(error),
+        }
+    }
+}
+
+/// A recording that is another than the one explained is wrong input.
+impl From<AnnotateError> for Failure {
+    fn from(error: AnnotateError) -> Self {
+        match error {
+            AnnotateError::Copy(error) => error.into(),
+            error => Failure::input(error),
+        }
+    }
+}
+
+/// A name that is taken is wrong input.
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        match error {
+            RecordError::Taken { .. } | RecordError::Ring(KeepError::Taken { .. }) => {
+                Failure::input(error)
+            }
+            error => Failure::work(error),
+        }
     }
 }

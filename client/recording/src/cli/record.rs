@@ -11,7 +11,7 @@ use dynocar::output::report_line;
 use dynocar_client::Host;
 use dynocar_shared::TrainId;
 
-use crate::record::{KeepError, RecordError, Rotation, SYNC, Settings, record};
+use crate::record::{Rotation, SYNC, Settings, record};
 use crate::train_channels::Wanted;
 
 /// Record what a controller and the daemon write, as MCAP.
@@ -61,11 +61,7 @@ impl WantedArguments {
     ///
     /// When there is no run-time directory.
     pub fn wanted(&self) -> Result<Wanted, Failure> {
-        let host = match &self.root {
-            Some(root) => Host::at(root),
-            None => Host::from_environment(),
-        };
-        let host = host.map_err(|error| Failure::Work(error.to_string()))?;
+        let host = Host::of(self.root.as_deref()).map_err(Failure::work)?;
         let trains = self.trains.iter().copied().map(TrainId).collect();
         Ok(Wanted {
             trains: observing::Wanted { host, trains },
@@ -121,13 +117,8 @@ pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
 ///
 /// As above.
 pub fn run(settings: &Settings) -> Result<(), Failure> {
-    let stop = ending::flag().map_err(|error| Failure::Work(error.to_string()))?;
-    let recorded = record(settings, &stop).map_err(|error| match error {
-        RecordError::Taken { .. } | RecordError::Ring(KeepError::Taken { .. }) => {
-            Failure::Input(error.to_string())
-        }
-        error => Failure::Work(error.to_string()),
-    })?;
+    let stop = ending::flag().map_err(Failure::work)?;
+    let recorded = record(settings, &stop)?;
     report_line(&format!(
         "{} samples, {} snapshots and {} events recorded, {} samples lost",
         recorded.samples, recorded.snapshots, recorded.events, recorded.lost

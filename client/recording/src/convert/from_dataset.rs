@@ -14,6 +14,7 @@ use mcap::McapError;
 use super::DATASET_FOLDER;
 use super::rows::{RowError, from_rows, is_rows};
 use crate::error::WriteError;
+use crate::topic::Message;
 use crate::writing::{RecordingWriter, WallClock};
 
 /// Between two runs of a dataset, for nobody knows the time that passed, in ns.
@@ -106,7 +107,8 @@ fn write(
             published_ns => published_ns,
         };
         newest_ns = at_ns.max(newest_ns);
-        writer.sample(sample, at_ns)?;
+        writer.log_next_at(u64::try_from(at_ns).unwrap_or(0));
+        writer.write(Message::Sample(sample))?;
     }
     writer.finish()?.into_inner().map_err(|error| error.into_error())?;
     Ok(settle(&Disk, path)?)

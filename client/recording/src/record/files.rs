@@ -7,17 +7,18 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use dynocar::storage::{Disk, SharedStorage, folder_of};
+use dynocar::storage::{SharedStorage, folder_of};
 use dynocar_client::monotonic_now_ns;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::TrainId;
 use mcap::McapError;
 
 use super::configuration::Configuration;
 use super::housekeeping::{Housekeeper, Task};
 use super::keeping::{self, Keeper};
 use super::rotation::{Rotation, next};
-use super::{RecordError, Recorded, SYNC};
+use super::{RecordError, Recorded};
 use crate::event::{Event, EventKind};
+use crate::topic::Message;
 use crate::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 
 /// A file, with the bytes that were handed to the system.
@@ -61,30 +62,26 @@ pub struct Files {
 
 impl Files {
     /// Begins the first file. With rotation its name is the output's with a number that is greater
-    /// than all that are there.
+    /// than all that are there. Files are brought to the disk no more often than every `sync`, and a keeper
+    /// keeps for good what lies around the events that are reasons to.
     ///
     /// # Errors
     ///
     /// When the name is taken or the file cannot be written.
-    pub fn begin(output: &Path, rotation: Rotation) -> Result<Self, RecordError> {
-        Files::begin_on(Arc::new(Disk), output, rotation, Some(SYNC))
-    }
-
-    /// The same on any storage; files are brought to the disk no more often than every `sync`.
-    ///
-    /// # Errors
-    ///
-    /// As [`Files::begin`].
-    pub fn begin_on(
+    pub fn begin(
         storage: SharedStorage,
         output: &Path,
         rotation: Rotation,
         sync: Option<Duration>,
+        keeper: Option<Keeper>,
     ) -> Result<Self, RecordError> {
         let path = if rotation.is_on() { next(output) } else { output.to_path_buf() };
         let (writer, bytes) = open(&storage, &path)?;
+        let ring = keeper.is_some().then(|| folder_of(output).into());
+        let mut housekeeper = Housekeeper::new(Arc::clone(&storage), output, rotation, keeper);
+        housekeeper.ask(Task::Begun { file: path.clone() });
         Ok(Files {
-            housekeeper: Housekeeper::new(Arc::clone(&storage), output, rotation),
+            housekeeper,
             storage,
             output: output.into(),
             rotation,
@@ -96,15 +93,8 @@ impl Files {
             synced: Instant::now(),
             configuration: None,
             recorded: Recorded::default(),
-            ring: None,
+            ring,
         })
-    }
-
-    /// Keeps for good what lies around the events that are reasons to.
-    pub fn set_keeper(&mut self, keeper: Keeper) {
-        self.housekeeper.set_keeper(keeper);
-        self.ring = Some(folder_of(&self.output).into());
-        self.housekeeper.ask(Task::Begun { file: self.path.clone() });
     }
 
     /// From now on a thread of its own brings files to the disk, keeps and removes them.
@@ -112,8 +102,9 @@ impl Files {
     /// # Errors
     ///
     /// When the system gives no thread.
-    pub fn keep_house_in_parallel(&mut self) -> Result<(), RecordError> {
-        self.housekeeper.go_in_parallel().map_err(RecordError::Thread)
+    pub fn keep_house_in_parallel(self) -> Result<Self, RecordError> {
+        let housekeeper = self.housekeeper.in_parallel().map_err(RecordError::Thread)?;
+        Ok(Files { housekeeper, ..self })
     }
 
     /// Samples, snapshots and events that no power cut takes any more.
@@ -126,41 +117,27 @@ impl Files {
         &self.path
     }
 
-    /// Writes a sample.
+    /// Writes a message.
     ///
     /// # Errors
     ///
-    /// When it cannot be written; so for every other item.
-    pub fn sample(&mut self, sample: &TrainSample) -> Result<(), RecordError> {
-        self.recorded.samples += 1;
-        let written = self.writer.sample(sample, sample.published_ns);
-        self.checked(written)
-    }
-
-    /// Writes a snapshot.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    pub fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), RecordError> {
-        self.recorded.snapshots += 1;
-        let written = self.writer.snapshot(snapshot);
-        self.checked(written)
-    }
-
-    /// Writes an event.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    pub fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.recorded.events += 1;
-        if event.kind() == EventKind::SamplesLost {
-            self.recorded.lost += event.count.unwrap_or(0);
+    /// When it cannot be written; so for all else.
+    pub fn write(&mut self, message: Message<'_>) -> Result<(), RecordError> {
+        match message {
+            Message::Sample(_) => self.recorded.samples += 1,
+            Message::Snapshot(_) => self.recorded.snapshots += 1,
+            Message::Event(event) => {
+                self.recorded.events += 1;
+                if event.kind() == EventKind::SamplesLost {
+                    self.recorded.lost += event.count.unwrap_or(0);
+                }
+            }
         }
-        let written = self.writer.event(event);
+        let written = self.writer.write(message);
         self.checked(written)?;
-        if keeping::is_reason(event) {
+        if let Message::Event(event) = message
+            && keeping::is_reason(event)
+        {
             self.housekeeper.ask(Task::Keep { event: event.clone() });
         }
         Ok(())
@@ -195,7 +172,8 @@ impl Files {
     /// As above.
     pub fn flush(&mut self) -> Result<(), RecordError> {
         if let Some(text) = self.ring.as_deref().and_then(keeping::requested) {
-            self.event(&Event::now(TrainId(0), EventKind::KeepRequested, text))?;
+            let asked = Event::now(TrainId(0), EventKind::KeepRequested, text);
+            self.write(Message::Event(&asked))?;
         }
         self.writer.set_clock(WallClock::now());
         let written = self.writer.flush();

@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
 use dynocar::output::report_line;
@@ -130,14 +130,19 @@ pub struct Housekeeper {
 }
 
 impl Housekeeper {
-    /// Does everything at once.
-    pub fn new(storage: SharedStorage, output: &Path, rotation: Rotation) -> Self {
+    /// Does everything at once; with a keeper, keeps.
+    pub fn new(
+        storage: SharedStorage,
+        output: &Path,
+        rotation: Rotation,
+        keeper: Option<Keeper>,
+    ) -> Self {
         let progress = Arc::<Progress>::default();
         let housekeeping = Housekeeping {
             storage,
             output: output.into(),
             rotation,
-            keeper: None,
+            keeper,
             progress: Arc::clone(&progress),
             named: PathBuf::new(),
             is_failure_reported: false,
@@ -145,32 +150,21 @@ impl Housekeeper {
         Housekeeper { place: HousekeepingThread::Here(Box::new(housekeeping)), progress }
     }
 
-    /// Does everything in a thread of its own from now on; with a keeper, keeps.
+    /// Does everything in a thread of its own from now on.
     ///
     /// # Errors
     ///
     /// When the system gives no thread.
-    pub fn go_in_parallel(&mut self) -> std::io::Result<()> {
-        if let HousekeepingThread::Here(_) = self.place {
-            let (tasks, asked) = channel();
-            let (hand_over, taken) = channel::<Box<Housekeeping>>();
-            let thread = std::thread::Builder::new().name("housekeeping".into());
-            let thread = thread.spawn(move || work(&taken, &asked))?;
-            let here =
-                std::mem::replace(&mut self.place, HousekeepingThread::Running(tasks, thread));
-            if let HousekeepingThread::Here(housekeeping) = here {
-                // The thread waits for it.
-                let _ = hand_over.send(housekeeping);
-            }
-        }
-        Ok(())
-    }
-
-    /// Keeps from now on; before it works in a thread of its own.
-    pub fn set_keeper(&mut self, keeper: Keeper) {
-        if let HousekeepingThread::Here(housekeeping) = &mut self.place {
-            housekeeping.keeper = Some(keeper);
-        }
+    pub fn in_parallel(self) -> std::io::Result<Self> {
+        let mut housekeeping = match self.place {
+            HousekeepingThread::Here(housekeeping) => housekeeping,
+            HousekeepingThread::Running(..) => return Ok(self),
+        };
+        let (tasks, asked) = channel();
+        let thread = std::thread::Builder::new().name("housekeeping".into());
+        let thread = thread.spawn(move || asked.iter().for_each(|it| housekeeping.take(it)))?;
+        let place = HousekeepingThread::Running(tasks, thread);
+        Ok(Housekeeper { place, progress: self.progress })
     }
 
     /// Asks for something.
@@ -203,9 +197,4 @@ impl Housekeeper {
             let _ = thread.join();
         }
     }
-}
-
-fn work(taken: &Receiver<Box<Housekeeping>>, asked: &Receiver<Task>) {
-    let Ok(mut housekeeping) = taken.recv() else { return };
-    asked.iter().for_each(|task| housekeeping.take(task));
 }

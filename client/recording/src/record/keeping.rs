@@ -8,11 +8,10 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use dynocar::output::{report_line, write_file};
-use dynocar::storage::{Disk, SharedStorage, StorageError};
+use dynocar::storage::{SharedStorage, StorageError};
 use dynocar_shared::Status;
 
 use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes, unix_s};
@@ -138,20 +137,7 @@ impl Keeper {
     /// # Errors
     ///
     /// When another recorder writes there, or the folder cannot be made.
-    pub fn begin(ring: &Path, keeping: Keeping) -> Result<Self, KeepError> {
-        Keeper::begin_on(Arc::new(Disk), ring, keeping)
-    }
-
-    /// The same on any storage.
-    ///
-    /// # Errors
-    ///
-    /// As [`Keeper::begin`].
-    pub fn begin_on(
-        storage: SharedStorage,
-        ring: &Path,
-        keeping: Keeping,
-    ) -> Result<Self, KeepError> {
+    pub fn begin(storage: SharedStorage, ring: &Path, keeping: Keeping) -> Result<Self, KeepError> {
         storage.make_folder(&ring.join(KEPT_FOLDER)).map_err(refused(ring))?;
         let lock = File::options().create(true).append(true).open(ring.join(LOCK_FILE));
         let lock = lock.map_err(refused(ring))?;

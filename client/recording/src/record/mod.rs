@@ -15,12 +15,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar::output::report_line;
-use dynocar::storage::{Disk, folder_of};
+use dynocar::storage::{Disk, SharedStorage, folder_of};
 use dynocar_client::ChannelError;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::TrainId;
 use mcap::McapError;
 
 use crate::event::{Event, EventKind};
+use crate::topic::Message;
 use crate::train_channels::{PAUSE, Sink, TrainChannels, Wanted};
 use configuration::Configuration;
 use maintenance::Maintenance;
@@ -115,15 +116,13 @@ impl Recorded {
 /// See [`RecordError`]; what was written by then can be read.
 pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let folder = folder_of(&settings.output);
-    let keeper = settings.keeping.map(|keeping| Keeper::begin(folder, keeping)).transpose()?;
+    let disk: SharedStorage = Arc::new(Disk);
+    let keeper = |keeping| Keeper::begin(Arc::clone(&disk), folder, keeping);
+    let keeper = settings.keeping.map(keeper).transpose()?;
     let Settings { output, rotation, sync, .. } = settings;
-    let mut files = Files::begin_on(Arc::new(Disk), output, *rotation, *sync)?;
-    if let Some(keeper) = keeper {
-        files.set_keeper(keeper);
-    }
-    files.keep_house_in_parallel()?;
+    let files = Files::begin(disk, output, *rotation, *sync, keeper)?;
     let mut recorder = Recorder {
-        files,
+        files: files.keep_house_in_parallel()?,
         configuration: settings.configuration.clone(),
         maintenance: Maintenance::default(),
     };
@@ -135,7 +134,7 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
         channels.take(&mut recorder)?;
         if flushed.elapsed() >= FLUSH {
             for event in recorder.maintenance.news() {
-                recorder.event(&event)?;
+                recorder.take(Message::Event(&event))?;
             }
             recorder.files.flush()?;
             flushed = Instant::now();
@@ -144,7 +143,8 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     }
     channels.take(&mut recorder)?;
     for train in channels.trains() {
-        recorder.event(&Event::now(train, EventKind::RecordingEnded, format!("train {train}")))?;
+        let ended = Event::now(train, EventKind::RecordingEnded, format!("train {train}"));
+        recorder.take(Message::Event(&ended))?;
     }
     recorder.files.finish()
 }
@@ -160,20 +160,13 @@ struct Recorder {
 impl Sink for Recorder {
     type Error = RecordError;
 
-    fn sample(&mut self, sample: &TrainSample) -> Result<(), RecordError> {
-        self.files.sample(sample)
-    }
-
-    fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), RecordError> {
-        self.files.snapshot(snapshot)
-    }
-
-    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.files.event(event)
+    fn take(&mut self, message: Message<'_>) -> Result<(), RecordError> {
+        self.files.write(message)
     }
 
     fn opened(&mut self, train: TrainId) -> Result<(), RecordError> {
-        self.event(&Event::now(train, EventKind::RecordingBegan, format!("train {train}")))
+        let began = Event::now(train, EventKind::RecordingBegan, format!("train {train}"));
+        self.take(Message::Event(&began))
     }
 
     fn daemon_came(&mut self, train: TrainId, process: u32) -> Result<(), RecordError> {

@@ -1,35 +1,21 @@
 //! Who takes what is read.
 
 use dynocar_client::ChannelError;
-use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_shared::TrainId;
 
-use crate::event::Event;
+use crate::topic::Message;
 
 /// Where that goes what is read: into a recording, to viewers.
 pub trait Sink {
     /// Why nothing more is taken.
     type Error: From<ChannelError>;
 
-    /// Takes a sample.
+    /// Takes a message.
     ///
     /// # Errors
     ///
-    /// When nothing more is taken; so for every other item.
-    fn sample(&mut self, sample: &TrainSample) -> Result<(), Self::Error>;
-
-    /// Takes a snapshot.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn snapshot(&mut self, snapshot: &ParameterSnapshot) -> Result<(), Self::Error>;
-
-    /// Takes an event.
-    ///
-    /// # Errors
-    ///
-    /// As above.
-    fn event(&mut self, event: &Event) -> Result<(), Self::Error>;
+    /// When nothing more is taken; so for all else.
+    fn take(&mut self, message: Message<'_>) -> Result<(), Self::Error>;
 
     /// The channels of a train are open.
     ///

@@ -11,6 +11,7 @@ use dynocar_shared::{TrainId, TrainSample};
 
 use super::sink::Sink;
 use crate::event::{Event, EventKind};
+use crate::topic::Message;
 
 /// The most samples taken in a row, before the other trains have their turn.
 const TURN: usize = 4 * SAMPLE_BUFFER;
@@ -82,7 +83,7 @@ impl TrainChannel {
         for _ in 0..TURN {
             let Some(sample) = self.samples.receive() else { break };
             self.count(sample.sequence, sink)?;
-            sink.sample(&sample)?;
+            sink.take(Message::Sample(&sample))?;
             self.is_driven = true;
         }
         let (train, changes) = (self.train(), self.observed.poll());
@@ -95,11 +96,11 @@ impl TrainChannel {
             let is_other = (it.epoch, it.sequence) != (taken.epoch, taken.sequence);
             let is_due = is_other && now_ns - taken.taken_ns >= self.interval_ns;
             if is_due || changes.clone().any(|change| change.kind != EventKind::DaemonSilent) {
-                sink.snapshot(it)?;
+                sink.take(Message::Snapshot(it))?;
                 *taken = TakenSnapshot { epoch: it.epoch, sequence: it.sequence, taken_ns: now_ns };
             }
             for change in changes {
-                sink.event(&Event::of(train, change))?;
+                sink.take(Message::Event(&Event::of(train, change)))?;
             }
         }
         Ok(())
@@ -116,7 +117,7 @@ impl TrainChannel {
             self.lost += missing;
             let text = format!("samples {} to {} never came", sequence - missing, sequence - 1);
             let lost = Event::now(self.train(), EventKind::SamplesLost, text);
-            sink.event(&Event { count: Some(missing), ..lost })?;
+            sink.take(Message::Event(&Event { count: Some(missing), ..lost }))?;
         }
         Ok(())
     }
@@ -155,7 +156,7 @@ impl TrainChannel {
                 }
                 _ => {}
             }
-            sink.event(&Event::of(train, &change))?;
+            sink.take(Message::Event(&Event::of(train, &change)))?;
         }
         Ok(())
     }

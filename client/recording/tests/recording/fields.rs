@@ -57,7 +57,7 @@ fn names_and_numbers_are_unique_in_every_message_and_numbers_never_meet_the_nest
 #[test]
 fn parameters_have_names_with_units_and_deviations_and_intervals_next_to_them() {
     let of = |&it: &Parameter| {
-        let suffixed = SUFFIXES.map(|(_, word, _)| suffixed_name(it, word));
+        let suffixed = SUFFIXES.map(|(_, word, ..)| suffixed_name(it, word));
         std::iter::once(it.full_name().to_owned()).chain(suffixed)
     };
     let names: Vec<String> = Parameter::ALL.iter().flat_map(of).collect();

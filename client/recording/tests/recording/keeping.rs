@@ -2,12 +2,15 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
+use dynocar::storage::Disk;
 use dynocar_recording::copying::recover;
 use dynocar_recording::event::{Event, EventKind};
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation, request_keeping};
 use dynocar_recording::recording::Recording;
+use dynocar_recording::topic::Message;
 use dynocar_shared::{Status, TrainId, TrainSample};
 
 const HOUR: Duration = Duration::from_secs(3600);
@@ -36,16 +39,15 @@ fn stretches(ring: &Path) -> Vec<PathBuf> {
 
 fn ring(folder: &Path, keeping: Keeping) -> Files {
     let rotation = Rotation { bytes: Some(8_000), keep_bytes: Some(30_000), ..Rotation::default() };
-    let keeper = Keeper::begin(folder, keeping).unwrap();
-    let mut files = Files::begin(&folder.join("ring.mcap"), rotation).unwrap();
-    files.set_keeper(keeper);
-    files
+    let keeper = Keeper::begin(Arc::new(Disk), folder, keeping).unwrap();
+    let sync = Some(Duration::from_secs(1));
+    Files::begin(Arc::new(Disk), &folder.join("ring.mcap"), rotation, sync, Some(keeper)).unwrap()
 }
 
 fn drive(files: &mut Files, sequences: std::ops::Range<u64>) {
     for sequence in sequences {
         let sample = TrainSample { sequence, ..TrainSample::empty(TrainId(1)) };
-        files.sample(&sample).unwrap();
+        files.write(Message::Sample(&sample)).unwrap();
         if sequence % 50 == 0 {
             files.flush().unwrap();
         }
@@ -58,7 +60,7 @@ fn what_lies_around_a_suspicion_outlives_the_ring() {
     let mut files = ring(folder.path(), keeping());
     drive(&mut files, 1..1000);
     let before = names(folder.path());
-    files.event(&event(EventKind::SuspicionRaised)).unwrap();
+    files.write(Message::Event(&event(EventKind::SuspicionRaised))).unwrap();
     let [stretch] = &stretches(folder.path())[..] else { panic!("one stretch") };
     assert_eq!(names(stretch), before);
     drive(&mut files, 1000..2000);
@@ -81,9 +83,9 @@ fn what_lies_around_a_suspicion_outlives_the_ring() {
 fn a_second_reason_lengthens_the_kept_event_and_a_late_one_begins_another() {
     let folder = tempfile::tempdir().unwrap();
     let mut files = ring(folder.path(), keeping());
-    files.event(&event(EventKind::DaemonSilent)).unwrap();
-    files.event(&event(EventKind::SamplesLost)).unwrap();
-    files.event(&event(EventKind::SamplesLost)).unwrap();
+    files.write(Message::Event(&event(EventKind::DaemonSilent))).unwrap();
+    files.write(Message::Event(&event(EventKind::SamplesLost))).unwrap();
+    files.write(Message::Event(&event(EventKind::SamplesLost))).unwrap();
     let [stretch] = &stretches(folder.path())[..] else { panic!("one stretch") };
     let account = std::fs::read_to_string(stretch.join("stretch.toml")).unwrap();
     assert_eq!(account.matches("[[reasons]]").count(), 2, "{account}");
@@ -94,7 +96,7 @@ fn a_second_reason_lengthens_the_kept_event_and_a_late_one_begins_another() {
     std::fs::write(stretch.join("stretch.toml"), ended.join("\n")).unwrap();
     drop(files);
     let mut files = ring(folder.path(), keeping());
-    files.event(&event(EventKind::DaemonSilent)).unwrap();
+    files.write(Message::Event(&event(EventKind::DaemonSilent))).unwrap();
     assert_eq!(stretches(folder.path()).len(), 2);
 }
 
@@ -103,7 +105,7 @@ fn a_recorder_that_died_leaves_its_kept_event_to_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let mut files = ring(folder.path(), keeping());
     drive(&mut files, 1..200);
-    files.event(&event(EventKind::SuspicionRaised)).unwrap();
+    files.write(Message::Event(&event(EventKind::SuspicionRaised))).unwrap();
     files.flush().unwrap();
     // As kill -9 does: nothing is finished.
     drop(files);
@@ -135,10 +137,12 @@ fn what_lies_too_far_back_and_what_is_no_reason_is_not_kept() {
     for nothing in
         [degraded.clone(), event(EventKind::DaemonCame), event(EventKind::SuspicionEnded)]
     {
-        files.event(&nothing).unwrap();
+        files.write(Message::Event(&nothing)).unwrap();
     }
     assert_eq!(stretches(folder.path()), [] as [PathBuf; 0]);
-    files.event(&Event { status: Some(Status::Invalid as i32), ..degraded }).unwrap();
+    files
+        .write(Message::Event(&Event { status: Some(Status::Invalid as i32), ..degraded }))
+        .unwrap();
     let [stretch] = &stretches(folder.path())[..] else { panic!("one stretch") };
     assert!(!names(stretch).contains(old) && names(stretch).len() == all.len() - 1);
 }
@@ -147,7 +151,7 @@ fn what_lies_too_far_back_and_what_is_no_reason_is_not_kept() {
 fn what_is_kept_stays_within_its_bound_and_the_recorder_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let mut files = ring(folder.path(), Keeping { most_bytes: 40_000, ..keeping() });
-    files.event(&event(EventKind::SuspicionRaised)).unwrap();
+    files.write(Message::Event(&event(EventKind::SuspicionRaised))).unwrap();
     drive(&mut files, 1..4000);
     files.finish().unwrap();
     let [stretch] = &stretches(folder.path())[..] else { panic!("one stretch") };
@@ -170,7 +174,7 @@ fn a_request_is_kept_and_one_to_nobody_is_refused() {
     assert!(account.contains("the driver felt a jerk"), "{account}");
     files.flush().unwrap();
     assert_eq!(stretches(folder.path()).len(), 1, "asked once");
-    let second = Keeper::begin(folder.path(), keeping()).unwrap_err();
+    let second = Keeper::begin(Arc::new(Disk), folder.path(), keeping()).unwrap_err();
     assert!(second.to_string().contains("another recorder"), "{second}");
     files.finish().unwrap();
     assert!(!request_keeping(folder.path(), "too late").unwrap());

@@ -6,6 +6,7 @@ use dynocar::config::DaemonConfig;
 use dynocar::dataset;
 use dynocar::pipelines::build_pipeline;
 use dynocar_analysis::identify::published_samples;
+use dynocar_recording::topic::Message;
 use dynocar_recording::writing::{
     CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration,
 };
@@ -64,11 +65,12 @@ pub fn write(path: &Path, samples: &[TrainSample], snapshots: &[ParameterSnapsho
     let pairs = [("number", "1".to_owned()), ("seen_monotonic_ns", "2000".to_owned())];
     writer.metadata(CONFIGURATION, &pairs).expect("written");
     for (index, sample) in samples.iter().enumerate() {
-        writer.sample(sample, sample.time_ns).expect("written");
+        writer.log_next_at(WallClock::of_another_host().wall_ns(sample.time_ns));
+        writer.write(Message::Sample(sample)).expect("written");
         if index % 200 == 0 {
             writer.flush().expect("flushed");
         }
     }
-    snapshots.iter().for_each(|it| writer.snapshot(it).expect("written"));
+    snapshots.iter().for_each(|it| writer.write(Message::Snapshot(it)).expect("written"));
     writer.finish().expect("finished");
 }

@@ -2,7 +2,6 @@
 //!
 //! 80 x 24 hold everything; larger terminals get the resistance at more speeds and plots.
 
-mod help;
 mod overview;
 mod pipelines;
 mod plots;
@@ -21,6 +20,24 @@ use crate::words::{daemon, samples};
 /// Less than this shows nothing whole.
 const COLUMNS_MIN: u16 = 60;
 const ROWS_MIN: u16 = 20;
+
+/// The keys and the words.
+const HELP: &str = "\
+q, Esc, Ctrl-C    quit
+Tab, Shift-Tab    next train, train before
+← →, 1, 2         overview, pipelines
+?                 this, and back
+
+± is a 95 % interval. A controller may use what is estimated; degraded has a
+reservation that the reason names; invalid must not be used. What each reason
+means and asks for: docs/guides/reading.md.
+
+Unexplained is the force that the model lacks, retarding positive. Evidence is
+twice the log-likelihood ratio for the suspected effect. Small plots show the
+last minutes, one block a second, from their lowest to their highest value.
+
+What to drive next is computed from the present covariance on level track, within
+what the train's file declares.";
 
 /// What is looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,7 +92,8 @@ pub fn draw(
     };
     title(frame, head, train, (choice.train, trains.len()), palette);
     if choice.has_help {
-        help::draw(frame, body, palette);
+        let help = Paragraph::new(HELP).wrap(Wrap { trim: false });
+        frame.render_widget(help.style(palette.plain()), body);
     } else if choice.view == View::Pipelines {
         pipelines::draw(frame, body, train, palette);
     } else {

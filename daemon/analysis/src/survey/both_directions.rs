@@ -1,6 +1,7 @@
 //! Whether both directions take one track, and which.
 
 use super::alignment::Alignment;
+use super::quantile::share_of;
 use super::recording_parts::SAME_ALIGNMENT_M;
 
 /// Both directions take the same way when so much of what both drive lies within `SAME_TRACK_M`.
@@ -96,14 +97,6 @@ fn forget_crossings(twins: &mut [Option<(usize, f64)>], growing: &Alignment, fal
             *twin = None;
         }
     }
-}
-
-/// The value below which a share of some values lies; 0 of none.
-fn share_of(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let index = (share * sorted.len().saturating_sub(1) as f64) as usize;
-    sorted.get(index).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use nalgebra::{SMatrix, SVector};
 
 use super::balance::Observation;
 
-const GRAVITY_MPS2: f64 = 9.81;
+/// Acceleration of gravity in m/s².
+pub const GRAVITY_MPS2: f64 = 9.81;
 
 /// The common unknowns: a, b, c in N/kN (v in m/s), the factor on the declared mass less 1, the
 /// seconds by which forces are stamped too early, and the mass of a passenger in kg.

@@ -1,7 +1,7 @@
 //! The friction brake's force from its pressure, from what the balance lacks under it.
 
 use super::chainage::Estimate;
-use super::quantile::middle;
+use super::quantile::{middle, share_of};
 use super::recording::RawRecording;
 
 /// Fewer observations under pressure say nothing.
@@ -32,12 +32,7 @@ pub fn acting_from_pa<'r>(raws: impl Iterator<Item = &'r RawRecording>) -> f64 {
             }
         }
     }
-    if under_traction.is_empty() {
-        return MARGIN_PA;
-    }
-    let rank = (0.95 * (under_traction.len() - 1) as f64) as usize;
-    let (_, level, _) = under_traction.select_nth_unstable_by(rank, f64::total_cmp);
-    level.max(0.0) + MARGIN_PA
+    share_of(&under_traction, 0.95).max(0.0) + MARGIN_PA
 }
 
 /// A straight line through (pressure in Pa, missing retarding force in N), robust to single

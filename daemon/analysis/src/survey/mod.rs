@@ -31,7 +31,7 @@ pub mod learn;
 pub mod line;
 mod normal;
 pub mod profile;
-mod quantile;
+pub mod quantile;
 pub mod recording;
 mod recording_parts;
 mod silence;

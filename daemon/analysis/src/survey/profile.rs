@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::balance::Observation;
 use super::banded::NotPositive;
-use super::common::{Common, Prior};
+use super::common::{Common, GRAVITY_MPS2, Prior};
 use super::layout::{Course, HEIGHT_STEP_M, Layout};
 use super::normal::Normal;
 use super::quantile::middle;
@@ -29,7 +29,6 @@ const TAIL: f64 = 4.0;
 const FEW_PASSES: usize = 100;
 /// Observations that one thread takes at a time.
 const CHUNK: usize = 65_536;
-const GRAVITY_MPS2: f64 = 9.81;
 
 /// An altitude that GNSS gave.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -16,15 +16,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 pub use super::explained::text;
 use super::text::for_shell;
 use super::threads::Threads;
-use crate::annotation::{AnnotationError, annotate};
+use crate::annotation::annotate;
 use crate::report;
 use crate::report::provenance::{Provenance, own_command_line};
 use crate::updated::{UPDATED_FILES, UPDATED_MARK, UpdatedFiles, UpdatedModelError, write_updated};
 use dynocar::cli::Failure;
 use dynocar::dataset::{self, DatasetFolder};
 use dynocar::output::{
-    OutputError, give, report_line, require_file, require_folder, require_new, write_file,
-    write_in_folder,
+    OutputError, give, report_line, require_files, require_folder, require_new,
+    require_replaceable, write_file, write_in_folder,
 };
 
 /// First line of a file with predictions.
@@ -108,10 +108,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     }
     if let Some(file) = &arguments.annotate {
         let timeline = Timeline::of(&dataset, &explanation);
-        annotate(path, &timeline, file).map_err(|error| match error {
-            AnnotationError::Input(_) => Failure::Input(error.to_string()),
-            AnnotationError::Failed { .. } => Failure::Work(error.to_string()),
-        })?;
+        annotate(path, &timeline, file)?;
     }
     Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation.answer))?)
 }
@@ -142,10 +139,7 @@ fn read(path: &Path, traction_only: bool) -> Result<Dataset, Failure> {
 
 /// Refuses wrong names of results before the work begins.
 fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
-    let files = [(&arguments.json, "{"), (&arguments.report, "<!DOCTYPE html>")];
-    for (file, mark) in files {
-        file.as_deref().map_or(Ok(()), |file| require_file(file, mark))?;
-    }
+    require_files(&[(&arguments.json, "{"), (&arguments.report, report::PAGE_MARK)])?;
     for folder in [&arguments.plots, &arguments.predictions] {
         folder.as_deref().map_or(Ok(()), require_folder)?;
     }
@@ -158,11 +152,6 @@ fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
         })),
         _ => Ok(()),
     }
-}
-
-/// Refuses a file in a folder for results that is there and is none of ours.
-fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
-    if file.exists() { require_file(file, mark) } else { Ok(()) }
 }
 
 /// The failure of a run that cannot be used, with what may be the matter.
@@ -190,7 +179,7 @@ pub fn grow(
     }
     write_updated(path, explanation, folder).map_err(|error| match error {
         UpdatedModelError::Output(error) => error.into(),
-        error => Failure::Work(error.to_string()),
+        error => Failure::work(error),
     })
 }
 
@@ -233,14 +222,13 @@ pub fn page(
     command: String,
 ) -> Result<String, Failure> {
     let provenance = Provenance::of(path, command)?;
-    report::page(dataset, explanation, provenance).map_err(|error| Failure::Work(error.to_string()))
+    report::page(dataset, explanation, &provenance).map_err(Failure::work)
 }
 
 fn write_plots(folder: &Path, dataset: &Dataset, explanation: &Explanation) -> Result<(), Failure> {
-    let images = report::images::images(dataset, explanation)
-        .map_err(|error| Failure::Work(error.to_string()))?;
-    for image in images {
-        let path = write_in_folder(folder, &image.name, &image.svg)?;
+    let images = report::images::images(dataset, explanation).map_err(Failure::work)?;
+    for (name, svg) in images {
+        let path = write_in_folder(folder, &name, &svg)?;
         report_line(&format!("plot: {}", path.display()));
     }
     Ok(())

@@ -11,7 +11,9 @@ use crate::fmu::{FmuError, INPUTS_MARK, archive, find_library, inputs, read_libr
 use dynocar::cli::Failure;
 use dynocar::dataset;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
-use dynocar::output::{report_line, require_file, require_folder, write_file, write_in_folder};
+use dynocar::output::{
+    report_line, require_file, require_folder, require_replaceable, write_file, write_in_folder,
+};
 
 /// Write the estimators, or the train itself, as an FMU for a simulator.
 ///
@@ -60,10 +62,10 @@ pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
     };
     let model = if arguments.plant { &PLANT } else { &ESTIMATORS };
     let library = match &arguments.library {
-        Some(path) => read_library(path),
-        None => find_library(&std::env::current_exe().unwrap_or_default()),
+        Some(path) => read_library(path)?,
+        None => find_library(&std::env::current_exe().unwrap_or_default())?,
     };
-    let fmu = library.and_then(|library| archive(model, &library, &files)).map_err(failure)?;
+    let fmu = archive(model, &library, &files)?;
     if let (Some(dataset), Some(folder)) = (&arguments.dataset, &arguments.inputs) {
         write_inputs(dataset, folder)?;
     }
@@ -72,12 +74,12 @@ pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-fn failure(error: FmuError) -> Failure {
-    match error {
-        FmuError::Unreadable { .. } | FmuError::OtherLibrary(_) => {
-            Failure::Input(error.to_string())
+impl From<FmuError> for Failure {
+    fn from(error: FmuError) -> Self {
+        match error {
+            FmuError::Unreadable { .. } | FmuError::OtherLibrary(_) => Failure::input(error),
+            FmuError::NoLibrary(_) | FmuError::Archive(_) => Failure::work(error),
         }
-        FmuError::NoLibrary(_) | FmuError::Archive(_) => Failure::Work(error.to_string()),
     }
 }
 
@@ -127,9 +129,7 @@ fn write_inputs(path: &Path, folder: &Path) -> Result<(), Failure> {
     let dataset = dataset::load(path)?;
     let names: Vec<_> =
         dataset.runs.iter().map(|run| format!("run_{:02}.csv", run.number)).collect();
-    for path in names.iter().map(|name| folder.join(name)).filter(|path| path.exists()) {
-        require_file(&path, INPUTS_MARK)?;
-    }
+    names.iter().try_for_each(|name| require_replaceable(&folder.join(name), INPUTS_MARK))?;
     for (run, name) in dataset.runs.iter().zip(&names) {
         write_in_folder(folder, name, &inputs(run))?;
     }

@@ -3,7 +3,7 @@
 mod answer;
 mod runs;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
@@ -18,7 +18,7 @@ use self::runs::{EstimatorSpread, RunAnswer};
 use super::text::diagnostics;
 use dynocar::cli::Failure;
 use dynocar::dataset;
-use dynocar::output::{give, require_file};
+use dynocar::output::{give, require_files};
 use dynocar_analysis::identify::{
     default_estimators, identify, recommended_estimators, samples_of_runs,
 };
@@ -26,65 +26,29 @@ use dynocar_analysis::identify::{
 /// Estimate resistance, mass, adhesion and friction from recorded runs.
 #[derive(Debug, Args)]
 pub struct IdentifyArguments {
-    /// The dataset's folder, or a recording
-    dataset: PathBuf,
-    /// This estimator, as v_mils; may be given several times [default: the recommended ones]
-    #[arg(long, value_name = "NAME")]
-    estimator: Vec<String>,
-    /// All estimators, the papers' methods too
-    #[arg(long)]
-    all: bool,
-    /// Learn from each run alone, too, and say how much the runs differ
-    #[arg(long)]
-    per_run: bool,
-    /// Use the forces under traction only: for recordings without the friction brake's force
-    #[arg(long)]
-    traction_only: bool,
+    #[command(flatten)]
+    question: Question,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
 }
 
-/// Which estimators are asked.
-#[derive(Clone, Copy, Debug)]
-pub enum Asked<'a> {
-    /// The recommended ones that the train and the recordings permit.
-    Recommended,
-    /// All of them.
-    All,
-    /// These, in this order.
-    Named(&'a [String]),
-}
-
-impl<'a> Asked<'a> {
-    /// As it is said: all, by name, or nothing said.
-    ///
-    /// # Errors
-    ///
-    /// All and some by name exclude each other.
-    pub fn of(all: bool, names: &'a [String]) -> Result<Self, Failure> {
-        match (all, names) {
-            (true, []) => Ok(Asked::All),
-            (true, names) => Err(Failure::Input(format!(
-                "--all: expected no --estimator with it, got {}",
-                names.join(", ")
-            ))),
-            (false, []) => Ok(Asked::Recommended),
-            (false, names) => Ok(Asked::Named(names)),
-        }
-    }
-}
-
-/// What is to be learned from.
-#[derive(Clone, Copy, Debug)]
-pub struct Question<'a> {
-    /// The dataset's folder.
-    pub dataset: &'a Path,
-    /// By which estimators.
-    pub asked: Asked<'a>,
-    /// From each run alone, too.
+/// What is to be learned from, by which estimators.
+#[derive(Clone, Debug, Args)]
+pub struct Question {
+    /// The dataset's folder, or a recording
+    pub dataset: PathBuf,
+    /// This estimator, as v_mils; may be given several times [default: the recommended ones]
+    #[arg(long, value_name = "NAME")]
+    pub estimator: Vec<String>,
+    /// All estimators, the papers' methods too
+    #[arg(long)]
+    pub all: bool,
+    /// Learn from each run alone, too, and say how much the runs differ
+    #[arg(long)]
     pub per_run: bool,
-    /// Use the forces under traction only.
+    /// Use the forces under traction only: for recordings without the friction brake's force
+    #[arg(long)]
     pub traction_only: bool,
 }
 
@@ -115,15 +79,8 @@ pub struct IdentifyAnswer {
 ///
 /// A wrong dataset or estimator name is an input failure.
 pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
-    if let Some(file) = &arguments.json {
-        require_file(file, "{")?;
-    }
-    let answer = answer(Question {
-        dataset: &arguments.dataset,
-        asked: Asked::of(arguments.all, &arguments.estimator)?,
-        per_run: arguments.per_run,
-        traction_only: arguments.traction_only,
-    })?;
+    require_files(&[(&arguments.json, "{")])?;
+    let answer = answer(&arguments.question)?;
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
 }
 
@@ -131,14 +88,20 @@ pub fn execute(arguments: &IdentifyArguments) -> Result<(), Failure> {
 ///
 /// # Errors
 ///
-/// A wrong dataset or estimator name is an input failure.
-pub fn answer(question: Question) -> Result<IdentifyAnswer, Failure> {
-    let named = match question.asked {
-        Asked::Named(names) => Some(named_estimators(names)?),
-        Asked::All => Some(default_estimators()),
-        Asked::Recommended => None,
+/// A wrong dataset or estimator name is an input failure; all and some by name exclude each other.
+pub fn answer(question: &Question) -> Result<IdentifyAnswer, Failure> {
+    let named = match (question.all, &question.estimator[..]) {
+        (true, []) => Some(default_estimators()),
+        (true, names) => {
+            let names = names.join(", ");
+            return Err(Failure::Input(format!(
+                "--all: expected no --estimator with it, got {names}"
+            )));
+        }
+        (false, []) => None,
+        (false, names) => Some(named_estimators(names)?),
     };
-    let (mut dataset, speed_unit) = dataset::load_with_speed_unit(question.dataset)?;
+    let (mut dataset, speed_unit) = dataset::load_with_speed_unit(&question.dataset)?;
     let is_chosen = named.is_some();
     let estimators = named.unwrap_or_else(|| recommended_estimators(&dataset));
     if question.traction_only {

@@ -9,15 +9,17 @@ use dynocar_client::Host;
 
 use super::threads::Threads;
 use crate::learn::watch::{Suspicions, TimeOfDay, watch};
-use crate::learn::{Bounds, page};
-use crate::learn::{LearnError, Learner, LearnerSettings, Outcome, Round, TrainRound};
+use crate::learn::{
+    Bounds, LearnError, Learner, LearnerSettings, Outcome, Round, TrainRound, page,
+};
+use crate::report::PAGE_MARK;
 use crate::report::provenance::own_command_line;
 use dynocar::cli::Failure;
 use dynocar::cli::run::start_log;
 use dynocar::config::DaemonConfig;
 use dynocar::ending;
 use dynocar::observing::ObservedTrain;
-use dynocar::output::{OutputError, print, require_file, write_file};
+use dynocar::output::{print, require_files, write_file};
 use dynocar::unpacking::UnpackError;
 
 /// Turn recorded runs into candidate models, while trains run.
@@ -60,17 +62,14 @@ pub fn execute(arguments: &LearnArguments) -> Result<(), Failure> {
 
 fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
     let config = DaemonConfig::load(&arguments.config)?;
-    if let Some(file) = &arguments.report {
-        require_file(file, "<!DOCTYPE html>")?;
-    }
+    require_files(&[(&arguments.report, PAGE_MARK)])?;
     if !arguments.runs.is_dir() {
         let runs = arguments.runs.display();
         return Err(Failure::Input(format!("{runs}: expected the folder of recorded runs")));
     }
     let store = dynocar::cli::models::store(arguments.models.as_deref(), Some(&config))?;
     start_log(&config)?;
-    let work = |error: &dyn std::fmt::Display| Failure::Work(error.to_string());
-    let stop = ending::flag().map_err(|error| work(&error))?;
+    let stop = ending::flag().map_err(Failure::work)?;
     let settings = LearnerSettings {
         store,
         runs: arguments.runs.clone(),
@@ -78,22 +77,16 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
         bounds: Bounds::default(),
         command: own_command_line(),
     };
-    let mut learner = Learner::open(settings).map_err(failure)?;
+    let mut learner = Learner::open(settings)?;
     let report = arguments.report.as_deref();
     if arguments.once {
-        let round =
-            learner.round(SystemTime::now(), &|| stop.load(Ordering::Relaxed)).map_err(failure)?;
+        let round = learner.round(SystemTime::now(), &|| stop.load(Ordering::Relaxed))?;
         write_report(report, &learner)?;
         return Ok(print(&lines_of(&round))?);
     }
-    let host = match &config.root {
-        Some(root) => Host::at(root),
-        None => Host::from_environment(),
-    };
-    let host = host.map_err(|error| work(&error))?;
+    let host = Host::of(config.root.as_deref()).map_err(Failure::work)?;
     let suspicions = config.trains.iter().map(|train| {
-        let observed = ObservedTrain::open(&host, train.id).map_err(|error| work(&error))?;
-        Ok(Suspicions::new(observed))
+        ObservedTrain::open(&host, train.id).map(Suspicions::new).map_err(Failure::work)
     });
     let mut suspicions = suspicions.collect::<Result<Vec<_>, Failure>>()?;
     watch(&mut learner, &mut suspicions, arguments.at, &stop, &mut |learner, round| {
@@ -106,20 +99,19 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
     })
 }
 
-fn failure(error: LearnError) -> Failure {
-    match error {
-        LearnError::Unpack(error @ UnpackError::Content { .. }) => {
-            Failure::Input(error.to_string())
+impl From<LearnError> for Failure {
+    fn from(error: LearnError) -> Self {
+        match error {
+            LearnError::Unpack(UnpackError::Content { .. }) => Failure::input(error),
+            error => Failure::work(error),
         }
-        error => Failure::Work(error.to_string()),
     }
 }
 
 fn write_report(file: Option<&Path>, learner: &Learner) -> Result<(), Failure> {
     let Some(file) = file else { return Ok(()) };
-    let page =
-        page::html(learner, SystemTime::now()).map_err(|error| Failure::Work(error.to_string()))?;
-    write_file(file, &page).map_err(|error: OutputError| error.into())
+    let page = page::html(learner, SystemTime::now()).map_err(Failure::work)?;
+    Ok(write_file(file, &page)?)
 }
 
 /// A line for each train.

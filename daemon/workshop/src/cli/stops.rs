@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::text::{TextTable, diagnostics};
 use dynocar::cli::Failure;
 use dynocar::dataset;
-use dynocar::output::{give, require_file};
+use dynocar::output::{give, require_files};
 use dynocar_shared::HALF_95;
 
 /// Estimate deceleration and stopping distance from recorded stops, without forces.
@@ -69,9 +69,7 @@ struct StopsAnswer {
 ///
 /// A wrong dataset is an input failure; so is one without a stop.
 pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
-    if let Some(file) = &arguments.json {
-        require_file(file, "{")?;
-    }
+    require_files(&[(&arguments.json, "{")])?;
     let dataset = dataset::load(&arguments.dataset)?;
     let find = FindSettings { share_min: arguments.applied, ..FindSettings::default() };
     let settings = StudySettings { find, repeatability: arguments.repeatability };

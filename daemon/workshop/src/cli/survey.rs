@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use super::threads::Threads;
+use crate::report::PAGE_MARK;
 use crate::report::provenance::{Provenance, own_command_line};
 use crate::survey::answer::{LearnedAnswer, SurveyAnswer};
 use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 use dynocar::cli::Failure;
-use dynocar::output::{give, report_line, require_file, require_folder, write_file};
+use dynocar::output::{give, report_line, require_files, require_folder, write_file};
 use dynocar_shared::HALF_95;
 
 /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
@@ -38,17 +39,14 @@ pub struct SurveyArguments {
 ///
 /// A wrong dataset or line is an input failure; a file that cannot be written one of work.
 pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
-    for (file, mark) in [(&arguments.json, "{"), (&arguments.report, "<!DOCTYPE html>")] {
-        file.as_deref().map_or(Ok(()), |file| require_file(file, mark))?;
-    }
+    require_files(&[(&arguments.json, "{"), (&arguments.report, PAGE_MARK)])?;
     require_folder(&arguments.out)?;
     let (source, line) = (&arguments.dataset, arguments.line.as_deref());
     let work = || survey_folder(source, line, &arguments.out);
-    let made = arguments.threads.work(work)?.map_err(failure)?;
+    let made = arguments.threads.work(work)??;
     report_line(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));
     if let Some(file) = &arguments.report {
-        let provenance = Provenance::of(source, own_command_line())
-            .map_err(|error| Failure::Input(error.to_string()))?;
+        let provenance = Provenance::of(source, own_command_line()).map_err(Failure::input)?;
         let page = page::html(&made.raw, &made.survey, &made.answer, &provenance)
             .map_err(|error| Failure::Work(format!("{}: {error}", file.display())))?;
         write_file(file, &page)?;
@@ -57,11 +55,13 @@ pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
     Ok(give(arguments.json.as_deref(), &made.answer, || summary(&made.answer))?)
 }
 
-fn failure(failure: SurveyFailure) -> Failure {
-    match failure {
-        SurveyFailure::Output(error) => Failure::from(error),
-        SurveyFailure::Load(error) => Failure::from(error),
-        _ => Failure::Input(failure.to_string()),
+impl From<SurveyFailure> for Failure {
+    fn from(failure: SurveyFailure) -> Self {
+        match failure {
+            SurveyFailure::Output(error) => error.into(),
+            SurveyFailure::Load(error) => error.into(),
+            _ => Failure::input(failure),
+        }
     }
 }
 

@@ -150,8 +150,8 @@ impl Conclusion<'_> {
         };
         let failed = |error: &dyn std::fmt::Display| LearnError::Report(error.to_string());
         let json = serde_json::to_string_pretty(answer).map_err(|error| failed(&error))?;
-        let page =
-            report::page(&pool.dataset, explanation, provenance).map_err(|error| failed(&error))?;
+        let page = report::page(&pool.dataset, explanation, &provenance)
+            .map_err(|error| failed(&error))?;
         Ok(Some(NewModel {
             text: ModelText { train: grown.train, track: grown.track },
             origin,

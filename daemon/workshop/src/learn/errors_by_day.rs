@@ -2,10 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use crate::report::html::legend;
 use crate::report::plots::days::{self, Day};
-use crate::report::plots::speeds::Width;
-use crate::report::plots::{PlotError, figure};
-use crate::report::sections::legend;
+use crate::report::plots::{PlotError, figure, wide_and_narrow};
 use dynocar::models::decision::in_force_after;
 use dynocar::models::history::History;
 use dynocar::models::{Action, ModelHash, Moment};
@@ -45,12 +44,11 @@ pub fn html(history: &History, trials: &Trials) -> Result<String, PlotError> {
         .filter(|at| (-1.0..=(last - first) as f64).contains(at))
         .collect();
     let name = Moment { unix_s: first as u64 * DAY_S }.day();
-    let [wide, narrow] =
-        [Width::Wide, Width::Narrow].map(|width| days::draw(&days, &changes, &name, width));
+    let plots = wide_and_narrow(|width| days::draw(&days, &changes, &name, width))?;
     let key = legend(&[("dot after", "in force"), ("ring before", "declared")]);
     let caption = "Open-loop error on the trips that were driven, by day; an upright line where \
                    another model came in force";
-    Ok(figure("trace", caption, &key, &[wide?, narrow?]))
+    Ok(figure("trace", caption, &key, &plots))
 }
 
 /// The model that the decisions had put in force at the end of a day; `None` for what was declared.

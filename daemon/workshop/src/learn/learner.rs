@@ -150,7 +150,11 @@ impl Learner {
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<TrainRound>, LearnError> {
         let models = self.settings.store.train(train);
-        let in_force = self.in_force(&models, declared, now)?;
+        let in_force = match models.in_force()? {
+            Some(hash) => hash,
+            // So that what grows from it has a parent in the store.
+            None => models.put_declared(declared, now)?,
+        };
         let bounds = self.settings.bounds;
         let trains: Vec<TrainId> = self.settings.trains.iter().map(|it| it.0).collect();
         let places = Places { runs: &self.settings.runs, own: &self.own, trains: &trains };
@@ -172,20 +176,6 @@ impl Learner {
         self.memory.explained.insert(train.to_string(), digest);
         self.memory.save(&self.own)?;
         Ok(Some(round_of(outcome)))
-    }
-
-    /// The model in force; what the configuration declares is put into the store, so that what grows from
-    /// it has a parent there.
-    fn in_force(
-        &self,
-        models: &TrainModels,
-        declared: &ModelText,
-        now: Moment,
-    ) -> Result<ModelHash, LearnError> {
-        if let Some(hash) = models.in_force()? {
-            return Ok(hash);
-        }
-        Ok(models.put_declared(declared, now)?)
     }
 
     /// Explains one choice of runs after the other until one shows an effect.

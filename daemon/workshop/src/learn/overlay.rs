@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE, Manifest, RunContent};
-use toml::{Table, Value};
+use toml::Table;
 
+use crate::updated::name_model;
 use dynocar::dataset::{DatasetFolder, LoadError};
 use dynocar::models::ModelText;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
@@ -29,12 +30,7 @@ impl<'a> Overlay<'a> {
     /// The description, which names the files of the model.
     fn described(&self, text: String) -> String {
         let Ok(mut table) = text.parse::<Table>() else { return text };
-        let file = |name: &str| Value::Table(Table::from_iter([("file".into(), name.into())]));
-        table.insert("train".into(), file(TRAIN_FILE));
-        match self.model.track {
-            Some(_) => table.insert("track".into(), file(TRACK_FILE)),
-            None => table.remove("track"),
-        };
+        name_model(&mut table, self.model.track.is_some());
         table.to_string()
     }
 }

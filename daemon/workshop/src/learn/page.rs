@@ -1,7 +1,6 @@
 //! The history of all trains' models as one page: what grew from what, what was decided, what happened in
 //! certain runs, what is open.
 
-use std::fmt::Write as _;
 use std::time::SystemTime;
 
 use dynocar_shared::TrainId;
@@ -10,12 +9,13 @@ use super::error::LearnError;
 use super::errors_by_day;
 use super::learner::Learner;
 use super::memory::OpenQuestion;
-use crate::report::document::document;
-use crate::report::html::{Column, Table, escape};
+use crate::report::html::Column::{Numbers, Words};
+use crate::report::html::{self, TableColumn, chance, document, escape, marked_table, table};
 use crate::report::provenance::Provenance;
 use dynocar::models::history::{History, State};
 use dynocar::models::numbered::Numbered;
-use dynocar::models::{Decision, MaintenanceEvent, ModelHash, Moment, Stored};
+use dynocar::models::origin::HeldOutError;
+use dynocar::models::{Decision, MaintenanceEvent, ModelHash, Moment, Origin, Stored};
 use dynocar::shadow::record::Trials;
 
 /// The page on what a learner's store holds.
@@ -58,13 +58,7 @@ fn of_train(
 ) -> String {
     let mut html = String::new();
     let mut section = |name: &str, title: &str, body: String| {
-        let id = format!("train-{train}-{name}");
-        // Writing to a string cannot fail.
-        let _ = write!(
-            html,
-            "<section id=\"{id}\" aria-labelledby=\"{id}-title\">\n\
-             <h2 id=\"{id}-title\">{title}</h2>\n{body}</section>\n"
-        );
+        html += &html::section(&format!("train-{train}-{name}"), title, &body);
     };
     section("models", &format!("Train {train}: models"), models(history));
     if !errors.is_empty() {
@@ -91,56 +85,52 @@ fn models(history: &History) -> String {
             }
         ),
     };
-    let mut table = Table::new(
-        "Each model below the one that it grew from; error of free prediction on runs held out",
-        &[
-            ("Model", Column::Words),
-            ("Made, UTC", Column::Words),
-            ("State", Column::Words),
-            ("Adds", Column::Words),
-            ("Before, m/s", Column::Numbers),
-            ("After, m/s", Column::Numbers),
-        ],
-    );
     let is_root = |stored: &Stored| {
         let parent = stored.origin.parent;
         !history.models.iter().any(|(other, _)| Some(other.hash) == parent)
     };
+    let mut rows = Vec::new();
     for (stored, state) in history.models.iter().filter(|(stored, _)| is_root(stored)) {
-        push_tree(&mut table, history, (stored, *state), 0);
+        push_tree(&mut rows, history, (stored, *state), 0);
     }
-    format!("<p>{words}</p>\n{}", table.html())
+    let indent = |depth: usize| match depth {
+        0 => String::new(),
+        depth => "\u{2003}".repeat(depth - 1) + "└\u{a0}",
+    };
+    let adds = |it: &Origin| {
+        format!("<span title=\"{}\">{}</span>", escape(&it.statement), escape(&it.adds()))
+    };
+    let error = |it: &Stored, pick: fn(&HeldOutError) -> f64| {
+        it.origin.error.as_ref().map_or("–".into(), |error| format!("{:.3}", pick(error)))
+    };
+    let columns: [TableColumn<ModelRow>; 6] = [
+        ("Model", Words, &|it| format!("{}<code>{}</code>", indent(it.2), it.0.hash)),
+        ("Made, UTC", Words, &|it| minute(it.0.origin.made)),
+        ("State", Words, &|it| it.1.words().into()),
+        ("Adds", Words, &|it| adds(&it.0.origin)),
+        ("Before, m/s", Numbers, &|it| error(it.0, |error| error.before_mps)),
+        ("After, m/s", Numbers, &|it| error(it.0, |error| error.after_mps)),
+    ];
+    let caption =
+        "Each model below the one that it grew from; error of free prediction on runs held out";
+    let table = marked_table(caption, &columns, &rows, |it| it.1 == State::InForce);
+    format!("<p>{words}</p>\n{table}")
 }
 
+/// A model with its state, and how deep it stands below the one that all grew from.
+type ModelRow<'h> = (&'h Stored, State, usize);
+
 /// A model and those that grew from it, each deeper than its parent.
-fn push_tree(
-    table: &mut Table,
-    history: &History,
-    (stored, state): (&Stored, State),
+fn push_tree<'h>(
+    rows: &mut Vec<ModelRow<'h>>,
+    history: &'h History,
+    (stored, state): (&'h Stored, State),
     depth: usize,
 ) {
-    let origin = &stored.origin;
-    let indent =
-        if depth == 0 { String::new() } else { "\u{2003}".repeat(depth - 1) + "└\u{a0}" };
-    let error = |pick: fn(&dynocar::models::origin::HeldOutError) -> f64| {
-        origin.error.as_ref().map_or("–".into(), |error| format!("{:.3}", pick(error)))
-    };
-    let cells = vec![
-        format!("{indent}<code>{}</code>", stored.hash),
-        minute(origin.made),
-        state.words().into(),
-        format!("<span title=\"{}\">{}</span>", escape(&origin.statement), escape(&origin.adds())),
-        error(|it| it.before_mps),
-        error(|it| it.after_mps),
-    ];
-    if state == State::InForce {
-        table.push_marked(cells)
-    } else {
-        table.push(cells)
-    }
+    rows.push((stored, state, depth));
     for (child, state) in &history.models {
         if child.origin.parent == Some(stored.hash) {
-            push_tree(table, history, (child, *state), depth + 1);
+            push_tree(rows, history, (child, *state), depth + 1);
         }
     }
 }
@@ -158,54 +148,32 @@ fn decisions(decisions: &[Numbered<Decision>]) -> String {
     if decisions.is_empty() {
         return "<p>Nothing was decided: what the configuration declares is in force.</p>\n".into();
     }
-    let mut table = Table::new(
-        "Who decided what",
-        &[
-            ("At, UTC", Column::Words),
-            ("Decision", Column::Words),
-            ("Model", Column::Words),
-            ("In force before", Column::Words),
-            ("By", Column::Words),
-            ("Reason", Column::Words),
-        ],
-    );
-    for (_, it) in decisions {
-        table.push(vec![
-            minute(it.at),
-            it.action.name().replace('_', " "),
-            model(it.model),
-            model(it.from),
-            escape(&it.by),
-            escape(&it.reason),
-        ]);
-    }
-    table.html()
+    let columns: [TableColumn<Numbered<Decision>>; 6] = [
+        ("At, UTC", Words, &|(_, it)| minute(it.at)),
+        ("Decision", Words, &|(_, it)| it.action.name().replace('_', " ")),
+        ("Model", Words, &|(_, it)| model(it.model)),
+        ("In force before", Words, &|(_, it)| model(it.from)),
+        ("By", Words, &|(_, it)| escape(&it.by)),
+        ("Reason", Words, &|(_, it)| escape(&it.reason)),
+    ];
+    table("Who decided what", &columns, decisions)
 }
 
 fn of_events(events: &[Numbered<MaintenanceEvent>]) -> String {
     if events.is_empty() {
         return "<p>None was found.</p>\n".into();
     }
-    let mut table = Table::new(
+    let columns: [TableColumn<Numbered<MaintenanceEvent>>; 4] = [
+        ("Recorded, UTC", Words, &|(_, it)| it.acted.map_or("–".into(), |[at, _]| minute(at))),
+        ("Kind", Words, &|(_, it)| escape(&it.kind.replace('_', " "))),
+        ("What", Words, &|(_, it)| escape(&it.sentence)),
+        ("Chance where nothing acts", Numbers, &|(_, it)| chance(it.p_value, 1)),
+    ];
+    table(
         "What acted in certain runs, and is no property of the train or the line",
-        &[
-            ("Recorded, UTC", Column::Words),
-            ("Kind", Column::Words),
-            ("What", Column::Words),
-            ("Chance where nothing acts", Column::Numbers),
-        ],
-    );
-    for (_, it) in events {
-        let chance =
-            if it.p_value < 1e-6 { "&lt; 10⁻⁶".into() } else { format!("{:.1e}", it.p_value) };
-        table.push(vec![
-            it.acted.map_or("–".into(), |[first, _]| minute(first)),
-            escape(&it.kind.replace('_', " ")),
-            escape(&it.sentence),
-            chance,
-        ]);
-    }
-    table.html()
+        &columns,
+        events,
+    )
 }
 
 fn of_questions(open: &[&OpenQuestion]) -> String {
@@ -217,9 +185,8 @@ fn of_questions(open: &[&OpenQuestion]) -> String {
         let settle = it.experiment.as_deref().map_or(String::new(), |experiment| {
             format!(" <strong>To settle it:</strong> {}", escape(experiment))
         });
-        let _ = writeln!(
-            html,
-            "<li>{} (model <code>{}</code>, {}).{settle}</li>",
+        html += &format!(
+            "<li>{} (model <code>{}</code>, {}).{settle}</li>\n",
             escape(it.statement.trim_end_matches('.')),
             it.model,
             it.at

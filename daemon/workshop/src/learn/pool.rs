@@ -111,15 +111,15 @@ pub fn read(
         kept.push((found.clone(), run));
     }
     kept.reverse();
+    let (found, runs) = kept.into_iter().unzip();
     let dataset = Dataset {
         name: format!("train {}", train.name),
         description: None,
         train: Arc::clone(train),
         track: track.map(Arc::clone),
-        runs: Vec::new(),
+        runs,
     };
-    let (runs, read) = kept.into_iter().unzip();
-    Pool { dataset: Dataset { runs: read, ..dataset }, runs }.in_order()
+    Pool { dataset, runs: found }.in_order()
 }
 
 impl Pool {

@@ -31,15 +31,6 @@ pub struct Source {
     pub recorded: Moment,
 }
 
-/// A recording that is unpacked.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UnpackedRecording {
-    /// The dataset's folder.
-    pub folder: PathBuf,
-    /// Where it came from.
-    pub source: Source,
-}
-
 /// True for a recording that is no longer written.
 pub fn is_finished(path: &Path) -> bool {
     let end = || -> io::Result<Vec<u8>> {
@@ -92,28 +83,28 @@ pub fn take_up(
         .map_err(failed("unpacking a recording into the folder"))
 }
 
-/// The unpacked recordings in a folder, the oldest first. What is older than the horizon goes, and the
+/// The folders of the unpacked recordings in one, the oldest first. What is older than the horizon goes, and the
 /// oldest go until the rest takes no more than it may.
-pub fn unpacked_in(folder: &Path, now: Moment, horizon: Duration) -> Vec<UnpackedRecording> {
+pub fn unpacked_in(folder: &Path, now: Moment, horizon: Duration) -> Vec<(PathBuf, Source)> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut found: Vec<UnpackedRecording> = Vec::new();
+    let mut found: Vec<(PathBuf, Source)> = Vec::new();
     for folder in entries.map(|entry| entry.path()) {
         let source = std::fs::read_to_string(folder.join(SOURCE_FILE)).ok();
         match source.and_then(|text| toml::from_str(&text).ok()) {
-            Some(source) => found.push(UnpackedRecording { folder, source }),
+            Some(source) => found.push((folder, source)),
             // What a learner left that died; nobody else works here.
             None => remove(&folder),
         }
     }
-    found.sort_by_key(|it| (it.source.recorded, it.folder.clone()));
+    found.sort_by_key(|(folder, source)| (source.recorded, folder.clone()));
     let oldest = Moment { unix_s: now.unix_s.saturating_sub(horizon.as_secs()) };
     let (mut kept, mut bytes) = (Vec::new(), 0);
-    for recording in found.into_iter().rev() {
-        bytes += bytes_in(&recording.folder);
-        if recording.source.recorded < oldest || bytes > BYTES_MAX {
-            remove(&recording.folder);
+    for (folder, source) in found.into_iter().rev() {
+        bytes += bytes_in(&folder);
+        if source.recorded < oldest || bytes > BYTES_MAX {
+            remove(&folder);
         } else {
-            kept.push(recording);
+            kept.push((folder, source));
         }
     }
     kept.reverse();

@@ -94,9 +94,8 @@ pub fn runs_of(
         let name = folder.strip_prefix(places.runs).unwrap_or(folder).display().to_string();
         runs.extend(runs_in(folder, &name, None, memory));
     }
-    for recording in recordings::unpacked_in(&unpacked, now, horizon) {
-        let source = &recording.source;
-        runs.extend(runs_in(&recording.folder, &source.name, Some(source.recorded), memory));
+    for (folder, source) in recordings::unpacked_in(&unpacked, now, horizon) {
+        runs.extend(runs_in(&folder, &source.name, Some(source.recorded), memory));
     }
     let newest = runs.iter().map(|run| run.recorded).max().unwrap_or(now).min(now);
     let oldest = Moment { unix_s: newest.unix_s.saturating_sub(horizon.as_secs()) };

@@ -2,66 +2,43 @@
 
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::report::ReportData;
-use dynocar_analysis::explain::report::errors::RunErrors;
 use dynocar_analysis::explain::report::panels::Panel;
 
-use super::ReportError;
+use super::Subject;
 use super::plots::speeds::Width;
 use super::plots::{Plot, PlotError, as_file, line, panel, runs, speeds};
 
-/// A plot as a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Image {
-    /// Name of the file.
-    pub name: String,
-    /// The SVG.
-    pub svg: String,
-}
-
-/// Every plot of the report: the errors of the runs, the line with what was found along it, the
+/// Names and SVG of every plot of the report: the errors of the runs, the line with what was found along it, the
 /// speeds of runs, the residual against covariates.
 ///
 /// # Errors
 ///
 /// When a plot cannot be drawn.
-pub fn images(dataset: &Dataset, explanation: &Explanation) -> Result<Vec<Image>, ReportError> {
-    let data = ReportData::of(dataset, explanation);
-    let has_effect = !explanation.answer.effects.is_empty();
-    let number = |file: &str| {
-        dataset.runs.iter().find(|run| run.file == file).map_or(0, |run| run.number as usize)
-    };
+pub fn images(
+    dataset: &Dataset,
+    explanation: &Explanation,
+) -> Result<Vec<(String, String)>, PlotError> {
+    let subject = &Subject::of(dataset, explanation);
+    let (data, has_effect) = (&subject.data, subject.has_effect());
     let mut images = Vec::new();
-    let mut keep = |name: String, drawn: Result<Plot, PlotError>| match drawn {
-        Ok(plot) => {
-            images.push(Image { name, svg: as_file(&plot.svg) });
-            Ok(())
-        }
-        Err(source) => Err(ReportError::Plot { plot: name, source }),
-    };
+    let mut keep = |name: String, plot: Plot| images.push((name, as_file(&plot.svg)));
     for role in [Role::Holdout, Role::Fit] {
-        let own: Vec<(usize, &RunErrors)> = data
-            .errors
-            .by_run
-            .iter()
-            .filter(|run| run.role == role)
-            .map(|run| (number(&run.file), run))
-            .collect();
+        let own = subject.errors_of(role);
         if !own.is_empty() {
-            keep(format!("errors_{}.svg", role.name()), runs::draw(&own, role, has_effect))?;
+            keep(format!("errors_{}.svg", role.name()), runs::draw(&own, role, has_effect)?);
         }
     }
     let track = dataset.track.as_deref();
-    if let Some(drawn) = line::draw(track, &data.line, has_effect, Width::Wide).transpose() {
-        keep("line.svg".into(), drawn)?;
+    if let Some(plot) = line::draw(track, &data.line, has_effect, Width::Wide)? {
+        keep("line.svg".into(), plot);
     }
     for trace in &data.traces {
-        let name = format!("speed_run_{}.svg", number(&trace.file));
-        keep(name, speeds::draw(trace, Width::Wide, has_effect))?;
+        let name = format!("speed_run_{}.svg", subject.number(&trace.file));
+        keep(name, speeds::draw(trace, Width::Wide, has_effect)?);
     }
     for shown in &data.panels {
-        let run = shown.file.as_deref().map(number);
-        keep(panel_name(shown, run), panel::draw(shown, has_effect))?;
+        let run = shown.file.as_deref().map(|file| subject.number(file));
+        keep(panel_name(shown, run), panel::draw(shown, has_effect)?);
     }
     Ok(images)
 }

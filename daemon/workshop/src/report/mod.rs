@@ -4,16 +4,14 @@
 //! # Layout
 //!
 //! - [`mod@page`]: the page from top to bottom
-//! - [`mod@document`]: head, policy and foot, for the survey's page too
 //! - [`sections`]: its parts
 //! - [`plots`]: the plots, as SVG text
 //! - [`mod@images`]: the same as files of their own
-//! - [`html`]: escaping, tables, numbers
+//! - [`html`]: what every page has, for the survey's and the learner's too: head, policy, tables, numbers
 //! - [`provenance`]: command, versions, content hash
 //! - `style.css`: the style, for wide and narrow, light and dark, screen and paper
 //! - `plots.js`: values at the pointer and zoom
 
-pub mod document;
 pub mod html;
 pub mod images;
 pub mod page;
@@ -24,11 +22,14 @@ mod subject;
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::report::ReportData;
 
-pub use subject::{ReportError, Subject};
+pub use subject::Subject;
 
+use plots::PlotError;
 use provenance::Provenance;
+
+/// How every page begins.
+pub const PAGE_MARK: &str = "<!DOCTYPE html>";
 
 /// The page on an explanation of a dataset.
 ///
@@ -38,8 +39,7 @@ use provenance::Provenance;
 pub fn page(
     dataset: &Dataset,
     explanation: &Explanation,
-    provenance: Provenance,
-) -> Result<String, ReportError> {
-    let data = ReportData::of(dataset, explanation);
-    page::html(&Subject { dataset, explanation, data, provenance })
+    provenance: &Provenance,
+) -> Result<String, PlotError> {
+    page::html(&Subject::of(dataset, explanation), provenance)
 }

@@ -7,12 +7,13 @@ use dynocar_analysis::explain::answer::Verdict;
 use dynocar_analysis::explain::report::{effect, words};
 use dynocar_core::plausibility::Severity;
 
-use super::document::document;
-use super::html::escape;
+use super::Subject;
+use super::html::{chance, document, escape, section};
+use super::plots::PlotError;
+use super::provenance::Provenance;
 use super::sections::{
     Section, candidates, errors, line, parameters, quality, reproduce, residual,
 };
-use super::{ReportError, Subject};
 use crate::run_facts::tonnes;
 
 /// The page.
@@ -20,7 +21,7 @@ use crate::run_facts::tonnes;
 /// # Errors
 ///
 /// When a plot cannot be drawn.
-pub fn html(subject: &Subject) -> Result<String, ReportError> {
+pub fn html(subject: &Subject, provenance: &Provenance) -> Result<String, PlotError> {
     let mut sections = vec![errors::section(subject)?];
     sections.extend(line::section(subject)?);
     sections.extend([
@@ -28,41 +29,29 @@ pub fn html(subject: &Subject) -> Result<String, ReportError> {
         parameters::section(subject),
         candidates::section(subject),
         quality::section(subject),
-        reproduce::section(subject),
+        reproduce::section(provenance),
     ]);
     let name = escape(&subject.dataset.name);
-    let mut main = diagnostics(subject);
-    main += &verdict(subject);
-    main += &contents(&sections);
-    for section in &sections {
-        // Writing to a string cannot fail.
-        let _ = write!(
-            main,
-            "<section id=\"{0}\" aria-labelledby=\"{0}-title\">\n\
-             <h2 id=\"{0}-title\">{1}</h2>\n{2}</section>\n",
-            section.id, section.title, section.body
-        );
+    let mut main = diagnostics(subject) + &verdict(subject) + &contents(&sections);
+    for Section { id, title, body } in &sections {
+        main += &section(id, title, body);
     }
     let title = format!("{name} – residual report");
-    Ok(document(&title, &header(subject, &name), &main, &subject.provenance))
+    Ok(document(&title, &header(subject, &name, provenance), &main, provenance))
 }
 
-fn header(subject: &Subject, name: &str) -> String {
+fn header(subject: &Subject, name: &str, provenance: &Provenance) -> String {
     let dataset = subject.dataset;
     let description = dataset
         .description
         .as_deref()
         .map_or(String::new(), |text| format!("<p class=\"description\">{}</p>\n", escape(text)));
     let count = |role| dataset.with_role(role).count();
-    let train = if dataset.train.name.is_empty() {
-        String::new()
-    } else {
-        format!("{}, ", escape(&dataset.train.name))
+    let train = match &dataset.train.name[..] {
+        "" => String::new(),
+        train => format!("{}, ", escape(train)),
     };
-    let line = match &dataset.track {
-        Some(_) => "line known",
-        None => "line not known",
-    };
+    let line = if dataset.track.is_some() { "line known" } else { "line not known" };
     format!(
         "<p class=\"kicker\">Dynocar · residual report</p>\n<h1>{name}</h1>\n\
          {description}<p class=\"facts\">{train}{} t, {:.0} m · {line} · {} fit and {} holdout \
@@ -71,7 +60,7 @@ fn header(subject: &Subject, name: &str) -> String {
         dataset.train.length_m,
         count(Role::Fit),
         count(Role::Holdout),
-        subject.provenance.day
+        provenance.day
     )
 }
 
@@ -170,8 +159,11 @@ fn figures(subject: &Subject) -> String {
         ));
         let p_value = subject.explanation.answer.effects.iter().map(|effect| effect.p_value);
         let worst = p_value.fold(0.0, f64::max);
-        let shown = if worst < 1e-6 { "&lt; 10⁻⁶".into() } else { format!("{worst:.2e}") };
-        list.push((shown, "chance of as much where nothing acts", "for the whole search".into()));
+        list.push((
+            chance(worst, 2),
+            "chance of as much where nothing acts",
+            "for the whole search".into(),
+        ));
     }
     let mut html = String::from("<dl class=\"figures\">\n");
     for (value, what, more) in list {

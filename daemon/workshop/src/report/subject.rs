@@ -1,24 +1,9 @@
-//! What a page is about, and why it cannot be made.
+//! What a page is about.
 
-use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::report::ReportData;
-
-use super::plots::PlotError;
-use super::provenance::Provenance;
-
-/// Why a page cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// A plot cannot be drawn.
-    #[error("the plot of {plot} cannot be drawn: {source}")]
-    Plot {
-        /// What it shows.
-        plot: String,
-        /// Why.
-        source: PlotError,
-    },
-}
+use dynocar_analysis::explain::report::errors::RunErrors;
 
 /// Everything that the page is about.
 pub struct Subject<'a> {
@@ -28,19 +13,33 @@ pub struct Subject<'a> {
     pub explanation: &'a Explanation,
     /// The same as numbers and words for the page.
     pub data: ReportData,
-    /// Where it comes from.
-    pub provenance: Provenance,
 }
 
-impl Subject<'_> {
+impl<'a> Subject<'a> {
+    /// An explanation of a dataset.
+    pub fn of(dataset: &'a Dataset, explanation: &'a Explanation) -> Self {
+        Subject { dataset, explanation, data: ReportData::of(dataset, explanation) }
+    }
+
     /// True when an effect was added to the model, so that there is an 'after'.
     pub fn has_effect(&self) -> bool {
         !self.explanation.answer.effects.is_empty()
+    }
+
+    /// What the model without effects is called in a key.
+    pub fn before(&self) -> &'static str {
+        if self.has_effect() { "before" } else { "declared model, a, b, c refitted" }
     }
 
     /// Number of a run in the dataset, from 1; 0 for one that is not there.
     pub fn number(&self, file: &str) -> usize {
         let runs = &self.dataset.runs;
         runs.iter().find(|run| run.file == file).map_or(0, |run| run.number as usize)
+    }
+
+    /// The errors of the runs of a role, with their numbers.
+    pub fn errors_of(&self, role: Role) -> Vec<(usize, &RunErrors)> {
+        let own = self.data.errors.by_run.iter().filter(|run| run.role == role);
+        own.map(|run| (self.number(&run.file), run)).collect()
     }
 }

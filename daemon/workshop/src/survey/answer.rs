@@ -2,6 +2,7 @@
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::chainage::Estimate;
+use dynocar_analysis::survey::quantile::middle;
 use dynocar_analysis::survey::stops::Stop;
 use dynocar_analysis::survey::{NotUsed, Survey, Trip, Vehicle};
 use serde::Serialize;
@@ -130,11 +131,9 @@ impl SurveyAnswer {
 
 impl SurveyedLine {
     fn of(survey: &Survey) -> Self {
-        let median = survey.profile.as_ref().map(|profile| {
+        let median = survey.profile.as_ref().and_then(|profile| {
             let entries = gradient_entries(survey, profile, 1);
-            let mut stds: Vec<f64> = entries.iter().map(|entry| entry.2).collect();
-            let middle = stds.len() / 2;
-            *stds.select_nth_unstable_by(middle, f64::total_cmp).1
+            middle(&mut entries.iter().map(|entry| entry.2).collect::<Vec<f64>>())
         });
         SurveyedLine {
             length_m: survey.alignments.length_m(),

@@ -7,8 +7,7 @@ use dynocar_analysis::survey::stops::Stop;
 use dynocar_analysis::survey::{Survey, survey};
 
 use super::answer::SurveyAnswer;
-use super::failure::SurveyFailure;
-use super::material::Material;
+use super::material::{Material, SurveyFailure};
 use super::read;
 use super::write::write;
 use dynocar::dataset::load;

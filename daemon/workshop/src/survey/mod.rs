@@ -2,12 +2,11 @@
 //!
 //! - [`read`]: a dataset's runs as recordings; a line that was surveyed before
 //! - [`write`](mod@write), [`trip_rows`]: the dataset folder with its trips
-//! - `folder`: all of it in turn; `failure`: why nothing comes of it
+//! - `folder`: all of it in turn; [`material`]: what the files are made of, why nothing comes of it
 //! - [`answer`]: the result for machines
 //! - [`page`]: the result as a page
 
 pub mod answer;
-mod failure;
 mod folder;
 pub mod material;
 pub mod page;
@@ -15,5 +14,5 @@ pub mod read;
 pub mod trip_rows;
 pub mod write;
 
-pub use failure::SurveyFailure;
 pub use folder::{Surveyed, survey_folder};
+pub use material::SurveyFailure;

@@ -10,10 +10,9 @@ use dynocar_shared::HALF_95;
 
 use super::answer::{SurveyAnswer, TripAnswer};
 use super::write::gradient_entries;
-use crate::report::document::document;
-use crate::report::html::{Column, Table, escape};
-use crate::report::plots::speeds::Width;
-use crate::report::plots::{PlotError, figure, gradient};
+use crate::report::html::Column::{Names, Numbers, Words};
+use crate::report::html::{self, TableColumn, document, escape, table};
+use crate::report::plots::{PlotError, figure, gradient, wide_and_narrow};
 use crate::report::provenance::Provenance;
 
 /// Width and height of the map.
@@ -41,10 +40,8 @@ pub fn html(
         made.day
     );
     let mut main = String::new();
-    let mut section = |id: &str, title: &str, body: String| {
-        // Writing to a string cannot fail.
-        let _ = write!(main, "<section id=\"{id}\">\n<h2>{title}</h2>\n{body}</section>\n");
-    };
+    let mut section =
+        |id: &str, title: &str, body: String| main += &html::section(id, title, &body);
     section("map", "The line", map(survey, answer));
     if let Some(profile) = &survey.profile {
         let mut body = profile_plots(&gradient_entries(survey, profile, 1), "growing chainage")?;
@@ -143,9 +140,8 @@ fn scale_bar(span: f64) -> String {
 }
 
 fn profile_plots(entries: &[(f64, f64, f64)], direction: &str) -> Result<String, PlotError> {
-    let [wide, narrow] =
-        [Width::Wide, Width::Narrow].map(|width| gradient::draw(entries, direction, width));
-    Ok(figure("trace", &format!("For {direction}"), "", &[wide?, narrow?]))
+    let plots = wide_and_narrow(|width| gradient::draw(entries, direction, width))?;
+    Ok(figure("trace", &format!("For {direction}"), "", &plots))
 }
 
 fn learned(answer: &SurveyAnswer) -> String {
@@ -154,52 +150,40 @@ fn learned(answer: &SurveyAnswer) -> String {
     };
     let rows = learned.rows().into_iter();
     let rows: Vec<_> = rows.map(|(.., name, it)| (name, it.value, HALF_95 * it.std)).collect();
-    let columns: Columns<(&str, f64, f64)> = &[
-        ("quantity", Column::Words, |it| it.0.into()),
-        ("value", Column::Numbers, |it| number(it.1, Some(it.2))),
-        ("±", Column::Numbers, |it| number(it.2, Some(it.2))),
+    let columns: [TableColumn<(&str, f64, f64)>; 3] = [
+        ("quantity", Words, &|it| it.0.into()),
+        ("value", Numbers, &|it| number(it.1, Some(it.2))),
+        ("±", Numbers, &|it| number(it.2, Some(it.2))),
     ];
-    table("Learned, with 95 % intervals", columns, &rows)
+    table("Learned, with 95 % intervals", &columns, &rows)
 }
 
-/// Head, setting and cells of a table's columns.
-type Columns<'c, T> = &'c [(&'c str, Column, fn(&T) -> String)];
-
-fn table<T>(caption: &str, columns: Columns<T>, rows: &[T]) -> String {
-    let head: Vec<(&str, Column)> = columns.iter().map(|it| (it.0, it.1)).collect();
-    let mut table = Table::new(caption, &head);
-    for row in rows {
-        table.push(columns.iter().map(|it| it.2(row)).collect());
-    }
-    table.html()
-}
-
-const STOPS: Columns<Stop> = &[
-    ("chainage, m", Column::Numbers, |it| format!("{:.1}", it.chainage_m)),
-    ("name", Column::Names, |it| escape(&it.name)),
-    ("direction", Column::Numbers, |it| it.direction.to_string()),
-    ("stands", Column::Numbers, |it| it.stands.to_string()),
-    ("scatter, m", Column::Numbers, |it| it.std_m.map_or("–".into(), |it| format!("{it:.1}"))),
+const STOPS: &[TableColumn<'_, Stop>] = &[
+    ("chainage, m", Numbers, &|it| format!("{:.1}", it.chainage_m)),
+    ("name", Names, &|it| escape(&it.name)),
+    ("direction", Numbers, &|it| it.direction.to_string()),
+    ("stands", Numbers, &|it| it.stands.to_string()),
+    ("scatter, m", Numbers, &|it| it.std_m.map_or("–".into(), &|it| format!("{it:.1}"))),
 ];
 
-const TRIPS: Columns<TripAnswer> = &[
-    ("file", Column::Names, |it| escape(&it.file)),
-    ("recording", Column::Names, |it| escape(&it.source)),
-    ("role", Column::Words, |it| it.role.into()),
-    ("direction", Column::Numbers, |it| it.direction.to_string()),
-    ("from, s", Column::Numbers, |it| format!("{:.0}", it.from_s)),
-    ("to, s", Column::Numbers, |it| format!("{:.0}", it.to_s)),
-    ("length, m", Column::Numbers, |it| format!("{:.0}", it.length_m)),
-    ("residual left out, N", Column::Numbers, |it| {
+const TRIPS: &[TableColumn<'_, TripAnswer>] = &[
+    ("file", Names, &|it| escape(&it.file)),
+    ("recording", Names, &|it| escape(&it.source)),
+    ("role", Words, &|it| it.role.into()),
+    ("direction", Numbers, &|it| it.direction.to_string()),
+    ("from, s", Numbers, &|it| format!("{:.0}", it.from_s)),
+    ("to, s", Numbers, &|it| format!("{:.0}", it.to_s)),
+    ("length, m", Numbers, &|it| format!("{:.0}", it.length_m)),
+    ("residual left out, N", Numbers, &|it| {
         it.left_out_residual_n.map_or("–".into(), |value| format!("{value:.0}"))
     }),
 ];
 
-const NOT_USED: Columns<NotUsed> = &[
-    ("recording", Column::Names, |it| escape(&it.source)),
-    ("from, s", Column::Numbers, |it| format!("{:.0}", it.from_s)),
-    ("to, s", Column::Numbers, |it| format!("{:.0}", it.to_s)),
-    ("why", Column::Words, |it| it.reason.into()),
+const NOT_USED: &[TableColumn<'_, NotUsed>] = &[
+    ("recording", Names, &|it| escape(&it.source)),
+    ("from, s", Numbers, &|it| format!("{:.0}", it.from_s)),
+    ("to, s", Numbers, &|it| format!("{:.0}", it.to_s)),
+    ("why", Words, &|it| it.reason.into()),
 ];
 
 fn open(answer: &SurveyAnswer) -> String {

@@ -12,7 +12,7 @@ use dynocar_analysis::survey::{KnownLine, Vehicle};
 use dynocar_model::track::Track;
 use dynocar_shared::SampleField;
 
-use super::failure::SurveyFailure;
+use super::material::SurveyFailure;
 use dynocar::dataset::{load_track, read_text};
 
 /// A run's rows in order of time, as numbers of its samples.

@@ -10,12 +10,12 @@ use dynocar_analysis::survey::stops::Stop;
 use dynocar_analysis::survey::{Survey, SurveyedProfile};
 use toml::{Table, Value};
 
-use super::failure::SurveyFailure;
-use super::material::Material;
+use super::material::{Material, SurveyFailure};
 use super::trip_rows::{Column, columns, run_csv};
 use crate::track_text::TrackText;
+use crate::updated::set;
 use dynocar::dataset::open;
-use dynocar::output::{require_file, write_in_folder};
+use dynocar::output::{require_replaceable, write_in_folder};
 
 /// Length of the beginning by which a file of a survey is known.
 const MARK_LENGTH: usize = 20;
@@ -55,10 +55,7 @@ pub fn write(material: &Material, folder: &Path) -> Result<Vec<PathBuf>, SurveyF
     for (name, text) in &files {
         // What is there and begins otherwise is no survey's: the raw recordings, most likely.
         let mark = text.get(..MARK_LENGTH.min(text.len())).unwrap_or_default();
-        let path = folder.join(name);
-        if path.exists() {
-            require_file(&path, mark)?;
-        }
+        require_replaceable(&folder.join(name), mark)?;
     }
     let written = files.iter().map(|(name, text)| {
         let path = folder.join(name);
@@ -97,12 +94,7 @@ fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
     let mut train: Table =
         text.parse().map_err(|error: toml::de::Error| wrong(error.message().to_string()))?;
     let common = &profile.learned.profile.common;
-    let mut set = |section: &str, key: &str, value: f64| {
-        let entry = train.entry(section).or_insert_with(|| Value::Table(Table::new()));
-        if let Value::Table(section) = entry {
-            section.insert(key.into(), Value::Float(value));
-        }
-    };
+    let mut set = |section: &str, key: &str, value| set(&mut train, section, key, value);
     for (key, value) in ["a", "b", "c"].into_iter().zip(common.davis()) {
         set("resistance", key, rounded(value, 1e-6));
     }

@@ -10,7 +10,7 @@ use plotters::prelude::{
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{RGBColor, ShapeStyle};
 
-use super::{AXIS, BAND, Frame, GRID, PlotError, SCALE, TEXT};
+use super::{AXIS, BAND, DrawError, Frame, GRID, SCALE, TEXT};
 use crate::report::html::minus;
 
 pub(super) type Area<'t> = DrawingArea<SVGBackend<'t>, Shift>;
@@ -52,7 +52,7 @@ pub(super) fn chart<'a, 't>(
     area: &'a Area<'t>,
     x: &Axis,
     y: &Axis,
-) -> Result<Chart<'a, 't>, PlotError> {
+) -> Result<Chart<'a, 't>, DrawError> {
     let px = |nominal: u32| nominal * SCALE;
     let (width, height) = area.dim_in_pixel();
     let mut chart = ChartBuilder::on(area)
@@ -136,7 +136,7 @@ pub(super) fn shade(
     ranges: &[[f64; 2]],
     x: [f64; 2],
     y: [f64; 2],
-) -> Result<(), PlotError> {
+) -> Result<(), DrawError> {
     let inside = ranges
         .iter()
         .map(|range| range.map(|value| value.clamp(x[0], x[1])))
@@ -153,7 +153,7 @@ pub(super) fn band(
     line: &[(f64, f64)],
     halves: &[f64],
     y: [f64; 2],
-) -> Result<(), PlotError> {
+) -> Result<(), DrawError> {
     let edge = |side: f64| {
         let both = line.iter().zip(halves);
         both.map(move |((at, value), half)| (*at, (value + side * half).clamp(y[0], y[1])))
@@ -164,7 +164,7 @@ pub(super) fn band(
 }
 
 /// Draws a horizontal line at zero.
-pub(super) fn zero_line(chart: &mut Chart, x: [f64; 2]) -> Result<(), PlotError> {
+pub(super) fn zero_line(chart: &mut Chart, x: [f64; 2]) -> Result<(), DrawError> {
     let line = vec![(x[0], 0.0), (x[1], 0.0)];
     chart.draw_series([plotters::element::PathElement::new(line, stroke(AXIS, 1.0))])?;
     Ok(())

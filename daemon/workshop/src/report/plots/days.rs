@@ -1,14 +1,12 @@
 //! The error of a train's models, day by day, with the days on which another came in force.
 
-use plotters::backend::SVGBackend;
-use plotters::drawing::IntoDrawingArea;
 use plotters::element::{Circle, PathElement};
 use plotters::style::{Color, RGBColor};
 
 use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, stroke};
 use super::reading::Reading;
 use super::speeds::Width;
-use super::{AFTER, AXIS, BEFORE, Plot, PlotError, SCALE, for_page};
+use super::{AFTER, AXIS, BEFORE, DrawError, Plot, PlotError, SCALE, picture};
 
 /// The errors of a day in m/s, where they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,25 +27,27 @@ pub struct Day {
 /// When the drawing fails.
 pub fn draw(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<Plot, PlotError> {
     let (nominal, height, _) = width.size();
-    let size = (nominal * SCALE, (height + 30) * SCALE);
-    let (mut drawing, mut frames) = (String::new(), Vec::new());
     let title = format!("Days since {first}");
-    {
-        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+    let label = format!(
+        "Error over 60 s by day since {first}, {} days, of the model in force and of the one that was \
+         declared; another came in force {} times",
+        days.len(),
+        changes.len()
+    );
+    let svg = picture(&label, width.class(), (nominal, height + 30), |area| {
         let x = padded(days.iter().map(|day| day.day), 0.02);
         let errors = days.iter().flat_map(|day| [day.declared_mps, day.in_force_mps]).flatten();
         let y = [0.0, range_with_zero(errors)[1]];
         let labels = if width == Width::Wide { 10 } else { 5 };
         let x_axis = Axis { range: x, title: &title, labels, is_whole: true };
         let y_axis = Axis { range: y, title: "Error over 60 s, m/s", labels: 5, is_whole: false };
-        let mut chart = chart(&area, &x_axis, &y_axis)?;
+        let mut chart = chart(area, &x_axis, &y_axis)?;
         let change = |&at: &f64| PathElement::new(vec![(at, y[0]), (at, y[1])], stroke(AXIS, 1.2));
         chart.draw_series(changes.iter().map(change))?;
         line(&mut chart, days, |day| day.declared_mps, (BEFORE, false))?;
         line(&mut chart, days, |day| day.in_force_mps, (AFTER, true))?;
-        frames.push(frame(&chart));
-        area.present()?;
-    }
+        Ok(vec![frame(&chart)])
+    })?;
     let values = |pick: fn(&Day) -> Option<f64>| {
         days.iter().map(|day| pick(day).unwrap_or(f64::NAN)).collect::<Vec<f64>>()
     };
@@ -55,13 +55,6 @@ pub fn draw(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<
     let reading = Reading::new("Day", "", true, at)
         .with("in force", "m/s", values(|day| day.in_force_mps), Vec::new())
         .with("declared", "m/s", values(|day| day.declared_mps), Vec::new());
-    let label = format!(
-        "Error over 60 s by day since {first}, {} days, of the model in force and of the one that was \
-         declared; another came in force {} times",
-        days.len(),
-        changes.len()
-    );
-    let svg = for_page(&drawing, &label, width.class(), size, &frames);
     Ok(Plot { svg, readings: vec![reading] })
 }
 
@@ -71,7 +64,7 @@ fn line(
     days: &[Day],
     pick: fn(&Day) -> Option<f64>,
     (colour, is_filled): (RGBColor, bool),
-) -> Result<(), PlotError> {
+) -> Result<(), DrawError> {
     let parts = days.chunk_by(|one, next| {
         pick(one).is_some() && pick(next).is_some() && next.day - one.day < 1.5
     });

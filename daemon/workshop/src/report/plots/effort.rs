@@ -1,14 +1,12 @@
 //! The greatest forces of a train over the speed, with its resistance.
 
 use dynocar_model::train::{EffortCurve, TrainModel};
-use plotters::backend::SVGBackend;
-use plotters::drawing::IntoDrawingArea;
 use plotters::element::{PathElement, Text};
 use plotters::style::RGBColor;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::axes::{Axis, chart, letters, range_with_zero, stroke};
-use super::{AFTER, BEFORE, MEASURED, PlotError, SCALE, for_page};
+use super::{AFTER, BEFORE, MEASURED, PlotError, SCALE, picture};
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (980, 380);
@@ -39,16 +37,13 @@ pub fn draw(train: &TrainModel) -> Result<Option<String>, PlotError> {
         lines.extend(curve.as_ref().map(|curve| (name, colour, points(curve, top_mps))));
     }
     lines.push(("resistance on level track", MEASURED, resistance(train, top_mps)));
-    let size = (SIZE.0 * SCALE, SIZE.1 * SCALE);
-    let mut drawing = String::new();
-    {
-        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+    let svg = picture(&label(train, top_mps), "wide", SIZE, |area| {
         let forces = lines.iter().flat_map(|line| line.2.iter().map(|point| point.1));
         let y = [0.0, range_with_zero(forces)[1]];
         let x = [0.0, 1.02 * 3.6 * top_mps];
         let x_axis = Axis { range: x, title: "Speed, km/h", labels: 10, is_whole: true };
         let y_axis = Axis { range: y, title: "Force, kN", labels: 6, is_whole: false };
-        let mut chart = chart(&area, &x_axis, &y_axis)?;
+        let mut chart = chart(area, &x_axis, &y_axis)?;
         let mut right_px = f64::from(SIZE.0) - 12.0;
         for (name, colour, points) in lines.iter().rev() {
             chart.draw_series([PathElement::new(points.clone(), stroke(*colour, 1.6))])?;
@@ -57,9 +52,9 @@ pub fn draw(train: &TrainModel) -> Result<Option<String>, PlotError> {
             area.draw(&Text::new((*name).to_string(), place, style))?;
             right_px -= LETTER_PX * (name.len() + 3) as f64;
         }
-        area.present()?;
-    }
-    Ok(Some(for_page(&drawing, &label(train, top_mps), "wide", size, &[])))
+        Ok(Vec::new())
+    });
+    svg.map(Some)
 }
 
 /// The curve from standstill to a speed, as (km/h, kN).

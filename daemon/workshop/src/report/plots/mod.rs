@@ -17,20 +17,33 @@ pub mod speeds;
 use std::fmt::Write as _;
 use std::io;
 
-use plotters::drawing::DrawingAreaErrorKind;
+use plotters::backend::SVGBackend;
+use plotters::drawing::{DrawingAreaErrorKind, IntoDrawingArea};
 use plotters::style::RGBColor;
 use serde_json::json;
 
 use super::html::escape;
+use axes::Area;
 use reading::Reading;
+use speeds::Width;
 
 /// What the model without effects is called beside its data.
 fn before_name(has_effect: bool) -> &'static str {
     if has_effect { "before" } else { "model" }
 }
 
+/// Why something cannot be drawn.
+type DrawError = DrawingAreaErrorKind<io::Error>;
+
 /// Why a plot cannot be drawn.
-pub type PlotError = DrawingAreaErrorKind<io::Error>;
+#[derive(Debug, thiserror::Error)]
+#[error("the plot of {plot} cannot be drawn: {source}")]
+pub struct PlotError {
+    /// What it shows.
+    plot: String,
+    /// Why.
+    source: DrawError,
+}
 
 /// A plot: the picture, and what a pointer reads from it.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,13 +61,6 @@ type Frame = [f64; 7];
 /// Drawn over nominal size.
 const SCALE: u32 = 2;
 
-/// A colour of the plots.
-struct Ink {
-    colour: RGBColor,
-    /// The page's variable for it.
-    variable: &'static str,
-}
-
 const TEXT: RGBColor = RGBColor(0x54, 0x5B, 0x66);
 const GRID: RGBColor = RGBColor(0xE3, 0xE6, 0xEA);
 const AXIS: RGBColor = RGBColor(0x9A, 0xA1, 0xAC);
@@ -65,22 +71,23 @@ const ACTING: RGBColor = RGBColor(0xE4, 0xEE, 0xF7);
 const BAND: RGBColor = RGBColor(0xD9, 0xC3, 0xAE);
 const TUNNEL: RGBColor = RGBColor(0xE2, 0xE3, 0xE7);
 
-const INKS: [Ink; 9] = [
-    Ink { colour: TEXT, variable: "--muted" },
-    Ink { colour: GRID, variable: "--grid" },
-    Ink { colour: AXIS, variable: "--axis" },
-    Ink { colour: MEASURED, variable: "--measured" },
-    Ink { colour: BEFORE, variable: "--before" },
-    Ink { colour: AFTER, variable: "--after" },
-    Ink { colour: ACTING, variable: "--acting" },
-    Ink { colour: BAND, variable: "--band" },
-    Ink { colour: TUNNEL, variable: "--tunnel" },
+/// The colours with the page's variables for them.
+const INKS: [(RGBColor, &str); 9] = [
+    (TEXT, "--muted"),
+    (GRID, "--grid"),
+    (AXIS, "--axis"),
+    (MEASURED, "--measured"),
+    (BEFORE, "--before"),
+    (AFTER, "--after"),
+    (ACTING, "--acting"),
+    (BAND, "--band"),
+    (TUNNEL, "--tunnel"),
 ];
 
 /// The style rules that give every colour of the plots its variable.
 pub fn colour_rules() -> String {
     let mut rules = String::new();
-    for Ink { colour: RGBColor(r, g, b), variable } in INKS {
+    for (RGBColor(r, g, b), variable) in INKS {
         for property in ["fill", "stroke"] {
             // Writing to a string cannot fail.
             let _ = writeln!(
@@ -92,15 +99,21 @@ pub fn colour_rules() -> String {
     rules
 }
 
-/// Makes a backend's drawing part of the page: it takes its size from the page, says what it
-/// shows, and where its charts lie.
-fn for_page(
-    drawing: &str,
+/// A picture of a nominal size in px for the page: it takes its size from the page, says what it shows, and where
+/// its charts lie; `paint` draws these and gives their frames.
+fn picture(
     label: &str,
     class: &str,
     (width, height): (u32, u32),
-    frames: &[Frame],
-) -> String {
+    paint: impl FnOnce(&Area<'_>) -> Result<Vec<Frame>, DrawError>,
+) -> Result<String, PlotError> {
+    let (width, height) = (width * SCALE, height * SCALE);
+    let mut drawing = String::new();
+    let painted = {
+        let area = SVGBackend::with_string(&mut drawing, (width, height)).into_drawing_area();
+        paint(&area).and_then(|frames| area.present().map(|()| frames))
+    };
+    let frames = painted.map_err(|source| PlotError { plot: label.into(), source })?;
     let body = drawing.find('>').map_or("", |end| &drawing[end + 1..]);
     // What is opaque need not say so.
     let body = body.replace(" opacity=\"1\"", "");
@@ -109,11 +122,22 @@ fn for_page(
     } else {
         format!(" data-frames=\"{}\"", json!(frames))
     };
-    format!(
+    Ok(format!(
         "<svg class=\"plot {class}\" viewBox=\"0 0 {width} {height}\" role=\"img\" \
          aria-label=\"{}\"{frames}>{body}",
         escape(label)
-    )
+    ))
+}
+
+/// A plot for wide pages and one for narrow ones.
+///
+/// # Errors
+///
+/// When one cannot be drawn.
+pub fn wide_and_narrow<T>(
+    draw: impl Fn(Width) -> Result<T, PlotError>,
+) -> Result<[T; 2], PlotError> {
+    Ok([draw(Width::Wide)?, draw(Width::Narrow)?])
 }
 
 /// A plot, or one for wide and one for narrow pages, that answers to the pointer; caption and key
@@ -150,14 +174,14 @@ mod tests {
 
     #[test]
     fn a_file_of_its_own_has_a_size_a_name_space_and_a_ground() {
-        let plot = for_page("<svg width=\"9\">\n<g/></svg>", "a", "wide", (800, 600), &[]);
+        let plot = picture("a", "wide", (400, 300), |_| Ok(Vec::new())).unwrap();
         let file = as_file(&plot);
         assert!(file.contains("viewBox=\"0 0 800 600\""), "{file}");
         assert!(
             file.contains(" xmlns=\"http://www.w3.org/2000/svg\" width=\"400\" height=\"300\">")
         );
-        let ground = "<rect width=\"800\" height=\"600\" fill=\"#FFFFFF\"/>\n<g/></svg>\n";
-        assert!(file.ends_with(ground), "{file}");
+        let ground = "<rect width=\"800\" height=\"600\" fill=\"#FFFFFF\"/>\n</svg>\n";
+        assert!(file.contains(ground), "{file}");
     }
 
     #[test]
@@ -165,22 +189,18 @@ mod tests {
         let rules = colour_rules();
         assert_eq!(rules.lines().count(), 2 * INKS.len());
         for (k, ink) in INKS.iter().enumerate() {
-            assert!(INKS[..k].iter().all(|other| other.colour != ink.colour));
+            assert!(INKS[..k].iter().all(|other| other.0 != ink.0));
         }
         assert!(rules.contains("svg.plot [fill=\"#B85C14\"]{fill:var(--before)}"));
     }
 
     #[test]
     fn a_drawing_for_the_page_has_no_size_of_its_own() {
-        let svg = for_page(
-            "<svg width=\"9\" xmlns=\"x\">\n<g/></svg>",
-            "a \"b\"",
-            "wide",
-            (8, 6),
-            &[[1.5; 7]],
-        );
+        let svg = picture("a \"b\"", "wide", (4, 3), |_| Ok(vec![[1.5; 7]])).unwrap();
         assert!(svg.starts_with("<svg class=\"plot wide\" viewBox=\"0 0 8 6\" role=\"img\""));
-        assert!(svg.contains("aria-label=\"a &quot;b&quot;\"") && svg.ends_with("<g/></svg>"));
+        assert!(
+            svg.contains("aria-label=\"a &quot;b&quot;\"") && svg.trim_end().ends_with("</svg>")
+        );
         assert!(svg.contains("data-frames=\"[[1.5,1.5,"), "{svg}");
     }
 }

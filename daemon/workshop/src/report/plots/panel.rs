@@ -2,8 +2,6 @@
 
 use dynocar_analysis::explain::report::covariates::Covariate;
 use dynocar_analysis::explain::report::panels::{Panel, PanelBin};
-use plotters::backend::SVGBackend;
-use plotters::drawing::IntoDrawingArea;
 use plotters::element::{Circle, PathElement};
 use plotters::style::{Color, RGBColor};
 
@@ -11,7 +9,7 @@ use super::axes::{
     Axis, Chart, band, chart, frame, padded, range_with_zero, shade, stroke, zero_line,
 };
 use super::reading::Reading;
-use super::{ACTING, AFTER, BEFORE, Plot, PlotError, SCALE, before_name, for_page};
+use super::{ACTING, AFTER, BEFORE, DrawError, Plot, PlotError, SCALE, before_name, picture};
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (470, 290);
@@ -24,10 +22,7 @@ const APART: f64 = 0.004;
 ///
 /// When the drawing fails.
 pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
-    let size = (SIZE.0 * SCALE, SIZE.1 * SCALE);
-    let (mut drawing, mut frames) = (String::new(), Vec::new());
-    {
-        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+    let svg = picture(&label(panel, has_effect), "panel", SIZE, |area| {
         let is_category = panel.covariate.is_category();
         let room = if is_category { 0.0 } else { 0.03 };
         let x = match panel.covariate {
@@ -41,7 +36,7 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
         let x_axis = Axis { range: x, title: &title, labels, is_whole: is_category };
         let y_axis =
             Axis { range: y, title: "Missing resistance, N/kN", labels: 5, is_whole: false };
-        let mut chart = chart(&area, &x_axis, &y_axis)?;
+        let mut chart = chart(area, &x_axis, &y_axis)?;
         shade(&mut chart, ACTING, &panel.acting, x, y)?;
         zero_line(&mut chart, x)?;
         if has_effect && !is_category {
@@ -54,10 +49,8 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
             chart.draw_series([PathElement::new(line, stroke(BEFORE, 1.0))])?;
         }
         means(&mut chart, &panel.bins, has_effect, x)?;
-        frames.push(frame(&chart));
-        area.present()?;
-    }
-    let svg = for_page(&drawing, &label(panel, has_effect), "panel", size, &frames);
+        Ok(vec![frame(&chart)])
+    })?;
     let covariate = panel.covariate;
     let reading = reading(covariate.title(), covariate.unit(), &panel.bins, has_effect);
     Ok(Plot { svg, readings: vec![reading] })
@@ -92,7 +85,7 @@ pub(super) fn means(
     bins: &[PanelBin],
     has_effect: bool,
     x: [f64; 2],
-) -> Result<(), PlotError> {
+) -> Result<(), DrawError> {
     let apart = if has_effect { APART * (x[1] - x[0]) } else { 0.0 };
     let before = bins.iter().map(|bin| (bin.at - apart, bin.before_n_per_kn));
     points(chart, before, BEFORE, false)?;
@@ -135,7 +128,7 @@ fn points(
     points: impl Iterator<Item = (f64, (f64, f64))> + Clone,
     colour: RGBColor,
     is_filled: bool,
-) -> Result<(), PlotError> {
+) -> Result<(), DrawError> {
     let whisker = |(at, (mean, half)): (f64, (f64, f64))| {
         PathElement::new(vec![(at, mean - half), (at, mean + half)], stroke(colour, 1.2))
     };

@@ -2,14 +2,12 @@
 
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::report::errors::RunErrors;
-use plotters::backend::SVGBackend;
-use plotters::drawing::IntoDrawingArea;
 use plotters::element::{Circle, PathElement};
 use plotters::prelude::Color;
 
 use super::axes::{Axis, chart, frame, range_with_zero, stroke};
 use super::reading::Reading;
-use super::{AFTER, AXIS, BEFORE, Plot, PlotError, SCALE, before_name, for_page};
+use super::{AFTER, AXIS, BEFORE, Plot, PlotError, SCALE, before_name, picture};
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (470, 230);
@@ -20,12 +18,10 @@ const SIZE: (u32, u32) = (470, 230);
 ///
 /// When the drawing fails.
 pub fn draw(runs: &[(usize, &RunErrors)], role: Role, has_effect: bool) -> Result<Plot, PlotError> {
-    let size = (SIZE.0 * SCALE, SIZE.1 * SCALE);
     let known: Vec<(usize, [f64; 2])> =
         runs.iter().filter_map(|(number, run)| Some((*number, run.full_run_mps?))).collect();
-    let (mut drawing, mut frames) = (String::new(), Vec::new());
-    {
-        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+    let label = format!("Error of the predicted speed of {} {} runs", known.len(), role.name());
+    let svg = picture(&label, "panel", SIZE, |area| {
         let last = known.iter().map(|run| run.0).max().unwrap_or(1) as f64;
         let first = known.iter().map(|run| run.0).min().unwrap_or(1) as f64;
         let x = [first - 0.6, last + 0.6];
@@ -33,7 +29,7 @@ pub fn draw(runs: &[(usize, &RunErrors)], role: Role, has_effect: bool) -> Resul
         let labels = ((last - first) as usize + 3).clamp(3, 14);
         let x_axis = Axis { range: x, title: "Run, by number", labels, is_whole: true };
         let y_axis = Axis { range: y, title: "RMSE of the speed, m/s", labels: 5, is_whole: false };
-        let mut chart = chart(&area, &x_axis, &y_axis)?;
+        let mut chart = chart(area, &x_axis, &y_axis)?;
         if has_effect {
             chart.draw_series(known.iter().map(|&(number, [before, after])| {
                 let at = number as f64;
@@ -49,11 +45,8 @@ pub fn draw(runs: &[(usize, &RunErrors)], role: Role, has_effect: bool) -> Resul
         if has_effect {
             chart.draw_series(point(1, AFTER.filled()))?;
         }
-        frames.push(frame(&chart));
-        area.present()?;
-    }
-    let role = if role == Role::Holdout { "holdout" } else { "fit" };
-    let label = format!("Error of the predicted speed of {} {role} runs", known.len());
+        Ok(vec![frame(&chart)])
+    })?;
     let at = known.iter().map(|run| run.0 as f64).collect();
     let errors = |side: usize| known.iter().map(|run| run.1[side]).collect();
     let mut reading = Reading::new("Run", "", true, at);
@@ -61,7 +54,6 @@ pub fn draw(runs: &[(usize, &RunErrors)], role: Role, has_effect: bool) -> Resul
     if has_effect {
         reading = reading.with("after", "m/s", errors(1), Vec::new());
     }
-    let svg = for_page(&drawing, &label, "panel", size, &frames);
     Ok(Plot { svg, readings: vec![reading] })
 }
 

@@ -1,15 +1,14 @@
 //! Measured and predicted speed of a run, and the error of the prediction below it.
 
-use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::report::traces::{Trace, TracePoint};
-use plotters::backend::SVGBackend;
-use plotters::drawing::IntoDrawingArea;
 use plotters::element::PathElement;
 use plotters::style::RGBColor;
 
 use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, shade, stroke, zero_line};
 use super::reading::Reading;
-use super::{ACTING, AFTER, BEFORE, MEASURED, Plot, PlotError, SCALE, before_name, for_page};
+use super::{
+    ACTING, AFTER, BEFORE, DrawError, MEASURED, Plot, PlotError, SCALE, before_name, picture,
+};
 
 /// For which page a plot is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,10 +43,8 @@ impl Width {
 /// When the drawing fails.
 pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotError> {
     let (nominal, above, below) = width.size();
-    let size = (nominal * SCALE, (above + below) * SCALE);
-    let (mut drawing, mut frames) = (String::new(), Vec::new());
-    {
-        let area = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+    let size = (nominal, above + below);
+    let svg = picture(&label(trace, has_effect), width.class(), size, |area| {
         let (speeds, errors) = area.split_vertically(above * SCALE);
         let points = || trace.pieces.iter().flatten();
         let x = padded(points().map(|point| point.time_s), 0.01);
@@ -78,10 +75,8 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
         if has_effect {
             lines(&mut lower, trace, AFTER, 1.4, |p| p.after_mps - p.measured_mps)?;
         }
-        frames.extend([frame(&upper), frame(&lower)]);
-        area.present()?;
-    }
-    let svg = for_page(&drawing, &label(trace, has_effect), width.class(), size, &frames);
+        Ok(vec![frame(&upper), frame(&lower)])
+    })?;
     Ok(Plot { svg, readings: readings(trace, has_effect) })
 }
 
@@ -112,7 +107,7 @@ fn lines(
     colour: RGBColor,
     width_px: f64,
     value: impl Fn(&TracePoint) -> f64,
-) -> Result<(), PlotError> {
+) -> Result<(), DrawError> {
     chart.draw_series(trace.pieces.iter().map(|piece| {
         let line: Vec<(f64, f64)> = piece.iter().map(|p| (p.time_s, value(p))).collect();
         PathElement::new(line, stroke(colour, width_px))
@@ -121,9 +116,8 @@ fn lines(
 }
 
 fn label(trace: &Trace, has_effect: bool) -> String {
-    let role = if trace.role == Role::Holdout { "holdout" } else { "fit" };
-    let mut text =
-        format!("Measured and predicted speed of the {role} run {} over time", trace.file);
+    let (role, file) = (trace.role.name(), &trace.file);
+    let mut text = format!("Measured and predicted speed of the {role} run {file} over time");
     if let Some([before, after]) = trace.rmse_mps {
         text += &if has_effect {
             format!("; error {before:.3} m/s before, {after:.3} m/s after the effect is added")

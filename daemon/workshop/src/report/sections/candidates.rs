@@ -2,40 +2,29 @@
 
 use dynocar_analysis::explain::evidence::SCORE_MIN;
 use dynocar_analysis::explain::identifiability::not_held;
+use dynocar_analysis::explain::report::candidates::CandidateRow;
 
 use super::Section;
 use crate::report::Subject;
-use crate::report::html::{Column, Table, escape, minus};
+use crate::report::html::Column::{Numbers, Words};
+use crate::report::html::{TableColumn, escape, marked_table, minus};
 
 /// The section.
 pub fn section(subject: &Subject) -> Section {
-    let has_beside = subject.data.candidates.iter().any(|row| row.beside.is_some());
-    let head = [
-        ("Candidate", Column::Words),
-        ("Evidence alone", Column::Numbers),
-        ("Error taken away alone", Column::Numbers),
-        ("Evidence given what was found", Column::Numbers),
-        ("Outcome", Column::Words),
+    let rows = &subject.data.candidates;
+    let has_beside = rows.iter().any(|row| row.beside.is_some());
+    let evidence =
+        |value: Option<f64>| value.map_or("–".into(), |value| minus(&format!("{value:.0}")));
+    let reduction = |share: f64| minus(&format!("{:.0} %", 100.0 * share));
+    let columns: [TableColumn<CandidateRow>; 5] = [
+        ("Candidate", Words, &|it| format!("{} <code>{}</code>", escape(it.title), it.kind)),
+        ("Evidence alone", Numbers, &|it| evidence(it.alone)),
+        ("Error taken away alone", Numbers, &|it| it.reduction.map_or("–".into(), reduction)),
+        ("Evidence given what was found", Numbers, &|it| evidence(it.beside)),
+        ("Outcome", Words, &|it| escape(&it.reason)),
     ];
-    let kept: Vec<(&str, Column)> = head
-        .into_iter()
-        .filter(|(name, _)| has_beside || !name.starts_with("Evidence given"))
-        .collect();
-    let mut table = Table::new("All kinds of the library", &kept);
-    for row in &subject.data.candidates {
-        let evidence =
-            |value: Option<f64>| value.map_or("–".into(), |value| minus(&format!("{value:.0}")));
-        let mut cells = vec![
-            format!("{} <code>{}</code>", escape(row.title), row.kind),
-            evidence(row.alone),
-            row.reduction.map_or("–".into(), |share| minus(&format!("{:.0} %", 100.0 * share))),
-        ];
-        if has_beside {
-            cells.push(evidence(row.beside));
-        }
-        cells.push(escape(&row.reason));
-        if row.is_found { table.push_marked(cells) } else { table.push(cells) }
-    }
+    let is_kept = |it: &TableColumn<_>| has_beside || !it.0.starts_with("Evidence given");
+    let kept: Vec<_> = columns.into_iter().filter(is_kept).collect();
     let mut body = format!(
         "<p>Every kind of the library was fitted together with a, b and c. Evidence is the \
          decrease of −2 log likelihood less the price of the parameters and of the structures \
@@ -43,11 +32,10 @@ pub fn section(subject: &Subject) -> Section {
          that were fitted and of runs left out of the fit, it must exceed {SCORE_MIN:.0}, and the effect \
          must be large enough to matter. ‘Alone’ is on top of a, b and c only.</p>\n"
     );
-    if subject.data.candidates.is_empty() {
-        body += "<p>The runs hold too little motion for any of them.</p>\n";
-    } else {
-        body += &table.html();
-    }
+    body += &match rows.is_empty() {
+        true => "<p>The runs hold too little motion for any of them.</p>\n".into(),
+        false => marked_table("All kinds of the library", &kept, rows, |row| row.is_found),
+    };
     for caveat in not_held(&subject.explanation.answer.identifiability) {
         body += &format!("<p>{}</p>\n", escape(caveat.trim()));
     }

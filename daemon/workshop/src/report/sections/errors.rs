@@ -1,7 +1,5 @@
 //! Error before and after, and the speeds behind it.
 
-use std::fmt::Write as _;
-
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::judged::Judged;
 use dynocar_analysis::explain::report::Estimate;
@@ -9,18 +7,20 @@ use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors
 use dynocar_analysis::explain::report::traces::Trace;
 use dynocar_analysis::explain::stop_to_stop::{StopToStop, reduction};
 
-use super::{Section, legend};
-use crate::report::html::{Column, Table, escape, estimate, percent};
-use crate::report::plots::speeds::Width;
-use crate::report::plots::{figure, runs, speeds};
-use crate::report::{ReportError, Subject};
+use super::Section;
+use crate::report::Subject;
+use crate::report::html::Column::{Names, Numbers, Words};
+use crate::report::html::{
+    TableColumn, details, escape, estimate, legend, marked_table, percent, table,
+};
+use crate::report::plots::{PlotError, figure, runs, speeds, wide_and_narrow};
 
 /// The section.
 ///
 /// # Errors
 ///
 /// When a plot cannot be drawn.
-pub fn section(subject: &Subject) -> Result<Section, ReportError> {
+pub fn section(subject: &Subject) -> Result<Section, PlotError> {
     let mut body = String::from(
         "<p>Each model starts at a run’s first measured speed, is driven by the reported forces to \
          the end, and its speed is compared with the measured one (root mean square over moving \
@@ -43,68 +43,60 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
     Ok(Section { id: "error", title: "Error before and after", body })
 }
 
+/// A row of the summary: the runs, their errors before and after, what is taken away; true for what judges.
+type SummaryRow = (String, [String; 3], bool);
+
 fn summary(subject: &Subject) -> String {
-    let head = [
-        ("Runs", Column::Words),
-        (if subject.has_effect() { "Before, m/s" } else { "Error, m/s" }, Column::Numbers),
-        ("After, m/s", Column::Numbers),
-        ("Taken away", Column::Numbers),
-    ];
-    // Without an effect there is no 'after'.
-    let columns = if subject.has_effect() { 4 } else { 2 };
-    let caption = "Error of the predicted speed with 95 % intervals";
-    let mut table = Table::new(caption, &head[..columns]);
     let errors = &subject.data.errors;
-    let rows = [
+    let pairs = [
         ("Holdout, whole runs", errors.holdout),
         ("Holdout, restarted every 60 s", errors.holdout_window60),
         ("Fit, whole runs", errors.fit),
         ("Fit, restarted every 60 s", errors.fit_window60),
     ];
     let is_by_stops = errors.holdout_stop_to_stop.is_some();
-    for (k, (name, pair)) in rows.into_iter().enumerate() {
+    let mut rows: Vec<SummaryRow> = Vec::new();
+    for (k, (name, pair)) in pairs.into_iter().enumerate() {
         let Some(pair) = pair else { continue };
-        let mut cells = vec![
-            name.into(),
-            estimate(&pair.before_mps),
-            estimate(&pair.after_mps),
-            percent(&pair.reduction),
-        ];
-        cells.truncate(columns);
-        if k == 0 && !is_by_stops { table.push_marked(cells) } else { table.push(cells) }
+        let [before, after] = [&pair.before_mps, &pair.after_mps].map(estimate);
+        let cells = [before, after, percent(&pair.reduction)];
+        rows.push((name.into(), cells, k == 0 && !is_by_stops));
     }
     for (name, found) in
         [("Holdout", &errors.holdout_stop_to_stop), ("Fit", &errors.fit_stop_to_stop)]
     {
-        let Some(found) = found else { continue };
-        for (k, mut cells) in stop_to_stop(name, found).into_iter().enumerate() {
-            cells.truncate(columns);
-            if k == 0 && name == "Holdout" { table.push_marked(cells) } else { table.push(cells) }
-        }
+        rows.extend(found.iter().flat_map(|found| stop_to_stop(name, found)));
     }
-    let mut html = table.html();
-    let _ = writeln!(html, "<p class=\"note\">{}</p>", intervals(errors.holdout, errors.fit));
-    html
+    let before = if subject.has_effect() { "Before, m/s" } else { "Error, m/s" };
+    let columns: [TableColumn<SummaryRow>; 4] = [
+        ("Runs", Words, &|row| row.0.clone()),
+        (before, Numbers, &|row| row.1[0].clone()),
+        ("After, m/s", Numbers, &|row| row.1[1].clone()),
+        ("Taken away", Numbers, &|row| row.1[2].clone()),
+    ];
+    // Without an effect there is no 'after'.
+    let shown = if subject.has_effect() { &columns[..] } else { &columns[..2] };
+    let caption = "Error of the predicted speed with 95 % intervals";
+    let note = intervals(errors.holdout, errors.fit);
+    marked_table(caption, shown, &rows, |row| row.2) + &format!("<p class=\"note\">{note}</p>\n")
 }
 
 /// The rows of the errors from stop to stop: the one that judges, and the middle one.
-fn stop_to_stop(name: &str, found: &StopToStop) -> [Vec<String>; 2] {
-    let row =
-        |what: &str, errors_mps: [f64; 2], intervals: Option<[[f64; 2]; 2]>, taken: String| {
-            let side = |side: usize| {
-                let interval = intervals.map(|both| both[side]);
-                estimate(&Estimate { value: errors_mps[side], interval })
-            };
-            vec![format!("{name}, from stop to stop, {what}"), side(0), side(1), taken]
+fn stop_to_stop(name: &str, found: &StopToStop) -> [SummaryRow; 2] {
+    let row = |what: &str, mps: [f64; 2], intervals: Option<[[f64; 2]; 2]>, taken: Estimate| {
+        let side = |side: usize| {
+            let interval = intervals.map(|both| both[side]);
+            estimate(&Estimate { value: mps[side], interval })
         };
+        let cells = [side(0), side(1), percent(&taken)];
+        (format!("{name}, from stop to stop, {what} {}", found.runs), cells)
+    };
     let judged = Judged::from(found);
     let taken = Estimate { value: judged.reduction, interval: judged.reduction_interval_95 };
     let of_median = Estimate { value: reduction(found.median_mps), interval: None };
-    let (all, middle) = (format!("all {}", found.runs), format!("median of {}", found.runs));
-    [
-        row(&all, judged.error_mps, judged.interval_95_mps, percent(&taken)),
-        row(&middle, found.median_mps, found.interval_95_mps, percent(&of_median)),
-    ]
+    let (all, cells) = row("all", judged.error_mps, judged.interval_95_mps, taken);
+    let (middle, of_middle) = row("median of", found.median_mps, found.interval_95_mps, of_median);
+    [(all, cells, name == "Holdout"), (middle, of_middle, false)]
 }
 
 /// How the intervals were found.
@@ -131,60 +123,32 @@ fn intervals(holdout: Option<ErrorPair>, fit: Option<ErrorPair>) -> String {
     format!("{holdout} {fit}")
 }
 
-fn by_run(subject: &Subject) -> Result<String, ReportError> {
-    let errors = &subject.data.errors.by_run;
-    let mut html = String::new();
+fn by_run(subject: &Subject) -> Result<String, PlotError> {
     let mut figures = String::new();
-    for (role, name) in [(Role::Holdout, "Holdout"), (Role::Fit, "Fit")] {
-        let own: Vec<(usize, &RunErrors)> = errors
-            .iter()
-            .filter(|run| run.role == role)
-            .map(|run| (subject.number(&run.file), run))
-            .collect();
-        if own.is_empty() {
-            continue;
+    for (role, name) in [(Role::Holdout, "Holdout runs"), (Role::Fit, "Fit runs")] {
+        let own = subject.errors_of(role);
+        if !own.is_empty() {
+            figures += &figure("", name, "", &[runs::draw(&own, role, subject.has_effect())?]);
         }
-        let plot = runs::draw(&own, role, subject.has_effect()).map_err(|source| {
-            ReportError::Plot { plot: format!("the errors of the {name} runs"), source }
-        })?;
-        figures += &figure("", &format!("{name} runs"), "", &[plot]);
     }
-    html += "<h3>Run by run</h3>\n";
-    html += &key(subject, false);
-    let _ = write!(html, "<div class=\"panels\">\n{figures}</div>\n");
-    let head = [
-        ("Run", Column::Numbers),
-        ("File", Column::Names),
-        ("Role", Column::Words),
-        ("Before, m/s", Column::Numbers),
-        ("After, m/s", Column::Numbers),
-        ("60 s before", Column::Numbers),
-        ("60 s after", Column::Numbers),
+    let side = |errors: Option<[f64; 2]>, side: usize| match errors {
+        Some(errors) if side == 0 || subject.has_effect() => format!("{:.3}", errors[side]),
+        _ => "–".into(),
+    };
+    let columns: [TableColumn<&RunErrors>; 7] = [
+        ("Run", Numbers, &|run| subject.number(&run.file).to_string()),
+        ("File", Names, &|run| escape(&run.file)),
+        ("Role", Words, &|run| run.role.name().into()),
+        ("Before, m/s", Numbers, &|run| side(run.full_run_mps, 0)),
+        ("After, m/s", Numbers, &|run| side(run.full_run_mps, 1)),
+        ("60 s before", Numbers, &|run| side(run.window60_mps, 0)),
+        ("60 s after", Numbers, &|run| side(run.window60_mps, 1)),
     ];
-    let mut table = Table::new("Error of every run", &head);
-    let mut ordered: Vec<&RunErrors> = errors.iter().collect();
+    let mut ordered: Vec<&RunErrors> = subject.data.errors.by_run.iter().collect();
     ordered.sort_by_key(|run| subject.number(&run.file));
-    for run in ordered {
-        let side = |errors: Option<[f64; 2]>, side: usize| match errors {
-            Some(errors) if side == 0 || subject.has_effect() => format!("{:.3}", errors[side]),
-            _ => "–".into(),
-        };
-        table.push(vec![
-            subject.number(&run.file).to_string(),
-            escape(&run.file),
-            run.role.name().into(),
-            side(run.full_run_mps, 0),
-            side(run.full_run_mps, 1),
-            side(run.window60_mps, 0),
-            side(run.window60_mps, 1),
-        ]);
-    }
-    let _ = write!(
-        html,
-        "<details>\n<summary>The same as a table</summary>\n{}</details>\n",
-        table.html()
-    );
-    Ok(html)
+    let table = details("The same as a table", &table("Error of every run", &columns, &ordered));
+    let key = key(subject, false);
+    Ok(format!("<h3>Run by run</h3>\n{key}<div class=\"panels\">\n{figures}</div>\n{table}"))
 }
 
 fn key(subject: &Subject, has_lines: bool) -> String {
@@ -194,24 +158,16 @@ fn key(subject: &Subject, has_lines: bool) -> String {
     }
     let (before, after) =
         if has_lines { ("line before", "line after") } else { ("ring before", "dot after") };
-    if subject.has_effect() {
-        entries.extend([(before, "before"), (after, "after")]);
-    } else {
-        entries.push((before, "declared model, a, b, c refitted"));
-    }
+    entries.push((before, subject.before()));
+    entries.extend(subject.has_effect().then_some((after, "after")));
     if has_lines && subject.data.traces.iter().any(|trace| !trace.acting_s.is_empty()) {
         entries.push(("area acting", "where the effect acts"));
     }
     legend(&entries)
 }
 
-fn trace_figure(subject: &Subject, trace: &Trace) -> Result<String, ReportError> {
-    let draw = |width| {
-        speeds::draw(trace, width, subject.has_effect())
-            .map_err(|source| ReportError::Plot { plot: trace.file.clone(), source })
-    };
-    let (wide, narrow) = (draw(Width::Wide)?, draw(Width::Narrow)?);
-    let role = if trace.role == Role::Holdout { "holdout" } else { "fit" };
+fn trace_figure(subject: &Subject, trace: &Trace) -> Result<String, PlotError> {
+    let plots = wide_and_narrow(|width| speeds::draw(trace, width, subject.has_effect()))?;
     let errors = match trace.rmse_mps {
         Some([before, after]) if subject.has_effect() => {
             format!(": {before:.3} m/s before, {after:.3} m/s after")
@@ -219,7 +175,8 @@ fn trace_figure(subject: &Subject, trace: &Trace) -> Result<String, ReportError>
         Some([before, _]) => format!(": {before:.3} m/s"),
         None => String::new(),
     };
-    let (number, file) = (subject.number(&trace.file), escape(&trace.file));
+    let (number, file, role) =
+        (subject.number(&trace.file), escape(&trace.file), trace.role.name());
     let caption = format!("Run {number}, {file} ({role}){errors}");
-    Ok(figure("trace", &caption, &key(subject, true), &[wide, narrow]))
+    Ok(figure("trace", &caption, &key(subject, true), &plots))
 }

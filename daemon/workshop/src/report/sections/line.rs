@@ -1,29 +1,23 @@
 //! The line as a picture: what is declared, what was found, and where the residual lives.
 
-use super::{Section, legend};
-use crate::report::plots::speeds::Width;
-use crate::report::plots::{figure, line};
-use crate::report::{ReportError, Subject};
+use super::Section;
+use crate::report::Subject;
+use crate::report::html::legend;
+use crate::report::plots::{PlotError, figure, line, wide_and_narrow};
 
 /// The section; none where no line is declared and no position known.
 ///
 /// # Errors
 ///
 /// When the plot cannot be drawn.
-pub fn section(subject: &Subject) -> Result<Option<Section>, ReportError> {
+pub fn section(subject: &Subject) -> Result<Option<Section>, PlotError> {
     let (track, found) = (subject.dataset.track.as_deref(), &subject.data.line);
     let has_effect = subject.has_effect();
-    let draw = |width| {
-        line::draw(track, found, has_effect, width)
-            .map_err(|source| ReportError::Plot { plot: "the line".into(), source })
-    };
-    let (Some(wide), Some(narrow)) = (draw(Width::Wide)?, draw(Width::Narrow)?) else {
-        return Ok(None);
-    };
+    let plots = wide_and_narrow(|width| line::draw(track, found, has_effect, width))?;
+    let [Some(wide), Some(narrow)] = plots else { return Ok(None) };
     let mut entries = Vec::new();
     if !found.residual.is_empty() {
-        let before = if has_effect { "before" } else { "declared model, a, b, c refitted" };
-        entries.push(("ring before", before));
+        entries.push(("ring before", subject.before()));
         entries.extend(has_effect.then_some(("dot after", "after")));
     }
     if !found.places.is_empty() {

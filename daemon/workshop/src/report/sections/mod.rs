@@ -19,12 +19,3 @@ pub struct Section {
     /// Its HTML.
     pub body: String,
 }
-
-/// The key to the colours of a plot.
-pub fn legend(entries: &[(&str, &str)]) -> String {
-    let items: String = entries
-        .iter()
-        .map(|(class, words)| format!("<li><i class=\"key {class}\"></i>{words}</li>"))
-        .collect();
-    format!("<ul class=\"legend\" aria-label=\"Key\">{items}</ul>\n")
-}

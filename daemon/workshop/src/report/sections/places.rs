@@ -1,10 +1,11 @@
 //! Where the effects act, and how surely that is known.
 
-use dynocar_analysis::explain::report::places::PlaceRuns;
+use dynocar_analysis::explain::report::places::{PlaceRow, PlaceRuns};
 use dynocar_analysis::explain::report::words::joined;
 
 use crate::report::Subject;
-use crate::report::html::{Column, Table, escape, estimate};
+use crate::report::html::Column::{Numbers, Words};
+use crate::report::html::{self, TableColumn, escape, estimate};
 
 /// A run counts as surely in or out beyond this probability.
 const SURE: f64 = 0.99;
@@ -19,13 +20,12 @@ pub fn table(subject: &Subject) -> String {
     }
     let mut html = String::from("<h3>Where, and how surely</h3>\n");
     if !places.ends.is_empty() {
-        let head = [("Place", Column::Words), ("Unit", Column::Words), ("Found", Column::Numbers)];
-        let mut table = Table::new("Ends of places with 95 % intervals", &head);
-        for row in &places.ends {
-            let place = format!("{}: {}", escape(&row.group), escape(&row.end));
-            table.push(vec![place, row.unit.into(), estimate(&row.at)]);
-        }
-        html += &table.html();
+        let columns: [TableColumn<PlaceRow>; 3] = [
+            ("Place", Words, &|row| format!("{}: {}", escape(&row.group), escape(&row.end))),
+            ("Unit", Words, &|row| row.unit.into()),
+            ("Found", Numbers, &|row| estimate(&row.at)),
+        ];
+        html += &html::table("Ends of places with 95 % intervals", &columns, &places.ends);
     }
     for runs in &places.runs {
         html += &format!("<p class=\"note\">{}</p>\n", sentence(runs));

@@ -1,20 +1,20 @@
 //! What the data are like.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::{ForceSource, GradientSource, OrderCounts, PositionSource, Run};
 use dynocar_analysis::explain::evidence::RunData;
 
 use super::Section;
 use crate::report::Subject;
-use crate::report::html::{Column, Table, count, escape, grouped};
+use crate::report::html::Column::{Names, Numbers, Words};
+use crate::report::html::{TableColumn, count, escape, grouped, table};
 use crate::run_facts::{mass_t, recorded, recorded_in_words};
 
 /// The section.
 pub fn section(subject: &Subject) -> Section {
     let explanation = subject.explanation;
-    let used: Vec<(&Run, Option<&RunData>)> = subject
+    let used: Vec<UsedRun> = subject
         .dataset
         .runs
         .iter()
@@ -41,47 +41,32 @@ pub fn section(subject: &Subject) -> Section {
     Section { id: "quality", title: "Data quality", body }
 }
 
-fn runs_table(used: &[(&Run, Option<&RunData>)]) -> String {
+/// A run, and what of it was used.
+type UsedRun<'a> = (&'a Run, Option<&'a RunData>);
+
+fn runs_table(used: &[UsedRun]) -> String {
+    let of_data = |it: &UsedRun, value: fn(&RunData) -> String| it.1.map_or("–".into(), value);
+    let top_mps = |run: &Run| run.quality.speed_range_mps.map(|(_, high)| format!("{high:.1}"));
+    let columns: [TableColumn<UsedRun>; 15] = [
+        ("Run", Numbers, &|it| it.0.number.to_string()),
+        ("File", Names, &|it| escape(&it.0.file)),
+        ("Recorded (UTC)", Words, &|it| recorded_in_words(it.0)),
+        ("Role", Words, &|it| it.0.role.name().into()),
+        ("Direction", Numbers, &|it| if it.0.direction > 0 { "+1".into() } else { "−1".into() }),
+        ("Mass, t", Numbers, &|it| mass_t(it.0)),
+        ("Duration, s", Numbers, &|it| format!("{:.0}", it.0.quality.duration_s)),
+        ("Distance, km", Numbers, &|it| format!("{:.1}", it.0.quality.distance_m / 1000.0)),
+        ("Top speed, m/s", Numbers, &|it| top_mps(it.0).unwrap_or("–".into())),
+        ("Rows", Numbers, &|it| grouped(it.0.quality.lines.rows)),
+        ("Used", Numbers, &|it| of_data(it, |data| grouped(data.samples().len()))),
+        ("Rejected", Numbers, &|it| of_data(it, |data| count(data.rejected))),
+        ("Outliers replaced", Numbers, &|it| of_data(it, |data| count(data.replaced))),
+        ("Gaps (longest)", Numbers, &|it| gaps(&it.0.quality.order)),
+        ("Restarts", Numbers, &|it| of_data(it, |data| count(data.recording.restarts()))),
+    ];
     let has_date = used.iter().any(|(run, _)| recorded(run).is_some());
-    let mut head = vec![("Run", Column::Numbers), ("File", Column::Names)];
-    head.extend(has_date.then_some(("Recorded (UTC)", Column::Words)));
-    head.extend([
-        ("Role", Column::Words),
-        ("Direction", Column::Numbers),
-        ("Mass, t", Column::Numbers),
-        ("Duration, s", Column::Numbers),
-        ("Distance, km", Column::Numbers),
-        ("Top speed, m/s", Column::Numbers),
-        ("Rows", Column::Numbers),
-        ("Used", Column::Numbers),
-        ("Rejected", Column::Numbers),
-        ("Outliers replaced", Column::Numbers),
-        ("Gaps (longest)", Column::Numbers),
-        ("Restarts", Column::Numbers),
-    ]);
-    let mut table = Table::new("The runs", &head);
-    for (run, data) in used {
-        let quality = &run.quality;
-        let of_data = |value: &dyn Fn(&RunData) -> String| data.map_or("–".into(), value);
-        let mut row = vec![run.number.to_string(), escape(&run.file)];
-        row.extend(has_date.then(|| recorded_in_words(run)));
-        row.extend([
-            run.role.name().into(),
-            if run.direction > 0 { "+1".into() } else { "−1".into() },
-            mass_t(run),
-            format!("{:.0}", quality.duration_s),
-            format!("{:.1}", quality.distance_m / 1000.0),
-            quality.speed_range_mps.map_or("–".into(), |(_, high)| format!("{high:.1}")),
-            grouped(quality.lines.rows),
-            of_data(&|data| grouped(data.samples().len())),
-            of_data(&|data| count(data.rejected)),
-            of_data(&|data| count(data.replaced)),
-            gaps(&quality.order),
-            of_data(&|data| count(data.recording.restarts())),
-        ]);
-        table.push(row);
-    }
-    table.html()
+    let is_shown = |it: &TableColumn<_>| has_date || !it.0.starts_with("Recorded");
+    table("The runs", &columns.into_iter().filter(is_shown).collect::<Vec<_>>(), used)
 }
 
 fn gaps(order: &OrderCounts) -> String {
@@ -92,15 +77,12 @@ fn gaps(order: &OrderCounts) -> String {
 }
 
 /// What was rejected, by reason, and what is missing, by quantity, run by run.
-fn counts_table(used: &[(&Run, Option<&RunData>)]) -> String {
+fn counts_table(used: &[UsedRun]) -> String {
     let mut rows: BTreeMap<(u8, String), BTreeMap<u32, usize>> = BTreeMap::new();
     let mut add = |group: u8, what: &str, run: &Run, count: usize| {
         if count > 0 {
-            *rows
-                .entry((group, what.replace('_', " ")))
-                .or_default()
-                .entry(run.number)
-                .or_default() += count;
+            let by_run = rows.entry((group, what.replace('_', " "))).or_default();
+            *by_run.entry(run.number).or_default() += count;
         }
     };
     for (run, _) in used {
@@ -120,21 +102,22 @@ fn counts_table(used: &[(&Run, Option<&RunData>)]) -> String {
     if rows.is_empty() {
         return "<p>No sample was rejected and no value is missing.</p>\n".into();
     }
-    let numbers: Vec<String> = used.iter().map(|(run, _)| format!("Run {}", run.number)).collect();
-    let mut head = vec![("What", Column::Words)];
-    head.extend(numbers.iter().map(|name| (name.as_str(), Column::Numbers)));
-    head.push(("All", Column::Numbers));
-    let mut table = Table::new("Rejected, missing and outlying, by run", &head);
-    for ((group, what), by_run) in &rows {
+    type Row = ((u8, String), BTreeMap<u32, usize>);
+    let what = |((group, what), _): &Row| {
         let title = ["Rejected", "Missing", "Outlying"][usize::from(*group)];
-        let mut cells = vec![format!("{title}: {}", escape(what))];
-        cells.extend(
-            used.iter().map(|(run, _)| count(by_run.get(&run.number).copied().unwrap_or(0))),
-        );
-        cells.push(grouped(by_run.values().sum()));
-        table.push(cells);
-    }
-    table.html()
+        format!("{title}: {}", escape(what))
+    };
+    let of_run = |(run, _): &UsedRun| {
+        let number = run.number;
+        let cell = move |row: &Row| count(row.1.get(&number).copied().unwrap_or(0));
+        (format!("Run {number}"), cell)
+    };
+    let runs: Vec<_> = used.iter().map(of_run).collect();
+    let mut columns: Vec<TableColumn<Row>> = vec![("What", Words, &what)];
+    columns.extend(runs.iter().map(|(name, cell)| (&name[..], Numbers, cell as _)));
+    columns.push(("All", Numbers, &|row| grouped(row.1.values().sum())));
+    let rows: Vec<Row> = rows.into_iter().collect();
+    table("Rejected, missing and outlying, by run", &columns, &rows)
 }
 
 fn sources(subject: &Subject) -> String {
@@ -184,7 +167,7 @@ fn diagnostics(subject: &Subject) -> String {
     }
     let mut html = String::from("<h3>Diagnostics</h3>\n<ul class=\"remarks\">\n");
     for (text, runs) in by_text {
-        let _ = writeln!(html, "<li>Run {}: {}</li>", runs.join(", "), escape(&text));
+        html += &format!("<li>Run {}: {}</li>\n", runs.join(", "), escape(&text));
     }
     html + "</ul>\n"
 }

@@ -1,14 +1,12 @@
 //! How to get the same again.
 
-use std::fmt::Write as _;
-
 use super::Section;
-use crate::report::Subject;
-use crate::report::html::{Column, Table, escape, grouped};
+use crate::report::html::Column::{Names, Numbers, Words};
+use crate::report::html::{TableColumn, details, escape, grouped, table};
+use crate::report::provenance::{FileDigest, Provenance};
 
 /// The section.
-pub fn section(subject: &Subject) -> Section {
-    let provenance = &subject.provenance;
+pub fn section(provenance: &Provenance) -> Section {
     let mut body = format!(
         "<p>The same dataset and version give the same numbers: nothing is drawn at random without \
          a fixed seed.</p>\n<dl class=\"sources\">\n\
@@ -22,20 +20,12 @@ pub fn section(subject: &Subject) -> Section {
         provenance.sha256,
         escape(&provenance.check_command())
     );
-    let head = [("File", Column::Names), ("Bytes", Column::Numbers), ("SHA-256", Column::Words)];
-    let mut table = Table::new("The files that were read", &head);
-    for file in &provenance.files {
-        table.push(vec![
-            escape(&file.path),
-            grouped(file.bytes),
-            format!("<code class=\"hash\">{}</code>", file.sha256),
-        ]);
-    }
-    // Writing to a string cannot fail.
-    let _ = write!(
-        body,
-        "<details>\n<summary>The files that were read</summary>\n{}</details>\n",
-        table.html()
-    );
+    let columns: [TableColumn<FileDigest>; 3] = [
+        ("File", Names, &|file| escape(&file.path)),
+        ("Bytes", Numbers, &|file| grouped(file.bytes)),
+        ("SHA-256", Words, &|file| format!("<code class=\"hash\">{}</code>", file.sha256)),
+    ];
+    let title = "The files that were read";
+    body += &details(title, &table(title, &columns, &provenance.files));
     Section { id: "reproduce", title: "How to reproduce", body }
 }

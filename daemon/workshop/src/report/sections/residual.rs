@@ -2,17 +2,17 @@
 
 use dynocar_analysis::explain::report::covariates::Covariate;
 
-use super::{Section, legend};
-use crate::report::html::escape;
-use crate::report::plots::{figure, panel};
-use crate::report::{ReportError, Subject};
+use super::Section;
+use crate::report::Subject;
+use crate::report::html::{escape, legend};
+use crate::report::plots::{PlotError, figure, panel};
 
 /// The section.
 ///
 /// # Errors
 ///
 /// When a plot cannot be drawn.
-pub fn section(subject: &Subject) -> Result<Section, ReportError> {
+pub fn section(subject: &Subject) -> Result<Section, PlotError> {
     let has_effect = subject.has_effect();
     let mut body = String::from(
         "<p>The resistance that the model lacks, in N per kN of weight (positive retards), on the \
@@ -21,8 +21,7 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
          windows, without an error, in plots of one run). Where nothing is missing, points scatter \
          around zero.</p>\n",
     );
-    let before = if has_effect { "before" } else { "declared model, a, b, c refitted" };
-    let mut entries = vec![("ring before", before)];
+    let mut entries = vec![("ring before", subject.before())];
     if has_effect {
         entries.push(("dot after", "after"));
         entries.push(("area band", "what the effect accounts for, 95 %"));
@@ -37,13 +36,16 @@ pub fn section(subject: &Subject) -> Result<Section, ReportError> {
             Some(file) => format!("Run {}, {file}, over time", subject.number(file)),
             None => panel.covariate.title().to_string(),
         };
-        let plot = panel::draw(panel, has_effect)
-            .map_err(|source| ReportError::Plot { plot: title.clone(), source })?;
         let note = match panel.covariate {
             Covariate::Direction => " <small>(+1: chainage grows)</small>",
             _ => "",
         };
-        body += &figure("", &format!("{}{note}", escape(&title)), "", &[plot]);
+        body += &figure(
+            "",
+            &format!("{}{note}", escape(&title)),
+            "",
+            &[panel::draw(panel, has_effect)?],
+        );
     }
     body += "</div>\n";
     if subject.data.panels.is_empty() {

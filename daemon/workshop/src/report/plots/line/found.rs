@@ -7,7 +7,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::panel::{Content, Panel, direction_label, rows};
 use crate::report::plots::axes::{Chart, letters, stroke};
-use crate::report::plots::{ACTING, AFTER, PlotError};
+use crate::report::plots::{ACTING, AFTER, DrawError};
 
 /// The panels below those of the declared line.
 pub(super) fn panels(found: &AlongLine) -> Vec<Panel> {
@@ -37,7 +37,7 @@ pub(super) fn bars(
     chart: &mut Chart,
     sections: &[MarkedInterval],
     from_km: f64,
-) -> Result<(), PlotError> {
+) -> Result<(), DrawError> {
     let rows = rows(sections);
     let height = 1.0 / rows.len() as f64;
     for (row, run) in rows.iter().enumerate() {

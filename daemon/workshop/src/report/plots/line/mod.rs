@@ -7,8 +7,6 @@ mod panel;
 
 use dynocar_analysis::explain::report::line::AlongLine;
 use dynocar_model::track::Track;
-use plotters::backend::SVGBackend;
-use plotters::drawing::IntoDrawingArea;
 use plotters::element::{PathElement, Text};
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -17,7 +15,7 @@ use super::axes::{
 };
 use super::panel::means;
 use super::speeds::Width;
-use super::{ACTING, AFTER, AXIS, Plot, PlotError, SCALE, TUNNEL, for_page};
+use super::{ACTING, AFTER, AXIS, DrawError, Plot, PlotError, SCALE, TUNNEL, picture};
 use panel::{Content, Panel};
 
 /// Nominal width in px of the letters of a stop's name, and of the gap to the next.
@@ -60,22 +58,19 @@ pub fn draw(
     let mut bottoms = Vec::new();
     let mut height = 0;
     for panel in &panels {
-        height += panel.height() * SCALE;
-        bottoms.push(height as i32);
+        height += panel.height();
+        bottoms.push((height * SCALE) as i32);
     }
-    let size = (width.size().0 * SCALE, height);
-    let (mut drawing, mut frames) = (String::new(), Vec::new());
-    {
-        let whole = SVGBackend::with_string(&mut drawing, size).into_drawing_area();
+    let size = (width.size().0, height);
+    let svg = picture(&ground.label(&panels), width.class(), size, |whole| {
         let areas = whole.split_by_breakpoints([0; 0], &bottoms[..bottoms.len() - 1]);
-        for (index, (panel, area)) in panels.iter().zip(&areas).enumerate() {
+        let drawn = panels.iter().zip(&areas).enumerate().map(|(index, (panel, area))| {
             let (is_first, is_last) = (index == 0, index + 1 == panels.len());
-            frames.push(frame(&ground.draw(panel, area, is_first, is_last)?));
-        }
-        whole.present()?;
-    }
+            Ok(frame(&ground.draw(panel, area, is_first, is_last)?))
+        });
+        drawn.collect()
+    })?;
     let readings = panels.iter().map(|panel| panel.reading(has_effect)).collect();
-    let svg = for_page(&drawing, &ground.label(&panels), width.class(), size, &frames);
     Ok(Some(Plot { svg, readings }))
 }
 
@@ -86,7 +81,7 @@ impl Ground<'_> {
         area: &'a Area<'t>,
         is_first: bool,
         is_last: bool,
-    ) -> Result<Chart<'a, 't>, PlotError> {
+    ) -> Result<Chart<'a, 't>, DrawError> {
         let (x, y) = (self.x, panel.range(self.has_effect));
         let below = if is_last { self.x_title() } else { String::new() };
         let labels = if self.width == Width::Wide { 10 } else { 5 };
@@ -129,7 +124,7 @@ impl Ground<'_> {
     }
 
     /// A line at each stop and, where there is room, its name above.
-    fn stops(&self, chart: &mut Chart, y: [f64; 2], has_names: bool) -> Result<(), PlotError> {
+    fn stops(&self, chart: &mut Chart, y: [f64; 2], has_names: bool) -> Result<(), DrawError> {
         let km_per_px = (self.x[1] - self.x[0]) / f64::from(self.width.size().0);
         let mut free_km = f64::NEG_INFINITY;
         for (at_m, name) in self.track.iter().flat_map(|track| &track.survey.stops) {
