@@ -1,9 +1,11 @@
 //! The runs of a dataset: what the train did, what the data are like, what to know.
 
+use std::iter;
+
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetDiagnostic, DatasetError, Diagnostic, ForceSource, GradientSource, Manifest,
-    PositionSource, Quantity, Role, Run, is_parquet,
+    DatasetDiagnostic, DatasetError, ForceSource, GradientSource, Manifest, PositionSource,
+    Quantity, Role, Run, RunQuality, is_parquet,
 };
 use dynocar_core::plausibility::InputFault;
 
@@ -77,44 +79,36 @@ fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
     table
 }
 
+/// What is counted of a run, each in a column.
+const COUNTS: [(&str, fn(&RunQuality) -> String); 10] = [
+    ("rows", |it| it.lines.rows.to_string()),
+    ("step s", |it| {
+        let about = if it.order.is_regular { "" } else { "~" };
+        format!("{about}{}", short(it.order.step_s, 4))
+    }),
+    ("gaps", |it| it.order.gaps.to_string()),
+    ("longest s", |it| short(it.order.longest_gap_s, 1)),
+    ("rows missing", |it| (it.order.missing_rows + it.rows_without_time as u64).to_string()),
+    ("out of order", |it| it.order.out_of_order.to_string()),
+    ("repeated", |it| it.order.repeated.to_string()),
+    ("cells missing", |it| total(&it.missing)),
+    ("outliers", |it| total(&it.outliers)),
+    ("refused", |it| it.refused_in_all().to_string()),
+];
+
+fn total(counts: &[QuantityCount]) -> String {
+    counts.iter().map(|count| count.count).sum::<usize>().to_string()
+}
+
 fn data_table(runs: &[Read]) -> TextTable {
-    let header = [
-        "run",
-        "rows",
-        "step s",
-        "gaps",
-        "longest s",
-        "rows missing",
-        "out of order",
-        "repeated",
-        "cells missing",
-        "outliers",
-        "refused",
-    ];
+    let header: Vec<&str> = iter::once("run").chain(COUNTS.map(|(name, _)| name)).collect();
     let mut table = TextTable::new(&header, &[]);
     for run in runs.iter().flatten() {
-        let quality = &run.quality;
-        let total =
-            |counts: &[QuantityCount]| counts.iter().map(|count| count.count).sum::<usize>();
-        let order = &quality.order;
-        let mut row = vec![run.number.to_string(), quality.lines.rows.to_string()];
-        row.push(if order.is_regular {
-            short(order.step_s, 4)
-        } else {
-            format!("~{}", short(order.step_s, 4))
+        let counts = COUNTS.iter().enumerate().map(|(index, (_, count))| {
+            let shown = count(&run.quality);
+            if shown == "0" && index > 1 { "-".into() } else { shown }
         });
-        let counts = [
-            order.gaps.to_string(),
-            short(order.longest_gap_s, 1),
-            (order.missing_rows + quality.rows_without_time as u64).to_string(),
-            order.out_of_order.to_string(),
-            order.repeated.to_string(),
-            total(&quality.missing).to_string(),
-            total(&quality.outliers).to_string(),
-            quality.refused_in_all().to_string(),
-        ];
-        row.extend(counts.into_iter().map(|count| if count == "0" { "-".into() } else { count }));
-        table.push(row);
+        table.push(iter::once(run.number.to_string()).chain(counts).collect());
     }
     table
 }
@@ -252,10 +246,7 @@ fn diagnostics_of(manifest: &Manifest, run: &Run) -> Vec<String> {
     if !quality.order.is_regular {
         diagnostics.push("the time step varies, so that missing rows cannot be counted".into());
     }
-    let by_run = run
-        .diagnostics
-        .iter()
-        .filter(|diagnostic| !matches!(diagnostic, Diagnostic::InputFault { .. }));
-    diagnostics.extend(by_run.map(ToString::to_string));
+    let by_run = run.diagnostics.iter().filter(|diagnostic| diagnostic.fault.is_none());
+    diagnostics.extend(by_run.map(|diagnostic| diagnostic.text.clone()));
     diagnostics
 }
