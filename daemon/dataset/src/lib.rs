@@ -10,7 +10,7 @@
 //!
 //! # Layout, in the order of reading
 //!
-//! - [`document`], `names`, [`error`]: keys and values with their lines; mistakes with their choices
+//! - [`node`], [`document`], `names`, [`error`]: keys and values with their lines; mistakes with their choices
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
@@ -43,6 +43,7 @@ mod lines;
 pub mod manifest;
 mod motion;
 mod names;
+pub mod node;
 mod order;
 mod plain_number;
 mod power;

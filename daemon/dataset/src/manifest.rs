@@ -6,20 +6,22 @@ use dynocar_model::named;
 use dynocar_model::units::Unit;
 
 use super::clock::{self, TimeFormat};
-use super::document::{Item, Node, above_zero};
+use super::document::{Item, above_zero};
 use super::error::{DatasetError, SourcePosition};
 use super::names::unknown;
+use super::node::Node;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
 use super::train_file::MASS;
 
-/// Which point of the train the recorded position is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PositionReference {
-    /// The train's centre.
-    Centre,
-    /// The train's head: half a length ahead of the centre in the direction of travel.
-    Head,
+named! {
+    /// Which point of the train the recorded position is of.
+    PositionReference ("in a dataset") {
+        /// The train's centre.
+        Centre "centre";
+        /// The train's head: half a length ahead of the centre in the direction of travel.
+        Head "head";
+    }
 }
 
 named! {
@@ -128,10 +130,16 @@ impl Manifest {
         let own = ["name", "description", "position_reference"];
         dataset.allow(&[&own[..], &TextLayout::KEYS[..]].concat())?;
         let columns = columns(&root.need_table("columns")?)?;
+        let reference = dataset.named_under(
+            "position_reference",
+            ("reference", "centre or head"),
+            PositionReference::from_name,
+            PositionReference::ALL.map(PositionReference::name),
+        )?;
         Ok(Manifest {
             name: dataset.need_quoted("name", "the dataset's name")?.into(),
             description: dataset.quoted("description")?.map(Into::into),
-            position_reference: position_reference(&dataset)?,
+            position_reference: reference.unwrap_or(PositionReference::Centre),
             layout: TextLayout::of(&dataset)?,
             train_file: file_of(&root.need_table("train")?, "the path of a train.toml")?,
             track_file: match root.table("track")? {
@@ -159,19 +167,6 @@ fn file_of(section: &Item, expected: &str) -> Result<FileEntry, DatasetError> {
     section.allow(&["file"])?;
     let path = section.need_quoted("file", expected)?.into();
     Ok(FileEntry { path, place: section.place_of("file") })
-}
-
-fn position_reference(section: &Item) -> Result<PositionReference, DatasetError> {
-    const KEY: &str = "position_reference";
-    if !section.has(KEY) {
-        return Ok(PositionReference::Centre);
-    }
-    let find = |word: &str| match word {
-        "centre" => Some(PositionReference::Centre),
-        "head" => Some(PositionReference::Head),
-        _ => None,
-    };
-    section.need_named(KEY, ("reference", "centre or head"), find, ["centre", "head"])
 }
 
 fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
@@ -298,16 +293,13 @@ fn is_same_path(one: &str, other: &str) -> bool {
 
 fn run(section: &Item) -> Result<RunEntry, DatasetError> {
     section.allow(&["file", "role", "direction", "mass_t", "start_m", "date"])?;
-    let roles = Role::ALL.map(Role::name);
-    let role = match section.has("role") {
-        true => section.need_named("role", ("role", "a role"), Role::from_name, roles)?,
-        false => Role::Fit,
-    };
+    let (roles, role) = (Role::ALL.map(Role::name), ("role", "a role"));
+    let role = section.named_under("role", role, Role::from_name, roles)?;
     let direction = section.checked_under("direction", "1 or -1", |it| it.abs() == 1.0)?;
     let mass_t = section.optional("mass_t", MASS, above_zero(1e5))?;
     Ok(RunEntry {
         file: section.need_quoted("file", "the path of a CSV or Parquet file")?.into(),
-        role,
+        role: role.unwrap_or(Role::Fit),
         direction: if direction == Some(-1.0) { -1 } else { 1 },
         mass_kg: mass_t.map(|mass| mass * 1000.0),
         start_m: section.optional("start_m", "a chainage in m", -1e9..=1e9)?,

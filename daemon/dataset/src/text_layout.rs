@@ -41,11 +41,9 @@ impl TextLayout {
     pub(super) fn of(section: &Item) -> Result<Self, DatasetError> {
         let mut layout =
             TextLayout { units_row: section.truth("units_row")?.unwrap_or(false), ..Self::PLAIN };
-        if section.has("encoding") {
-            let words = ("encoding", "the name of an encoding");
-            layout.encoding =
-                section.need_named("encoding", words, encoding::by_name, encoding::USUAL)?;
-        }
+        let (words, usual) = (("encoding", "the name of an encoding"), encoding::USUAL);
+        let encoding = section.named_under("encoding", words, encoding::by_name, usual)?;
+        layout.encoding = encoding.unwrap_or(UTF_8);
         if let Some(mark) = section.quoted("delimiter")? {
             layout.delimiter = match mark.as_bytes() {
                 &[mark] if mark.is_ascii() && !b"\"\r\n".contains(&mark) => mark,

@@ -8,8 +8,9 @@ use dynocar_model::track::{
     TrackSurvey, Tunnel,
 };
 
-use super::document::{Entries, Item, Node, above_zero};
+use super::document::{Entries, Item, above_zero};
 use super::error::{DatasetError, SourcePosition};
+use super::node::Node;
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
 const GRADIENT_MAX_PERMILLE: f64 = 150.0;

@@ -8,9 +8,10 @@ use dynocar_model::train::{
 };
 
 use super::corrections::read_corrections;
-use super::document::{Item, Node, above_zero};
+use super::document::{Item, above_zero};
 use super::error::DatasetError;
 use super::extra::read_extra;
+use super::node::Node;
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
 pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;

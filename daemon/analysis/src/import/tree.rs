@@ -4,7 +4,7 @@ use granit_parser::{Event, Parser, ScalarStyle};
 
 use crate::dataset::DatasetError;
 use crate::dataset::SourcePosition;
-use crate::dataset::document::{Content, Node};
+use crate::dataset::node::{Content, Node};
 
 /// No format nests deeper; a file that does would cost stack.
 const DEPTH_MAX: usize = 64;

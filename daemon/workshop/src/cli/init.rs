@@ -19,7 +19,7 @@ use super::train_text::{Found, TRAIN_FILE, TrainText};
 use crate::track_text::TRACK_FILE;
 pub use arguments::InitArguments;
 use described::{DAEMON_FILE, Described};
-use draft::{Draft, DraftFile};
+use draft::Draft;
 use dynocar::cli::Failure;
 use dynocar::dataset::labelled_text;
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
@@ -86,15 +86,10 @@ fn describe(
     let mut corrections = 0;
     loop {
         let text = dataset_text::dataset(&guess, &name, &files, has_track);
-        let own = |path, text| DraftFile { path, label: None, text };
-        let mut draft = vec![own(MANIFEST_FILE, &text[..]), own(TRAIN_FILE, &train.text)];
-        draft.extend(track.as_deref().map(|track| own(TRACK_FILE, track)));
+        let mut draft = vec![(MANIFEST_FILE, None, &text[..]), (TRAIN_FILE, None, &train.text)];
+        draft.extend(track.as_deref().map(|track| (TRACK_FILE, None, track)));
         let runs = files.iter().zip(&recordings);
-        draft.extend(runs.map(|(path, &Recording { label, text })| DraftFile {
-            path,
-            label: Some(label),
-            text,
-        }));
+        draft.extend(runs.map(|(path, it)| (&path[..], Some(it.label), it.text)));
         let (head, runs) = Draft { folder, files: draft }.read()?;
         let knows_mass = arguments.train.knows_mass();
         if corrections == CORRECTIONS_MAX || guess.correct(&runs, knows_mass).is_none() {

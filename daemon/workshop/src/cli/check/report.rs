@@ -200,28 +200,26 @@ fn gradient(track: &Track) -> String {
 }
 
 fn curves(track: &Track) -> String {
-    match (track.knows_curves(), track.curves()) {
-        (false, _) => "not known".into(),
-        (true, []) => "none".into(),
-        (true, curves) => {
-            let (low, high) = range(curves.iter().map(|curve| curve.radius_m));
-            let length_m: f64 = curves.iter().map(|curve| curve.end_m - curve.start_m).sum();
-            let (low, high, km) = (short(low, 1), short(high, 1), short(length_m / 1000.0, 2));
-            format!("{}, {km} km in all, radius {low} to {high} m", curves.len())
-        }
-    }
+    let lengths_m = track.curves().iter().map(|curve| curve.end_m - curve.start_m);
+    let (low, high) = range(track.curves().iter().map(|curve| curve.radius_m));
+    let more = format!("radius {} to {} m", short(low, 1), short(high, 1));
+    intervals(track.knows_curves(), lengths_m, &more)
 }
 
 fn tunnels(track: &Track) -> String {
-    match (track.knows_tunnels(), track.tunnels()) {
+    let lengths_m = track.tunnels().iter().map(|tunnel| tunnel.end_m - tunnel.start_m);
+    let more = format!("the longest {} m", short(range(lengths_m.clone()).1, 1));
+    intervals(track.knows_tunnels(), lengths_m, &more)
+}
+
+/// How many intervals there are, their length in all, and what more is to be said.
+fn intervals(is_known: bool, lengths_m: impl ExactSizeIterator<Item = f64>, more: &str) -> String {
+    match (is_known, lengths_m.len()) {
         (false, _) => "not known".into(),
-        (true, []) => "none".into(),
-        (true, tunnels) => {
-            let lengths_m = tunnels.iter().map(|tunnel| tunnel.end_m - tunnel.start_m);
-            let (_, longest) = range(lengths_m.clone());
-            let length_m: f64 = lengths_m.sum();
-            let (longest, km) = (short(longest, 1), short(length_m / 1000.0, 2));
-            format!("{}, {km} km in all, the longest {longest} m", tunnels.len())
+        (true, 0) => "none".into(),
+        (true, count) => {
+            let km = short(lengths_m.sum::<f64>() / 1000.0, 2);
+            format!("{count}, {km} km in all, {more}")
         }
     }
 }

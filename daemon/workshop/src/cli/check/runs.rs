@@ -4,7 +4,7 @@ use std::iter;
 
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetDiagnostic, DatasetError, ForceSource, GradientSource, Manifest, PositionSource,
+    DatasetDiagnostic, DatasetError, ForceSource, GradientSource, Manifest, Phases, PositionSource,
     Quantity, Role, Run, RunQuality, is_parquet,
 };
 use dynocar_core::plausibility::InputFault;
@@ -56,22 +56,16 @@ fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
             Ok(run) => {
                 let quality = &run.quality;
                 let top = quality.speed_range_mps.map(|(_, high)| unit.from_base(high));
-                let top = top.map(|high| format!("{high:.1}"));
                 row.push(mass_t(run));
                 row.push(format!("{:.1}", quality.start_s));
                 row.push(format!("{:.1}", quality.duration_s));
                 row.push(format!("{:.2}", quality.distance_m / 1000.0));
-                row.push(top.unwrap_or_else(|| "-".into()));
-                let phases = &quality.phases;
-                for seconds in [
-                    phases.standstill_s,
-                    phases.coasting_s,
-                    phases.traction_s,
-                    phases.braking_s,
-                    phases.unknown_s,
-                ] {
-                    row.push(if seconds == 0.0 { "-".into() } else { format!("{seconds:.0}") });
-                }
+                row.push(top.map_or_else(|| "-".into(), |high| format!("{high:.1}")));
+                let Phases { standstill_s, coasting_s, traction_s, braking_s, unknown_s } =
+                    quality.phases;
+                let phases = [standstill_s, coasting_s, traction_s, braking_s, unknown_s];
+                let shown = |s: f64| if s == 0.0 { "-".into() } else { format!("{s:.0}") };
+                row.extend(phases.map(shown));
             }
         }
         table.push(row);
