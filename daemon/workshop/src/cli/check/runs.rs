@@ -73,8 +73,10 @@ fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
     table
 }
 
+/// The head of a column and its cell for a run.
+type Count = (&'static str, fn(&RunQuality) -> String);
 /// What is counted of a run, each in a column.
-const COUNTS: [(&str, fn(&RunQuality) -> String); 10] = [
+const COUNTS: [Count; 10] = [
     ("rows", |it| it.lines.rows.to_string()),
     ("step s", |it| {
         let about = if it.order.is_regular { "" } else { "~" };
