@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use dynocar_dataset::encoding::decoded;
 use dynocar_dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest,
-    Problem, RunContent, SourcePosition, is_parquet, parse_track, parse_train, top_keys,
+    RunContent, is_parquet, parse_track, parse_train, top_keys,
 };
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
@@ -243,19 +243,15 @@ pub fn load_track(path: &Path) -> Result<Track, LoadError> {
     Ok(parse_track(&label, &text)?)
 }
 
-fn labelled_text(path: &Path) -> Result<(String, String), LoadError> {
+/// A file's name in messages and its text.
+///
+/// # Errors
+///
+/// When it cannot be read.
+pub fn labelled_text(path: &Path) -> Result<(String, String), DatasetError> {
     let label = path.display().to_string();
-    let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
+    let text = read_text(path).map_err(|problem| problem.of(&label))?;
     Ok((label, text))
-}
-
-/// The error of a file that was named itself and cannot be read.
-pub fn file_error(label: &str, problem: FileProblem) -> DatasetError {
-    let line = match problem {
-        FileProblem::NotUtf8 { line } | FileProblem::OtherEncoding { line, .. } => Some(line),
-        _ => None,
-    };
-    SourcePosition { file: label.into(), line }.problem(Problem::File(problem))
 }
 
 #[cfg(test)]

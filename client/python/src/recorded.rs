@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use dynocar::cli::Failure;
 use dynocar::cli::check::refusal;
 use dynocar::output::OutputError;
-use dynocar_workshop::cli::check::{self as checking, Understood};
+use dynocar_workshop::cli::check as checking;
 use dynocar_workshop::cli::identify as identifying;
 use pyo3::prelude::*;
 use serde::Serialize;
@@ -47,7 +47,7 @@ pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(JsonAndText, Vec<
         let answer = (json(&understood.answer(&path))?, understood.text());
         match (understood, wrong) {
             (_, Some(failure)) => Err(failure),
-            (Understood::Dataset(_, runs), None) => {
+            (checking::Understood { dataset: Some((_, runs)), .. }, None) => {
                 Ok((answer, runs.into_iter().flatten().collect::<Vec<_>>()))
             }
             _ => {

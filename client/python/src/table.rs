@@ -5,7 +5,7 @@ use std::sync::Arc;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, UInt32Array};
 use arrow_buffer::{BooleanBuffer, NullBuffer, ScalarBuffer};
-use dynocar_analysis::dataset::{Extras, Run};
+use dynocar_analysis::dataset::{EXTRAS, Quantity, Run};
 use dynocar_shared::SampleField;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -87,11 +87,10 @@ impl Table {
         let fields = samples.fold(0, |fields, sample| fields | sample.valid);
         let fields = SampleField::ALL.into_iter().filter(|field| fields & field.bit() != 0);
         let fields: Vec<SampleField> = fields.collect();
-        let is_known = |extra: &usize| {
-            let mut values = runs.iter().flat_map(|run| extras(&run.extras)[*extra].1).flatten();
-            values.any(Option::is_some)
+        let is_known = |(quantity, _): &(Quantity, _)| {
+            runs.iter().filter_map(|run| run.extra(*quantity)).flatten().any(Option::is_some)
         };
-        let known: Vec<usize> = (0..EXTRAS).filter(is_known).collect();
+        let known: Vec<(Quantity, &str)> = EXTRAS.into_iter().filter(is_known).collect();
         let numbered = |run: &Run| batch(Some(run.number), quantities(run, &fields, &known));
         let all = runs.iter().map(numbered).collect::<PyResult<Vec<_>>>()?;
         // The columns after the run's number, in the same memory.
@@ -105,11 +104,9 @@ impl Table {
 
 /// So many samples are in the processor's cache while one column after the other is taken from them.
 const SAMPLES_AT_ONCE: usize = 512;
-/// Number of [`extras`].
-const EXTRAS: usize = 11;
 
 /// What a run holds: its times, these quantities of its samples, and of those beyond them.
-fn quantities(run: &Run, fields: &[SampleField], known: &[usize]) -> Columns {
+fn quantities(run: &Run, fields: &[SampleField], known: &[(Quantity, &'static str)]) -> Columns {
     let column = |name| (name, Vec::with_capacity(run.samples.len()));
     let mut times = column("time_s");
     let mut columns: Columns = fields.iter().map(|field| column(field.name())).collect();
@@ -120,28 +117,13 @@ fn quantities(run: &Run, fields: &[SampleField], known: &[usize]) -> Columns {
         }
     }
     columns.insert(0, times);
-    for (name, values) in known.iter().map(|extra| extras(&run.extras)[*extra]) {
-        let known = values.iter().flatten().map(|value| value.unwrap_or(f64::NAN));
+    for (quantity, name) in known {
+        let known =
+            run.extra(*quantity).into_iter().flatten().map(|value| value.unwrap_or(f64::NAN));
         let whole = known.chain(std::iter::repeat(f64::NAN)).take(run.samples.len());
-        columns.push((name, whole.collect()));
+        columns.push((*name, whole.collect()));
     }
     columns
-}
-
-fn extras(extras: &Extras) -> [(&'static str, &Option<Vec<Option<f64>>>); EXTRAS] {
-    [
-        ("relative_humidity", &extras.relative_humidity),
-        ("wind_speed_mps", &extras.wind_speed_mps),
-        ("passengers", &extras.passengers),
-        ("altitude_m", &extras.altitude_m),
-        ("latitude_deg", &extras.latitude_deg),
-        ("longitude_deg", &extras.longitude_deg),
-        ("course_deg", &extras.course_deg),
-        ("curvature_per_m", &extras.curvature_per_m),
-        ("door_open", &extras.door_open),
-        ("traction_power_w", &extras.traction_power_w),
-        ("line_power_w", &extras.line_power_w),
-    ]
 }
 
 /// Columns in Arrow's form: what is missing is null there, and NaN in the memory that NumPy sees.

@@ -5,7 +5,6 @@ use std::borrow::Cow;
 use dynocar_model::units::Unit;
 
 use super::clock::TimeFormat;
-use super::error::Problem;
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
@@ -43,10 +42,10 @@ pub fn not_a_value(
     cell: &[u8],
     layout: &TextLayout,
     is_below_names: bool,
-) -> Problem {
+) -> String {
     let printable = |letter: char| if letter.is_control() { ' ' } else { letter };
     let text: String = lossy(cell).chars().take(60).map(printable).collect();
-    let column = mapping.column.clone();
+    let column = &mapping.column;
     let with_point: Vec<u8> =
         cell.iter().map(|&letter| if letter == b',' { b'.' } else { letter }).collect();
     let of_time = TimeFormat::of_cell(cell);
@@ -65,11 +64,14 @@ pub fn not_a_value(
         String::new()
     };
     match &mapping.format {
-        None => Problem::NotANumber { column, text, hint },
-        Some(format) => {
-            let (format, expected) = (format.name().to_owned(), format.example().to_owned());
-            Problem::NotATime { column, format, expected, text, hint }
+        None => {
+            format!("column '{column}': expected a number or an empty cell, got '{text}'{hint}")
         }
+        Some(format) => format!(
+            "column '{column}': expected a time as {} (format = \"{}\"), got '{text}'{hint}",
+            format.example(),
+            format.name()
+        ),
     }
 }
 

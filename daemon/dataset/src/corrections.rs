@@ -3,17 +3,15 @@
 use dynocar_model::terms::CORRECTIONS;
 use dynocar_model::train::TrainModel;
 
-use super::document::Section;
+use super::document::Item;
 use super::error::DatasetError;
 
 /// Reads the table into a train; what is absent corrects nothing.
-pub(super) fn read_corrections(
-    section: &Section,
-    train: &mut TrainModel,
-) -> Result<(), DatasetError> {
+pub(super) fn read_corrections(section: &Item, train: &mut TrainModel) -> Result<(), DatasetError> {
     section.allow(&CORRECTIONS.map(|key| key.name))?;
     for key in CORRECTIONS {
-        if let Some(value) = section.number(key.name, key.allowed, |value| key.allows(value))? {
+        let value = section.checked_under(key.name, key.allowed, |value| key.allows(value))?;
+        if let Some(value) = value {
             *(key.of)(train) = value;
         }
     }

@@ -3,12 +3,12 @@
 use dynocar_core::plausibility::{DetectedFault, Severity};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
+use dynocar_model::units::Unit;
 use serde::Serialize;
 
 use super::Dataset;
 use super::declared::misdeclared;
 use super::diagnostic::Diagnostic;
-use super::fault_unit::unit_of;
 use super::run::Run;
 
 /// A diagnostic on a dataset.
@@ -49,27 +49,23 @@ pub fn diagnostics<'r>(
     track: Option<&Track>,
     runs: impl IntoIterator<Item = &'r Run>,
 ) -> Vec<DatasetDiagnostic> {
-    let of_declared = misdeclared(train, track).into_iter();
-    let mut diagnostics: Vec<DatasetDiagnostic> = of_declared
-        .map(|it| DatasetDiagnostic {
-            code: it.code,
-            severity: it.severity,
-            runs: Vec::new(),
-            text: it.text,
-        })
-        .collect();
+    let of = |runs, it: &Diagnostic| DatasetDiagnostic {
+        code: it.code,
+        severity: it.severity,
+        runs,
+        text: it.text.clone(),
+    };
+    let of_declared = misdeclared(train, track);
+    let mut diagnostics: Vec<_> = of_declared.iter().map(|it| of(Vec::new(), it)).collect();
     // The factors of an input fault that several runs share, from the lowest to the highest.
-    let mut faults: Vec<(usize, DetectedFault, &'static str, (f64, f64))> = Vec::new();
+    let mut faults: Vec<(usize, DetectedFault, Unit, (f64, f64))> = Vec::new();
     for run in runs {
-        for diagnostic in run.diagnostics.iter().filter(|it| it.severity() > Severity::Info) {
-            let same = |other: &DatasetDiagnostic| {
-                other.code == diagnostic.code() && !other.runs.is_empty()
-            };
-            let known = match diagnostic {
-                Diagnostic::InputFault { detected, read_as } => {
+        for diagnostic in run.diagnostics.iter().filter(|it| it.severity > Severity::Info) {
+            let known = match diagnostic.fault {
+                Some((detected, read_as)) => {
                     let known = faults.iter_mut().find(|(_, other, unit, (low, _))| {
                         other.fault == detected.fault
-                            && unit == read_as
+                            && *unit == read_as
                             && (*low < 1.0) == (detected.factor < 1.0)
                     });
                     known.map(|(index, .., range)| {
@@ -77,26 +73,25 @@ pub fn diagnostics<'r>(
                         *index
                     })
                 }
-                new => diagnostics
-                    .iter()
-                    .position(|other| same(other) && other.text == new.to_string()),
+                None => diagnostics.iter().position(|other: &DatasetDiagnostic| {
+                    let is_of_runs = other.code == diagnostic.code && !other.runs.is_empty();
+                    is_of_runs && other.text == diagnostic.text
+                }),
             };
             match known {
                 Some(index) => diagnostics[index].runs.push(run.file.clone()),
                 None => {
-                    if let Diagnostic::InputFault { detected, read_as } = diagnostic {
+                    if let Some((detected, read_as)) = diagnostic.fault {
                         let range = (detected.factor, detected.factor);
-                        faults.push((diagnostics.len(), *detected, read_as, range));
+                        faults.push((diagnostics.len(), detected, read_as, range));
                     }
-                    let (code, severity) = (diagnostic.code(), diagnostic.severity());
-                    let (runs, text) = (vec![run.file.clone()], diagnostic.to_string());
-                    diagnostics.push(DatasetDiagnostic { code, severity, runs, text });
+                    diagnostics.push(of(vec![run.file.clone()], diagnostic));
                 }
             }
         }
     }
     for (index, detected, read_as, range) in faults {
-        diagnostics[index].text = detected.words_for(range, &unit_of(detected, read_as));
+        diagnostics[index].text = detected.words_for(range, &read_as);
     }
     diagnostics.sort_by_key(|diagnostic| std::cmp::Reverse(diagnostic.severity));
     diagnostics

@@ -4,6 +4,8 @@ use dynocar_core::plausibility::Severity;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 
+use super::diagnostic::Diagnostic;
+
 /// Masses per metre of train in t/m: from a light rail car to a loaded ore train, with room.
 const MASS_PER_LENGTH_T_PER_M: (f64, f64) = (0.1, 20.0);
 /// Lengths in m of a vehicle or a train; 1 m stands for a train taken as a point.
@@ -14,23 +16,12 @@ const EFFORT_MPS2: (f64, f64) = (0.01, 10.0);
 /// Basic resistances in N/kN at any speed.
 const RESISTANCE_N_PER_KN: (f64, f64) = (0.05, 200.0);
 
-/// Something declared that cannot be true.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Misdeclared {
-    /// The name for machines.
-    pub code: &'static str,
-    /// How much it matters.
-    pub severity: Severity,
-    /// What is wrong, with figures and the likely input fault.
-    pub text: String,
-}
-
-/// Judges a train and its line.
-pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Misdeclared> {
+/// What cannot be true of a train and its line.
+pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     let mut say = |is_wrong: bool, code: &'static str, text: String| {
         if is_wrong {
-            found.push(Misdeclared { code, severity: Severity::Fundamental, text });
+            found.push(Diagnostic::new(code, Severity::Fundamental, text, []));
         }
     };
     let is_outside = |value: f64, (low, high): (f64, f64)| !(low..=high).contains(&value);

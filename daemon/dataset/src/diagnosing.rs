@@ -1,7 +1,9 @@
 //! Looks for what may be diagnosed in a run.
 
-use dynocar_core::plausibility::{DetectedFaults, InputFault};
+use dynocar_core::plausibility::Severity::{Fundamental, Info, Warning};
+use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
 use dynocar_model::train::Drive;
+use toml::Value;
 
 use super::diagnostic::Diagnostic;
 use super::fault_unit::read_as;
@@ -27,6 +29,14 @@ const STANDS_STILL_MIN_S: f64 = 10.0;
 /// The speed in m/s from which a train surely moves.
 const MOVING_MPS: f64 = 1.0;
 
+fn of(quantity: Quantity) -> (&'static str, Value) {
+    ("quantity", quantity.name().into())
+}
+
+fn of_count(rows: usize) -> (&'static str, Value) {
+    ("count", Value::Integer(rows as i64))
+}
+
 /// Looks for what may be wrong with a run.
 pub(super) fn diagnostics(
     context: Context,
@@ -34,24 +44,29 @@ pub(super) fn diagnostics(
     quality: &RunQuality,
     detected: &DetectedFaults,
 ) -> Vec<Diagnostic> {
-    let fault = |detected| Diagnostic::InputFault {
-        detected,
-        read_as: read_as(context.manifest, detected),
-    };
+    let fault = |it: DetectedFault| Diagnostic::of_fault(it, read_as(context.manifest, it.fault));
     let mut diagnostics: Vec<Diagnostic> = detected.iter().map(fault).collect();
     of_time(quality, &mut diagnostics);
     of_content(context, run, quality, &mut diagnostics);
     diagnostics.extend(stands_still(run));
     of_position(context, run, quality, detected, &mut diagnostics);
     if run.speeds.negative > 0 {
-        diagnostics.push(Diagnostic::NegativeSpeed { count: run.speeds.negative });
+        let count = run.speeds.negative;
+        let text = format!(
+            "the speed is below zero in {count} rows, and those samples are refused: speed counts in \
+             the direction of travel, whatever the chainage does"
+        );
+        let figures = [of_count(count)];
+        diagnostics.push(Diagnostic::new("negative_speed", Warning, text, figures));
     }
     let handles = (Quantity::TractionHandle, Quantity::BrakeHandle);
     of_force(run, &run.forces.traction, Quantity::TractionForce, handles.0, &mut diagnostics);
     of_force(run, &run.forces.brake, Quantity::BrakeForce, handles.1, &mut diagnostics);
     of_power(context, run, &mut diagnostics);
     if run.gradient_source == GradientSource::Unknown {
-        diagnostics.push(Diagnostic::GradientUnknown);
+        let text = "the gradient is unknown: there is no gradient in the track, no gradient, \
+                    specific_force or altitude in the columns";
+        diagnostics.push(Diagnostic::new("gradient_unknown", Info, text, []));
     }
     of_plausibility(run, &mut diagnostics);
     diagnostics
@@ -66,21 +81,42 @@ fn of_power(context: Context, run: &Resolved, diagnostics: &mut Vec<Diagnostic>)
     let drive = declared.unwrap_or(Drive::USUAL);
     let has_friction = context.train.brake_gear.friction_brake.is_some()
         && run.table.filled(Quantity::BrakeCylinderPressure).is_some();
-    diagnostics.push(Diagnostic::ForceByPower {
-        efficiency: drive.efficiency,
-        is_declared: declared.is_some(),
-        speed_min_mps: drive.speed_min_mps,
-        is_brake: run.forces.brake.source == ForceSource::Power && !has_friction,
-    });
+    let is_brake = run.forces.brake.source == ForceSource::Power && !has_friction;
+    let Drive { efficiency, speed_min_mps, .. } = drive;
+    let of_drive = match declared {
+        Some(_) => "",
+        None => " as usual, since no efficiency is declared",
+    };
+    let of_brake = match is_brake {
+        true => {
+            "; the brake force is what the drive feeds back, so that --traction-only is needed where \
+             a friction brake acts in addition to it"
+        }
+        false => "",
+    };
+    let text = format!(
+        "no traction_force is mapped: above {speed_min_mps} m/s it is the power of the drive over the \
+         speed, {efficiency} of it{of_drive}; explain estimates the efficiency{of_brake}"
+    );
+    let figures = [
+        ("efficiency", efficiency.into()),
+        ("is_declared", declared.is_some().into()),
+        ("speed_min_mps", speed_min_mps.into()),
+        ("is_brake", is_brake.into()),
+    ];
+    diagnostics.push(Diagnostic::new("force_by_power", Info, text, figures));
 }
 
 fn of_time(quality: &RunQuality, diagnostics: &mut Vec<Diagnostic>) {
     let step_s = quality.order.step_s;
     if step_s > 0.0 && !(USUAL_STEP_S.0..=USUAL_STEP_S.1).contains(&step_s) {
-        diagnostics.push(Diagnostic::UnusualStep { step_s });
+        let text = format!("the median time step is {step_s} s: is the unit of time right?");
+        let figures = [("step_s", step_s.into())];
+        diagnostics.push(Diagnostic::new("unusual_step", Warning, text, figures));
     }
     if quality.lines.truncated {
-        diagnostics.push(Diagnostic::BreaksOff);
+        let text = "the file breaks off within its last line, which is not used";
+        diagnostics.push(Diagnostic::new("breaks_off", Warning, text, []));
     }
 }
 
@@ -93,13 +129,22 @@ fn of_content(
 ) {
     let quantities = context.manifest.columns.iter().map(|mapping| mapping.quantity);
     let empty = quantities.filter(|&quantity| run.table.filled(quantity).is_none());
-    diagnostics.extend(empty.map(|quantity| Diagnostic::NoValues { quantity }));
+    diagnostics.extend(empty.map(|quantity| {
+        let text = format!("{quantity} is mapped, but no row has a value of it");
+        Diagnostic::new("no_values", Info, text, [of(quantity)])
+    }));
     if run.order.rows().nth(1).is_none() {
-        diagnostics.push(Diagnostic::OneRow);
+        let text = "only one row is in order of time: motion cannot be seen in it";
+        diagnostics.push(Diagnostic::new("one_row", Warning, text, []));
     } else if let Some((_, highest_mps)) = quality.speed_range_mps
         && highest_mps < MOVING_MPS
     {
-        diagnostics.push(Diagnostic::NeverMoves { highest_mps });
+        let text = format!(
+            "the train hardly moves, at {highest_mps} m/s at most: nothing can be learned; is the \
+             unit of speed right?"
+        );
+        let figures = [("highest_mps", highest_mps.into())];
+        diagnostics.push(Diagnostic::new("never_moves", Warning, text, figures));
     }
 }
 
@@ -127,7 +172,14 @@ fn stands_still(run: &Resolved) -> Option<Diagnostic> {
     }
     let (for_s, start) = longest?;
     let (from_s, speed_mps) = (run.times_s[start], run.speeds.speed_mps[start]);
-    Some(Diagnostic::StandsStill { from_s, for_s, speed_mps })
+    let text = format!(
+        "from {from_s} s every column but the time keeps its value for {for_s:.1} s, at \
+         {speed_mps:.1} m/s: unless the data are free of noise, the recorder hung, and the file \
+         should end there"
+    );
+    let figures =
+        [("from_s", from_s.into()), ("for_s", for_s.into()), ("speed_mps", speed_mps.into())];
+    Some(Diagnostic::new("stands_still", Warning, text, figures))
 }
 
 fn of_position(
@@ -139,7 +191,9 @@ fn of_position(
 ) {
     if run.position_source == PositionSource::IntegratedSpeed {
         if context.track.is_some() && run.entry.start_m.is_none() {
-            diagnostics.push(Diagnostic::StartUnknown);
+            let text = "no position is recorded: it is integrated from 0 m; give the run's start_m \
+                        to place it on the line";
+            diagnostics.push(Diagnostic::new("start_unknown", Info, text, []));
         }
         return;
     }
@@ -163,7 +217,10 @@ fn of_position(
     if net_m * f64::from(direction) < -DISTANCE_MIN_M
         && !is_reported(&[InputFault::DirectionReversed])
     {
-        diagnostics.push(Diagnostic::AgainstDirection { direction, net_m });
+        let text =
+            format!("the position changes by {net_m:.0} m in all, against direction = {direction}");
+        let figures = [("direction", Value::from(direction)), ("net_m", net_m.into())];
+        diagnostics.push(Diagnostic::new("against_direction", Fundamental, text, figures));
     }
     let (position_m, speed_m) = (net_m.abs(), quality.distance_m);
     let is_long = position_m.max(speed_m) > DISTANCE_MIN_M;
@@ -173,7 +230,13 @@ fn of_position(
         && is_long
         && (position_m - speed_m).abs() > DISTANCE_TOLERANCE * position_m.max(speed_m)
     {
-        diagnostics.push(Diagnostic::DistanceMismatch { position_m, speed_m });
+        let text = format!(
+            "the position covers {position_m:.0} m, the integrated speed {speed_m:.0} m (ratio \
+             {:.3}): are the units of time, position and speed right?",
+            position_m / speed_m
+        );
+        let figures = [("position_m", position_m.into()), ("speed_m", speed_m.into())];
+        diagnostics.push(Diagnostic::new("distance_mismatch", Warning, text, figures));
     }
     let length_m = context.track.and_then(|track| track.length_m);
     // A train may stop with its head at the line's end and its centre half a length outside.
@@ -181,7 +244,12 @@ fn of_position(
     if let (Some(length_m), Some((from_m, to_m))) = (length_m, quality.position_range_m)
         && (from_m < -beyond_m || to_m > length_m + beyond_m)
     {
-        diagnostics.push(Diagnostic::OffTheLine { from_m, to_m, length_m });
+        let text = format!(
+            "positions from {from_m:.0} m to {to_m:.0} m leave the line, 0 m to {length_m:.0} m"
+        );
+        let figures =
+            [("from_m", from_m.into()), ("to_m", to_m.into()), ("length_m", length_m.into())];
+        diagnostics.push(Diagnostic::new("off_the_line", Warning, text, figures));
     }
 }
 
@@ -194,20 +262,36 @@ fn of_force(
 ) {
     if force.negative > 0 {
         let lowest_n = force.force_n.iter().copied().fold(f64::INFINITY, f64::min);
-        diagnostics.push(Diagnostic::NegativeForce { quantity, count: force.negative, lowest_n });
+        let count = force.negative;
+        let text = format!(
+            "{quantity} is below zero in {count} rows, down to {lowest_n:.0} N, and those samples are \
+             refused: a signed force is a control_force, a negative retarding one needs scale = -1"
+        );
+        let figures = [of(quantity), of_count(count), ("lowest_n", lowest_n.into())];
+        diagnostics.push(Diagnostic::new("negative_force", Warning, text, figures));
     }
     if force.handle_out_of_range > 0 {
         let column = run.table.column(handle).unwrap_or_default();
         let lowest = column.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let count = force.handle_out_of_range;
-        diagnostics.push(Diagnostic::HandleOutOfRange { quantity: handle, count, lowest, highest });
+        let hint = if highest > 2.0 { ": is the unit '%'?" } else { "" };
+        let text = format!(
+            "{handle} lies outside 0 to 1 in {count} rows, from {lowest} to {highest}; there it \
+             counts as missing{hint}"
+        );
+        let figures =
+            [of(handle), of_count(count), ("lowest", lowest.into()), ("highest", highest.into())];
+        diagnostics.push(Diagnostic::new("handle_out_of_range", Warning, text, figures));
     }
     if force.source == ForceSource::Column && run.table.column(handle).is_some() {
-        diagnostics.push(Diagnostic::UnusedHandle { quantity: handle });
+        let text = format!("{handle} is not used, since the force itself is mapped");
+        diagnostics.push(Diagnostic::new("unused_handle", Info, text, [of(handle)]));
     }
     if force.source == ForceSource::None {
-        diagnostics.push(Diagnostic::ForceNotRecorded { quantity });
+        let text =
+            format!("no {quantity} is mapped: without it the balance of forces is not known");
+        diagnostics.push(Diagnostic::new("force_not_recorded", Info, text, [of(quantity)]));
     }
 }
 
@@ -229,7 +313,18 @@ fn of_plausibility(run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
         let count = column.iter().filter(is_outside).count();
         if count > 0 {
             let unit = quantity.unit().name();
-            diagnostics.push(Diagnostic::Implausible { quantity, count, low, high, unit });
+            let text = format!(
+                "{quantity} lies outside {low} to {high} {unit} in {count} rows, and those samples \
+                 are refused: is the unit right?"
+            );
+            let figures = [
+                of(quantity),
+                of_count(count),
+                ("low", low.into()),
+                ("high", high.into()),
+                ("unit", unit.into()),
+            ];
+            diagnostics.push(Diagnostic::new("implausible", Warning, text, figures));
         }
     }
 }

@@ -1,11 +1,13 @@
-//! Reading TOML with the line of every key, and refusing keys that mean nothing.
+//! What may be expected of a value of a document.
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use std::ops::{Bound, RangeBounds};
+
+use dynocar_model::units::Unit;
 use toml::value::Datetime;
 
-use super::error::{DatasetError, Problem, SourcePosition};
-use super::names::Choices;
+use super::error::{DatasetError, SourcePosition};
+use super::names::unknown;
+use super::node::{Content, Node};
 
 /// The names of the tables and keys at the top of a TOML file, in the order of the file.
 ///
@@ -13,220 +15,363 @@ use super::names::Choices;
 ///
 /// When the text is not TOML.
 pub fn top_keys(label: &str, text: &str) -> Result<Vec<String>, DatasetError> {
-    let document = Document::parse(label, text)?;
-    Ok(document.root().keys().into_iter().map(|(name, _)| name.into()).collect())
+    let root = Node::of_toml(label, text)?;
+    Ok(Item::root(label, &root).keys().map(Into::into).collect())
 }
 
-/// A TOML file with its name, for messages.
-pub(super) struct Document<'t> {
+/// Above 0, up to a bound.
+pub fn above_zero(most: f64) -> (Bound<f64>, Bound<f64>) {
+    (Bound::Excluded(0.0), Bound::Included(most))
+}
+
+/// A value with file and path, for messages.
+#[derive(Clone, Debug)]
+pub struct Item<'t> {
     label: &'t str,
-    /// Byte offsets at which the lines start.
-    line_starts: Vec<usize>,
-    root: Spanned<DeTable<'t>>,
+    /// The keys that lead to it, as `vehicles[2].mass`.
+    pub path: String,
+    node: &'t Node,
 }
 
-impl<'t> Document<'t> {
-    /// Parses a file's text; a byte-order mark is skipped.
-    pub fn parse(label: &'t str, text: &'t str) -> Result<Self, DatasetError> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let line_starts: Vec<usize> =
-            std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        let root = DeTable::parse(text).map_err(|error| {
-            let line = error.span().map(|span| line_of(&line_starts, span.start));
-            let place = SourcePosition { file: label.into(), line };
-            let message = error.message().trim_end().replace('\n', ", ");
-            place.problem(Problem::Syntax { language: "TOML", message })
-        })?;
-        Ok(Document { label, line_starts, root })
+/// A list of N-tuples of numbers, each with its place.
+pub type Entries<'t, const N: usize> = Vec<([f64; N], Item<'t>)>;
+
+/// What is not as expected gives an error with file, line, the path to the value and what was expected.
+impl<'t> Item<'t> {
+    /// A file as a whole.
+    pub fn root(label: &'t str, node: &'t Node) -> Self {
+        Item { label, path: String::new(), node }
     }
 
-    /// The tables and keys at the top.
-    pub fn root(&self) -> Section<'_> {
-        Section { document: self, path: String::new(), at: None, table: self.root.get_ref() }
-    }
-
-    fn place(&self, offset: usize) -> SourcePosition {
-        SourcePosition::line(self.label, line_of(&self.line_starts, offset))
-    }
-}
-
-fn line_of(line_starts: &[usize], offset: usize) -> usize {
-    line_starts.partition_point(|&start| start <= offset).max(1)
-}
-
-/// A table of a document; keys are named with the path to it.
-pub(super) struct Section<'d> {
-    document: &'d Document<'d>,
-    path: String,
-    /// Byte offset of the table; `None` for the whole file.
-    at: Option<usize>,
-    table: &'d DeTable<'d>,
-}
-
-/// A list of N-tuples of numbers, with the place of each.
-pub(super) type Entries<const N: usize> = Vec<([f64; N], SourcePosition)>;
-
-impl<'d> Section<'d> {
-    /// Refuses keys other than these.
-    pub fn allow(&self, keys: &[&str]) -> Result<(), DatasetError> {
-        // The map is ordered by name; the user meets the first in the file first.
-        let unknown = self.table.keys().filter(|key| !keys.contains(&key.get_ref().as_ref()));
-        let Some(first) = unknown.min_by_key(|key| key.span().start) else { return Ok(()) };
-        let name = first.get_ref().to_string();
-        let context = match self.path.as_str() {
-            "" => String::new(),
-            path => format!(" in [{path}]"),
-        };
-        let choices = Choices::new(&name, keys.iter().copied());
-        let problem = Problem::UnknownName { what: "key", name, context, choices };
-        Err(self.document.place(first.span().start).problem(problem))
-    }
-
-    /// The error of a word under a key that is none of the choices.
-    pub fn unknown(
-        &self,
-        key: &str,
-        what: &'static str,
-        name: &str,
-        choices: &[&str],
-    ) -> DatasetError {
-        let choices = Choices::new(name, choices.iter().copied());
-        let (name, context) = (name.into(), format!(" in {}", self.full(key)));
-        self.place_of(key).problem(Problem::UnknownName { what, name, context, choices })
-    }
-
-    /// Where the table stands.
+    /// File and line.
     pub fn place(&self) -> SourcePosition {
-        match self.at {
-            Some(offset) => self.document.place(offset),
-            None => SourcePosition::whole(self.document.label),
-        }
+        SourcePosition { file: self.label.into(), line: self.node.line }
     }
 
-    /// Where a key's value stands; the table when there is none.
-    pub fn place_of(&self, key: &str) -> SourcePosition {
-        match self.table.get(key) {
-            Some(value) => self.document.place(value.span().start),
-            None => self.place(),
-        }
+    /// A problem with this value.
+    pub fn wrong(&self, words: impl std::fmt::Display) -> DatasetError {
+        self.place().problem(words)
     }
 
-    /// A key with the path to it.
+    /// The error of a name that is none of those which can stand here.
+    pub fn unknown<T: Into<String>>(
+        &self,
+        what: &str,
+        name: &str,
+        names: impl IntoIterator<Item = T>,
+    ) -> DatasetError {
+        self.wrong(unknown(what, name, &format!(" in {}", self.path), names))
+    }
+
+    /// The error of a value outside its range.
+    pub fn out_of_range(&self, value: &str, allowed: &str) -> DatasetError {
+        self.wrong(format!("{} = {value}: expected {allowed}", self.name()))
+    }
+
+    /// The error of a value outside its range under a key of this map, be it there or not.
+    pub fn key_out_of_range(&self, key: &str, value: &str, allowed: &str) -> DatasetError {
+        self.place_of(key).problem(format!("{} = {value}: expected {allowed}", self.full(key)))
+    }
+
+    /// The error of a value of another kind than is expected.
+    pub fn wrong_type(&self, expected: &str) -> DatasetError {
+        self.wrong(format!("{}: expected {expected}, got {}", self.name(), self.node.shown()))
+    }
+
+    /// The error of two keys of this map that exclude each other.
+    pub fn exclusive(&self, key: &str, other: &str) -> DatasetError {
+        let (full, other) = (self.full(key), self.full(other));
+        let words = format!("{full} and {other} exclude each other: give one of them");
+        self.place_of(key).problem(words)
+    }
+
+    /// A path to a key of this map.
     pub fn full(&self, key: &str) -> String {
         if self.path.is_empty() { key.into() } else { format!("{}.{key}", self.path) }
     }
 
-    /// The names of the keys, with their place, in the order of the file.
-    pub fn keys(&self) -> Vec<(&'d str, SourcePosition)> {
-        let mut keys: Vec<_> = self.table.keys().collect();
-        keys.sort_by_key(|key| key.span().start);
-        keys.into_iter()
-            .map(|key| (key.get_ref().as_ref(), self.document.place(key.span().start)))
-            .collect()
+    fn name(&self) -> &str {
+        if self.path.is_empty() { "the file" } else { &self.path }
+    }
+
+    fn entries_of_map(&self) -> &'t [(String, Node)] {
+        match &self.node.content {
+            Content::Map(entries) => entries,
+            _ => &[],
+        }
+    }
+
+    /// The names of this map in the order of the file; none of another value.
+    pub fn keys(&self) -> impl Iterator<Item = &'t str> + use<'t> {
+        self.entries_of_map().iter().map(|(name, _)| name.as_str())
+    }
+
+    /// Refuses keys of this map other than these.
+    pub fn allow(&self, keys: &[&str]) -> Result<(), DatasetError> {
+        let Some(name) = self.keys().find(|name| !keys.contains(name)) else { return Ok(()) };
+        let context = if self.path.is_empty() { "".into() } else { format!(" in [{}]", self.path) };
+        Err(self.place_of(name).problem(unknown("key", name, &context, keys.iter().copied())))
+    }
+
+    /// True for a key of this map whose value nobody has asked for.
+    pub fn is_unread(&self, key: &str) -> bool {
+        self.find(key).is_some_and(|item| !item.node.is_read.get())
+    }
+
+    fn find(&self, key: &str) -> Option<Item<'t>> {
+        let (_, node) = self.entries_of_map().iter().find(|(name, _)| name == key)?;
+        Some(Item { label: self.label, path: self.full(key), node })
+    }
+
+    /// Where a key of this map stands; this map where it has none.
+    pub fn place_of(&self, key: &str) -> SourcePosition {
+        self.find(key).map_or_else(|| self.place(), |item| item.place())
+    }
+
+    /// True where a key of this map has a value, which is not counted as read.
+    pub fn has(&self, key: &str) -> bool {
+        self.find(key).is_some_and(|item| !item.node.is_null())
+    }
+
+    /// The value under a key of this map, unless it is null.
+    pub fn get(&self, key: &str) -> Option<Item<'t>> {
+        let item = self.find(key)?;
+        item.node.is_read.set(true);
+        (!item.node.is_null()).then_some(item)
+    }
+
+    /// The value under a key that must be there.
+    pub fn need(&self, key: &str, expected: &str) -> Result<Item<'t>, DatasetError> {
+        if !self.is_map() {
+            return Err(self.wrong_type(&format!("keys and values, among them {key}")));
+        }
+        let missing = || format!("missing key {}: expected {expected}", self.full(key));
+        self.get(key).ok_or_else(|| self.wrong(missing()))
     }
 
     /// The table under a key.
-    pub fn table(&self, key: &str) -> Result<Option<Section<'d>>, DatasetError> {
-        let Some((name, value)) = self.table.get_key_value(key) else { return Ok(None) };
-        let DeValue::Table(table) = value.get_ref() else {
-            return Err(self.wrong_type(key, "a table", value));
-        };
-        // A table's own span may cover the first key only; its name is where the eye looks.
-        let at = Some(name.span().start);
-        Ok(Some(Section { document: self.document, path: self.full(key), at, table }))
+    pub fn table(&self, key: &str) -> Result<Option<Item<'t>>, DatasetError> {
+        match self.get(key) {
+            Some(other) if !other.is_map() => Err(other.wrong_type("a table")),
+            table => Ok(table),
+        }
     }
 
     /// The table under a key that must be there.
-    pub fn required_table(&self, key: &str) -> Result<Section<'d>, DatasetError> {
-        self.table(key)?.ok_or_else(|| self.missing(key, "a table"))
+    pub fn need_table(&self, key: &str) -> Result<Item<'t>, DatasetError> {
+        self.need(key, "a table")?;
+        Ok(self.table(key)?.expect("a table that is needed"))
     }
 
-    /// The tables of an array of tables.
-    pub fn tables(&self, key: &str) -> Result<Vec<Section<'d>>, DatasetError> {
-        let Some(value) = self.table.get(key) else { return Ok(Vec::new()) };
-        let DeValue::Array(items) = value.get_ref() else {
-            return Err(self.wrong_type(key, "a list of tables", value));
+    /// The tables of an array of tables, none where the key is not there.
+    pub fn tables(&self, key: &str) -> Result<Vec<Item<'t>>, DatasetError> {
+        let Some(list) = self.get(key) else { return Ok(Vec::new()) };
+        let tables = list.list("a list of tables", 0)?;
+        match tables.iter().find(|item| !item.is_map()) {
+            Some(other) => Err(other.wrong_type("a table")),
+            None => Ok(tables),
+        }
+    }
+
+    /// The items of this list, `least` or more.
+    pub fn list(&self, expected: &str, least: usize) -> Result<Vec<Item<'t>>, DatasetError> {
+        let Content::List(nodes) = &self.node.content else {
+            return Err(self.wrong_type(expected));
         };
-        let mut tables = Vec::with_capacity(items.len());
-        for (index, item) in items.iter().enumerate() {
-            let path = format!("{}[{}]", self.full(key), index + 1);
-            let DeValue::Table(table) = item.get_ref() else {
-                return Err(self.wrong_type(key, "a list of tables", item));
-            };
-            let at = Some(item.span().start);
-            tables.push(Section { document: self.document, path, at, table });
+        if nodes.len() < least {
+            let found = format!("a list of {}", nodes.len());
+            return Err(self.out_of_range(&found, &format!("at least {least} {expected}")));
         }
-        Ok(tables)
+        let path = |index: usize| format!("{}[{}]", self.path, index + 1);
+        let items = nodes.iter().enumerate();
+        Ok(items.map(|(index, node)| Item { path: path(index), node, ..*self }).collect())
     }
 
-    /// The text under a key.
-    pub fn text(&self, key: &str) -> Result<Option<&'d str>, DatasetError> {
-        let Some(value) = self.table.get(key) else { return Ok(None) };
-        match value.get_ref() {
-            DeValue::String(text) => Ok(Some(text)),
-            _ => Err(self.wrong_type(key, "a text in quotes", value)),
+    /// The N items of this list.
+    pub fn tuple<const N: usize>(&self, form: &str) -> Result<[Item<'t>; N], DatasetError> {
+        let items = self.list(form, 0)?;
+        let found = format!("a list of {}", items.len());
+        items.try_into().map_err(|_| self.out_of_range(&found, form))
+    }
+
+    /// True for a list.
+    pub fn is_list(&self) -> bool {
+        matches!(self.node.content, Content::List(_))
+    }
+
+    /// True for a map.
+    pub fn is_map(&self) -> bool {
+        matches!(self.node.content, Content::Map(_))
+    }
+
+    /// This text, or number as it is written.
+    pub fn text(&self, expected: &str) -> Result<&'t str, DatasetError> {
+        match &self.node.content {
+            Content::Text(text) | Content::Plain(text)
+                if !self.node.is_null() && !text.trim().is_empty() =>
+            {
+                Ok(text)
+            }
+            _ => Err(self.wrong_type(expected)),
         }
     }
 
-    /// True where the key is there.
-    pub fn has(&self, key: &str) -> bool {
-        self.table.contains_key(key)
+    /// The text, or number as it is written, under a key that must be there.
+    pub fn need_text(&self, key: &str, expected: &str) -> Result<&'t str, DatasetError> {
+        self.need(key, expected)?.text(expected)
+    }
+
+    /// The text in quotes under a key.
+    pub fn quoted(&self, key: &str) -> Result<Option<&'t str>, DatasetError> {
+        let Some(item) = self.get(key) else { return Ok(None) };
+        item.as_quoted().map(Some).ok_or_else(|| item.wrong_type("a text in quotes"))
+    }
+
+    /// This text, where it stands in quotes.
+    pub fn as_quoted(&self) -> Option<&'t str> {
+        match &self.node.content {
+            Content::Text(text) => Some(text),
+            _ => None,
+        }
+    }
+
+    /// The text in quotes under a key that must be there and not be empty.
+    pub fn need_quoted(&self, key: &str, expected: &str) -> Result<&'t str, DatasetError> {
+        let item = self.need(key, expected)?;
+        match self.quoted(key)?.unwrap_or_default() {
+            text if text.trim().is_empty() => Err(item.out_of_range("\"\"", expected)),
+            text => Ok(text),
+        }
+    }
+
+    /// What the word in quotes under a key, which must be there, names: one of these names.
+    pub fn need_named<T, N: Into<String>>(
+        &self,
+        key: &str,
+        (what, expected): (&str, &str),
+        find: impl Fn(&str) -> Option<T>,
+        names: impl IntoIterator<Item = N>,
+    ) -> Result<T, DatasetError> {
+        let (item, word) = (self.need(key, expected)?, self.need_quoted(key, expected)?);
+        find(word).ok_or_else(|| item.unknown(what, word, names))
+    }
+
+    /// The same, when the key is there.
+    pub fn named_under<T, N: Into<String>>(
+        &self,
+        key: &str,
+        words: (&str, &str),
+        find: impl Fn(&str) -> Option<T>,
+        names: impl IntoIterator<Item = N>,
+    ) -> Result<Option<T>, DatasetError> {
+        self.has(key).then(|| self.need_named(key, words, find, names)).transpose()
     }
 
     /// The truth under a key.
     pub fn truth(&self, key: &str) -> Result<Option<bool>, DatasetError> {
-        let Some(value) = self.table.get(key) else { return Ok(None) };
-        match value.get_ref() {
-            DeValue::Boolean(truth) => Ok(Some(*truth)),
-            _ => Err(self.wrong_type(key, "true or false", value)),
+        let Some(item) = self.get(key) else { return Ok(None) };
+        match &item.node.content {
+            Content::Plain(text) if text == "true" || text == "false" => Ok(Some(text == "true")),
+            _ => Err(item.wrong_type("true or false")),
         }
     }
 
     /// The date or time under a key, as TOML writes it, in quotes or without.
     pub fn datetime(&self, key: &str) -> Result<Option<Datetime>, DatasetError> {
-        let Some(value) = self.table.get(key) else { return Ok(None) };
-        let datetime = match value.get_ref() {
-            DeValue::Datetime(datetime) => Some(*datetime),
-            DeValue::String(text) => text.trim().parse().ok(),
+        let Some(item) = self.get(key) else { return Ok(None) };
+        let datetime = match &item.node.content {
+            Content::Text(text) | Content::Plain(text) => text.trim().parse().ok(),
             _ => None,
         };
-        let wrong = || self.wrong_type(key, "a date, as 2026-03-18", value);
-        datetime.map(Some).ok_or_else(wrong)
+        datetime.map(Some).ok_or_else(|| item.wrong_type("a date, as 2026-03-18"))
     }
 
-    /// The text under a key that must be there and not be empty.
-    pub fn required_text(&self, key: &str, expected: &str) -> Result<&'d str, DatasetError> {
-        let text = self.text(key)?.ok_or_else(|| self.missing(key, expected))?;
-        if text.trim().is_empty() {
-            return Err(self.out_of_range(key, "\"\"", expected));
+    /// This number, when it satisfies `is_allowed`; `allowed` says so in words.
+    pub fn checked(
+        &self,
+        allowed: &str,
+        is_allowed: impl Fn(f64) -> bool,
+    ) -> Result<f64, DatasetError> {
+        let number = self.node.number().ok_or_else(|| self.wrong_type(allowed))?;
+        if !(number.is_finite() && is_allowed(number)) {
+            return Err(self.out_of_range(&number.to_string(), allowed));
         }
-        Ok(text)
+        Ok(number)
     }
 
-    /// The number under a key, when it satisfies `is_allowed`; `allowed` says so in words.
-    pub fn number(
+    /// A number that stands here, when it is within a range.
+    pub fn within(
+        &self,
+        number: f64,
+        allowed: &str,
+        range: impl RangeBounds<f64>,
+    ) -> Result<f64, DatasetError> {
+        let refused = || self.out_of_range(&number.to_string(), allowed);
+        Some(number).filter(|it| it.is_finite() && range.contains(it)).ok_or_else(refused)
+    }
+
+    /// This number, within a range.
+    pub fn number(&self, allowed: &str, range: impl RangeBounds<f64>) -> Result<f64, DatasetError> {
+        self.checked(allowed, |number| range.contains(&number))
+    }
+
+    /// This number of a unit, in the base unit, within a range in that.
+    pub fn in_unit(
+        &self,
+        unit: &Unit,
+        allowed: &str,
+        range: impl RangeBounds<f64>,
+    ) -> Result<f64, DatasetError> {
+        let number = self.checked(allowed, |number| range.contains(&unit.to_base(number)))?;
+        Ok(unit.to_base(number))
+    }
+
+    /// The number under a key, when there is one and it satisfies `is_allowed`.
+    pub fn checked_under(
         &self,
         key: &str,
         allowed: &str,
         is_allowed: impl Fn(f64) -> bool,
     ) -> Result<Option<f64>, DatasetError> {
-        let Some(value) = self.table.get(key) else { return Ok(None) };
-        let number = number(value.get_ref());
-        let number = number.ok_or_else(|| self.wrong_type(key, "a number", value))?;
-        if !(number.is_finite() && is_allowed(number)) {
-            return Err(self.out_of_range(key, &number.to_string(), allowed));
-        }
-        Ok(Some(number))
+        self.get(key).map(|item| item.checked(allowed, is_allowed)).transpose()
     }
 
-    /// The number under a key that must be there.
-    pub fn required_number(
+    /// The number under a key, when there is one.
+    pub fn optional(
         &self,
         key: &str,
         allowed: &str,
-        is_allowed: impl Fn(f64) -> bool,
+        range: impl RangeBounds<f64>,
+    ) -> Result<Option<f64>, DatasetError> {
+        self.get(key).map(|item| item.number(allowed, range)).transpose()
+    }
+
+    /// The number under a key that must be there.
+    pub fn required(
+        &self,
+        key: &str,
+        allowed: &str,
+        range: impl RangeBounds<f64>,
     ) -> Result<f64, DatasetError> {
-        self.number(key, allowed, is_allowed)?.ok_or_else(|| self.missing(key, allowed))
+        self.need(key, allowed)?.number(allowed, range)
+    }
+
+    /// The entries of the list under a key, each as `read` takes it; `form` shows one.
+    pub fn entries_as<T>(
+        &self,
+        key: &str,
+        form: &str,
+        read: impl Fn(&[Item<'t>]) -> Option<T>,
+    ) -> Result<Option<Vec<(T, Item<'t>)>>, DatasetError> {
+        let Some(list) = self.get(key) else { return Ok(None) };
+        let entry = |(index, item): (usize, Item<'t>)| {
+            let entry = item.list("", 0).ok().and_then(|items| read(&items));
+            let item = Item { path: format!("{} entry {}", list.path, index + 1), ..item };
+            let entry = entry.ok_or_else(|| item.wrong_type(form))?;
+            Ok((entry, item))
+        };
+        let items = list.list(&format!("a list of {form}"), 0)?;
+        items.into_iter().enumerate().map(entry).collect::<Result<_, _>>().map(Some)
     }
 
     /// The list of N-tuples of finite numbers under a key; `form` shows one entry.
@@ -234,112 +379,10 @@ impl<'d> Section<'d> {
         &self,
         key: &str,
         form: &str,
-    ) -> Result<Option<Entries<N>>, DatasetError> {
-        let Some(value) = self.table.get(key) else { return Ok(None) };
-        let DeValue::Array(items) = value.get_ref() else {
-            return Err(self.wrong_type(key, &format!("a list of {form}"), value));
-        };
-        let mut entries = Vec::with_capacity(items.len());
-        for (index, item) in items.iter().enumerate() {
-            let entry = tuple::<N>(item.get_ref()).ok_or_else(|| {
-                let place = self.document.place(item.span().start);
-                let key = format!("{} entry {}", self.full(key), index + 1);
-                let expected = format!("{form}, finite numbers");
-                let found = shown(item.get_ref());
-                place.problem(Problem::WrongType { key, expected, found })
-            })?;
-            entries.push((entry, self.document.place(item.span().start)));
-        }
-        Ok(Some(entries))
-    }
-
-    /// The list of [chainage_m, "name"] under a key, empty when absent.
-    pub fn named_chainages(&self, key: &str) -> Result<Vec<(f64, String)>, DatasetError> {
-        const FORM: &str = "[chainage_m, \"name\"]";
-        let Some(value) = self.table.get(key) else { return Ok(Vec::new()) };
-        let DeValue::Array(items) = value.get_ref() else {
-            return Err(self.wrong_type(key, &format!("a list of {FORM}"), value));
-        };
-        let entry = |(index, item): (usize, &Spanned<DeValue>)| {
-            let pair = match item.get_ref() {
-                DeValue::Array(pair) if pair.len() == 2 => {
-                    let at_m = number(pair[0].get_ref()).filter(|at_m| at_m.is_finite());
-                    at_m.zip(pair[1].get_ref().as_str()).map(|(at_m, name)| (at_m, name.into()))
-                }
-                _ => None,
-            };
-            pair.ok_or_else(|| {
-                let place = self.document.place(item.span().start);
-                let key = format!("{} entry {}", self.full(key), index + 1);
-                let (expected, found) = (FORM.into(), shown(item.get_ref()));
-                place.problem(Problem::WrongType { key, expected, found })
-            })
-        };
-        items.iter().enumerate().map(entry).collect()
-    }
-
-    /// The error of a key that is not there.
-    pub fn missing(&self, key: &str, expected: &str) -> DatasetError {
-        let (key, expected) = (self.full(key), expected.into());
-        self.place().problem(Problem::MissingKey { key, expected })
-    }
-
-    /// The error of a value outside its range.
-    pub fn out_of_range(&self, key: &str, value: &str, allowed: &str) -> DatasetError {
-        let (value, allowed) = (value.into(), allowed.into());
-        self.place_of(key).problem(Problem::OutOfRange { key: self.full(key), value, allowed })
-    }
-
-    /// The error of two keys that exclude each other.
-    pub fn exclusive(&self, key: &str, other: &str) -> DatasetError {
-        let (full, other) = (self.full(key), self.full(other));
-        self.place_of(key).problem(Problem::Exclusive { key: full, other })
-    }
-
-    fn wrong_type(&self, key: &str, expected: &str, found: &Spanned<DeValue>) -> DatasetError {
-        let place = self.document.place(found.span().start);
-        let (expected, found) = (expected.into(), shown(found.get_ref()));
-        place.problem(Problem::WrongType { key: self.full(key), expected, found })
-    }
-}
-
-fn number(value: &DeValue) -> Option<f64> {
-    match value {
-        DeValue::Float(float) => float.as_str().parse().ok(),
-        DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str().parse().ok(),
-        DeValue::Integer(integer) => {
-            i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|number| number as f64)
-        }
-        _ => None,
-    }
-}
-
-fn tuple<const N: usize>(value: &DeValue) -> Option<[f64; N]> {
-    let DeValue::Array(items) = value else { return None };
-    if items.len() != N {
-        return None;
-    }
-    let mut numbers = [0.0; N];
-    for (slot, item) in numbers.iter_mut().zip(items.iter()) {
-        *slot = number(item.get_ref()).filter(|number| number.is_finite())?;
-    }
-    Some(numbers)
-}
-
-/// A value in few words.
-fn shown(value: &DeValue) -> String {
-    match value {
-        DeValue::String(text) if text.chars().count() <= 40 => format!("the text \"{text}\""),
-        DeValue::String(_) => "a long text".into(),
-        DeValue::Integer(integer) => integer.to_string(),
-        DeValue::Float(float) => float.to_string(),
-        DeValue::Boolean(truth) => truth.to_string(),
-        DeValue::Datetime(_) => "a date or time".into(),
-        DeValue::Array(items) if items.len() <= 4 => {
-            let items: Vec<_> = items.iter().map(|item| shown(item.get_ref())).collect();
-            format!("[{}]", items.join(", "))
-        }
-        DeValue::Array(items) => format!("a list of {} items", items.len()),
-        DeValue::Table(_) => "a table".into(),
+    ) -> Result<Option<Entries<'t, N>>, DatasetError> {
+        self.entries_as(key, &format!("{form}, finite numbers"), |items| {
+            let numbers = items.iter().map(|item| item.node.number().filter(|it| it.is_finite()));
+            numbers.collect::<Option<Vec<f64>>>()?.try_into().ok()
+        })
     }
 }

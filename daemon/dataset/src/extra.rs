@@ -4,40 +4,38 @@ use dynocar_model::terms::extra::{
     Covariate, Extra, FACTORS, FACTORS_MAX, FORCE, FORCE_MAX_N_PER_KN, Factor, Form, TABLES,
 };
 
-use super::document::Section;
+use super::document::Item;
 use super::error::DatasetError;
 
 /// Reads the tables of a train file; none where none stand there.
-pub(super) fn read_extra(root: &Section) -> Result<Vec<Extra>, DatasetError> {
+pub(super) fn read_extra(root: &Item) -> Result<Vec<Extra>, DatasetError> {
     root.tables(TABLES)?.iter().map(extra).collect()
 }
 
-fn extra(section: &Section) -> Result<Extra, DatasetError> {
+fn extra(section: &Item) -> Result<Extra, DatasetError> {
     section.allow(&[FORCE, FACTORS])?;
-    let is_force = |force: f64| force.abs() <= FORCE_MAX_N_PER_KN;
-    let n_per_kn = section.required_number(FORCE, "N/kN, from -100 to 100", is_force)?;
+    let range = -FORCE_MAX_N_PER_KN..=FORCE_MAX_N_PER_KN;
+    let n_per_kn = section.required(FORCE, "N/kN, from -100 to 100", range)?;
     let tables = section.tables(FACTORS)?;
     if tables.is_empty() || tables.len() > FACTORS_MAX {
         let found = format!("{} of them", tables.len());
-        return Err(section.out_of_range(FACTORS, &found, "one or two tables"));
+        return Err(section.key_out_of_range(FACTORS, &found, "one or two tables"));
     }
     let factors = tables.iter().map(factor).collect::<Result<_, _>>()?;
     Ok(Extra { n_per_kn, factors })
 }
 
-fn factor(section: &Section) -> Result<Factor, DatasetError> {
-    let covariates = Covariate::ALL.map(Covariate::name);
-    let of = section.required_text("of", "a covariate")?;
-    let of = Covariate::from_name(of)
-        .ok_or_else(|| section.unknown("of", "covariate", of, &covariates))?;
-    let word = section.required_text("form", "a form")?;
-    let form = Form::from_name(word)
-        .ok_or_else(|| section.unknown("form", "form", word, &Form::ALL.map(Form::name)))?;
+fn factor(section: &Item) -> Result<Factor, DatasetError> {
+    let (covariate, covariates) =
+        (("covariate", "a covariate"), Covariate::ALL.map(Covariate::name));
+    let of = section.need_named("of", covariate, Covariate::from_name, covariates)?;
+    let forms = Form::ALL.map(Form::name);
+    let form = section.need_named("form", ("form", "a form"), Form::from_name, forms)?;
     let keys: Vec<&str> = ["of", "form"].iter().chain(form.numbers()).copied().collect();
     section.allow(&keys)?;
     let mut numbers = [0.0; 2];
     for (number, name) in numbers.iter_mut().zip(form.numbers()) {
-        *number = section.required_number(name, "a number", f64::is_finite)?;
+        *number = section.required(name, "a number", ..)?;
     }
     match form.refusal(numbers) {
         None => Ok(Factor { of, form, numbers }),
@@ -45,11 +43,8 @@ fn factor(section: &Section) -> Result<Factor, DatasetError> {
             let named = form.numbers().iter().zip(numbers);
             let found: Vec<String> =
                 named.map(|(name, number)| format!("{name} = {number}")).collect();
-            Err(section.out_of_range(
-                "form",
-                &format!("{word} with {}", found.join(", ")),
-                expected,
-            ))
+            let found = format!("{} with {}", form.name(), found.join(", "));
+            Err(section.key_out_of_range("form", &found, expected))
         }
     }
 }

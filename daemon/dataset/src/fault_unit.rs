@@ -1,6 +1,6 @@
 //! The unit that a diagnostic is reported in.
 
-use dynocar_core::plausibility::{DetectedFault, InputFault};
+use dynocar_core::plausibility::InputFault;
 use dynocar_model::units::Unit;
 
 use super::manifest::Manifest;
@@ -23,15 +23,11 @@ pub(super) fn concerned(fault: InputFault) -> (&'static [Quantity], &'static str
     }
 }
 
-/// The unit in which the manifest reads the quantity of a detected fault.
-pub(super) fn read_as(manifest: &Manifest, detected: DetectedFault) -> &'static str {
-    let (quantities, otherwise) = concerned(detected.fault);
+/// The unit in which the manifest reads the quantity of a fault.
+pub(super) fn read_as(manifest: &Manifest, fault: InputFault) -> Unit {
+    let (quantities, otherwise) = concerned(fault);
     let mapped = quantities.iter().find_map(|&quantity| manifest.mapping(quantity));
-    mapped.map_or(otherwise, |mapping| mapping.unit.name())
-}
-
-/// The unit of a detected fault's quantity with this name.
-pub(super) fn unit_of(detected: DetectedFault, name: &str) -> Unit {
-    let dimension = detected.fault.dimension();
+    let name = mapped.map_or(otherwise, |mapping| mapping.unit.name());
+    let dimension = fault.dimension();
     Unit::find(dimension, name).unwrap_or_else(|| Unit::base_of(dimension))
 }

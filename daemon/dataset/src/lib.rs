@@ -10,7 +10,7 @@
 //!
 //! # Layout, in the order of reading
 //!
-//! - `document`, `names`, [`error`]: TOML with the line of every key; mistakes with their choices
+//! - [`node`], [`document`], `names`, [`error`]: keys and values with their lines; mistakes with their choices
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
@@ -30,7 +30,7 @@ pub mod dataset_diagnostic;
 mod declared;
 mod diagnosing;
 pub mod diagnostic;
-mod document;
+pub mod document;
 pub mod encoding;
 pub mod error;
 mod extra;
@@ -43,6 +43,7 @@ mod lines;
 pub mod manifest;
 mod motion;
 mod names;
+pub mod node;
 mod order;
 mod plain_number;
 mod power;
@@ -65,16 +66,15 @@ pub use clock::TimeFormat;
 pub use dataset_diagnostic::DatasetDiagnostic;
 pub use diagnostic::Diagnostic;
 pub use document::top_keys;
-pub use error::{DatasetError, FileProblem, Problem, SourcePosition};
+pub use error::{DatasetError, FileProblem, SourcePosition};
 pub use forces::ForceSource;
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
 pub use motion::PositionSource;
-pub use names::Choices;
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use resolved::{DATASET_TRAIN, GradientSource};
-pub use run::{Extras, Run, is_parquet, recorded_unix_s};
+pub use run::{EXTRAS, Extra, Run, is_parquet, recorded_unix_s};
 pub use run_content::{RunColumn, RunContent};
 pub use table::LineCounts;
 pub use text_layout::TextLayout;
@@ -281,14 +281,11 @@ fn text(
 }
 
 fn unread(file: String, problem: FileProblem, listed_at: Option<&SourcePosition>) -> DatasetError {
-    match (&problem, listed_at) {
-        (&(FileProblem::NotUtf8 { line } | FileProblem::OtherEncoding { line, .. }), _) => {
-            SourcePosition::line(&file, line).problem(Problem::File(problem))
-        }
-        (FileProblem::NotText(_) | FileProblem::Table(_), _) | (_, None) => {
-            SourcePosition::whole(&file).problem(Problem::File(problem))
-        }
-        (_, Some(place)) => place.clone().problem(Problem::ListedFile { file, problem }),
+    use FileProblem::{NotText, NotUtf8, OtherEncoding, Table};
+    let is_there = matches!(problem, NotUtf8 { .. } | OtherEncoding { .. } | NotText(_) | Table(_));
+    match listed_at {
+        Some(place) if !is_there => place.clone().problem(format!("{file}: {problem}")),
+        _ => problem.of(&file),
     }
 }
 
@@ -307,9 +304,10 @@ fn require_curves(manifest: &Manifest, train: &TrainModel) -> Result<(), Dataset
         if let (Some(mapping), None, None) =
             (manifest.mapping(handle), manifest.mapping(force), curve)
         {
-            let (quantity, train_file) = (handle.name(), manifest.train_file.path.clone());
-            let problem = Problem::NoEffortCurve { quantity, train_file, key };
-            return Err(mapping.place.clone().problem(problem));
+            let train_file = &manifest.train_file.path;
+            let words =
+                format!("{handle} is a share of the effort curve, but {train_file} has no {key}");
+            return Err(mapping.place.clone().problem(words));
         }
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::error::{DatasetError, Problem, SourcePosition};
+use super::error::{DatasetError, SourcePosition};
 use super::plain_number::plain_number;
 
 /// A cell of a row.
@@ -130,8 +130,10 @@ pub fn below<'t>(label: &str, text: &'t str, skip_rows: usize) -> Result<&'t str
     for lines in 0..skip_rows {
         let Some(end) = rest.find(['\n', '\r']) else {
             let lines = lines + usize::from(!rest.is_empty());
-            let problem = Problem::NothingBelow { skip_rows, lines };
-            return Err(SourcePosition::whole(label).problem(problem));
+            return Err(SourcePosition::whole(label).problem(format!(
+                "skip_rows = {skip_rows}: expected lines above the names, but the file has {lines} \
+                 lines"
+            )));
         };
         let is_pair = rest[end..].starts_with("\r\n");
         rest = &rest[end + 1 + usize::from(is_pair)..];

@@ -6,19 +6,22 @@ use dynocar_model::named;
 use dynocar_model::units::Unit;
 
 use super::clock::{self, TimeFormat};
-use super::document::{Document, Section};
-use super::error::{DatasetError, Problem, SourcePosition};
-use super::names::Choices;
+use super::document::{Item, above_zero};
+use super::error::{DatasetError, SourcePosition};
+use super::names::unknown;
+use super::node::Node;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
+use super::train_file::MASS;
 
-/// Which point of the train the recorded position is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PositionReference {
-    /// The train's centre.
-    Centre,
-    /// The train's head: half a length ahead of the centre in the direction of travel.
-    Head,
+named! {
+    /// Which point of the train the recorded position is of.
+    PositionReference ("in a dataset") {
+        /// The train's centre.
+        Centre "centre";
+        /// The train's head: half a length ahead of the centre in the direction of travel.
+        Head "head";
+    }
 }
 
 named! {
@@ -120,19 +123,25 @@ impl Manifest {
     ///
     /// Names file, line, key, value and what was allowed. Unknown keys are refused.
     pub fn parse(label: &str, text: &str) -> Result<Self, DatasetError> {
-        let document = Document::parse(label, text)?;
-        let root = document.root();
+        let document = Node::of_toml(label, text)?;
+        let root = Item::root(label, &document);
         root.allow(&["dataset", "train", "track", "columns", "runs"])?;
-        let dataset = root.required_table("dataset")?;
+        let dataset = root.need_table("dataset")?;
         let own = ["name", "description", "position_reference"];
         dataset.allow(&[&own[..], &TextLayout::KEYS[..]].concat())?;
-        let columns = columns(&root.required_table("columns")?)?;
+        let columns = columns(&root.need_table("columns")?)?;
+        let reference = dataset.named_under(
+            "position_reference",
+            ("reference", "centre or head"),
+            PositionReference::from_name,
+            PositionReference::ALL.map(PositionReference::name),
+        )?;
         Ok(Manifest {
-            name: dataset.required_text("name", "the dataset's name")?.into(),
-            description: dataset.text("description")?.map(Into::into),
-            position_reference: position_reference(&dataset)?,
+            name: dataset.need_quoted("name", "the dataset's name")?.into(),
+            description: dataset.quoted("description")?.map(Into::into),
+            position_reference: reference.unwrap_or(PositionReference::Centre),
             layout: TextLayout::of(&dataset)?,
-            train_file: file_of(&root.required_table("train")?, "the path of a train.toml")?,
+            train_file: file_of(&root.need_table("train")?, "the path of a train.toml")?,
             track_file: match root.table("track")? {
                 Some(section) => Some(file_of(&section, "the path of a track.toml")?),
                 None => None,
@@ -154,30 +163,20 @@ impl Manifest {
     }
 }
 
-fn file_of(section: &Section, expected: &str) -> Result<FileEntry, DatasetError> {
+fn file_of(section: &Item, expected: &str) -> Result<FileEntry, DatasetError> {
     section.allow(&["file"])?;
-    let path = section.required_text("file", expected)?.into();
+    let path = section.need_quoted("file", expected)?.into();
     Ok(FileEntry { path, place: section.place_of("file") })
 }
 
-fn position_reference(section: &Section) -> Result<PositionReference, DatasetError> {
-    const KEY: &str = "position_reference";
-    match section.text(KEY)? {
-        None | Some("centre") => Ok(PositionReference::Centre),
-        Some("head") => Ok(PositionReference::Head),
-        Some(word) => Err(section.unknown(KEY, "reference", word, &["centre", "head"])),
-    }
-}
-
-fn columns(section: &Section) -> Result<Vec<ColumnMapping>, DatasetError> {
+fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
     let mut mappings = Vec::new();
-    for (name, place) in section.keys() {
-        let Some(quantity) = Quantity::from_name(name) else {
-            let choices = Choices::new(name, Quantity::ALL.map(Quantity::name));
-            let (what, context) = ("quantity", " in [columns]".into());
-            let name = name.into();
-            return Err(place.problem(Problem::UnknownName { what, name, context, choices }));
-        };
+    for name in section.keys() {
+        let quantity = Quantity::from_name(name).ok_or_else(|| {
+            let names = Quantity::ALL.map(Quantity::name);
+            let words = unknown("quantity", name, " in [columns]", names);
+            section.place_of(name).problem(words)
+        })?;
         mappings.push(mapping(section, quantity)?);
     }
     mappings.sort_by_key(|mapping| mapping.quantity);
@@ -189,7 +188,7 @@ fn columns(section: &Section) -> Result<Vec<ColumnMapping>, DatasetError> {
                 }
                 _ => "{ column = \"…\", unit = \"…\" }",
             };
-            return Err(section.missing(quantity.name(), expected));
+            section.need(quantity.name(), expected)?;
         }
     }
     let is_mapped =
@@ -207,8 +206,8 @@ fn columns(section: &Section) -> Result<Vec<ColumnMapping>, DatasetError> {
     Ok(mappings)
 }
 
-fn mapping(columns: &Section, quantity: Quantity) -> Result<ColumnMapping, DatasetError> {
-    let section = columns.required_table(quantity.name())?;
+fn mapping(columns: &Item, quantity: Quantity) -> Result<ColumnMapping, DatasetError> {
+    let section = columns.need_table(quantity.name())?;
     let format = match quantity {
         Quantity::Time => {
             section.allow(&["column", "unit", "scale", "offset", "format"])?;
@@ -223,33 +222,31 @@ fn mapping(columns: &Section, quantity: Quantity) -> Result<ColumnMapping, Datas
         Some(_) => Unit::base_of(quantity.dimension()),
         None => unit(&section, quantity)?,
     };
-    let column = section.required_text("column", "the name of a column in the runs' files")?;
+    let column = section.need_quoted("column", "the name of a column in the runs' files")?;
+    let scale = section.checked_under("scale", "a number other than 0", |it| it != 0.0)?;
     Ok(ColumnMapping {
         quantity,
         column: column.trim().into(),
         unit,
         format,
-        scale: section
-            .number("scale", "a number other than 0", |scale| scale != 0.0)?
-            .unwrap_or(1.0),
-        offset: section.number("offset", "a finite number", |_| true)?.unwrap_or(0.0),
+        scale: scale.unwrap_or(1.0),
+        offset: section.optional("offset", "a finite number", ..)?.unwrap_or(0.0),
         place: section.place(),
     })
 }
 
-fn unit(section: &Section, quantity: Quantity) -> Result<Unit, DatasetError> {
+fn unit(section: &Item, quantity: Quantity) -> Result<Unit, DatasetError> {
     let units: Vec<_> = Unit::of(quantity.dimension()).map(|unit| unit.name()).collect();
     let or_format = if quantity == Quantity::Time { "; or a format" } else { "" };
     let expected = format!("a unit: {}{or_format}", units.join(", "));
-    let unit = section.required_text("unit", &expected)?;
-    Unit::find(quantity.dimension(), unit)
-        .ok_or_else(|| section.unknown("unit", "unit", unit, &units))
+    let find = |name: &str| Unit::find(quantity.dimension(), name);
+    section.need_named("unit", ("unit", &expected), find, units)
 }
 
 /// How times are written that are no numbers.
-fn time_format(section: &Section) -> Result<Option<TimeFormat>, DatasetError> {
+fn time_format(section: &Item) -> Result<Option<TimeFormat>, DatasetError> {
     const KEY: &str = "format";
-    let Some(name) = section.text(KEY)? else { return Ok(None) };
+    let Some(name) = section.quoted(KEY)? else { return Ok(None) };
     for other in ["unit", "scale", "offset"] {
         if section.has(other) {
             return Err(section.exclusive(KEY, other));
@@ -258,32 +255,34 @@ fn time_format(section: &Section) -> Result<Option<TimeFormat>, DatasetError> {
     let allowed = "\"iso\" (2026-03-18T07:13:20.2), \"clock\" (07:13:20.2) or a pattern of strftime \
                    with the hour, and with the whole date or none of it (%d.%m.%Y %H:%M:%S); a \
                    fraction of the second is read in any case";
-    let refused = || section.out_of_range(KEY, &format!("{name:?}"), allowed);
+    let refused = || section.key_out_of_range(KEY, &format!("{name:?}"), allowed);
     TimeFormat::from_name(name).map(Some).ok_or_else(refused)
 }
 
-fn runs(root: &Section, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, DatasetError> {
+fn runs(root: &Item, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, DatasetError> {
     let mut runs: Vec<RunEntry> = Vec::new();
     for section in root.tables("runs")? {
         let run = run(&section)?;
         let has_date = |it: &ColumnMapping| it.format.as_ref().is_some_and(TimeFormat::has_date);
         if run.date_unix_s.is_some() && columns.iter().any(has_date) {
-            let (key, other) = (section.full("date"), "columns.time.format with a date".into());
-            return Err(section.place_of("date").problem(Problem::Exclusive { key, other }));
+            let words = "exclude each other: give one of them";
+            let words =
+                format!("{} and columns.time.format with a date {words}", section.full("date"));
+            return Err(section.place_of("date").problem(words));
         }
         let twin = runs.iter().find(|other| is_same_path(&other.file, &run.file));
         if let Some(first_line) = twin.and_then(|twin| twin.place.line) {
-            let (key, file) = (section.full("file"), run.file);
-            let problem = Problem::RepeatedRun { key, file, first_line };
-            return Err(section.place_of("file").problem(problem));
+            let key = section.full("file");
+            let words = format!("{key}: {} is listed in line {first_line} already", run.file);
+            return Err(section.place_of("file").problem(words));
         }
         runs.push(run);
     }
     if runs.is_empty() {
-        Err(root.missing("runs", "at least one [[runs]] table"))
-    } else {
-        Ok(runs)
+        let words = "missing key runs: expected at least one [[runs]] table";
+        return Err(root.place().problem(words));
     }
+    Ok(runs)
 }
 
 /// True for two spellings of one path, as `1.csv` and `./1.csv`.
@@ -292,33 +291,28 @@ fn is_same_path(one: &str, other: &str) -> bool {
     parts(one).eq(parts(other))
 }
 
-fn run(section: &Section) -> Result<RunEntry, DatasetError> {
+fn run(section: &Item) -> Result<RunEntry, DatasetError> {
     section.allow(&["file", "role", "direction", "mass_t", "start_m", "date"])?;
-    let role = match section.text("role")? {
-        None => Role::Fit,
-        Some(word) => Role::from_name(word)
-            .ok_or_else(|| section.unknown("role", "role", word, &Role::ALL.map(Role::name)))?,
-    };
-    let direction = section.number("direction", "1 or -1", |direction| direction.abs() == 1.0)?;
-    let mass_t = section.number("mass_t", "a mass in t above 0, at most 100000", |mass| {
-        mass > 0.0 && mass <= 1e5
-    })?;
+    let (roles, role) = (Role::ALL.map(Role::name), ("role", "a role"));
+    let role = section.named_under("role", role, Role::from_name, roles)?;
+    let direction = section.checked_under("direction", "1 or -1", |it| it.abs() == 1.0)?;
+    let mass_t = section.optional("mass_t", MASS, above_zero(1e5))?;
     Ok(RunEntry {
-        file: section.required_text("file", "the path of a CSV or Parquet file")?.into(),
-        role,
+        file: section.need_quoted("file", "the path of a CSV or Parquet file")?.into(),
+        role: role.unwrap_or(Role::Fit),
         direction: if direction == Some(-1.0) { -1 } else { 1 },
         mass_kg: mass_t.map(|mass| mass * 1000.0),
-        start_m: section.number("start_m", "a chainage in m", |start| start.abs() <= 1e9)?,
+        start_m: section.optional("start_m", "a chainage in m", -1e9..=1e9)?,
         date_unix_s: date(section)?,
         place: section.place(),
     })
 }
 
 /// The second at which a run's date begins.
-fn date(section: &Section) -> Result<Option<i64>, DatasetError> {
+fn date(section: &Item) -> Result<Option<i64>, DatasetError> {
     let Some(date) = section.datetime("date")? else { return Ok(None) };
     let allowed = "a day of the calendar, as 2026-03-18 or 2026-03-18T07:13:20";
-    let refused = || section.out_of_range("date", &date.to_string(), allowed);
+    let refused = || section.key_out_of_range("date", &date.to_string(), allowed);
     clock::unix_s(&date).map(Some).ok_or_else(refused)
 }
 

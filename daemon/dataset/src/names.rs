@@ -2,55 +2,34 @@
 
 use strsim::levenshtein;
 
-/// The names that were possible, with the one most like what was written.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Choices {
-    names: Vec<String>,
-    nearest: Option<usize>,
+/// The words for a name that is none of those which can stand in its place.
+pub fn unknown<T: Into<String>>(
+    what: &str,
+    name: &str,
+    context: &str,
+    names: impl IntoIterator<Item = T>,
+) -> String {
+    let names: Vec<String> = names.into_iter().map(Into::into).collect();
+    let meant = nearest(name, &names).map(|meant| format!("; did you mean '{meant}'?"));
+    let choices: Vec<String> = names.iter().map(|name| format!("'{name}'")).collect();
+    let (meant, choices) = (meant.unwrap_or_default(), choices.join(", "));
+    format!("unknown {what} '{name}'{context}{meant} (choices: {choices})")
 }
 
-impl Choices {
-    /// The choices for a word that is none of them.
-    pub fn new<T: Into<String>>(word: &str, names: impl IntoIterator<Item = T>) -> Self {
-        let names: Vec<String> = names.into_iter().map(Into::into).collect();
-        let nearest = nearest(word, &names);
-        Choices { names, nearest }
-    }
-
-    /// The possible names.
-    pub fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    /// The name most like the word, when it is like enough to be meant.
-    pub fn nearest(&self) -> Option<&str> {
-        self.nearest.map(|index| self.names[index].as_str())
-    }
-}
-
-impl std::fmt::Display for Choices {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if let Some(nearest) = self.nearest() {
-            write!(f, "; did you mean '{nearest}'?")?;
-        }
-        let names: Vec<_> = self.names.iter().map(|name| format!("'{name}'")).collect();
-        write!(f, " (choices: {})", names.join(", "))
-    }
-}
-
-/// The index of the name nearest to a word: at most a third of the letters differ, or else it
-/// is the only name that the word begins.
-fn nearest(word: &str, names: &[String]) -> Option<usize> {
+/// The name that is likely meant by a word: at most a third of the letters differ, or else it is
+/// the only name that the word begins.
+pub fn nearest<'n>(word: &str, all: &'n [String]) -> Option<&'n str> {
     let word = folded(word);
-    let names: Vec<_> = names.iter().map(|name| folded(name)).collect();
+    let names: Vec<_> = all.iter().map(|name| folded(name)).collect();
     let distances = names.iter().enumerate().map(|(index, name)| (levenshtein(&word, name), index));
     let (distance, index) = distances.min()?;
     let letters = |name: &str| name.chars().count();
     if distance <= letters(&word).max(letters(&names[index])) / 3 {
-        return Some(index);
+        return Some(&all[index]);
     }
     let mut begun = (0..names.len()).filter(|&index| names[index].starts_with(&word));
-    begun.next().filter(|_| begun.next().is_none() && !word.is_empty())
+    let only = begun.next().filter(|_| begun.next().is_none() && !word.is_empty());
+    only.map(|index| all[index].as_str())
 }
 
 /// Case and what separates words do not distinguish names for the purpose of a guess.
@@ -66,19 +45,26 @@ mod tests {
 
     #[test]
     fn the_name_that_was_meant_is_suggested() {
+        let meant = |word: &str, names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|&name| name.into()).collect();
+            nearest(word, &names).map(ToOwned::to_owned)
+        };
+        let of = |name: &str| Some(name.to_string());
         let units = ["m/s", "km/h", "mph"];
-        assert_eq!(Choices::new("kmh", units).nearest(), Some("km/h"));
-        assert_eq!(Choices::new("KM/H", units).nearest(), Some("km/h"));
-        assert_eq!(Choices::new("furlong", units).nearest(), None);
-        assert_eq!(Choices::new("v", ["t", "v_kmh"]).nearest(), Some("v_kmh"));
-        assert_eq!(Choices::new("v", ["t", "v_kmh", "v_ref"]).nearest(), None);
+        assert_eq!(meant("kmh", &units), of("km/h"));
+        assert_eq!(meant("KM/H", &units), of("km/h"));
+        assert_eq!(meant("furlong", &units), None);
+        assert_eq!(meant("v", &["t", "v_kmh"]), of("v_kmh"));
+        assert_eq!(meant("v", &["t", "v_kmh", "v_ref"]), None);
         let keys = ["position_reference", "description"];
-        assert_eq!(Choices::new("Position-Referance", keys).nearest(), Some("position_reference"));
+        assert_eq!(meant("Position-Referance", &keys), of("position_reference"));
     }
 
     #[test]
     fn choices_are_listed_after_the_suggestion() {
-        let shown = Choices::new("sped", ["speed", "time"]).to_string();
-        assert_eq!(shown, "; did you mean 'speed'? (choices: 'speed', 'time')");
+        let shown = unknown("key", "sped", " in [x]", ["speed", "time"]);
+        let expected =
+            "unknown key 'sped' in [x]; did you mean 'speed'? (choices: 'speed', 'time')";
+        assert_eq!(shown, expected);
     }
 }

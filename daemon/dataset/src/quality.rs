@@ -2,7 +2,7 @@
 
 use dynocar_model::terms::wheel::STILL_MPS;
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::forces::Force;
 use super::judge::Judge;
@@ -58,9 +58,10 @@ pub struct QuantityCount {
 }
 
 /// A count for a reason.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ReasonCount {
     /// The reason.
+    #[serde(serialize_with = "by_name")]
     pub reason: RejectionReason,
     /// How many.
     pub count: usize,
@@ -68,6 +69,10 @@ pub struct ReasonCount {
     pub first_line: usize,
     /// Time in s of the first.
     pub first_s: f64,
+}
+
+fn by_name<S: Serializer>(reason: &RejectionReason, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(reason.name())
 }
 
 /// Mean and range of a quantity over a run.
@@ -79,18 +84,6 @@ pub struct Spread {
     pub low: f64,
     /// The highest.
     pub high: f64,
-}
-
-impl Serialize for ReasonCount {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        use serde::ser::SerializeStruct;
-        let mut fields = serializer.serialize_struct("ReasonCount", 4)?;
-        fields.serialize_field("reason", self.reason.name())?;
-        fields.serialize_field("count", &self.count)?;
-        fields.serialize_field("first_line", &self.first_line)?;
-        fields.serialize_field("first_s", &self.first_s)?;
-        fields.end()
-    }
 }
 
 /// For how many s the train did what.
@@ -109,24 +102,10 @@ pub struct Phases {
 }
 
 impl RunQuality {
-    /// How many values of a quantity are missing.
-    pub fn missing_of(&self, quantity: Quantity) -> usize {
-        count_of(&self.missing, quantity)
-    }
-
-    /// How many values of a quantity stick out.
-    pub fn outliers_of(&self, quantity: Quantity) -> usize {
-        count_of(&self.outliers, quantity)
-    }
-
     /// Samples that validation refuses, whatever the reason.
     pub fn refused_in_all(&self) -> usize {
         self.refused.iter().map(|refused| refused.count).sum()
     }
-}
-
-fn count_of(counts: &[QuantityCount], quantity: Quantity) -> usize {
-    counts.iter().find(|count| count.quantity == quantity).map_or(0, |count| count.count)
 }
 
 /// Looks at a run that is read, whose samples were judged.

@@ -5,7 +5,7 @@ use dynocar_shared::{SampleField, TrainSample};
 
 use super::diagnosing::diagnostics;
 use super::diagnostic::Diagnostic;
-use super::error::{DatasetError, Problem, SourcePosition};
+use super::error::{DatasetError, SourcePosition};
 use super::forces::ForceSource;
 use super::judge::Judge;
 use super::manifest::{Manifest, Role, RunEntry};
@@ -20,32 +20,24 @@ use super::table::Table;
 
 const DAY_S: i64 = 86_400;
 
-/// Quantities that a sample does not carry, one value for each sample, `None` where missing.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Extras {
-    /// Relative humidity, 0 to 1.
-    pub relative_humidity: Option<Vec<Option<f64>>>,
-    /// Wind speed in m/s, as recorded.
-    pub wind_speed_mps: Option<Vec<Option<f64>>>,
-    /// Number of passengers.
-    pub passengers: Option<Vec<Option<f64>>>,
-    /// Altitude in m.
-    pub altitude_m: Option<Vec<Option<f64>>>,
-    /// Latitude in degrees.
-    pub latitude_deg: Option<Vec<Option<f64>>>,
-    /// Longitude in degrees.
-    pub longitude_deg: Option<Vec<Option<f64>>>,
-    /// Course in degrees, clockwise from north.
-    pub course_deg: Option<Vec<Option<f64>>>,
-    /// Measured curvature in 1/m, turning left positive.
-    pub curvature_per_m: Option<Vec<Option<f64>>>,
-    /// 1 while a door is open.
-    pub door_open: Option<Vec<Option<f64>>>,
-    /// Power of the drive in W.
-    pub traction_power_w: Option<Vec<Option<f64>>>,
-    /// Power from the line in W, by its own column or by voltage and current.
-    pub line_power_w: Option<Vec<Option<f64>>>,
-}
+/// Quantities that a sample does not carry and a run keeps besides, with name and unit. Power from the line is by its
+/// own column, or by voltage and current.
+pub const EXTRAS: [(Quantity, &str); 11] = [
+    (Quantity::RelativeHumidity, "relative_humidity"),
+    (Quantity::WindSpeed, "wind_speed_mps"),
+    (Quantity::Passengers, "passengers"),
+    (Quantity::Altitude, "altitude_m"),
+    (Quantity::Latitude, "latitude_deg"),
+    (Quantity::Longitude, "longitude_deg"),
+    (Quantity::Course, "course_deg"),
+    (Quantity::Curvature, "curvature_per_m"),
+    (Quantity::DoorOpen, "door_open"),
+    (Quantity::TractionPower, "traction_power_w"),
+    (Quantity::LinePower, "line_power_w"),
+];
+
+/// Values of a quantity, one for each sample, `None` where missing.
+pub type Extra = Vec<Option<f64>>;
 
 /// A recorded run.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,8 +60,8 @@ pub struct Run {
     /// that are missing by the time that passed, so that they count as lost. Rows out of order
     /// or repeated are kept for validation to refuse and count.
     pub samples: Vec<TrainSample>,
-    /// Quantities beyond those of a sample.
-    pub extras: Extras,
+    /// Those of [`EXTRAS`] that are recorded.
+    pub extras: Vec<(Quantity, Extra)>,
     /// Where the positions come from.
     pub position_source: PositionSource,
     /// Where the gradient comes from.
@@ -91,14 +83,16 @@ impl Run {
         if self.traction_source != ForceSource::Power {
             return None;
         }
-        let filled = |values: &'_ Option<Vec<Option<f64>>>| {
-            values.as_ref().is_some_and(|values| values.iter().any(Option::is_some))
-        };
-        let extras = &self.extras;
-        match filled(&extras.traction_power_w) {
-            true => Some((extras.traction_power_w.as_ref()?, false)),
-            false => Some((extras.line_power_w.as_ref()?, true)),
+        let own = self.extra(Quantity::TractionPower);
+        match own.filter(|values| values.iter().any(Option::is_some)) {
+            Some(own) => Some((own, false)),
+            None => Some((self.extra(Quantity::LinePower)?, true)),
         }
+    }
+
+    /// What is recorded of a quantity beyond those of a sample.
+    pub fn extra(&self, quantity: Quantity) -> Option<&Extra> {
+        self.extras.iter().find(|(other, _)| *other == quantity).map(|(_, values)| values)
     }
 
     /// Takes forces that act `late_s` before their stamps where they act.
@@ -157,19 +151,21 @@ pub(super) fn read(
     let rows = table.lines.rows;
     let has_speed = table.filled(Quantity::Speed).is_some();
     let resolved = Resolved::of(context, entry, table);
-    let refuse = |problem| Err(SourcePosition::whole(label).problem(problem));
-    let column =
-        |quantity| context.manifest.mapping(quantity).map_or(String::new(), |it| it.column.clone());
+    let refuse = |quantity, words: String| {
+        let column = context.manifest.mapping(quantity).map_or("", |it| &it.column);
+        Err(SourcePosition::whole(label).problem(format!("column '{column}': expected {words}")))
+    };
     for (quantity, is_there) in
         [(Quantity::Time, !resolved.times_s.is_empty()), (Quantity::Speed, has_speed)]
     {
         if !is_there {
-            return refuse(Problem::NoValues { quantity, column: column(quantity), rows });
+            return refuse(quantity, format!("values of {quantity}, found none in {rows} rows"));
         }
     }
     let (time_s, rows) = (resolved.times_s[0], resolved.times_s.len());
     if rows > 1 && resolved.times_s.iter().all(|&other| other == time_s) {
-        return refuse(Problem::OneTime { column: column(Quantity::Time), time_s, rows });
+        let words = format!("times that grow, found {time_s} s in all {rows} rows");
+        return refuse(Quantity::Time, words);
     }
     let mut judge = Judge::new(context, resolved.position_source == PositionSource::Column);
     let samples: Vec<TrainSample> =
@@ -237,25 +233,16 @@ fn recorded(
     Some(first_day.or_else(declared)? * DAY_S + first_s.floor() as i64)
 }
 
-fn extras(table: &Table) -> Extras {
-    let column = |quantity| {
-        let values = table.column(quantity)?.iter();
-        Some(values.map(|&value| (!value.is_nan()).then_some(value)).collect())
+fn extras(table: &Table) -> Vec<(Quantity, Extra)> {
+    let held = |&it: &f64| (!it.is_nan()).then_some(it);
+    let extra = |(quantity, _): (Quantity, _)| {
+        let values = match quantity {
+            Quantity::LinePower => power::line_power_w(table)?,
+            quantity => table.column(quantity)?.into(),
+        };
+        Some((quantity, values.iter().map(held).collect()))
     };
-    Extras {
-        relative_humidity: column(Quantity::RelativeHumidity),
-        wind_speed_mps: column(Quantity::WindSpeed),
-        passengers: column(Quantity::Passengers),
-        altitude_m: column(Quantity::Altitude),
-        latitude_deg: column(Quantity::Latitude),
-        longitude_deg: column(Quantity::Longitude),
-        course_deg: column(Quantity::Course),
-        curvature_per_m: column(Quantity::Curvature),
-        door_open: column(Quantity::DoorOpen),
-        traction_power_w: column(Quantity::TractionPower),
-        line_power_w: power::line_power_w(table)
-            .map(|values| values.iter().map(|&it| (!it.is_nan()).then_some(it)).collect()),
-    }
+    EXTRAS.into_iter().filter_map(extra).collect()
 }
 
 /// True for the name of a Parquet file, which a run may be in place of CSV.

@@ -4,8 +4,8 @@ use dynocar_model::units::Unit;
 
 use super::cell::{held, lossy, not_a_value, parse_cell};
 use super::clock::DayClock;
-use super::error::{DatasetError, Problem, SourcePosition};
-use super::header::{find_column, misplaced, names_of};
+use super::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
+use super::header::{find_columns, names_of};
 use super::lines::{Row, RowReader, below};
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
@@ -94,13 +94,10 @@ impl Table {
         let refuse = |problem| SourcePosition::whole(label).problem(problem);
         let names: Vec<String> = columns.iter().map(|it| it.name.trim().into()).collect();
         if names.is_empty() {
-            return Err(refuse(Problem::NoHeader));
+            return Err(refuse(NO_HEADER));
         }
-        let index = |mapping| {
-            find_column(mapping, &names, &TextLayout::PLAIN)
-                .map_err(|problem| SourcePosition::line(label, 1).problem(problem))
-        };
-        let indices: Vec<usize> = mappings.iter().map(index).collect::<Result<_, _>>()?;
+        let indices = find_columns(&names, "", (&TextLayout::PLAIN, mappings))
+            .map_err(|words| SourcePosition::line(label, 1).problem(words))?;
         let held_by = |(at, mapping): (usize, &ColumnMapping)| {
             let values = &mut columns[indices[at]].values;
             // Its numbers stay where they are, unless another quantity needs them, too.
@@ -115,7 +112,7 @@ impl Table {
         let columns: Vec<(Quantity, Vec<f64>)> = mappings.iter().enumerate().map(held_by).collect();
         let rows = columns.first().map_or(0, |(_, values)| values.len());
         if rows == 0 {
-            return Err(refuse(Problem::NoRows));
+            return Err(refuse(NO_ROWS));
         }
         let lines = LineCounts { rows, ..LineCounts::default() };
         Ok(Table { columns, line_of_row: (2..rows + 2).collect(), first_day: None, lines })
@@ -136,13 +133,26 @@ impl Table {
         let mut reader = RowReader::new(text, layout.delimiter, layout.decimal);
         let mut row = Row::default();
         if !reader.read(&mut row) {
-            return Err(SourcePosition::whole(label).problem(Problem::NoHeader));
+            return Err(SourcePosition::whole(label).problem(NO_HEADER));
         }
-        let mut rows = Rows::new(label, layout, mappings, &names_of(&row))
-            .map_err(|problem| misplaced(problem, whole, (layout, mappings)))
-            .map_err(|problem| {
-                SourcePosition::line(label, layout.skip_rows + row.line).problem(problem)
-            })?;
+        let names = names_of(&row);
+        let indices = find_columns(&names, whole, (layout, mappings)).map_err(|words| {
+            SourcePosition::line(label, layout.skip_rows + row.line).problem(words)
+        })?;
+        let columns = mappings.iter().zip(indices).map(|(mapping, index)| {
+            let clock = mapping.format.as_ref().map(DayClock::new);
+            let converted_to = mapping.converted_to();
+            Column { mapping, index, converted_to, clock, values: Vec::new() }
+        });
+        let mut rows = Rows {
+            label,
+            width: names.len(),
+            layout,
+            columns: columns.collect(),
+            line_of_row: Vec::new(),
+            lines: LineCounts::default(),
+            pending: None,
+        };
         let mut has_row = reader.read(&mut row);
         if layout.units_row && has_row {
             rows.require_units(&row)?;
@@ -193,31 +203,7 @@ enum Flaw {
     CutNumber(DatasetError),
 }
 
-impl<'m> Rows<'m> {
-    fn new(
-        label: &'m str,
-        layout: &'m TextLayout,
-        mappings: &'m [ColumnMapping],
-        header: &[String],
-    ) -> Result<Self, Problem> {
-        let mut columns = Vec::with_capacity(mappings.len());
-        for mapping in mappings {
-            let index = find_column(mapping, header, layout)?;
-            let clock = mapping.format.as_ref().map(DayClock::new);
-            let converted_to = mapping.converted_to();
-            columns.push(Column { mapping, index, converted_to, clock, values: Vec::new() });
-        }
-        Ok(Rows {
-            label,
-            width: header.len(),
-            layout,
-            columns,
-            line_of_row: Vec::new(),
-            lines: LineCounts::default(),
-            pending: None,
-        })
-    }
-
+impl Rows<'_> {
     /// Makes room for so many more rows, where there is some: it is a guess.
     fn reserve(&mut self, rows: usize) {
         for column in &mut self.columns {
@@ -234,8 +220,12 @@ impl<'m> Rows<'m> {
             // The unit "1" is one.
             if is_number && cell != b"1" {
                 let place = SourcePosition::line(self.label, self.layout.skip_rows + row.line);
-                let (column, found) = (column.mapping.column.clone(), lossy(cell).into());
-                return Err(place.problem(Problem::NoUnits { column, found }));
+                return Err(place.problem(format!(
+                    "units_row = true: expected units below the names, found the number {} in column \
+                     '{}'",
+                    lossy(cell),
+                    column.mapping.column
+                )));
             }
         }
         Ok(())
@@ -247,7 +237,8 @@ impl<'m> Rows<'m> {
         let place = || SourcePosition::line(self.label, line);
         let found = row.cells.len();
         if found < self.width && row.cells.iter().any(|cell| cell.text.contains(&b'\n')) {
-            return Err(place().problem(Problem::UnclosedQuote));
+            let words = "a quoted cell runs over the end of the line: is a quote unclosed?";
+            return Err(place().problem(words));
         }
         if (self.width..found).any(|index| !row.trimmed(index).is_empty()) {
             let hint = match self.layout.decimal {
@@ -257,8 +248,9 @@ impl<'m> Rows<'m> {
                 }
                 _ => "",
             };
-            let expected = self.width;
-            return Err(place().problem(Problem::TooManyCells { expected, found, hint }));
+            let width = self.width;
+            let words = format!("{found} cells, but the header has {width} columns{hint}");
+            return Err(place().problem(words));
         }
         self.pending = (found < self.width).then_some(Flaw::Short);
         for column in &mut self.columns {
@@ -315,7 +307,7 @@ impl<'m> Rows<'m> {
             }
         }
         if self.lines.rows == 0 {
-            return Err(SourcePosition::whole(self.label).problem(Problem::NoRows));
+            return Err(SourcePosition::whole(self.label).problem(NO_ROWS));
         }
         let first_day = self.columns.iter().find_map(|it| it.clock.as_ref()?.first_day());
         let columns = self.columns.into_iter();

@@ -2,7 +2,7 @@
 
 use encoding_rs::{Encoding, UTF_8};
 
-use super::document::Section;
+use super::document::Item;
 use super::encoding;
 use super::error::DatasetError;
 
@@ -38,18 +38,43 @@ impl TextLayout {
     };
 
     /// Reads the keys of `[dataset]`; what is left out is plain.
-    pub(super) fn of(section: &Section) -> Result<Self, DatasetError> {
-        let layout = TextLayout {
-            encoding: encoding_of(section)?,
-            delimiter: delimiter(section)?,
-            decimal: decimal(section)?,
-            skip_rows: skip_rows(section)?,
-            units_row: section.truth("units_row")?.unwrap_or(false),
-        };
+    pub(super) fn of(section: &Item) -> Result<Self, DatasetError> {
+        let mut layout =
+            TextLayout { units_row: section.truth("units_row")?.unwrap_or(false), ..Self::PLAIN };
+        let (words, usual) = (("encoding", "the name of an encoding"), encoding::USUAL);
+        let encoding = section.named_under("encoding", words, encoding::by_name, usual)?;
+        layout.encoding = encoding.unwrap_or(UTF_8);
+        if let Some(mark) = section.quoted("delimiter")? {
+            layout.delimiter = match mark.as_bytes() {
+                &[mark] if mark.is_ascii() && !b"\"\r\n".contains(&mark) => mark,
+                _ => {
+                    let allowed = "one ASCII character, as \",\" \";\" or \"\\t\"";
+                    return Err(section.key_out_of_range(
+                        "delimiter",
+                        &format!("{mark:?}"),
+                        allowed,
+                    ));
+                }
+            };
+        }
+        if let Some(mark) = section.quoted("decimal")? {
+            layout.decimal = match mark {
+                "." => b'.',
+                "," => b',',
+                _ => {
+                    let found = format!("{mark:?}");
+                    return Err(section.key_out_of_range("decimal", &found, "\".\" or \",\""));
+                }
+            };
+        }
+        let is_allowed = |rows: f64| (0.0..=SKIP_ROWS_MAX).contains(&rows) && rows.fract() == 0.0;
+        let rows =
+            section.checked_under("skip_rows", "a number of lines, 0 to 10000", is_allowed)?;
+        layout.skip_rows = rows.unwrap_or(0.0) as usize;
         // A comma between the digits of a quoted cell separates no cells.
         if layout.delimiter == layout.decimal && layout.decimal != b',' {
-            let shown = format!("{:?}", char::from(layout.decimal).to_string());
-            return Err(section.out_of_range("decimal", &shown, "another mark than the delimiter"));
+            let allowed = "another mark than the delimiter";
+            return Err(section.key_out_of_range("decimal", "\".\"", allowed));
         }
         Ok(layout)
     }
@@ -58,38 +83,4 @@ impl TextLayout {
     pub fn lines_above(&self) -> usize {
         self.skip_rows + 1 + usize::from(self.units_row)
     }
-}
-
-fn encoding_of(section: &Section) -> Result<&'static Encoding, DatasetError> {
-    const KEY: &str = "encoding";
-    let Some(name) = section.text(KEY)? else { return Ok(UTF_8) };
-    encoding::by_name(name).ok_or_else(|| section.unknown(KEY, KEY, name, &encoding::USUAL))
-}
-
-fn delimiter(section: &Section) -> Result<u8, DatasetError> {
-    const KEY: &str = "delimiter";
-    match section.text(KEY)?.map(str::as_bytes) {
-        None => Ok(b','),
-        Some(&[mark]) if mark.is_ascii() && !b"\"\r\n".contains(&mark) => Ok(mark),
-        Some(other) => {
-            let shown = format!("{:?}", String::from_utf8_lossy(other));
-            Err(section.out_of_range(KEY, &shown, "one ASCII character, as \",\" \";\" or \"\\t\""))
-        }
-    }
-}
-
-fn decimal(section: &Section) -> Result<u8, DatasetError> {
-    match section.text("decimal")? {
-        None | Some(".") => Ok(b'.'),
-        Some(",") => Ok(b','),
-        Some(other) => {
-            Err(section.out_of_range("decimal", &format!("{other:?}"), "\".\" or \",\""))
-        }
-    }
-}
-
-fn skip_rows(section: &Section) -> Result<usize, DatasetError> {
-    let allowed = "a number of lines, 0 to 10000";
-    let is_allowed = |count: f64| (0.0..=SKIP_ROWS_MAX).contains(&count) && count.fract() == 0.0;
-    Ok(section.number("skip_rows", allowed, is_allowed)?.unwrap_or(0.0) as usize)
 }

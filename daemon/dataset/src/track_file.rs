@@ -1,13 +1,16 @@
 //! `track.toml`.
 
+use std::ops::Bound;
+
 use dynocar_model::terms::{gradient, masses, place};
 use dynocar_model::track::{
     Curve, GradientError, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackError,
     TrackSurvey, Tunnel,
 };
 
-use super::document::{Document, Section};
-use super::error::{DatasetError, Problem, SourcePosition};
+use super::document::{Entries, Item, above_zero};
+use super::error::{DatasetError, SourcePosition};
+use super::node::Node;
 
 /// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
 const GRADIENT_MAX_PERMILLE: f64 = 150.0;
@@ -20,13 +23,12 @@ const UNNAMED: &str = "unnamed line";
 ///
 /// Names file, line, key, value and what was allowed. Unknown keys are refused.
 pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
-    let document = Document::parse(label, text)?;
-    let root = document.root();
+    let document = Node::of_toml(label, text)?;
+    let root = Item::root(label, &document);
     root.allow(&["track"])?;
     let Some(section) = root.table("track")? else {
         let unknown = Track::new(UNNAMED.into(), None, None, None, None);
-        return unknown
-            .map_err(|error| SourcePosition::whole(label).problem(Problem::Track(error)));
+        return unknown.map_err(|error| root.wrong(error));
     };
     section.allow(&[
         "name",
@@ -46,90 +48,128 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
         "alignment",
         "alignment_falling",
     ])?;
-    let length_m = section.number("length_m", "a length in m above 0", |length| length > 0.0)?;
-    let gradient = profile(&section, "gradient", -GRADIENT_MAX_PERMILLE)?;
-    let (gradient, gradient_places) = gradient.unzip();
-    let curves = section.entries::<3>("curves", "[start_m, end_m, radius_m]")?.map(split);
-    let (curves, curve_places) = curves.unzip();
-    let tunnels = section.entries::<2>("tunnels", "[start_m, end_m]")?.map(split);
-    let (tunnels, tunnel_places) = tunnels.unzip();
-    let to_curve = |&[start_m, end_m, radius_m]: &[f64; 3]| Curve { start_m, end_m, radius_m };
-    let to_tunnel = |&[start_m, end_m]: &[f64; 2]| Tunnel { start_m, end_m };
-    let curves: Option<Vec<Curve>> = curves.map(|list: Vec<_>| list.iter().map(to_curve).collect());
-    let tunnels: Option<Vec<Tunnel>> =
-        tunnels.map(|list: Vec<_>| list.iter().map(to_tunnel).collect());
-    let starts = Starts {
-        curves: curves.iter().flatten().map(|curve| curve.start_m).collect(),
-        tunnels: tunnels.iter().flatten().map(|tunnel| tunnel.start_m).collect(),
-    };
-    let places = Places {
-        gradient: gradient_places.unwrap_or_default(),
-        curves: curve_places.unwrap_or_default(),
-        tunnels: tunnel_places.unwrap_or_default(),
-    };
-    let name = section.text("name")?.unwrap_or(UNNAMED).into();
-    let refused = |error| Err(places.of(&error, &starts, &section).problem(Problem::Track(error)));
-    let track = match Track::new(name, length_m, gradient.as_deref(), curves, tunnels) {
-        Ok(track) => track,
-        Err(error) => return refused(error),
-    };
+    let length_m = section.checked_under("length_m", "a length in m above 0", |it| it > 0.0)?;
+    let gradient = pairs(&section, "gradient", PERMILLE, &gradients(-GRADIENT_MAX_PERMILLE))?;
+    let curves = section.entries::<3>("curves", "[start_m, end_m, radius_m]")?;
+    let tunnels = section.entries::<2>("tunnels", "[start_m, end_m]")?;
+    let name = section.quoted("name")?.unwrap_or(UNNAMED).into();
+    let profile = gradient.as_ref().map(|(list, _)| &list[..]);
+    let to_curve =
+        |&([start_m, end_m, radius_m], _): &([f64; 3], _)| Curve { start_m, end_m, radius_m };
+    let to_tunnel = |&([start_m, end_m], _): &([f64; 2], _)| Tunnel { start_m, end_m };
+    let of_curves = curves.as_ref().map(|list| list.iter().map(to_curve).collect());
+    let of_tunnels = tunnels.as_ref().map(|list| list.iter().map(to_tunnel).collect());
+    let track = Track::new(name, length_m, profile, of_curves, of_tunnels).map_err(|error| {
+        let gradient = gradient.map_or_else(Vec::new, |(_, entries)| entries);
+        let starts =
+            [("gradient", gradient), ("curves", placed(curves)), ("tunnels", placed(tunnels))];
+        place_of(&error, &starts, &section).problem(error)
+    })?;
     with_survey(with_corrections(track, &section)?, &section)
 }
 
-/// Adds what a survey knows besides the profile.
-fn with_survey(mut track: Track, section: &Section) -> Result<Track, DatasetError> {
-    let profile = |key: &str, low: f64| -> Result<Option<StepProfile>, DatasetError> {
-        let Some((list, places)) = profile(section, key, low)? else { return Ok(None) };
-        let made = StepProfile::new(&list).map_err(|error| {
-            let index = match error {
-                ProfileError::Empty => None,
-                ProfileError::NotFinite { index, .. }
-                | ProfileError::NotIncreasing { index, .. } => places.get(index - 1).cloned(),
-            };
-            let place = index.unwrap_or_else(|| section.place_of(key));
-            place.problem(Problem::Track(TrackError::Gradient(error)))
-        })?;
-        Ok(Some(made))
+/// Entries of a list by their first number, a chainage in m.
+type Placed<'t> = Vec<(f64, Item<'t>)>;
+
+fn placed<const N: usize>(entries: Option<Entries<N>>) -> Placed {
+    entries.into_iter().flatten().map(|(numbers, entry)| (numbers[0], entry)).collect()
+}
+
+/// Where the entry stands that an error means.
+fn place_of(error: &TrackError, lists: &[(&str, Placed); 3], section: &Item) -> SourcePosition {
+    let entries = |name: &str| lists.iter().find(|(list, _)| *list == name).map(|(_, it)| &it[..]);
+    let (name, index) = match error {
+        TrackError::Gradient(error) => ("gradient", index_of(error)),
+        TrackError::PermittedSpeed(error) => ("permitted_speed", index_of(error)),
+        TrackError::BadRadius { index, .. } => ("curves", Some(*index)),
+        TrackError::BadInterval { list, index, .. } => (*list, Some(*index)),
+        TrackError::Overlap { list, index, .. } => {
+            // The error counts by chainage; the file may be in another order.
+            let starts = entries(list).unwrap_or_default();
+            let mut order: Vec<usize> = (0..starts.len()).collect();
+            order.sort_by(|&one, &other| starts[one].0.total_cmp(&starts[other].0));
+            (*list, order.get(index - 1).map(|entry| entry + 1))
+        }
     };
+    let entry = index.and_then(|index| entries(name)?.get(index - 1));
+    entry.map_or_else(|| section.place_of(name), |(_, entry)| entry.place())
+}
+
+/// Number of the entry, from 1, that an error of a profile means.
+fn index_of(error: &ProfileError) -> Option<usize> {
+    match error {
+        ProfileError::Empty => None,
+        ProfileError::NotFinite { index, .. } | ProfileError::NotIncreasing { index, .. } => {
+            Some(*index)
+        }
+    }
+}
+
+const PERMILLE: &str = "[chainage_m, permille]";
+
+/// Which values a list may hold, and in words.
+type Allowed = (String, (Bound<f64>, Bound<f64>));
+
+fn gradients(low: f64) -> Allowed {
+    let words = format!("from {low} to {GRADIENT_MAX_PERMILLE} permille");
+    (words, (Bound::Included(low), Bound::Included(GRADIENT_MAX_PERMILLE)))
+}
+
+/// A list of pairs of chainage in m and an allowed value, with the place of each.
+#[expect(clippy::type_complexity, reason = "a list and its places, taken apart at once")]
+fn pairs<'t>(
+    section: &Item<'t>,
+    key: &str,
+    form: &str,
+    (words, range): &Allowed,
+) -> Result<Option<(Vec<(f64, f64)>, Placed<'t>)>, DatasetError> {
+    let Some(entries) = section.entries::<2>(key, form)? else { return Ok(None) };
+    let entries = entries.into_iter().map(|([at_m, value], entry)| {
+        Ok(((at_m, entry.within(value, words, *range)?), (at_m, entry)))
+    });
+    entries.collect::<Result<_, DatasetError>>().map(Some)
+}
+
+/// Adds what a survey knows besides the profile.
+fn with_survey(mut track: Track, section: &Item) -> Result<Track, DatasetError> {
+    type Wrap = fn(ProfileError) -> TrackError;
+    let profile = |key: &str, form, allowed: Allowed, wrap: Wrap| {
+        let Some((list, entries)) = pairs(section, key, form, &allowed)? else { return Ok(None) };
+        StepProfile::new(&list).map(Some).map_err(|error| {
+            let entry = index_of(&error).and_then(|index| entries.get(index - 1));
+            let place = entry.map_or_else(|| section.place_of(key), |(_, entry)| entry.place());
+            place.problem(wrap(error))
+        })
+    };
+    let gradient =
+        |key: &str, low: f64| profile(key, PERMILLE, gradients(low), TrackError::Gradient);
+    let speeds = ("a speed in m/s above 0, at most 200".into(), above_zero(200.0));
+    let stop = |items: &[Item]| {
+        let [at, name] = items else { return None };
+        Some((at.number("", ..).ok()?, name.as_quoted()?.to_owned()))
+    };
+    let stops = section.entries_as("stops", "[chainage_m, \"name\"]", stop)?;
+    let permitted = "permitted_speed";
     track.survey = TrackSurvey {
-        gradient_falling: profile("gradient_falling", -GRADIENT_MAX_PERMILLE)?,
-        gradient_std_permille: profile("gradient_std", 0.0)?,
-        stops: section.named_chainages("stops")?,
-        permitted_speed_mps: permitted_speed(section)?,
-        alignment: section.text("alignment")?.map(Into::into),
-        alignment_falling: section.text("alignment_falling")?.map(Into::into),
+        gradient_falling: gradient("gradient_falling", -GRADIENT_MAX_PERMILLE)?,
+        gradient_std_permille: gradient("gradient_std", 0.0)?,
+        stops: stops.into_iter().flatten().map(|(stop, _)| stop).collect(),
+        permitted_speed_mps: profile(
+            permitted,
+            "[chainage_m, speed_mps]",
+            speeds,
+            TrackError::PermittedSpeed,
+        )?,
+        alignment: section.quoted("alignment")?.map(Into::into),
+        alignment_falling: section.quoted("alignment_falling")?.map(Into::into),
     };
     Ok(track)
 }
 
-/// The list of [chainage_m, speed_mps] under `permitted_speed`.
-fn permitted_speed(section: &Section) -> Result<Option<StepProfile>, DatasetError> {
-    const KEY: &str = "permitted_speed";
-    let Some(entries) = section.entries::<2>(KEY, "[chainage_m, speed_mps]")? else {
-        return Ok(None);
-    };
-    for (index, ([_, speed_mps], place)) in entries.iter().enumerate() {
-        if !(*speed_mps > 0.0 && *speed_mps <= 200.0) {
-            let key = format!("{} entry {}", section.full(KEY), index + 1);
-            let (value, allowed) =
-                (speed_mps.to_string(), "a speed in m/s above 0, at most 200".into());
-            return Err(place.clone().problem(Problem::OutOfRange { key, value, allowed }));
-        }
-    }
-    let list: Vec<(f64, f64)> =
-        entries.into_iter().map(|([at_m, speed], _)| (at_m, speed)).collect();
-    let made = StepProfile::new(&list).map_err(|error| {
-        section.place_of(KEY).problem(Problem::Track(TrackError::PermittedSpeed(error)))
-    })?;
-    Ok(Some(made))
-}
-
 /// Adds what measured runs have shown of the line: resistance at places, other masses in sections.
-fn with_corrections(mut track: Track, section: &Section) -> Result<Track, DatasetError> {
-    const RESISTANCE: &str = "[start_m, end_m, extra N/kN]";
+fn with_corrections(mut track: Track, section: &Item) -> Result<Track, DatasetError> {
     let shift = "a shift in m from -10000 to 10000";
-    let is_shift = |shift_m: f64| shift_m.abs() <= 1e4;
-    if let Some(shift_m) = section.number(gradient::SHIFT, shift, is_shift)? {
+    if let Some(shift_m) = section.optional(gradient::SHIFT, shift, -1e4..=1e4)? {
         track.gradient_shift_m = shift_m;
     }
     let falling = gradient_error(section, gradient::ERROR_FALLING)?;
@@ -138,122 +178,40 @@ fn with_corrections(mut track: Track, section: &Section) -> Result<Track, Datase
             track.gradient_error = Some(GradientError { profile, falling });
         }
         (None, Some(_)) => {
-            let key = section.full(gradient::ERROR_FALLING);
-            let value = "without gradient_error".to_string();
-            let allowed = "the list gradient_error with it, for growing chainage".to_string();
-            let problem = Problem::OutOfRange { key, value, allowed };
-            return Err(section.place_of(gradient::ERROR_FALLING).problem(problem));
+            let allowed = "the list gradient_error with it, for growing chainage";
+            let found = "without gradient_error";
+            return Err(section.key_out_of_range(gradient::ERROR_FALLING, found, allowed));
         }
         (None, None) => {}
     }
-    if let Some(entries) = section.entries::<3>(place::LIST, RESISTANCE)? {
+    if let Some(entries) = section.entries::<3>(place::LIST, "[start_m, end_m, extra N/kN]")? {
         let places: Vec<_> =
-            entries.iter().map(|([start_m, end_m, extra], _)| (*start_m, *end_m, *extra)).collect();
+            entries.iter().map(|([from, to, extra], _)| (*from, *to, *extra)).collect();
         track = track
             .with_resistance(&places)
-            .map_err(|error| section.place_of(place::LIST).problem(Problem::Track(error)))?;
+            .map_err(|error| section.place_of(place::LIST).problem(error))?;
     }
     const MASSES: &str = "[from_m, to_m, direction (1 or -1), mass factor]";
-    if let Some(entries) = section.entries::<4>(masses::LIST, MASSES)? {
-        let mut sections = Vec::with_capacity(entries.len());
-        for (index, ([from_m, to_m, direction, mass_factor], place)) in
-            entries.into_iter().enumerate()
-        {
-            let is_sound =
-                from_m < to_m && direction.abs() == 1.0 && (0.1..=10.0).contains(&mass_factor);
-            if !is_sound {
-                let key = format!("{} entry {}", section.full(masses::LIST), index + 1);
-                let value = format!("[{from_m}, {to_m}, {direction}, {mass_factor}]");
-                let allowed = "from_m < to_m, direction 1 or -1, a factor from 0.1 to 10".into();
-                return Err(place.problem(Problem::OutOfRange { key, value, allowed }));
-            }
-            sections.push(MassSection { from_m, to_m, direction, mass_factor });
+    for (numbers, entry) in section.entries::<4>(masses::LIST, MASSES)?.into_iter().flatten() {
+        let [from_m, to_m, direction, mass_factor] = numbers;
+        let is_sound =
+            from_m < to_m && direction.abs() == 1.0 && (0.1..=10.0).contains(&mass_factor);
+        if !is_sound {
+            let found = format!("[{from_m}, {to_m}, {direction}, {mass_factor}]");
+            let allowed = "from_m < to_m, direction 1 or -1, a factor from 0.1 to 10";
+            return Err(entry.out_of_range(&found, allowed));
         }
-        track.masses = sections;
+        track.masses.push(MassSection { from_m, to_m, direction, mass_factor });
     }
     Ok(track)
 }
 
 /// What the declared gradient lacks, in one of its lists.
-fn gradient_error(
-    section: &Section,
-    name: &'static str,
-) -> Result<Option<LinearProfile>, DatasetError> {
-    let Some(entries) = section.entries::<2>(name, "[chainage_m, permille]")? else {
-        return Ok(None);
-    };
+fn gradient_error(section: &Item, name: &str) -> Result<Option<LinearProfile>, DatasetError> {
+    let Some(entries) = section.entries::<2>(name, PERMILLE)? else { return Ok(None) };
     let entries = entries.into_iter().map(|([at_m, permille], _)| (at_m, permille)).collect();
-    let refused =
-        |error| section.place_of(name).problem(Problem::Track(TrackError::Gradient(error)));
+    let refused = |error| section.place_of(name).problem(TrackError::Gradient(error));
     LinearProfile::new(entries).map(Some).map_err(refused)
-}
-
-/// Where the entries of the lists stand.
-struct Places {
-    gradient: Vec<SourcePosition>,
-    curves: Vec<SourcePosition>,
-    tunnels: Vec<SourcePosition>,
-}
-
-/// Where the intervals start, in the order of the file.
-struct Starts {
-    curves: Vec<f64>,
-    tunnels: Vec<f64>,
-}
-
-impl Places {
-    /// The place of the entry that an error means.
-    fn of(&self, error: &TrackError, starts: &Starts, section: &Section) -> SourcePosition {
-        let (list, index) = match error {
-            TrackError::Gradient(ProfileError::Empty) => return section.place_of("gradient"),
-            TrackError::Gradient(
-                ProfileError::NotFinite { index, .. } | ProfileError::NotIncreasing { index, .. },
-            ) => (&self.gradient, *index),
-            TrackError::PermittedSpeed(_) => return section.place_of("permitted_speed"),
-            TrackError::BadRadius { index, .. } => (&self.curves, *index),
-            TrackError::BadInterval { list, index, .. } => (self.list(list), *index),
-            TrackError::Overlap { list, index, .. } => {
-                let starts = if *list == "tunnels" { &starts.tunnels } else { &starts.curves };
-                // The error counts by chainage; the file may be in another order.
-                let mut order: Vec<usize> = (0..starts.len()).collect();
-                order.sort_by(|&one, &other| starts[one].total_cmp(&starts[other]));
-                (self.list(list), order.get(index - 1).map_or(*index, |entry| entry + 1))
-            }
-        };
-        list.get(index - 1).cloned().unwrap_or_else(|| section.place())
-    }
-
-    fn list(&self, list: &str) -> &Vec<SourcePosition> {
-        if list == "tunnels" { &self.tunnels } else { &self.curves }
-    }
-}
-
-fn split<const N: usize>(
-    entries: Vec<([f64; N], SourcePosition)>,
-) -> (Vec<[f64; N]>, Vec<SourcePosition>) {
-    entries.into_iter().unzip()
-}
-
-type Gradient = (Vec<(f64, f64)>, Vec<SourcePosition>);
-
-/// A list of [chainage_m, permille] with values from `low` to the steepest gradient.
-fn profile(section: &Section, key: &str, low: f64) -> Result<Option<Gradient>, DatasetError> {
-    let Some(entries) = section.entries::<2>(key, "[chainage_m, permille]")? else {
-        return Ok(None);
-    };
-    for (index, ([_, permille], place)) in entries.iter().enumerate() {
-        if !(low..=GRADIENT_MAX_PERMILLE).contains(permille) {
-            let key = format!("{} entry {}", section.full(key), index + 1);
-            let allowed = format!("from {low} to {GRADIENT_MAX_PERMILLE} permille");
-            let value = permille.to_string();
-            return Err(place.clone().problem(Problem::OutOfRange { key, value, allowed }));
-        }
-    }
-    let (list, places) = split(entries);
-    Ok(Some((
-        list.into_iter().map(|[chainage_m, permille]| (chainage_m, permille)).collect(),
-        places,
-    )))
 }
 
 #[cfg(test)]

@@ -1,14 +1,17 @@
 //! `train.toml`.
 
+use std::ops::RangeInclusive;
+
 use dynocar_model::terms::{Key, curve, extra, rotating, tunnel};
 use dynocar_model::train::{
     BrakeGear, Corrections, Davis, Drive, EffortCurve, FrictionBrake, TrainModel,
 };
 
 use super::corrections::read_corrections;
-use super::document::{Document, Section};
-use super::error::{DatasetError, Problem};
+use super::document::{Item, above_zero};
+use super::error::DatasetError;
 use super::extra::read_extra;
+use super::node::Node;
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
 pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
@@ -16,6 +19,8 @@ pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
 pub const PASSENGER_MASS_DEFAULT_KG: f64 = 70.0;
 /// A friction brake is released up to this pressure in Pa unless a train says otherwise.
 pub const RELEASE_PRESSURE_DEFAULT_PA: f64 = 20e3;
+/// Which masses a train and a run of it may have.
+pub(super) const MASS: &str = "a mass in t above 0, at most 100000";
 
 /// Reads the text of a `train.toml`; `label` names the file in messages.
 ///
@@ -23,19 +28,13 @@ pub const RELEASE_PRESSURE_DEFAULT_PA: f64 = 20e3;
 ///
 /// Names file, line, key, value and what was allowed. Unknown keys are refused.
 pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> {
-    let document = Document::parse(label, text)?;
-    let root = document.root();
+    let document = Node::of_toml(label, text)?;
+    let root = Item::root(label, &document);
     root.allow(&["train", "resistance", "traction", "brake", "corrections", extra::TABLES])?;
-    let train = root.required_table("train")?;
-    train.allow(&[
-        "name",
-        "mass_t",
-        "length_m",
-        "cars",
-        "rotating_mass_factor",
-        "passenger_mass_kg",
-    ])?;
-    let resistance = root.required_table("resistance")?;
+    let train = root.need_table("train")?;
+    let gamma = &rotating::FACTOR;
+    train.allow(&["name", "mass_t", "length_m", "cars", gamma.name, "passenger_mass_kg"])?;
+    let resistance = root.need_table("resistance")?;
     let (traction, drive) = match root.table("traction")? {
         Some(section) => {
             section.allow(&[
@@ -52,26 +51,19 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         Some(section) => brake(&section)?,
         None => (None, BrakeGear::default()),
     };
-    let mass_t =
-        train.required_number("mass_t", "a mass in t above 0, at most 100000", |mass| {
-            mass > 0.0 && mass <= 1e5
-        })?;
+    let mass_t = train.required("mass_t", MASS, above_zero(1e5))?;
     let length_m =
-        train.required_number("length_m", "a length in m above 0, at most 10000", |length| {
-            length > 0.0 && length <= 1e4
-        })?;
-    let cars = train.number("cars", "a whole number from 1 to 1000", |cars| {
-        (1.0..=1000.0).contains(&cars) && cars.fract() == 0.0
-    })?;
-    let passenger_kg = train.number("passenger_mass_kg", "a mass in kg from 0 to 200", |mass| {
-        (0.0..=200.0).contains(&mass)
-    })?;
-    let gamma = &rotating::FACTOR;
+        train.required("length_m", "a length in m above 0, at most 10000", above_zero(1e4))?;
+    let is_count = |cars: f64| (1.0..=1000.0).contains(&cars) && cars.fract() == 0.0;
+    let cars = train.checked_under("cars", "a whole number from 1 to 1000", is_count)?;
+    let passenger = "a mass in kg from 0 to 200";
+    let passenger_kg = train.optional("passenger_mass_kg", passenger, 0.0..=200.0)?;
+    let rotating_mass_factor = train.need(gamma.name, gamma.allowed)?;
     let rotating_mass_factor =
-        train.required_number(gamma.name, gamma.allowed, |value| gamma.allows(value))?;
+        rotating_mass_factor.checked(gamma.allowed, |value| gamma.allows(value))?;
     let (davis, curve_constant_n_per_kn_m, tunnel_constant_n_per_kn_m) = declared(&resistance)?;
     let mut model = TrainModel {
-        name: train.text("name")?.unwrap_or("unnamed train").into(),
+        name: train.quoted("name")?.unwrap_or("unnamed train").into(),
         mass_kg: mass_t * 1000.0,
         passenger_mass_kg: passenger_kg.unwrap_or(PASSENGER_MASS_DEFAULT_KG),
         length_m,
@@ -94,33 +86,28 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
 }
 
 /// Davis coefficients, curve constant and tunnel constant.
-fn declared(section: &Section) -> Result<(Davis, f64, f64), DatasetError> {
+fn declared(section: &Item) -> Result<(Davis, f64, f64), DatasetError> {
     section.allow(&["a", "b", "c", curve::CONSTANT.name, tunnel::CONSTANT.name])?;
     // Fitted coefficients may be negative one by one; forces in N instead of N/kN are far out.
-    let within = |limit: f64| move |value: f64| value.abs() <= limit;
     let davis = Davis {
-        a: section.required_number("a", "N/kN, from -100 to 100", within(100.0))?,
-        b: section.required_number("b", "N/kN per m/s, from -10 to 10", within(10.0))?,
-        c: section.required_number("c", "N/kN per (m/s)², from -1 to 1", within(1.0))?,
+        a: section.required("a", "N/kN, from -100 to 100", -100.0..=100.0)?,
+        b: section.required("b", "N/kN per m/s, from -10 to 10", -10.0..=10.0)?,
+        c: section.required("c", "N/kN per (m/s)², from -1 to 1", -1.0..=1.0)?,
     };
-    let number = |key: &Key| section.number(key.name, key.allowed, |value| key.allows(value));
+    let number =
+        |key: &Key| section.checked_under(key.name, key.allowed, |value| key.allows(value));
     let (curve, tunnel) = (number(&curve::CONSTANT)?, number(&tunnel::CONSTANT)?);
     Ok((davis, curve.unwrap_or(CURVE_CONSTANT_DEFAULT_N_PER_KN_M), tunnel.unwrap_or(0.0)))
 }
 
 /// The drive that is known by its electric power; `None` where nothing is declared of it.
-fn drive(section: &Section) -> Result<Option<Drive>, DatasetError> {
-    let efficiency = section.number("efficiency", "a share from 0.3 to 1", |share| {
-        Drive::EFFICIENCIES.contains(&share)
-    })?;
-    let auxiliary_kw =
-        section.number("auxiliary_power_kw", "a power in kW from 0 to 2000", |kw| {
-            Drive::AUXILIARIES_KW.contains(&kw)
-        })?;
-    let speed_min =
-        section.number("power_speed_min_mps", "a speed in m/s from 0.5 to 20", |mps| {
-            (0.5..=20.0).contains(&mps)
-        })?;
+fn drive(section: &Item) -> Result<Option<Drive>, DatasetError> {
+    let share = "a share from 0.3 to 1";
+    let efficiency = section.optional("efficiency", share, Drive::EFFICIENCIES)?;
+    let power = "a power in kW from 0 to 2000";
+    let auxiliary_kw = section.optional("auxiliary_power_kw", power, Drive::AUXILIARIES_KW)?;
+    let speed = "a speed in m/s from 0.5 to 20";
+    let speed_min = section.optional("power_speed_min_mps", speed, 0.5..=20.0)?;
     if efficiency.or(auxiliary_kw).or(speed_min).is_none() {
         return Ok(None);
     }
@@ -133,21 +120,17 @@ fn drive(section: &Section) -> Result<Option<Drive>, DatasetError> {
 }
 
 /// The friction brake that is known by its pressure.
-fn friction_brake(section: &Section) -> Result<Option<FrictionBrake>, DatasetError> {
-    let gain = section.number("force_per_pressure_n_per_pa", "N/Pa from 0 to 1000", |gain| {
-        (0.0..=1e3).contains(&gain)
-    })?;
+fn friction_brake(section: &Item) -> Result<Option<FrictionBrake>, DatasetError> {
+    let gain = section.optional("force_per_pressure_n_per_pa", "N/Pa from 0 to 1000", 0.0..=1e3)?;
     let release =
-        section.number("release_pressure_pa", "a pressure in Pa from 0 to 1e6", |pa| {
-            (0.0..=1e6).contains(&pa)
-        })?;
+        section.optional("release_pressure_pa", "a pressure in Pa from 0 to 1e6", 0.0..=1e6)?;
     Ok(gain.map(|force_per_pressure_n_per_pa| FrictionBrake {
         force_per_pressure_n_per_pa,
         release_pressure_pa: release.unwrap_or(RELEASE_PRESSURE_DEFAULT_PA),
     }))
 }
 
-fn brake(section: &Section) -> Result<(Option<EffortCurve>, BrakeGear), DatasetError> {
+fn brake(section: &Item) -> Result<(Option<EffortCurve>, BrakeGear), DatasetError> {
     section.allow(&[
         "max_force_kn",
         "effort",
@@ -161,68 +144,71 @@ fn brake(section: &Section) -> Result<(Option<EffortCurve>, BrakeGear), DatasetE
         "force_per_pressure_n_per_pa",
         "release_pressure_pa",
     ])?;
-    let max_force_kn = section.number("max_force_kn", FORCE_KN, is_force_kn)?;
+    let max_force_kn = section.optional("max_force_kn", FORCE, FORCES_KN)?;
     let curve = effort(section)?;
     if max_force_kn.is_some() && curve.is_some() {
         return Err(section.exclusive("max_force_kn", "effort"));
     }
     let constant = max_force_kn.and_then(|force| EffortCurve::new(vec![(0.0, force * 1000.0)]));
-    let size = |key| {
-        section.number(key, "a size in mm above 0, at most 2000", |size| size > 0.0 && size <= 2e3)
-    };
-    let share =
-        |key| section.number(key, "above 0, at most 1", |share| share > 0.0 && share <= 1.0);
+    let size =
+        |key| section.optional(key, "a size in mm above 0, at most 2000", above_zero(2000.0));
+    let share = |key| section.optional(key, "above 0, at most 1", above_zero(1.0));
     let gear = BrakeGear {
         cylinder_diameter_mm: size("cylinder_diameter_mm")?,
         disc_radius_mm: size("disc_radius_mm")?,
         wheel_radius_mm: size("wheel_radius_mm")?,
         efficiency: share("efficiency")?,
-        ratio: section.number("ratio", "above 0, at most 100", |x| x > 0.0 && x <= 100.0)?,
+        ratio: section.optional("ratio", "above 0, at most 100", above_zero(100.0))?,
         friction: share("friction")?,
-        pads: section.number("pads", "from 1 to 100000", |pads| (1.0..=1e5).contains(&pads))?,
+        pads: section.optional("pads", "from 1 to 100000", 1.0..=1e5)?,
         friction_brake: friction_brake(section)?,
     };
     Ok((curve.or(constant), gear))
 }
 
-const FORCE_KN: &str = "a force in kN from 0 to 10000";
-
-fn is_force_kn(force_kn: f64) -> bool {
-    (0.0..=1e4).contains(&force_kn)
-}
+const FORCE: &str = "a force in kN from 0 to 10000";
+const FORCES_KN: RangeInclusive<f64> = 0.0..=1e4;
 
 /// The curve under `effort`, from [speed_mps, force kN].
-fn effort(section: &Section) -> Result<Option<EffortCurve>, DatasetError> {
+fn effort<'t>(section: &Item<'t>) -> Result<Option<EffortCurve>, DatasetError> {
     const KEY: &str = "effort";
     let Some(entries) = section.entries::<2>(KEY, "[speed_mps, force kN]")? else {
         return Ok(None);
     };
-    let mut points: Vec<(f64, f64)> = Vec::with_capacity(entries.len());
-    for (index, ([speed_mps, force_kn], place)) in entries.into_iter().enumerate() {
-        let refuse = |value: f64, allowed: &str| {
-            let key = format!("{} entry {}", section.full(KEY), index + 1);
-            let (value, allowed) = (value.to_string(), allowed.into());
-            place.clone().problem(Problem::OutOfRange { key, value, allowed })
-        };
-        if !(0.0..=200.0).contains(&speed_mps) {
-            return Err(refuse(speed_mps, "a speed in m/s from 0 to 200"));
-        }
-        if !is_force_kn(force_kn) {
-            return Err(refuse(force_kn, FORCE_KN));
-        }
-        if let Some(&(before, _)) = points.last()
+    let point = |([speed_mps, force_kn], entry): ([f64; 2], Item<'t>)| {
+        let speed_mps = entry.within(speed_mps, "a speed in m/s from 0 to 200", 0.0..=200.0)?;
+        let force_kn = entry.within(force_kn, FORCE, FORCES_KN)?;
+        Ok((entry, speed_mps, 1000.0 * force_kn))
+    };
+    let points = growing(&section.full(KEY), entries.into_iter().map(point))?;
+    let none = || section.key_out_of_range(KEY, "[]", "at least one [speed_mps, force kN]");
+    EffortCurve::new(points).map(Some).ok_or_else(none)
+}
+
+/// Points of an effort curve, (m/s, N), whose speeds grow, each from where it stands; `key` names the curve.
+///
+/// # Errors
+///
+/// At the first that does not follow the one before it.
+pub fn growing<'t>(
+    key: &str,
+    points: impl Iterator<Item = Result<(Item<'t>, f64, f64), DatasetError>>,
+) -> Result<Vec<(f64, f64)>, DatasetError> {
+    let mut grown: Vec<(f64, f64)> = Vec::new();
+    for (index, point) in points.enumerate() {
+        let (place, speed_mps, force_n) = point?;
+        if let Some(&(before, _)) = grown.last()
             && speed_mps <= before
         {
-            let (key, index) = (section.full(KEY), index + 1);
-            let found = speed_mps;
-            return Err(place.problem(Problem::EffortOrder { key, index, found, before }));
+            return Err(place.wrong(format!(
+                "{key} entry {}: expected a speed above the one before ({before} m/s), got \
+                 {speed_mps} m/s",
+                index + 1
+            )));
         }
-        points.push((speed_mps, force_kn * 1000.0));
+        grown.push((speed_mps, force_n));
     }
-    match EffortCurve::new(points) {
-        Some(curve) => Ok(Some(curve)),
-        None => Err(section.out_of_range(KEY, "[]", "at least one [speed_mps, force kN]")),
-    }
+    Ok(grown)
 }
 
 #[cfg(test)]
@@ -320,7 +306,8 @@ release_pressure_pa = 21000.0
             ),
             (
                 ("mass_t = 981.7", "mass_t = \"heavy\""),
-                "train.toml:4: train.mass_t: expected a number, got the text \"heavy\"",
+                "train.toml:4: train.mass_t: expected a mass in t above 0, at most 100000, got the \
+                 text \"heavy\"",
             ),
             (
                 ("a = 0.79", "a = 3947.6"),

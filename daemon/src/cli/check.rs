@@ -13,7 +13,7 @@ pub use daemon::{DaemonAnswer, answer, read, report};
 use super::Failure;
 use super::companion::{become_it, words_of_command};
 use crate::config::DaemonConfig;
-use crate::dataset::{FileKind, file_error, is_recording, kind_of, read_text};
+use crate::dataset::{FileKind, is_recording, kind_of, labelled_text};
 use crate::error_document::ErrorAnswer;
 use crate::output::{give, report_line, require_file, write_json};
 use crate::programs::WORKSHOP;
@@ -129,7 +129,6 @@ fn may_be_configuration(path: &Path) -> Result<bool, Failure> {
     if !is_toml || !path.is_file() || is_recording(path) {
         return Ok(false);
     }
-    let label = path.display().to_string();
-    let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
+    let (label, text) = labelled_text(path)?;
     Ok(kind_of(&top_keys(&label, &text)?) == Some(FileKind::Daemon))
 }

@@ -10,7 +10,7 @@ use dynocar_model::train::TrainModel;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::dataset::{file_error, read_text};
+use crate::dataset::labelled_text;
 
 /// The file of the train in a model's folder.
 pub const TRAIN_FILE: &str = "train.toml";
@@ -74,9 +74,7 @@ impl ModelText {
     ///
     /// When one cannot be read.
     pub fn read(train: &Path, track: Option<&Path>) -> Result<Self, DatasetError> {
-        let text = |path: &Path| {
-            read_text(path).map_err(|problem| file_error(&path.display().to_string(), problem))
-        };
+        let text = |path: &Path| labelled_text(path).map(|(_, text)| text);
         Ok(ModelText { train: text(train)?, track: track.map(text).transpose()? })
     }
 

@@ -2,9 +2,9 @@
 
 use dynocar_model::named;
 
-use super::error::{ImportError, ImportProblem};
-use super::item::Item;
+use crate::dataset::DatasetError;
 use crate::dataset::SourcePosition;
+use crate::dataset::document::Item;
 
 named! {
     /// A project whose files are read.
@@ -32,17 +32,25 @@ const ROLLING_STOCK: &str = "https://railtoolkit.org/schema/rolling-stock.json";
 const RUNNING_PATH: &str = "https://railtoolkit.org/schema/running-path.json";
 const VERSIONS: [&str; 2] = ["2022.05", "2024.07"];
 
+const EXPECTED: &str = "expected a railtoolkit rolling stock or running path (a key 'schema'), a \
+                        TTOBench track or train ('metadata' with 'stops' or 'mass'), or an OSRD \
+                        rolling stock ('rolling_resistance')";
+const RAILML: &str = "railML is not imported: its licence forbids an open implementation without \
+                      certification; convert the file to railtoolkit's schema, or write train.toml \
+                      and track.toml by hand";
+
 /// Refuses XML, and railML by its name.
-pub(super) fn refuse_xml(label: &str, text: &str) -> Result<(), ImportError> {
+pub(super) fn refuse_xml(label: &str, text: &str) -> Result<(), DatasetError> {
     let Some(root) = xml_root(text.strip_prefix('\u{feff}').unwrap_or(text)) else {
         return Ok(());
     };
     let name = root.rsplit(':').next().unwrap_or(root).to_lowercase();
-    let problem = match name.as_str() {
-        "railml" => ImportProblem::RailMl,
-        _ => ImportProblem::Xml { root: root.chars().take(40).collect() },
+    let root: String = root.chars().take(40).collect();
+    let words = match name.as_str() {
+        "railml" => RAILML.into(),
+        _ => format!("expected YAML or JSON, found XML with the root '{root}'; {EXPECTED}"),
     };
-    Err(ImportError::new(SourcePosition::whole(label), problem))
+    Err(SourcePosition::whole(label).problem(words))
 }
 
 /// The name of the root element; `None` for a text that is no XML.
@@ -65,7 +73,7 @@ fn xml_root(text: &str) -> Option<&str> {
 }
 
 /// The kind of a file by its keys, or of those of one project.
-pub(super) fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, ImportError> {
+pub(super) fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, DatasetError> {
     let has = |key: &str| root.has(key);
     let recognised = if has("schema") {
         Some(Format::Railtoolkit)
@@ -81,11 +89,14 @@ pub(super) fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, Impor
         Some(Format::Osrd) => Ok(Kind::OsrdRollingStock),
         Some(Format::Ttobench) if has("mass") => Ok(Kind::TtobenchTrain),
         Some(Format::Ttobench) => Ok(Kind::TtobenchTrack),
-        None => Err(root.wrong(ImportProblem::NotRecognised { found: found(root) })),
+        None => {
+            let words = format!("the format is not recognised: {}; {EXPECTED}", found(root));
+            Err(root.wrong(words + "; --format says which it is"))
+        }
     }
 }
 
-fn railtoolkit(root: &Item) -> Result<Kind, ImportError> {
+fn railtoolkit(root: &Item) -> Result<Kind, DatasetError> {
     let expected = "the address of railtoolkit's schema";
     let schema = root.need("schema", expected)?;
     let kind = match schema.text(expected)? {
@@ -99,10 +110,7 @@ fn railtoolkit(root: &Item) -> Result<Kind, ImportError> {
     let version = root.need("schema_version", &versions)?;
     match version.text(&versions)? {
         known if VERSIONS.contains(&known) => Ok(kind),
-        other => {
-            let problem = ImportProblem::Version { found: other.into(), expected: versions };
-            Err(version.wrong(problem))
-        }
+        other => Err(version.wrong(format!("schema_version = {other}: expected {versions}"))),
     }
 }
 

@@ -3,8 +3,8 @@
 use dynocar_model::track::Curve;
 use dynocar_model::train::Davis;
 
-use super::item::Item;
-use crate::dataset::SourcePosition;
+use crate::dataset::document::Item;
+use crate::dataset::{DatasetError, SourcePosition};
 
 /// How a file is to be read where its format leaves a choice.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -101,6 +101,11 @@ impl Account {
             self.left(&format!("{prefix}{key}"), why);
         }
     }
+}
+
+/// A force of an effort curve in N.
+pub(super) fn force_n(item: &Item) -> Result<f64, DatasetError> {
+    item.number("a force in N from 0 to 1e7", 0.0..=1e7)
 }
 
 /// A train as far as its file gives it, in SI units.

@@ -6,18 +6,15 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - `tree`, `item`, `effort`: YAML and JSON with the line of every value; what may be expected of one
+//! - `tree`: YAML and JSON with the line of every value
 //! - [`mod@format`]: which project's file it is, by its content
 //! - `rolling_stock`, `vehicle`, `running_path`: railtoolkit's schemas
 //! - `ttobench`, `ttobench_train`, `ttobench_track`: TTOBench's files
 //! - `osrd`: OSRD's rolling stock
-//! - [`imported`], [`error`]: what comes out, or why nothing does
+//! - [`imported`]: what comes out
 
-mod effort;
-pub mod error;
 pub mod format;
 pub mod imported;
-mod item;
 mod osrd;
 mod rolling_stock;
 mod running_path;
@@ -29,12 +26,12 @@ mod ttobench_track;
 mod ttobench_train;
 mod vehicle;
 
-pub use error::{ImportError, ImportProblem};
 pub use format::Format;
 pub use imported::{Account, FieldOutcome, ImportedLine, ImportedTrain, Reading};
 
+use crate::dataset::DatasetError;
+use crate::dataset::document::Item;
 use format::Kind;
-use item::Item;
 
 /// A file.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +62,7 @@ pub fn import(
     sources: &[Source],
     forced: Option<Format>,
     reading: &Reading,
-) -> Result<Imported, ImportError> {
+) -> Result<Imported, DatasetError> {
     let mut read = Vec::new();
     for source in sources {
         format::refuse_xml(source.label, source.text)?;

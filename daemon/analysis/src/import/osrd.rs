@@ -5,10 +5,10 @@
 
 use dynocar_model::train::{Davis, TrainModel};
 
-use super::effort::{Speeds, points};
-use super::error::{ImportError, ImportProblem};
-use super::imported::{Account, ImportedTrain, Reading};
-use super::item::{Item, above_zero};
+use super::imported::{Account, ImportedTrain, Reading, force_n};
+use crate::dataset::DatasetError;
+use crate::dataset::document::{Item, above_zero};
+use crate::dataset::train_file::growing;
 
 /// Why fields have no place, and which.
 const WITHOUT_PLACE: [(&str, &str); 9] = [
@@ -32,11 +32,9 @@ const WITHOUT_PLACE: [(&str, &str); 9] = [
 const RESISTANCE_N_PER_KN: (f64, f64) = (0.1, 60.0);
 /// Where a file gives no greatest speed, one that every train reaches.
 const SPEED_MPS: f64 = 20.0;
-const SPEEDS: Speeds =
-    Speeds { allowed: "a speed in m/s from 0 to 200", range: 0.0..=200.0, per_mps: 1.0 };
 
 /// The train of a file.
-pub(super) fn train(root: &Item, reading: &Reading) -> Result<ImportedTrain, ImportError> {
+pub(super) fn train(root: &Item, reading: &Reading) -> Result<ImportedTrain, DatasetError> {
     let mut account = Account::default();
     let mass_kg = root.required("mass", "a mass in kg from 1000 to 1e8", 1e3..=1e8)?;
     account.taken("mass", "mass_t", "kg / 1000");
@@ -78,7 +76,7 @@ fn resistance(
     mass_kg: f64,
     top_mps: Option<f64>,
     account: &mut Account,
-) -> Result<Davis, ImportError> {
+) -> Result<Davis, DatasetError> {
     let item = root.need("rolling_resistance", "Davis coefficients")?;
     let kind = item.need("type", "\"davis\"")?;
     if kind.text("\"davis\"")? != "davis" {
@@ -97,9 +95,12 @@ fn resistance(
         (true, false) => (whole, "for the whole train", by_force, by_mass),
         (false, true) => (each_kg, "for each kg", by_mass, by_force),
         _ => {
-            let key = item.path.clone();
-            let problem = ImportProblem::Davis { key, speed_mps, by_force, by_mass, mass_kg };
-            return Err(item.wrong(problem));
+            return Err(item.wrong(format!(
+                "{}: {by_force:.3e} N/kN at {speed_mps:.1} m/s if A, B and C are in N for the whole \
+                 train, {by_mass:.3e} N/kN if for each kg, and neither can be: is the mass of \
+                 {mass_kg} kg right?",
+                item.path
+            )));
         }
     };
     let how = format!(
@@ -114,7 +115,7 @@ fn effort(
     item: &Item,
     reading: &Reading,
     account: &mut Account,
-) -> Result<Vec<(f64, f64)>, ImportError> {
+) -> Result<Vec<(f64, f64)>, DatasetError> {
     let modes = item.need("modes", "effort curves by mode")?;
     let stated = match &reading.mode {
         Some(wanted) => wanted.as_str(),
@@ -129,9 +130,11 @@ fn effort(
         let found = format!("a list of {}", forces.len());
         return Err(list.out_of_range(&found, &format!("one for each of {} speeds", speeds.len())));
     }
-    let items =
-        speeds.into_iter().zip(forces).map(|(speed, force)| Ok([speed.clone(), speed, force]));
-    let points = points(&curve.full("speeds"), &SPEEDS, items)?;
+    let points = speeds.into_iter().zip(forces).map(|(speed, force)| {
+        let speed_mps = speed.number("a speed in m/s from 0 to 200", 0.0..=200.0)?;
+        Ok((speed, speed_mps, force_n(&force)?))
+    });
+    let points = growing(&curve.full("speeds"), points)?;
     let field = format!("effort_curves.modes.{stated}.default_curve");
     account.taken(&field, "effort", "m/s, N / 1000");
     let others: Vec<&str> = modes.keys().filter(|name| *name != stated).collect();

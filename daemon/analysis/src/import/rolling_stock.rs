@@ -3,10 +3,10 @@
 
 use dynocar_model::train::{Davis, EffortCurve};
 
-use super::error::{ImportError, ImportProblem};
 use super::imported::{Account, ImportedTrain, Reading};
-use super::item::Item;
 use super::vehicle::{Kind, Vehicle, vehicle};
+use crate::dataset::DatasetError;
+use crate::dataset::document::Item;
 
 const WITHOUT_PLACE: [(&str, &str); 4] = [
     ("train.toml holds no identifier", "UUID"),
@@ -17,7 +17,10 @@ const WITHOUT_PLACE: [(&str, &str); 4] = [
 
 /// The trains of files of one schema, whose vehicles may stand in another of the files. Without a
 /// train each vehicle is one.
-pub(super) fn trains(roots: &[Item], reading: &Reading) -> Result<Vec<ImportedTrain>, ImportError> {
+pub(super) fn trains(
+    roots: &[Item],
+    reading: &Reading,
+) -> Result<Vec<ImportedTrain>, DatasetError> {
     let mut vehicles: Vec<Vehicle> = Vec::new();
     let mut trains: Vec<(&str, Item)> = Vec::new();
     for root in roots {
@@ -45,7 +48,7 @@ pub(super) fn trains(roots: &[Item], reading: &Reading) -> Result<Vec<ImportedTr
         };
         return Ok(vehicles.iter().map(alone).collect());
     }
-    let described = |(id, item): &(&str, Item)| -> Result<ImportedTrain, ImportError> {
+    let described = |(id, item): &(&str, Item)| -> Result<ImportedTrain, DatasetError> {
         let name = item.need_text("name", "a name")?;
         let mut train = train(item, id, name, &formation(item, &vehicles)?, reading);
         train.account.taken("trains.formation", "cars", "the number of vehicles");
@@ -55,7 +58,7 @@ pub(super) fn trains(roots: &[Item], reading: &Reading) -> Result<Vec<ImportedTr
     trains.iter().map(described).collect()
 }
 
-fn list<'t>(item: Option<Item<'t>>, what: &str) -> Result<Vec<Item<'t>>, ImportError> {
+fn list<'t>(item: Option<Item<'t>>, what: &str) -> Result<Vec<Item<'t>>, DatasetError> {
     item.map_or(Ok(Vec::new()), |item| item.list(what, 1))
 }
 
@@ -64,23 +67,24 @@ pub(super) fn unique<'i, 't: 'i>(
     mut known: impl Iterator<Item = (&'t str, &'i Item<'t>)>,
     id: &str,
     item: &Item,
-) -> Result<(), ImportError> {
+) -> Result<(), DatasetError> {
     let Some((_, first)) = known.find(|(other, _)| *other == id) else { return Ok(()) };
-    let (key, first_line) = (item.full("id"), first.place().line.unwrap_or(1));
-    Err(item.wrong(ImportProblem::Repeated { key, id: id.into(), first_line }))
+    let (key, line) = (item.full("id"), first.place().line.unwrap_or(1));
+    let words = format!("expected another than in line {line}, which is the same");
+    Err(item.wrong(format!("{key} = '{id}': {words}")))
 }
 
 fn formation<'v, 't>(
     item: &Item,
     vehicles: &'v [Vehicle<'t>],
-) -> Result<Vec<&'v Vehicle<'t>>, ImportError> {
+) -> Result<Vec<&'v Vehicle<'t>>, DatasetError> {
     let expected = "identifiers of vehicles";
     let wanted = item.need("formation", expected)?.list(expected, 1)?;
     let find = |wanted: &Item| {
         let id = wanted.text(expected)?;
         vehicles.iter().find(|it| it.id == id).ok_or_else(|| {
-            let (key, id) = (wanted.path.clone(), id.into());
-            wanted.wrong(ImportProblem::NoVehicle { key, id })
+            let words = "is described in none of the files; give its file too";
+            wanted.wrong(format!("{}: the vehicle '{id}' {words}", wanted.path))
         })
     };
     wanted.iter().map(find).collect()

@@ -1,10 +1,10 @@
 //! railtoolkit's running paths: sections of permitted speed and resistance. The schema of 2022.05 writes
 //! a section as a list, the later main as keys and values, of which speed or resistance may be missing.
 
-use super::error::ImportError;
 use super::imported::{Account, ImportedLine};
-use super::item::{Item, above_zero};
 use super::rolling_stock::unique;
+use crate::dataset::DatasetError;
+use crate::dataset::document::{Item, above_zero};
 
 const SECTIONS: &str = "characteristic_sections";
 /// Why fields have no place, and which.
@@ -22,7 +22,7 @@ struct Section {
 }
 
 /// The paths of a file.
-pub(super) fn lines(root: &Item) -> Result<Vec<ImportedLine>, ImportError> {
+pub(super) fn lines(root: &Item) -> Result<Vec<ImportedLine>, DatasetError> {
     let mut seen: Vec<(&str, Item)> = Vec::new();
     let mut lines = Vec::new();
     for item in root.need("paths", "a list of paths")?.list("paths", 1)? {
@@ -34,7 +34,7 @@ pub(super) fn lines(root: &Item) -> Result<Vec<ImportedLine>, ImportError> {
     Ok(lines)
 }
 
-fn line(item: &Item, id: &str) -> Result<ImportedLine, ImportError> {
+fn line(item: &Item, id: &str) -> Result<ImportedLine, DatasetError> {
     let items = item.need(SECTIONS, "a list of sections")?.list("sections", 2)?;
     // The names became optional with the keys.
     let name = match (item.get("name"), items[0].is_list()) {
@@ -107,20 +107,20 @@ const POSITION: &str = "a position in m, within 1e9";
 const SPEED: &str = "a speed in km/h above 0, at most 720";
 const RESISTANCE: &str = "a resistance in permil from -150 to 150";
 
-fn position_m(item: &Item) -> Result<f64, ImportError> {
+fn position_m(item: &Item) -> Result<f64, DatasetError> {
     item.number(POSITION, -1e9..=1e9)
 }
 
-fn speed_mps(item: &Item) -> Result<f64, ImportError> {
+fn speed_mps(item: &Item) -> Result<f64, DatasetError> {
     Ok(item.number(SPEED, above_zero(720.0))? / 3.6)
 }
 
-fn permille(item: &Item) -> Result<f64, ImportError> {
+fn permille(item: &Item) -> Result<f64, DatasetError> {
     item.number(RESISTANCE, -150.0..=150.0)
 }
 
 /// A section as `[m, km/h, ‰]`.
-fn by_place(item: &Item) -> Result<Section, ImportError> {
+fn by_place(item: &Item) -> Result<Section, DatasetError> {
     let [position, speed, resistance] =
         item.tuple("[position m, speed km/h, resistance permil]")?;
     Ok(Section {
@@ -131,7 +131,7 @@ fn by_place(item: &Item) -> Result<Section, ImportError> {
 }
 
 /// A section as keys and values.
-fn by_keys(item: &Item) -> Result<Section, ImportError> {
+fn by_keys(item: &Item) -> Result<Section, DatasetError> {
     let speed = item.get("speed").map(|it| speed_mps(&it)).transpose()?;
     let resistance = item.get("resistance").map(|it| permille(&it)).transpose()?;
     if speed.is_none() && resistance.is_none() {

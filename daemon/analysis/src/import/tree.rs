@@ -1,46 +1,23 @@
 //! YAML as a tree whose every node knows its line. JSON is YAML too, so that both are read alike.
 
-use std::cell::Cell;
-
 use granit_parser::{Event, Parser, ScalarStyle};
 
-use super::error::ImportError;
-use crate::dataset::{Problem, SourcePosition};
+use crate::dataset::DatasetError;
+use crate::dataset::SourcePosition;
+use crate::dataset::node::{Content, Node};
 
 /// No format nests deeper; a file that does would cost stack.
 const DEPTH_MAX: usize = 64;
 
-/// A value with its place.
-#[derive(Debug)]
-pub(super) struct Node {
-    /// Line, from 1.
-    pub line: usize,
-    pub content: Content,
-    /// True once somebody has asked for it.
-    pub is_read: Cell<bool>,
-}
-
-#[derive(Debug)]
-pub(super) enum Content {
-    /// A text; plain ones, without quotes, may be numbers.
-    Scalar {
-        text: String,
-        is_plain: bool,
-    },
-    List(Vec<Node>),
-    /// In the order of the file, no key twice.
-    Map(Vec<(String, Node)>),
-}
-
 /// Reads a file's only document; `label` names the file in messages.
-pub(super) fn parse(label: &str, text: &str) -> Result<Node, ImportError> {
+pub(super) fn parse(label: &str, text: &str) -> Result<Node, DatasetError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let is_json = text.trim_start().starts_with(['{', '[']);
     // JSON may be indented by tabs, which it allows nowhere else.
     let spaced = if is_json { text.replace('\t', " ") } else { text.into() };
     let language = if is_json { "JSON" } else { "YAML" };
     let wrong = |line: usize, message: String| {
-        ImportError::new(SourcePosition::line(label, line), Problem::Syntax { language, message })
+        SourcePosition::line(label, line).problem(format!("not valid {language}: {message}"))
     };
     let options = granit_parser::options! { emit_comments: false };
     let events = Parser::new_from_str_with_options(&spaced, options).map(|next| {
@@ -57,18 +34,20 @@ pub(super) fn parse(label: &str, text: &str) -> Result<Node, ImportError> {
     match (roots.next(), roots.next()) {
         (Some(root), None) => Ok(root),
         (None, _) => Err(wrong(1, "the file is empty".into())),
-        (_, Some(second)) => Err(wrong(second.line, "expected one document, found another".into())),
+        (_, Some(second)) => {
+            Err(wrong(second.line.unwrap_or(1), "expected one document, found another".into()))
+        }
     }
 }
 
 /// Makes a tree of a parser's events, each with its line.
 struct Reader<'w, I> {
     events: I,
-    wrong: &'w dyn Fn(usize, String) -> ImportError,
+    wrong: &'w dyn Fn(usize, String) -> DatasetError,
 }
 
-impl<'e, I: Iterator<Item = Result<(Event<'e>, usize), ImportError>>> Reader<'_, I> {
-    fn next(&mut self, depth: usize) -> Result<Option<Node>, ImportError> {
+impl<'e, I: Iterator<Item = Result<(Event<'e>, usize), DatasetError>>> Reader<'_, I> {
+    fn next(&mut self, depth: usize) -> Result<Option<Node>, DatasetError> {
         self.events.next().map_or(Ok(None), |event| self.node(event?, depth))
     }
 
@@ -77,15 +56,13 @@ impl<'e, I: Iterator<Item = Result<(Event<'e>, usize), ImportError>>> Reader<'_,
         &mut self,
         (event, line): (Event<'e>, usize),
         depth: usize,
-    ) -> Result<Option<Node>, ImportError> {
+    ) -> Result<Option<Node>, DatasetError> {
         if depth > DEPTH_MAX {
             return Err((self.wrong)(line, format!("expected at most {DEPTH_MAX} levels")));
         }
         let content = match event {
-            Event::Scalar(text, style, ..) => {
-                let is_plain = style == ScalarStyle::Plain;
-                Content::Scalar { text: text.into_owned(), is_plain }
-            }
+            Event::Scalar(text, ScalarStyle::Plain, ..) => Content::Plain(text.into_owned()),
+            Event::Scalar(text, ..) => Content::Text(text.into_owned()),
             Event::SequenceStart(..) => {
                 let mut items = Vec::new();
                 while let Some(item) = self.next(depth + 1)? {
@@ -99,19 +76,19 @@ impl<'e, I: Iterator<Item = Result<(Event<'e>, usize), ImportError>>> Reader<'_,
             }
             _ => return Ok(None),
         };
-        Ok(Some(Node { line, content, is_read: Cell::new(false) }))
+        Ok(Some(Node::new(Some(line), content)))
     }
 
-    fn entries(&mut self, depth: usize) -> Result<Vec<(String, Node)>, ImportError> {
+    fn entries(&mut self, depth: usize) -> Result<Vec<(String, Node)>, DatasetError> {
         let mut entries = Vec::new();
         while let Some(key) = self.next(depth)? {
-            let Content::Scalar { text, .. } = key.content else {
-                return Err((self.wrong)(key.line, "expected a name as key".into()));
+            let (Content::Text(text) | Content::Plain(text)) = key.content else {
+                return Err((self.wrong)(key.line.unwrap_or(1), "expected a name as key".into()));
             };
             entries.extend(self.next(depth)?.map(|value| (text, value)));
         }
         let mut names: Vec<(&str, usize)> =
-            entries.iter().map(|(name, value)| (name.as_str(), value.line)).collect();
+            entries.iter().map(|(name, value)| (name.as_str(), value.line.unwrap_or(1))).collect();
         names.sort_unstable();
         if let Some(&[_, (name, line)]) = names.windows(2).find(|pair| pair[0].0 == pair[1].0) {
             return Err((self.wrong)(line, format!("the key '{name}' stands twice")));
@@ -139,10 +116,8 @@ mod tests {
             let names: Vec<&str> = entries.iter().map(|(name, _)| name.as_str()).collect();
             assert_eq!(names, ["a", "b"]);
             let Content::List(items) = &entries[0].1.content else { panic!("{root:?}") };
-            assert_eq!(items[1].line, 4);
-            assert!(
-                matches!(&items[1].content, Content::Scalar { text, is_plain: true } if text == "1.5")
-            );
+            assert_eq!(items[1].line, Some(4));
+            assert!(matches!(&items[1].content, Content::Plain(text) if text == "1.5"));
         }
     }
 
@@ -153,7 +128,7 @@ mod tests {
         let text = format!("{{\"a\":{{\"values\":[{pairs}]}},\"b\":\"\\u00e9\\ud83d\\ude83\"}}");
         let root = parse("a", &text).unwrap_or_else(|error| panic!("{error}"));
         let Content::Map(entries) = &root.content else { panic!("{root:?}") };
-        assert!(matches!(&entries[1].1.content, Content::Scalar { text, .. } if text == "é🚃"));
+        assert!(matches!(&entries[1].1.content, Content::Text(text) if text == "é🚃"));
     }
 
     #[test]

@@ -4,12 +4,12 @@ use std::ops::RangeBounds;
 
 use dynocar_model::units::{Dimension, Unit};
 
-use super::error::ImportError;
 use super::imported::Account;
-use super::item::Item;
+use crate::dataset::DatasetError;
+use crate::dataset::document::Item;
 
 /// The unit named under a key of a map, by the field's spelling of it.
-pub(super) fn unit(item: &Item, key: &str, dimension: Dimension) -> Result<Unit, ImportError> {
+pub(super) fn unit(item: &Item, key: &str, dimension: Dimension) -> Result<Unit, DatasetError> {
     let stated = item.need(key, "a unit")?;
     let name = stated.text("a unit")?;
     // "permil" is theirs, "permille" ours.
@@ -26,14 +26,14 @@ pub(super) fn value(
     dimension: Dimension,
     allowed: &str,
     range: impl RangeBounds<f64>,
-) -> Result<Option<f64>, ImportError> {
+) -> Result<Option<f64>, DatasetError> {
     let Some(item) = root.get(key) else { return Ok(None) };
     let unit = unit(&item, "unit", dimension)?;
     item.need("value", "a number")?.in_unit(&unit, allowed, range).map(Some)
 }
 
 /// The coefficient of resistance of a value in N/(m/s)^power, with its unit.
-pub(super) fn coefficient<'t>(item: &Item<'t>, power: i32) -> Result<(f64, &'t str), ImportError> {
+pub(super) fn coefficient<'t>(item: &Item<'t>, power: i32) -> Result<(f64, &'t str), DatasetError> {
     let stated = item.need("unit", "a unit")?;
     let name = stated.text("a unit")?;
     let known = || {
@@ -59,7 +59,7 @@ pub(super) fn coefficient<'t>(item: &Item<'t>, power: i32) -> Result<(f64, &'t s
 }
 
 /// Words that name a file: the identifier of its metadata.
-pub(super) fn id<'t>(root: &Item<'t>) -> Result<&'t str, ImportError> {
+pub(super) fn id<'t>(root: &Item<'t>) -> Result<&'t str, DatasetError> {
     root.need("metadata", "keys and values with an id")?.need("id", "an identifier")?.text("an id")
 }
 

@@ -5,10 +5,10 @@ use std::ops::{Bound, RangeBounds};
 use dynocar_model::track::Curve;
 use dynocar_model::units::{Dimension, Unit};
 
-use super::error::ImportError;
 use super::imported::{Account, ImportedLine};
-use super::item::{Item, above_zero};
 use super::ttobench::{id, rest, unit};
+use crate::dataset::DatasetError;
+use crate::dataset::document::{Item, above_zero};
 
 const WITHOUT_PLACE: [(&str, &str); 1] =
     [("track.toml holds gradients, no height above the sea", "altitude")];
@@ -22,7 +22,7 @@ const POSITION_MAX_M: f64 = 1e7;
 const RADIUS_MIN_M: f64 = 10.0;
 
 /// The line of a file.
-pub(super) fn line(root: &Item) -> Result<ImportedLine, ImportError> {
+pub(super) fn line(root: &Item) -> Result<ImportedLine, DatasetError> {
     let id = id(root)?;
     let mut account = Account::default();
     let stops = stops(root)?;
@@ -61,7 +61,7 @@ pub(super) fn line(root: &Item) -> Result<ImportedLine, ImportError> {
     })
 }
 
-fn stops(root: &Item) -> Result<Vec<f64>, ImportError> {
+fn stops(root: &Item) -> Result<Vec<f64>, DatasetError> {
     let item = root.need("stops", "stops with their unit")?;
     let unit = unit(&item, "unit", Dimension::Length)?;
     let mut stops = Vec::new();
@@ -71,7 +71,7 @@ fn stops(root: &Item) -> Result<Vec<f64>, ImportError> {
     Ok(stops)
 }
 
-fn position_m(item: &Item, unit: &Unit, before_m: Option<f64>) -> Result<f64, ImportError> {
+fn position_m(item: &Item, unit: &Unit, before_m: Option<f64>) -> Result<f64, DatasetError> {
     let (allowed, least) = match before_m {
         Some(before_m) => {
             let allowed = format!("a position above the one before ({before_m} m)");
@@ -88,7 +88,7 @@ fn pairs(
     (name, dimension): (&str, Dimension),
     allowed: &str,
     range: impl RangeBounds<f64> + Clone,
-) -> Result<Vec<(f64, f64)>, ImportError> {
+) -> Result<Vec<(f64, f64)>, DatasetError> {
     let units = item.need("units", "the units of the values")?;
     let (along, unit) =
         (unit(&units, "position", Dimension::Length)?, unit(&units, name, dimension)?);
@@ -102,7 +102,7 @@ fn pairs(
 }
 
 /// Curves from triples of position and the radius there and before the next.
-fn curves(item: &Item, length_m: f64) -> Result<Vec<Curve>, ImportError> {
+fn curves(item: &Item, length_m: f64) -> Result<Vec<Curve>, DatasetError> {
     let units = item.need("units", "the units of the values")?;
     let along = unit(&units, "position", Dimension::Length)?;
     let from = unit(&units, "radius at start", Dimension::Length)?;
@@ -137,7 +137,7 @@ fn curves(item: &Item, length_m: f64) -> Result<Vec<Curve>, ImportError> {
 }
 
 /// The reciprocal of a radius, which is "infinity" where the line is straight.
-fn curvature_per_m(item: &Item, unit: &Unit) -> Result<f64, ImportError> {
+fn curvature_per_m(item: &Item, unit: &Unit) -> Result<f64, DatasetError> {
     if item.text("a radius").is_ok_and(|text| text == "infinity") {
         return Ok(0.0);
     }

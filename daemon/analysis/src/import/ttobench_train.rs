@@ -3,10 +3,10 @@
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_model::units::Dimension;
 
-use super::error::ImportError;
 use super::imported::{Account, ImportedTrain};
-use super::item::{Item, above_zero};
 use super::ttobench::{coefficient, id, rest, value};
+use crate::dataset::DatasetError;
+use crate::dataset::document::{Item, above_zero};
 
 /// Why fields have no place, and which.
 const WITHOUT_PLACE: [(&str, &str); 6] = [
@@ -25,7 +25,7 @@ const WITHOUT_PLACE: [(&str, &str); 6] = [
 const SPEED_RATIO: f64 = 1.12;
 
 /// The train of a file.
-pub(super) fn train(root: &Item) -> Result<ImportedTrain, ImportError> {
+pub(super) fn train(root: &Item) -> Result<ImportedTrain, DatasetError> {
     let id = id(root)?;
     let mut account = Account::default();
     root.need("mass", "a mass with its unit")?;
@@ -64,7 +64,7 @@ fn resistance(
     root: &Item,
     mass_kg: f64,
     account: &mut Account,
-) -> Result<Option<Davis>, ImportError> {
+) -> Result<Option<Davis>, DatasetError> {
     let keys = ["rolling resistance r0", "rolling resistance r1", "rolling resistance r2"];
     let items = keys.map(|key| root.get(key));
     let weight_kn = TrainModel::weight_kn(mass_kg);
@@ -84,7 +84,7 @@ fn resistance(
 }
 
 /// The smaller of force and power / speed, up to the greatest speed.
-fn traction(root: &Item, account: &mut Account) -> Result<Option<Vec<(f64, f64)>>, ImportError> {
+fn traction(root: &Item, account: &mut Account) -> Result<Option<Vec<(f64, f64)>>, DatasetError> {
     let (force, power, top) = ("max traction force", "max traction power", "max speed");
     let force = value(root, force, Dimension::Force, "from 1 to 1e7 N", 1.0..=1e7)?;
     let power = value(root, power, Dimension::Power, "from 1 to 1e9 W", 1.0..=1e9)?;

@@ -10,16 +10,15 @@
 
 use dynocar_model::train::{Davis, EffortCurve};
 
-use super::effort::{Speeds, points};
-use super::error::ImportError;
-use super::item::{Item, above_zero};
+use super::imported::force_n;
+use crate::dataset::DatasetError;
+use crate::dataset::document::{Item, above_zero};
+use crate::dataset::train_file::growing;
 
 /// Speed in m/s at which the coefficients of speed hold.
 const REFERENCE_MPS: f64 = 100.0 / 3.6;
 /// Head wind in m/s.
 const WIND_MPS: f64 = 15.0 / 3.6;
-const SPEEDS: Speeds =
-    Speeds { allowed: "a speed in km/h from 0 to 720", range: 0.0..=720.0, per_mps: 3.6 };
 
 /// Which law a vehicle's resistance follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +66,7 @@ pub(super) struct Vehicle<'t> {
 }
 
 /// Reads a vehicle.
-pub(super) fn vehicle(item: Item) -> Result<Vehicle, ImportError> {
+pub(super) fn vehicle(item: Item) -> Result<Vehicle, DatasetError> {
     let kind_item = item.need("vehicle_type", "a type of vehicle")?;
     let kind = kind_item.text("a type of vehicle")?;
     let (_, kind) = KINDS
@@ -108,13 +107,14 @@ pub(super) fn vehicle(item: Item) -> Result<Vehicle, ImportError> {
 }
 
 /// Pairs of km/h and N.
-fn effort(list: &Item) -> Result<EffortCurve, ImportError> {
+fn effort(list: &Item) -> Result<EffortCurve, DatasetError> {
     const FORM: &str = "pairs of speed in km/h and force in N";
-    let pairs = list.list(FORM, 3)?.into_iter().map(|pair| {
+    let points = list.list(FORM, 3)?.into_iter().map(|pair| {
         let [speed, force] = pair.tuple(FORM)?;
-        Ok([pair, speed, force])
+        let speed_mps = speed.number("a speed in km/h from 0 to 720", 0.0..=720.0)? / 3.6;
+        Ok((pair, speed_mps, force_n(&force)?))
     });
-    let points = points(&list.path, &SPEEDS, pairs)?;
+    let points = growing(&list.path, points)?;
     Ok(EffortCurve::new(points).expect("three or more finite points of growing speed"))
 }
 

@@ -4,11 +4,10 @@ use std::cmp::Reverse;
 
 use super::columns::{Column, Columns};
 use super::facts::Facts;
-use super::guessed::{GivenColumn, GuessResult, GuessedColumn, Unmapped};
+use super::guessed::{GivenColumn, GuessedColumn, Unmapped};
 use super::matching::{can_hold, consider};
 use super::name::named_unit;
-use super::problem::{GuessError, GuessProblem};
-use crate::{Quantity, SourcePosition};
+use crate::{DatasetError, Quantity, SourcePosition};
 
 /// A column that may hold a quantity.
 #[derive(Clone)]
@@ -37,7 +36,11 @@ impl<'c> Assignment<'c> {
     /// # Errors
     ///
     /// Where what is declared cannot be.
-    pub fn new(columns: &'c Columns, given: &[GivenColumn], label: &str) -> GuessResult<Self> {
+    pub fn new(
+        columns: &'c Columns,
+        given: &[GivenColumn],
+        label: &str,
+    ) -> Result<Self, DatasetError> {
         let mut assignment = Assignment {
             columns: &columns.columns,
             taken: Vec::new(),
@@ -46,9 +49,8 @@ impl<'c> Assignment<'c> {
             refused: Vec::new(),
         };
         for it in given {
-            let problem = assignment.take_given(it, columns);
-            let place = || SourcePosition::line(label, columns.layout.skip_rows + 1);
-            problem.map_err(|problem| GuessError::new(place(), problem))?;
+            let place = || SourcePosition::line(label, columns.layout.text.skip_rows + 1);
+            assignment.take_given(it, columns).map_err(|words| place().problem(words))?;
         }
         for (index, column) in columns.columns.iter().enumerate() {
             if column.unusable.is_some() || assignment.is_taken(index) {
@@ -69,11 +71,12 @@ impl<'c> Assignment<'c> {
         Ok(assignment)
     }
 
-    fn take_given(&mut self, given: &GivenColumn, columns: &Columns) -> Result<(), GuessProblem> {
-        let (name, quantity) = (given.column.clone(), given.quantity);
+    fn take_given(&mut self, given: &GivenColumn, columns: &Columns) -> Result<(), String> {
+        let (name, quantity) = (&given.column, given.quantity);
         let index = self.columns.iter().position(|column| column.name.text == given.column.trim());
         let Some(index) = index else {
-            return Err(GuessProblem::NoSuchColumn { name, quantity, columns: columns.names() });
+            let names = columns.names();
+            return Err(format!("no column '{name}' for {quantity}; the columns: {names}"));
         };
         let column = &self.columns[index];
         let reason = match &column.unusable {
@@ -81,7 +84,7 @@ impl<'c> Assignment<'c> {
             None => can_hold(&column.all, quantity),
         };
         if let Err(reason) = reason {
-            return Err(GuessProblem::Unfit { name, quantity, reason });
+            return Err(format!("column '{name}' cannot be {quantity}: {reason}"));
         }
         let unit = (given.unit, named_unit(&column.name, quantity));
         let reason = "given on the command line".into();

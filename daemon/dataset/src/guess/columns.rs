@@ -1,11 +1,11 @@
 //! The columns of all files together, with what their values are like.
 use super::facts::Facts;
-use super::guessed::{GuessResult, Recording};
+use super::guessed::Recording;
 use super::layout::{Layout, layout};
 use super::name::Name;
-use super::problem::{GuessError, GuessProblem};
+use crate::TextLayout;
+use crate::error::{DatasetError, NO_HEADER, SourcePosition};
 use crate::lines::{Row, RowReader, below};
-use crate::{Problem, SourcePosition};
 
 /// A column of the first file's header.
 #[derive(Clone, Debug)]
@@ -25,8 +25,6 @@ pub struct Column {
 pub struct Columns {
     /// How the first file's text falls into cells, as that of all.
     pub layout: Layout,
-    /// Between a number and its fraction.
-    pub decimal: u8,
     /// The columns, in the order of the first file's header.
     pub columns: Vec<Column>,
     /// Rows of values in each file.
@@ -39,15 +37,16 @@ impl Columns {
     /// # Errors
     ///
     /// Where one of them has no header or no rows, or another layout than the first.
-    pub fn read(files: &[Recording]) -> GuessResult<Self> {
+    pub fn read(files: &[Recording]) -> Result<Self, DatasetError> {
         let layouts: Vec<Layout> =
             files.iter().map(|file| layout(file.label, file.text)).collect::<Result<_, _>>()?;
         let Some(first) = layouts.first() else {
-            return Err(SourcePosition::whole("no file").problem(Problem::NoHeader).into());
+            return Err(SourcePosition::whole("no file").problem(NO_HEADER));
         };
-        let decimal = layouts.iter().find_map(|it| it.decimal).unwrap_or(b'.');
+        let mut first = first.clone();
+        first.text.decimal = layouts.iter().find_map(|it| it.decimal).unwrap_or(b'.');
         for (file, other) in files.iter().zip(&layouts) {
-            require_alike(file, other, files[0].label, first, decimal)?;
+            require_alike(file, other, (files[0].label, &first.text))?;
         }
         let mut columns: Vec<Column> = first
             .header
@@ -61,7 +60,7 @@ impl Columns {
             .collect();
         let mut rows = Vec::new();
         for (file, layout) in files.iter().zip(&layouts) {
-            let (facts, count) = read_file(file, layout, decimal)?;
+            let (facts, count) = read_file(file, layout, first.text.decimal)?;
             for column in &mut columns {
                 let place = layout.header.iter().position(|name| *name == column.name);
                 let of_file = place.map_or_else(Facts::new, |index| facts[index].clone());
@@ -77,7 +76,7 @@ impl Columns {
             }
             rows.push(count);
         }
-        Ok(Columns { layout: first.clone(), decimal, columns, rows })
+        Ok(Columns { layout: first, columns, rows })
     }
 
     /// Every column's name, for messages.
@@ -105,40 +104,44 @@ fn unusable(name: &Name, files: &[Recording], layouts: &[Layout]) -> Option<Stri
 fn require_alike(
     file: &Recording,
     layout: &Layout,
-    label: &str,
-    first: &Layout,
-    decimal: u8,
-) -> GuessResult<()> {
+    (label, first): (&str, &TextLayout),
+) -> Result<(), DatasetError> {
     let mark = |mark: u8| format!("{:?}", char::from(mark).to_string());
-    let own_decimal = layout.decimal.unwrap_or(decimal);
+    let (own, own_decimal) = (&layout.text, layout.decimal.unwrap_or(first.decimal));
     let shown = |is_there: bool| String::from(if is_there { "there" } else { "not there" });
-    let above = |layout: &Layout| layout.skip_rows.to_string();
+    let above = |layout: &TextLayout| layout.skip_rows.to_string();
     let all = [
-        ("the delimiter", mark(layout.delimiter), mark(first.delimiter)),
-        ("the decimal mark", mark(own_decimal), mark(decimal)),
-        ("the number of lines above the names", above(layout), above(first)),
-        ("a line of units", shown(layout.units_row), shown(first.units_row)),
+        ("the delimiter", mark(own.delimiter), mark(first.delimiter)),
+        ("the decimal mark", mark(own_decimal), mark(first.decimal)),
+        ("the number of lines above the names", above(own), above(first)),
+        ("a line of units", shown(own.units_row), shown(first.units_row)),
     ];
     let Some((what, found, expected)) = all.into_iter().find(|(_, one, other)| one != other) else {
         return Ok(());
     };
-    let problem = GuessProblem::OtherLayout { what, found, expected, first: label.into() };
-    Err(GuessError::new(SourcePosition::whole(file.label), problem))
+    Err(SourcePosition::whole(file.label).problem(format!(
+        "{what} is {found}, but {expected} in {label}: files of one dataset are laid out alike"
+    )))
 }
 
 /// What the values of every column are like, and the number of rows.
-fn read_file(file: &Recording, layout: &Layout, decimal: u8) -> GuessResult<(Vec<Facts>, usize)> {
-    let text = below(file.label, file.text, layout.skip_rows)?;
-    let mut reader = RowReader::new(text, layout.delimiter, decimal);
+fn read_file(
+    file: &Recording,
+    layout: &Layout,
+    decimal: u8,
+) -> Result<(Vec<Facts>, usize), DatasetError> {
+    let TextLayout { skip_rows, delimiter, units_row, .. } = layout.text;
+    let text = below(file.label, file.text, skip_rows)?;
+    let mut reader = RowReader::new(text, delimiter, decimal);
     let mut facts = vec![Facts::new(); layout.header.len()];
-    let above = 1 + usize::from(layout.units_row);
+    let above = 1 + usize::from(units_row);
     let (mut row, mut rows) = (Row::default(), 0);
     while reader.read(&mut row) {
         rows += 1;
         if rows <= above {
             continue;
         }
-        let line = row.line + layout.skip_rows;
+        let line = row.line + skip_rows;
         for (facts, cell) in facts.iter_mut().zip(&row.cells) {
             facts.push_cell(line, cell.text.trim_ascii(), decimal);
         }

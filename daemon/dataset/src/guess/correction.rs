@@ -3,8 +3,8 @@
 use dynocar_core::plausibility::InputFault;
 
 use super::guessed::Guess;
-use crate::fault_unit::{concerned, unit_of};
-use crate::{Diagnostic, GradientSource, Run};
+use crate::fault_unit::concerned;
+use crate::{GradientSource, Run};
 
 impl Guess {
     /// Changes the unit of one quantity whose unit no name gives, where the runs, read as guessed,
@@ -20,12 +20,11 @@ impl Guess {
     ) -> Option<String> {
         let of_run = |run: &'r Run| run.diagnostics.iter().map(move |diagnostic| (run, diagnostic));
         for (run, diagnostic) in runs.into_iter().flat_map(of_run) {
-            let Diagnostic::InputFault { detected, read_as } = diagnostic else { continue };
+            let Some((detected, read_as)) = diagnostic.fault else { continue };
             let is_measured = is_mass_known && run.gradient_source != GradientSource::Unknown;
             if needs_balance(detected.fault) && !is_measured {
                 continue;
             }
-            let read_as = unit_of(*detected, read_as);
             let Some(unit) = detected.true_unit(&read_as) else { continue };
             let (quantities, _) = concerned(detected.fault);
             let is_open = |quantity| {

@@ -5,9 +5,8 @@ use dynocar_model::units::Unit;
 use super::facts::Facts;
 use super::name::{Name, named_unit};
 use super::plausible::{UnitChoice, choose_unit};
-use super::problem::GuessError;
 use super::spelling::Spelled;
-use crate::{Quantity, TimeFormat};
+use crate::{Quantity, TextLayout, TimeFormat};
 
 /// A recording's file.
 #[derive(Clone, Copy, Debug)]
@@ -32,14 +31,8 @@ pub struct GivenColumn {
 /// The description of recordings, as far as it can be guessed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Guess {
-    /// Between the cells of a row.
-    pub delimiter: u8,
-    /// Between a number and its fraction.
-    pub decimal: u8,
-    /// Lines above the names.
-    pub skip_rows: usize,
-    /// True where a line of units stands below the names.
-    pub units_row: bool,
+    /// How the text falls into cells; the encoding is as UTF-8 where nobody says another.
+    pub layout: TextLayout,
     /// The columns that hold a quantity, in the order of [`Quantity::ALL`].
     pub columns: Vec<GuessedColumn>,
     /// The other columns, in the order of the header.
@@ -145,6 +138,3 @@ impl GuessedColumn {
         GuessedColumn { unit, scale: 1.0, format, doubts, is_unit_open: false, ..self }
     }
 }
-
-/// A guess, or why there is none.
-pub type GuessResult<T> = Result<T, GuessError>;

@@ -1,10 +1,10 @@
 //! How a file's text falls into cells: delimiter, decimal mark, the lines above the names, names and units.
 use super::name::Name;
-use super::problem::{GuessError, GuessProblem};
 use super::spelling;
 use crate::cell::parse_cell;
+use crate::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
 use crate::lines::{self, RowReader};
-use crate::{Problem, SourcePosition, TimeFormat};
+use crate::{TextLayout, TimeFormat};
 
 /// What may separate cells, in the order of preference.
 const DELIMITERS: [u8; 4] = *b";\t|,";
@@ -12,16 +12,12 @@ const DELIMITERS: [u8; 4] = *b";\t|,";
 const ROWS_MAX: usize = 200;
 
 /// How a file's text falls into cells.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
-    /// Between the cells of a row.
-    pub delimiter: u8,
+    /// As a dataset says it.
+    pub text: TextLayout,
     /// Between a number and its fraction; `None` where no number has one.
     pub decimal: Option<u8>,
-    /// Lines above that with the names.
-    pub skip_rows: usize,
-    /// True where a line of units stands below the names.
-    pub units_row: bool,
     /// The columns' names, with the units that stand below them.
     pub header: Vec<Name>,
 }
@@ -44,16 +40,16 @@ struct Block {
 /// # Errors
 ///
 /// Where no line above the values holds names of columns, or no values follow.
-pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
+pub fn layout(label: &str, text: &str) -> Result<Layout, DatasetError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let readings = DELIMITERS.map(|delimiter| {
         let rows = first_rows(text, delimiter);
         (delimiter, block(&rows), rows)
     });
-    let wrong = |line: usize, problem| GuessError::new(SourcePosition::line(label, line), problem);
+    let wrong = |line: usize, words: String| Err(SourcePosition::line(label, line).problem(words));
     let [(.., rows), ..] = &readings;
     if rows.iter().all(|row| row.filled().next().is_none()) {
-        return Err(SourcePosition::whole(label).problem(Problem::NoHeader).into());
+        return Err(SourcePosition::whole(label).problem(NO_HEADER));
     }
     let best =
         readings.iter().max_by(|one, other| fit(one.1, &one.2).total_cmp(&fit(other.1, &other.2)));
@@ -61,30 +57,40 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, GuessError> {
         best.filter(|(.., rows)| rows.iter().any(|row| row.cells.len() > 1))
     else {
         let found = Name::parse(&rows[0].cells.join(",")).shown();
-        return Err(wrong(1, GuessProblem::OneColumn { found }));
+        return wrong(
+            1,
+            format!(
+                "expected names of columns separated by a comma, semicolon, tab or |, found only \
+                 '{found}'"
+            ),
+        );
     };
     let Some(Block { header, units }) = *block else {
-        let found = rows[0].cells[0].trim().to_string();
-        return Err(wrong(rows[0].line, GuessProblem::NoNames { found }));
+        let found = rows[0].cells[0].trim();
+        let words = "write the names into a line above";
+        let words = format!("expected names of columns, found '{found}': {words}");
+        return wrong(rows[0].line, words);
     };
     let (names, values) = (&rows[header], &rows[units.unwrap_or(header) + 1..]);
     if values.is_empty() {
-        return Err(SourcePosition::whole(label).problem(Problem::NoRows).into());
+        return Err(SourcePosition::whole(label).problem(NO_ROWS));
     }
     let (found, usual) = (names.cells.len(), usual_width(values).unwrap_or(0));
     if found < usual {
-        return Err(wrong(names.line, GuessProblem::FewNames { found, usual }));
+        let words = "write a name for every column";
+        let above = format!("found {found} cells above rows of {usual}");
+        return wrong(names.line, format!("expected names of columns, {above}: {words}"));
     }
     let units = units.map(|units| &rows[units]);
     let name = |(index, cell): (usize, &String)| {
         let unit = units.and_then(|row| row.cells.get(index)).map(|cell| without_brackets(cell));
         Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && spelling::is_unit(unit)))
     };
+    let (delimiter, skip_rows) = (*delimiter, names.line - 1);
+    let units_row = units.is_some();
     Ok(Layout {
-        delimiter: *delimiter,
+        text: TextLayout { delimiter, skip_rows, units_row, ..TextLayout::PLAIN },
         decimal: decimal(values),
-        skip_rows: names.line - 1,
-        units_row: units.is_some(),
         header: names.cells.iter().enumerate().map(name).collect(),
     })
 }
@@ -199,7 +205,7 @@ mod tests {
     fn recognised(text: &str) -> (char, Option<char>, usize) {
         let layout = layout("a.csv", text).unwrap();
         let decimal = layout.decimal.map(char::from);
-        (char::from(layout.delimiter), decimal, layout.header.len())
+        (char::from(layout.text.delimiter), decimal, layout.header.len())
     }
 
     fn refusal(text: &str) -> String {
@@ -240,7 +246,7 @@ mod tests {
             let names: Vec<String> = layout.header.iter().map(|name| name.text.clone()).collect();
             let units: Vec<Option<String>> =
                 layout.header.iter().map(|it| it.unit.clone()).collect();
-            (layout.skip_rows, layout.units_row, names.join(" "), units)
+            (layout.text.skip_rows, layout.text.units_row, names.join(" "), units)
         };
         let unit = |text: &str| Some(text.to_string());
         let (none, plain) = (vec![None, None, None], "t v F".to_string());

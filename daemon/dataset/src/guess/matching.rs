@@ -5,7 +5,8 @@ use super::guessed::GuessedColumn;
 use super::name::{Name, readings};
 use super::spelling::{self, Spelled};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
-use crate::{Choices, Quantity};
+use crate::Quantity;
+use crate::names::nearest;
 
 /// What a name is worth that says the quantity and nothing else.
 const SAID: i32 = 100;
@@ -171,11 +172,10 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
         let is_own = *term == it.name().replace('_', " ");
         (*weight == TermWeight::Named || is_own) && term.len() >= WITHIN_MIN - 1
     };
-    let names: Vec<(Quantity, String)> =
-        all().filter(is_named).map(|(it, _, term)| (it, term.replace(' ', ""))).collect();
-    let choices = Choices::new(&joined, names.iter().map(|(_, term)| term.clone()));
-    let nearest = choices.nearest()?;
-    let is_meant = names.iter().any(|(of, term)| *of == quantity && term == nearest);
+    let (of, names): (Vec<Quantity>, Vec<String>) =
+        all().filter(is_named).map(|(it, _, term)| (it, term.replace(' ', ""))).unzip();
+    let nearest = nearest(&joined, &names)?;
+    let is_meant = of.iter().zip(&names).any(|(of, term)| *of == quantity && term == nearest);
     // Likeness of single letters only: a name's beginning says too little here.
     let is_alike = joined.len().abs_diff(nearest.len()) <= 2;
     (is_meant && is_alike).then(|| (50, format!("that the name is like '{nearest}'")))

@@ -12,7 +12,7 @@
 //!   call the quantities
 //! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
 //! - `assignment`, `forces`, `correction`: one column for each quantity, and what cannot stand
-//! - [`guessed`], [`problem`]: what comes out, or why nothing does
+//! - [`guessed`]: what comes out
 
 mod assignment;
 mod columns;
@@ -24,7 +24,6 @@ mod layout;
 mod matching;
 mod name;
 mod plausible;
-pub mod problem;
 mod spelling;
 mod vocabulary;
 
@@ -33,9 +32,8 @@ mod tests;
 
 pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, Recording, Unmapped};
 pub use name::Name;
-pub use problem::{GuessError, GuessProblem};
 
-use super::{Quantity, SourcePosition};
+use super::{DatasetError, Quantity, SourcePosition};
 
 /// Guesses the description of recordings that are laid out alike, and takes what is declared for
 /// granted.
@@ -44,17 +42,24 @@ use super::{Quantity, SourcePosition};
 ///
 /// Where a file is none that a dataset can have, or holds no time or no speed that can be
 /// recognised; with file, line and what was expected.
-pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, GuessError> {
+pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, DatasetError> {
     let read = columns::Columns::read(files)?;
     let label = files.first().map_or("", |file| file.label);
     let mut assignment = assignment::Assignment::new(&read, given, label)?;
     forces::settle(&mut assignment);
     for quantity in [Quantity::Time, Quantity::Speed] {
         if !assignment.has(quantity) {
-            let (reasons, columns) = (assignment.near(quantity), read.names());
-            let place = SourcePosition::line(label, read.layout.skip_rows + 1);
-            let problem = GuessProblem::Missing { quantity, reasons, columns };
-            return Err(GuessError::new(place, problem));
+            let near = match assignment.near(quantity).join("; ") {
+                none if none.is_empty() => none,
+                near => format!(" ({near})"),
+            };
+            let grows =
+                if quantity == Quantity::Time { " (numbers or times that grow)" } else { "" };
+            return Err(SourcePosition::line(label, read.layout.text.skip_rows + 1).problem(format!(
+                "no column was recognised as {quantity}{near}; the columns: {}; say which it is: \
+                 --column {quantity}=COLUMN:UNIT{grows}",
+                read.names()
+            )));
         }
     }
     let (columns, unmapped) = assignment.finish();
@@ -70,6 +75,5 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, GuessE
         day: dates.clone().find_map(|column| column.facts[index].day),
     });
     let runs = runs.collect();
-    let layout::Layout { delimiter, skip_rows, units_row, .. } = read.layout;
-    Ok(Guess { delimiter, decimal: read.decimal, skip_rows, units_row, columns, unmapped, runs })
+    Ok(Guess { layout: read.layout.text, columns, unmapped, runs })
 }

@@ -130,7 +130,7 @@ fn a_decimal_comma_and_a_semicolon_are_seen() {
         vec![comma(row[0]), comma(row[2] * 3.6), comma(row[3] / 1e3)]
     });
     let guess = guessed(&text);
-    assert_eq!((guess.delimiter, guess.decimal), (b';', b','));
+    assert_eq!((guess.layout.delimiter, guess.layout.decimal), (b';', b','));
     let expected = [
         (Time, "Zeit [s]", "s", 1.0),
         (Speed, "v [km/h]", "km/h", 1.0),
@@ -276,7 +276,11 @@ fn files_of_another_layout_are_refused() {
 #[test]
 fn what_lacks_time_or_speed_is_refused_with_what_comes_near() {
     let message = refusal("t,F\n0,1\n1,2\n");
-    assert_eq!(message, "a.csv:1: no column was recognised as speed; the columns: 't', 'F'");
+    assert_eq!(
+        message,
+        "a.csv:1: no column was recognised as speed; the columns: 't', 'F'; say which it is: \
+         --column speed=COLUMN:UNIT"
+    );
     let message = refusal("timestamp,v\n2024-05-01 10:00,1\n2024-05-01 10:01,2\n");
     assert!(
         message.contains("time ('timestamp': it holds text in line 2: '2024-05-01 10:00')"),
@@ -312,8 +316,8 @@ fn a_loggers_preamble_units_and_clock_times_are_described() {
                 18.03.2026;23:59:59,0;10,5;60;\n18.03.2026;23:59:59,5;11,5;60;x\n\
                 19.03.2026;00:00:00,0;12,5;60;\n19.03.2026;00:00:00,5;13,5;60;\n";
     let guess = guess(&[Recording { label: "a.csv", text }], &[]).unwrap();
-    assert_eq!((guess.delimiter, guess.decimal), (b';', b','));
-    assert_eq!((guess.skip_rows, guess.units_row), (2, true));
+    assert_eq!((guess.layout.delimiter, guess.layout.decimal), (b';', b','));
+    assert_eq!((guess.layout.skip_rows, guess.layout.units_row), (2, true));
     let time = guess.column(Quantity::Time).unwrap();
     assert_eq!((&time.name.text[..], time.format.as_ref()), ("Uhrzeit", Some(&TimeFormat::Clock)));
     assert!(time.doubts.is_empty(), "{:?}", time.doubts);

@@ -10,13 +10,14 @@ mod understood;
 pub use understood::Understood;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use dynocar::cli::check::{self as daemon_check, CheckArguments, or_refused};
 use dynocar_analysis::dataset::{SourcePosition, parse_track, parse_train, top_keys};
 use serde::Serialize;
 
 use dynocar::cli::Failure;
-use dynocar::dataset::{self, FileKind, LoadError, file_error, kind_of, read_text};
+use dynocar::dataset::{self, FileKind, LoadError, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
 
 /// Runs `dynocar check`.
@@ -63,20 +64,23 @@ pub fn understand(path: &Path) -> Result<Understood, Failure> {
     if !path.is_file() || dataset::is_recording(path) {
         return read_dataset(path);
     }
-    let label = path.display().to_string();
+    let (label, text) = labelled_text(path)?;
     let refuse = |message| Err(Failure::At(SourcePosition::whole(&label), message));
-    let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
     if path.extension().is_none_or(|extension| extension != "toml") {
         return refuse(format!("{label}: not a TOML file; {EXPECTED}"));
     }
     let keys = top_keys(&label, &text)?;
-    Ok(match kind_of(&keys) {
-        Some(FileKind::Dataset) => return read_dataset(path),
-        Some(FileKind::Train) => Understood::Train(Box::new(parse_train(&label, &text)?)),
-        Some(FileKind::Track) => Understood::Track(Box::new(parse_track(&label, &text)?)),
-        Some(FileKind::Daemon) => Understood::Daemon(Box::new(daemon_check::read(path)?)),
-        None => return refuse(format!("{label}: {}; {EXPECTED}", found(&keys))),
-    })
+    let Some(kind) = kind_of(&keys) else {
+        return refuse(format!("{label}: {}; {EXPECTED}", found(&keys)));
+    };
+    let mut understood = Understood::of(kind);
+    match kind {
+        FileKind::Dataset => return read_dataset(path),
+        FileKind::Train => understood.train = Some(Arc::new(parse_train(&label, &text)?)),
+        FileKind::Track => understood.track = Some(Arc::new(parse_track(&label, &text)?)),
+        FileKind::Daemon => understood.daemon = Some(daemon_check::read(path)?),
+    }
+    Ok(understood)
 }
 
 const EXPECTED: &str = "expected a dataset's folder or its dataset.toml (with a table [dataset]), \
@@ -101,5 +105,10 @@ fn read_dataset(path: &Path) -> Result<Understood, Failure> {
         other => other.into(),
     })?;
     let runs = head.read_each(&folder);
-    Ok(Understood::Dataset(Box::new(head), runs))
+    Ok(Understood {
+        dataset: Some((head.manifest, runs)),
+        train: Some(head.train),
+        track: head.track,
+        ..Understood::of(FileKind::Dataset)
+    })
 }

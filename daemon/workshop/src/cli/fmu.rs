@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use dynocar_analysis::dataset::{DatasetError, DatasetFiles, FileProblem};
+use dynocar_analysis::dataset::{DatasetError, DatasetFiles};
 use dynocar_fmu::variables::ModelFile;
 use dynocar_fmu::{ESTIMATORS, PLANT};
 
@@ -88,10 +88,7 @@ fn named_files(
     train: Option<&Path>,
     track: Option<&Path>,
 ) -> Result<Vec<(ModelFile, String)>, Failure> {
-    let text = |path: &Path| {
-        dataset::read_text(path)
-            .map_err(|problem| dataset::file_error(&path.display().to_string(), problem))
-    };
+    let text = |path: &Path| dataset::labelled_text(path).map(|(_, text)| text);
     let mut files = Vec::new();
     if let Some(path) = train {
         dataset::load_train(path)?;
@@ -114,8 +111,7 @@ fn files_of_updated(folder: &Path) -> Result<Vec<(ModelFile, String)>, Failure> 
 fn files_of_dataset(path: &Path) -> Result<Vec<(ModelFile, String)>, Failure> {
     let (folder, head) = dataset::open(path)?;
     let text = |path: &str| -> Result<String, DatasetError> {
-        let unreadable = |problem: FileProblem| dataset::file_error(&folder.label(path), problem);
-        folder.read(path).map_err(unreadable)
+        folder.read(path).map_err(|problem| problem.of(&folder.label(path)))
     };
     let mut files = vec![(ModelFile::Train, text(&head.manifest.train_file.path)?)];
     if let Some(track) = &head.manifest.track_file {

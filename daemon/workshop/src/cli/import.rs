@@ -8,12 +8,12 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::{parse_track, parse_train};
-use dynocar_analysis::import::{Format, ImportError, Reading, Source, import};
+use dynocar_analysis::import::{Format, Reading, Source, import};
 
 use super::train_text::{TRAIN_FILE, TrainArguments};
 use crate::track_text::TRACK_FILE;
 use dynocar::cli::Failure;
-use dynocar::dataset::{file_error, read_text};
+use dynocar::dataset::labelled_text;
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 
 /// Import trains and lines of railtoolkit, TTOBench or OSRD.
@@ -55,15 +55,11 @@ pub struct ImportArguments {
 pub fn execute(arguments: &ImportArguments) -> Result<(), Failure> {
     let out = &arguments.out;
     require_folder(out)?;
-    let mut texts = Vec::new();
-    for path in &arguments.files {
-        let label = path.display().to_string();
-        let text = read_text(path).map_err(|problem| file_error(&label, problem))?;
-        texts.push((label, text));
-    }
+    let texts = arguments.files.iter().map(|path| labelled_text(path));
+    let texts: Vec<_> = texts.collect::<Result<_, _>>()?;
     let sources: Vec<Source> = texts.iter().map(|(label, text)| Source { label, text }).collect();
     let reading = Reading { load_share: arguments.load, mode: arguments.mode.clone() };
-    let imported = import(&sources, arguments.format, &reading).map_err(failure)?;
+    let imported = import(&sources, arguments.format, &reading)?;
     let train = chosen(&imported.trains, |it| &it.id, arguments.train_id.as_deref(), "train")?;
     let line = chosen(&imported.lines, |it| &it.id, arguments.line_id.as_deref(), "line")?;
     if train.is_none() && !arguments.train.is_empty() {
@@ -118,10 +114,6 @@ fn chosen<'i, T>(
             "--{what} {wanted}: it stands in several files; give one of them at a time"
         ))),
     }
-}
-
-fn failure(error: ImportError) -> Failure {
-    Failure::At(error.place.clone(), error.to_string())
 }
 
 fn format(name: &str) -> Result<Format, String> {

@@ -10,20 +10,18 @@ mod letters;
 mod paths;
 mod summary;
 
-use std::path::Path;
-
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
-use dynocar_analysis::dataset::guess::{Guess, GuessError, GuessProblem, Recording, guess};
-use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity, SourcePosition};
+use dynocar_analysis::dataset::guess::{Guess, Recording, guess};
+use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity};
 use toml::Value;
 
 use super::train_text::{Found, TRAIN_FILE, TrainText};
 use crate::track_text::TRACK_FILE;
 pub use arguments::InitArguments;
 use described::{DAEMON_FILE, Described};
-use draft::{Draft, DraftFile};
+use draft::Draft;
 use dynocar::cli::Failure;
-use dynocar::dataset::{file_error, read_text};
+use dynocar::dataset::labelled_text;
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 
 const WRITER: &str = "dynocar init";
@@ -72,9 +70,10 @@ fn describe(
     let files = paths::from_folder(arguments.folder(), &arguments.csv)?;
     let recordings: Vec<Recording> =
         texts.iter().map(|(label, text)| Recording { label, text }).collect();
-    let mut guess = guess(&recordings, &arguments.column).map_err(failure)?;
+    let mut guess = guess(&recordings, &arguments.column)?;
+    guess.layout.encoding = encoding;
     let track = match has_track {
-        true => Some(read_track(&arguments.folder().join(TRACK_FILE))?),
+        true => Some(labelled_text(&arguments.folder().join(TRACK_FILE))?.1),
         false => None,
     };
     if let Some(mass_t) = recorded_mass_t(&guess) {
@@ -86,21 +85,16 @@ fn describe(
     let folder = arguments.folder();
     let mut corrections = 0;
     loop {
-        let text = dataset_text::dataset(&guess, &name, (&files, encoding), has_track);
-        let own = |path, text| DraftFile { path, label: None, text };
-        let mut draft = vec![own(MANIFEST_FILE, &text[..]), own(TRAIN_FILE, &train.text)];
-        draft.extend(track.as_deref().map(|track| own(TRACK_FILE, track)));
+        let text = dataset_text::dataset(&guess, &name, &files, has_track);
+        let mut draft = vec![(MANIFEST_FILE, None, &text[..]), (TRAIN_FILE, None, &train.text)];
+        draft.extend(track.as_deref().map(|track| (TRACK_FILE, None, track)));
         let runs = files.iter().zip(&recordings);
-        draft.extend(runs.map(|(path, &Recording { label, text })| DraftFile {
-            path,
-            label: Some(label),
-            text,
-        }));
+        draft.extend(runs.map(|(path, it)| (&path[..], Some(it.label), it.text)));
         let (head, runs) = Draft { folder, files: draft }.read()?;
         let knows_mass = arguments.train.knows_mass();
         if corrections == CORRECTIONS_MAX || guess.correct(&runs, knows_mass).is_none() {
             let diagnostics = diagnostics(&head.train, head.track.as_deref(), &runs);
-            return Ok(Described { guess, encoding, files, diagnostics, text });
+            return Ok(Described { guess, files, diagnostics, text });
         }
         corrections += 1;
     }
@@ -111,20 +105,4 @@ fn recorded_mass_t(guess: &Guess) -> Option<f64> {
     let column = guess.column(Quantity::TrainMass)?;
     let mass_t = column.unit.to_base(column.middle * column.scale) / 1000.0;
     (mass_t > 0.0 && mass_t.is_finite()).then_some((mass_t * 10.0).round() / 10.0)
-}
-
-fn read_track(path: &Path) -> Result<String, Failure> {
-    Ok(read_text(path).map_err(|problem| file_error(&path.display().to_string(), problem))?)
-}
-
-/// A guess that failed, with what helps.
-fn failure(error: GuessError) -> Failure {
-    let message = match *error.problem {
-        GuessProblem::Missing { quantity, .. } => format!(
-            "{error}; say which it is: --column {quantity}=COLUMN:UNIT{}",
-            if quantity == Quantity::Time { " (numbers or times that grow)" } else { "" }
-        ),
-        _ => error.to_string(),
-    };
-    Failure::At(SourcePosition { file: error.place.file, line: error.place.line }, message)
 }

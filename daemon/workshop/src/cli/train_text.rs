@@ -99,11 +99,22 @@ impl TrainArguments {
 
     /// True where a key is said.
     pub fn knows(&self, key: &str) -> bool {
-        match key {
-            "name" => self.name.is_some(),
-            "cars" => self.cars.is_some(),
-            key => self.clone().figure(key).is_some_and(|figure| figure.is_some()),
-        }
+        self.said().into_iter().any(|(said, value)| said == key && value.is_some())
+    }
+
+    /// What is said, by its key, in the order of the file.
+    fn said(&self) -> [(&'static str, Option<Value>); 8] {
+        let number = |it: Option<f64>| it.map(Value::Float);
+        [
+            ("name", self.name.clone().map(Value::String)),
+            ("mass_t", number(self.mass_t)),
+            ("length_m", number(self.length_m)),
+            ("cars", self.cars.map(|cars| Value::Integer(cars.into()))),
+            ("rotating_mass_factor", number(self.rotating_mass_factor)),
+            ("a", number(self.a)),
+            ("b", number(self.b)),
+            ("c", number(self.c)),
+        ]
     }
 
     fn figure(&mut self, key: &str) -> Option<&mut Option<f64>> {
@@ -169,29 +180,43 @@ impl TrainArguments {
         });
         let length_m = known_length_m.unwrap_or((mass_t / MASS_PER_LENGTH_T_PER_M).max(1.0));
         let cars = (length_m / CAR_LENGTH_M).round().clamp(1.0, 1000.0) as u32;
-        let mut lines = Lines { text: head(writer), defaults: Vec::new(), found };
-        let name = self.name.clone();
-        lines.push("name", name.map(Value::String), Value::String("my train".into()), "");
-        lines.number("mass_t", self.mass_t, mass_t, "t, with its load");
-        lines.number("length_m", self.length_m, length_m, "m, over the couplers");
-        let given = self.cars.map(|cars| Value::Integer(cars.into()));
-        lines.push("cars", given, Value::Integer(cars.into()), "with the locomotive");
-        let words = "inertia of wheels, axles and motors as a share of the mass";
-        let gamma = self.rotating_mass_factor;
-        lines.number("rotating_mass_factor", gamma, ROTATING_MASS_DEFAULT, words);
-        lines.text += RESISTANCE;
-        let units = ["N/kN", "N/kN per m/s", "N/kN per (m/s)²"];
-        let given = [("a", self.a), ("b", self.b), ("c", self.c)];
-        for (((key, given), default), unit) in given.into_iter().zip(DAVIS_DEFAULT).zip(units) {
-            lines.number(key, given, default, unit);
+        let [a, b, c] = DAVIS_DEFAULT.map(Value::Float);
+        let inertia = "inertia of wheels, axles and motors as a share of the mass";
+        let defaults = [
+            (Value::String("my train".into()), ""),
+            (Value::Float(mass_t), "t, with its load"),
+            (Value::Float(length_m), "m, over the couplers"),
+            (Value::Integer(cars.into()), "with the locomotive"),
+            (Value::Float(ROTATING_MASS_DEFAULT), inertia),
+            (a, "N/kN"),
+            (b, "N/kN per m/s"),
+            (c, "N/kN per (m/s)²"),
+        ];
+        let (mut text, mut marked) = (head(writer), Vec::new());
+        for ((key, said), (default, words)) in self.said().into_iter().zip(defaults) {
+            let from_files = found.figures.iter().find(|figure| figure.0 == key);
+            let (value, comment) = match (said, from_files) {
+                (Some(value), _) => (value, words.into()),
+                (None, Some((_, value, from))) => (value.clone(), on_one_line(from)),
+                (None, None) => {
+                    marked.push(format!("{key} = {default}"));
+                    (default, format!("DEFAULT; {words}").trim_end_matches("; ").to_owned())
+                }
+            };
+            let assignment = format!("{key} = {value}");
+            text += if key == "a" { RESISTANCE } else { "" };
+            text += &match &comment[..] {
+                "" => format!("{assignment}\n"),
+                comment => format!("{assignment:<31} # {comment}\n"),
+            };
         }
-        lines.text += CURVES;
-        lines.text += &found.traction.as_deref().map_or(TRACTION.into(), effort);
-        lines.text += BRAKE;
+        text += CURVES;
+        text += &found.traction.as_deref().map_or(TRACTION.into(), effort);
+        text += BRAKE;
         // The file's own reader judges the figures; only what was given can be wrong.
-        parse_train("train", &lines.text)
-            .map_err(|error| Failure::Input(format!("the train as given: {}", error.problem)))?;
-        Ok(TrainText { text: lines.text, defaults: lines.defaults })
+        parse_train("train", &text)
+            .map_err(|error| Failure::Input(format!("the train as given: {}", error.words)))?;
+        Ok(TrainText { text, defaults: marked })
     }
 }
 
@@ -243,39 +268,6 @@ const BRAKE: &str = "\
 # [brake]
 # max_force_kn = 200.0
 ";
-
-struct Lines<'f> {
-    text: String,
-    defaults: Vec<String>,
-    found: &'f Found,
-}
-
-impl Lines<'_> {
-    fn number(&mut self, key: &str, given: Option<f64>, default: f64, comment: &str) {
-        self.push(key, given.map(Value::Float), Value::Float(default), comment);
-    }
-
-    fn push(&mut self, key: &str, given: Option<Value>, default: Value, comment: &str) {
-        let found = self.found.figures.iter().find(|figure| figure.0 == key);
-        match (given, found) {
-            (Some(value), _) => self.known(key, &value, comment),
-            (None, Some((_, value, from))) => self.known(key, value, &on_one_line(from)),
-            (None, None) => {
-                self.defaults.push(format!("{key} = {default}"));
-                let comment = format!("DEFAULT; {comment}");
-                self.known(key, &default, comment.trim_end_matches("; "));
-            }
-        }
-    }
-
-    fn known(&mut self, key: &str, value: &Value, comment: &str) {
-        let assignment = format!("{key} = {value}");
-        self.text += &match comment {
-            "" => format!("{assignment}\n"),
-            comment => format!("{assignment:<31} # {comment}\n"),
-        };
-    }
-}
 
 #[cfg(test)]
 mod tests {

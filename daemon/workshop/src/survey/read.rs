@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_analysis::dataset::{Dataset, ForceSource, Role, Run};
+use dynocar_analysis::dataset::{Dataset, ForceSource, Quantity, Role, Run};
 use dynocar_analysis::survey::alignment::Alignment;
 use dynocar_analysis::survey::common::Prior;
 use dynocar_analysis::survey::geodesy::LocalPlane;
@@ -38,13 +38,13 @@ fn recording(dataset: &Dataset, run: &Run) -> RawRecording {
     let of = |field: SampleField| -> Vec<f64> {
         rows.iter().map(|&row| run.samples[row].get(field).unwrap_or(f64::NAN)).collect()
     };
-    let extra = |values: &Option<Vec<Option<f64>>>| -> Vec<f64> {
-        let Some(values) = values else { return Vec::new() };
+    let extra = |quantity| -> Vec<f64> {
+        let Some(values) = run.extra(quantity) else { return Vec::new() };
         rows.iter().map(|&row| values[row].unwrap_or(f64::NAN)).collect()
     };
-    let position = |values: &Option<Vec<Option<f64>>>| match values {
-        Some(_) => extra(values),
-        None => vec![f64::NAN; rows.len()],
+    let position = |quantity| match extra(quantity) {
+        none if none.is_empty() => vec![f64::NAN; rows.len()],
+        values => values,
     };
     let (traction, brake) = (of(SampleField::TractionForce), of(SampleField::BrakeForce));
     let pressure = of(SampleField::BrakeCylinderPressure);
@@ -60,7 +60,7 @@ fn recording(dataset: &Dataset, run: &Run) -> RawRecording {
             _ => traction - brake,
         }
     });
-    let passengers = extra(&run.extras.passengers);
+    let passengers = extra(Quantity::Passengers);
     let mass_kg = rows.iter().enumerate().map(|(index, &row)| {
         match passengers.get(index).is_some_and(|count| count.is_nan()) {
             true => f64::NAN,
@@ -74,10 +74,10 @@ fn recording(dataset: &Dataset, run: &Run) -> RawRecording {
         speed_mps: of(SampleField::Speed),
         control_n: control_n.collect(),
         friction_pa: if has_pressure && is_apart { pressure } else { Vec::new() },
-        latitude_deg: position(&run.extras.latitude_deg),
-        longitude_deg: position(&run.extras.longitude_deg),
-        altitude_m: extra(&run.extras.altitude_m),
-        door_open: extra(&run.extras.door_open),
+        latitude_deg: position(Quantity::Latitude),
+        longitude_deg: position(Quantity::Longitude),
+        altitude_m: extra(Quantity::Altitude),
+        door_open: extra(Quantity::DoorOpen),
         mass_kg: mass_kg.collect(),
         passengers,
     }
@@ -86,10 +86,10 @@ fn recording(dataset: &Dataset, run: &Run) -> RawRecording {
 /// What is declared of the vehicle.
 pub fn vehicle(dataset: &Dataset) -> Vehicle {
     let train = &dataset.train;
-    let has_passengers = dataset.runs.iter().any(|run| run.extras.passengers.is_some());
+    let has_passengers = dataset.runs.iter().any(|run| run.extra(Quantity::Passengers).is_some());
     let is_declared = |run: &Run| {
         run.samples.iter().any(|sample| sample.get(SampleField::Mass).is_some())
-            && run.extras.passengers.is_none()
+            && run.extra(Quantity::Passengers).is_none()
     };
     Vehicle {
         prior: Prior {

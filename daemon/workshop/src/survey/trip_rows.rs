@@ -1,7 +1,7 @@
 //! The file of a trip: its rows with a chainage, in SI units, forces where they act.
 
 use dynocar_analysis::dataset::stamps::{is_stamped_late, stamped_late};
-use dynocar_analysis::dataset::{Dataset, Extras, ForceSource, Quantity, Run};
+use dynocar_analysis::dataset::{Dataset, ForceSource, Quantity, Run};
 use dynocar_analysis::survey::{Survey, Trip};
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -23,7 +23,7 @@ enum Source {
     /// A field of the samples.
     Field(SampleField),
     /// What was recorded beside them.
-    Extra(fn(&Extras) -> &Option<Vec<Option<f64>>>),
+    Extra,
     /// Made of several, see `run_csv`.
     Made,
 }
@@ -50,17 +50,17 @@ const COLUMNS: [Column; 19] = {
         column(Quantity::TractionForce, "N", 1, Made),
         column(Quantity::BrakeForce, "N", 1, Made),
         column(Quantity::BrakeCylinderPressure, "Pa", 1, Field(SampleField::BrakeCylinderPressure)),
-        column(Quantity::TractionPower, "W", 0, Extra(|it| &it.traction_power_w)),
-        column(Quantity::LinePower, "W", 0, Extra(|it| &it.line_power_w)),
+        column(Quantity::TractionPower, "W", 0, Extra),
+        column(Quantity::LinePower, "W", 0, Extra),
         column(Quantity::Acceleration, "m/s2", 5, Field(SampleField::Acceleration)),
         column(Quantity::SpecificForce, "m/s2", 5, Field(SampleField::SpecificForce)),
         column(Quantity::TrainMass, "kg", 1, Made),
-        column(Quantity::Passengers, "1", 0, Extra(|it| &it.passengers)),
+        column(Quantity::Passengers, "1", 0, Extra),
         column(Quantity::AmbientTemperature, "degC", 2, Field(SampleField::AmbientTemperature)),
-        column(Quantity::Altitude, "m", 2, Extra(|it| &it.altitude_m)),
-        column(Quantity::Latitude, "deg", 7, Extra(|it| &it.latitude_deg)),
-        column(Quantity::Longitude, "deg", 7, Extra(|it| &it.longitude_deg)),
-        column(Quantity::DoorOpen, "1", 0, Extra(|it| &it.door_open)),
+        column(Quantity::Altitude, "m", 2, Extra),
+        column(Quantity::Latitude, "deg", 7, Extra),
+        column(Quantity::Longitude, "deg", 7, Extra),
+        column(Quantity::DoorOpen, "1", 0, Extra),
         column(Quantity::WheelSlide, "1", 0, Made),
     ]
 };
@@ -76,7 +76,7 @@ pub fn columns(dataset: &Dataset) -> Vec<Column> {
     let is_signed = any(&|run| run.traction_source == ForceSource::ControlForce);
     let is_there = |column: &Column| match (column.source, column.quantity) {
         (Source::Field(field), _) => has(field),
-        (Source::Extra(of), _) => any(&|run| of(&run.extras).is_some()),
+        (Source::Extra, quantity) => any(&|run| run.extra(quantity).is_some()),
         (_, Quantity::ControlForce) => is_signed,
         (_, Quantity::TractionForce) => !is_signed && has(SampleField::TractionForce),
         (_, Quantity::BrakeForce) => !is_signed && any(&has_own_brake),
@@ -119,7 +119,7 @@ pub fn run_csv(material: &Material, trip: &Trip) -> String {
         };
         let value = |column: &Column| match (column.source, column.quantity) {
             (Source::Field(field), _) => sample.get(field),
-            (Source::Extra(of), _) => of(&run.extras).as_ref()?[ordered[row]],
+            (Source::Extra, quantity) => run.extra(quantity)?[ordered[row]],
             (_, Quantity::Time) => Some(sample.time_ns as f64 * 1e-9),
             (_, Quantity::Position) => {
                 Some(material.survey.alignments.chainage_m(trip.direction, along_m))
@@ -148,7 +148,7 @@ fn mass_kg(material: &Material, run: &Run, row: usize) -> Option<f64> {
     if prior.is_weighed {
         return Some(declared_kg);
     }
-    let passengers = run.extras.passengers.as_ref().and_then(|it| it[row]).unwrap_or(0.0);
+    let passengers = run.extra(Quantity::Passengers).and_then(|it| it[row]).unwrap_or(0.0);
     let per_passenger_kg = common.passenger_kg() - prior.passenger_kg;
     Some(declared_kg + prior.mass_kg * common.mass_share() + passengers * per_passenger_kg)
 }

@@ -17,17 +17,11 @@ use dynocar::output::{report_line, write_in_folder};
 /// An input failure for what has neither; a failure of the work where a drawing cannot be made or
 /// written.
 pub(super) fn draw(understood: &Understood, folder: &Path) -> Result<(), Failure> {
-    let (train, track) = match understood {
-        Understood::Dataset(head, _) => (Some(&*head.train), head.track.as_deref()),
-        Understood::Train(train) => (Some(&**train), None),
-        Understood::Track(track) => (None, Some(&**track)),
-        Understood::Daemon(_) => {
-            return Err(Failure::Input(
-                "--draw: expected a dataset, a train or a track, not a daemon's configuration"
-                    .into(),
-            ));
-        }
-    };
+    if understood.daemon.is_some() {
+        let words = "expected a dataset, a train or a track, not a daemon's configuration";
+        return Err(Failure::Input(format!("--draw: {words}")));
+    }
+    let (train, track) = (understood.train.as_deref(), understood.track.as_deref());
     let failed = |error| Failure::Work(format!("the drawing failed: {error}"));
     let line = line::draw(track, &AlongLine::default(), false, Width::Wide).map_err(failed)?;
     let line = line.map(|plot| plot.svg);

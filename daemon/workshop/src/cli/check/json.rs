@@ -1,11 +1,9 @@
 //! What was understood, machine-readable. Units are SI and part of the keys.
+#![allow(non_camel_case_types, reason = "the types of an object's values are called as their keys")]
 
 use std::path::Path;
 
-use dynocar_analysis::dataset::{
-    ColumnMapping, DatasetError, DatasetHead, Diagnostic, ForceSource, GradientSource, Manifest,
-    PositionSource, Quantity, Role, Run, RunEntry, RunQuality, TimeFormat,
-};
+use dynocar_analysis::dataset::{DatasetError, Manifest, Run, RunEntry, TimeFormat};
 use dynocar_model::terms::CORRECTIONS;
 use dynocar_model::terms::extra::Extra;
 use dynocar_model::track::{LinearProfile, Track};
@@ -13,99 +11,24 @@ use dynocar_model::train::{Corrections, EffortCurve, TrainModel};
 use serde::{Serialize, Serializer};
 
 use super::Understood;
+use super::report::range;
 use crate::run_facts::recorded;
 use dynocar::cli::Failure;
-use dynocar::cli::check::{self as daemon, CheckAnswer, DaemonAnswer};
-use dynocar::models::Moment;
+use dynocar::cli::check::{self as daemon, CheckAnswer};
 
-/// What was understood.
-#[derive(Debug, Serialize)]
-pub(super) struct Content<'a> {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    dataset: Option<DatasetAnswer<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    train: Option<TrainAnswer<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    track: Option<TrackAnswer<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    daemon: Option<DaemonAnswer<'a>>,
-}
-
-#[derive(Debug, Serialize)]
-struct DatasetAnswer<'a> {
-    name: &'a str,
-    description: Option<&'a str>,
-    columns: Vec<ColumnAnswer<'a>>,
-    runs: Vec<RunAnswer<'a>>,
-}
-
-#[derive(Debug, Serialize)]
-struct ColumnAnswer<'a> {
-    quantity: Quantity,
-    column: &'a str,
-    unit: &'static str,
-    /// How its cells are written, where they are times and no numbers.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    format: Option<&'a str>,
-    scale: f64,
-    offset: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct RunAnswer<'a> {
-    file: &'a str,
-    role: Role,
-    direction: i8,
-    #[serde(flatten)]
-    outcome: RunOutcome<'a>,
-}
-
-#[derive(Debug, Serialize)]
-#[serde(untagged)]
-enum RunOutcome<'a> {
-    Read {
-        mass_kg: f64,
-        /// In UTC; left out where it is not known.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        recorded: Option<Moment>,
-        samples: usize,
-        position_source: PositionSource,
-        gradient_source: GradientSource,
-        traction_source: ForceSource,
-        brake_source: ForceSource,
-        quality: &'a RunQuality,
-        #[serde(rename = "remarks")]
-        diagnostics: &'a [Diagnostic],
-    },
-    Failed {
-        error: String,
-    },
-}
-
-#[derive(Debug, Serialize)]
-struct TrainAnswer<'a> {
-    name: &'a str,
-    mass_kg: f64,
-    length_m: f64,
-    cars: u32,
-    rotating_mass_factor: f64,
-    a: f64,
-    b: f64,
-    c: f64,
-    curve_constant_n_per_kn_m: f64,
-    tunnel_constant_n_per_kn_m: f64,
-    /// Points (m/s, N).
-    traction_effort: Option<&'a [(f64, f64)]>,
-    brake_effort: Option<&'a [(f64, f64)]>,
-    /// As in `train.toml`; `null` when nothing is corrected.
-    corrections: Option<CorrectionsAnswer<'a>>,
-    /// Formulas of the resistances of forms of their own.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    extra: Vec<String>,
+/// An object of these keys, in this order; after `..`, those of others, where they are there.
+macro_rules! object {
+    ($($key:ident: $value:expr,)* $(..$rest:ident: $more:expr,)*) => {{
+        #[derive(Serialize)]
+        struct Object<$($key,)* $($rest,)*> {
+            $($key: $key,)*
+            $(#[serde(flatten)] $rest: Option<$rest>,)*
+        }
+        Object { $($key: $value,)* $($rest: $more,)* }
+    }};
 }
 
 /// Every correction of a train, by its key and in the order of the table.
-#[derive(Debug)]
 struct CorrectionsAnswer<'a>(&'a TrainModel);
 
 impl Serialize for CorrectionsAnswer<'_> {
@@ -114,97 +37,77 @@ impl Serialize for CorrectionsAnswer<'_> {
     }
 }
 
-#[derive(Debug, Serialize)]
-struct TrackAnswer<'a> {
-    name: &'a str,
-    length_m: Option<f64>,
-    /// `null`: not known.
-    gradients: Option<usize>,
-    gradient_range_permille: Option<(f64, f64)>,
-    curves: Option<usize>,
-    tunnels: Option<usize>,
-    gradient_shift_m: f64,
-    /// (m, ‰) that the declared gradient lacks.
-    gradient_error: Vec<(f64, f64)>,
-    /// The same for falling chainage, where it is another way.
-    gradient_error_falling: Vec<(f64, f64)>,
-    /// Steps (m, N/kN) of further resistance; `null`: not known.
-    resistance: Option<Vec<(f64, f64)>>,
-    /// [from_m, to_m, direction, mass factor]
-    masses: Vec<[f64; 4]>,
-}
-
 /// The answer to what was understood.
-pub(super) fn answer<'a>(path: &Path, understood: &'a Understood) -> CheckAnswer<Content<'a>> {
+pub(super) fn answer(path: &Path, understood: &Understood) -> impl Serialize {
     let errors: Vec<String> = understood.errors().map(ToString::to_string).collect();
     let first = understood.errors().next().cloned();
-    let (dataset, train, track) = match understood {
-        Understood::Dataset(head, runs) => {
-            let DatasetHead { manifest, train, track } = &**head;
-            (Some(dataset(manifest, runs)), Some(&**train), track.as_deref())
-        }
-        Understood::Train(train) => (None, Some(&**train), None),
-        Understood::Track(track) => (None, None, Some(&**track)),
-        Understood::Daemon(_) => (None, None, None),
-    };
-    let content = Content {
-        dataset,
-        train: train.map(train_answer),
-        track: track.map(track_answer),
-        daemon: match understood {
-            Understood::Daemon(config) => Some(daemon::answer(config)),
-            _ => None,
-        },
-    };
+    let dataset = understood.dataset.as_ref();
+    let train = understood.train.as_deref();
+    let track = understood.track.as_deref();
+    let config = understood.daemon.as_ref();
     CheckAnswer {
         path: path.display().to_string(),
-        kind: Some(understood.kind()),
+        kind: Some(understood.kind),
         valid: errors.is_empty(),
         errors,
         error: first.and_then(|error| Failure::from(error).answer()),
         diagnostics: understood.diagnostics(),
-        content: Some(content),
+        content: Some(object! {
+            ..of_dataset: dataset.map(|it| object! { dataset: of_dataset(it), }),
+            ..of_train: train.map(|it| object! { train: of_train(it), }),
+            ..of_track: track.map(|it| object! { track: of_track(it), }),
+            ..of_daemon: config.map(|it| object! { daemon: daemon::answer(it), }),
+        }),
     }
 }
 
-fn dataset<'a>(manifest: &'a Manifest, runs: &'a [Result<Run, DatasetError>]) -> DatasetAnswer<'a> {
-    let column = |mapping: &'a ColumnMapping| ColumnAnswer {
-        quantity: mapping.quantity,
-        column: &mapping.column,
-        unit: mapping.unit.name(),
-        format: mapping.format.as_ref().map(TimeFormat::name),
-        scale: mapping.scale,
-        offset: mapping.offset,
+fn of_dataset((manifest, runs): &(Manifest, Vec<Result<Run, DatasetError>>)) -> impl Serialize {
+    let columns = manifest.columns.iter().map(|mapping| {
+        let format = mapping.format.as_ref().map(TimeFormat::name);
+        object! {
+            quantity: mapping.quantity,
+            column: &mapping.column,
+            unit: mapping.unit.name(),
+            ..written: format.map(|format| object! { format: format, }),
+            ..converted: Some(object! { scale: mapping.scale, offset: mapping.offset, }),
+        }
+    });
+    object! {
+        name: &manifest.name,
+        description: manifest.description.as_deref(),
+        columns: columns.collect::<Vec<_>>(),
+        runs: manifest.runs.iter().zip(runs).map(of_run).collect::<Vec<_>>(),
+    }
+}
+
+fn of_run<'a>((entry, run): (&'a RunEntry, &'a Result<Run, DatasetError>)) -> impl Serialize {
+    let read = |run: &'a Run| {
+        object! {
+            samples: run.samples.len(),
+            position_source: run.position_source,
+            gradient_source: run.gradient_source,
+            traction_source: run.traction_source,
+            brake_source: run.brake_source,
+            quality: &run.quality,
+            remarks: &run.diagnostics,
+        }
     };
-    let run = |(entry, run): (&'a RunEntry, &'a Result<Run, DatasetError>)| RunAnswer {
+    let run = run.as_ref();
+    object! {
         file: &entry.file,
         role: entry.role,
         direction: entry.direction,
-        outcome: match run {
-            Err(error) => RunOutcome::Failed { error: error.to_string() },
-            Ok(run) => RunOutcome::Read {
-                mass_kg: run.mass_kg,
-                recorded: recorded(run),
-                samples: run.samples.len(),
-                position_source: run.position_source,
-                gradient_source: run.gradient_source,
-                traction_source: run.traction_source,
-                brake_source: run.brake_source,
-                quality: &run.quality,
-                diagnostics: &run.diagnostics,
-            },
-        },
-    };
-    DatasetAnswer {
-        name: &manifest.name,
-        description: manifest.description.as_deref(),
-        columns: manifest.columns.iter().map(column).collect(),
-        runs: manifest.runs.iter().zip(runs).map(run).collect(),
+        ..failed: run.err().map(|error| object! { error: error.to_string(), }),
+        ..mass: run.ok().map(|run| object! { mass_kg: run.mass_kg, }),
+        ..at: run.ok().and_then(recorded).map(|at| object! { recorded: at, }),
+        ..data: run.ok().map(read),
     }
 }
 
-fn train_answer(train: &TrainModel) -> TrainAnswer<'_> {
-    TrainAnswer {
+fn of_train(train: &TrainModel) -> impl Serialize {
+    let corrections = Some(train).filter(|train| train.corrections != Corrections::NONE);
+    let extra: Vec<String> = train.extra.iter().map(Extra::law).collect();
+    object! {
         name: &train.name,
         mass_kg: train.mass_kg,
         length_m: train.length_m,
@@ -215,40 +118,40 @@ fn train_answer(train: &TrainModel) -> TrainAnswer<'_> {
         c: train.resistance.c,
         curve_constant_n_per_kn_m: train.curve_constant_n_per_kn_m,
         tunnel_constant_n_per_kn_m: train.tunnel_constant_n_per_kn_m,
+        // Points (m/s, N).
         traction_effort: train.traction.as_ref().map(EffortCurve::points),
         brake_effort: train.brake.as_ref().map(EffortCurve::points),
-        corrections: (train.corrections != Corrections::NONE).then_some(CorrectionsAnswer(train)),
-        extra: train.extra.iter().map(Extra::law).collect(),
+        // As in `train.toml`; `null` when nothing is corrected.
+        corrections: corrections.map(CorrectionsAnswer),
+        // Formulas of the resistances of forms of their own.
+        ..own: Some(extra).filter(|it| !it.is_empty()).map(|extra| object! { extra: extra, }),
     }
 }
 
-fn track_answer(track: &Track) -> TrackAnswer<'_> {
+/// What is `null` is not known.
+fn of_track(track: &Track) -> impl Serialize {
     let gradient = track.gradient();
-    let range = gradient.map(|profile| {
-        profile.entries().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, permille)| {
-            (low.min(permille), high.max(permille))
-        })
-    });
-    let lacks = |profile: Option<&LinearProfile>| {
+    let lacks = track.gradient_error.as_ref();
+    let points = |profile: Option<&LinearProfile>| {
         profile.map_or_else(Vec::new, |profile| profile.entries().to_vec())
     };
-    TrackAnswer {
+    let masses = track.masses.iter();
+    object! {
         name: &track.name,
         length_m: track.length_m,
         gradients: gradient.map(|profile| profile.entries().len()),
-        gradient_range_permille: range,
+        gradient_range_permille: gradient.map(|it| range(it.entries().map(|entry| entry.1))),
         curves: track.knows_curves().then(|| track.curves().len()),
         tunnels: track.knows_tunnels().then(|| track.tunnels().len()),
         gradient_shift_m: track.gradient_shift_m,
-        gradient_error: lacks(track.gradient_error.as_ref().map(|error| &error.profile)),
-        gradient_error_falling: lacks(
-            track.gradient_error.as_ref().and_then(|error| error.falling.as_ref()),
-        ),
-        resistance: track.resistance().map(|profile| profile.entries().collect()),
-        masses: track
-            .masses
-            .iter()
+        // (m, ‰) that the declared gradient lacks, and the same for falling chainage, where it is another way.
+        gradient_error: points(lacks.map(|error| &error.profile)),
+        gradient_error_falling: points(lacks.and_then(|error| error.falling.as_ref())),
+        // Steps (m, N/kN) of further resistance.
+        resistance: track.resistance().map(|profile| profile.entries().collect::<Vec<_>>()),
+        // [from_m, to_m, direction, mass factor]
+        masses: masses
             .map(|it| [it.from_m, it.to_m, it.direction, it.mass_factor])
-            .collect(),
+            .collect::<Vec<_>>(),
     }
 }

@@ -11,31 +11,25 @@ use crate::cli::text::{self, WIDTH, line, short, wrap};
 
 /// The whole report.
 pub(super) fn report(understood: &Understood) -> String {
-    match understood {
-        Understood::Train(model) => match &text::diagnostics(&understood.diagnostics())[..] {
-            "" => train(model),
-            diagnostics => format!("{}\nnotes\n{diagnostics}", train(model)),
-        },
-        Understood::Track(line) => track(line),
-        Understood::Daemon(config) => daemon::report(config),
-        Understood::Dataset(head, read) => {
-            let track = match &head.track {
-                Some(line) => track(line),
-                None => "track    not known\n".into(),
-            };
-            let parts = [
-                dataset(&head.manifest),
-                train(&head.train),
-                track,
-                columns(&head.manifest),
-                runs::report(&head.manifest, read, &understood.diagnostics()),
-            ];
-            parts.join("\n")
+    let dataset = understood.dataset.as_ref();
+    let diagnostics = understood.diagnostics();
+    let mut parts: Vec<String> = dataset.iter().map(|(manifest, _)| head(manifest)).collect();
+    parts.extend(understood.train.as_deref().map(train));
+    parts.extend(understood.track.as_deref().map(track));
+    parts.extend(understood.daemon.as_ref().map(daemon::report));
+    if let Some((manifest, runs)) = dataset {
+        if understood.track.is_none() {
+            parts.push("track    not known\n".into());
         }
+        parts.push(columns(manifest));
+        parts.push(runs::report(manifest, runs, &diagnostics));
+    } else if !diagnostics.is_empty() {
+        parts.push(format!("notes\n{}", text::diagnostics(&diagnostics)));
     }
+    parts.join("\n")
 }
 
-fn dataset(manifest: &Manifest) -> String {
+fn head(manifest: &Manifest) -> String {
     let mut text = format!("dataset  {}\n", manifest.name);
     if let Some(description) = &manifest.description {
         for line in wrap(description, WIDTH) {
@@ -98,72 +92,41 @@ fn train(train: &TrainModel) -> String {
 /// What measured runs have added to the declared model, as far as it changes something.
 fn corrections(known: &Corrections) -> Vec<String> {
     let none = Corrections::NONE;
-    let mut parts = Vec::new();
-    let mut say = |acts: bool, words: String| {
-        if acts {
-            parts.push(words);
-        }
-    };
     let signed = |value: f64, decimals| {
         let sign = if value < 0.0 { "-" } else { "+" };
         format!("{sign}{}", short(value.abs(), decimals))
     };
-    say(
-        known.speed_scale != none.speed_scale,
-        format!("measured over true speed {}", short(known.speed_scale, 5)),
+    let wind = format!("headwind {} m/s as the chainage grows", signed(known.wind_plus_mps, 3));
+    let bearings = format!(
+        "{} N/kN of cold bearings, fading in {} s",
+        signed(known.bearing_delta_a_n_per_kn, 4),
+        short(known.bearing_tau_s, 1)
     );
-    say(
-        known.speed_delay_s > 0.0,
-        format!("the measured speed is {} s late", short(known.speed_delay_s, 3)),
+    let ambient = format!(
+        "{} % of w0 per kelvin above {} K",
+        signed(100.0 * known.ambient_w0_per_k, 4),
+        short(known.ambient_reference_k, 2)
     );
-    say(
-        known.speed_lag_s > 0.0,
-        format!(
-            "the measured speed follows with a time constant of {} s",
-            short(known.speed_lag_s, 3)
-        ),
-    );
-    say(
-        known.traction_gain != none.traction_gain,
-        format!("reported over true traction {}", short(known.traction_gain, 5)),
-    );
-    say(
-        known.actuator_delay_s > 0.0,
-        format!("forces act {} s late", short(known.actuator_delay_s, 3)),
-    );
-    say(
-        known.actuator_lag_s > 0.0,
-        format!("forces build up with a time constant of {} s", short(known.actuator_lag_s, 3)),
-    );
-    say(
-        known.tunnel_c_factor != none.tunnel_c_factor,
-        format!("{} c v² in tunnels", short(known.tunnel_c_factor, 4)),
-    );
-    say(
-        known.tunnel_dc_n_per_kn_per_mps2 != 0.0,
-        format!("c {} greater in tunnels", short(known.tunnel_dc_n_per_kn_per_mps2, 6)),
-    );
-    say(
-        known.wind_plus_mps != 0.0,
-        format!("headwind {} m/s as the chainage grows", signed(known.wind_plus_mps, 3)),
-    );
-    say(
-        known.bearing_delta_a_n_per_kn > 0.0,
-        format!(
-            "{} N/kN of cold bearings, fading in {} s",
-            signed(known.bearing_delta_a_n_per_kn, 4),
-            short(known.bearing_tau_s, 1)
-        ),
-    );
-    say(
-        known.ambient_w0_per_k != 0.0,
-        format!(
-            "{} % of w0 per kelvin above {} K",
-            signed(100.0 * known.ambient_w0_per_k, 4),
-            short(known.ambient_reference_k, 2)
-        ),
-    );
-    if parts.is_empty() { vec!["none that changes anything".into()] } else { parts }
+    let number = |number: fn(&Corrections) -> f64, before: &str, decimals, after: &str| {
+        let words = format!("{before}{}{after}", short(number(known), decimals));
+        (number(known) != number(&none), words)
+    };
+    let all = [
+        number(|it| it.speed_scale, "measured over true speed ", 5, ""),
+        number(|it| it.speed_delay_s, "the measured speed is ", 3, " s late"),
+        number(|it| it.speed_lag_s, "the measured speed follows with a time constant of ", 3, " s"),
+        number(|it| it.traction_gain, "reported over true traction ", 5, ""),
+        number(|it| it.actuator_delay_s, "forces act ", 3, " s late"),
+        number(|it| it.actuator_lag_s, "forces build up with a time constant of ", 3, " s"),
+        number(|it| it.tunnel_c_factor, "", 4, " c v² in tunnels"),
+        number(|it| it.tunnel_dc_n_per_kn_per_mps2, "c ", 6, " greater in tunnels"),
+        (known.wind_plus_mps != 0.0, wind),
+        (known.bearing_delta_a_n_per_kn > 0.0, bearings),
+        (known.ambient_w0_per_k != 0.0, ambient),
+    ];
+    let acting: Vec<String> =
+        all.into_iter().filter(|(acts, _)| *acts).map(|(_, words)| words).collect();
+    if acting.is_empty() { vec!["none that changes anything".into()] } else { acting }
 }
 
 /// The declared resistance in kN at a few speeds, which shows a wrong unit at a glance.
@@ -237,28 +200,26 @@ fn gradient(track: &Track) -> String {
 }
 
 fn curves(track: &Track) -> String {
-    match (track.knows_curves(), track.curves()) {
-        (false, _) => "not known".into(),
-        (true, []) => "none".into(),
-        (true, curves) => {
-            let (low, high) = range(curves.iter().map(|curve| curve.radius_m));
-            let length_m: f64 = curves.iter().map(|curve| curve.end_m - curve.start_m).sum();
-            let (low, high, km) = (short(low, 1), short(high, 1), short(length_m / 1000.0, 2));
-            format!("{}, {km} km in all, radius {low} to {high} m", curves.len())
-        }
-    }
+    let lengths_m = track.curves().iter().map(|curve| curve.end_m - curve.start_m);
+    let (low, high) = range(track.curves().iter().map(|curve| curve.radius_m));
+    let more = format!("radius {} to {} m", short(low, 1), short(high, 1));
+    intervals(track.knows_curves(), lengths_m, &more)
 }
 
 fn tunnels(track: &Track) -> String {
-    match (track.knows_tunnels(), track.tunnels()) {
+    let lengths_m = track.tunnels().iter().map(|tunnel| tunnel.end_m - tunnel.start_m);
+    let more = format!("the longest {} m", short(range(lengths_m.clone()).1, 1));
+    intervals(track.knows_tunnels(), lengths_m, &more)
+}
+
+/// How many intervals there are, their length in all, and what more is to be said.
+fn intervals(is_known: bool, lengths_m: impl ExactSizeIterator<Item = f64>, more: &str) -> String {
+    match (is_known, lengths_m.len()) {
         (false, _) => "not known".into(),
-        (true, []) => "none".into(),
-        (true, tunnels) => {
-            let lengths_m = tunnels.iter().map(|tunnel| tunnel.end_m - tunnel.start_m);
-            let (_, longest) = range(lengths_m.clone());
-            let length_m: f64 = lengths_m.sum();
-            let (longest, km) = (short(longest, 1), short(length_m / 1000.0, 2));
-            format!("{}, {km} km in all, the longest {longest} m", tunnels.len())
+        (true, 0) => "none".into(),
+        (true, count) => {
+            let km = short(lengths_m.sum::<f64>() / 1000.0, 2);
+            format!("{count}, {km} km in all, {more}")
         }
     }
 }
@@ -299,7 +260,8 @@ fn found(track: &Track) -> String {
     text
 }
 
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+/// The lowest and the highest of numbers.
+pub(super) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
     })

@@ -1,9 +1,11 @@
 //! The runs of a dataset: what the train did, what the data are like, what to know.
 
+use std::iter;
+
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetDiagnostic, DatasetError, Diagnostic, ForceSource, GradientSource, Manifest,
-    PositionSource, Quantity, Role, Run, is_parquet,
+    DatasetDiagnostic, DatasetError, ForceSource, GradientSource, Manifest, Phases, PositionSource,
+    Quantity, Role, Run, RunQuality, is_parquet,
 };
 use dynocar_core::plausibility::InputFault;
 
@@ -54,22 +56,16 @@ fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
             Ok(run) => {
                 let quality = &run.quality;
                 let top = quality.speed_range_mps.map(|(_, high)| unit.from_base(high));
-                let top = top.map(|high| format!("{high:.1}"));
                 row.push(mass_t(run));
                 row.push(format!("{:.1}", quality.start_s));
                 row.push(format!("{:.1}", quality.duration_s));
                 row.push(format!("{:.2}", quality.distance_m / 1000.0));
-                row.push(top.unwrap_or_else(|| "-".into()));
-                let phases = &quality.phases;
-                for seconds in [
-                    phases.standstill_s,
-                    phases.coasting_s,
-                    phases.traction_s,
-                    phases.braking_s,
-                    phases.unknown_s,
-                ] {
-                    row.push(if seconds == 0.0 { "-".into() } else { format!("{seconds:.0}") });
-                }
+                row.push(top.map_or_else(|| "-".into(), |high| format!("{high:.1}")));
+                let Phases { standstill_s, coasting_s, traction_s, braking_s, unknown_s } =
+                    quality.phases;
+                let phases = [standstill_s, coasting_s, traction_s, braking_s, unknown_s];
+                let shown = |s: f64| if s == 0.0 { "-".into() } else { format!("{s:.0}") };
+                row.extend(phases.map(shown));
             }
         }
         table.push(row);
@@ -77,44 +73,38 @@ fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
     table
 }
 
+/// The head of a column and its cell for a run.
+type Count = (&'static str, fn(&RunQuality) -> String);
+/// What is counted of a run, each in a column.
+const COUNTS: [Count; 10] = [
+    ("rows", |it| it.lines.rows.to_string()),
+    ("step s", |it| {
+        let about = if it.order.is_regular { "" } else { "~" };
+        format!("{about}{}", short(it.order.step_s, 4))
+    }),
+    ("gaps", |it| it.order.gaps.to_string()),
+    ("longest s", |it| short(it.order.longest_gap_s, 1)),
+    ("rows missing", |it| (it.order.missing_rows + it.rows_without_time as u64).to_string()),
+    ("out of order", |it| it.order.out_of_order.to_string()),
+    ("repeated", |it| it.order.repeated.to_string()),
+    ("cells missing", |it| total(&it.missing)),
+    ("outliers", |it| total(&it.outliers)),
+    ("refused", |it| it.refused_in_all().to_string()),
+];
+
+fn total(counts: &[QuantityCount]) -> String {
+    counts.iter().map(|count| count.count).sum::<usize>().to_string()
+}
+
 fn data_table(runs: &[Read]) -> TextTable {
-    let header = [
-        "run",
-        "rows",
-        "step s",
-        "gaps",
-        "longest s",
-        "rows missing",
-        "out of order",
-        "repeated",
-        "cells missing",
-        "outliers",
-        "refused",
-    ];
+    let header: Vec<&str> = iter::once("run").chain(COUNTS.map(|(name, _)| name)).collect();
     let mut table = TextTable::new(&header, &[]);
     for run in runs.iter().flatten() {
-        let quality = &run.quality;
-        let total =
-            |counts: &[QuantityCount]| counts.iter().map(|count| count.count).sum::<usize>();
-        let order = &quality.order;
-        let mut row = vec![run.number.to_string(), quality.lines.rows.to_string()];
-        row.push(if order.is_regular {
-            short(order.step_s, 4)
-        } else {
-            format!("~{}", short(order.step_s, 4))
+        let counts = COUNTS.iter().enumerate().map(|(index, (_, count))| {
+            let shown = count(&run.quality);
+            if shown == "0" && index > 1 { "-".into() } else { shown }
         });
-        let counts = [
-            order.gaps.to_string(),
-            short(order.longest_gap_s, 1),
-            (order.missing_rows + quality.rows_without_time as u64).to_string(),
-            order.out_of_order.to_string(),
-            order.repeated.to_string(),
-            total(&quality.missing).to_string(),
-            total(&quality.outliers).to_string(),
-            quality.refused_in_all().to_string(),
-        ];
-        row.extend(counts.into_iter().map(|count| if count == "0" { "-".into() } else { count }));
-        table.push(row);
+        table.push(iter::once(run.number.to_string()).chain(counts).collect());
     }
     table
 }
@@ -252,10 +242,7 @@ fn diagnostics_of(manifest: &Manifest, run: &Run) -> Vec<String> {
     if !quality.order.is_regular {
         diagnostics.push("the time step varies, so that missing rows cannot be counted".into());
     }
-    let by_run = run
-        .diagnostics
-        .iter()
-        .filter(|diagnostic| !matches!(diagnostic, Diagnostic::InputFault { .. }));
-    diagnostics.extend(by_run.map(ToString::to_string));
+    let by_run = run.diagnostics.iter().filter(|diagnostic| diagnostic.fault.is_none());
+    diagnostics.extend(by_run.map(|diagnostic| diagnostic.text.clone()));
     diagnostics
 }

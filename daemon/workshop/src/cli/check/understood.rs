@@ -1,53 +1,48 @@
 //! What was understood of a path.
 
+use std::sync::Arc;
+
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
-use dynocar_analysis::dataset::{DatasetDiagnostic, DatasetError, DatasetHead, Run};
+use dynocar_analysis::dataset::{DatasetDiagnostic, DatasetError, Manifest, Run};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 
 use dynocar::config::DaemonConfig;
 use dynocar::dataset::FileKind;
 
-/// What was understood.
-pub enum Understood {
-    /// A dataset, with what became of each of its runs.
-    Dataset(Box<DatasetHead>, Vec<Result<Run, DatasetError>>),
+/// What was understood: what a file of this kind holds, and all that belongs to it.
+pub struct Understood {
+    /// What it was read from.
+    pub(super) kind: FileKind,
+    /// A dataset's file, with what became of each of its runs.
+    pub dataset: Option<(Manifest, Vec<Result<Run, DatasetError>>)>,
     /// A train.
-    Train(Box<TrainModel>),
+    pub(super) train: Option<Arc<TrainModel>>,
     /// A line.
-    Track(Box<Track>),
+    pub(super) track: Option<Arc<Track>>,
     /// A daemon's configuration.
-    Daemon(Box<DaemonConfig>),
+    pub(super) daemon: Option<DaemonConfig>,
 }
 
 impl Understood {
-    /// What it was read from.
-    pub(super) fn kind(&self) -> FileKind {
-        match self {
-            Understood::Dataset(..) => FileKind::Dataset,
-            Understood::Train(_) => FileKind::Train,
-            Understood::Track(_) => FileKind::Track,
-            Understood::Daemon(_) => FileKind::Daemon,
-        }
+    /// Nothing yet of a file of this kind.
+    pub(super) fn of(kind: FileKind) -> Self {
+        Understood { kind, dataset: None, train: None, track: None, daemon: None }
+    }
+
+    /// The runs of a dataset, each or what is wrong with it.
+    fn runs(&self) -> &[Result<Run, DatasetError>] {
+        self.dataset.as_ref().map_or(&[], |(_, runs)| runs)
     }
 
     /// What may spoil results, the worst first.
     pub(super) fn diagnostics(&self) -> Vec<DatasetDiagnostic> {
-        match self {
-            Understood::Dataset(head, runs) => {
-                diagnostics(&head.train, head.track.as_deref(), runs.iter().flatten())
-            }
-            Understood::Train(train) => diagnostics(train, None, []),
-            Understood::Track(_) | Understood::Daemon(_) => Vec::new(),
-        }
+        let Some(train) = &self.train else { return Vec::new() };
+        diagnostics(train, self.track.as_deref(), self.runs().iter().flatten())
     }
 
     /// What is wrong with single runs.
     pub fn errors(&self) -> impl Iterator<Item = &DatasetError> {
-        let runs = match self {
-            Understood::Dataset(_, runs) => &runs[..],
-            Understood::Train(_) | Understood::Track(_) | Understood::Daemon(_) => &[],
-        };
-        runs.iter().filter_map(|run| run.as_ref().err())
+        self.runs().iter().filter_map(|run| run.as_ref().err())
     }
 }

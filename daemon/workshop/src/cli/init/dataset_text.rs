@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use dynocar_analysis::dataset::Quantity;
 use dynocar_analysis::dataset::guess::{Guess, GuessedColumn, GuessedRun};
-use encoding_rs::{Encoding, UTF_8};
+use dynocar_analysis::dataset::{Quantity, TextLayout};
+use encoding_rs::UTF_8;
 use toml::Value;
 
 use crate::cli::text::comment;
@@ -19,13 +19,8 @@ pub fn name_of(folder: &Path) -> String {
     name.filter(|name| !name.is_empty()).unwrap_or_else(|| "recordings".into())
 }
 
-/// The text of `dataset.toml`; `files` are the runs' paths from its folder, in this encoding.
-pub fn dataset(
-    guess: &Guess,
-    name: &str,
-    (files, encoding): (&[String], &'static Encoding),
-    has_track: bool,
-) -> String {
+/// The text of `dataset.toml`; `files` are the runs' paths from its folder.
+pub fn dataset(guess: &Guess, name: &str, files: &[String], has_track: bool) -> String {
     let head = comment(
         "",
         "Recorded runs of one train. Written by dynocar init: every line under [columns] is a guess \
@@ -43,7 +38,7 @@ pub fn dataset(
         "{head}[dataset]\nname = {}\n{}# position_reference = \"head\"    # where the recorded \
          position is the head's, not the centre's\n\n[train]\nfile = {}\n\n{track}{}\n\n[columns]\n",
         quoted(name),
-        layout_text(guess, encoding),
+        layout_text(&guess.layout),
         quoted(TRAIN_FILE),
         quoted(TRACK_FILE)
     );
@@ -75,18 +70,18 @@ pub fn dataset(
 }
 
 /// How the files' text falls into cells.
-fn layout_text(guess: &Guess, encoding: &'static Encoding) -> String {
+fn layout_text(layout: &TextLayout) -> String {
     let mut text = String::new();
-    if encoding != UTF_8 {
-        text += &format!("encoding = {}\n", quoted(&encoding.name().to_lowercase()));
+    if layout.encoding != UTF_8 {
+        text += &format!("encoding = {}\n", quoted(&layout.encoding.name().to_lowercase()));
     }
-    let delimiter = char::from(guess.delimiter).to_string();
+    let delimiter = char::from(layout.delimiter).to_string();
     text += &format!("delimiter = {}\n", quoted(&delimiter));
-    text += &format!("decimal = {}\n", quoted(&char::from(guess.decimal).to_string()));
-    if guess.skip_rows > 0 {
-        text += &format!("skip_rows = {:<19}# lines above the names\n", guess.skip_rows);
+    text += &format!("decimal = {}\n", quoted(&char::from(layout.decimal).to_string()));
+    if layout.skip_rows > 0 {
+        text += &format!("skip_rows = {:<19}# lines above the names\n", layout.skip_rows);
     }
-    if guess.units_row {
+    if layout.units_row {
         text += "units_row = true               # a line of units below the names\n";
     }
     text
@@ -154,7 +149,7 @@ mod tests {
         let files = [Recording { label: "a.csv", text }];
         let guess = guess(&files, &[]).unwrap_or_else(|error| panic!("{error}"));
         let files = ["da\"y\\1.csv".to_string()];
-        let text = dataset(&guess, "x\n[y]", (&files, UTF_8), true);
+        let text = dataset(&guess, "x\n[y]", &files, true);
         let manifest = Manifest::parse("dataset.toml", &text).unwrap_or_else(|it| panic!("{it}"));
         let columns: Vec<&str> = manifest.columns.iter().map(|it| it.column.as_str()).collect();
         assert_eq!(columns, ["t \"s\" [s]", "v\t\\x [km/h]"]);
@@ -170,7 +165,7 @@ mod tests {
         for count in 1..4 {
             let guess = guess(&vec![recording; count], &[]).unwrap();
             let files: Vec<String> = (0..count).map(|index| format!("{index}.csv")).collect();
-            let text = dataset(&guess, "x", (&files, UTF_8), false);
+            let text = dataset(&guess, "x", &files, false);
             let manifest = Manifest::parse("dataset.toml", &text).unwrap();
             let roles: Vec<Role> = manifest.runs.iter().map(|run| run.role).collect();
             assert_eq!(roles.contains(&Role::Holdout), count > 1);

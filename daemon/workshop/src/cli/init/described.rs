@@ -2,7 +2,6 @@
 
 use dynocar_analysis::dataset::DatasetDiagnostic;
 use dynocar_analysis::dataset::guess::Guess;
-use encoding_rs::Encoding;
 
 /// Name of the daemon's configuration.
 pub const DAEMON_FILE: &str = "daemon.toml";
@@ -11,8 +10,6 @@ pub const DAEMON_FILE: &str = "daemon.toml";
 pub struct Described {
     /// Which column was taken for what.
     pub guess: Guess,
-    /// Which letters the files' bytes are.
-    pub encoding: &'static Encoding,
     /// The runs' files, as the dataset names them.
     pub files: Vec<String>,
     /// What cannot be true of the runs as they were understood, the worst first.

@@ -6,38 +6,29 @@ use dynocar_analysis::dataset::{DatasetFiles, DatasetHead, FileProblem, Run};
 
 use dynocar::cli::Failure;
 
-/// A file of the dataset.
-pub struct DraftFile<'t> {
-    /// Path as the dataset names it.
-    pub path: &'t str,
-    /// Name in messages, where it is not the path from the dataset's folder.
-    pub label: Option<&'t str>,
-    /// What it will hold, or holds.
-    pub text: &'t str,
-}
-
 /// The dataset's files.
 pub struct Draft<'t> {
     /// Where they will be.
     pub folder: &'t Path,
-    /// The files.
-    pub files: Vec<DraftFile<'t>>,
+    /// Path of each as the dataset names it, its name in messages where that is not the path from the folder, and
+    /// what it will hold, or holds.
+    pub files: Vec<(&'t str, Option<&'t str>, &'t str)>,
 }
 
 impl DatasetFiles for Draft<'_> {
     fn read(&self, path: &str) -> Result<String, FileProblem> {
-        self.file(path).map(|file| file.text.into()).ok_or(FileProblem::Missing)
+        self.file(path).map(|(_, text)| text.into()).ok_or(FileProblem::Missing)
     }
 
     fn label(&self, path: &str) -> String {
-        let label = self.file(path).and_then(|file| file.label);
+        let label = self.file(path).and_then(|(label, _)| label);
         label.map_or_else(|| self.folder.join(path).display().to_string(), Into::into)
     }
 }
 
 impl Draft<'_> {
-    fn file(&self, path: &str) -> Option<&DraftFile<'_>> {
-        self.files.iter().find(|file| file.path == path)
+    fn file(&self, path: &str) -> Option<(Option<&str>, &str)> {
+        self.files.iter().find(|file| file.0 == path).map(|&(_, label, text)| (label, text))
     }
 
     /// Reads the dataset with all its runs.

@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use dynocar_analysis::dataset::SourcePosition;
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
+use dynocar_analysis::dataset::{FileProblem, SourcePosition};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use dynocar::cli::Failure;
-use dynocar::dataset::file_error;
 use dynocar::text_file::{read_beginning, read_bytes};
 
 /// Name and text of a file.
@@ -22,7 +21,7 @@ pub fn texts(paths: &[PathBuf]) -> Result<(Vec<NamedText>, &'static Encoding), F
     let mut files = Vec::new();
     for path in paths {
         let label = path.display().to_string();
-        let unread = |problem| file_error(&label, problem);
+        let unread = |problem: FileProblem| problem.of(&label);
         // In UTF-16 every other byte may be 0, which is a mark of other formats elsewhere.
         let begins = guessed(&read_beginning(path, 2).map_err(unread)?);
         let is_wide = [UTF_16LE, UTF_16BE].contains(&begins);
@@ -45,7 +44,7 @@ pub fn texts(paths: &[PathBuf]) -> Result<(Vec<NamedText>, &'static Encoding), F
             );
             return Err(Failure::At(SourcePosition::whole(&label), words));
         }
-        let text = decoded(bytes, encoding).map_err(|problem| file_error(&label, problem))?;
+        let text = decoded(bytes, encoding).map_err(|problem| problem.of(&label))?;
         texts.push((label, text));
     }
     Ok((texts, encoding))

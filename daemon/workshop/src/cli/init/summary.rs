@@ -29,25 +29,25 @@ pub fn text(folder: &Path, train: &TrainText, described: Option<&Described>) -> 
 }
 
 fn recordings(described: &Described) -> String {
-    let guess = &described.guess;
+    let (guess, layout) = (&described.guess, &described.guess.layout);
     let mut text = String::new();
     for (run, file) in guess.runs.iter().zip(&described.files) {
         let falls = if run.direction < 0 { ", the position falls" } else { "" };
         text += &format!("{file}: {} rows{falls}\n", run.rows);
     }
-    let delimiter = match guess.delimiter {
+    let delimiter = match layout.delimiter {
         b'\t' => "a tab".into(),
         mark => format!("'{}'", char::from(mark)),
     };
-    text += &format!("cells end at {delimiter}, decimals at '{}'\n", char::from(guess.decimal));
-    if described.encoding != UTF_8 {
-        let name = described.encoding.name().to_lowercase();
+    text += &format!("cells end at {delimiter}, decimals at '{}'\n", char::from(layout.decimal));
+    if layout.encoding != UTF_8 {
+        let name = layout.encoding.name().to_lowercase();
         text += &format!("letters are {name}: the files are no UTF-8\n");
     }
-    if guess.skip_rows > 0 {
-        text += &format!("the names stand in line {}\n", guess.skip_rows + 1);
+    if layout.skip_rows > 0 {
+        text += &format!("the names stand in line {}\n", layout.skip_rows + 1);
     }
-    if guess.units_row {
+    if layout.units_row {
         text += "units stand in the line below the names\n";
     }
     text.push('\n');
