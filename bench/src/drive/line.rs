@@ -8,6 +8,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::Ability;
+use crate::output::Record;
 use crate::scenarios::world::{BRAKE_STD, LoadSource, Scenario, Traffic, World};
 use crate::statistics::normal;
 
@@ -71,6 +72,19 @@ impl Service {
     /// In words.
     pub fn name(&self) -> String {
         format!("{}, {}, {} ms", traffic_name(self.traffic), self.condition.name(), self.cycle_ms)
+    }
+
+    /// The first cells of a row of a table.
+    pub fn record(&self) -> Record {
+        Record::default()
+            .with("train", traffic_name(self.traffic))
+            .with("condition", self.condition.name())
+            .with("cycle_ms", self.cycle_ms)
+    }
+
+    /// The controller's cycle in s.
+    pub fn cycle_s(&self) -> f64 {
+        f64::from(self.cycle_ms) * 1e-3
     }
 
     /// The world's scenario: places are those of balises, loads as the kind of traffic knows them.

@@ -68,8 +68,7 @@ fn contender(
     windows: &Windows,
     mut run: impl FnMut(&[Observation]) -> Vec<f64> + 'static,
 ) -> Contender {
-    let windows = windows.clone();
-    Contender::new(name, windows.len(), move || {
+    Contender::new(name, windows.len(), windows, move |windows| {
         windows.iter().flat_map(|window| run(window)).collect()
     })
 }

@@ -68,13 +68,9 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
 /// The cases of this module, for a train.
 pub fn cases(train: &TrainModel) -> Vec<Case> {
     let drive = drive(train);
-    let of_peer = drive.clone();
-    let case = Case::new(
-        "mass Kalman step, 8 behaviours",
-        Agreement::Relative(1e-6),
-        Contender::new("ours", SAMPLES - 1, move || ours(&drive)),
-    );
-    vec![case.peer(Contender::new("textbook EKF bank", SAMPLES - 1, move || textbook(&of_peer)))]
+    let ours = Contender::new("ours", SAMPLES - 1, &drive, ours);
+    let case = Case::new("mass Kalman step, 8 behaviours", Agreement::Relative(1e-6), ours);
+    vec![case.peer(Contender::new("textbook EKF bank", SAMPLES - 1, &drive, textbook))]
 }
 
 fn ours(drive: &Drive) -> Vec<f64> {

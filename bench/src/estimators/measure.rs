@@ -7,12 +7,13 @@
 //! The clock is the thread's processor time: what other programs take meanwhile does not count.
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 
-use crate::output::Failure;
+use crate::output::{Failure, Record, table};
 use crate::statistics::quantiles;
 
 /// One way to do the work of a case.
@@ -26,9 +27,15 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// A contender by its name, updates in a pass, and pass.
-    pub fn new(name: &str, updates: usize, pass: impl FnMut() -> Vec<f64> + 'static) -> Self {
-        Contender { name: name.into(), updates, pass: Box::new(pass) }
+    /// A contender by its name, updates in a pass, and a pass over the data of the case.
+    pub fn new<D: ?Sized + 'static>(
+        name: &str,
+        updates: usize,
+        data: &Arc<D>,
+        mut pass: impl FnMut(&D) -> Vec<f64> + 'static,
+    ) -> Self {
+        let data = Arc::clone(data);
+        Contender { name: name.into(), updates, pass: Box::new(move || pass(&data)) }
     }
 }
 
@@ -223,13 +230,40 @@ fn now() -> Duration {
     Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
+/// A row for each contender.
+pub fn text(entries: &[Entry]) -> String {
+    let row = |entry: &Entry| {
+        let [low, high] = entry.quartiles_ns;
+        let spread = 50.0 * (high - low) / entry.ns_per_update;
+        Record::default()
+            .with("case", &entry.name)
+            .with("ns", nanoseconds(entry.ns_per_update))
+            .number("spread %", spread, 0)
+            .with("target ns", entry.target_ns.map_or(String::new(), nanoseconds))
+            .with("met", entry.meets_target.map_or("", |met| if met { "yes" } else { "NO" }))
+            .number("peer / ours", entry.peer_over_ours, 2)
+    };
+    table(&entries.iter().map(row).collect::<Vec<_>>())
+}
+
+/// Three significant digits below 100, groups of thousands above.
+fn nanoseconds(value: f64) -> String {
+    if value < 100.0 {
+        return format!("{value:.1}");
+    }
+    let digits = format!("{value:.0}").into_bytes();
+    let groups = digits.rchunks(3).rev().map(String::from_utf8_lossy);
+    groups.collect::<Vec<_>>().join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_peer_with_another_answer_is_refused() {
-        let contender = |answer: f64| Contender::new("x", 1, move || vec![answer]);
+        let contender =
+            |answer: f64| Contender::new("x", 1, &Arc::new(answer), |answer| vec![*answer]);
         let case = |peer: f64| {
             Case::new("case", Agreement::Relative(1e-3), contender(1.0)).peer(contender(peer))
         };
@@ -240,12 +274,19 @@ mod tests {
 
     #[test]
     fn peers_follow_ours_and_only_ours_has_a_target() {
-        let contender = |name: &str| Contender::new(name, 1, || vec![1.0]);
+        let contender = |name: &str| Contender::new(name, 1, &Arc::new(()), |_| vec![1.0]);
         let case = Case::new("c", Agreement::Relative(1e-6), contender("ours"));
         let case = case.peer(contender("p")).aim(1e9);
         let entries = case.measure(&Effort { rounds: 1, slice: Duration::ZERO }).unwrap();
         assert_eq!((entries[0].meets_target, entries[0].peer), (Some(true), false));
         assert_eq!((entries[1].name.as_str(), entries[1].target_ns), ("c (p)", None));
         assert!(entries[1].peer && entries[1].peer_over_ours.is_some());
+    }
+
+    #[test]
+    fn thousands_are_grouped() {
+        assert_eq!(nanoseconds(41.26), "41.3");
+        assert_eq!(nanoseconds(987.6), "988");
+        assert_eq!(nanoseconds(1_234_567.0), "1 234 567");
     }
 }

@@ -73,6 +73,24 @@ impl<const N: usize> TextbookFilter<N> {
             keep * self.covariance * keep.transpose() + gain * gain.transpose() * noise;
         said
     }
+
+    /// A step of a forward pass: over time, to a mean by a transition, unless it is the first, and to a measurement.
+    pub fn pass(
+        &mut self,
+        moved: Option<(SVector<f64, N>, SMatrix<f64, N, N>)>,
+        added: &SMatrix<f64, N, N>,
+        row: &RowSVector<f64, N>,
+        measured: f64,
+        noise: f64,
+    ) -> TextbookStep<N> {
+        let (mean, transition) = moved.unwrap_or((self.mean, SMatrix::identity()));
+        if moved.is_some() {
+            self.predict(mean, &transition, added);
+        }
+        let predicted = *self;
+        self.measure(row, measured, noise);
+        TextbookStep { predicted, filtered: *self, transition }
+    }
 }
 
 /// A step of a forward pass: before its measurement, after it, and how it was reached.

@@ -71,15 +71,6 @@ pub fn cases() -> Vec<Case> {
     vec![step_of_one(&drive), step_of_bank(&drive), step_as_run(&drive)]
 }
 
-fn contender(
-    name: &str,
-    drive: &Arc<Drive>,
-    run: impl Fn(&Drive) -> Vec<f64> + 'static,
-) -> Contender {
-    let drive = drive.clone();
-    Contender::new(name, drive.samples.len(), move || run(&drive))
-}
-
 fn first_hypothesis(drive: &Drive, noise: &NoiseModel) -> Hypothesis {
     let mut first = Hypothesis::new(&DECLARED, &DAVIS_STD, LearnedNoise::new(noise));
     first.anchor(drive.first_mps);
@@ -113,7 +104,7 @@ fn textbook_step(filter: &mut TextbookFilter<4>, step: &Step, measured_mps: f64)
 }
 
 fn step_of_one(drive: &Arc<Drive>) -> Case {
-    let ours = contender("ours", drive, |drive| {
+    let ours = Contender::new("ours", STEPS, drive, |drive| {
         let model = noise(false);
         let mut filter = first_hypothesis(drive, &model);
         for (step, measured_mps) in &drive.samples {
@@ -122,7 +113,7 @@ fn step_of_one(drive: &Arc<Drive>) -> Case {
         }
         filter.state.as_slice().to_vec()
     });
-    let peer = contender("textbook EKF", drive, |drive| {
+    let peer = Contender::new("textbook EKF", STEPS, drive, |drive| {
         let mut filter = first_textbook(drive);
         for (step, measured_mps) in &drive.samples {
             textbook_step(&mut filter, step, *measured_mps);
@@ -133,7 +124,7 @@ fn step_of_one(drive: &Arc<Drive>) -> Case {
 }
 
 fn step_of_bank(drive: &Arc<Drive>) -> Case {
-    let ours = contender("ours", drive, |drive| {
+    let ours = Contender::new("ours", STEPS, drive, |drive| {
         let model = noise(false);
         let first = first_hypothesis(drive, &model);
         let mut bank = JumpBank::new(first, HYPOTHESES, JUMPS, model, NO_OUTLIERS);
@@ -144,7 +135,7 @@ fn step_of_bank(drive: &Arc<Drive>) -> Case {
         let variances = likeliest.davis_covariance().diagonal();
         likeliest.state.iter().chain(&variances).copied().collect()
     });
-    let peer = contender("textbook EKF bank", drive, |drive| {
+    let peer = Contender::new("textbook EKF bank", STEPS, drive, |drive| {
         let mut bank = TextbookBank::new(first_textbook(drive));
         for (step, measured_mps) in &drive.samples {
             bank.advance(step, *measured_mps);
@@ -158,7 +149,7 @@ fn step_of_bank(drive: &Arc<Drive>) -> Case {
 
 /// As the pipeline runs it, with noise learned and outliers judged; no peer does that.
 fn step_as_run(drive: &Arc<Drive>) -> Case {
-    let ours = contender("ours", drive, |drive| {
+    let ours = Contender::new("ours", STEPS, drive, |drive| {
         let mut filter = OnlineFilter::new(OnlineSettings {
             davis: DECLARED,
             davis_std: DAVIS_STD,

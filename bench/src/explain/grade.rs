@@ -7,7 +7,7 @@ use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
 use super::attainable::attainable_mps;
-use super::case::Case;
+use super::family::Case;
 use super::parameters::{ParameterGrade, graded};
 use super::place::{ends_within, place_iou};
 use super::scenario::Competing;

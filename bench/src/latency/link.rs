@@ -12,9 +12,8 @@ use dynocar_tests::process::Site;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::ipc;
 
-use super::bytes::{as_bytes, from_bytes};
 use super::plain::{self, refused};
-use super::sockets::{CLIENT_SOCKET, SERVER_SOCKET};
+use super::server::{CLIENT_SOCKET, SERVER_SOCKET, as_bytes, from_bytes};
 use crate::output::{Failure, during};
 
 /// Sends samples, and counts how far the answers have come.

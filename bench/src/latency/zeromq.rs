@@ -6,9 +6,8 @@ use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 use dynocar_tests::process::Site;
 
-use super::bytes::{as_bytes, from_bytes};
 use super::link::{BLOCK, Wire};
-use super::sockets::answer;
+use super::server::{answer, as_bytes, from_bytes};
 use crate::output::Failure;
 
 fn address(folder: &Path) -> String {

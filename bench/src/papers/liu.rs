@@ -4,7 +4,6 @@
 //! [`scenario`]. Errors are those of w0 over 40 to 72 km/h, where the runs coast, since a, b and
 //! c are hardly distinguishable there.
 
-pub mod bound;
 pub mod methods;
 pub mod scenario;
 
@@ -20,11 +19,10 @@ use nalgebra::Matrix3;
 
 use self::methods::Method;
 use self::scenario::{
-    Condition, Measured, ROTATING_MASS_FACTOR, STEP_S, compared_speeds_mps, davis, truth,
+    Condition, Measured, ROTATING_MASS_FACTOR, compared_speeds_mps, davis, truth,
 };
-use super::row::Row;
+use super::row::{Row, Seeds};
 use super::score::{Score, w0_errors};
-use super::seeds::Seeds;
 use crate::rig::pipelines::default_pipeline;
 use crate::statistics::{mean, root_mean_square};
 
@@ -62,7 +60,7 @@ fn accuracy(condition: Condition, seeds: Seeds) -> Vec<Row> {
         }
         let (found, covariance) = live(&runs);
         online.take_resistance((&found, &covariance), &truth, &speeds);
-        let bound = bound_of(condition, &runs);
+        let bound = scenario::bound(condition, &runs);
         ours.take_bound(&bound, &speeds);
         online.take_bound(&bound, &speeds);
     }
@@ -81,23 +79,6 @@ fn accuracy(condition: Condition, seeds: Seeds) -> Vec<Row> {
         .collect();
     rows.push(row("online: resistance_kalman".into(), None, &online));
     rows
-}
-
-/// The bound for the samples that a seed kept.
-fn bound_of(condition: Condition, runs: &[Vec<Measured>]) -> Matrix3<f64> {
-    let kept: Vec<Vec<bool>> = runs
-        .iter()
-        .map(|run| {
-            let last = run.last().map_or(0.0, |sample| sample.time_s);
-            let mut kept = vec![false; (last / STEP_S).round() as usize + 1];
-            for sample in run {
-                kept[(sample.time_s / STEP_S).round() as usize] = true;
-            }
-            kept
-        })
-        .collect();
-    let is_kept = |run: usize, index: usize| kept[run].get(index).copied().unwrap_or(false);
-    bound::covariance(condition, is_kept)
 }
 
 /// Our fit of whole runs: the computed speed against the measured one, all along each run.

@@ -4,6 +4,7 @@ use dynocar_core::filter::{Mils, Penalty, RunningMedian, SquareRootInformation};
 use nalgebra::Vector3;
 
 use super::scenario::{Measured, ROTATING_MASS_FACTOR};
+use crate::statistics::{mean, straight_line};
 
 /// p0 of eq. 11.
 const START_VARIANCE: f64 = 1e6;
@@ -51,18 +52,12 @@ fn segments_of(run: &[Measured]) -> Vec<Segment> {
 }
 
 fn segment(samples: &[Measured]) -> Option<Segment> {
-    let count = samples.len() as f64;
     if samples.len() < 2 {
         return None;
     }
-    let mean_s = samples.iter().map(|sample| sample.time_s).sum::<f64>() / count;
-    let mean_kmh = samples.iter().map(|sample| sample.speed_kmh).sum::<f64>() / count;
-    let (mut product, mut spread) = (0.0, 0.0);
-    for sample in samples {
-        product += (sample.time_s - mean_s) * (sample.speed_kmh - mean_kmh);
-        spread += (sample.time_s - mean_s).powi(2);
-    }
-    let acceleration_mps2 = product / spread / 3.6;
+    let points: Vec<(f64, f64)> = samples.iter().map(|it| (it.time_s, it.speed_kmh)).collect();
+    let acceleration_mps2 = straight_line(&points).1 / 3.6;
+    let mean_kmh = mean(samples.iter().map(|it| it.speed_kmh));
     let w0_n_per_kn = -1000.0 * (1.0 + ROTATING_MASS_FACTOR) / 9.81 * acceleration_mps2;
     Some(Segment { speed_kmh: mean_kmh, w0_n_per_kn })
 }
@@ -146,11 +141,7 @@ fn recursion(segments: &[Segment], length: usize, bad_beyond: Option<f64>) -> Op
 /// Variance of the segments' residuals in (N/kN)², Table 1's last column.
 pub fn residual_variance(segments: &[Segment], theta_kmh: [f64; 3]) -> f64 {
     let theta = Vector3::from(theta_kmh);
-    let sum: f64 = segments
-        .iter()
-        .map(|segment| (segment.w0_n_per_kn - segment.features().dot(&theta)).powi(2))
-        .sum();
-    sum / segments.len() as f64
+    mean(segments.iter().map(|it| (it.w0_n_per_kn - it.features().dot(&theta)).powi(2)))
 }
 
 #[cfg(test)]

@@ -6,8 +6,7 @@ use dynocar_model::train::Davis;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector4};
 
-use super::disturbance::{GUST_STD_MPS, GUST_TIME_S, MEAN_WIND_STD_MPS};
-use super::sensor::speed_variance;
+use super::ride::{GUST_STD_MPS, GUST_TIME_S, MEAN_WIND_STD_MPS, speed_variance};
 use super::shuttle::{Instant, PERIOD_S, Shuttle};
 
 /// Unknowns: inverse mass relative to the true one, then z1, z2, z3 in a basis.

@@ -9,13 +9,10 @@ use dynocar_core::pipeline::Estimator;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::leg::{kalman, known_resistance, leg};
-use super::line::STATIONS_M;
-use super::sensor::measure;
-use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle, calm};
-use crate::papers::row::{Row, WANG};
-use crate::papers::seeds::Seeds;
-use crate::statistics::mean;
+use super::ride::{kalman, known_resistance, leg, measure};
+use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle, calm};
+use crate::papers::row::{Row, Seeds, WANG};
+use crate::statistics::{mean, straight_line};
 
 /// The fixed mass in kg that the controller assumes without learning.
 const ASSUMED_MASS_KG: f64 = 117_100.0;
@@ -121,14 +118,7 @@ fn energy_at_time(shuttle: &Shuttle, case: &Case, time_s: f64) -> f64 {
         .map(|k| drive(shuttle, case, CRUISE_MPS * (1.0 + 0.002 * f64::from(k))))
         .map(|driven| ((driven.time_s / time_s).ln(), driven.energy_j.ln()))
         .collect();
-    let count = points.len() as f64;
-    let (mean_x, mean_y) = (
-        points.iter().map(|p| p.0).sum::<f64>() / count,
-        points.iter().map(|p| p.1).sum::<f64>() / count,
-    );
-    let spread: f64 = points.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
-    let slope = points.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum::<f64>() / spread;
-    (mean_y - slope * mean_x).exp()
+    straight_line(&points).0.exp()
 }
 
 /// What the filter knows after the leg before.

@@ -17,15 +17,13 @@ use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::bound::disturbed_davis_covariance;
 use super::offline;
 use super::scenario::{
-    CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps, drive,
-    fast_speeds_mps,
+    CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps,
+    disturbed_davis_covariance, drive, fast_speeds_mps,
 };
-use crate::papers::row::{Row, XIA};
+use crate::papers::row::{Row, Seeds, XIA};
 use crate::papers::score::{Score, w0_std};
-use crate::papers::seeds::Seeds;
 use crate::statistics::{mean, normal, root_mean_square};
 
 /// Data capacity I of the paper's window.
