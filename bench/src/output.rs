@@ -25,6 +25,19 @@ pub fn expect(holds: bool, words: impl FnOnce() -> String) -> Result<(), Failure
     if holds { Ok(()) } else { Err(Usage(words()).into()) }
 }
 
+/// What a name on the command line stands for.
+///
+/// # Errors
+///
+/// When it is none of those that there are, with these.
+pub fn named<T: Copy>(option: &str, name: &str, all: &[(&str, T)]) -> Result<T, Failure> {
+    let found = all.iter().find(|(own, _)| *own == name).map(|(_, it)| *it);
+    found.ok_or_else(|| {
+        let known: Vec<&str> = all.iter().map(|(own, _)| *own).collect();
+        Usage(format!("{option} {name}: expected one of {}", known.join(", "))).into()
+    })
+}
+
 /// Says during what an error happened.
 pub fn during<E: Display>(what: impl Display) -> impl FnOnce(E) -> Failure {
     move |error| format!("{what}: {error}").into()

@@ -241,7 +241,7 @@ fn saved_w(planner: &Planner<'_>, due_s: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::line::{Condition, Service};
+    use super::super::line::{CONDITIONS, Condition, ORDINARY, Service};
     use super::*;
     use crate::scenarios::world::Traffic;
 
@@ -259,7 +259,7 @@ mod tests {
     #[test]
     fn a_driver_that_knows_its_train_stops_at_the_platform_and_in_time() {
         for traffic in [Traffic::Metro, Traffic::Emu, Traffic::HighSpeed] {
-            for leg in drive(traffic, Condition::Ordinary, true, 5) {
+            for leg in drive(traffic, ORDINARY, true, 5) {
                 println!("{traffic:?} {leg:?}");
                 assert!(leg.beyond_m.abs() < 0.5, "{leg:?}");
                 assert!(leg.late_s.abs() < 6.0, "{leg:?}");
@@ -273,7 +273,7 @@ mod tests {
 
     #[test]
     fn declared_parameters_cost_time_energy_or_place_but_the_train_arrives() {
-        for leg in drive(Traffic::Metro, Condition::StrongBrakes, false, 5) {
+        for leg in drive(Traffic::Metro, CONDITIONS[2], false, 5) {
             println!("{leg:?}");
             assert!(leg.beyond_m.abs() < 3.0 && leg.late_s.abs() < 15.0, "{leg:?}");
         }

@@ -32,7 +32,7 @@ use clap::Args;
 use dynocar::output::{report_line, write_file};
 use serde_json::json;
 
-use self::line::{Condition, Service};
+use self::line::{CONDITIONS, ORDINARY, Service};
 use self::run::{Extent, Informant};
 use self::score::Scored;
 use crate::output::{Failure, Record, expect, give, table, write_csv};
@@ -80,9 +80,9 @@ fn services(cycle_ms: Option<u32>) -> Vec<Service> {
     let of = |traffic: Traffic| {
         let usual_ms = if traffic == Traffic::Metro { 50 } else { 200 };
         let cycle_ms = cycle_ms.unwrap_or(usual_ms);
-        Condition::ALL.map(|condition| Service { traffic, condition, cycle_ms })
+        CONDITIONS.map(|condition| Service { traffic, condition, cycle_ms })
     };
-    let fast = Service { traffic: Traffic::Metro, condition: Condition::Ordinary, cycle_ms: 10 };
+    let fast = Service { traffic: Traffic::Metro, condition: ORDINARY, cycle_ms: 10 };
     all.into_iter().flat_map(of).chain(cycle_ms.is_none().then_some(fast)).collect()
 }
 
@@ -135,7 +135,7 @@ impl DriveArguments {
 /// The ordinary service of each traffic; that of its usual cycle comes first.
 fn ordinary(scored: &[Scored]) -> Vec<&Scored> {
     let mut first: Vec<&Scored> = Vec::new();
-    for it in scored.iter().filter(|it| it.service.condition == Condition::Ordinary) {
+    for it in scored.iter().filter(|it| it.service.condition == ORDINARY) {
         if first.iter().all(|other| other.service.traffic != it.service.traffic) {
             first.push(it);
         }
@@ -145,7 +145,7 @@ fn ordinary(scored: &[Scored]) -> Vec<&Scored> {
 
 fn measure(service: Service, extent: Extent) -> Result<Scored, Failure> {
     let mut all = [Vec::new(), Vec::new(), Vec::new()];
-    for (driven, informant) in all.iter_mut().zip(Informant::ALL) {
+    for (driven, (informant, _)) in all.iter_mut().zip(Informant::ALL) {
         *driven = run::drive(service, informant, extent)?;
     }
     report_line(&format!("{}: done", service.name()));

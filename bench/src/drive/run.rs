@@ -4,7 +4,7 @@ use dynocar_shared::TrainSample;
 
 use super::answers::{self, ASKED, Memory};
 use super::journey::{DrivenLeg, Journey};
-use super::line::{Condition, Service};
+use super::line::Service;
 use super::link::Link;
 use super::train::Train;
 use crate::output::Failure;
@@ -22,17 +22,12 @@ pub enum Informant {
 }
 
 impl Informant {
-    /// All of them.
-    pub const ALL: [Informant; 3] = [Informant::Declared, Informant::Dynocar, Informant::Truth];
-
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Informant::Declared => "declared",
-            Informant::Dynocar => "dynocar",
-            Informant::Truth => "true",
-        }
-    }
+    /// All of them, in words.
+    pub const ALL: [(Informant, &str); 3] = [
+        (Informant::Declared, "declared"),
+        (Informant::Dynocar, "dynocar"),
+        (Informant::Truth, "true"),
+    ];
 }
 
 /// Which trains drive how far.
@@ -101,10 +96,8 @@ pub fn drive(
             scores: [Score::default(); 4],
         })
         .collect();
-    let mut death = match service.condition {
-        Condition::DaemonDies => Death::On(stops / 3),
-        _ => Death::Never,
-    };
+    let dies = service.condition.daemon_dies;
+    let mut death = if dies { Death::On(stops / 3) } else { Death::Never };
     loop {
         let on_the_way = |(_, it): &(usize, &mut Driving)| it.journey.legs.len() < stops;
         let mut samples: Vec<(usize, TrainSample)> = all
@@ -134,7 +127,7 @@ pub fn drive(
         }
     }
     let lost = link.as_ref().map_or(0, Link::lost);
-    if lost > 0 && service.condition != Condition::DaemonDies {
+    if lost > 0 && !dies {
         return Err(format!("daemon: {lost} samples were lost in lock-step").into());
     }
     Ok(all.into_iter().map(|it| Driven { legs: it.journey.legs, scores: it.scores }).collect())

@@ -155,7 +155,7 @@ fn ranged(record: Record, name: &str, figure: Figure, factor: f64, decimals: usi
         .number(format!("{name}_high"), factor * figure.high, decimals)
 }
 
-fn line(service: &Service, informant: Informant, drives: &Drives<'_>) -> Line {
+fn line(service: &Service, (informant, name): (Informant, &str), drives: &Drives<'_>) -> Line {
     let figures = figures(drives.own.len(), |it| drives.statistics(it));
     let legs = drives.own.iter().flat_map(|driven| &driven.legs);
     let looks: Vec<_> = legs.flat_map(|leg| &leg.looks).collect();
@@ -165,8 +165,7 @@ fn line(service: &Service, informant: Informant, drives: &Drives<'_>) -> Line {
         |ratios: Vec<f64>| 100.0 * ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
     let given = looks.iter().filter_map(|look| Some(look.bound_m? / look.true_m)).collect();
     let fixed = looks.iter().map(|it| it.fixed_m / it.true_m).collect();
-    let record =
-        service.record().with("parameters", informant.name()).with("stops", drives.stops());
+    let record = service.record().with("parameters", name).with("stops", drives.stops());
     let columns = [
         ("stop_error_mean_cm", 100.0, 0),
         ("stop_error_std_cm", 100.0, 0),

@@ -78,10 +78,8 @@ pub fn textbook_kalman_em(window: &[Observation]) -> f64 {
 fn forward(window: &[Observation], coefficient: f64) -> Vec<TextbookStep<2>> {
     let first_variances =
         Vector2::new(NOISE.measured_distance_m2, FIRST_SPEED_STD_MPS * FIRST_SPEED_STD_MPS);
-    let mut filter = TextbookFilter {
-        mean: Vector2::new(window[0].distance_m, window[0].speed_mps),
-        covariance: Matrix2::from_diagonal(&first_variances),
-    };
+    let mean = Vector2::new(window[0].distance_m, window[0].speed_mps);
+    let mut filter = TextbookFilter::new(mean, Matrix2::from_diagonal(&first_variances));
     let added = Matrix2::from_diagonal(&Vector2::from(step_variances()));
     let row = RowVector2::new(1.0, 0.0);
     let step = |(index, observed): (usize, &Observation)| {

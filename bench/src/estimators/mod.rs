@@ -27,8 +27,8 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use crate::output::{Failure, Usage, give, table};
-use measure::{Case, Effort, Entry};
+use crate::output::{Failure, Record, Usage, give, table};
+use measure::{Case, Effort};
 use pipelines::DemoRun;
 
 /// Speed of every estimator compared with peers that do the same work on the same data.
@@ -68,11 +68,11 @@ impl EstimatorsArguments {
                 return Err(Usage(words).into());
             }
         }
-        let mut entries: Vec<Entry> = Vec::new();
+        let mut records: Vec<Record> = Vec::new();
         for case in chosen {
-            entries.extend(case.measure(&effort)?);
+            records.extend(case.measure(&effort)?);
         }
-        give(&self.json, &json!({ "cases": entries }), || measure::text(&entries))
+        give(&self.json, &json!({ "cases": records }), || table(&records))
     }
 }
 

@@ -93,7 +93,7 @@ fn ours(samples: &[Sample]) -> Vec<f64> {
 
 fn textbook(samples: &[Sample]) -> Vec<f64> {
     let (mean, covariance) = first();
-    let mut filter = TextbookFilter { mean, covariance };
+    let mut filter = TextbookFilter::new(mean, covariance);
     let mut row = RowSVector::<f64, STATES>::zeros();
     row[SPEED] = 1.0;
     let mut noise = SMatrix::<f64, STATES, STATES>::zeros();

@@ -12,7 +12,7 @@ use dynocar_tests::simulator::dataset_writer::{
 use dynocar_tests::simulator::{SimulatedDataset, SimulatorSettings, simulate};
 
 use super::scenario::{Scenario, World};
-use crate::output::{Failure, Usage};
+use crate::output::{Failure, named};
 use crate::parallel;
 
 /// What is simulated.
@@ -83,15 +83,9 @@ impl FamilyArguments {
     ///
     /// When there is no such kind.
     pub fn scenarios(&self, usual: Vec<Scenario>) -> Result<Vec<Scenario>, Failure> {
-        let all = Scenario::all();
-        let one = |name: &String| {
-            let found = all.iter().find(|scenario| scenario.name() == name).copied();
-            found.ok_or_else(|| {
-                let known: Vec<_> = all.iter().map(|scenario| scenario.name()).collect();
-                Usage(format!("--kind {name}: expected one of {}", known.join(", "))).into()
-            })
-        };
-        if self.kinds.is_empty() { Ok(usual) } else { self.kinds.iter().map(one).collect() }
+        let all: Vec<_> = Scenario::all().into_iter().map(|it| (it.name(), it)).collect();
+        let chosen = self.kinds.iter().map(|name| named("--kind", name, &all));
+        if self.kinds.is_empty() { Ok(usual) } else { chosen.collect() }
     }
 
     /// Every scenario with every seed, scenario by scenario.

@@ -49,15 +49,6 @@ impl World {
     }
 }
 
-/// A kind that is hardly distinguishable from the one that acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Competing {
-    /// The kind.
-    pub kind: EffectKind,
-    /// True when no data of the family distinguish the two.
-    pub is_never_named: bool,
-}
-
 /// A family of datasets; a seed makes one of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scenario {
@@ -80,6 +71,18 @@ pub enum Scenario {
     /// One effect of a kind drawn from the seed, recorded so.
     Poor,
 }
+
+/// The families that are no single kind, by name.
+const FAMILIES: [(Scenario, &str); 8] = [
+    (Scenario::Two, "two_effects"),
+    (Scenario::Alike, "level_straight_line"),
+    (Scenario::UnmappedTunnel, "unmapped_tunnel"),
+    (Scenario::SlowForce, "slow_force"),
+    (Scenario::AnyLaw, "any_law"),
+    (Scenario::LoadsByStop, "loads_by_stop"),
+    (Scenario::PoorNull, "none_poor_recording"),
+    (Scenario::Poor, "poor_recording"),
+];
 
 /// Pairs that a train meets and that no data of this kind confuse.
 const PAIRS: [[EffectKind; 2]; 10] = {
@@ -121,31 +124,14 @@ impl Scenario {
     /// All of them, in the order of the table.
     pub fn all() -> Vec<Scenario> {
         let kinds = EffectKind::ALL.iter().copied().map(Scenario::Kind);
-        let others = [
-            Scenario::Two,
-            Scenario::Alike,
-            Scenario::UnmappedTunnel,
-            Scenario::SlowForce,
-            Scenario::AnyLaw,
-            Scenario::LoadsByStop,
-            Scenario::PoorNull,
-            Scenario::Poor,
-        ];
-        kinds.chain(others).collect()
+        kinds.chain(FAMILIES.map(|(family, _)| family)).collect()
     }
 
     /// Its name on the command line and in the table.
     pub fn name(self) -> &'static str {
         match self {
             Scenario::Kind(kind) => kind.name(),
-            Scenario::Two => "two_effects",
-            Scenario::Alike => "level_straight_line",
-            Scenario::UnmappedTunnel => "unmapped_tunnel",
-            Scenario::SlowForce => "slow_force",
-            Scenario::AnyLaw => "any_law",
-            Scenario::LoadsByStop => "loads_by_stop",
-            Scenario::PoorNull => "none_poor_recording",
-            Scenario::Poor => "poor_recording",
+            other => FAMILIES.iter().find(|it| it.0 == other).map_or("", |it| it.1),
         }
     }
 
@@ -200,15 +186,12 @@ impl Scenario {
         }
     }
 
-    /// The kind that is hardly distinguishable from the one that acts.
-    pub fn competing(self) -> Option<Competing> {
+    /// The kind that is hardly distinguishable from the one that acts, and whether no data of the family distinguish
+    /// the two.
+    pub fn competing(self) -> Option<(EffectKind, bool)> {
         match self {
-            Scenario::Alike => {
-                Some(Competing { kind: EffectKind::MassChange, is_never_named: true })
-            }
-            Scenario::UnmappedTunnel => {
-                Some(Competing { kind: EffectKind::LocalResistance, is_never_named: false })
-            }
+            Scenario::Alike => Some((EffectKind::MassChange, true)),
+            Scenario::UnmappedTunnel => Some((EffectKind::LocalResistance, false)),
             _ => None,
         }
     }

@@ -8,9 +8,9 @@ use dynocar_client::monotonic_now_ns;
 use dynocar_shared::PipelineKind;
 use dynocar_tests::process::{Process, Site};
 
-use super::link::{ClientLink, Datagrams, Link, Notifying, Numbered};
+use super::link::{Client, Controller, Datagrams, Notifying};
 use super::schedule::{Schedule, Slice, await_ready, drive};
-use super::server::{COMPARED, TRAIN};
+use super::sockets::{COMPARED, TRAIN};
 #[cfg(feature = "zeromq")]
 use super::zeromq::ZeroMq;
 use crate::output::{Failure, during};
@@ -202,15 +202,15 @@ pub fn measure(case: &Case, cores: Cores, schedule: &Schedule) -> Result<Outcome
     // They end with the slice.
     let _companions = started?;
     prioritise(cores.priority);
-    let mut link: Box<dyn Link> = match &case.answerer {
-        Answerer::Floor if blocks => Box::new(Numbered::new(Notifying::open(&site, TRAIN)?)),
-        Answerer::Floor => Box::new(ClientLink::open(&site, TRAIN, PipelineKind::Echo)?),
-        Answerer::Daemon { polled, .. } => Box::new(ClientLink::open(&site, TRAIN, *polled)?),
-        Answerer::UnixDatagram => Box::new(Numbered::new(Datagrams::open(&site, blocks)?)),
+    let mut controller = match &case.answerer {
+        Answerer::Floor if blocks => Controller::new(Notifying::open(&site, TRAIN)?),
+        Answerer::Floor => Controller::new(Client::open(&site, TRAIN, PipelineKind::Echo)?),
+        Answerer::Daemon { polled, .. } => Controller::new(Client::open(&site, TRAIN, *polled)?),
+        Answerer::UnixDatagram => Controller::new(Datagrams::open(&site, blocks)?),
         #[cfg(feature = "zeromq")]
-        Answerer::ZeroMq => Box::new(Numbered::new(ZeroMq::open(&site, blocks)?)),
+        Answerer::ZeroMq => Controller::new(ZeroMq::open(&site, blocks)?),
     };
-    let outcome = run(&mut *link, &mut peer, cores, schedule)?;
+    let outcome = run(&mut controller, &mut peer, cores, schedule)?;
     if matches!(case.answerer, Answerer::Daemon { .. }) {
         stop(peer)?;
     }
@@ -218,7 +218,7 @@ pub fn measure(case: &Case, cores: Cores, schedule: &Schedule) -> Result<Outcome
 }
 
 fn run(
-    link: &mut dyn Link,
+    link: &mut Controller,
     peer: &mut Process,
     cores: Cores,
     schedule: &Schedule,

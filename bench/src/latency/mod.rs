@@ -9,7 +9,7 @@
 //! - [`schedule`]: the open-loop measurement of one slice
 //! - [`link`]: the controller's end of each transport
 //! - [`server`]: the answering processes
-//! - [`plain`]: the plain transport's notification
+//! - [`sockets`], [`plain`]: what they need
 //! - `zeromq`: both ends of ZeroMQ, with the feature of that name
 //! - [`costs`]: one poll, one publish, a daemon at rest
 //! - [`report`], [`plot`]: the result
@@ -22,6 +22,7 @@ pub mod plot;
 pub mod report;
 pub mod schedule;
 pub mod server;
+pub mod sockets;
 #[cfg(feature = "zeromq")]
 pub mod zeromq;
 

@@ -8,7 +8,7 @@ use plotters::prelude::*;
 
 use super::case::{Answerer, Case};
 use super::report::{Measured, pooled};
-use super::server::COMPARED;
+use super::sockets::COMPARED;
 use crate::output::{Failure, during};
 
 const SIZE: (u32, u32) = (1_000, 640);

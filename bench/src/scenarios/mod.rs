@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar_shared::PipelineKind;
 
-use crate::output::{self, Failure, Usage, expect, give, write_csv};
+use crate::output::{self, Failure, expect, give, named, write_csv};
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
 /// changes, and whether its intervals hold.
@@ -62,11 +62,9 @@ impl ScenariosArguments {
         expect(!chosen.is_empty(), || {
             format!("--scenario {}: expected a part of a scenario's name", self.scenario)
         })?;
-        let kind = |name: &String| {
-            PipelineKind::from_name(name)
-                .ok_or_else(|| Usage(format!("--pipeline {name}: expected a pipeline's kind")))
-        };
-        let kinds = self.pipelines.iter().map(kind).collect::<Result<Vec<_>, _>>()?;
+        let all: Vec<_> = PipelineKind::ALL.iter().map(|kind| (kind.name(), *kind)).collect();
+        let kinds = self.pipelines.iter().map(|name| named("--pipeline", name, &all));
+        let kinds = kinds.collect::<Result<Vec<_>, _>>()?;
         let is_some = self.hours > 0.0 && self.hours.is_finite() && self.seeds > 0;
         expect(is_some, || "--hours and --seeds: expected more than 0".into())?;
         let records = table::run(&table::Plan {

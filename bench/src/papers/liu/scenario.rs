@@ -27,57 +27,28 @@ pub const NOISE_KMH: f64 = 0.05;
 pub const RUNS_KMH: [(f64, f64); 2] = [(72.0, 40.0), (68.0, 42.0)];
 /// a, b, c and the start speed of each run.
 const UNKNOWNS: usize = 3 + RUNS_KMH.len();
-/// Share of outliers.
-pub const OUTLIER_SHARE: f64 = 0.05;
 /// Outliers are off by 1 to 5 km/h, up or down.
 pub const OUTLIER_KMH: (f64, f64) = (1.0, 5.0);
-/// Share of missing samples.
-pub const MISSING_SHARE: f64 = 0.2;
-
-/// What is wrong with the data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Condition {
-    /// Noise and rounding only.
-    Clean,
-    /// 5 % outliers besides.
-    Outliers,
-    /// 20 % of the samples are missing.
-    Missing,
-    /// Both.
-    Both,
-}
-
-impl Condition {
-    /// Every condition.
-    pub const ALL: [Condition; 4] =
-        [Condition::Clean, Condition::Outliers, Condition::Missing, Condition::Both];
-
+/// What is wrong with the data besides noise and rounding.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Condition {
     /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Condition::Clean => "clean",
-            Condition::Outliers => "5 % outliers",
-            Condition::Missing => "20 % missing",
-            Condition::Both => "5 % outliers, 20 % missing",
-        }
-    }
-
-    /// Share of outliers.
-    pub fn outlier_share(self) -> f64 {
-        match self {
-            Condition::Outliers | Condition::Both => OUTLIER_SHARE,
-            Condition::Clean | Condition::Missing => 0.0,
-        }
-    }
-
+    pub name: &'static str,
+    /// Share of outliers, which are off by [`OUTLIER_KMH`].
+    pub outlier_share: f64,
     /// Share of missing samples.
-    pub fn missing_share(self) -> f64 {
-        match self {
-            Condition::Missing | Condition::Both => MISSING_SHARE,
-            Condition::Clean | Condition::Outliers => 0.0,
-        }
-    }
+    pub missing_share: f64,
 }
+
+/// Every condition.
+pub const CONDITIONS: [Condition; 4] = [
+    Condition { name: "clean", outlier_share: 0.0, missing_share: 0.0 },
+    Condition { name: "5 % outliers", outlier_share: 0.05, missing_share: 0.0 },
+    Condition { name: "20 % missing", outlier_share: 0.0, missing_share: 0.2 },
+    Condition { name: "5 % outliers, 20 % missing", outlier_share: 0.05, missing_share: 0.2 },
+];
+/// Nothing is wrong.
+pub const CLEAN: Condition = CONDITIONS[0];
 
 /// A measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,12 +97,12 @@ pub fn measure(condition: Condition, seed: u64) -> Vec<Vec<Measured>> {
             let speeds = true_speeds_kmh(run, &truth());
             let samples = speeds.iter().enumerate().filter_map(|(index, &true_kmh)| {
                 let mut speed_kmh = true_kmh + NOISE_KMH * normal(&mut random);
-                if random.random::<f64>() < condition.outlier_share() {
+                if random.random::<f64>() < condition.outlier_share {
                     let (low, high) = OUTLIER_KMH;
                     let size = low + (high - low) * random.random::<f64>();
                     speed_kmh += if random.random() { size } else { -size };
                 }
-                let is_missing = random.random::<f64>() < condition.missing_share();
+                let is_missing = random.random::<f64>() < condition.missing_share;
                 let speed_kmh = (speed_kmh / QUANTUM_KMH).round() * QUANTUM_KMH;
                 (!is_missing).then_some(Measured { time_s: STEP_S * index as f64, speed_kmh })
             });
@@ -203,7 +174,7 @@ fn normal_integral(x: f64) -> f64 {
 /// speed unknown.
 pub fn bound(condition: Condition, runs: &[Vec<Measured>]) -> Matrix3<f64> {
     // Per (m/s)².
-    let weight = sample_information(condition.outlier_share()) * 3.6 * 3.6;
+    let weight = sample_information(condition.outlier_share) * 3.6 * 3.6;
     let mut information = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
     for (run, (&speeds_kmh, samples)) in RUNS_KMH.iter().zip(runs).enumerate() {
         let rows = derivatives(speeds_kmh);
@@ -246,8 +217,8 @@ mod tests {
     #[test]
     fn conditions_do_to_the_data_what_they_say() {
         let count = |condition| measure(condition, 3).iter().map(Vec::len).sum::<usize>() as f64;
-        let share = 1.0 - count(Condition::Missing) / count(Condition::Clean);
-        assert!((share - MISSING_SHARE).abs() < 0.05);
+        let share = 1.0 - count(CONDITIONS[2]) / count(CLEAN);
+        assert!((share - CONDITIONS[2].missing_share).abs() < 0.05);
         let wild = |condition| {
             let runs = measure(condition, 3);
             runs.iter()
@@ -255,9 +226,9 @@ mod tests {
                 .filter(|pair| (pair[1].speed_kmh - pair[0].speed_kmh).abs() > 0.8)
                 .count()
         };
-        assert_eq!(wild(Condition::Clean), 0);
-        assert!(wild(Condition::Outliers) > 40);
-        assert_eq!(measure(Condition::Both, 9), measure(Condition::Both, 9));
+        assert_eq!(wild(CLEAN), 0);
+        assert!(wild(CONDITIONS[1]) > 40);
+        assert_eq!(measure(CONDITIONS[3], 9), measure(CONDITIONS[3], 9));
     }
 
     #[test]
@@ -279,11 +250,11 @@ mod tests {
     #[test]
     fn fewer_samples_allow_less() {
         let at_15 = |covariance| w0_std(&covariance, 15.0);
-        let runs = measure(Condition::Clean, 3);
+        let runs = measure(CLEAN, 3);
         let of_run = |run: &Vec<Measured>| run.iter().step_by(2).copied().collect();
         let half: Vec<Vec<Measured>> = runs.iter().map(of_run).collect();
-        let all = at_15(bound(Condition::Clean, &runs));
-        let half = at_15(bound(Condition::Clean, &half));
+        let all = at_15(bound(CLEAN, &runs));
+        let half = at_15(bound(CLEAN, &half));
         assert!((half / all - 2.0_f64.sqrt()).abs() < 0.03);
         assert!(all > 0.002 && all < 0.009, "{all} N/kN");
     }

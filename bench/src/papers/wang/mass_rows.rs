@@ -32,7 +32,7 @@ impl Condition {
         let permille = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
         match self {
             Condition::Calm => Box::new(calm),
-            Condition::Wind => Box::new(wind(shuttle.truth.basic.c, seed ^ 0x5eed)),
+            Condition::Wind => Box::new(wind(shuttle.truth[0].c, seed ^ 0x5eed)),
             Condition::Presumed => Box::new(presumed(seed)),
             Condition::GradientError => Box::new(move |_| permille),
         }

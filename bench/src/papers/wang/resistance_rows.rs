@@ -50,7 +50,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
         })
         .collect();
     let empirical = Davis { a: 2.7551, b: 0.014 * 3.6, c: 0.00075 * 12.96 };
-    let empirical = w0_errors(&empirical, &shuttle.truth.basic, &speeds[0]);
+    let empirical = w0_errors(&empirical, &shuttle.truth[0], &speeds[0]);
     rows[0].baseline = Some(root_mean_square(&empirical));
     rows.push(curve_in_tunnel_row(seeds.at_most(20)));
     rows.extend(printed_rows(&shuttle, &ride, seeds.at_most(20)));
@@ -82,7 +82,7 @@ fn error_row(quantity: String, errors: &Errors, bound: Option<f64>, seeds: Seeds
 }
 
 fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds) -> [Errors; 3] {
-    let truths = [shuttle.truth.basic, shuttle.truth.curve, shuttle.truth.tunnel];
+    let truths = &shuttle.truth;
     let mut errors: [Errors; 3] = Default::default();
     for seed in seeds.range() {
         let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed));
@@ -154,11 +154,11 @@ fn driven_speeds(shuttle: &Shuttle, ride: &[Instant], section: Section) -> Vec<f
         .iter()
         .filter(|instant| instant.speed_mps > 1.0)
         .filter(|instant| {
-            let shares = shuttle.shares(instant.position_m);
+            let [_, curve, tunnel] = shuttle.shares(instant.position_m);
             match section {
-                Section::Basic => shares.curve == 0.0 && shares.tunnel == 0.0,
-                Section::Curve => shares.curve > 0.999,
-                Section::Tunnel => shares.tunnel > 0.999,
+                Section::Basic => curve == 0.0 && tunnel == 0.0,
+                Section::Curve => curve > 0.999,
+                Section::Tunnel => tunnel > 0.999,
             }
         })
         .map(|instant| instant.speed_mps)

@@ -177,12 +177,9 @@ pub fn there_and_back(
 
 /// The resistances that act.
 pub fn known_resistance(shuttle: &Shuttle) -> LineResistance {
-    LineResistance {
-        basic: shuttle.truth.basic,
-        curve: Some(shuttle.truth.curve),
-        tunnel: Some(shuttle.truth.tunnel),
-        reference_radius_m: CURVE_RADIUS_M,
-    }
+    let [basic, curve, tunnel] = shuttle.truth;
+    let (curve, tunnel) = (Some(curve), Some(tunnel));
+    LineResistance { basic, curve, tunnel, reference_radius_m: CURVE_RADIUS_M }
 }
 
 /// Our filter with a resistance.

@@ -23,44 +23,17 @@ pub const EMPTY_MASS_KG: f64 = 110_000.0;
 /// Greatest brake force in N.
 pub const BRAKE_MAX_N: f64 = 110_000.0;
 
-/// Basic, curve and tunnel resistance as functions of speed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curves {
-    /// z1.
-    pub basic: Davis,
-    /// z2, whole train in a curve.
-    pub curve: Davis,
-    /// z3, whole train in a tunnel.
-    pub tunnel: Davis,
-}
-
-impl Curves {
-    /// Table 2's means, converted from km/h.
-    pub fn table_2() -> Self {
-        let from_kmh = |a: f64, b: f64, c: f64| Davis { a, b: b * 3.6, c: c * 12.96 };
-        Curves {
-            basic: from_kmh(2.845737, 0.015846, 0.000765),
-            curve: from_kmh(1.362406, 0.002273, 0.000228),
-            tunnel: from_kmh(0.609985, 0.022346, 0.001276),
-        }
+/// Table 2's means, converted from km/h: basic resistance z1, z2 of the whole train in a curve, z3 in a tunnel.
+pub const TABLE_2: [Davis; 3] = {
+    const fn from_kmh(a: f64, b: f64, c: f64) -> Davis {
+        Davis { a, b: b * 3.6, c: c * 12.96 }
     }
-
-    /// Resistance in N/kN of a train of which a share is in curves and a share in tunnels.
-    pub fn w_n_per_kn(&self, speed_mps: f64, shares: Shares) -> f64 {
-        self.basic.w0_n_per_kn(speed_mps)
-            + shares.curve * self.curve.w0_n_per_kn(speed_mps)
-            + shares.tunnel * self.tunnel.w0_n_per_kn(speed_mps)
-    }
-}
-
-/// Shares of the train in curves and in tunnels, 0 to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shares {
-    /// In curves.
-    pub curve: f64,
-    /// In tunnels.
-    pub tunnel: f64,
-}
+    [
+        from_kmh(2.845737, 0.015846, 0.000765),
+        from_kmh(1.362406, 0.002273, 0.000228),
+        from_kmh(0.609985, 0.022346, 0.001276),
+    ]
+};
 
 /// The train and the line.
 #[derive(Clone, Debug)]
@@ -69,8 +42,8 @@ pub struct Shuttle {
     pub train: Arc<TrainModel>,
     /// The line as mapped.
     pub track: Arc<Track>,
-    /// The resistances that act.
-    pub truth: Curves,
+    /// The resistances that act: z1, z2 and z3.
+    pub truth: [Davis; 3],
     /// 1 + gamma as it is; the train is declared with gamma = 0.
     pub inertia_factor: f64,
 }
@@ -104,7 +77,6 @@ pub fn calm(_speed_mps: f64) -> f64 {
 impl Shuttle {
     /// The scenario's train and line; `curve_in_tunnel` adds a curve inside the middle tunnel.
     pub fn new(curve_in_tunnel: bool) -> Self {
-        let truth = Curves::table_2();
         let effort: Vec<(f64, f64)> = (0..=22)
             .map(|k| {
                 let speed_mps = f64::from(5 * k) * KMH;
@@ -116,7 +88,7 @@ impl Shuttle {
             cars: 4,
             traction: EffortCurve::new(effort),
             brake: EffortCurve::new(vec![(0.0, BRAKE_MAX_N)]),
-            ..TrainModel::bare("four-car airport train", EMPTY_MASS_KG, truth.basic)
+            ..TrainModel::bare("four-car airport train", EMPTY_MASS_KG, TABLE_2[0])
         };
         let track = Track::new(
             "synthetic 28 km shuttle".into(),
@@ -126,23 +98,28 @@ impl Shuttle {
             Some(tunnels()),
         )
         .expect("ordered lists");
-        Shuttle { train: Arc::new(train), track: Arc::new(track), truth, inertia_factor: 1.0 }
+        let (train, track) = (Arc::new(train), Arc::new(track));
+        Shuttle { train, track, truth: TABLE_2, inertia_factor: 1.0 }
     }
 
-    /// Shares of the train in curves and tunnels.
-    pub fn shares(&self, position_m: f64) -> Shares {
+    /// Shares of the train, 0 to 1, to which z1, z2 and z3 apply.
+    pub fn shares(&self, position_m: f64) -> [f64; 3] {
         let length_m = self.train.length_m;
         let curvature = self.track.curvature_per_m(position_m, length_m).unwrap_or(0.0);
-        Shares {
-            curve: CURVE_RADIUS_M * curvature,
-            tunnel: self.track.tunnel_share(position_m, length_m).unwrap_or(0.0),
-        }
+        let tunnel = self.track.tunnel_share(position_m, length_m).unwrap_or(0.0);
+        [1.0, CURVE_RADIUS_M * curvature, tunnel]
+    }
+
+    /// A figure of z1, z2 and z3, summed by the shares of a train at a chainage in m.
+    pub fn sum(&self, position_m: f64, of: impl Fn(&Davis) -> f64) -> f64 {
+        let shares = self.shares(position_m);
+        self.truth.iter().zip(shares).map(|(davis, share)| share * of(davis)).sum()
     }
 
     /// Acceleration in m/s² with `extra` N/kN of resistance.
     pub fn acceleration_mps2(&self, at: &Instant, extra_n_per_kn: f64) -> f64 {
         let gradient = self.track.gradient_permille(at.position_m, self.train.length_m);
-        let w = self.truth.w_n_per_kn(at.speed_mps, self.shares(at.position_m))
+        let w = self.sum(at.position_m, |davis| davis.w0_n_per_kn(at.speed_mps))
             + at.direction * gradient.unwrap_or(0.0)
             + extra_n_per_kn;
         (at.force_n / at.mass_kg - 1e-3 * STANDARD_GRAVITY_MPS2 * w) / self.inertia_factor
