@@ -4,16 +4,22 @@ use dynocar_tests::simulator::run_file::run_file;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
-/// Length in both of two sets of intervals over that in either; those of a set do not overlap.
-fn interval_iou(truth: &[[f64; 2]], found: &[[f64; 2]]) -> f64 {
-    let length = |set: &[[f64; 2]]| set.iter().map(|[from, to]| to - from).sum::<f64>();
-    let both: f64 = truth
-        .iter()
-        .flat_map(|[from, to]| {
-            found.iter().map(move |[start, end]| (to.min(*end) - from.max(*start)).max(0.0))
-        })
-        .sum();
-    both / (length(truth) + length(found) - both)
+/// Total length of intervals that are cut into disjoint pieces by sampling.
+fn interval_iou(one: &[[f64; 2]], other: &[[f64; 2]]) -> f64 {
+    let ends = one.iter().chain(other).flatten().copied();
+    let low = ends.clone().fold(f64::INFINITY, f64::min);
+    let high = ends.fold(f64::NEG_INFINITY, f64::max);
+    let inside =
+        |set: &[[f64; 2]], at: f64| set.iter().any(|[from, to]| (*from..*to).contains(&at));
+    let (mut both, mut either) = (0, 0);
+    const POINTS: usize = 20_000;
+    for k in 0..POINTS {
+        let at = low + (high - low) * (k as f64 + 0.5) / POINTS as f64;
+        let (here, there) = (inside(one, at), inside(other, at));
+        both += usize::from(here && there);
+        either += usize::from(here || there);
+    }
+    both as f64 / either.max(1) as f64
 }
 
 fn pairs(value: &Value) -> Vec<[f64; 2]> {
@@ -50,10 +56,21 @@ pub fn place_iou(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> 
                     }
                 }
             }
-            Some(interval_iou(&truth, &found))
+            Some(run_windows_iou(&truth, &found))
         }
         _ => None,
     }
+}
+
+fn run_windows_iou(truth: &[[f64; 2]], found: &[[f64; 2]]) -> f64 {
+    let length = |set: &[[f64; 2]]| set.iter().map(|[from, to]| to - from).sum::<f64>();
+    let both: f64 = truth
+        .iter()
+        .flat_map(|[from, to]| {
+            found.iter().map(move |[start, end]| (to.min(*end) - from.max(*start)).max(0.0))
+        })
+        .sum();
+    both / (length(truth) + length(found) - both)
 }
 
 /// Whether the 95 % intervals of the ends of a place hold the true ends. An end of an interval is
