@@ -6,16 +6,16 @@ use clap::{CommandFactory, Parser, Subcommand};
 use dynocar::cli::parse;
 use dynocar::output::report_line;
 
-use crate::drive::command::DriveArguments;
+use crate::drive::DriveArguments;
 use crate::estimators::EstimatorsArguments;
-use crate::explain::command::ExplainArguments;
-use crate::latency::command::LatencyArguments;
+use crate::explain::ExplainArguments;
+use crate::latency::LatencyArguments;
 use crate::latency::server::{PeerArguments, serve};
 use crate::load::LoadArguments;
-use crate::monitor::command::MonitorArguments;
+use crate::monitor::MonitorArguments;
 use crate::output::Usage;
 use crate::papers::PapersArguments;
-use crate::scenarios::command::ScenariosArguments;
+use crate::scenarios::ScenariosArguments;
 use crate::survey::SurveyArguments;
 
 /// Measures Dynocar: accuracy against the statistical bound, speed against peers.

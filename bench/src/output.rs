@@ -1,10 +1,12 @@
 //! Results for people and for machines, and how a command of this program fails.
 
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
+use serde_json::Value;
 
 /// Why a command fails, in words; exit status 1, or 2 for [`Usage`].
 pub type Failure = Box<dyn Error + Send + Sync>;
@@ -21,6 +23,19 @@ pub struct Usage(pub String);
 /// When it does not hold.
 pub fn expect(holds: bool, words: impl FnOnce() -> String) -> Result<(), Failure> {
     if holds { Ok(()) } else { Err(Usage(words()).into()) }
+}
+
+/// What a name on the command line stands for.
+///
+/// # Errors
+///
+/// When it is none of those that there are, with these.
+pub fn named<T: Copy>(option: &str, name: &str, all: &[(&str, T)]) -> Result<T, Failure> {
+    let found = all.iter().find(|(own, _)| *own == name).map(|(_, it)| *it);
+    found.ok_or_else(|| {
+        let known: Vec<&str> = all.iter().map(|(own, _)| *own).collect();
+        Usage(format!("{option} {name}: expected one of {}", known.join(", "))).into()
+    })
 }
 
 /// Says during what an error happened.
@@ -41,16 +56,39 @@ pub fn give(
     Ok(dynocar::output::give(json.as_deref(), result, for_people)?)
 }
 
-/// A row of a table of figures: each column's name with its cell, empty where there is no figure.
+/// A cell of a table: its column, what people read there, where it is for them, and what machines get.
+#[derive(Clone, Debug)]
+struct Cell {
+    name: String,
+    text: Option<String>,
+    value: Value,
+}
+
+/// A row of a table of figures, empty where there is none: for people, as CSV, and as JSON with the column's names.
 #[derive(Clone, Debug, Default)]
-pub struct Record(Vec<(String, String)>);
+pub struct Record(Vec<Cell>);
 
 impl Record {
+    /// With one more cell that people read otherwise than machines.
+    #[must_use]
+    pub fn shown(mut self, name: impl Into<String>, text: String, value: impl Into<Value>) -> Self {
+        self.0.push(Cell { name: name.into(), text: Some(text), value: value.into() });
+        self
+    }
+
+    /// With one more cell that people do not see.
+    #[must_use]
+    pub fn for_machines(mut self, name: &str, value: impl Into<Value>) -> Self {
+        self.0.push(Cell { name: name.into(), text: None, value: value.into() });
+        self
+    }
+
     /// With one more cell.
     #[must_use]
-    pub fn with(mut self, name: impl Into<String>, cell: impl Display) -> Self {
-        self.0.push((name.into(), cell.to_string()));
-        self
+    pub fn with(self, name: impl Into<String>, cell: impl Display) -> Self {
+        let text = cell.to_string();
+        let value = text.parse::<u64>().map_or(Value::from(&*text), Value::from);
+        self.shown(name, text, value)
     }
 
     /// With one more number of so many decimals; empty where there is none.
@@ -62,32 +100,54 @@ impl Record {
         decimals: usize,
     ) -> Self {
         let known = value.into().filter(|it| it.is_finite());
-        self.with(name, known.map_or(String::new(), |it| format!("{it:.decimals$}")))
+        self.shown(name, known.map_or(String::new(), |it| format!("{it:.decimals$}")), known)
     }
 
-    /// The cell of a column.
+    /// The number in a column, as machines get it.
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.0.iter().find(|it| it.name == name)?.value.as_f64()
+    }
+
+    /// The cell of a column, as people read it.
     #[cfg(test)]
     pub fn cell(&self, name: &str) -> Option<&str> {
-        self.0.iter().find(|it| it.0 == name).map(|it| it.1.as_str())
+        self.0.iter().find(|it| it.name == name)?.text.as_deref()
     }
 
-    /// As people read it: units in words, and an interval in the cell of its figure.
+    /// Names and texts of the cells that people see.
+    fn seen(&self) -> Vec<(&str, &str)> {
+        self.0.iter().filter_map(|it| Some((it.name.as_str(), it.text.as_deref()?))).collect()
+    }
+
+    /// As people read it: units in words, and an interval in the cell of its figure; a time says its unit itself.
     fn for_people(&self) -> Vec<(String, String)> {
-        let mut cells: Vec<(String, String)> = Vec::with_capacity(self.0.len());
-        let mut rest = self.0.iter();
-        while let Some((name, cell)) = rest.next() {
+        let seen = self.seen();
+        let (mut cells, mut rest) = (Vec::with_capacity(seen.len()), seen.iter());
+        while let Some((name, text)) = rest.next() {
             let is_figure = rest.as_slice().first().is_some_and(|it| it.0 == format!("{name}_low"));
-            let mut cell = cell.clone();
+            let mut text = text.to_string();
             if is_figure
                 && let (Some(low), Some(high)) = (rest.next(), rest.next())
                 && !low.1.is_empty()
             {
-                cell += &format!(" ({}–{})", low.1, high.1);
+                text += &format!(" ({}–{})", low.1, high.1);
             }
-            cells.push((name.replace('_', " ").replace("percent", "%"), cell));
+            let name = name.trim_end_matches("_ns").replace('_', " ").replace("percent", "%");
+            cells.push((name, text));
         }
         cells
     }
+}
+
+impl Serialize for Record {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|it| (&it.name, &it.value)))
+    }
+}
+
+/// How often things came, in words.
+pub fn counts<K: Display>(of: &BTreeMap<K, usize>) -> String {
+    of.iter().map(|(it, count)| format!("{it} {count}")).collect::<Vec<_>>().join(", ")
 }
 
 /// Rows with the same columns as a table of Markdown that reads in a terminal too: words to the left, numbers
@@ -128,10 +188,10 @@ pub fn write_csv(file: &Path, records: &[Record]) -> Result<(), Failure> {
     let write = || -> Result<(), csv::Error> {
         let mut writer = csv::Writer::from_path(file)?;
         if let Some(first) = records.first() {
-            writer.write_record(first.0.iter().map(|it| &it.0))?;
+            writer.write_record(first.seen().iter().map(|it| it.0))?;
         }
         for record in records {
-            writer.write_record(record.0.iter().map(|it| &it.1))?;
+            writer.write_record(record.seen().iter().map(|it| it.1))?;
         }
         Ok(writer.flush()?)
     };

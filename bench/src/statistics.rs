@@ -1,4 +1,6 @@
-//! Means, quantiles and random numbers over seeded runs.
+//! Means, quantiles, differences and random numbers over seeded runs.
+
+use std::borrow::Borrow;
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -7,14 +9,23 @@ use rand_chacha::ChaCha8Rng;
 pub const KMH: f64 = 1.0 / 3.6;
 
 /// Arithmetic mean; 0 of none.
-pub fn mean(values: &[f64]) -> f64 {
-    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+pub fn mean(values: impl IntoIterator<Item: Borrow<f64>>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    for value in values {
+        sum += value.borrow();
+        count += 1;
+    }
+    if count == 0 { 0.0 } else { sum / f64::from(count) }
+}
+
+/// Share of what is so; 0 of none.
+pub fn share(are_so: impl IntoIterator<Item = bool>) -> f64 {
+    mean(are_so.into_iter().map(|is_so| f64::from(u8::from(is_so))))
 }
 
 /// Root mean square; 0 of none.
-pub fn root_mean_square(values: &[f64]) -> f64 {
-    let squares: Vec<f64> = values.iter().map(|value| value * value).collect();
-    mean(&squares).sqrt()
+pub fn root_mean_square(values: impl IntoIterator<Item: Borrow<f64>>) -> f64 {
+    mean(values.into_iter().map(|value| value.borrow() * value.borrow())).sqrt()
 }
 
 /// The values that these shares of all do not exceed; none of none.
@@ -29,6 +40,33 @@ pub fn median(values: Vec<f64>) -> Option<f64> {
     quantiles(values, [0.5]).map(|[middle]| middle)
 }
 
+/// A straight line through some points, by least squares: its value at 0, and its slope.
+pub fn straight_line(points: &[(f64, f64)]) -> (f64, f64) {
+    let (mean_x, mean_y) = (mean(points.iter().map(|it| it.0)), mean(points.iter().map(|it| it.1)));
+    let spread: f64 = points.iter().map(|it| (it.0 - mean_x).powi(2)).sum();
+    let slope = points.iter().map(|it| (it.0 - mean_x) * (it.1 - mean_y)).sum::<f64>() / spread;
+    (mean_y - slope * mean_x, slope)
+}
+
+/// Derivatives of every element of a list with respect to each parameter, by central differences of these widths:
+/// of what a scenario's own motion gives, apart from the derivatives that estimators use.
+pub fn jacobian<const N: usize>(
+    widths: [f64; N],
+    at: impl Fn([f64; N]) -> Vec<f64>,
+) -> Vec<[f64; N]> {
+    let mut rows = Vec::new();
+    for (column, width) in widths.into_iter().enumerate() {
+        let mut change = [0.0; N];
+        change[column] = width;
+        let (plus, minus) = (at(change), at(change.map(|width| -width)));
+        rows.resize(plus.len().max(rows.len()), [0.0; N]);
+        for (row, (plus, minus)) in rows.iter_mut().zip(plus.iter().zip(minus)) {
+            row[column] = (plus - minus) / (2.0 * width);
+        }
+    }
+    rows
+}
+
 /// A standard normal number.
 pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
@@ -41,8 +79,10 @@ mod tests {
 
     #[test]
     fn moments_and_quantiles_of_a_small_set() {
-        assert_eq!(root_mean_square(&[3.0, -4.0]), 12.5_f64.sqrt());
-        assert_eq!((mean(&[1.0, 2.0, 6.0]), mean(&[])), (3.0, 0.0));
+        assert_eq!(root_mean_square([3.0, -4.0]), 12.5_f64.sqrt());
+        assert_eq!((mean([1.0, 2.0, 6.0]), mean(&[] as &[f64])), (3.0, 0.0));
+        assert_eq!(share([true, false, true, true]), 0.75);
+        assert_eq!(straight_line(&[(1.0, 3.0), (2.0, 5.0), (4.0, 9.0)]), (1.0, 2.0));
         let found = quantiles(vec![5.0, 1.0, 100.0, 2.0, 3.0], [0.25, 0.5, 0.75]);
         assert_eq!(found, Some([2.0, 3.0, 5.0]));
         assert_eq!((median(vec![3.0, 1.0, 10.0, 2.0]), median(Vec::new())), (Some(3.0), None));

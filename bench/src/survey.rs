@@ -10,7 +10,6 @@ use dynocar_tests::simulator::{
     EffectRequest, GnssReceiver, SimulatorSettings, TrainType, simulate,
 };
 use dynocar_workshop::survey::read::{recordings, vehicle};
-use serde::Serialize;
 
 use crate::output::{Failure, Record, give, table};
 
@@ -33,22 +32,6 @@ const RECORDINGS: usize = 10;
 /// Length in s of a recording.
 const DURATION_S: f64 = 480.0;
 
-/// What was measured.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Row>,
-}
-
-/// One number of passes.
-#[derive(Serialize)]
-struct Row {
-    passes: usize,
-    samples: usize,
-    line_m: f64,
-    total_s: f64,
-    pass_ms: f64,
-}
-
 impl SurveyArguments {
     /// Surveys ever more passes of one line.
     ///
@@ -69,30 +52,20 @@ impl SurveyArguments {
         write_dataset(&simulate(&settings), raw)?;
         let dataset = dynocar::dataset::load(raw)?;
         let (few, vehicle) = (recordings(&dataset), vehicle(&dataset));
-        let mut rows = Vec::new();
+        let mut records = Vec::new();
         for &passes in &self.passes {
             let raws: Vec<_> = few.iter().cycle().take(passes).cloned().collect();
             let start = Instant::now();
             let surveyed = survey(&raws, &vehicle, None)?;
             let total_s = start.elapsed().as_secs_f64();
-            rows.push(Row {
-                passes,
-                samples: raws.iter().map(|raw| raw.time_s.len()).sum(),
-                line_m: surveyed.alignments.growing.length_m(),
-                total_s,
-                pass_ms: 1e3 * total_s / passes as f64,
-            });
+            let record = Record::default()
+                .with("passes", passes)
+                .with("samples", raws.iter().map(|raw| raw.time_s.len()).sum::<usize>())
+                .number("line m", surveyed.alignments.growing.length_m(), 0)
+                .number("total s", total_s, 2)
+                .number("ms a pass", 1e3 * total_s / passes as f64, 1);
+            records.push(record);
         }
-        let records: Vec<Record> = rows.iter().map(record).collect();
-        give(&self.json, &Report { rows }, || table(&records))
+        give(&self.json, &records, || table(&records))
     }
-}
-
-fn record(row: &Row) -> Record {
-    Record::default()
-        .with("passes", row.passes)
-        .with("samples", row.samples)
-        .number("line m", row.line_m, 0)
-        .number("total s", row.total_s, 2)
-        .number("ms a pass", row.pass_ms, 1)
 }

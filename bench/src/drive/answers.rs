@@ -7,16 +7,11 @@ use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, Uncertain};
 
 use super::knowledge::Knowledge;
 use super::train::Train;
+use crate::scenarios::score::{Answer, COUNTS_MPS, Score};
 
 /// What the driver asks for.
 pub const ASKED: [Quantity; 4] =
     [Quantity::Resistance, Quantity::Mass, Quantity::BrakeFriction, Quantity::Adhesion];
-/// Deviations beyond which an answer is wrong.
-const WRONG: f64 = 4.0;
-/// Share of the truth by which a worse answer than the declared one is worse.
-const WORSE_BY: f64 = 0.01;
-/// Speed in m/s from which an answer counts.
-const COUNTS_MPS: f64 = 2.0;
 
 fn value(snapshot: &ParameterSnapshot, parameter: Parameter) -> Option<Uncertain> {
     Some(Uncertain::new(snapshot.value(parameter)?, snapshot.std(parameter)?))
@@ -100,56 +95,10 @@ impl Memory {
     }
 }
 
-/// How often one quantity was usable, and right.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Use {
-    /// Cycles of the moving train; of the braking one for brake and adhesion.
-    pub cycles: u64,
-    /// Those in which it was usable.
-    pub usable: u64,
-    /// Of those, with the truth more than four deviations off.
-    pub wrong: u64,
-    /// Of those, further from the truth than the declared value, by 1 % of the truth.
-    pub worse: u64,
-    /// Sums of the squares of the errors over the truth: usable, and of the declared value then.
-    pub squares: [f64; 2],
-    /// Changes of usable.
-    pub changes: u64,
-    /// Cycles until the first use.
-    pub first: Option<u64>,
-    was_usable: bool,
-}
-
-impl Use {
-    fn push(&mut self, answer: Option<[f64; 4]>) {
-        self.cycles += 1;
-        self.changes += u64::from(answer.is_some() != self.was_usable);
-        self.was_usable = answer.is_some();
-        let Some([value, std, declared, truth]) = answer else { return };
-        self.first.get_or_insert(self.cycles);
-        self.usable += 1;
-        self.wrong += u64::from((value - truth).abs() > WRONG * std);
-        for (sum, it) in self.squares.iter_mut().zip([value, declared]) {
-            *sum += (it / truth - 1.0).powi(2);
-        }
-        let by = (value - truth).abs() - (declared - truth).abs();
-        self.worse += u64::from(by > WORSE_BY * truth);
-    }
-
-    /// Joins another train's.
-    pub fn join(&mut self, other: &Use) {
-        self.cycles += other.cycles;
-        self.usable += other.usable;
-        self.wrong += other.wrong;
-        self.worse += other.worse;
-        self.changes += other.changes;
-        self.squares = [0, 1].map(|which| self.squares[which] + other.squares[which]);
-    }
-}
-
-/// Takes in a cycle: what is declared and what was learned, in the order of [`ASKED`].
+/// Takes in a cycle of the moving train: what is declared and what was learned, in the order of [`ASKED`]; brake and
+/// adhesion count while the train brakes.
 pub fn count(
-    uses: &mut [Use; 4],
+    scores: &mut [Score; 4],
     train: &Train,
     is_braking: bool,
     declared: &Knowledge,
@@ -168,16 +117,19 @@ pub fn count(
         }
         _ => Uncertain::exact(f64::NAN),
     };
-    let scale = learned.brake_scale;
+    let w0_found = Uncertain::new(w0(&learned.davis), learned.w0_std_n_per_kn);
     let answers = [
-        [w0(&learned.davis), learned.w0_std_n_per_kn, w0(&declared.davis), w0(&train.davis())],
-        [learned.mass_kg.value, learned.mass_kg.std, declared.mass_kg.value, train.mass_kg()],
-        [scale.value, scale.std, 1.0, train.brake_scale()],
-        [adhesion.value, adhesion.std, f64::INFINITY, train.adhesion(speed_mps)],
+        Answer::of(w0_found, w0(&declared.davis), w0(&train.davis())),
+        Answer::of(learned.mass_kg, declared.mass_kg.value, train.mass_kg),
+        Answer::of(learned.brake_scale, 1.0, train.brake_scale()),
+        Answer::of(adhesion, f64::INFINITY, train.adhesion(speed_mps)),
     ];
+    let cycle_ms = f64::from(train.service.cycle_ms);
     for (index, answer) in answers.into_iter().enumerate() {
         if index < 2 || is_braking {
-            uses[index].push(is_usable[index].then_some(answer));
+            let score = &mut scores[index];
+            let time_s = 1e-3 * (score.cycles + 1) as f64 * cycle_ms;
+            score.push(time_s, 1e-3 * cycle_ms, is_usable[index].then_some(answer));
         }
     }
 }

@@ -8,8 +8,7 @@
 
 use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};
-use super::leg::Leg;
-use super::plan::{COASTING_MIN_SHARE, Plan, Planner};
+use super::plan::{COASTING_MIN_SHARE, Leg, Plan, Planner};
 
 /// Bandwidth in rad/s of the estimate of speed and of what is not explained, at most.
 const OBSERVER_RAD_PER_S: f64 = 0.8;

@@ -7,8 +7,7 @@ use dynocar_shared::{RailCondition, SampleField, TrainSample, Uncertain};
 
 use super::driver::{Driver, Measured, Phase};
 use super::knowledge::Knowledge;
-use super::leg::Leg;
-use super::plan::Planner;
+use super::plan::{Leg, Planner};
 use super::train::Train;
 
 /// Running time of the timetable over the shortest one with declared parameters, and s on top.
@@ -53,18 +52,14 @@ pub struct DrivenLeg {
     pub looks: Vec<Look>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum State {
-    Standing { left_s: f64 },
-    Running,
-}
-
 /// A train with its driver.
 pub struct Journey {
     /// The train.
     pub train: Train,
+    /// None while the train stands at a stop.
     driver: Option<Driver>,
-    state: State,
+    /// Time in s until it leaves.
+    standing_s: f64,
     running_s: f64,
     braking_s: f64,
     accelerations: Vec<f64>,
@@ -78,11 +73,10 @@ pub struct Journey {
 impl Journey {
     /// A train about to leave its first stop.
     pub fn new(train: Train) -> Self {
-        let left_s = train.standing_s();
         Journey {
+            standing_s: train.standing_s(),
             train,
             driver: None,
-            state: State::Standing { left_s },
             running_s: 0.0,
             braking_s: 0.0,
             accelerations: Vec::new(),
@@ -124,22 +118,19 @@ impl Journey {
     ///
     /// The driver drives by `knowledge`; `sure` is what bounds a stop.
     pub fn proceed(&mut self, sample: &TrainSample, knowledge: &Knowledge, sure: &Knowledge) {
-        let cycle_s = f64::from(self.train.service().cycle_ms) * 1e-3;
-        match &mut self.state {
-            State::Standing { left_s } => {
-                *left_s -= cycle_s;
-                let is_over = *left_s <= 0.0;
-                self.train.apply(-0.4 * self.train.ability().brake_max_n);
-                if is_over {
-                    self.depart(sample, knowledge, cycle_s);
-                }
-            }
-            State::Running => self.run(sample, (knowledge, sure), cycle_s),
+        let cycle_s = self.train.service.cycle_s();
+        if self.driver.is_some() {
+            return self.run(sample, (knowledge, sure), cycle_s);
+        }
+        self.standing_s -= cycle_s;
+        self.train.apply(-0.4 * self.train.ability.brake_max_n);
+        if self.standing_s <= 0.0 {
+            self.depart(sample, knowledge, cycle_s);
         }
     }
 
     fn depart(&mut self, sample: &TrainSample, knowledge: &Knowledge, cycle_s: f64) {
-        let (leg, ability) = (self.train.leg(), self.train.ability().clone());
+        let (leg, ability) = (self.train.leg(), self.train.ability.clone());
         let declared = self.declared(sample);
         // The timetable is that of the declared load, whatever it weighs today.
         let usual =
@@ -152,7 +143,6 @@ impl Journey {
         let truth = self.train.truth();
         self.saved_w = saved_w(&Planner { leg: &leg, knowledge: &truth, ability: &ability }, due_s);
         self.driver = Some(Driver::new(leg, ability, cycle_s, *knowledge));
-        self.state = State::Running;
         (self.running_s, self.braking_s) = (0.0, 0.0);
         self.accelerations.clear();
     }
@@ -188,7 +178,7 @@ impl Journey {
     }
 
     fn look(&self, knowledge: &Knowledge) -> Look {
-        let ability = self.train.ability();
+        let ability = &self.train.ability;
         let speed_mps = self.train.speed_mps().max(STANDING_MPS);
         let at_m = self.driver.as_ref().map_or(0.0, |driver| driver.estimate().0);
         let slope = |within_m: f64| {
@@ -233,7 +223,7 @@ impl Journey {
             looks: std::mem::take(&mut self.looks),
         });
         self.train.turn_to_next();
-        self.state = State::Standing { left_s: self.train.standing_s() };
+        self.standing_s = self.train.standing_s();
     }
 }
 
@@ -251,7 +241,7 @@ fn saved_w(planner: &Planner<'_>, due_s: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::line::{Condition, Service};
+    use super::super::line::{CONDITIONS, Condition, ORDINARY, Service};
     use super::*;
     use crate::scenarios::world::Traffic;
 
@@ -269,7 +259,7 @@ mod tests {
     #[test]
     fn a_driver_that_knows_its_train_stops_at_the_platform_and_in_time() {
         for traffic in [Traffic::Metro, Traffic::Emu, Traffic::HighSpeed] {
-            for leg in drive(traffic, Condition::Ordinary, true, 5) {
+            for leg in drive(traffic, ORDINARY, true, 5) {
                 println!("{traffic:?} {leg:?}");
                 assert!(leg.beyond_m.abs() < 0.5, "{leg:?}");
                 assert!(leg.late_s.abs() < 6.0, "{leg:?}");
@@ -283,7 +273,7 @@ mod tests {
 
     #[test]
     fn declared_parameters_cost_time_energy_or_place_but_the_train_arrives() {
-        for leg in drive(Traffic::Metro, Condition::StrongBrakes, false, 5) {
+        for leg in drive(Traffic::Metro, CONDITIONS[2], false, 5) {
             println!("{leg:?}");
             assert!(leg.beyond_m.abs() < 3.0 && leg.late_s.abs() < 15.0, "{leg:?}");
         }

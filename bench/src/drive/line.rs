@@ -8,56 +8,42 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::Ability;
+use crate::output::Record;
 use crate::scenarios::world::{BRAKE_STD, LoadSource, Scenario, Traffic, World};
 use crate::statistics::normal;
 
 /// What is particular about brakes, rail or daemon.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Condition {
-    /// Nothing.
-    Ordinary,
-    /// The brake exerts 10 % less than its pressure says.
-    WeakBrakes,
-    /// The brake exerts 10 % more.
-    StrongBrakes,
-    /// The rail is wet, and mostly more slippery than the law says.
-    WetRail,
-    /// The daemon is killed in the middle of a leg, and another one comes.
-    DaemonDies,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Condition {
+    /// In words.
+    pub name: &'static str,
+    /// Exerted brake force over what its pressure says.
+    brake_scale: f64,
+    /// True where the rail is wet, and mostly more slippery than the law says.
+    is_wet: bool,
+    /// True where the daemon is killed in the middle of a leg, and another one comes.
+    pub daemon_dies: bool,
 }
 
 impl Condition {
-    /// All of them.
-    pub const ALL: [Condition; 5] = [
-        Condition::Ordinary,
-        Condition::WeakBrakes,
-        Condition::StrongBrakes,
-        Condition::WetRail,
-        Condition::DaemonDies,
-    ];
-
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Condition::Ordinary => "ordinary",
-            Condition::WeakBrakes => "brakes 10 % weaker",
-            Condition::StrongBrakes => "brakes 10 % stronger",
-            Condition::WetRail => "wet rail",
-            Condition::DaemonDies => "daemon dies",
-        }
-    }
-
-    fn brake_scale(self) -> f64 {
-        match self {
-            Condition::WeakBrakes => 0.9,
-            Condition::StrongBrakes => 1.1,
-            _ => 1.0,
-        }
+    const fn brakes(name: &'static str, brake_scale: f64) -> Self {
+        Condition { name, brake_scale, is_wet: false, daemon_dies: false }
     }
 }
 
+/// Nothing is particular.
+pub const ORDINARY: Condition = Condition::brakes("ordinary", 1.0);
+/// All conditions.
+pub const CONDITIONS: [Condition; 5] = [
+    ORDINARY,
+    Condition::brakes("brakes 10 % weaker", 0.9),
+    Condition::brakes("brakes 10 % stronger", 1.1),
+    Condition { name: "wet rail", is_wet: true, ..ORDINARY },
+    Condition { name: "daemon dies", daemon_dies: true, ..ORDINARY },
+];
+
 /// A row of the table: kind of traffic and what is particular.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Service {
     /// Kind of traffic.
     pub traffic: Traffic,
@@ -70,7 +56,20 @@ pub struct Service {
 impl Service {
     /// In words.
     pub fn name(&self) -> String {
-        format!("{}, {}, {} ms", traffic_name(self.traffic), self.condition.name(), self.cycle_ms)
+        format!("{}, {}, {} ms", traffic_name(self.traffic), self.condition.name, self.cycle_ms)
+    }
+
+    /// The first cells of a row of a table.
+    pub fn record(&self) -> Record {
+        Record::default()
+            .with("train", traffic_name(self.traffic))
+            .with("condition", self.condition.name)
+            .with("cycle_ms", self.cycle_ms)
+    }
+
+    /// The controller's cycle in s.
+    pub fn cycle_s(&self) -> f64 {
+        f64::from(self.cycle_ms) * 1e-3
     }
 
     /// The world's scenario: places are those of balises, loads as the kind of traffic knows them.
@@ -183,11 +182,9 @@ impl Hidden {
     /// Draws it for a world.
     pub fn draw(service: &Service, world: &World, random: &mut ChaCha8Rng) -> Self {
         let end_m = world.stops_m[world.stops_m.len() - 1];
-        let rail = match service.condition {
-            Condition::WetRail => {
-                (RailCondition::Wet, (0.75 + 0.1 * normal(random)).clamp(0.55, 1.0))
-            }
-            _ => (RailCondition::Dry, 1.0 + 0.05 * normal(random)),
+        let rail = match service.condition.is_wet {
+            true => (RailCondition::Wet, (0.75 + 0.1 * normal(random)).clamp(0.55, 1.0)),
+            false => (RailCondition::Dry, 1.0 + 0.05 * normal(random)),
         };
         let wind_std_mps = match service.traffic {
             Traffic::Metro => 0.0,
@@ -211,7 +208,7 @@ impl Hidden {
             .map(|(from_m, to_m)| (from_m, to_m, 350.0 + 900.0 * random.random::<f64>()))
             .collect();
         Hidden {
-            brake_scale: service.condition.brake_scale() * (1.0 + BRAKE_STD * normal(random)),
+            brake_scale: service.condition.brake_scale * (1.0 + BRAKE_STD * normal(random)),
             rail,
             wind_mps: wind_std_mps * normal(random),
             tunnels_m,

@@ -2,31 +2,152 @@
 //! with the true ones.
 //!
 //! - [`knowledge`]: what a driver holds for true of its train, and what the train can do
-//! - [`leg`]: the line from stop to stop as the map has it
 //! - [`answers`]: from the daemon's answers to what the driver drives by, and whether they were right
 //! - [`braking`]: the braking curve to the stopping point
-//! - [`plan`]: the speed profile for the timetable with the least energy
+//! - [`plan`]: the line as the map has it, and the speed profile for the timetable with the least energy
 //! - [`driver`]: tracking the plan and the braking curve
 //! - [`mod@line`]: brakes, rails, wind, tunnels, curves and loads beside the world of ordinary mistakes
 //! - [`train`]: the train, whose truth nobody knows
 //! - [`journey`]: a train and its driver from stop to stop
 //! - [`link`]: channels to a daemon of its own, in lock-step
 //! - [`run`]: all trains of a service with one kind of parameters
-//! - [`score`], `records`, [`picture`]: what it comes to
-//! - [`command`]: the command line
+//! - [`score`], [`picture`]: what it comes to
 
 pub mod answers;
 pub mod braking;
-pub mod command;
 pub mod driver;
 pub mod journey;
 pub mod knowledge;
-pub mod leg;
 pub mod line;
 pub mod link;
 pub mod picture;
 pub mod plan;
-mod records;
 pub mod run;
 pub mod score;
 pub mod train;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar::output::{report_line, write_file};
+use serde_json::json;
+
+use self::line::{CONDITIONS, ORDINARY, Service};
+use self::run::{Extent, Informant};
+use self::score::Scored;
+use crate::output::{Failure, Record, expect, give, table, write_csv};
+use crate::parallel;
+use crate::scenarios::world::Traffic;
+
+/// What a controller gains: an automatic driver with declared parameters, with the daemon's answers, and
+/// with the true ones.
+///
+/// Exit status 1 where the driver with Dynocar is worse than with declared parameters.
+#[derive(Debug, Args)]
+pub struct DriveArguments {
+    /// Trains for each scenario, each with a seed of its own
+    #[arg(long, default_value_t = 20)]
+    trains: usize,
+    /// Stops of each train
+    #[arg(long, default_value_t = 10)]
+    stops: usize,
+    /// The first seed
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+    /// Only scenarios whose name contains this, as metro or 'wet rail'
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    scenario: String,
+    /// The controller's cycle in ms; else 50 for metro and 200 for the others, and a metro with 10
+    #[arg(long, value_name = "MS")]
+    cycle_ms: Option<u32>,
+    /// Scenarios at a time
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the drives as CSV; FILE_answers and FILE_differences beside it
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the picture of the ordinary scenarios, as SVG
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+}
+
+/// Every scenario.
+fn services(cycle_ms: Option<u32>) -> Vec<Service> {
+    let all = [Traffic::Metro, Traffic::Emu, Traffic::HighSpeed, Traffic::Freight];
+    let of = |traffic: Traffic| {
+        let usual_ms = if traffic == Traffic::Metro { 50 } else { 200 };
+        let cycle_ms = cycle_ms.unwrap_or(usual_ms);
+        CONDITIONS.map(|condition| Service { traffic, condition, cycle_ms })
+    };
+    let fast = Service { traffic: Traffic::Metro, condition: ORDINARY, cycle_ms: 10 };
+    all.into_iter().flat_map(of).chain(cycle_ms.is_none().then_some(fast)).collect()
+}
+
+impl DriveArguments {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When the command line is wrong, a process fails, or the driver with Dynocar is worse.
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut chosen = services(self.cycle_ms);
+        chosen.retain(|service| service.name().contains(&self.scenario));
+        expect(!chosen.is_empty(), || {
+            format!("--scenario {}: expected a part of a scenario's name", self.scenario)
+        })?;
+        expect(self.trains > 0 && self.stops > 0, || {
+            "--trains and --stops: expected more than 0".into()
+        })?;
+        let cycle_ms = self.cycle_ms.unwrap_or(50);
+        expect((10..=200).contains(&cycle_ms), || {
+            format!("--cycle-ms {cycle_ms}: expected 10 to 200")
+        })?;
+        let extent = Extent { trains: self.trains, stops: self.stops, first_seed: self.first_seed };
+        let scored = parallel::over(&chosen, self.threads, |service| measure(*service, extent));
+        let scored = scored.into_iter().collect::<Result<Vec<Scored>, _>>()?;
+        if let Some(file) = &self.picture {
+            write_file(file, &picture::svg(&ordinary(&scored))?)?;
+        }
+        let lines = scored.iter().flat_map(|it| &it.lines).map(|line| line.record.clone());
+        let answers = scored.iter().flat_map(|it| it.answers.clone());
+        let differences = scored.iter().flat_map(|it| it.differences.clone());
+        let tables: [Vec<Record>; 3] = [lines.collect(), answers.collect(), differences.collect()];
+        if let Some(file) = &self.csv {
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+            for (ending, records) in ["", "_answers", "_differences"].iter().zip(&tables) {
+                write_csv(&file.with_file_name(format!("{stem}{ending}.csv")), records)?;
+            }
+        }
+        let [drives, answers, differences] = &tables;
+        let all = json!({ "drives": drives, "answers": answers, "differences": differences });
+        give(&self.json, &all, || tables.each_ref().map(|it| table(it)).join("\n"))?;
+        let broken: Vec<&str> = scored.iter().filter_map(|it| it.broken.as_deref()).collect();
+        match broken.is_empty() {
+            true => Ok(()),
+            false => Err(format!("worse with Dynocar:\n{}", broken.join("\n")).into()),
+        }
+    }
+}
+
+/// The ordinary service of each traffic; that of its usual cycle comes first.
+fn ordinary(scored: &[Scored]) -> Vec<&Scored> {
+    let mut first: Vec<&Scored> = Vec::new();
+    for it in scored.iter().filter(|it| it.service.condition == ORDINARY) {
+        if first.iter().all(|other| other.service.traffic != it.service.traffic) {
+            first.push(it);
+        }
+    }
+    first
+}
+
+fn measure(service: Service, extent: Extent) -> Result<Scored, Failure> {
+    let mut all = [Vec::new(), Vec::new(), Vec::new()];
+    for (driven, (informant, _)) in all.iter_mut().zip(Informant::ALL) {
+        *driven = run::drive(service, informant, extent)?;
+    }
+    report_line(&format!("{}: done", service.name()));
+    Ok(score::score(service, &all))
+}

@@ -3,7 +3,8 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::score::{Figure, ReportRow, Scored};
+use super::line::traffic_name;
+use super::score::{ENERGY, Figure, LATE, STOP_RMS, Scored};
 use crate::output::Failure;
 
 const SIZE: (u32, u32) = (1_080, 400);
@@ -11,24 +12,33 @@ const COLORS: [RGBColor; 3] =
     [RGBColor(176, 176, 176), RGBColor(31, 119, 180), RGBColor(44, 160, 44)];
 const NAMES: [&str; 3] = ["declared parameters", "with Dynocar", "true parameters"];
 
-type Drawn = Result<(), Failure>;
+/// Title, place among the statistics, and factor and shift of what is drawn.
+const PANELS: [(&str, usize, f64, f64); 3] = [
+    ("stopping error in cm (rms)", STOP_RMS, 100.0, 0.0),
+    ("off the timetable in s", LATE, 1.0, 0.0),
+    ("energy above the least in %", ENERGY, 1.0, -100.0),
+];
 
 /// The picture of some services as SVG; one group of bars each.
 ///
 /// # Errors
 ///
 /// When it cannot be drawn.
-pub fn svg(scored: &[Scored]) -> Result<String, Failure> {
+pub fn svg(scored: &[&Scored]) -> Result<String, Failure> {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
         area.fill(&WHITE)?;
         let panels = area.split_evenly((1, 3));
-        let cm = |line: &ReportRow| scaled(line.error_m, 100.0, 0.0);
-        panel(&panels[0], "stopping error in cm (rms)", scored, cm, true)?;
-        panel(&panels[1], "off the timetable in s", scored, |line| line.late_s, false)?;
-        let more = |line: &ReportRow| scaled(line.energy_percent, 1.0, -100.0);
-        panel(&panels[2], "energy above the least in %", scored, more, false)?;
+        for (index, (area, (title, which, factor, shift))) in panels.iter().zip(PANELS).enumerate()
+        {
+            let of = |value: f64| factor * value + shift;
+            let figure = |all: &[Figure]| {
+                let Figure { value, low, high } = all[which];
+                Figure { value: of(value), low: of(low), high: of(high) }
+            };
+            panel(area, title, scored, figure, index == 0)?;
+        }
         area.present()?;
     }
     Ok(text)
@@ -38,11 +48,11 @@ pub fn svg(scored: &[Scored]) -> Result<String, Failure> {
 fn panel(
     area: &DrawingArea<SVGBackend<'_>, Shift>,
     title: &str,
-    scored: &[Scored],
-    figure: impl Fn(&ReportRow) -> Figure,
+    scored: &[&Scored],
+    figure: impl Fn(&[Figure]) -> Figure,
     has_legend: bool,
-) -> Drawn {
-    let figures = scored.iter().flat_map(|it| &it.lines).map(&figure);
+) -> Result<(), Failure> {
+    let figures = scored.iter().flat_map(|it| &it.lines).map(|line| figure(&line.figures));
     let most = figures.map(|it| it.high).fold(0.0, f64::max).max(1e-3);
     let right = 4.0 * scored.len() as f64;
     let mut chart = ChartBuilder::on(area)
@@ -63,7 +73,8 @@ fn panel(
     for (group, it) in scored.iter().enumerate() {
         let left = 4.0 * group as f64 + 0.5;
         for (bar, line) in it.lines.iter().enumerate() {
-            let (from, to, bar_figure) = (left + bar as f64, left + bar as f64 + 0.9, figure(line));
+            let (from, to) = (left + bar as f64, left + bar as f64 + 0.9);
+            let bar_figure = figure(&line.figures);
             let (middle, color) = (0.5 * (from + to), COLORS[bar]);
             chart.draw_series([Rectangle::new(
                 [(from, 0.0), (to, bar_figure.value.max(0.0))],
@@ -72,8 +83,7 @@ fn panel(
             let ends = [(middle, bar_figure.low.max(0.0)), (middle, bar_figure.high.max(0.0))];
             chart.draw_series([PathElement::new(ends, BLACK.stroke_width(1))])?;
         }
-        let scenario = &it.lines[0].scenario;
-        let name = scenario.split(',').next().unwrap_or(scenario).to_owned();
+        let name = traffic_name(it.service.traffic);
         chart.draw_series([Text::new(name, (left, -0.03 * most), ("sans-serif", 14))])?;
     }
     if has_legend {
@@ -86,9 +96,4 @@ fn panel(
         }
     }
     Ok(())
-}
-
-fn scaled(figure: Figure, factor: f64, shift: f64) -> Figure {
-    let of = |value: f64| factor * value + shift;
-    Figure { value: of(figure.value), low: of(figure.low), high: of(figure.high) }
 }

@@ -2,12 +2,13 @@
 
 use dynocar_shared::TrainSample;
 
-use super::answers::{self, ASKED, Memory, Use};
+use super::answers::{self, ASKED, Memory};
 use super::journey::{DrivenLeg, Journey};
-use super::line::{Condition, Service};
+use super::line::Service;
 use super::link::Link;
 use super::train::Train;
 use crate::output::Failure;
+use crate::scenarios::score::Score;
 
 /// By which parameters the driver drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,17 +22,12 @@ pub enum Informant {
 }
 
 impl Informant {
-    /// All of them.
-    pub const ALL: [Informant; 3] = [Informant::Declared, Informant::Dynocar, Informant::Truth];
-
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Informant::Declared => "declared",
-            Informant::Dynocar => "Dynocar",
-            Informant::Truth => "true",
-        }
-    }
+    /// All of them, in words.
+    pub const ALL: [(Informant, &str); 3] = [
+        (Informant::Declared, "declared"),
+        (Informant::Dynocar, "dynocar"),
+        (Informant::Truth, "true"),
+    ];
 }
 
 /// Which trains drive how far.
@@ -50,34 +46,35 @@ pub struct Extent {
 pub struct Driven {
     /// Its legs.
     pub legs: Vec<DrivenLeg>,
-    /// What the daemon's answers were worth.
-    pub uses: [Use; 4],
+    /// What the daemon's answers were worth, by [`ASKED`].
+    pub scores: [Score; 4],
 }
 
-/// A train that asks the daemon.
-struct Asking {
+/// A train on its way, with what its driver keeps of the daemon's answers.
+struct Driving {
     journey: Journey,
     memory: Memory,
-    uses: [Use; 4],
+    scores: [Score; 4],
 }
 
-impl Asking {
-    fn proceed(&mut self, train: usize, sample: &TrainSample, link: &Link) {
+impl Driving {
+    /// One cycle of a driver that asks the daemon.
+    fn ask(&mut self, train: usize, sample: &TrainSample, link: &Link) {
         let declared = self.journey.declared(sample);
         let is_usable = ASKED.map(|quantity| link.usable(train, quantity).is_some());
-        let friction = self.journey.train.declared_friction();
+        let friction = self.journey.train.gear.friction;
         let learned = answers::learned(&declared, friction, sample.speed_mps, |quantity| {
             link.usable(train, quantity)
         });
         let is_braking = self.journey.is_braking();
         let train = &self.journey.train;
-        answers::count(&mut self.uses, train, is_braking, &declared, &learned, is_usable);
+        answers::count(&mut self.scores, train, is_braking, &declared, &learned, is_usable);
         let known = self.memory.recall(&learned, is_usable, is_braking);
         self.journey.proceed(sample, &known, &learned);
     }
 }
 
-/// Drives every train of a service.
+/// Drives every train of a service, all of them cycle by cycle.
 ///
 /// # Errors
 ///
@@ -87,98 +84,92 @@ pub fn drive(
     informant: Informant,
     extent: Extent,
 ) -> Result<Vec<Driven>, Failure> {
-    let seeds = extent.first_seed..extent.first_seed + extent.trains as u64;
-    let trains = seeds.map(|seed| Train::new(service, seed));
-    if informant == Informant::Dynocar {
-        return with_daemon(service, trains.collect(), extent.stops);
-    }
-    let alone = |train| {
-        let mut journey = Journey::new(train);
-        while journey.legs.len() < extent.stops {
-            let sample = journey.train.sample();
-            let known = match informant {
-                Informant::Truth => journey.train.truth(),
-                _ => journey.declared(&sample),
-            };
-            journey.proceed(&sample, &known, &known);
-        }
-        Driven { legs: journey.legs, uses: [Use::default(); 4] }
+    let Extent { trains, stops, first_seed } = extent;
+    let mut link = match informant {
+        Informant::Dynocar => Some(Link::open(&service.declared(), trains)?),
+        Informant::Declared | Informant::Truth => None,
     };
-    Ok(trains.map(alone).collect())
-}
-
-/// Cycles in which a driver does not yet know that the daemon is gone: 250 ms, as a reader presumes.
-fn cycles_unnoticed(service: &Service) -> u32 {
-    250_u32.div_ceil(service.cycle_ms)
-}
-
-fn with_daemon(service: Service, trains: Vec<Train>, stops: usize) -> Result<Vec<Driven>, Failure> {
-    let mut link = Link::open(&service.declared(), trains.len())?;
-    let mut asking: Vec<Asking> = trains
-        .into_iter()
-        .map(|train| Asking {
-            journey: Journey::new(train),
+    let mut all: Vec<Driving> = (first_seed..first_seed + trains as u64)
+        .map(|seed| Driving {
+            journey: Journey::new(Train::new(service, seed)),
             memory: Memory::default(),
-            uses: [Use::default(); 4],
+            scores: [Score::default(); 4],
         })
         .collect();
-    let (mut death, mut silent_cycles) = (Death::of(&asking[0], stops), 0);
+    let dies = service.condition.daemon_dies;
+    let mut death = if dies { Death::On(stops / 3) } else { Death::Never };
     loop {
-        let mut samples: Vec<(usize, TrainSample)> = asking
+        let on_the_way = |(_, it): &(usize, &mut Driving)| it.journey.legs.len() < stops;
+        let mut samples: Vec<(usize, TrainSample)> = all
             .iter_mut()
             .enumerate()
-            .filter(|(_, it)| it.journey.legs.len() < stops)
+            .filter(on_the_way)
             .map(|(index, it)| (index, it.journey.train.sample()))
             .collect();
         if samples.is_empty() {
             break;
         }
-        if let Some(left) = &mut death {
-            if !left.is_dead && left.is_reached(&asking[0].journey, left.kill_at) {
-                link.kill_daemon();
-                left.is_dead = true;
-            } else if left.is_dead && left.is_reached(&asking[0].journey, left.return_at) {
-                link.start_daemon()?;
-                death = None;
-            } else if left.is_dead {
-                silent_cycles += 1;
-                if silent_cycles == cycles_unnoticed(&service) {
-                    link.notice_silence();
-                }
-            }
+        if let Some(link) = &mut link {
+            death.come(&service, &all[0].journey, link)?;
+            link.exchange(&mut samples)?;
         }
-        link.exchange(&mut samples)?;
         for (index, sample) in &samples {
-            asking[*index].proceed(*index, sample, &link);
+            let driving = &mut all[*index];
+            if let Some(link) = &link {
+                driving.ask(*index, sample, link);
+                continue;
+            }
+            let known = match informant {
+                Informant::Truth => driving.journey.train.truth(),
+                _ => driving.journey.declared(sample),
+            };
+            driving.journey.proceed(sample, &known, &known);
         }
     }
-    let lost = link.lost();
-    if lost > 0 && service.condition != Condition::DaemonDies {
+    let lost = link.as_ref().map_or(0, Link::lost);
+    if lost > 0 && !dies {
         return Err(format!("daemon: {lost} samples were lost in lock-step").into());
     }
-    Ok(asking.into_iter().map(|it| Driven { legs: it.journey.legs, uses: it.uses }).collect())
+    Ok(all.into_iter().map(|it| Driven { legs: it.journey.legs, scores: it.scores }).collect())
 }
 
-/// When the daemon dies and another comes, by the first train's leg and time on it.
+/// Time in s on a leg at which the daemon dies, or another comes.
+const MIDWAY_S: f64 = 40.0;
+/// Time in ms for which a driver does not yet know that the daemon is gone, as a reader presumes.
+const UNNOTICED_MS: u32 = 250;
+
+/// What becomes of the daemon, by the first train's legs.
 #[derive(Clone, Copy, Debug)]
-struct Death {
-    kill_at: (usize, f64),
-    return_at: (usize, f64),
-    is_dead: bool,
+enum Death {
+    /// It stays, or another has come.
+    Never,
+    /// It dies in the middle of this leg.
+    On(usize),
+    /// It is dead for so many cycles; another comes in the middle of this leg.
+    Until(usize, u32),
 }
 
 impl Death {
-    /// In the middle of the leg after a third of the stops; another comes in the middle of the next.
-    fn of(first: &Asking, stops: usize) -> Option<Self> {
-        let (leg, time_s) = (stops / 3, 40.0);
-        first.journey.train.loses_daemon().then_some(Death {
-            kill_at: (leg, time_s),
-            return_at: (leg + 1, time_s),
-            is_dead: false,
-        })
-    }
-
-    fn is_reached(&self, first: &Journey, (leg, time_s): (usize, f64)) -> bool {
-        first.legs.len() > leg || (first.legs.len() == leg && first.running_s() >= time_s)
+    fn come(&mut self, service: &Service, first: &Journey, link: &mut Link) -> Result<(), Failure> {
+        let (legs, running_s) = (first.legs.len(), first.running_s());
+        let is_midway = |leg: usize| legs > leg || (legs == leg && running_s >= MIDWAY_S);
+        match *self {
+            Death::On(leg) if is_midway(leg) => {
+                link.kill_daemon();
+                *self = Death::Until(leg + 1, 0);
+            }
+            Death::Until(leg, _) if is_midway(leg) => {
+                link.start_daemon()?;
+                *self = Death::Never;
+            }
+            Death::Until(leg, cycles) => {
+                if cycles + 1 == UNNOTICED_MS.div_ceil(service.cycle_ms) {
+                    link.notice_silence();
+                }
+                *self = Death::Until(leg, cycles + 1);
+            }
+            Death::Never | Death::On(_) => {}
+        }
+        Ok(())
     }
 }

@@ -11,8 +11,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::{Ability, Knowledge};
-use super::leg::{Leg, PIECE_M};
-use super::line::{Condition, Hidden, Service, ability, declared_gear, next_load_kg};
+use super::line::{Hidden, Service, ability, declared_gear, next_load_kg};
+use super::plan::{Leg, PIECE_M};
 use crate::scenarios::world::{LoadSource, STOP_TO_STOP_STD, WEIGHING_STD, World};
 use crate::statistics::normal;
 
@@ -25,20 +25,24 @@ const MEAN_DELAY_S: f64 = 0.1;
 
 /// A train on its line.
 pub struct Train {
-    service: Service,
+    /// Its service.
+    pub service: Service,
     world: World,
     hidden: Hidden,
     /// As declared.
     pub declared: TrainModel,
-    gear: DeclaredGear,
-    ability: Ability,
+    /// Its brake gear, as the daemon reckons with it.
+    pub gear: DeclaredGear,
+    /// What it can do, as declared.
+    pub ability: Ability,
     seed: u64,
     random: ChaCha8Rng,
     next_stop: usize,
     direction: f64,
     start_m: f64,
     motion: Motion,
-    mass_kg: f64,
+    /// True gross mass in kg.
+    pub mass_kg: f64,
     weighed_kg: f64,
     brake_scale: f64,
     balise_m: f64,
@@ -131,21 +135,6 @@ impl Train {
         Leg { length_m, top_mps, due_s: f64::INFINITY, slopes_permille }
     }
 
-    /// What it can do, as declared.
-    pub fn ability(&self) -> &Ability {
-        &self.ability
-    }
-
-    /// Disc friction as declared.
-    pub fn declared_friction(&self) -> f64 {
-        self.gear.friction
-    }
-
-    /// Its service.
-    pub fn service(&self) -> &Service {
-        &self.service
-    }
-
     fn chainage_m(&self) -> f64 {
         self.start_m + self.direction * self.motion.distance_m
     }
@@ -158,11 +147,6 @@ impl Train {
     /// True speed in m/s.
     pub fn speed_mps(&self) -> f64 {
         self.motion.speed_mps
-    }
-
-    /// True gross mass in kg.
-    pub fn mass_kg(&self) -> f64 {
-        self.mass_kg
     }
 
     /// Exerted over reported brake force on this leg.
@@ -219,7 +203,7 @@ impl Train {
 
     /// One cycle under a commanded force in N, braking negative; gives the acceleration in m/s² at its end.
     pub fn apply(&mut self, commanded_n: f64) -> f64 {
-        let cycle_s = f64::from(self.service.cycle_ms) * 1e-3;
+        let cycle_s = self.service.cycle_s();
         let steps = (cycle_s / STEP_MAX_S).ceil();
         let step_s = cycle_s / steps;
         // The reported force follows the command; what is left of the lag is the mean delay.
@@ -287,11 +271,6 @@ impl Train {
     /// Distance in m from the start of the way of a measured place.
     pub fn along_m(&self, sample: &TrainSample) -> f64 {
         self.direction * (sample.position_m - self.start_m)
-    }
-
-    /// True where the daemon is to be killed on some leg.
-    pub fn loses_daemon(&self) -> bool {
-        self.service.condition == Condition::DaemonDies
     }
 
     /// Standing time at a stop in s: shortened, for nothing is learned meanwhile.

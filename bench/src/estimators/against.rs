@@ -6,38 +6,21 @@
 use std::path::Path;
 use std::process::Command;
 
-use serde::Serialize;
 use serde_json::Value;
 
 use super::measure::quartiles;
-use crate::output::{Failure, Record, table};
+use crate::output::{Failure, Record};
 
 /// Rounds of both programs.
 const ROUNDS: usize = 31;
 
-/// Times of a case by two builds.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CaseAgainst {
-    /// Name of the work.
-    pub name: String,
-    /// Median time in ns of an update of this build.
-    pub ns_per_update: f64,
-    /// The same of the other build.
-    pub other_ns_per_update: f64,
-    /// Median over the rounds of the time in ns that this build takes more.
-    pub more_ns: f64,
-    /// Median over the rounds of this build's time over the other's.
-    pub ratio: f64,
-    /// Quartiles of it.
-    pub ratio_quartiles: [f64; 2],
-}
-
-/// Measures the cases whose name contains `case` in this program and in another.
+/// Measures the cases whose name contains `case` in this program and in another: the median times of an update in
+/// ns, and over the rounds the medians of what this build takes more and of its time over the other's.
 ///
 /// # Errors
 ///
 /// When one of them cannot be run, or has no such case.
-pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseAgainst>, Failure> {
+pub fn measure(other: &Path, case: &str) -> Result<Vec<Record>, Failure> {
     let ours = std::env::current_exe()?;
     let mut rounds: Vec<[Vec<(String, f64)>; 2]> = Vec::with_capacity(ROUNDS);
     for round in 0..ROUNDS {
@@ -56,24 +39,22 @@ pub fn measure(other: &Path, case: &str) -> Result<Vec<CaseAgainst>, Failure> {
     Ok(names
         .filter_map(|name| {
             let pairs = rounds.iter().map(|[a, b]| Some((named(a, &name)?, named(b, &name)?)));
-            Some(CaseAgainst::of(name.clone(), &pairs.collect::<Option<Vec<_>>>()?))
+            Some(record(&name, &pairs.collect::<Option<Vec<_>>>()?))
         })
         .collect())
 }
 
-impl CaseAgainst {
-    fn of(name: String, pairs: &[(f64, f64)]) -> Self {
-        let of = |of: fn(&(f64, f64)) -> f64| quartiles(pairs.iter().map(of).collect());
-        let [low, ratio, high] = of(|(ours, other)| ours / other);
-        CaseAgainst {
-            name,
-            ns_per_update: of(|pair| pair.0)[1],
-            other_ns_per_update: of(|pair| pair.1)[1],
-            more_ns: of(|(ours, other)| ours - other)[1],
-            ratio,
-            ratio_quartiles: [low, high],
-        }
-    }
+fn record(name: &str, pairs: &[(f64, f64)]) -> Record {
+    let of = |of: fn(&(f64, f64)) -> f64| quartiles(pairs.iter().map(of).collect());
+    let [low, ratio, high] = of(|(ours, other)| ours / other);
+    Record::default()
+        .with("case", name)
+        .number("ns", of(|pair| pair.0)[1], 1)
+        .number("other ns", of(|pair| pair.1)[1], 1)
+        .number("more ns", of(|(ours, other)| ours - other)[1], 1)
+        .number("ratio", ratio, 2)
+        .number("ratio_low", low, 2)
+        .number("ratio_high", high, 2)
 }
 
 /// One measurement of a program: cases by name with the time of an update in ns.
@@ -98,21 +79,6 @@ fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, Failure> {
         .ok_or_else(|| failed("a case without name or time came".into()))
 }
 
-/// The cases as a table for people.
-pub fn text(cases: &[CaseAgainst]) -> String {
-    let row = |case: &CaseAgainst| {
-        Record::default()
-            .with("case", &case.name)
-            .number("ns", case.ns_per_update, 1)
-            .number("other ns", case.other_ns_per_update, 1)
-            .number("more ns", case.more_ns, 1)
-            .number("ratio", case.ratio, 2)
-            .number("ratio_low", case.ratio_quartiles[0], 2)
-            .number("ratio_high", case.ratio_quartiles[1], 2)
-    };
-    table(&cases.iter().map(row).collect::<Vec<_>>())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,8 +86,8 @@ mod tests {
     #[test]
     fn ratios_are_taken_round_by_round_and_a_program_that_measures_nothing_is_named() {
         let pairs = [(100.0, 50.0), (120.0, 60.0), (90.0, 45.0)];
-        let case = CaseAgainst::of("case".into(), &pairs);
-        assert_eq!((case.ratio, case.more_ns), (2.0, 50.0));
+        let case = record("case", &pairs);
+        assert_eq!((case.value("ratio"), case.value("more ns")), (Some(2.0), Some(50.0)));
         let error = times(Path::new("/bin/true"), "rls").unwrap_err();
         assert!(error.to_string().starts_with("/bin/true: expected the times"), "{error}");
     }

@@ -20,7 +20,7 @@ use super::em_peers::{
     textbook_particle_em,
 };
 use super::measure::{Agreement, Case, Contender};
-use super::textbook::{Said, TextbookFilter, TextbookStep, smooth};
+use super::textbook::{TextbookFilter, TextbookStep, smooth};
 
 /// Samples of a window.
 const SAMPLES: usize = 40;
@@ -68,8 +68,7 @@ fn contender(
     windows: &Windows,
     mut run: impl FnMut(&[Observation]) -> Vec<f64> + 'static,
 ) -> Contender {
-    let windows = windows.clone();
-    Contender::new(name, windows.len(), move || {
+    Contender::new(name, windows.len(), windows, move |windows| {
         windows.iter().flat_map(|window| run(window)).collect()
     })
 }
@@ -132,26 +131,20 @@ fn tracker_model(walk: Walk) -> TrackerModel {
 
 fn textbook_first(model: &TrackerModel, first: &Observation) -> TextbookFilter<STATES> {
     let Gaussian { mean, covariance } = model.initial(first);
-    TextbookFilter { mean, covariance }
+    TextbookFilter::new(mean, covariance)
 }
-
-/// Which form the textbook's filter takes its measurements in.
-type Measure = fn(&mut TextbookFilter<STATES>, &RowVector4<f64>, f64, f64) -> Said;
 
 /// A step of the textbook's extended Kalman filter, with the same motion.
 fn textbook_step(
     filter: &mut TextbookFilter<STATES>,
-    measure: Measure,
     model: &TrackerModel,
     observed: &Observation,
 ) -> TextbookStep<STATES> {
-    let (mean, transition) = motion::predict(&INPUTS, &model.law, model.walk, &filter.mean);
+    let moved = motion::predict(&INPUTS, &model.law, model.walk, &filter.mean);
     let added = motion::process_noise(&model.noise, model.walk, INPUTS.step_s);
-    filter.predict(mean, &transition, &added);
-    let predicted = *filter;
     let row = RowVector4::new(1.0, 0.0, 0.0, 0.0);
-    measure(filter, &row, observed.distance_m, model.noise.measured_distance_m2);
-    TextbookStep { predicted, filtered: *filter, transition }
+    let noise = model.noise.measured_distance_m2;
+    filter.pass(Some(moved), &added, &row, observed.distance_m, noise)
 }
 
 fn window_smoother(windows: &Windows) -> Case {
@@ -174,10 +167,8 @@ fn window_smoother(windows: &Windows) -> Case {
             filtered: filter,
             transition: nalgebra::SMatrix::identity(),
         }];
-        for observed in &window[1..] {
-            let measure = TextbookFilter::measure;
-            forward.push(textbook_step(&mut filter, measure, &of_peer, observed));
-        }
+        let steps = window[1..].iter().map(|it| textbook_step(&mut filter, &of_peer, it));
+        forward.extend(steps);
         let smoothed = smooth(&forward).expect("covariances have inverses");
         let lagged = &smoothed[SAMPLES - 1 - LAG];
         let scale = State::Scale as usize;
@@ -199,12 +190,13 @@ fn filter_step() -> Case {
         }
         tracker.state().expect("it has begun").mean.iter().take(3).copied().collect()
     });
-    let peer = |name: &str, measure: Measure| {
+    let peer = |name: &str, is_joseph: bool| {
         let model = of_peer.clone();
         let mut peer = contender(name, &data, move |window| {
-            let mut filter = textbook_first(&model, &window[0]);
+            let first = textbook_first(&model, &window[0]);
+            let mut filter = TextbookFilter { is_joseph, ..first };
             for observed in &window[1..] {
-                textbook_step(&mut filter, measure, &model, observed);
+                textbook_step(&mut filter, &model, observed);
             }
             filter.mean.iter().take(3).copied().collect()
         });
@@ -213,6 +205,6 @@ fn filter_step() -> Case {
     };
     ours.updates = steps;
     Case::new("braking EKF step", SAME, ours)
-        .peer(peer("textbook EKF", TextbookFilter::measure))
-        .peer(peer("textbook EKF, Joseph form", TextbookFilter::measure_joseph))
+        .peer(peer("textbook EKF", false))
+        .peer(peer("textbook EKF, Joseph form", true))
 }

@@ -78,26 +78,20 @@ pub fn textbook_kalman_em(window: &[Observation]) -> f64 {
 fn forward(window: &[Observation], coefficient: f64) -> Vec<TextbookStep<2>> {
     let first_variances =
         Vector2::new(NOISE.measured_distance_m2, FIRST_SPEED_STD_MPS * FIRST_SPEED_STD_MPS);
-    let mut filter = TextbookFilter {
-        mean: Vector2::new(window[0].distance_m, window[0].speed_mps),
-        covariance: Matrix2::from_diagonal(&first_variances),
-    };
+    let mean = Vector2::new(window[0].distance_m, window[0].speed_mps);
+    let mut filter = TextbookFilter::new(mean, Matrix2::from_diagonal(&first_variances));
     let added = Matrix2::from_diagonal(&Vector2::from(step_variances()));
     let row = RowVector2::new(1.0, 0.0);
-    let mut steps = Vec::with_capacity(window.len());
-    for (index, observed) in window.iter().enumerate() {
-        let mut transition = Matrix2::identity();
-        if index > 0 {
+    let step = |(index, observed): (usize, &Observation)| {
+        let moved = (index > 0).then(|| {
             let (mean, step) = moved(filter.mean.into(), coefficient);
             let by_speed = step.speed_by_speed;
-            transition = Matrix2::new(1.0, 0.5 * INPUTS.step_s * (1.0 + by_speed), 0.0, by_speed);
-            filter.predict(mean.into(), &transition, &added);
-        }
-        let predicted = filter;
-        filter.measure(&row, observed.distance_m, NOISE.measured_distance_m2);
-        steps.push(TextbookStep { predicted, filtered: filter, transition });
-    }
-    steps
+            let by_distance = 0.5 * INPUTS.step_s * (1.0 + by_speed);
+            (mean.into(), Matrix2::new(1.0, by_distance, 0.0, by_speed))
+        });
+        filter.pass(moved, &added, &row, observed.distance_m, NOISE.measured_distance_m2)
+    };
+    window.iter().enumerate().map(step).collect()
 }
 
 /// Particles of one step: states and filtered weights.

@@ -37,11 +37,15 @@ fn rows() -> Rows {
 /// The cases of this module.
 pub fn cases() -> Vec<Case> {
     let rows = rows();
-    let of = |name: &str, run: fn(&[Row]) -> Vector3<f64>| contender(name, &rows, run);
+    let of = |name: &str, run: fn(&[Row]) -> Vector3<f64>| {
+        Contender::new(name, ROWS, &rows, move |rows| run(rows).as_slice().to_vec())
+    };
     let length = ROWS as u32;
     let lambda = Vector3::repeat(PENALTY * f64::from(length));
     let penalty = Penalty { lambda, length, is_printed: true };
-    let penalised = contender("ours", &rows, move |rows| ours_mils::<1>(rows, 1, penalty));
+    let penalised = Contender::new("ours", ROWS, &rows, move |rows| {
+        ours_mils::<1>(rows, 1, penalty).as_slice().to_vec()
+    });
     vec![
         Case::new("rls", SAME, of("ours", |rows| ours_rls(rows, Forgetting::None)))
             .aim(60.0)
@@ -65,11 +69,6 @@ pub fn cases() -> Vec<Case> {
         .peer(of("textbook, static", textbook_mils))
         .peer(of("textbook, dynamic", dynamic_mils)),
     ]
-}
-
-fn contender(name: &str, rows: &Rows, run: impl Fn(&[Row]) -> Vector3<f64> + 'static) -> Contender {
-    let rows = rows.clone();
-    Contender::new(name, rows.len(), move || run(&rows).as_slice().to_vec())
 }
 
 fn ours_rls(rows: &[Row], forgetting: Forgetting) -> Vector3<f64> {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dynocar_core::filter::bank::{Bank, Nats};
 use dynocar_core::filter::random::Random;
 use dynocar_estimators::wang::MassKalmanSettings;
 use dynocar_estimators::wang::bias_bank::{BIAS, BiasBank, Dynamics, INVERSE_MASS, MODELS, SPEED};
@@ -68,13 +69,9 @@ fn drive(train: &TrainModel) -> Arc<Drive> {
 /// The cases of this module, for a train.
 pub fn cases(train: &TrainModel) -> Vec<Case> {
     let drive = drive(train);
-    let of_peer = drive.clone();
-    let case = Case::new(
-        "mass Kalman step, 8 behaviours",
-        Agreement::Relative(1e-6),
-        Contender::new("ours", SAMPLES - 1, move || ours(&drive)),
-    );
-    vec![case.peer(Contender::new("textbook EKF bank", SAMPLES - 1, move || textbook(&of_peer)))]
+    let ours = Contender::new("ours", SAMPLES - 1, &drive, ours);
+    let case = Case::new("mass Kalman step, 8 behaviours", Agreement::Relative(1e-6), ours);
+    vec![case.peer(Contender::new("textbook EKF bank", SAMPLES - 1, &drive, textbook))]
 }
 
 fn ours(drive: &Drive) -> Vec<f64> {
@@ -89,12 +86,6 @@ fn ours(drive: &Drive) -> Vec<f64> {
     vec![best.mean[SPEED], best.mean[INVERSE_MASS], best.covariance[(INVERSE_MASS, INVERSE_MASS)]]
 }
 
-struct Member {
-    filter: TextbookFilter<3>,
-    model: BiasModel,
-    log_weight: f64,
-}
-
 fn textbook(drive: &Drive) -> Vec<f64> {
     let member = |model: &BiasModel| {
         let variances = Vector3::new(
@@ -103,13 +94,12 @@ fn textbook(drive: &Drive) -> Vec<f64> {
             model.std_mps2 * model.std_mps2,
         );
         let mean = Vector3::new(drive.motions[0].speed_mps, 1.0, 0.0);
-        let filter = TextbookFilter { mean, covariance: Matrix3::from_diagonal(&variances) };
-        Member { filter, model: *model, log_weight: 0.0 }
+        (TextbookFilter::new(mean, Matrix3::from_diagonal(&variances)), *model)
     };
-    let mut members: Vec<_> = drive.models.iter().map(member).collect();
+    let mut members = Bank::<_, Nats, MODELS>::even(drive.models.iter().map(member));
     let row = RowVector3::new(1.0, 0.0, 0.0);
     for pair in drive.motions.windows(2) {
-        for Member { filter, model, log_weight } in &mut members {
+        for ((filter, model), log_weight) in members.weighed_mut() {
             predict(filter, model, &drive.dynamics, pair);
             let variance = filter.covariance[(SPEED, SPEED)] + SPEED_VARIANCE;
             let size = (pair[1].speed_mps - filter.mean[SPEED]).abs() / variance.sqrt();
@@ -118,17 +108,10 @@ fn textbook(drive: &Drive) -> Vec<f64> {
             let surprise = 0.5 * size.min(HUBER).powi(2) + HUBER * (size - HUBER).max(0.0);
             *log_weight = (1.0 - 1.0 / MEMORY) * *log_weight - surprise - 0.5 * variance.ln();
         }
-        let highest =
-            members.iter().map(|member| member.log_weight).fold(f64::NEG_INFINITY, f64::max);
-        for member in &mut members {
-            member.log_weight = (member.log_weight - highest).max(-30.0);
-        }
+        members.settle();
+        members.weighed_mut().for_each(|(_, log_weight)| *log_weight = log_weight.max(-30.0));
     }
-    let best = members
-        .iter()
-        .max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))
-        .expect("there are behaviours");
-    let TextbookFilter { mean, covariance } = &best.filter;
+    let (TextbookFilter { mean, covariance, .. }, _) = members.likeliest();
     vec![mean[SPEED], mean[INVERSE_MASS], covariance[(INVERSE_MASS, INVERSE_MASS)]]
 }
 

@@ -7,12 +7,12 @@
 //! The clock is the thread's processor time: what other programs take meanwhile does not count.
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
-use serde::Serialize;
 
-use crate::output::Failure;
+use crate::output::{Failure, Record};
 use crate::statistics::quantiles;
 
 /// One way to do the work of a case.
@@ -26,9 +26,15 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// A contender by its name, updates in a pass, and pass.
-    pub fn new(name: &str, updates: usize, pass: impl FnMut() -> Vec<f64> + 'static) -> Self {
-        Contender { name: name.into(), updates, pass: Box::new(pass) }
+    /// A contender by its name, updates in a pass, and a pass over the data of the case.
+    pub fn new<D: ?Sized + 'static>(
+        name: &str,
+        updates: usize,
+        data: &Arc<D>,
+        mut pass: impl FnMut(&D) -> Vec<f64> + 'static,
+    ) -> Self {
+        let data = Arc::clone(data);
+        Contender { name: name.into(), updates, pass: Box::new(move || pass(&data)) }
     }
 }
 
@@ -91,28 +97,6 @@ impl Effort {
     pub const QUICK: Effort = Effort { rounds: 5, slice: Duration::from_millis(1) };
 }
 
-/// Time of one contender.
-#[derive(Debug, Serialize)]
-pub struct Entry {
-    /// Name of the work; a peer's with its own name in brackets.
-    pub name: String,
-    /// True for a peer.
-    pub peer: bool,
-    /// Median over the rounds in ns.
-    pub ns_per_update: f64,
-    /// Quartiles over the rounds in ns.
-    pub quartiles_ns: [f64; 2],
-    /// Median over the rounds of the peer's time over ours; absent for ours.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub peer_over_ours: Option<f64>,
-    /// What is aimed at, in ns.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub target_ns: Option<f64>,
-    /// Whether the median meets it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub meets_target: Option<bool>,
-}
-
 /// Lower quartile, median and upper quartile of at least one value.
 pub fn quartiles(values: Vec<f64>) -> [f64; 3] {
     quantiles(values, [0.25, 0.5, 0.75]).unwrap_or([f64::NAN; 3])
@@ -155,12 +139,14 @@ impl Case {
         Ok(())
     }
 
-    /// Checks the answers, warms up and measures; ours comes first.
+    /// Checks the answers, warms up and measures: the median time of an update over the rounds, half the distance of
+    /// its quartiles, what is aimed at, and of a peer the median over the rounds of its time over ours. Ours comes
+    /// first.
     ///
     /// # Errors
     ///
     /// The first peer whose answer differs from ours.
-    pub fn measure(mut self, effort: &Effort) -> Result<Vec<Entry>, Failure> {
+    pub fn measure(mut self, effort: &Effort) -> Result<Vec<Record>, Failure> {
         self.check()?;
         let mut contenders: Vec<_> =
             std::iter::once(&mut self.ours).chain(&mut self.peers).collect();
@@ -173,24 +159,28 @@ impl Case {
                 times[index].push(time(contenders[index], passes[index]));
             }
         }
-        let entry = |(index, contender): (usize, &&mut Contender)| {
-            let (case, [low, median, high]) = (&self.name, quartiles(times[index].clone()));
+        let record = |(index, contender): (usize, &&mut Contender)| {
+            let [low, median, high] = quartiles(times[index].clone());
             let target_ns = self.target_ns.filter(|_| index == 0);
-            let ratios = || times[index].iter().zip(&times[0]).map(|(own, ours)| own / ours);
-            Entry {
-                name: match index {
-                    0 => case.clone(),
-                    _ => format!("{case} ({})", contender.name),
-                },
-                peer: index > 0,
-                ns_per_update: median,
-                quartiles_ns: [low, high],
-                peer_over_ours: (index > 0).then(|| quartiles(ratios().collect())[1]),
-                target_ns,
-                meets_target: target_ns.map(|target_ns| median < target_ns),
-            }
+            let met = target_ns.map_or("", |most| if median < most { "yes" } else { "NO" });
+            let ratios = times[index].iter().zip(&times[0]).map(|(own, ours)| own / ours);
+            let name = match index {
+                0 => self.name.clone(),
+                _ => format!("{} ({})", self.name, contender.name),
+            };
+            Record::default()
+                .with("case", &name)
+                .shown("ns", nanoseconds(median), median)
+                .number("spread %", 50.0 * (high - low) / median, 0)
+                .shown("target ns", target_ns.map_or(String::new(), nanoseconds), target_ns)
+                .with("met", met)
+                .number("peer / ours", (index > 0).then(|| quartiles(ratios.collect())[1]), 2)
+                // What another build of this program reads.
+                .for_machines("name", name)
+                .for_machines("peer", index > 0)
+                .for_machines("ns_per_update", median)
         };
-        Ok(contenders.iter().enumerate().map(entry).collect())
+        Ok(contenders.iter().enumerate().map(record).collect())
     }
 }
 
@@ -223,13 +213,24 @@ fn now() -> Duration {
     Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
+/// Three significant digits below 100, groups of thousands above.
+fn nanoseconds(value: f64) -> String {
+    if value < 100.0 {
+        return format!("{value:.1}");
+    }
+    let digits = format!("{value:.0}").into_bytes();
+    let groups = digits.rchunks(3).rev().map(String::from_utf8_lossy);
+    groups.collect::<Vec<_>>().join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_peer_with_another_answer_is_refused() {
-        let contender = |answer: f64| Contender::new("x", 1, move || vec![answer]);
+        let contender =
+            |answer: f64| Contender::new("x", 1, &Arc::new(answer), |answer| vec![*answer]);
         let case = |peer: f64| {
             Case::new("case", Agreement::Relative(1e-3), contender(1.0)).peer(contender(peer))
         };
@@ -240,12 +241,20 @@ mod tests {
 
     #[test]
     fn peers_follow_ours_and_only_ours_has_a_target() {
-        let contender = |name: &str| Contender::new(name, 1, || vec![1.0]);
+        let contender = |name: &str| Contender::new(name, 1, &Arc::new(()), |_| vec![1.0]);
         let case = Case::new("c", Agreement::Relative(1e-6), contender("ours"));
         let case = case.peer(contender("p")).aim(1e9);
-        let entries = case.measure(&Effort { rounds: 1, slice: Duration::ZERO }).unwrap();
-        assert_eq!((entries[0].meets_target, entries[0].peer), (Some(true), false));
-        assert_eq!((entries[1].name.as_str(), entries[1].target_ns), ("c (p)", None));
-        assert!(entries[1].peer && entries[1].peer_over_ours.is_some());
+        let records = case.measure(&Effort { rounds: 1, slice: Duration::ZERO }).unwrap();
+        let of = |row: usize, name: &str| records[row].cell(name).unwrap();
+        assert_eq!((of(0, "case"), of(0, "met"), of(0, "peer / ours")), ("c", "yes", ""));
+        assert_eq!((of(1, "case"), of(1, "met"), of(1, "target ns")), ("c (p)", "", ""));
+        assert!(records[1].value("peer / ours").is_some());
+    }
+
+    #[test]
+    fn thousands_are_grouped() {
+        assert_eq!(nanoseconds(41.26), "41.3");
+        assert_eq!(nanoseconds(987.6), "988");
+        assert_eq!(nanoseconds(1_234_567.0), "1 234 567");
     }
 }

@@ -3,12 +3,11 @@
 //! Peers do the same work on the same data and must give the same answer before anything is
 //! timed, so that no speed is bought with accuracy.
 //!
-//! - [`measure`]: interleaved rounds, medians, ratios
+//! - [`measure`]: interleaved rounds, medians, ratios, the table
 //! - [`textbook`], [`em_peers`]: what our estimators are compared with
 //! - [`least_squares`], [`trajectory_bank`], [`trajectory_fit`], [`braking`], [`mass`],
 //!   [`resistance`]: the cases
 //! - [`pipelines`]: every kind of pipeline from sample to snapshot
-//! - [`report`]: the table
 //! - [`against`]: another build of the program beside this one
 
 pub mod against;
@@ -18,7 +17,6 @@ pub mod least_squares;
 pub mod mass;
 pub mod measure;
 pub mod pipelines;
-pub mod report;
 pub mod resistance;
 pub mod textbook;
 pub mod trajectory_bank;
@@ -27,10 +25,10 @@ pub mod trajectory_fit;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
+use serde_json::json;
 
-use crate::output::{Failure, Usage, give};
-use measure::{Case, Effort, Entry};
+use crate::output::{Failure, Record, Usage, give, table};
+use measure::{Case, Effort};
 use pipelines::DemoRun;
 
 /// Speed of every estimator compared with peers that do the same work on the same data.
@@ -50,12 +48,6 @@ pub struct EstimatorsArguments {
     json: Option<PathBuf>,
 }
 
-/// Everything that was measured; a peer follows ours.
-#[derive(Serialize)]
-struct Report {
-    cases: Vec<Entry>,
-}
-
 impl EstimatorsArguments {
     /// Runs the command.
     ///
@@ -65,7 +57,7 @@ impl EstimatorsArguments {
     pub fn run(&self) -> Result<(), Failure> {
         if let (Some(other), Some(case)) = (&self.beside, &self.case) {
             let cases = against::measure(other, case)?;
-            return give(&self.json, &cases, || against::text(&cases));
+            return give(&self.json, &cases, || table(&cases));
         }
         let effort = if self.quick { Effort::QUICK } else { Effort::FULL };
         let mut chosen = cases()?;
@@ -76,10 +68,11 @@ impl EstimatorsArguments {
                 return Err(Usage(words).into());
             }
         }
-        let measured: Result<Vec<_>, _> =
-            chosen.into_iter().map(|case| case.measure(&effort)).collect();
-        let report = Report { cases: measured?.into_iter().flatten().collect() };
-        give(&self.json, &report, || report::text(&report.cases))
+        let mut records: Vec<Record> = Vec::new();
+        for case in chosen {
+            records.extend(case.measure(&effort)?);
+        }
+        give(&self.json, &json!({ "cases": records }), || table(&records))
     }
 }
 

@@ -65,9 +65,8 @@ pub fn cases(run: &Arc<DemoRun>) -> Vec<Case> {
     let can_be_built = |kind: &&PipelineKind| EstimatorSettings::default_of(**kind).is_some();
     let all = PipelineKind::ALL.iter().filter(can_be_built);
     all.map(|&kind| {
-        let run = run.clone();
         let name = format!("pipeline {kind}");
-        let ours = Contender::new("ours", run.samples.len(), move || {
+        let ours = Contender::new("ours", run.samples.len(), run, move |run| {
             let snapshot = run.process(kind);
             vec![snapshot.samples_used as f64, snapshot.updates as f64]
         });

@@ -69,13 +69,9 @@ fn first() -> (SVector<f64, STATES>, SMatrix<f64, STATES, STATES>) {
 /// The cases of this module.
 pub fn cases() -> Vec<Case> {
     let samples = samples();
-    let of_peer = samples.clone();
-    let case = Case::new(
-        "resistance Kalman step, 8 states",
-        Agreement::Relative(1e-6),
-        Contender::new("ours", SAMPLES, move || ours(&samples)),
-    );
-    vec![case.peer(Contender::new("textbook EKF", SAMPLES, move || textbook(&of_peer)))]
+    let ours = Contender::new("ours", SAMPLES, &samples, ours);
+    let case = Case::new("resistance Kalman step, 8 states", Agreement::Relative(1e-6), ours);
+    vec![case.peer(Contender::new("textbook EKF", SAMPLES, &samples, textbook))]
 }
 
 fn ours(samples: &[Sample]) -> Vec<f64> {
@@ -97,7 +93,7 @@ fn ours(samples: &[Sample]) -> Vec<f64> {
 
 fn textbook(samples: &[Sample]) -> Vec<f64> {
     let (mean, covariance) = first();
-    let mut filter = TextbookFilter { mean, covariance };
+    let mut filter = TextbookFilter::new(mean, covariance);
     let mut row = RowSVector::<f64, STATES>::zeros();
     row[SPEED] = 1.0;
     let mut noise = SMatrix::<f64, STATES, STATES>::zeros();

@@ -12,6 +12,9 @@ pub struct TextbookFilter<const N: usize> {
     pub mean: SVector<f64, N>,
     /// Covariance.
     pub covariance: SMatrix<f64, N, N>,
+    /// True for P = (I - K H) P (I - K H)' + K R K' in place of P = (I - K H) P, as textbooks advise where rounding
+    /// matters.
+    pub is_joseph: bool,
 }
 
 /// What a measurement said.
@@ -32,6 +35,11 @@ impl Said {
 }
 
 impl<const N: usize> TextbookFilter<N> {
+    /// In the plain form.
+    pub fn new(mean: SVector<f64, N>, covariance: SMatrix<f64, N, N>) -> Self {
+        TextbookFilter { mean, covariance, is_joseph: false }
+    }
+
     /// Moves on: P = F P F' + Q.
     pub fn predict(
         &mut self,
@@ -43,35 +51,36 @@ impl<const N: usize> TextbookFilter<N> {
         self.covariance = transition * self.covariance * transition.transpose() + noise;
     }
 
-    /// Takes a measurement into the mean, K = P H' / (H P H' + R); gives K.
-    fn correct(
-        &mut self,
-        row: &RowSVector<f64, N>,
-        measured: f64,
-        noise: f64,
-    ) -> (SVector<f64, N>, Said) {
+    /// Takes in a measurement, K = P H' / (H P H' + R).
+    pub fn measure(&mut self, row: &RowSVector<f64, N>, measured: f64, noise: f64) -> Said {
         let variance = (row * self.covariance * row.transpose())[0] + noise;
         let gain = self.covariance * row.transpose() / variance;
         let innovation = measured - (row * self.mean)[0];
         self.mean += gain * innovation;
-        (gain, Said { innovation, variance })
-    }
-
-    /// Takes in a measurement: P = (I - K H) P.
-    pub fn measure(&mut self, row: &RowSVector<f64, N>, measured: f64, noise: f64) -> Said {
-        let (gain, said) = self.correct(row, measured, noise);
-        self.covariance = (SMatrix::<f64, N, N>::identity() - gain * row) * self.covariance;
-        said
-    }
-
-    /// As [`TextbookFilter::measure`] with P = (I - K H) P (I - K H)' + K R K', as textbooks
-    /// advise where rounding matters.
-    pub fn measure_joseph(&mut self, row: &RowSVector<f64, N>, measured: f64, noise: f64) -> Said {
-        let (gain, said) = self.correct(row, measured, noise);
         let keep = SMatrix::<f64, N, N>::identity() - gain * row;
-        self.covariance =
-            keep * self.covariance * keep.transpose() + gain * gain.transpose() * noise;
-        said
+        self.covariance = keep * self.covariance;
+        if self.is_joseph {
+            self.covariance = self.covariance * keep.transpose() + gain * gain.transpose() * noise;
+        }
+        Said { innovation, variance }
+    }
+
+    /// A step of a forward pass: over time, to a mean by a transition, unless it is the first, and to a measurement.
+    pub fn pass(
+        &mut self,
+        moved: Option<(SVector<f64, N>, SMatrix<f64, N, N>)>,
+        added: &SMatrix<f64, N, N>,
+        row: &RowSVector<f64, N>,
+        measured: f64,
+        noise: f64,
+    ) -> TextbookStep<N> {
+        let (mean, transition) = moved.unwrap_or((self.mean, SMatrix::identity()));
+        if moved.is_some() {
+            self.predict(mean, &transition, added);
+        }
+        let predicted = *self;
+        self.measure(row, measured, noise);
+        TextbookStep { predicted, filtered: *self, transition }
     }
 }
 

@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use dynocar_core::filter::Gaussian;
+use dynocar_core::filter::bank::{Bank, Odds};
+use dynocar_core::filter::mixture::Mixture;
 use dynocar_core::filter::random::Random;
 use dynocar_estimators::xia::trajectory::bank::{JumpBank, JumpModel};
 use dynocar_estimators::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
@@ -71,15 +74,6 @@ pub fn cases() -> Vec<Case> {
     vec![step_of_one(&drive), step_of_bank(&drive), step_as_run(&drive)]
 }
 
-fn contender(
-    name: &str,
-    drive: &Arc<Drive>,
-    run: impl Fn(&Drive) -> Vec<f64> + 'static,
-) -> Contender {
-    let drive = drive.clone();
-    Contender::new(name, drive.samples.len(), move || run(&drive))
-}
-
 fn first_hypothesis(drive: &Drive, noise: &NoiseModel) -> Hypothesis {
     let mut first = Hypothesis::new(&DECLARED, &DAVIS_STD, LearnedNoise::new(noise));
     first.anchor(drive.first_mps);
@@ -88,10 +82,8 @@ fn first_hypothesis(drive: &Drive, noise: &NoiseModel) -> Hypothesis {
 
 fn first_textbook(drive: &Drive) -> TextbookFilter<4> {
     let deviations = Vector4::new(DAVIS_STD[0], DAVIS_STD[1], DAVIS_STD[2], 0.03);
-    TextbookFilter {
-        mean: Vector4::new(DECLARED.a, DECLARED.b, DECLARED.c, drive.first_mps),
-        covariance: SMatrix::from_diagonal(&deviations.component_mul(&deviations)),
-    }
+    let mean = Vector4::new(DECLARED.a, DECLARED.b, DECLARED.c, drive.first_mps);
+    TextbookFilter::new(mean, SMatrix::from_diagonal(&deviations.component_mul(&deviations)))
 }
 
 /// An extended Kalman filter's step over time and its measurement; the log-likelihood.
@@ -113,7 +105,7 @@ fn textbook_step(filter: &mut TextbookFilter<4>, step: &Step, measured_mps: f64)
 }
 
 fn step_of_one(drive: &Arc<Drive>) -> Case {
-    let ours = contender("ours", drive, |drive| {
+    let ours = Contender::new("ours", STEPS, drive, |drive| {
         let model = noise(false);
         let mut filter = first_hypothesis(drive, &model);
         for (step, measured_mps) in &drive.samples {
@@ -122,7 +114,7 @@ fn step_of_one(drive: &Arc<Drive>) -> Case {
         }
         filter.state.as_slice().to_vec()
     });
-    let peer = contender("textbook EKF", drive, |drive| {
+    let peer = Contender::new("textbook EKF", STEPS, drive, |drive| {
         let mut filter = first_textbook(drive);
         for (step, measured_mps) in &drive.samples {
             textbook_step(&mut filter, step, *measured_mps);
@@ -133,7 +125,7 @@ fn step_of_one(drive: &Arc<Drive>) -> Case {
 }
 
 fn step_of_bank(drive: &Arc<Drive>) -> Case {
-    let ours = contender("ours", drive, |drive| {
+    let ours = Contender::new("ours", STEPS, drive, |drive| {
         let model = noise(false);
         let first = first_hypothesis(drive, &model);
         let mut bank = JumpBank::new(first, HYPOTHESES, JUMPS, model, NO_OUTLIERS);
@@ -144,12 +136,13 @@ fn step_of_bank(drive: &Arc<Drive>) -> Case {
         let variances = likeliest.davis_covariance().diagonal();
         likeliest.state.iter().chain(&variances).copied().collect()
     });
-    let peer = contender("textbook EKF bank", drive, |drive| {
-        let mut bank = TextbookBank::new(first_textbook(drive));
+    let peer = Contender::new("textbook EKF bank", STEPS, drive, |drive| {
+        let members = Bank::even([(first_textbook(drive), 0.0)]);
+        let mut bank = TextbookBank { members, since_spawn_s: 0.0 };
         for (step, measured_mps) in &drive.samples {
             bank.advance(step, *measured_mps);
         }
-        let likeliest = &bank.members[bank.likeliest()].filter;
+        let (likeliest, _) = bank.members.likeliest();
         let variances = likeliest.covariance.diagonal();
         likeliest.mean.iter().chain(variances.iter().take(3)).copied().collect()
     });
@@ -158,7 +151,7 @@ fn step_of_bank(drive: &Arc<Drive>) -> Case {
 
 /// As the pipeline runs it, with noise learned and outliers judged; no peer does that.
 fn step_as_run(drive: &Arc<Drive>) -> Case {
-    let ours = contender("ours", drive, |drive| {
+    let ours = Contender::new("ours", STEPS, drive, |drive| {
         let mut filter = OnlineFilter::new(OnlineSettings {
             davis: DECLARED,
             davis_std: DAVIS_STD,
@@ -177,79 +170,53 @@ fn step_as_run(drive: &Arc<Drive>) -> Case {
     Case::new("jump bank step, noise learned, published", SAME, ours).aim(3000.0)
 }
 
-#[derive(Clone)]
-struct Member {
-    filter: TextbookFilter<4>,
-    log_weight: f64,
-    age_s: f64,
-}
-
-/// Extended Kalman filters with the bank's rules for jumps: one member more each second, the
+/// Extended Kalman filters with their ages in s, and the bank's rules for jumps: one member more each second, the
 /// two closest in relative age united when there are too many.
 struct TextbookBank {
-    members: Vec<Member>,
+    members: Bank<(TextbookFilter<4>, f64), Odds, HYPOTHESES>,
     since_spawn_s: f64,
 }
 
 impl TextbookBank {
-    fn new(first: TextbookFilter<4>) -> Self {
-        let first = Member { filter: first, log_weight: 0.0, age_s: 0.0 };
-        TextbookBank { members: vec![first], since_spawn_s: 0.0 }
-    }
-
-    fn likeliest(&self) -> usize {
-        let weight = |i: &usize| self.members[*i].log_weight;
-        (0..self.members.len()).max_by(|i, j| weight(i).total_cmp(&weight(j))).unwrap_or(0)
-    }
-
     fn advance(&mut self, step: &Step, measured_mps: f64) {
         self.since_spawn_s += STEP_S;
         if self.since_spawn_s >= JUMPS.spacing_s {
             self.spawn();
         }
-        for member in &mut self.members {
-            member.log_weight += textbook_step(&mut member.filter, step, measured_mps);
-            member.age_s += STEP_S;
+        for ((filter, age_s), weight) in self.members.weighed_mut() {
+            *weight *= textbook_step(filter, step, measured_mps).exp();
+            *age_s += STEP_S;
         }
-        let best = self.members[self.likeliest()].log_weight;
-        self.members.iter_mut().for_each(|member| member.log_weight -= best);
-        self.members.retain(|member| member.log_weight > -40.0);
+        self.members.settle();
+        self.members.drop_up_to((-40.0_f64).exp());
     }
 
     fn spawn(&mut self) {
-        let mut child = self.members[self.likeliest()].clone();
-        child.log_weight += (self.since_spawn_s.ln() - JUMPS.evidence).min(-0.7);
-        child.age_s = 0.0;
+        let (mut child, _) = *self.members.likeliest();
         for i in [A, B, C] {
-            child.filter.covariance[(i, i)] += JUMPS.std[i] * JUMPS.std[i];
+            child.covariance[(i, i)] += JUMPS.std[i] * JUMPS.std[i];
         }
+        let weight = (self.since_spawn_s.ln() - JUMPS.evidence).min(-0.7).exp();
         self.since_spawn_s = 0.0;
-        if self.members.len() == HYPOTHESES {
+        if self.members.hypotheses().len() == HYPOTHESES {
             self.unite();
         }
-        self.members.push(child);
+        self.members.join((child, 0.0), weight);
     }
 
     fn unite(&mut self) {
-        let age = |i: usize| self.members[i].age_s;
-        let gap = |i: usize| (age(i) - age(i + 1)) / age(i).max(f64::MIN_POSITIVE);
-        let older = (0..self.members.len() - 1)
+        let (all, weights) = (self.members.hypotheses(), self.members.weights());
+        let gap = |i: usize| (all[i].1 - all[i + 1].1) / all[i].1.max(f64::MIN_POSITIVE);
+        let older = (0..all.len() - 1)
             .min_by(|&i, &j| gap(i).total_cmp(&gap(j)))
             .expect("a full bank has two members");
-        let younger = self.members.remove(older + 1);
-        let older = &mut self.members[older];
-        let (more, less) = if older.log_weight >= younger.log_weight {
-            (older.clone(), younger)
-        } else {
-            (younger, older.clone())
-        };
-        let odds = (less.log_weight - more.log_weight).exp();
-        let share = odds / (1.0 + odds);
-        let apart = less.filter.mean - more.filter.mean;
-        let covariance = more.filter.covariance * (1.0 - share)
-            + less.filter.covariance * share
-            + apart * apart.transpose() * (share * (1.0 - share));
-        let filter = TextbookFilter { mean: more.filter.mean + apart * share, covariance };
-        *older = Member { filter, log_weight: more.log_weight + odds.ln_1p(), age_s: more.age_s };
+        let mut both = Mixture::default();
+        for at in [older, older + 1] {
+            both.add(weights[at], &all[at].0.mean, &all[at].0.covariance);
+        }
+        let Gaussian { mean, covariance } = both.belief;
+        let heavier = if weights[older] >= weights[older + 1] { older } else { older + 1 };
+        let united = (TextbookFilter::new(mean, covariance), all[heavier].1);
+        self.members.unite(older, (united, both.weight));
     }
 }

@@ -112,13 +112,12 @@ pub fn cases() -> Vec<Case> {
 
 fn case(samples: usize, target_ns: f64) -> Case {
     let windows = Windows::new(samples);
-    let of_peer = windows.clone();
     let mut fitter = TrajectoryFitter::with_capacity(1, samples);
-    let ours = Contender::new("ours", WINDOWS, move || {
+    let ours = Contender::new("ours", WINDOWS, &windows, move |windows| {
         windows.answers(|window| windows.fit(&mut fitter, window).davis)
     });
-    let peer = Contender::new("levenberg-marquardt", WINDOWS, move || {
-        of_peer.answers(|window| peer_fit(of_peer.segment(window), &of_peer.warm[window]))
+    let peer = Contender::new("levenberg-marquardt", WINDOWS, &windows, |windows| {
+        windows.answers(|window| peer_fit(windows.segment(window), &windows.warm[window]))
     });
     let name = format!("trajectory fit, warm, {samples} samples");
     // In standard deviations.

@@ -1,14 +1,54 @@
 //! Which simulated datasets explain and monitor work on.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::{Explanation, explain};
+use dynocar_tests::simulator::dataset_writer::{
+    dataset_files, read_files, write_dataset, write_truth,
+};
+use dynocar_tests::simulator::{SimulatedDataset, SimulatorSettings, simulate};
 
-use super::case::Case;
-use super::scenario::Scenario;
-use super::world::World;
-use crate::output::{Failure, Usage};
+use super::scenario::{Scenario, World};
+use crate::output::{Failure, named};
 use crate::parallel;
+
+/// What is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// The family.
+    pub scenario: Scenario,
+    /// The seed.
+    pub seed: u64,
+    /// The world it happens in.
+    pub world: World,
+}
+
+impl Case {
+    /// Simulates the case.
+    pub fn simulate(&self) -> SimulatedDataset {
+        simulate(&self.settings())
+    }
+
+    /// What the simulator is asked for.
+    pub fn settings(&self) -> SimulatorSettings {
+        self.scenario.settings(self.seed, self.world)
+    }
+
+    /// Writes the dataset, with its truth beside it, as `<kind>-<seed>` into a folder.
+    ///
+    /// # Errors
+    ///
+    /// When the files cannot be written.
+    pub fn write(&self, folder: &Path) -> io::Result<()> {
+        let name = format!("{}-{}", self.scenario.name(), self.seed);
+        let simulated = self.simulate();
+        write_dataset(&simulated, &folder.join(&name))?;
+        write_truth(&simulated, &folder.join(name + ".truth.json"))
+    }
+}
 
 /// The simulated datasets of a command, and what becomes of its result.
 #[derive(Debug, Args)]
@@ -43,15 +83,9 @@ impl FamilyArguments {
     ///
     /// When there is no such kind.
     pub fn scenarios(&self, usual: Vec<Scenario>) -> Result<Vec<Scenario>, Failure> {
-        let all = Scenario::all();
-        let one = |name: &String| {
-            let found = all.iter().find(|scenario| scenario.name() == name).copied();
-            found.ok_or_else(|| {
-                let known: Vec<_> = all.iter().map(|scenario| scenario.name()).collect();
-                Usage(format!("--kind {name}: expected one of {}", known.join(", "))).into()
-            })
-        };
-        if self.kinds.is_empty() { Ok(usual) } else { self.kinds.iter().map(one).collect() }
+        let all: Vec<_> = Scenario::all().into_iter().map(|it| (it.name(), it)).collect();
+        let chosen = self.kinds.iter().map(|name| named("--kind", name, &all));
+        if self.kinds.is_empty() { Ok(usual) } else { chosen.collect() }
     }
 
     /// Every scenario with every seed, scenario by scenario.
@@ -72,4 +106,22 @@ impl FamilyArguments {
         let by_scenario = results.chunks(self.seeds.max(1)).map(<[R]>::to_vec);
         scenarios.iter().copied().zip(by_scenario).collect()
     }
+}
+
+/// Reads a simulated dataset through its files, as the program does.
+///
+/// # Panics
+///
+/// When the simulator's files are refused.
+pub fn read(simulated: &SimulatedDataset) -> Dataset {
+    read_files(&dataset_files(simulated))
+}
+
+/// Explains a simulated dataset.
+///
+/// # Panics
+///
+/// When a run has no usable sample.
+pub fn explained(dataset: &Dataset) -> Explanation {
+    explain(dataset, &|_, _| {}).expect("usable runs")
 }

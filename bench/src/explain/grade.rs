@@ -2,15 +2,15 @@
 
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::ExplainAnswer;
+use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
 use super::attainable::attainable_mps;
-use super::case::Case;
+use super::family::Case;
 use super::parameters::{ParameterGrade, graded};
 use super::place::{ends_within, place_iou};
-use super::scenario::Competing;
 
 /// How good an answer is.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,7 +52,7 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
     let everyday: Vec<&str> = case.world.everyday().iter().map(|kind| kind.name()).collect();
     let competing = case.scenario.competing();
     let is_invented = |kind: &&str| {
-        let is_competing = competing.is_some_and(|competing| competing.kind.name() == *kind);
+        let is_competing = competing.is_some_and(|(competing, _)| competing.name() == *kind);
         !truth.contains(kind) && !everyday.contains(kind) && !is_competing
     };
     let is_right = if everyday.is_empty() {
@@ -93,16 +93,16 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
 /// Whether the answer names what acts, and nothing else.
 fn is_exactly(
     simulated: &SimulatedDataset,
-    competing: Option<Competing>,
+    competing: Option<(EffectKind, bool)>,
     verdict: &str,
     found: &[&str],
 ) -> bool {
     let mut expected: Vec<&str> =
         simulated.effects.iter().map(|effect| effect.kind().name()).collect();
-    if let Some(competing) =
-        competing.filter(|competing| competing.is_never_named || verdict == "ambiguous")
+    if let Some((kind, is_never_named)) = competing
+        && (is_never_named || verdict == "ambiguous")
     {
-        expected.push(competing.kind.name());
+        expected.push(kind.name());
     }
     let mut found = found.to_vec();
     expected.sort_unstable();

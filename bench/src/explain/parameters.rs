@@ -3,6 +3,7 @@
 use dynocar_model::terms::delay;
 use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::disturbances::Disturbances;
+use dynocar_tests::simulator::run_file::run_file;
 use dynocar_tests::simulator::run_maker::RunPlan;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
@@ -122,44 +123,38 @@ fn mass_factors(
     simulated: &SimulatedDataset,
 ) -> Vec<Option<ParameterGrade>> {
     let graded = |list: &str,
-                  (from, to): (f64, f64),
+                  keys: [&str; 2],
+                  [from, to]: [f64; 2],
                   truth: f64,
-                  overlap: &dyn Fn(&Value) -> f64| {
-        let found = own["parameters"][list].as_array()?;
-        let (at, best) = found
-            .iter()
-            .enumerate()
-            .max_by(|one, other| overlap(one.1).total_cmp(&overlap(other.1)))?;
+                  is_like: &dyn Fn(&Value) -> bool| {
+        let overlap = |entry: &Value| {
+            let [low, high] = keys.map(|key| entry[key].as_f64().unwrap_or(0.0));
+            if is_like(entry) { (high.min(to) - low.max(from)).max(0.0) } else { 0.0 }
+        };
+        let found = own["parameters"][list].as_array()?.iter().enumerate();
+        let (at, best) = found.max_by(|one, other| overlap(one.1).total_cmp(&overlap(other.1)))?;
         (overlap(best) > 0.5 * (to - from)).then_some(())?;
         let (value, deviation) = (best["mass_factor"].as_f64()?, own["std"][list][at].as_f64()?);
         let error = (value - truth) / (truth - 1.0);
         Some(ParameterGrade { name: "mass_factor".into(), error, z: (value - truth) / deviation })
     };
-    let length = |entry: &Value, keys: (&str, &str), (from, to): (f64, f64)| {
-        let low = entry[keys.0].as_f64().unwrap_or(0.0).max(from);
-        (entry[keys.1].as_f64().unwrap_or(0.0).min(to) - low).max(0.0)
-    };
     match effect {
         Effect::MassChangeSections(sections) => sections
             .iter()
-            .map(|section| {
-                let range = (section.from_m, section.to_m);
-                graded("sections", range, section.mass_factor, &|entry| {
-                    let same = entry["direction"].as_f64() == Some(section.direction);
-                    if same { length(entry, ("from_m", "to_m"), range) } else { 0.0 }
-                })
+            .map(|it| {
+                let is_like = |entry: &Value| entry["direction"].as_f64() == Some(it.direction);
+                let range_m = [it.from_m, it.to_m];
+                graded("sections", ["from_m", "to_m"], range_m, it.mass_factor, &is_like)
             })
             .collect(),
         Effect::MassChangeWindows(windows) => windows
             .iter()
-            .map(|(window, factor)| {
-                let file = dynocar_tests::simulator::run_file::run_file(window.run);
-                let truth = factor * load_of_the_day(simulated, window.run);
-                let range = (window.start_s, window.end_s);
-                graded("windows", range, truth, &|entry| {
-                    let same = entry["run"] == file.as_str();
-                    if same { length(entry, ("t_start_s", "t_end_s"), range) } else { 0.0 }
-                })
+            .map(|(it, factor)| {
+                let file = run_file(it.run);
+                let is_like = |entry: &Value| entry["run"] == file.as_str();
+                let truth = factor * load_of_the_day(simulated, it.run);
+                let range_s = [it.start_s, it.end_s];
+                graded("windows", ["t_start_s", "t_end_s"], range_s, truth, &is_like)
             })
             .collect(),
         _ => Vec::new(),

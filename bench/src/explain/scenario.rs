@@ -1,19 +1,52 @@
-//! What is simulated: one kind, two at once, or a poor recording.
+//! What is simulated: one kind, two at once, or a poor recording, and what is a little wrong besides.
 
+use clap::ValueEnum;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::{
     Defects, Deviations, Effect, EffectRequest, Law, SimulatorSettings, TrainType, Unlisted,
 };
 
-use super::world::World;
+/// A world that effects happen in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum World {
+    /// Everything but the effect is as declared, to a good survey and calibrated sensors.
+    Plain,
+    /// Trains of cars on couplings, in a wind of each day.
+    Coupled,
+    /// Weights, map, curve constant, winds, forces and wheels, all a little wrong at once.
+    Rough,
+}
 
-/// A kind that is hardly distinguishable from the one that acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Competing {
-    /// The kind.
-    pub kind: EffectKind,
-    /// True when no data of the family distinguish the two.
-    pub is_never_named: bool,
+impl World {
+    /// By how much things are wrong in it.
+    pub fn deviations(self) -> Deviations {
+        match self {
+            World::Plain => Deviations::PLAIN,
+            World::Coupled => Deviations::COUPLED,
+            World::Rough => Deviations::ROUGH,
+        }
+    }
+
+    /// Kinds that are in this world, small, whatever else acts: to name them is no error.
+    pub fn everyday(self) -> &'static [EffectKind] {
+        use EffectKind::{
+            ActuatorDelay, BearingTemperature, CurveResistance, GradientError, MassChange,
+            TractionGain, WheelDiameter, Wind,
+        };
+        match self {
+            World::Plain | World::Coupled => &[],
+            World::Rough => &[
+                ActuatorDelay,
+                BearingTemperature,
+                CurveResistance,
+                GradientError,
+                MassChange,
+                TractionGain,
+                WheelDiameter,
+                Wind,
+            ],
+        }
+    }
 }
 
 /// A family of datasets; a seed makes one of it.
@@ -38,6 +71,18 @@ pub enum Scenario {
     /// One effect of a kind drawn from the seed, recorded so.
     Poor,
 }
+
+/// The families that are no single kind, by name.
+const FAMILIES: [(Scenario, &str); 8] = [
+    (Scenario::Two, "two_effects"),
+    (Scenario::Alike, "level_straight_line"),
+    (Scenario::UnmappedTunnel, "unmapped_tunnel"),
+    (Scenario::SlowForce, "slow_force"),
+    (Scenario::AnyLaw, "any_law"),
+    (Scenario::LoadsByStop, "loads_by_stop"),
+    (Scenario::PoorNull, "none_poor_recording"),
+    (Scenario::Poor, "poor_recording"),
+];
 
 /// Pairs that a train meets and that no data of this kind confuse.
 const PAIRS: [[EffectKind; 2]; 10] = {
@@ -79,31 +124,14 @@ impl Scenario {
     /// All of them, in the order of the table.
     pub fn all() -> Vec<Scenario> {
         let kinds = EffectKind::ALL.iter().copied().map(Scenario::Kind);
-        let others = [
-            Scenario::Two,
-            Scenario::Alike,
-            Scenario::UnmappedTunnel,
-            Scenario::SlowForce,
-            Scenario::AnyLaw,
-            Scenario::LoadsByStop,
-            Scenario::PoorNull,
-            Scenario::Poor,
-        ];
-        kinds.chain(others).collect()
+        kinds.chain(FAMILIES.map(|(family, _)| family)).collect()
     }
 
     /// Its name on the command line and in the table.
     pub fn name(self) -> &'static str {
         match self {
             Scenario::Kind(kind) => kind.name(),
-            Scenario::Two => "two_effects",
-            Scenario::Alike => "level_straight_line",
-            Scenario::UnmappedTunnel => "unmapped_tunnel",
-            Scenario::SlowForce => "slow_force",
-            Scenario::AnyLaw => "any_law",
-            Scenario::LoadsByStop => "loads_by_stop",
-            Scenario::PoorNull => "none_poor_recording",
-            Scenario::Poor => "poor_recording",
+            other => FAMILIES.iter().find(|it| it.0 == other).map_or("", |it| it.1),
         }
     }
 
@@ -158,15 +186,12 @@ impl Scenario {
         }
     }
 
-    /// The kind that is hardly distinguishable from the one that acts.
-    pub fn competing(self) -> Option<Competing> {
+    /// The kind that is hardly distinguishable from the one that acts, and whether no data of the family distinguish
+    /// the two.
+    pub fn competing(self) -> Option<(EffectKind, bool)> {
         match self {
-            Scenario::Alike => {
-                Some(Competing { kind: EffectKind::MassChange, is_never_named: true })
-            }
-            Scenario::UnmappedTunnel => {
-                Some(Competing { kind: EffectKind::LocalResistance, is_never_named: false })
-            }
+            Scenario::Alike => Some((EffectKind::MassChange, true)),
+            Scenario::UnmappedTunnel => Some((EffectKind::LocalResistance, false)),
             _ => None,
         }
     }

@@ -1,23 +1,24 @@
 //! What is measured together with what.
 
+use std::process::Stdio;
+
 use dynocar::config::IdleStrategy;
+use dynocar::programs::{LIVE, RECORDING, call};
 use dynocar_client::monotonic_now_ns;
 use dynocar_shared::PipelineKind;
 use dynocar_tests::process::{Process, Site};
 
-use super::companion::Companion;
-use super::link::{ClientLink, Datagrams, Link, Notifying, Numbered};
+use super::link::{Client, Controller, Datagrams, Notifying};
 use super::schedule::{Schedule, Slice, await_ready, drive};
-use super::server::TRAIN;
-use super::sockets::COMPARED;
+use super::sockets::{COMPARED, TRAIN};
 #[cfg(feature = "zeromq")]
 use super::zeromq::ZeroMq;
-use crate::output::Failure;
+use crate::output::{Failure, during};
 use crate::rig::cores::{Cores, bind, prioritise};
 use crate::rig::motion::Motion;
 use crate::rig::pipelines;
 use crate::rig::site::{DaemonPlan, ThreadPlan, peer, put_candidates, require, site, stop};
-use crate::rig::usage::{self, ThreadUsage};
+use crate::rig::usage;
 
 /// The daemon's thread in every case.
 const THREAD: &str = "measured";
@@ -39,6 +40,48 @@ pub enum Answerer {
     /// [`COMPARED`] behind a ZeroMQ pair socket.
     #[cfg(feature = "zeromq")]
     ZeroMq,
+}
+
+/// A program that reads what a controller and the daemon write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Companion {
+    /// `dynocar record`.
+    Recorder,
+    /// `dynocar live`, with nobody looking.
+    Live,
+}
+
+impl Companion {
+    /// Its name in a case.
+    pub fn name(self) -> &'static str {
+        match self {
+            Companion::Recorder => "recorder",
+            Companion::Live => "live",
+        }
+    }
+
+    /// Starts it on a site, and waits for its first line: by then its channels are open.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be started.
+    pub fn start(self, site: &Site) -> Result<Process, Failure> {
+        let (train, file) = (TRAIN.to_string(), site.path().join("run.mcap"));
+        let file = file.to_string_lossy();
+        let (package, arguments) = match self {
+            Companion::Recorder => (RECORDING, vec!["record", "--output", &file]),
+            Companion::Live => (LIVE, vec!["--port", "0"]),
+        };
+        let mut program = call(package);
+        // One that is not there is named in words.
+        let look = program.arg("--version").stdout(Stdio::null()).status();
+        look.map_err(during(package))?;
+        let program = program.get_program().to_string_lossy();
+        let mut process = site.start(&program, &[&arguments[..], &["--train", &train]].concat());
+        process.await_error("\n");
+        require(&mut process)?;
+        Ok(process)
+    }
 }
 
 /// One line of the result.
@@ -137,8 +180,8 @@ pub fn cases_in_shadow() -> Vec<Case> {
 pub struct Outcome {
     /// Its latencies.
     pub slice: Slice,
-    /// What the daemon's thread suffered meanwhile; `None` without a daemon.
-    pub suffered: Option<ThreadUsage>,
+    /// Page faults, own waits and preemptions of the daemon's thread meanwhile; `None` without a daemon.
+    pub suffered: Option<[u64; 3]>,
 }
 
 /// Measures one slice of a case with processes of its own; binds the calling thread.
@@ -159,15 +202,15 @@ pub fn measure(case: &Case, cores: Cores, schedule: &Schedule) -> Result<Outcome
     // They end with the slice.
     let _companions = started?;
     prioritise(cores.priority);
-    let mut link: Box<dyn Link> = match &case.answerer {
-        Answerer::Floor if blocks => Box::new(Numbered::new(Notifying::open(&site, TRAIN)?)),
-        Answerer::Floor => Box::new(ClientLink::open(&site, TRAIN, PipelineKind::Echo)?),
-        Answerer::Daemon { polled, .. } => Box::new(ClientLink::open(&site, TRAIN, *polled)?),
-        Answerer::UnixDatagram => Box::new(Numbered::new(Datagrams::open(&site, blocks)?)),
+    let mut controller = match &case.answerer {
+        Answerer::Floor if blocks => Controller::new(Notifying::open(&site, TRAIN)?),
+        Answerer::Floor => Controller::new(Client::open(&site, TRAIN, PipelineKind::Echo)?),
+        Answerer::Daemon { polled, .. } => Controller::new(Client::open(&site, TRAIN, *polled)?),
+        Answerer::UnixDatagram => Controller::new(Datagrams::open(&site, blocks)?),
         #[cfg(feature = "zeromq")]
-        Answerer::ZeroMq => Box::new(Numbered::new(ZeroMq::open(&site, blocks)?)),
+        Answerer::ZeroMq => Controller::new(ZeroMq::open(&site, blocks)?),
     };
-    let outcome = run(&mut *link, &mut peer, cores, schedule)?;
+    let outcome = run(&mut controller, &mut peer, cores, schedule)?;
     if matches!(case.answerer, Answerer::Daemon { .. }) {
         stop(peer)?;
     }
@@ -175,7 +218,7 @@ pub fn measure(case: &Case, cores: Cores, schedule: &Schedule) -> Result<Outcome
 }
 
 fn run(
-    link: &mut dyn Link,
+    link: &mut Controller,
     peer: &mut Process,
     cores: Cores,
     schedule: &Schedule,
@@ -188,7 +231,10 @@ fn run(
     let slice = drive(link, &mut motion, schedule.rate_hz, schedule.measure_s)?;
     let after = usage::of_thread(peer.id(), THREAD);
     require(peer)?;
-    let suffered = before.zip(after).map(|(before, after)| after.since(&before));
+    let since = |(before, after): ([u64; 3], [u64; 3])| {
+        std::array::from_fn(|which| after[which] - before[which])
+    };
+    let suffered = before.zip(after).map(since);
     Ok(Outcome { slice, suffered })
 }
 

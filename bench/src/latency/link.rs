@@ -12,77 +12,120 @@ use dynocar_tests::process::Site;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::ipc;
 
-use super::bytes::{as_bytes, from_bytes};
 use super::plain::{self, refused};
-use super::sockets::{CLIENT_SOCKET, SERVER_SOCKET};
+use super::sockets::{CLIENT_SOCKET, SERVER_SOCKET, as_bytes, from_bytes};
 use crate::output::{Failure, during};
 
-/// Sends samples, and counts how far the answers have come.
-pub trait Link {
-    /// Sends a sample; gives its sequence number.
-    ///
-    /// # Errors
-    ///
-    /// When the transport fails for good; a message that a full queue refuses is only lost.
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, Failure>;
-
-    /// The sequence number of the newest sample behind the polled pipeline's newest snapshot, 0
-    /// when none has come.
+/// A transport that carries samples there and answers back.
+pub trait Wire {
+    /// Sends a sample, which has a number; one that a full queue refuses is lost.
     ///
     /// # Errors
     ///
     /// When the transport fails for good.
-    fn poll(&mut self) -> Result<u64, Failure>;
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure>;
 
-    /// When the newest answered sample left, and when its answer did, in ns of the monotonic clock;
-    /// `None` where the peer does not say so.
-    fn stamps(&self) -> Option<(i64, i64)> {
-        None
-    }
-
-    /// Takes what else has come, while no answer is awaited: other pipelines' snapshots, which a
-    /// controller's next poll would find in its way.
+    /// Takes one answer, if there is one.
     ///
     /// # Errors
     ///
-    /// As [`Link::poll`].
-    fn rest(&mut self) -> Result<(), Failure> {
-        std::hint::spin_loop();
-        Ok(())
+    /// When the transport fails for good.
+    fn receive(&mut self) -> Result<Option<Answer>, Failure>;
+
+    /// True where other pipelines' snapshots come, too, which a controller's next poll would find in its way.
+    fn carries_others(&self) -> bool {
+        false
     }
 }
 
-/// What a controller links: Dynocar's client library.
-pub struct ClientLink {
-    publisher: SamplePublisher,
-    reader: SnapshotReader,
-    pipeline: PipelineKind,
-    answer: Answer,
-}
-
-/// How far the answers have come, and when sample and answer left.
+/// How far the answers have come, and when, in ns of the monotonic clock, the newest answered sample and its answer
+/// left.
 #[derive(Clone, Copy, Debug, Default)]
-struct Answer {
-    newest: u64,
-    left_ns: i64,
-    answered_ns: i64,
+pub struct Answer {
+    /// Number of the newest sample behind the snapshot.
+    pub newest: u64,
+    /// When that sample left.
+    pub left_ns: i64,
+    /// When the snapshot left.
+    pub answered_ns: i64,
 }
 
-impl Answer {
-    fn of(snapshot: &ParameterSnapshot) -> Self {
+impl From<&ParameterSnapshot> for Answer {
+    fn from(snapshot: &ParameterSnapshot) -> Self {
         Answer {
             newest: snapshot.sample_sequence,
             left_ns: snapshot.sample_published_ns,
             answered_ns: snapshot.published_ns,
         }
     }
+}
 
-    fn stamps(&self) -> Option<(i64, i64)> {
-        (self.answered_ns > 0).then_some((self.left_ns, self.answered_ns))
+/// A controller that numbers its samples, and counts how far the answers have come.
+pub struct Controller {
+    wire: Box<dyn Wire>,
+    sequence: u64,
+    answer: Answer,
+}
+
+impl Controller {
+    /// A controller that has sent nothing.
+    pub fn new(wire: impl Wire + 'static) -> Self {
+        Controller { wire: Box::new(wire), sequence: 0, answer: Answer::default() }
+    }
+
+    /// Sends a sample; gives its number.
+    ///
+    /// # Errors
+    ///
+    /// As [`Wire::send`].
+    pub fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, Failure> {
+        (sample.sequence, sample.published_ns) = (self.sequence + 1, monotonic_now_ns());
+        self.wire.send(sample)?;
+        self.sequence = sample.sequence;
+        Ok(self.sequence)
+    }
+
+    /// The number of the newest answered sample, 0 when none has been.
+    ///
+    /// # Errors
+    ///
+    /// As [`Wire::receive`].
+    pub fn poll(&mut self) -> Result<u64, Failure> {
+        let newer = |it: &Answer| it.newest >= self.answer.newest;
+        if let Some(answer) = self.wire.receive()?.filter(newer) {
+            self.answer = answer;
+        }
+        Ok(self.answer.newest)
+    }
+
+    /// When the newest answered sample left, and when its answer did; `None` where the peer does not say so.
+    pub fn stamps(&self) -> Option<(i64, i64)> {
+        let Answer { left_ns, answered_ns, .. } = self.answer;
+        (answered_ns > 0).then_some((left_ns, answered_ns))
+    }
+
+    /// Takes what else has come, while no answer is awaited.
+    ///
+    /// # Errors
+    ///
+    /// As [`Wire::receive`].
+    pub fn rest(&mut self) -> Result<(), Failure> {
+        if self.wire.carries_others() {
+            return self.poll().map(|_| ());
+        }
+        std::hint::spin_loop();
+        Ok(())
     }
 }
 
-impl ClientLink {
+/// What a controller links: Dynocar's client library.
+pub struct Client {
+    publisher: SamplePublisher,
+    reader: SnapshotReader,
+    pipeline: PipelineKind,
+}
+
+impl Client {
     /// Opens publisher and reader; the answers of one pipeline count.
     ///
     /// # Errors
@@ -90,83 +133,24 @@ impl ClientLink {
     /// When a channel cannot be opened.
     pub fn open(site: &Site, train: TrainId, pipeline: PipelineKind) -> Result<Self, Failure> {
         let publisher = SamplePublisher::open(&site.host(), train)?;
-        let reader = SnapshotReader::open(&site.host(), train)?;
-        Ok(ClientLink { publisher, reader, pipeline, answer: Answer::default() })
+        Ok(Client { publisher, reader: SnapshotReader::open(&site.host(), train)?, pipeline })
     }
 }
 
-impl Link for ClientLink {
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, Failure> {
-        Ok(self.publisher.publish(sample)?)
+impl Wire for Client {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
+        // It numbers by itself.
+        Ok(self.publisher.publish(sample).map(|_| ())?)
     }
 
-    fn poll(&mut self) -> Result<u64, Failure> {
-        if self.reader.poll() > 0
-            && let Some(reading) = self.reader.latest(self.pipeline, 0)
-        {
-            self.answer = Answer::of(reading.snapshot);
-        }
-        Ok(self.answer.newest)
+    fn receive(&mut self) -> Result<Option<Answer>, Failure> {
+        let has_news = self.reader.poll() > 0;
+        let latest = self.reader.latest(self.pipeline, 0).filter(|_| has_news);
+        Ok(latest.map(|reading| reading.snapshot.into()))
     }
 
-    fn stamps(&self) -> Option<(i64, i64)> {
-        self.answer.stamps()
-    }
-
-    fn rest(&mut self) -> Result<(), Failure> {
-        self.poll().map(|_| ())
-    }
-}
-
-/// A transport that carries samples there and snapshots back, and counts nothing.
-pub trait Wire {
-    /// Sends a sample; one that a full queue refuses is lost.
-    ///
-    /// # Errors
-    ///
-    /// When the transport fails for good.
-    fn send(&mut self, sample: &TrainSample) -> Result<(), Failure>;
-
-    /// Takes one snapshot, if there is one.
-    ///
-    /// # Errors
-    ///
-    /// When the transport fails for good.
-    fn receive(&mut self) -> Result<Option<ParameterSnapshot>, Failure>;
-}
-
-/// A wire whose samples are numbered here.
-pub struct Numbered<W> {
-    wire: W,
-    sequence: u64,
-    answer: Answer,
-}
-
-impl<W: Wire> Numbered<W> {
-    /// Numbers from 1.
-    pub fn new(wire: W) -> Self {
-        Numbered { wire, sequence: 0, answer: Answer::default() }
-    }
-}
-
-impl<W: Wire> Link for Numbered<W> {
-    fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, Failure> {
-        self.sequence += 1;
-        (sample.sequence, sample.published_ns) = (self.sequence, monotonic_now_ns());
-        self.wire.send(sample)?;
-        Ok(self.sequence)
-    }
-
-    fn poll(&mut self) -> Result<u64, Failure> {
-        let newer = |it: &ParameterSnapshot| it.sample_sequence >= self.answer.newest;
-        if let Some(snapshot) = self.wire.receive()?.filter(newer) {
-            self.answer = Answer::of(&snapshot);
-        }
-        Ok(self.answer.newest)
-    }
-
-    fn stamps(&self) -> Option<(i64, i64)> {
-        self.answer.stamps()
+    fn carries_others(&self) -> bool {
+        true
     }
 }
 
@@ -195,13 +179,13 @@ impl Notifying {
 }
 
 impl Wire for Notifying {
-    fn send(&mut self, sample: &TrainSample) -> Result<(), Failure> {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
         self.sender.send(sample)?;
         self.notifier.notify().map(|_| ()).map_err(refused("notification"))
     }
 
-    fn receive(&mut self) -> Result<Option<ParameterSnapshot>, Failure> {
-        Ok(self.receiver.receive())
+    fn receive(&mut self) -> Result<Option<Answer>, Failure> {
+        Ok(self.receiver.receive().as_ref().map(Answer::from))
     }
 }
 
@@ -229,7 +213,7 @@ impl Datagrams {
 }
 
 impl Wire for Datagrams {
-    fn send(&mut self, sample: &TrainSample) -> Result<(), Failure> {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
         match self.socket.send_to(as_bytes(sample), &self.server) {
             Err(error) if !is_passing(error.kind()) => Err(during("sending a datagram")(error)),
             // Full, or the server does not listen yet: lost.
@@ -237,14 +221,19 @@ impl Wire for Datagrams {
         }
     }
 
-    fn receive(&mut self) -> Result<Option<ParameterSnapshot>, Failure> {
+    fn receive(&mut self) -> Result<Option<Answer>, Failure> {
         let mut bytes = [0; size_of::<ParameterSnapshot>()];
         match self.socket.recv(&mut bytes) {
-            Ok(count) => Ok(from_bytes(&bytes[..count])),
+            Ok(count) => Ok(snapshot(&bytes[..count])),
             Err(error) if is_passing(error.kind()) => Ok(None),
             Err(error) => Err(during("receiving a datagram")(error)),
         }
     }
+}
+
+/// The answer in the bytes of a snapshot.
+pub(super) fn snapshot(bytes: &[u8]) -> Option<Answer> {
+    from_bytes::<ParameterSnapshot>(bytes).as_ref().map(Answer::from)
 }
 
 /// True for what a receiver or sender has to live with.

@@ -5,51 +5,134 @@
 //! else the machine does falls on all of them alike. Ratios to the floor are taken within a round;
 //! the median of the rounds is reported.
 //!
-//! - [`case`]: what is measured together with what
-//! - [`companion`]: programs that read the same channels
+//! - [`case`]: what is measured together with what, and beside which readers of the same channels
 //! - [`schedule`]: the open-loop measurement of one slice
 //! - [`link`]: the controller's end of each transport
 //! - [`server`]: the answering processes
-//! - [`sockets`], [`plain`], [`bytes`]: what they need
+//! - [`sockets`], [`plain`]: what they need
 //! - `zeromq`: both ends of ZeroMQ, with the feature of that name
-//! - [`costs`]: one poll, one publish
-//! - [`rest`]: what a daemon takes while no sample comes
+//! - [`costs`]: one poll, one publish, a daemon at rest
 //! - [`report`], [`plot`]: the result
-//! - [`command`]: the command line
 
-pub mod bytes;
 pub mod case;
-pub mod command;
-pub mod companion;
 pub mod costs;
 pub mod link;
 pub mod plain;
 pub mod plot;
 pub mod report;
-pub mod rest;
 pub mod schedule;
 pub mod server;
 pub mod sockets;
 #[cfg(feature = "zeromq")]
 pub mod zeromq;
 
-use crate::rig::cores::Cores;
-use case::{Case, Outcome};
-use costs::Costs;
-use rest::AtRest;
-use schedule::Schedule;
+use std::path::PathBuf;
 
-/// What was measured.
-#[derive(Clone, Debug)]
-pub struct Measured {
-    /// Each case with its outcome of every round.
-    pub cases: Vec<(Case, Vec<Outcome>)>,
-    /// What a call costs.
-    pub costs: Costs,
-    /// What a daemon takes while no sample comes.
-    pub at_rest: Vec<AtRest>,
-    /// How it was driven.
-    pub schedule: Schedule,
-    /// Where it ran.
-    pub cores: Cores,
+use clap::Args;
+use dynocar::config::IdleStrategy;
+use dynocar::output::report_line;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use self::report::Measured;
+use self::schedule::Schedule;
+use crate::output::{Failure, expect, give};
+use crate::rig::cores::{CoreArguments, Cores, bind, in_thread, prioritise};
+
+/// Sample → snapshot through real processes, compared with the floor and what a user would pick else.
+#[derive(Debug, Args)]
+pub struct LatencyArguments {
+    /// Few short rounds of the main cases: a check that everything runs, not a measurement
+    #[arg(long)]
+    quick: bool,
+    /// Samples a second
+    #[arg(long, default_value_t = 1_000.0, value_name = "HZ")]
+    rate: f64,
+    /// Rounds through all cases
+    #[arg(long, value_name = "N")]
+    rounds: Option<usize>,
+    /// Seconds of each case in each round
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+    /// Only the cases whose name contains this, and the floors
+    #[arg(long, value_name = "TEXT")]
+    case: Option<String>,
+    /// Also measure with a recorder and a live view beside the daemon; their programs lie beside this one
+    #[arg(long)]
+    readers: bool,
+    /// Also measure with two candidates on trial in the shadow of the daemon's model
+    #[arg(long)]
+    shadow: bool,
+    #[command(flatten)]
+    place: CoreArguments,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw the distributions
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+}
+
+impl LatencyArguments {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When the command line is wrong, or a process or a transport fails; never because of a time.
+    pub fn run(&self) -> Result<(), Failure> {
+        let rate = self.rate;
+        expect((0.1..=1e6).contains(&rate), || {
+            format!("--rate {rate}: expected 0.1 to 1000000 Hz")
+        })?;
+        let is_short = self.seconds.is_none_or(|seconds| seconds > 0.0 && seconds <= 3_600.0);
+        expect(is_short, || "--seconds: expected up to 3600 s".into())?;
+        expect(self.rounds != Some(0), || "--rounds 0: expected at least one round".into())?;
+        let measured = self.measure()?;
+        if let Some(file) = &self.plot {
+            plot::draw(&measured, file)?;
+        }
+        let (all, text) = report::of(&measured);
+        give(&self.json, &all, || text)
+    }
+
+    fn measure(&self) -> Result<Measured, Failure> {
+        let choose = |quick: f64, usual: f64| if self.quick { quick } else { usual };
+        let cores = Cores::choose(&self.place);
+        let schedule = Schedule {
+            rate_hz: self.rate,
+            warm_up_s: choose(0.6, 0.8),
+            measure_s: self.seconds.unwrap_or(choose(0.2, 2.0)),
+        };
+        let mut cases = case::cases(self.quick);
+        if self.readers {
+            cases.extend(case::cases_with_readers());
+        }
+        if self.shadow {
+            cases.extend(case::cases_in_shadow());
+        }
+        let text = self.case.as_deref().unwrap_or_default();
+        cases.retain(|case| case.name == "floor" || case.name.contains(text));
+        let mut cases: Vec<_> = cases.into_iter().map(|case| (case, Vec::new())).collect();
+        let costs = in_thread(|| {
+            bind(cores.controller);
+            prioritise(cores.priority);
+            costs::measure(choose(20.0, 400.0) as usize)
+        })?;
+        let mut random = ChaCha8Rng::seed_from_u64(self.place.seed);
+        let rounds = self.rounds.unwrap_or(choose(1.0, 15.0) as usize);
+        for round in 1..=rounds {
+            report_line(&format!("round {round} of {rounds}"));
+            let mut order: Vec<usize> = (0..cases.len()).collect();
+            order.shuffle(&mut random);
+            for index in order {
+                let outcome = in_thread(|| case::measure(&cases[index].0, cores, &schedule))?;
+                cases[index].1.push(outcome);
+            }
+        }
+        let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event]
+            .map(|idle| costs::at_rest(idle, cores, choose(0.5, 5.0)));
+        let at_rest = at_rest.into_iter().collect::<Result<_, _>>()?;
+        Ok(Measured { cases, costs, at_rest, schedule, cores })
+    }
 }

@@ -6,9 +6,8 @@ use dynocar::output::write_file;
 use hdrhistogram::Histogram;
 use plotters::prelude::*;
 
-use super::Measured;
 use super::case::{Answerer, Case};
-use super::report::pooled;
+use super::report::{Measured, pooled};
 use super::sockets::COMPARED;
 use crate::output::{Failure, during};
 
@@ -52,7 +51,10 @@ fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Failure> {
         let color = Palette99::pick(index).to_rgba();
         let label = format!("{} ({})", case.name, case.idle);
         chart
-            .draw_series(LineSeries::new(points(&pooled(outcomes)), color.stroke_width(2)))?
+            .draw_series(LineSeries::new(
+                points(&pooled(outcomes, |slice| &slice.from_appointed)),
+                color.stroke_width(2),
+            ))?
             .label(label)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
     }

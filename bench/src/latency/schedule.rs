@@ -3,7 +3,7 @@
 use dynocar_client::monotonic_now_ns;
 use hdrhistogram::Histogram;
 
-use super::link::Link;
+use super::link::Controller;
 use crate::output::Failure;
 use crate::rig::motion::Motion;
 use crate::rig::quantiles::{histogram, record};
@@ -76,7 +76,7 @@ struct InFlight {
 ///
 /// When it stays silent.
 pub fn await_ready(
-    link: &mut dyn Link,
+    link: &mut Controller,
     motion: &mut Motion,
     mut require: impl FnMut() -> Result<(), Failure>,
 ) -> Result<(), Failure> {
@@ -105,7 +105,7 @@ pub fn await_ready(
 ///
 /// When the transport fails.
 pub fn drive(
-    link: &mut dyn Link,
+    link: &mut Controller,
     motion: &mut Motion,
     rate_hz: f64,
     seconds: f64,
@@ -145,7 +145,7 @@ impl InFlight {
     /// those before it too, for a snapshot stands on all of them.
     fn await_answer(
         &mut self,
-        link: &mut dyn Link,
+        link: &mut Controller,
         sequence: u64,
         until_ns: i64,
         slice: &mut Slice,
@@ -175,8 +175,13 @@ impl InFlight {
 
 #[cfg(test)]
 mod tests {
+    use super::super::link::{Answer, Wire};
     use super::*;
     use dynocar_shared::{TrainId, TrainSample};
+
+    fn answer(newest: u64) -> Result<Option<Answer>, Failure> {
+        Ok(Some(Answer { newest, ..Answer::default() }))
+    }
 
     /// Answers at once, but is silent while it is held up.
     struct HeldUp {
@@ -185,24 +190,24 @@ mod tests {
         until_ns: i64,
     }
 
-    impl Link for HeldUp {
-        fn publish(&mut self, _: &mut TrainSample) -> Result<u64, Failure> {
-            self.sent += 1;
+    impl Wire for HeldUp {
+        fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
+            self.sent = sample.sequence;
             if self.sent == self.silent_from {
                 self.until_ns = monotonic_now_ns() + 50_000_000;
             }
-            Ok(self.sent)
+            Ok(())
         }
 
-        fn poll(&mut self) -> Result<u64, Failure> {
+        fn receive(&mut self) -> Result<Option<Answer>, Failure> {
             let is_silent = monotonic_now_ns() < self.until_ns;
-            Ok(if is_silent { self.silent_from - 1 } else { self.sent })
+            answer(if is_silent { self.silent_from - 1 } else { self.sent })
         }
     }
 
     #[test]
     fn every_sample_that_a_standstill_kept_waiting_is_counted_with_its_wait() {
-        let mut link = HeldUp { sent: 0, silent_from: 100, until_ns: 0 };
+        let mut link = Controller::new(HeldUp { sent: 0, silent_from: 100, until_ns: 0 });
         let slice = drive(&mut link, &mut Motion::of(TrainId(1), 0), 1_000.0, 0.2).unwrap();
         assert_eq!((slice.from_appointed.len(), slice.unanswered), (200, 0));
         // A standstill of 50 ms keeps 50 samples of a kHz waiting, 25 ms in the mean.
@@ -214,18 +219,18 @@ mod tests {
     #[test]
     fn a_sample_without_an_answer_is_counted_as_such() {
         struct Silent(u64);
-        impl Link for Silent {
-            fn publish(&mut self, _: &mut TrainSample) -> Result<u64, Failure> {
+        impl Wire for Silent {
+            fn send(&mut self, _: &mut TrainSample) -> Result<(), Failure> {
                 self.0 += 1;
-                Ok(self.0)
+                Ok(())
             }
 
-            fn poll(&mut self) -> Result<u64, Failure> {
-                Ok(self.0.min(3))
+            fn receive(&mut self) -> Result<Option<Answer>, Failure> {
+                answer(self.0.min(3))
             }
         }
         let mut motion = Motion::of(TrainId(1), 0);
-        let slice = drive(&mut Silent(0), &mut motion, 10_000.0, 5e-4).unwrap();
+        let slice = drive(&mut Controller::new(Silent(0)), &mut motion, 10_000.0, 5e-4).unwrap();
         assert_eq!((slice.from_appointed.len(), slice.unanswered), (3, 2));
     }
 }

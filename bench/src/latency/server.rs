@@ -6,14 +6,12 @@ use clap::{Args, ValueEnum};
 use dynocar::config::DaemonConfig;
 use dynocar_client::channel::{Receiver, Sender, Transport};
 use dynocar_client::{Host, monotonic_now_ns};
-use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 
-use super::{plain, sockets};
+use super::plain;
+use super::sockets::{TRAIN, pipeline, serve_datagrams};
 use crate::output::Failure;
 use crate::rig::cores::{bind, prioritise};
-
-/// The train of every latency case.
-pub const TRAIN: TrainId = TrainId(1);
 
 /// A process of a measurement; started by the measuring commands, not by people.
 #[derive(Debug, Args)]
@@ -60,9 +58,7 @@ pub fn serve(arguments: &PeerArguments) -> Result<(), Failure> {
     match kind {
         PeerKind::Daemon => Ok(dynocar::run::run(&DaemonConfig::load(place)?)?),
         #[cfg(feature = "zeromq")]
-        PeerKind::Zeromq => {
-            super::zeromq::serve(place, sockets::pipeline(place, TRAIN)?, *blocks, pin)
-        }
+        PeerKind::Zeromq => super::zeromq::serve(place, pipeline(place)?, *blocks, pin),
         PeerKind::Echo => {
             pin();
             let host = Host::from_environment()?;
@@ -88,7 +84,7 @@ pub fn serve(arguments: &PeerArguments) -> Result<(), Failure> {
         }
         PeerKind::UnixDatagram => {
             pin();
-            sockets::serve_datagrams(place, sockets::pipeline(place, TRAIN)?, *blocks)
+            serve_datagrams(place, pipeline(place)?, *blocks)
         }
     }
 }

@@ -6,9 +6,8 @@ use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 use dynocar_tests::process::Site;
 
-use super::bytes::{as_bytes, from_bytes};
-use super::link::{BLOCK, Wire};
-use super::sockets::answer;
+use super::link::{Answer, BLOCK, Wire, snapshot};
+use super::sockets::{answer, as_bytes, from_bytes};
 use crate::output::Failure;
 
 fn address(folder: &Path) -> String {
@@ -81,14 +80,14 @@ impl ZeroMq {
 }
 
 impl Wire for ZeroMq {
-    fn send(&mut self, sample: &TrainSample) -> Result<(), Failure> {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
         send(&self.socket, as_bytes(sample))
     }
 
-    fn receive(&mut self) -> Result<Option<ParameterSnapshot>, Failure> {
+    fn receive(&mut self) -> Result<Option<Answer>, Failure> {
         let mut bytes = [0; size_of::<ParameterSnapshot>()];
         match self.socket.recv_into(&mut bytes, self.flags) {
-            Ok(count) => Ok(from_bytes(&bytes[..count.min(size_of::<ParameterSnapshot>())])),
+            Ok(count) => Ok(snapshot(&bytes[..count.min(size_of::<ParameterSnapshot>())])),
             Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => Ok(None),
             Err(error) => Err(error.into()),
         }

@@ -12,18 +12,16 @@ pub mod report;
 pub mod search;
 pub mod traffic;
 pub mod trial;
-pub mod waits;
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use dynocar::config::IdleStrategy;
+use serde_json::json;
 
-use crate::output::{Failure, expect, give};
-use crate::rig::cores::{CoreArguments, Cores, in_thread};
-use crate::rig::host::HostGaps;
+use crate::output::{Failure, expect, give, table};
+use crate::rig::cores::{CoreArguments, Cores, HostGaps, in_thread};
 use crate::rig::pipelines;
-use report::Report;
 use traffic::TrafficPlan;
 use trial::TrialPlan;
 
@@ -100,15 +98,24 @@ impl LoadArguments {
         host.watch(plan.cores, watched_s);
         let trial = in_thread(|| trial::run(&plan))?;
         host.watch(plan.cores, watched_s);
-        let mut report = Report::of(&plan, &trial, host.figures());
+        let (mut all, mut text) = report::of(&plan, &trial, &host);
         let short = TrialPlan { seconds: plan.seconds.min(TRIAL_SECONDS), ..plan };
         if self.search {
-            report.search = Some(search::highest_rate(&short)?);
+            let found = search::highest_rate(&short)?;
+            let limit =
+                if found.limited_by_publishers { "the publishers'" } else { "the daemon's" };
+            text += &format!(
+                "highest rate without loss: {:.0} Hz a train, {:.0} samples/s; the limit is {limit}\n",
+                found.rate_hz, found.samples_per_s
+            );
+            all["search"] = json!(found);
         }
         if self.growth {
-            report.growth = Some(search::growth(&short)?);
+            let sizes = search::growth(&short)?;
+            text += &table(&sizes);
+            all["growth"] = json!(sizes);
         }
-        give(&self.json, &report, || report::table(&report))
+        give(&self.json, &all, || text)
     }
 
     fn plan(&self) -> Result<TrialPlan, Failure> {

@@ -3,10 +3,10 @@
 use dynocar::output::report_line;
 use serde::Serialize;
 
-use super::trial::{self, Trial, TrialPlan};
-use crate::output::Failure;
+use super::report;
+use super::trial::{self, TrialPlan};
+use crate::output::{Failure, Record};
 use crate::rig::cores::in_thread;
-use crate::rig::quantiles::{Quantiles, pooled};
 
 /// A publisher that is later than this has itself reached its limit, in ns.
 const PUBLISHER_LAG_NS: i64 = 50_000_000;
@@ -16,7 +16,7 @@ const STEPS: usize = 5;
 const RATE_MAX_HZ: f64 = 2e6;
 
 /// The outcome of a search.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Found {
     /// Highest rate of each train at which nothing was lost, in Hz; 0 when the first was too high.
     pub rate_hz: f64,
@@ -34,12 +34,7 @@ pub struct Found {
 ///
 /// When a process or channel fails.
 pub fn highest_rate(plan: &TrialPlan) -> Result<Found, Failure> {
-    let mut found = Found {
-        rate_hz: 0.0,
-        samples_per_s: 0.0,
-        failed_at_hz: None,
-        limited_by_publishers: false,
-    };
+    let mut found = Found::default();
     let mut steps = STEPS;
     let mut rate_hz = plan.traffic.rate_hz;
     while steps > 0 && rate_hz < RATE_MAX_HZ {
@@ -71,60 +66,26 @@ pub fn highest_rate(plan: &TrialPlan) -> Result<Found, Failure> {
     Ok(found)
 }
 
-/// One size of the daemon's task.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Size {
-    /// Number of trains.
-    pub trains: u64,
-    /// Number of pipelines.
-    pub pipelines: usize,
-    /// Samples without account.
-    pub lost: u64,
-    /// Latency over all pipelines.
-    #[serde(flatten)]
-    pub latency: Quantiles,
-    /// Processor time of the daemon, in %.
-    pub cpu_percent: f64,
-    /// Resident memory of the daemon, in bytes.
-    pub rss_bytes: u64,
-}
-
 /// Trials of one train up to the plan's number, with one pipeline, half and all of them.
 ///
 /// # Errors
 ///
 /// When a process or channel fails.
-pub fn growth(plan: &TrialPlan) -> Result<Vec<Size>, Failure> {
-    let mut counts = vec![1];
-    while counts[counts.len() - 1] * 4 < plan.trains {
-        counts.push(counts[counts.len() - 1] * 4);
-    }
-    if plan.trains > 1 {
-        counts.push(plan.trains);
-    }
+pub fn growth(plan: &TrialPlan) -> Result<Vec<Record>, Failure> {
+    let fours = std::iter::successors(Some(1), |trains| Some(4 * trains));
+    let mut counts: Vec<u64> = fours.take_while(|&trains| trains < plan.trains).collect();
+    counts.push(plan.trains);
     let all = plan.pipelines.len();
     let mut widths = vec![1, all.div_ceil(2), all];
     widths.dedup();
     let mut sizes = Vec::new();
     for &trains in &counts {
         for &width in &widths {
-            let mut plan = plan.clone();
-            plan.trains = trains;
+            let mut plan = TrialPlan { trains, ..plan.clone() };
             plan.pipelines.truncate(width);
             report_line(&format!("{trains} trains, {width} pipelines"));
-            sizes.push(size(&plan, &in_thread(|| trial::run(&plan))?));
+            sizes.push(report::size(&plan, &in_thread(|| trial::run(&plan))?));
         }
     }
     Ok(sizes)
-}
-
-fn size(plan: &TrialPlan, trial: &Trial) -> Size {
-    Size {
-        trains: plan.trains,
-        pipelines: plan.pipelines.len(),
-        lost: trial.missing(),
-        latency: Quantiles::of(&pooled(trial.pipelines.iter().map(|it| &it.latency))),
-        cpu_percent: trial.cpu_percent,
-        rss_bytes: trial.rss_bytes,
-    }
 }

@@ -8,7 +8,6 @@ use dynocar_tests::process::Site;
 use hdrhistogram::Histogram;
 
 use super::traffic::{Traffic, TrafficPlan};
-use super::waits::Waits;
 use crate::output::Failure;
 use crate::rig::cores::{Cores, bind, prioritise};
 use crate::rig::pipelines;
@@ -46,8 +45,6 @@ pub struct PipelineOutcome {
     pub used: u64,
     /// Samples refused.
     pub rejected: u64,
-    /// Samples that it counted as missing.
-    pub lost: u64,
     /// From appointed time to the poll that brought the snapshot.
     pub latency: Histogram<u64>,
     /// The same from the moment at which the sample left: without the publishers' own delays.
@@ -55,6 +52,11 @@ pub struct PipelineOutcome {
 }
 
 impl PipelineOutcome {
+    fn new(kind: PipelineKind) -> Self {
+        let (latency, since_leaving) = (histogram(), histogram());
+        PipelineOutcome { kind, offered: 0, used: 0, rejected: 0, latency, since_leaving }
+    }
+
     /// Samples of which the pipeline gave no account: lost, and too late to be noticed as lost.
     pub fn missing(&self) -> u64 {
         self.offered.saturating_sub(self.used + self.rejected)
@@ -75,8 +77,9 @@ pub struct Trial {
     /// The latest that a sample left after its appointed time, in ns: beyond some ms the
     /// publishers themselves are at their limit.
     pub publisher_lag_ns: i64,
-    /// What kernel and host took from the two threads that matter.
-    pub waits: Waits,
+    /// For how long in s publishers and daemon were ready but had no processor, and the machine beneath took their
+    /// cores away.
+    pub waits_s: [f64; 3],
 }
 
 impl Trial {
@@ -122,14 +125,15 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, Failure> {
     for train in &mut trains {
         await_all(&mut train.reader, &mut daemon, plan.pipelines.len(), |_| true)?;
     }
-    let mut outcomes: Vec<PipelineOutcome> = plan.pipelines.iter().copied().map(fresh).collect();
+    let mut outcomes: Vec<PipelineOutcome> =
+        plan.pipelines.iter().copied().map(PipelineOutcome::new).collect();
     let start_ns = monotonic_now_ns() + 600_000_000;
     for (index, train) in trains.iter_mut().enumerate() {
         let spread = index as f64 / plan.trains as f64;
         let id = TrainId(index as u64 + 1);
         train.traffic = Traffic::new(plan.traffic, id, spread, start_ns, plan.seed);
     }
-    let waits_before = Waits::so_far(daemon.id(), FAST, plan.cores);
+    let waits_before_s = usage::waits_s(daemon.id(), FAST, plan.cores);
     let (mut lag_ns, mut early) = (0, ProcessUsage::default());
     let end_ns = start_ns + (plan.seconds * 1e9) as i64;
     let early_ns = start_ns + (plan.seconds * 1e8) as i64;
@@ -152,7 +156,8 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, Failure> {
         trains[turn].poll(&mut outcomes);
     }
     let late = usage::of_process(daemon.id()).unwrap_or_default();
-    let waits = Waits::so_far(daemon.id(), FAST, plan.cores).since(waits_before);
+    let waits_s = usage::waits_s(daemon.id(), FAST, plan.cores);
+    let waits_s = std::array::from_fn(|which| waits_s[which] - waits_before_s[which]);
     let wall_s = (monotonic_now_ns() - early_at_ns) as f64 * 1e-9;
     settle(&mut trains, &mut outcomes);
     for train in &trains {
@@ -166,7 +171,7 @@ pub fn run(plan: &TrialPlan) -> Result<Trial, Failure> {
         rss_start_bytes: early.rss_bytes,
         rss_bytes: late.rss_bytes,
         publisher_lag_ns: lag_ns,
-        waits,
+        waits_s,
     })
 }
 
@@ -188,11 +193,6 @@ fn daemon_plan(plan: &TrialPlan) -> DaemonPlan {
     ];
     let threads = threads.into_iter().filter(|thread| !thread.pipelines.is_empty()).collect();
     DaemonPlan { trains: plan.trains, threads, ..DaemonPlan::default() }
-}
-
-fn fresh(kind: PipelineKind) -> PipelineOutcome {
-    let (latency, since_leaving) = (histogram(), histogram());
-    PipelineOutcome { kind, offered: 0, used: 0, rejected: 0, lost: 0, latency, since_leaving }
 }
 
 fn open_train(site: &Site, id: TrainId, plan: &TrialPlan) -> Result<Train, Failure> {
@@ -266,7 +266,6 @@ impl Train {
                 outcome.offered += self.publisher.published();
                 outcome.used += snapshot.samples_used;
                 outcome.rejected += snapshot.samples_rejected;
-                outcome.lost += snapshot.samples_lost;
             }
         }
     }

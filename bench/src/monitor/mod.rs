@@ -1,12 +1,110 @@
 //! The residual monitor over seeded simulations: how soon it names what begins to act, how long it
 //! names what does not, and how seldom it names something while nothing does.
 //!
-//! - [`acting`]: when an effect acts, from the true motion
 //! - [`watch`]: one simulated dataset, fed sample by sample
-//! - [`matrix`]: all kinds over all seeds, in numbers
-//! - [`command`]: the command line
 
-pub mod acting;
-pub mod command;
-pub mod matrix;
 pub mod watch;
+
+use std::collections::BTreeMap;
+
+use clap::Args;
+use dynocar::output::report_line;
+use dynocar_tests::simulator::{SimulatorSettings, simulate};
+use serde_json::json;
+
+use self::watch::{Watched, watch};
+use crate::explain::family::{Case, FamilyArguments};
+use crate::explain::scenario::Scenario;
+use crate::output::{Failure, Record, counts, give, table};
+use crate::statistics::median;
+
+/// The live monitor on every kind of undeclared effect, and on nulls: seconds of motion from onset
+/// to the right suspect, hours with a wrong one, false suspicions in 100 hours.
+#[derive(Debug, Args)]
+pub struct MonitorArguments {
+    #[command(flatten)]
+    family: FamilyArguments,
+    /// Runs of a quarter of an hour in each dataset
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(2..))]
+    runs: u16,
+}
+
+impl MonitorArguments {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such kind, or the result cannot be written.
+    pub fn run(&self) -> Result<(), Failure> {
+        let (family, runs) = (&self.family, usize::from(self.runs));
+        let watched = family.over(&family.scenarios(Scenario::all())?, |case| {
+            let watched = watch(&simulate(&SimulatorSettings { runs, ..case.settings() }));
+            if family.verbose {
+                print_case(case, &watched);
+            }
+            watched
+        });
+        let kinds: Vec<Record> = watched.iter().map(|(kind, own)| record(*kind, own)).collect();
+        let nulls = || watched.iter().filter(|(kind, _)| kind.is_null()).flat_map(|it| &it.1);
+        let hours = nulls().map(|it| it.driven_s).sum::<f64>() / 3600.0;
+        let suspicions: usize = nulls().map(|it| it.false_suspicions().count()).sum();
+        let per_100_h = 100.0 * suspicions as f64 / hours.max(f64::MIN_POSITIVE);
+        let all = json!({
+            "kinds": kinds,
+            "null_hours": hours,
+            "null_suspicions": suspicions,
+            "per_100_h": per_100_h,
+        });
+        give(&family.json, &all, || {
+            let words = format!(
+                "nothing undeclared: {suspicions} suspicions in {hours:.0} h of motion, \
+                 {per_100_h:.2} in 100 h\n"
+            );
+            table(&kinds) + &words
+        })
+    }
+}
+
+/// What came out for one kind; times are of motion. Datasets are those in which it acts, or all nulls, which are
+/// right where they stayed silent.
+fn record(scenario: Scenario, all: &[Watched]) -> Record {
+    let is_null = scenario.is_null();
+    let watched: Vec<&Watched> = all.iter().filter(|it| is_null || it.has_acted).collect();
+    let count = |is_so: &dyn Fn(&Watched) -> bool| watched.iter().filter(|it| is_so(it)).count();
+    let hours = |of: fn(&Watched) -> f64| watched.iter().map(|it| of(it)).sum::<f64>() / 3600.0;
+    let mut after_s: Vec<f64> = watched.iter().filter_map(|it| it.named_after_s).collect();
+    after_s.sort_unstable_by(f64::total_cmp);
+    let mut others = BTreeMap::new();
+    for kind in watched.iter().flat_map(|it| it.false_suspicions()) {
+        *others.entry(kind.name()).or_insert(0) += 1;
+    }
+    let is_silent = |it: &Watched| it.raised.is_empty();
+    let is_right = |it: &Watched| if is_null { is_silent(it) } else { it.named_after_s.is_some() };
+    let nine_of_ten = after_s.get((after_s.len() * 9).div_ceil(10).max(1) - 1).copied();
+    Record::default()
+        .with("kind", scenario.name())
+        .with("right", format!("{}/{}", count(&is_right), watched.len()))
+        .with("alone", count(&|it| it.led_after_s.is_some()))
+        .with("wrong", count(&|it| !is_right(it) && !is_silent(it)))
+        .with("missed", count(&|it| !is_right(it) && is_silent(it)))
+        .number("after s", median(after_s), 0)
+        .number("90 % s", nine_of_ten, 0)
+        .number("hours", hours(|it| it.driven_s), 1)
+        .number("wrong h", hours(|it| it.wrong_s), 2)
+        .number("stale h", hours(|it| it.stale_s), 2)
+        .with("others that led", counts(&others))
+}
+
+/// One dataset's suspicions on standard error.
+fn print_case(case: &Case, watched: &Watched) {
+    let raised = watched.raised.iter().map(|(kind, s)| format!("{kind} at {s:.0} s"));
+    let raised: Vec<String> = raised.collect();
+    report_line(&format!(
+        "{} seed {}: {} (wrong {:.0} s of {:.0})",
+        case.scenario.name(),
+        case.seed,
+        if raised.is_empty() { "silent".into() } else { raised.join(", ") },
+        watched.wrong_s,
+        watched.driven_s
+    ));
+}

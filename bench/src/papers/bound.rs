@@ -16,7 +16,7 @@ use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::RailCondition;
 
-use crate::statistics::root_mean_square;
+use crate::statistics::{mean, root_mean_square};
 
 /// What is known of the coefficient beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -158,21 +158,19 @@ fn transition(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> Matri
 
 /// Root of the mean variance.
 pub fn deviation(bounds: &[BoundAt]) -> f64 {
-    root_mean_square(&bounds.iter().map(|bound| bound.std).collect::<Vec<_>>())
+    root_mean_square(bounds.iter().map(|bound| bound.std))
 }
 
 /// Mean of |error| / truth in % of a Gaussian error at the bound.
 pub fn mean_relative_percent(bounds: &[BoundAt]) -> f64 {
-    let sum: f64 = bounds.iter().map(|bound| bound.std / bound.truth).sum();
-    100.0 * (2.0 / std::f64::consts::PI).sqrt() * sum / bounds.len() as f64
+    100.0 * std::f64::consts::FRAC_2_PI.sqrt() * mean(bounds.iter().map(|it| it.std / it.truth))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::papers::braking::{JIN_TABLE_3, XIE_TABLE_2};
-    use crate::papers::braking_run::run;
-    use crate::papers::braking_score::{LAG_S, LAG_STEPS, presumed, smoother};
+    use crate::papers::braking_score::{LAG_S, LAG_STEPS, presumed, run, smoother};
 
     #[test]
     fn later_measurements_and_a_known_law_lower_the_bound() {

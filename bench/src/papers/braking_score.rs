@@ -1,18 +1,24 @@
-//! Errors of the braking estimators over seeded runs.
+//! Pipelines over simulated brakings, and their errors over seeded runs.
 
+use std::sync::Arc;
+
+use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::{
     BrakeFactor, BrakingSettings, EkfSettings, LawSettings, SmootherSettings,
 };
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::xie::EmSettings;
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::TrainModel;
+use dynocar_shared::{Parameter, ParameterSnapshot};
 
-use super::braking::{Braking, SPEED_NOISE_MPS, ShareStep, WINDOW, disc_friction};
-use super::braking_run::{Scored, run};
-use super::row::Row;
-use super::seeds::Seeds;
+use super::braking::{
+    Braking, Moment, PRESSURE_PA, SPEED_NOISE_MPS, STEP_S, ShareStep, WINDOW, disc_friction, train,
+};
+use super::row::{Row, Seeds};
 use crate::parallel;
-use crate::statistics::mean;
+use crate::statistics::{mean, share};
 
 /// Lag in s of our smoother.
 pub const LAG_S: f64 = 5.0;
@@ -20,6 +26,71 @@ pub const LAG_S: f64 = 5.0;
 pub const LAG_STEPS: usize = 25;
 /// Steps from the middle of a window to its end.
 pub const MIDDLE_STEPS: usize = WINDOW - 1 - WINDOW / 2;
+
+/// The sample that a pipeline sees at a moment.
+fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> ResolvedSample {
+    ResolvedSample {
+        time_ns: (moment.time_s * 1e9).round() as i64,
+        step_s: if is_first { 0.0 } else { STEP_S },
+        position_m: Some(moment.measured_m),
+        speed_mps: moment.measured_mps,
+        mass_kg: train.mass_kg,
+        inertial_mass_kg: train.mass_kg * (1.0 + train.rotating_mass_factor),
+        weight_kn: TrainModel::weight_kn(train.mass_kg),
+        traction_force_n: None,
+        brake_force_n: None,
+        gradient_permille: Some(0.0),
+        brake_cylinder_pressure_pa: Some(PRESSURE_PA),
+        ..ResolvedSample::coasting()
+    }
+}
+
+/// An estimate and the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scored {
+    /// The true coefficient.
+    pub truth: f64,
+    /// Estimate minus truth.
+    pub error: f64,
+    /// Its claimed standard deviation.
+    pub std: f64,
+}
+
+/// Runs a pipeline over a braking and scores its updates once for each lag: as if an estimate
+/// belonged to the moment so many steps before its update.
+pub fn run<const LAGS: usize>(
+    settings: &EstimatorSettings,
+    moments: &[Moment],
+    lags_steps: [usize; LAGS],
+) -> [Vec<Scored>; LAGS] {
+    let train = Arc::new(train());
+    let mut estimator = settings.build(&train).expect("valid settings");
+    let mut snapshot = ParameterSnapshot::empty();
+    let mut scored = std::array::from_fn(|_| Vec::new());
+    for (k, moment) in moments.iter().enumerate() {
+        if estimator.update(&resolved(&train, moment, k == 0)) != Outcome::Updated {
+            continue;
+        }
+        estimator.write(&mut snapshot);
+        let Some((value, std)) = coefficient(&snapshot) else { continue };
+        for (lag_steps, scored) in lags_steps.into_iter().zip(&mut scored) {
+            let of = k.checked_sub(lag_steps).map(|i| &moments[i]);
+            if let Some(of) = of.filter(|of| of.is_scored) {
+                let error = value - of.truth;
+                scored.push(Scored { truth: of.truth, error, std });
+            }
+        }
+    }
+    scored
+}
+
+/// The coefficient of a snapshot, be it a number or a bound.
+fn coefficient(snapshot: &ParameterSnapshot) -> Option<(f64, f64)> {
+    use Parameter::{Adhesion, AdhesionLowerBound, BrakingRatio, DiscFriction};
+    [Adhesion, AdhesionLowerBound, DiscFriction, BrakingRatio]
+        .into_iter()
+        .find_map(|parameter| Some((snapshot.value(parameter)?, snapshot.std(parameter)?)))
+}
 
 /// Runs `work` for every seed, on as many threads as the machine has.
 pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
@@ -73,28 +144,19 @@ impl Score {
 
     /// The errors of runs, pooled.
     pub fn of(runs: &[Vec<Scored>]) -> Self {
-        let pool = |value: fn(&Scored) -> f64| {
-            let values: Vec<f64> = runs.iter().flatten().map(value).collect();
-            mean(&values)
-        };
-        let nees_of_runs: Vec<f64> = runs
-            .iter()
-            .filter(|run| !run.is_empty())
-            .map(|run| mean(&run.iter().map(nees).collect::<Vec<_>>()))
-            .collect();
+        let all = || runs.iter().flatten();
+        let errors = all().count() as f64;
+        let runs = runs.iter().filter(|run| !run.is_empty());
+        let nees_of_runs: Vec<f64> = runs.map(|run| mean(run.iter().map(nees))).collect();
         let centre = mean(&nees_of_runs);
-        let squares: Vec<f64> = nees_of_runs.iter().map(|nees| (nees - centre).powi(2)).collect();
         Score {
-            relative_percent: pool(|scored| 100.0 * (scored.error / scored.truth).abs()),
-            rmse: pool(|scored| scored.error * scored.error).sqrt(),
-            coverage: pool(|scored| {
-                f64::from(u8::from(scored.error.abs() <= 1.959_964 * scored.std))
-            }),
-            nees: pool(nees),
-            nees_run_variance: mean(&squares),
+            relative_percent: mean(all().map(|it| 100.0 * (it.error / it.truth).abs())),
+            rmse: mean(all().map(|it| it.error * it.error)).sqrt(),
+            coverage: share(all().map(|it| it.error.abs() <= 1.959_964 * it.std)),
+            nees: mean(all().map(nees)),
+            nees_run_variance: mean(nees_of_runs.iter().map(|nees| (nees - centre).powi(2))),
             runs: nees_of_runs.len(),
-            errors_per_run: runs.iter().map(Vec::len).sum::<usize>() as f64
-                / nees_of_runs.len().max(1) as f64,
+            errors_per_run: errors / nees_of_runs.len().max(1) as f64,
         }
     }
 }
@@ -135,47 +197,40 @@ fn reports(sought: BrakingCoefficient) -> BrakeFactor {
     }
 }
 
+/// The settings of a kind for adhesion, or of its like for what brakes are made of.
+fn of_kind<S>(
+    sought: BrakingCoefficient,
+    settings: S,
+    [adhesion, brake]: [fn(S) -> EstimatorSettings; 2],
+) -> EstimatorSettings {
+    match sought {
+        BrakingCoefficient::Adhesion => adhesion(settings),
+        BrakingCoefficient::Friction | BrakingCoefficient::Ratio => brake(settings),
+    }
+}
+
 /// The papers' EM, of which these settings are given.
 pub fn em(sought: BrakingCoefficient, given: EmSettings) -> EstimatorSettings {
     let settings = EmSettings { braking: braking_settings(), reports: reports(sought), ..given };
-    match sought {
-        BrakingCoefficient::Adhesion => EstimatorSettings::AdhesionEm(settings),
-        BrakingCoefficient::Friction | BrakingCoefficient::Ratio => {
-            EstimatorSettings::BrakeEm(settings)
-        }
-    }
+    of_kind(sought, settings, [EstimatorSettings::AdhesionEm, EstimatorSettings::BrakeEm])
 }
 
 /// The papers' baseline from an initial value.
 pub fn ekf(sought: BrakingCoefficient, initial: f64) -> EstimatorSettings {
-    let settings = EkfSettings {
-        braking: braking_settings(),
-        initial: Some(initial),
-        reports: reports(sought),
-        ..EkfSettings::default()
-    };
-    match sought {
-        BrakingCoefficient::Adhesion => EstimatorSettings::AdhesionEkf(settings),
-        BrakingCoefficient::Friction | BrakingCoefficient::Ratio => {
-            EstimatorSettings::BrakeEkf(settings)
-        }
-    }
+    let (braking, initial, reports) = (braking_settings(), Some(initial), reports(sought));
+    let settings = EkfSettings { braking, initial, reports, ..EkfSettings::default() };
+    of_kind(sought, settings, [EstimatorSettings::AdhesionEkf, EstimatorSettings::BrakeEkf])
 }
 
 /// Our smoother.
 pub fn smoother(sought: BrakingCoefficient, lag_s: f64) -> EstimatorSettings {
-    let settings = SmootherSettings {
-        braking: braking_settings(),
-        lag_s,
-        reports: reports(sought),
-        ..SmootherSettings::default()
-    };
-    match sought {
-        BrakingCoefficient::Adhesion => EstimatorSettings::AdhesionSmoother(settings),
-        BrakingCoefficient::Friction | BrakingCoefficient::Ratio => {
-            EstimatorSettings::BrakeSmoother(settings)
-        }
-    }
+    let (braking, reports) = (braking_settings(), reports(sought));
+    let settings = SmootherSettings { braking, lag_s, reports, ..SmootherSettings::default() };
+    of_kind(
+        sought,
+        settings,
+        [EstimatorSettings::AdhesionSmoother, EstimatorSettings::BrakeSmoother],
+    )
 }
 
 /// Our estimator where the curve over speed is known but for its scale.

@@ -9,8 +9,7 @@ use super::braking_score::{
     LAG_S, LAG_STEPS, MIDDLE_STEPS, Score, drawn_braking, ekf, em, known_law, presumed, score,
     smoother,
 };
-use super::row::Row;
-use super::seeds::Seeds;
+use super::row::{Row, Seeds};
 
 /// One of the papers' tables, and what is measured for it.
 pub struct Table {
@@ -148,28 +147,18 @@ pub fn drawn_rows(
     seeds: Seeds,
 ) -> Vec<Row> {
     let braking = drawn_braking(sought);
-    let table = Table {
-        paper,
-        table: "drawn coefficients",
-        name,
-        braking,
-        initials: &[],
-        published_percent: f64::NAN,
-        published_baseline_percent: f64::NAN,
-    };
     let knowledge = Knowledge::Share(presumed(sought));
-    [("the present", 0.0, 0), ("5 s back", LAG_S, LAG_STEPS)]
-        .into_iter()
-        .map(|(what, lag_s, lag_steps)| {
-            let score = drawn_score(sought, lag_s, lag_steps, seeds);
-            Row {
-                ours: Some(score.rmse),
-                bound: Some(deviation(&bound(&braking, knowledge, lag_steps))),
-                ..score.row(
-                    score.nees_freedom(),
-                    table.row(&format!("root mean square error, {what}"), "1", seeds),
-                )
-            }
-        })
-        .collect()
+    let row = |(what, lag_s, lag_steps)| {
+        let score = drawn_score(sought, lag_s, lag_steps, seeds);
+        let quantity = format!("{name}, root mean square error, {what}");
+        Row {
+            ours: Some(score.rmse),
+            bound: Some(deviation(&bound(&braking, knowledge, lag_steps))),
+            ..score.row(
+                score.nees_freedom(),
+                Row::new(paper, "drawn coefficients", quantity, "1", seeds),
+            )
+        }
+    };
+    [("the present", 0.0, 0), ("5 s back", LAG_S, LAG_STEPS)].map(row).into()
 }

@@ -7,9 +7,8 @@ use dynocar_shared::{EffortPoint, Stop};
 use super::braking::{JIN_TABLE_3, JIN_TABLE_4, PRESSURE_PA, declared, disc_friction, train};
 use super::braking_score::{over_seeds, score, smoother};
 use super::braking_table::{Table, drawn_rows, drawn_score};
-use super::row::Row;
-use super::seeds::Seeds;
-use super::xie::{PAPER_GRAVITY_MPS2, stop_in_steps, stop_rows};
+use super::row::{Row, Seeds};
+use super::xie::{PAPER_GRAVITY_MPS2, stop_rows};
 use crate::statistics::{KMH, mean};
 
 const FRICTION: Table = Table {
@@ -56,8 +55,7 @@ fn ratio_extras(seeds: Seeds) -> Vec<Row> {
         let moments = RATIO.braking.simulate(seed);
         let scored = moments.iter().filter(|moment| moment.is_scored);
         let declared = declared(BrakingCoefficient::Ratio);
-        let errors = scored.map(|moment| 100.0 * (declared / moment.truth - 1.0).abs());
-        mean(&errors.collect::<Vec<_>>())
+        mean(scored.map(|moment| 100.0 * (declared / moment.truth - 1.0).abs()))
     });
     vec![Row {
         published: Some(RATIO.published_percent),
@@ -75,7 +73,7 @@ fn ratio_extras(seeds: Seeds) -> Vec<Row> {
 }
 
 /// The stop from 350 km/h of figure 8.
-fn stop() -> Vec<Row> {
+fn stop() -> [Row; 2] {
     let train = train();
     let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");
     let force_n = |speed_mps: f64| gear.force_n(PRESSURE_PA, disc_friction(speed_mps), gear.ratio);
@@ -90,15 +88,8 @@ fn stop() -> Vec<Row> {
         gravity_mps2: PAPER_GRAVITY_MPS2,
         ..Stop::level(350.0 * KMH, train.mass_kg, davis, &effort)
     };
-    let ours = stop.estimate(0.95).expect("a stop");
-    stop_rows(
-        "Jin 2020",
-        "figure 8",
-        "350 km/h to standstill",
-        (4647.16, 94.2),
-        stop_in_steps(&train, &stop, force_n),
-        (ours.distance_m, ours.time_s),
-    )
+    let source = ["Jin 2020", "figure 8"];
+    stop_rows(source, "350 km/h to standstill", [4647.16, 94.2], (&train, &stop), force_n)
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 //! [`scenario`]. Errors are those of w0 over 40 to 72 km/h, where the runs coast, since a, b and
 //! c are hardly distinguishable there.
 
-pub mod bound;
 pub mod methods;
 pub mod scenario;
 
@@ -18,13 +17,12 @@ use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 use nalgebra::Matrix3;
 
-use self::methods::Method;
+use self::methods::METHODS;
 use self::scenario::{
-    Condition, Measured, ROTATING_MASS_FACTOR, STEP_S, compared_speeds_mps, davis, truth,
+    CLEAN, CONDITIONS, Condition, Measured, ROTATING_MASS_FACTOR, compared_speeds_mps, davis, truth,
 };
-use super::row::Row;
+use super::row::{Row, Seeds};
 use super::score::{Score, w0_errors};
-use super::seeds::Seeds;
 use crate::rig::pipelines::default_pipeline;
 use crate::statistics::{mean, root_mean_square};
 
@@ -40,19 +38,19 @@ type Estimate = (Davis, Matrix3<f64>);
 /// Rows for every method under every condition, over seeded runs.
 pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows: Vec<Row> =
-        Condition::ALL.into_iter().flat_map(|condition| accuracy(condition, seeds)).collect();
+        CONDITIONS.into_iter().flat_map(|condition| accuracy(condition, seeds)).collect();
     rows.extend(table_1(seeds));
     rows
 }
 
 fn accuracy(condition: Condition, seeds: Seeds) -> Vec<Row> {
-    let mut of_methods = vec![Vec::new(); Method::ALL.len()];
+    let mut of_methods = vec![Vec::new(); METHODS.len()];
     let (mut ours, mut online) = (Score::default(), Score::default());
     let (speeds, truth) = (compared_speeds_mps(), truth());
     for seed in seeds.range() {
         let runs = scenario::measure(condition, seed);
         let segments = methods::segments(&runs);
-        for (errors, method) in of_methods.iter_mut().zip(Method::ALL) {
+        for (errors, method) in of_methods.iter_mut().zip(METHODS) {
             if let Some(theta_kmh) = method.estimate(&segments) {
                 errors.extend(w0_errors(&davis(theta_kmh), &truth, &speeds));
             }
@@ -62,42 +60,25 @@ fn accuracy(condition: Condition, seeds: Seeds) -> Vec<Row> {
         }
         let (found, covariance) = live(&runs);
         online.take_resistance((&found, &covariance), &truth, &speeds);
-        let bound = bound_of(condition, &runs);
+        let bound = scenario::bound(condition, &runs);
         ours.take_bound(&bound, &speeds);
         online.take_bound(&bound, &speeds);
     }
-    let row = |quantity: String, method: Option<f64>, score: &Score| {
-        let quantity = format!("w0 over 40-72 km/h, {quantity}, {}", condition.name());
+    let row = |quantity: &str, method: Option<f64>, score: &Score| {
+        let quantity = format!("w0 over 40-72 km/h, {quantity}, {}", condition.name);
         Row {
             paper_method: method,
             baseline: Some(root_mean_square(&of_methods[0])),
             ..score.row(Row::new(PAPER, "Table 1, section 4.2", quantity, "N/kN", seeds))
         }
     };
-    let mut rows: Vec<Row> = Method::ALL
+    let mut rows: Vec<Row> = METHODS
         .iter()
         .zip(&of_methods)
-        .map(|(method, errors)| row(method.name(), Some(root_mean_square(errors)), &ours))
+        .map(|(method, errors)| row(method.name, Some(root_mean_square(errors)), &ours))
         .collect();
-    rows.push(row("online: resistance_kalman".into(), None, &online));
+    rows.push(row("online: resistance_kalman", None, &online));
     rows
-}
-
-/// The bound for the samples that a seed kept.
-fn bound_of(condition: Condition, runs: &[Vec<Measured>]) -> Matrix3<f64> {
-    let kept: Vec<Vec<bool>> = runs
-        .iter()
-        .map(|run| {
-            let last = run.last().map_or(0.0, |sample| sample.time_s);
-            let mut kept = vec![false; (last / STEP_S).round() as usize + 1];
-            for sample in run {
-                kept[(sample.time_s / STEP_S).round() as usize] = true;
-            }
-            kept
-        })
-        .collect();
-    let is_kept = |run: usize, index: usize| kept[run].get(index).copied().unwrap_or(false);
-    bound::covariance(condition, is_kept)
 }
 
 /// Our fit of whole runs: the computed speed against the measured one, all along each run.
@@ -159,19 +140,14 @@ fn live(runs: &[Vec<Measured>]) -> Estimate {
 /// Table 1's last column: the variance of the segments' residuals. The paper's are of its own
 /// recorded data, so that only the order of the methods compares.
 fn table_1(seeds: Seeds) -> Vec<Row> {
-    let published = [
-        (Method::LeastSquares, 0.5632),
-        (Method::Rls, 0.5632),
-        (Method::Mils(2), 0.5623),
-        (Method::Mils(4), 0.5618),
-        (Method::Mils(6), 0.5613),
-    ];
-    published
+    let published = [0.5632, 0.5632, 0.5623, 0.5618, 0.5613];
+    METHODS
         .into_iter()
+        .zip(published)
         .map(|(method, published)| {
             let (mut variances, mut ours) = (Vec::new(), Vec::new());
             for seed in seeds.range() {
-                let runs = scenario::measure(Condition::Clean, seed);
+                let runs = scenario::measure(CLEAN, seed);
                 let segments = methods::segments(&runs);
                 let variance = |theta_kmh| methods::residual_variance(&segments, theta_kmh);
                 variances.extend(method.estimate(&segments).map(variance));
@@ -180,7 +156,7 @@ fn table_1(seeds: Seeds) -> Vec<Row> {
                         .map(|(Davis { a, b, c }, _)| variance([a, b / 3.6, c / (3.6 * 3.6)])),
                 );
             }
-            let quantity = format!("variance of the segments' residuals, {}", method.name());
+            let quantity = format!("variance of the segments' residuals, {}", method.name);
             Row {
                 published: Some(published),
                 paper_method: Some(mean(&variances)),
@@ -198,7 +174,7 @@ mod tests {
     #[test]
     fn a_few_seeds_show_the_order_of_the_methods_and_nearness_to_the_bound() {
         let rows = rows(Seeds::from_zero(12));
-        assert_eq!(rows.len(), 4 * (Method::ALL.len() + 1) + 5);
+        assert_eq!(rows.len(), 4 * (METHODS.len() + 1) + 5);
         for row in rows.iter().filter(|row| row.unit == "N/kN") {
             let (ours, bound) = (row.ours.unwrap(), row.bound.unwrap());
             // 12 seeds scatter by a quarter around their expectation.

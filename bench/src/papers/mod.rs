@@ -2,18 +2,14 @@
 
 mod bound;
 mod braking;
-mod braking_run;
 mod braking_score;
 mod braking_table;
-mod differences;
 mod jin;
 mod literal_em;
 mod liu;
 mod promise;
 mod row;
 mod score;
-mod seeds;
-mod table;
 mod wang;
 mod xia;
 mod xie;
@@ -22,12 +18,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dynocar::output::report_line;
-use serde::Serialize;
+use serde_json::json;
 
-use crate::output::{self, Failure, expect, give, write_csv};
+use crate::output::{Failure, Record, expect, give, table, write_csv};
 use promise::Verdict;
-use row::Row;
-use seeds::Seeds;
+use row::{Row, Seeds};
 
 /// Every table of the five papers over seeded runs: the paper's figure, its method, ours, the bound.
 ///
@@ -52,20 +47,6 @@ pub struct PapersArguments {
     /// Write the rows as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-}
-
-#[derive(Serialize)]
-struct Answer {
-    rows: Vec<JudgedRow>,
-}
-
-/// A row with what is promised of it.
-#[derive(Serialize)]
-struct JudgedRow {
-    #[serde(flatten)]
-    row: Row,
-    #[serde(flatten)]
-    verdict: Verdict,
 }
 
 /// What measures the rows of a paper.
@@ -98,27 +79,117 @@ impl PapersArguments {
             report_line(&format!("{name}: {} seeds from {}", seeds.count, seeds.first));
             rows.extend(measure(seeds));
         }
-        let judge = |row: Row| JudgedRow { verdict: Verdict::of(&row), row };
-        let answer = Answer { rows: rows.into_iter().map(judge).collect() };
-        let records: Vec<_> =
-            answer.rows.iter().map(|it| table::record(&it.row, &it.verdict)).collect();
-        let promised = || answer.rows.iter().map(|it| it.verdict.promised.len()).sum::<usize>();
-        let broken = || answer.rows.iter().map(|it| it.verdict.broken.len()).sum::<usize>();
-        give(&self.json, &answer, || {
-            let counts = format!("promises: {}, {} broken\n", promised(), broken());
-            output::table(&records) + &counts
+        let verdicts: Vec<Verdict> = rows.iter().map(Verdict::of).collect();
+        let judged = || rows.iter().zip(&verdicts);
+        let records: Vec<Record> = judged().map(|(row, verdict)| record(row, verdict)).collect();
+        let promised: usize = verdicts.iter().map(|it| it.promised.len()).sum();
+        let broken: usize = verdicts.iter().map(|it| it.broken.len()).sum();
+        give(&self.json, &json!({ "rows": records, "promised": promised }), || {
+            table(&records) + &format!("promises: {promised}, {broken} broken\n")
         })?;
         if let Some(file) = &self.csv {
             write_csv(file, &records)?;
         }
-        let broken = answer.rows.iter().filter(|it| !it.verdict.broken.is_empty());
-        let words = broken.map(|JudgedRow { row, verdict }| {
-            format!("{}, {}: {}", row.paper, row.quantity, verdict.broken.join(", "))
-        });
+        let words = judged()
+            .filter(|(_, it)| !it.broken.is_empty())
+            .map(|(row, it)| format!("{}, {}: {}", row.paper, row.quantity, it.broken.join(", ")));
         let words: Vec<String> = words.collect();
         match words.is_empty() {
             true => Ok(()),
             false => Err(format!("broken promises:\n{}", words.join("\n")).into()),
         }
+    }
+}
+
+/// Where a note begins in a quantity.
+const NOTES: [&str; 6] =
+    [" (paper's method:", "; paper's method:", " (baseline:", "; baseline:", " (EM:", "; EM:"];
+
+/// A row for people and for a file of CSV. What stands behind a quantity, from `paper's method:` or `baseline:` on,
+/// is a note.
+fn record(row: &Row, verdict: &Verdict) -> Record {
+    let (quantity, mut notes) = match NOTES.iter().filter_map(|it| row.quantity.find(it)).min() {
+        Some(at) => {
+            let note = row.quantity[at..].trim_start_matches([' ', '(', ';']);
+            (&row.quantity[..at], vec![note.trim_end_matches(')').to_owned()])
+        }
+        None => (&row.quantity[..], Vec::new()),
+    };
+    if !verdict.broken.is_empty() {
+        notes.push(format!("BROKEN: {}", verdict.broken.join(", ")));
+    } else if let Some(reason) = verdict.may_be_wider.filter(|_| !verdict.promised.is_empty()) {
+        notes.push(format!("may be wider: {reason}"));
+    }
+    let ratio = row.ours.zip(row.bound).filter(|(_, bound)| *bound > 0.0);
+    let band = verdict.nees_band.filter(|_| row.nees.is_some());
+    Record::default()
+        .with("paper", row.paper)
+        .with("table", row.table)
+        .with("quantity", quantity)
+        .with("unit", row.unit)
+        .shown("published", figure(row.published), row.published)
+        .shown("papers_method", figure(row.paper_method), row.paper_method)
+        .shown("baseline", figure(row.baseline), row.baseline)
+        .shown("ours", figure(row.ours), row.ours)
+        .shown("bound", figure(row.bound), row.bound)
+        .number("ours_over_bound", ratio.map(|(ours, bound)| ours / bound), 2)
+        .number("coverage_percent", row.coverage.map(|share| 100.0 * share), 1)
+        .number("nees", row.nees, 2)
+        .number("nees_low", band.map(|it| it.0), 2)
+        .number("nees_high", band.map(|it| it.1), 2)
+        .with("seeds", row.seeds)
+        .with("note", notes.join("; "))
+}
+
+/// Three significant digits, in scientific form where a plain one would be long.
+fn figure(value: Option<f64>) -> String {
+    let Some(value) = value else { return String::new() };
+    if value == 0.0 {
+        return "0".into();
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-4..=5).contains(&exponent) {
+        return format!("{value:.2e}");
+    }
+    format!("{value:.*}", (2 - exponent).max(0) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row() -> Row {
+        Row {
+            published: Some(0.04),
+            ours: Some(0.0297),
+            bound: Some(0.027),
+            coverage: Some(0.951),
+            ..Row::new(
+                "Xia 2023",
+                "Table 3",
+                "w0 over driven speeds",
+                "N/kN",
+                Seeds::from_zero(200),
+            )
+        }
+    }
+
+    #[test]
+    fn figures_stand_apart_from_notes() {
+        let row = Row { quantity: "mass, 3 km (paper's method: by hand)".into(), ..row() };
+        let record = record(&row, &Verdict::of(&row));
+        let of = |name: &str| record.cell(name).unwrap();
+        assert_eq!((of("quantity"), of("note")), ("mass, 3 km", "paper's method: by hand"));
+        assert_eq!((of("ours_over_bound"), of("coverage_percent")), ("1.10", "95.1"));
+        assert_eq!((of("baseline"), of("nees")), ("", ""));
+    }
+
+    #[test]
+    fn figures_have_three_significant_digits() {
+        let cases = [(4.1e-10, "4.10e-10"), (0.02971, "0.0297"), (56.04, "56.0"), (3085.5, "3086")];
+        for (value, expected) in cases {
+            assert_eq!(figure(Some(value)), expected);
+        }
+        assert_eq!(figure(None), "");
     }
 }

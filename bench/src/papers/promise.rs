@@ -1,6 +1,5 @@
 //! What is promised of our methods, row by row, and whether a measurement keeps it.
 
-use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::row::Row;
@@ -63,7 +62,7 @@ const SEEDS_MIN: usize = 100;
 const BAND_PROBABILITY: f64 = 0.99;
 
 /// The measurement of a row against what is promised of it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// The 99 % chi-square band of the mean NEES per degree of freedom.
     pub nees_band: Option<(f64, f64)>,
@@ -152,7 +151,7 @@ fn nees_band(freedom: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::papers::seeds::Seeds;
+    use crate::papers::row::Seeds;
 
     fn row(quantity: &str, ours: f64, seeds: usize) -> Row {
         let seeds = Seeds::from_zero(seeds);

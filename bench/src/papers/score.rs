@@ -4,7 +4,7 @@ use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::row::Row;
-use crate::statistics::{mean, root_mean_square};
+use crate::statistics::{mean, root_mean_square, share};
 
 /// Standard deviations to either side of an estimate that hold the truth with 95 %.
 const INTERVAL: f64 = 1.96;
@@ -14,7 +14,7 @@ const INTERVAL: f64 = 1.96;
 pub struct Score {
     /// Estimate minus truth.
     pub errors: Vec<f64>,
-    covered: Vec<f64>,
+    covered: Vec<bool>,
     /// Normalised estimation error squared, per degree of freedom.
     nees: Vec<f64>,
     freedom: f64,
@@ -26,7 +26,7 @@ impl Score {
     /// Takes in a number with its claimed standard deviation.
     pub fn take(&mut self, error: f64, std: f64) {
         self.errors.push(error);
-        self.cover(error, std);
+        self.covered.push(error.abs() <= INTERVAL * std);
         self.nees.push((error / std).powi(2));
         self.freedom += 1.0;
     }
@@ -39,11 +39,10 @@ impl Score {
         truth: &Davis,
         speeds_mps: &[f64],
     ) {
-        let errors = w0_errors(found, truth, speeds_mps);
-        for (error, &speed_mps) in errors.iter().zip(speeds_mps) {
-            self.cover(*error, w0_std(covariance, speed_mps));
+        for (error, &speed_mps) in w0_errors(found, truth, speeds_mps).into_iter().zip(speeds_mps) {
+            self.errors.push(error);
+            self.covered.push(error.abs() <= INTERVAL * w0_std(covariance, speed_mps));
         }
-        self.errors.extend(errors);
         let error = Vector3::new(found.a - truth.a, found.b - truth.b, found.c - truth.c);
         if let Some(factor) = covariance.cholesky() {
             self.nees.push(error.dot(&factor.solve(&error)) / 3.0);
@@ -56,16 +55,12 @@ impl Score {
         self.bounds.extend(speeds_mps.iter().map(|&speed_mps| w0_std(covariance, speed_mps)));
     }
 
-    fn cover(&mut self, error: f64, std: f64) {
-        self.covered.push(f64::from(u8::from(error.abs() <= INTERVAL * std)));
-    }
-
     /// A row with our figures: those of this score.
     pub fn row(&self, row: Row) -> Row {
         Row {
             ours: Some(root_mean_square(&self.errors)),
             bound: (!self.bounds.is_empty()).then(|| root_mean_square(&self.bounds)),
-            coverage: Some(mean(&self.covered)),
+            coverage: Some(share(self.covered.iter().copied())),
             nees: Some(mean(&self.nees)),
             nees_freedom: Some(self.freedom),
             ..row
@@ -87,7 +82,7 @@ pub fn w0_std(covariance: &Matrix3<f64>, speed_mps: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::papers::seeds::Seeds;
+    use crate::papers::row::Seeds;
 
     #[test]
     fn an_error_of_one_standard_deviation_is_covered_and_counts_one() {

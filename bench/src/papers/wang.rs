@@ -1,26 +1,17 @@
 //! Wang 2022: staged learning of resistance and mass, traction energy.
 //!
-//! - [`mod@line`], [`shuttle`], [`driver`], [`disturbance`], [`sensor`]: the scenario, from line to
-//!   samples
+//! - [`shuttle`], [`ride`]: the scenario, from line to samples
 //! - [`bound`]: what no estimator can beat
-//! - [`printed`]: the descent as printed
-//! - [`resistance_rows`], [`leg`], [`mass_rows`], [`step_row`], [`energy_rows`]: the comparison
+//! - [`resistance_rows`], [`mass_rows`], [`energy_rows`]: the comparison
 
 mod bound;
-mod disturbance;
-mod driver;
 mod energy_rows;
-mod leg;
-mod line;
 mod mass_rows;
-mod printed;
 mod resistance_rows;
-mod sensor;
+mod ride;
 mod shuttle;
-mod step_row;
 
-use super::row::Row;
-use super::seeds::Seeds;
+use super::row::{Row, Seeds};
 
 /// Every row of the paper over a number of seeded runs.
 ///
@@ -29,7 +20,6 @@ use super::seeds::Seeds;
 pub fn rows(seeds: Seeds) -> Vec<Row> {
     let mut rows = resistance_rows::rows(seeds);
     rows.extend(mass_rows::rows(seeds));
-    rows.push(step_row::row(&shuttle::Shuttle::new(false), seeds));
     rows.extend(energy_rows::rows(seeds));
     rows
 }

@@ -1,19 +1,16 @@
 //! Xia 2023: Davis coefficients by trajectory fit.
 //!
-//! - [`scenario`]: line, driver and truth, seeded
-//! - [`bound`]: the Cramér-Rao bound from the scenario's own numerical Jacobian
+//! - [`scenario`]: line, driver and truth, seeded, and the Cramér-Rao bound
 //! - [`offline`]: Table 3 (without noise) and Figure 4 (with noise); `ratio_posterior` is the fit with
 //!   an unknown disturbance
 //! - [`online`]: Table 4 (coefficients that switch on the way)
 
-mod bound;
 mod offline;
 mod online;
 mod ratio_posterior;
 mod scenario;
 
-use super::row::Row;
-use super::seeds::Seeds;
+use super::row::{Row, Seeds};
 
 /// Every line of the comparison for this paper.
 ///
@@ -30,7 +27,8 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::papers::xia::scenario::{CASES, KMH, Profile, drive};
+    use crate::papers::xia::scenario::{CASES, Profile, drive};
+    use crate::statistics::KMH;
 
     #[test]
     fn the_scenarios_keep_to_their_speeds_and_forces() {
@@ -55,7 +53,7 @@ mod tests {
         };
         use dynocar_estimators::xia::trajectory::step::StepRule;
         let run = drive(Profile::Full, 25e3, 1, |_| CASES[0]);
-        let numerical = bound::davis_covariance(&run, &CASES[0]);
+        let numerical = scenario::davis_covariance(&run, &CASES[0]);
         let settings = FitSettings {
             speed_noise_mps: Some(scenario::SPEED_NOISE_MPS),
             ..FitSettings::new(StepRule::Distance)

@@ -11,8 +11,7 @@ use super::braking::{PRESSURE_PA, STEP_S, XIE_TABLE_2, XIE_TABLE_3, train};
 use super::braking_score::{MIDDLE_STEPS, em, over_seeds, score};
 use super::braking_table::{Table, drawn_rows};
 use super::literal_em::finite_changes;
-use super::row::Row;
-use super::seeds::Seeds;
+use super::row::{Row, Seeds};
 use crate::statistics::{KMH, mean};
 
 /// Initial values of both tables.
@@ -71,11 +70,7 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
         // With the printed density the gradient is zero: the initial value is the estimate.
         let moments = table.braking.simulate(seed);
         let scored = moments.iter().filter(|moment| moment.is_scored);
-        mean(
-            &scored
-                .map(|moment| 100.0 * (table.initial(seed) / moment.truth - 1.0).abs())
-                .collect::<Vec<_>>(),
-        )
+        mean(scored.map(|moment| 100.0 * (table.initial(seed) / moment.truth - 1.0).abs()))
     });
     vec![
         capped(Some(0.05), "mean relative error, printed cap min(F, B), from 0.05"),
@@ -95,35 +90,20 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
     ]
 }
 
-/// One stop: speeds in km/h, what the rail carries, and the paper's metres and seconds.
-struct PublishedStop {
-    from_kmh: f64,
-    to_kmh: f64,
-    what: &'static str,
-    adhesion: RailAdhesion,
-    distance_m: f64,
-    time_s: f64,
-}
+/// A stop of the paper: first and last speed in km/h, what the rail carries, in words and numbers, metres and seconds.
+type PublishedStop = ([f64; 2], &'static str, RailAdhesion, [f64; 2]);
 
 const STOPS: [PublishedStop; 6] = {
-    const fn stop(
-        (from_kmh, to_kmh): (f64, f64),
-        what: &'static str,
-        adhesion: RailAdhesion,
-        (distance_m, time_s): (f64, f64),
-    ) -> PublishedStop {
-        PublishedStop { from_kmh, to_kmh, what, adhesion, distance_m, time_s }
-    }
     const HIGH: RailAdhesion = RailAdhesion::Coefficient(Uncertain::exact(0.1542));
     const LOW: RailAdhesion = RailAdhesion::Coefficient(Uncertain::exact(0.0726));
     const WET: RailAdhesion = RailAdhesion::Law(RailCondition::Wet, Uncertain::exact(1.0));
     [
-        stop((300.0, 100.0), "adhesion 0.1542", HIGH, (3060.7, 56.1)),
-        stop((300.0, 100.0), "adhesion 0.0726", LOW, (3946.7, 71.7)),
-        stop((300.0, 100.0), "wet rail", WET, (3481.1, 62.8)),
-        stop((250.0, 50.0), "adhesion 0.1542", HIGH, (2404.3, 59.3)),
-        stop((250.0, 50.0), "adhesion 0.0726", LOW, (2958.9, 72.7)),
-        stop((250.0, 50.0), "wet rail", WET, (2614.4, 62.7)),
+        ([300.0, 100.0], "adhesion 0.1542", HIGH, [3060.7, 56.1]),
+        ([300.0, 100.0], "adhesion 0.0726", LOW, [3946.7, 71.7]),
+        ([300.0, 100.0], "wet rail", WET, [3481.1, 62.8]),
+        ([250.0, 50.0], "adhesion 0.1542", HIGH, [2404.3, 59.3]),
+        ([250.0, 50.0], "adhesion 0.0726", LOW, [2958.9, 72.7]),
+        ([250.0, 50.0], "wet rail", WET, [2614.4, 62.7]),
     ]
 };
 
@@ -137,43 +117,52 @@ fn stops() -> Vec<Row> {
     let force_n = gear.declared_force_n(PRESSURE_PA);
     let effort = [EffortPoint { speed_mps: 0.0, force_n }];
     let davis = [train.resistance.a, train.resistance.b, train.resistance.c];
-    let mut rows = Vec::new();
-    for published in &STOPS {
+    let weight_n = train.mass_kg * PAPER_GRAVITY_MPS2;
+    let of = |&([from_kmh, to_kmh], what, adhesion, published): &PublishedStop| {
         let stop = Stop {
-            to_speed_mps: published.to_kmh * KMH,
-            adhesion: published.adhesion,
+            to_speed_mps: to_kmh * KMH,
+            adhesion,
             gravity_mps2: PAPER_GRAVITY_MPS2,
-            ..Stop::level(published.from_kmh * KMH, train.mass_kg, davis, &effort)
+            ..Stop::level(from_kmh * KMH, train.mass_kg, davis, &effort)
         };
-        let ours = stop.estimate(0.95).expect("a stop");
-        let carried = |speed_mps| match published.adhesion {
+        let carried = |speed_mps| match adhesion {
             RailAdhesion::Coefficient(coefficient) => coefficient.value,
             RailAdhesion::Law(condition, scale) => scale.value * condition.adhesion(speed_mps),
             RailAdhesion::Unlimited => f64::INFINITY,
         };
-        let weight_n = train.mass_kg * PAPER_GRAVITY_MPS2;
-        let (distance_m, time_s) =
-            stop_in_steps(&train, &stop, |speed_mps| force_n.min(weight_n * carried(speed_mps)));
-        let speeds =
-            format!("{} to {} km/h, {}", published.from_kmh, published.to_kmh, published.what);
-        rows.extend(stop_rows(
-            "Xie 2019",
-            if published.from_kmh > 275.0 { "figures 10, 11" } else { "figures 20, 21" },
-            &speeds,
-            (published.distance_m, published.time_s),
-            (distance_m, time_s),
-            (ours.distance_m, ours.time_s),
-        ));
-    }
-    rows
+        let brake_n = |speed_mps| force_n.min(weight_n * carried(speed_mps));
+        let table = if from_kmh > 275.0 { "figures 10, 11" } else { "figures 20, 21" };
+        let what = format!("{from_kmh} to {to_kmh} km/h, {what}");
+        stop_rows(["Xie 2019", table], &what, published, (&train, &stop), brake_n)
+    };
+    STOPS.iter().flat_map(of).collect()
+}
+
+/// Rows of metres and of seconds: as published, by the papers' recursion, by ours.
+pub fn stop_rows(
+    [paper, table]: [&'static str; 2],
+    what: &str,
+    published: [f64; 2],
+    (train, stop): (&TrainModel, &Stop<'_>),
+    brake_n: impl Fn(f64) -> f64,
+) -> [Row; 2] {
+    let ours = stop.estimate(0.95).expect("a stop");
+    let (ours, in_steps) = ([ours.distance_m, ours.time_s], stop_in_steps(train, stop, brake_n));
+    let quantities = [("distance", "m"), ("time", "s")];
+    std::array::from_fn(|which| {
+        let (name, unit) = quantities[which];
+        let quantity = format!("braking {name}, {what}");
+        Row {
+            published: Some(published[which]),
+            paper_method: Some(in_steps[which]),
+            ours: Some(ours[which]),
+            ..Row::new(paper, table, quantity, unit, Seeds::from_zero(1))
+        }
+    })
 }
 
 /// The papers' recursion, Xie 2019, eq. (2)-(3) with the position corrected: metres and seconds.
-pub fn stop_in_steps(
-    train: &TrainModel,
-    stop: &Stop<'_>,
-    brake_n: impl Fn(f64) -> f64,
-) -> (f64, f64) {
+fn stop_in_steps(train: &TrainModel, stop: &Stop<'_>, brake_n: impl Fn(f64) -> f64) -> [f64; 2] {
     let weight_kn = 1e-3 * train.mass_kg * stop.gravity_mps2;
     let (mut distance_m, mut time_s, mut speed_mps) = (0.0, 0.0, stop.from_speed_mps);
     loop {
@@ -185,31 +174,10 @@ pub fn stop_in_steps(
         distance_m += 0.5 * share * STEP_S * (speed_mps + after_mps);
         time_s += share * STEP_S;
         if share < 1.0 {
-            return (distance_m, time_s);
+            return [distance_m, time_s];
         }
         speed_mps = after_mps;
     }
-}
-
-/// A row of metres and one of seconds.
-pub fn stop_rows(
-    paper: &'static str,
-    table: &'static str,
-    what: &str,
-    published: (f64, f64),
-    in_steps: (f64, f64),
-    ours: (f64, f64),
-) -> Vec<Row> {
-    let row = |quantity: String, unit, published, in_steps, ours| Row {
-        published: Some(published),
-        paper_method: Some(in_steps),
-        ours: Some(ours),
-        ..Row::new(paper, table, quantity, unit, Seeds::from_zero(1))
-    };
-    vec![
-        row(format!("braking distance, {what}"), "m", published.0, in_steps.0, ours.0),
-        row(format!("braking time, {what}"), "s", published.1, in_steps.1, ours.1),
-    ]
 }
 
 #[cfg(test)]

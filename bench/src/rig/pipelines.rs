@@ -9,7 +9,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId};
 
-use crate::output::{Failure, Usage};
+use crate::output::{Failure, named};
 
 /// A pipeline of a kind with its default settings.
 ///
@@ -50,18 +50,11 @@ fn estimating() -> impl Iterator<Item = PipelineKind> {
 ///
 /// In words, with the names there are.
 pub fn by_names(names: &[String]) -> Result<Vec<PipelineKind>, Failure> {
-    let one = |name: &String| {
-        let kind = PipelineKind::from_name(name)
-            .filter(|&kind| EstimatorSettings::default_of(kind).is_some());
-        kind.ok_or_else(|| {
-            let known: Vec<_> = estimating().map(|kind| kind.name()).collect();
-            Usage(format!("--pipelines {name}: expected one of {}", known.join(", "))).into()
-        })
-    };
+    let all: Vec<_> = estimating().map(|kind| (kind.name(), kind)).collect();
     match names {
         [name] if name == "all" => Ok([fast(), slow()].concat()),
         [name] if name == "fast" => Ok(fast()),
         [name] if name == "slow" => Ok(slow()),
-        names => names.iter().map(one).collect(),
+        names => names.iter().map(|name| named("--pipelines", name, &all)).collect(),
     }
 }

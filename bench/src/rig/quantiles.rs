@@ -1,7 +1,6 @@
 //! Histograms of latencies, and what is reported of them.
 
 use hdrhistogram::Histogram;
-use serde::Serialize;
 
 use crate::output::Record;
 
@@ -22,48 +21,18 @@ pub fn record(histogram: &mut Histogram<u64>, latency_ns: i64) {
     histogram.saturating_record(latency_ns.clamp(1, LONGEST_NS as i64) as u64);
 }
 
-/// What is reported of a histogram, in ns.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Quantiles {
-    /// Number of latencies.
-    pub count: u64,
-    /// Median.
-    pub p50_ns: u64,
-    /// 99 %.
-    pub p99_ns: u64,
-    /// 99.9 %.
-    pub p999_ns: u64,
-    /// 99.99 %.
-    pub p9999_ns: u64,
-    /// The longest.
-    pub max_ns: u64,
-}
-
-impl Quantiles {
-    /// Of a histogram.
-    pub fn of(histogram: &Histogram<u64>) -> Self {
-        Quantiles {
-            count: histogram.len(),
-            p50_ns: histogram.value_at_quantile(0.5),
-            p99_ns: histogram.value_at_quantile(0.99),
-            p999_ns: histogram.value_at_quantile(0.999),
-            p9999_ns: histogram.value_at_quantile(0.9999),
-            max_ns: histogram.max(),
-        }
-    }
-}
-
 /// Cells of a table: the quantiles of latencies.
-pub fn cells(record: Record, it: &Quantiles) -> Record {
+pub fn cells(record: Record, of: &Histogram<u64>) -> Record {
+    let at = |quantile: f64| of.value_at_quantile(quantile);
     [
-        ("p50", it.p50_ns),
-        ("p99", it.p99_ns),
-        ("p99.9", it.p999_ns),
-        ("p99.99", it.p9999_ns),
-        ("max", it.max_ns),
+        ("p50_ns", at(0.5)),
+        ("p99_ns", at(0.99)),
+        ("p99.9_ns", at(0.999)),
+        ("p99.99_ns", at(0.9999)),
+        ("max_ns", of.max()),
     ]
     .into_iter()
-    .fold(record, |record, (name, ns)| record.with(name, for_people(ns as f64)))
+    .fold(record, |record, (name, ns)| record.shown(name, for_people(ns as f64), ns))
 }
 
 /// All of some histograms with the bounds of [`histogram`].
@@ -96,9 +65,10 @@ mod tests {
         for ns in 1..=1000 {
             record(&mut steps, ns);
         }
-        let quantiles = Quantiles::of(&steps);
-        assert_eq!((quantiles.count, quantiles.max_ns), (1000, 1000));
-        assert_eq!((quantiles.p50_ns, quantiles.p99_ns, quantiles.p999_ns), (500, 990, 999));
+        let found = cells(Record::default(), &steps);
+        let of = |name: &str| found.value(name).unwrap();
+        assert_eq!([of("p50_ns"), of("p99_ns"), of("p99.9_ns")], [500.0, 990.0, 999.0]);
+        assert_eq!(of("max_ns"), 1000.0);
     }
 
     #[test]

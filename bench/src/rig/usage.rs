@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use super::cores::Cores;
 
 /// Processor time and memory of a process at one moment.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,45 +13,11 @@ pub struct ProcessUsage {
     pub rss_bytes: u64,
 }
 
-/// What one thread has suffered since it began.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct ThreadUsage {
-    /// Page faults answered without the disk.
-    pub minor_faults: u64,
-    /// Page faults answered from the disk.
-    pub major_faults: u64,
-    /// Times it waited of its own accord.
-    pub voluntary_switches: u64,
-    /// Times it was made to wait for another.
-    pub involuntary_switches: u64,
-}
-
-impl ThreadUsage {
-    /// What came since an earlier moment.
-    pub fn since(&self, earlier: &ThreadUsage) -> ThreadUsage {
-        ThreadUsage {
-            minor_faults: self.minor_faults - earlier.minor_faults,
-            major_faults: self.major_faults - earlier.major_faults,
-            voluntary_switches: self.voluntary_switches - earlier.voluntary_switches,
-            involuntary_switches: self.involuntary_switches - earlier.involuntary_switches,
-        }
-    }
-}
-
-impl std::ops::AddAssign for ThreadUsage {
-    fn add_assign(&mut self, other: ThreadUsage) {
-        self.minor_faults += other.minor_faults;
-        self.major_faults += other.major_faults;
-        self.voluntary_switches += other.voluntary_switches;
-        self.involuntary_switches += other.involuntary_switches;
-    }
-}
-
 /// A process's usage; `None` when it is gone.
 pub fn of_process(process_id: u32) -> Option<ProcessUsage> {
     let folder = format!("/proc/{process_id}");
     let tasks = std::fs::read_dir(format!("{folder}/task")).ok()?;
-    let cpu_ns: u64 = tasks.flatten().filter_map(|task| run_time_ns(&task.path())).sum();
+    let cpu_ns: u64 = tasks.flatten().filter_map(|task| schedule_figure(&task.path(), 0)).sum();
     let pages = std::fs::read_to_string(format!("{folder}/statm")).ok()?;
     let pages: u64 = pages.split(' ').nth(1)?.parse().ok()?;
     Some(ProcessUsage {
@@ -60,29 +26,18 @@ pub fn of_process(process_id: u32) -> Option<ProcessUsage> {
     })
 }
 
-/// A thread's time on a processor; finer than the ticks of `/proc/…/stat`.
-fn run_time_ns(task: &Path) -> Option<u64> {
-    schedule_figure(task, 0)
-}
-
 /// A figure of `/proc/…/schedstat`: time on a processor, or ready and waiting for one, in ns.
 fn schedule_figure(task: &Path, index: usize) -> Option<u64> {
     std::fs::read_to_string(task.join("schedstat")).ok()?.split(' ').nth(index)?.parse().ok()
 }
 
-/// For how long the calling thread was ready but had no processor, in s.
-pub fn own_wait_s() -> f64 {
-    schedule_figure(Path::new("/proc/thread-self"), 1).unwrap_or(0) as f64 * 1e-9
-}
-
-/// The same for a process's thread of this name; 0 when there is none.
-pub fn thread_wait_s(process_id: u32, name: &str) -> f64 {
-    let wait_ns = task_named(process_id, name).and_then(|task| schedule_figure(&task, 1));
-    wait_ns.unwrap_or(0) as f64 * 1e-9
+/// For how long a task was ready but had no processor, in s; 0 when there is none.
+fn wait_s(task: Option<&Path>) -> f64 {
+    task.and_then(|task| schedule_figure(task, 1)).unwrap_or(0) as f64 * 1e-9
 }
 
 /// For how long the machine beneath kept a core from its kernel, in s, as far as it says so.
-pub fn stolen_s(core: usize) -> f64 {
+fn stolen_s(core: usize) -> f64 {
     let stat = std::fs::read_to_string("/proc/stat").unwrap_or_default();
     let name = format!("cpu{core} ");
     let line = stat.lines().find_map(|line| line.strip_prefix(&name));
@@ -90,29 +45,34 @@ pub fn stolen_s(core: usize) -> f64 {
     ticks.unwrap_or(0) as f64 / rustix::param::clock_ticks_per_second() as f64
 }
 
-/// The usage of a process's thread of this name; `None` when there is none.
-pub fn of_thread(process_id: u32, name: &str) -> Option<ThreadUsage> {
-    task_named(process_id, name).and_then(|task| read_thread(&task))
+/// For how long so far, in s, the calling thread and a process's thread of this name were ready but had no
+/// processor, and the machine beneath took their cores away.
+pub fn waits_s(process_id: u32, name: &str, cores: Cores) -> [f64; 3] {
+    let thread = task_named(process_id, name);
+    [
+        wait_s(Some(Path::new("/proc/thread-self"))),
+        wait_s(thread.as_deref()),
+        stolen_s(cores.controller) + stolen_s(cores.server),
+    ]
+}
+
+/// Page faults of a process's thread of this name since it began, how often it waited of its own accord, and how
+/// often it was made to wait for another; `None` when there is none.
+pub fn of_thread(process_id: u32, name: &str) -> Option<[u64; 3]> {
+    let task = task_named(process_id, name)?;
+    let stat = std::fs::read_to_string(task.join("stat")).ok()?;
+    let status = std::fs::read_to_string(task.join("status")).ok()?;
+    let line = |key: &str| {
+        status.lines().find_map(|line| line.strip_prefix(key)?.trim().parse::<u64>().ok())
+    };
+    let faults = stat_field(&stat, 10)? + stat_field(&stat, 12)?;
+    Some([faults, line("voluntary_ctxt_switches:")?, line("nonvoluntary_ctxt_switches:")?])
 }
 
 fn task_named(process_id: u32, name: &str) -> Option<PathBuf> {
     let tasks = std::fs::read_dir(format!("/proc/{process_id}/task")).ok()?;
     tasks.flatten().map(|task| task.path()).find(|task| {
         std::fs::read_to_string(task.join("comm")).is_ok_and(|own| own.trim_end() == name)
-    })
-}
-
-fn read_thread(task: &Path) -> Option<ThreadUsage> {
-    let stat = std::fs::read_to_string(task.join("stat")).ok()?;
-    let status = std::fs::read_to_string(task.join("status")).ok()?;
-    let line = |key: &str| {
-        status.lines().find_map(|line| line.strip_prefix(key)?.trim().parse::<u64>().ok())
-    };
-    Some(ThreadUsage {
-        minor_faults: stat_field(&stat, 10)?,
-        major_faults: stat_field(&stat, 12)?,
-        voluntary_switches: line("voluntary_ctxt_switches:")?,
-        involuntary_switches: line("nonvoluntary_ctxt_switches:")?,
     })
 }
 
@@ -141,18 +101,19 @@ mod tests {
             .unwrap()
             .join()
             .unwrap();
-        assert!(usage.is_some_and(|usage| usage.minor_faults > 0));
+        assert!(usage.is_some_and(|usage| usage[0] > 0));
         assert_eq!(of_thread(id, "nobody"), None);
     }
 
     #[test]
     fn waits_and_stolen_time_are_read_and_never_fall() {
-        let before = (own_wait_s(), stolen_s(0));
+        let cores = Cores { controller: 0, server: usize::MAX, priority: None };
+        let before = waits_s(std::process::id(), "nobody", cores);
         std::thread::yield_now();
-        assert!(own_wait_s() >= before.0 && stolen_s(0) >= before.1);
-        assert!(std::path::Path::new("/proc/thread-self/schedstat").exists());
-        assert_eq!(thread_wait_s(std::process::id(), "nobody"), 0.0);
-        assert_eq!(stolen_s(usize::MAX), 0.0);
+        let after = waits_s(std::process::id(), "nobody", cores);
+        assert!(after[0] >= before[0] && after[2] >= before[2]);
+        assert!(Path::new("/proc/thread-self/schedstat").exists());
+        assert_eq!((after[1], stolen_s(usize::MAX)), (0.0, 0.0));
     }
 
     #[test]

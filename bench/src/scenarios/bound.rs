@@ -2,7 +2,8 @@
 //!
 //! All that [`World::draw`] draws is unknown at once, each with the variance that it is drawn with:
 //! a, b, c, the loads, the scales and the delay of forces, brakes from stop to stop, wheels, rotating
-//! mass, the wind of the day, and gusts and the map's error at every knot. What measured speeds say of them follows from how the true motion would differ.
+//! mass, the wind of the day, and gusts and the map's error at every knot. What measured speeds say of them follows
+//! from how the true motion would differ.
 
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_tests::simulator::Deviations;
@@ -14,14 +15,14 @@ use super::world::{
     ROTATING_MASS_STD, WEIGHING_STD, World, knot_std_permille,
 };
 
-/// Indices of the unknowns that every run shares; loads, brakes of each leg and knots follow.
+/// Indices of the unknowns that every run shares, behind a, b and c; loads, brakes of each leg, gusts and knots
+/// follow.
 const TRACTION_SCALE: usize = 3;
 const BRAKE_SCALE: usize = 4;
 const DELAY: usize = 5;
 const ROTATING_MASS: usize = 6;
 const WHEEL: usize = 7;
 const WIND: usize = 8;
-const SHARED: usize = 9;
 /// Time in s between the speeds that are taken in: those between say the same many times.
 const BLOCK_S: f64 = 0.5;
 /// Distance in m between the places under the train at which the map is averaged.
@@ -33,6 +34,7 @@ const DRAWN_LOAD_STD: f64 = 0.24 / 3.464;
 
 /// What measured speeds say so far of all that is unknown.
 pub struct Bound {
+    /// Variance beforehand of each unknown.
     prior: Vec<f64>,
     information: DMatrix<f64>,
     /// Change of the speed by each unknown, of the run under way.
@@ -40,17 +42,13 @@ pub struct Bound {
     /// The unknowns that the run under way has met.
     met: Vec<usize>,
     is_met: Vec<bool>,
-    loads: usize,
+    /// The unknown load of the run under way, and its brake.
     load: usize,
-    opens_at_stops: bool,
-    was_standing: bool,
+    brake: usize,
+    /// Where brakes, gusts and knots begin among the unknowns.
     brakes_from: usize,
-    legs: usize,
-    leg: usize,
     gusts_from: usize,
     knots_from: usize,
-    map_variance: f64,
-    length_m: f64,
     block_s: f64,
     last: Option<Truth>,
 }
@@ -59,7 +57,6 @@ impl Bound {
     /// Before the first sample of a drive of so many hours.
     pub fn new(world: &World, hours: f64) -> Self {
         let scenario = &world.scenario;
-        let opens_at_stops = scenario.load == LoadSource::Changing;
         let load_std = match scenario.load {
             LoadSource::Exact => 0.0,
             LoadSource::Weighed(permille) => 1e-3 * f64::from(permille),
@@ -68,47 +65,42 @@ impl Bound {
         };
         // No train here stops more than once a minute.
         let legs = (60.0 * hours) as usize + 2;
-        let loads = if opens_at_stops { legs } else { 1 };
-        let brakes_from = SHARED + loads;
-        let gusts_from = brakes_from + legs;
-        let knots_from = gusts_from + (3600.0 * hours / GUST_S) as usize + 3;
+        let loads = if scenario.load == LoadSource::Changing { legs } else { 1 };
+        let gusts = (3600.0 * hours / GUST_S) as usize + 3;
         let end_m = world.stops_m[world.stops_m.len() - 1] + 1000.0;
-        let count = knots_from + (end_m / KNOT_M) as usize + 3;
-        let declared = world.declared.resistance;
-        let mut prior = vec![EXACT; count];
-        for (index, value) in [declared.a, declared.b, declared.c].into_iter().enumerate() {
-            prior[index] = (COEFFICIENT_SHARE * value).powi(2);
-        }
-        let usual = Deviations::ROUGH;
-        prior[TRACTION_SCALE] = usual.force_share.powi(2);
-        prior[BRAKE_SCALE] = usual.force_share.powi(2) + BRAKE_STD.powi(2);
-        prior[DELAY] = DELAY_STD_S.powi(2);
-        prior[ROTATING_MASS] = ROTATING_MASS_STD.powi(2);
-        prior[WHEEL] = usual.wheel_share.powi(2);
-        prior[WIND] = usual.day_wind_mps.powi(2);
-        prior[SHARED..brakes_from].fill((load_std * load_std).max(EXACT));
-        prior[brakes_from..gusts_from].fill(world.stop_to_stop_std.powi(2).max(EXACT));
-        let gust_variance = (KNOT_OVER_MEAN * world.gust_std_mps).powi(2);
-        prior[gusts_from..knots_from].fill(gust_variance.max(EXACT));
-        let map_variance = knot_std_permille(scenario.map_std_permille).powi(2).max(EXACT);
-        prior[knots_from..].fill(map_variance);
+        let knots = (end_m / KNOT_M) as usize + 3;
+        let (declared, usual) = (world.declared.resistance, Deviations::ROUGH);
+        let davis = [declared.a, declared.b, declared.c].map(|it| (COEFFICIENT_SHARE * it).powi(2));
+        let mut prior = davis.to_vec();
+        prior.extend([
+            usual.force_share.powi(2),
+            usual.force_share.powi(2) + BRAKE_STD.powi(2),
+            DELAY_STD_S.powi(2),
+            ROTATING_MASS_STD.powi(2),
+            usual.wheel_share.powi(2),
+            usual.day_wind_mps.powi(2),
+        ]);
+        let mut add = |count: usize, std: f64| {
+            let from = prior.len();
+            prior.resize(from + count, (std * std).max(EXACT));
+            from
+        };
+        let load = add(loads, load_std);
+        let brakes_from = add(legs, world.stop_to_stop_std);
+        let gusts_from = add(gusts, KNOT_OVER_MEAN * world.gust_std_mps);
+        let knots_from = add(knots, knot_std_permille(scenario.map_std_permille));
+        let count = prior.len();
         Bound {
+            prior,
             information: DMatrix::zeros(count, count),
             sensitivity: vec![0.0; count],
             met: Vec::new(),
             is_met: vec![false; count],
-            prior,
-            loads,
-            load: SHARED,
-            opens_at_stops,
-            was_standing: true,
+            load,
+            brake: brakes_from,
             brakes_from,
-            legs,
-            leg: 0,
             gusts_from,
             knots_from,
-            map_variance,
-            length_m: world.declared.length_m,
             block_s: 0.0,
             last: None,
         }
@@ -117,27 +109,26 @@ impl Bound {
     /// Takes in a cycle of a drive.
     pub fn see(&mut self, world: &World, truth: &Truth, cycle_s: f64) {
         let last = self.last.replace(*truth);
-        if truth.is_standing {
-            for index in self.met.drain(..) {
-                self.sensitivity[index] = 0.0;
-                self.is_met[index] = false;
-            }
-            self.block_s = 0.0;
-            if !self.was_standing {
-                self.leg = (self.leg + 1).min(self.legs - 1);
-            }
-            if self.opens_at_stops && !self.was_standing && self.load + 1 < SHARED + self.loads {
-                self.load += 1;
-            }
-        } else if let Some(last) = last {
+        if !truth.is_standing {
+            let Some(last) = last else { return };
             self.move_on(world, &last, truth, cycle_s);
             self.block_s += cycle_s;
             if self.block_s >= BLOCK_S {
                 self.measure(world, truth.speed_mps, self.block_s / cycle_s);
                 self.block_s = 0.0;
             }
+            return;
         }
-        self.was_standing = truth.is_standing;
+        for index in self.met.drain(..) {
+            self.sensitivity[index] = 0.0;
+            self.is_met[index] = false;
+        }
+        self.block_s = 0.0;
+        if last.is_some_and(|last| !last.is_standing) {
+            self.brake = (self.brake + 1).min(self.gusts_from - 1);
+            let changes = world.scenario.load == LoadSource::Changing;
+            self.load = (self.load + usize::from(changes)).min(self.brakes_from - 1);
+        }
     }
 
     fn meet(&mut self, index: usize, change_mps: f64) {
@@ -164,7 +155,7 @@ impl Bound {
         }
         self.meet(TRACTION_SCALE, -step_s * push_mps2.max(0.0));
         self.meet(BRAKE_SCALE, -step_s * push_mps2.min(0.0));
-        self.meet(self.brakes_from + self.leg, -step_s * push_mps2.min(0.0));
+        self.meet(self.brake, -step_s * push_mps2.min(0.0));
         self.meet(WIND, truth.direction * step_s * gain * by_wind);
         let (knot, share) = truth.gust;
         self.meet(self.gusts_from + knot, -step_s * gain * by_wind * (1.0 - share));
@@ -176,17 +167,17 @@ impl Bound {
         );
         self.meet(WHEEL, 0.0);
         self.meet(self.load, step_s * push_mps2);
-        if self.map_variance > EXACT {
-            self.pass_knots(truth, step_s * gain);
+        if world.scenario.map_std_permille > 0.0 {
+            self.pass_knots(world.declared.length_m, truth, step_s * gain);
         }
     }
 
-    fn pass_knots(&mut self, truth: &Truth, seconds_gain: f64) {
-        let places = (self.length_m / UNDER_TRAIN_M).ceil() as usize + 1;
+    fn pass_knots(&mut self, length_m: f64, truth: &Truth, seconds_gain: f64) {
+        let places = (length_m / UNDER_TRAIN_M).ceil() as usize + 1;
         let change_mps = -truth.direction * seconds_gain / places as f64;
         for place in 0..places {
             let under = place as f64 / (places - 1) as f64 - 0.5;
-            let at = ((truth.place_m + under * self.length_m) / KNOT_M).max(0.0);
+            let at = ((truth.place_m + under * length_m) / KNOT_M).max(0.0);
             let (knot, share) = (self.knots_from + at as usize, at.fract());
             if knot + 1 < self.prior.len() {
                 self.meet(knot, change_mps * (1.0 - share));

@@ -5,14 +5,79 @@
 //! - [`drive`]: driving from stop to stop, and what the controller writes of it
 //! - [`bound`]: how well both can be known at best
 //! - [`score`]: what an answer was worth over a drive
-//! - [`rows`]: the scenarios of the table
-//! - [`table`]: all of it in numbers
-//! - [`command`]: the command line
+//! - [`table`]: the scenarios, all of it in numbers
 
 pub mod bound;
-pub mod command;
 pub mod drive;
-pub mod rows;
 pub mod score;
 pub mod table;
 pub mod world;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar_shared::PipelineKind;
+
+use crate::output::{self, Failure, expect, give, named, write_csv};
+
+/// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
+/// changes, and whether its intervals hold.
+#[derive(Debug, Args)]
+pub struct ScenariosArguments {
+    /// Drives for each scenario
+    #[arg(long, default_value_t = 20)]
+    seeds: u64,
+    /// The first seed
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
+    /// Hours of each drive
+    #[arg(long, default_value_t = 2.0)]
+    hours: f64,
+    /// Only scenarios whose name contains this, as metro
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    scenario: String,
+    /// A pipeline; may be repeated
+    #[arg(long = "pipeline", value_name = "KIND", default_value = "train_kalman")]
+    pipelines: Vec<String>,
+    /// Scenarios at a time
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the result as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+impl ScenariosArguments {
+    /// Runs the command.
+    ///
+    /// # Errors
+    ///
+    /// When the command line is wrong, or the result cannot be written.
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut chosen = table::scenarios();
+        chosen.retain(|(names, _)| names.join(", ").contains(&self.scenario));
+        expect(!chosen.is_empty(), || {
+            format!("--scenario {}: expected a part of a scenario's name", self.scenario)
+        })?;
+        let all: Vec<_> = PipelineKind::ALL.iter().map(|kind| (kind.name(), *kind)).collect();
+        let kinds = self.pipelines.iter().map(|name| named("--pipeline", name, &all));
+        let kinds = kinds.collect::<Result<Vec<_>, _>>()?;
+        let is_some = self.hours > 0.0 && self.hours.is_finite() && self.seeds > 0;
+        expect(is_some, || "--hours and --seeds: expected more than 0".into())?;
+        let records = table::run(&table::Plan {
+            scenarios: &chosen,
+            kinds: &kinds,
+            seeds: self.seeds,
+            first_seed: self.first_seed,
+            hours: self.hours,
+            threads: self.threads,
+        })?;
+        if let Some(file) = &self.csv {
+            write_csv(file, &records)?;
+        }
+        give(&self.json, &records, || output::table(&records))
+    }
+}

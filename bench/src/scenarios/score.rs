@@ -1,124 +1,135 @@
-//! What an answer was worth over a drive.
+//! What answers were worth over a drive.
 
-use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot, Quantity};
+use dynocar_shared::{HALF_95, Uncertain};
 
-use nalgebra::{Matrix4, Vector4};
+use crate::output::Record;
+use crate::statistics::median;
 
-use super::drive::Moment;
-
+/// Speed in m/s from which an answer counts.
+pub const COUNTS_MPS: f64 = 2.0;
 /// Deviations beyond which an answer is wrong.
 const WRONG: f64 = 4.0;
+/// Share of the truth by which a worse answer than the declared one is worse.
+const WORSE_BY: f64 = 0.01;
+
+/// A usable answer: its error, its standard deviation, and the error of what is declared, over the truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer {
+    /// Error over the truth.
+    pub error: f64,
+    deviation: f64,
+    declared_error: f64,
+}
+
+impl Answer {
+    /// What was found, beside what is declared and the truth.
+    pub fn of(found: Uncertain, declared: f64, truth: f64) -> Self {
+        let error = |value: f64| (value - truth) / truth;
+        let deviation = found.std / truth;
+        Answer { error: error(found.value), deviation, declared_error: error(declared) }
+    }
+}
 
 /// One quantity of one pipeline over one drive.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Score {
-    /// Cycles of the moving train, from the first use on where `usable` is counted.
+    /// Cycles of the moving train.
     pub cycles: u64,
     /// Those in which the answer was called usable.
     pub usable: u64,
     /// Of those, the truth within the 95 % interval.
     pub covered: u64,
-    /// Time in s until the first usable answer.
-    pub first_s: Option<f64>,
+    /// Of those, the truth more than four deviations off.
+    pub wrong: u64,
+    /// Of those, the declared value nearer to the truth, by 1 % of the truth.
+    pub worse: u64,
     /// Changes of usable.
     pub changes: u64,
+    /// Time in s until the first usable answer.
+    pub first_s: Option<f64>,
     /// Longest time in s that a usable answer was wrong.
     pub wrong_s: f64,
     wrong_now_s: f64,
-    /// Sums of squares of the usable answers' errors and of their deviations, relative to the truth.
+    /// Sum of squares of the usable answers' errors, relative to the truth.
     pub error_square: f64,
-    /// See `error_square`.
+    /// The same of their deviations.
     pub deviation_square: f64,
-    /// Sums of squares of errors and of least deviations at the instants where both are compared.
-    at_instants: [f64; 2],
+    /// The same of what is declared then.
+    pub declared_square: f64,
+    /// Sum of squares of errors where they are compared with the least deviations.
+    pub compared_square: f64,
+    /// The same of the least deviations there.
+    pub least_square: f64,
     was_usable: bool,
 }
 
 impl Score {
     /// Takes in a cycle of so many s.
-    pub fn push(&mut self, time_s: f64, cycle_s: f64, answer: Option<ScoredAnswer>) {
+    pub fn push(&mut self, time_s: f64, cycle_s: f64, answer: Option<Answer>) {
         self.cycles += 1;
-        let is_usable = answer.is_some();
-        self.changes += u64::from(is_usable != self.was_usable);
-        self.was_usable = is_usable;
-        let Some(ScoredAnswer { error, deviation }) = answer else {
+        self.changes += u64::from(answer.is_some() != self.was_usable);
+        self.was_usable = answer.is_some();
+        let Some(Answer { error, deviation, declared_error }) = answer else {
             self.wrong_now_s = 0.0;
             return;
         };
+        let is_wrong = error.abs() > WRONG * deviation;
         self.usable += 1;
         self.first_s.get_or_insert(time_s);
         self.covered += u64::from(error.abs() <= HALF_95 * deviation);
+        self.wrong += u64::from(is_wrong);
+        self.worse += u64::from(error.abs() - declared_error.abs() > WORSE_BY);
         self.error_square += error * error;
         self.deviation_square += deviation * deviation;
-        self.wrong_now_s =
-            if error.abs() > WRONG * deviation { self.wrong_now_s + cycle_s } else { 0.0 };
+        self.declared_square += declared_error * declared_error;
+        self.wrong_now_s = if is_wrong { self.wrong_now_s + cycle_s } else { 0.0 };
         self.wrong_s = self.wrong_s.max(self.wrong_now_s);
-    }
-
-    /// Joins another drive's.
-    pub fn join(&mut self, other: &Score) {
-        self.cycles += other.cycles;
-        self.usable += other.usable;
-        self.covered += other.covered;
-        self.changes += other.changes;
-        self.wrong_s = self.wrong_s.max(other.wrong_s);
-        self.error_square += other.error_square;
-        self.deviation_square += other.deviation_square;
-        for (sum, more) in self.at_instants.iter_mut().zip(other.at_instants) {
-            *sum += more;
-        }
     }
 
     /// Takes in a usable answer's error and the least deviation, both relative to the truth.
     pub fn compare(&mut self, error: f64, least: f64) {
-        self.at_instants[0] += error * error;
-        self.at_instants[1] += least * least;
-    }
-
-    /// Errors over the least deviations; `None` where they were never compared.
-    pub fn over_bound(&self) -> Option<f64> {
-        let [error, least] = self.at_instants;
-        (least > 0.0).then(|| (error / least).sqrt())
+        self.compared_square += error * error;
+        self.least_square += least * least;
     }
 }
 
-/// The least relative deviation of a quantity by the bound of the drive.
-pub fn least_deviation(bound: &Matrix4<f64>, quantity: Quantity, moment: &Moment) -> f64 {
-    let v = moment.speed_mps;
-    let row = match quantity {
-        Quantity::Resistance => Vector4::new(1.0, v, v * v, 0.0) / moment.w0_n_per_kn,
-        _ => Vector4::new(0.0, 0.0, 0.0, 1.0),
-    };
-    row.dot(&(bound * row)).max(0.0).sqrt()
-}
+/// A quantity over several drives.
+pub struct Scores<'a>(pub &'a [Score]);
 
-/// A usable answer: error and standard deviation, both relative to the truth.
-#[derive(Clone, Copy, Debug)]
-pub struct ScoredAnswer {
-    /// Error over the truth.
-    pub error: f64,
-    /// Standard deviation over the truth.
-    pub deviation: f64,
-}
-
-/// The resistance at the speed driven or the mass, if a snapshot may be used for it.
-pub fn answer(
-    snapshot: &ParameterSnapshot,
-    quantity: Quantity,
-    moment: &Moment,
-) -> Option<ScoredAnswer> {
-    if !snapshot.is_usable_for(quantity) {
-        return None;
+impl Scores<'_> {
+    /// The sum of a count over all drives.
+    pub fn count(&self, of: fn(&Score) -> u64) -> u64 {
+        self.0.iter().map(of).sum()
     }
-    let (value, deviation, truth) = match quantity {
-        Quantity::Resistance => {
-            let at = snapshot.resistance_at(moment.speed_mps)?;
-            (at.w0_n_per_kn, at.w0_std_n_per_kn, moment.w0_n_per_kn)
-        }
-        _ => {
-            let mass_t = snapshot.value(Parameter::Mass)?;
-            (mass_t, snapshot.std(Parameter::Mass)?, 1e-3 * moment.mass_kg)
-        }
-    };
-    Some(ScoredAnswer { error: (value - truth) / truth, deviation: deviation / truth })
+
+    /// A count as a share of the cycles with a usable answer, in %.
+    pub fn percent(&self, of: fn(&Score) -> u64) -> f64 {
+        100.0 * self.count(of) as f64 / self.count(|it| it.usable).max(1) as f64
+    }
+
+    /// Root of a mean square over the usable answers, in % of the truth; no number where none was usable.
+    pub fn rms_percent(&self, of: fn(&Score) -> f64) -> f64 {
+        100.0 * (self.sum(of) / self.count(|it| it.usable) as f64).sqrt()
+    }
+
+    /// The root of one sum over another; no number where the other is none.
+    pub fn ratio(&self, of: fn(&Score) -> f64, over: fn(&Score) -> f64) -> f64 {
+        (self.sum(of) / self.sum(over)).sqrt()
+    }
+
+    fn sum(&self, of: fn(&Score) -> f64) -> f64 {
+        self.0.iter().map(of).sum()
+    }
+
+    /// With the share of the time in which the answer was usable.
+    pub fn usable(&self, record: Record) -> Record {
+        let share = self.count(|it| it.usable) as f64 / self.count(|it| it.cycles).max(1) as f64;
+        record.number("usable_percent", 100.0 * share, 1)
+    }
+
+    /// With the median time until the first use.
+    pub fn first_use(&self, record: Record) -> Record {
+        let first_s = self.0.iter().map(|it| it.first_s.unwrap_or(f64::INFINITY));
+        record.number("first_use_s", median(first_s.collect()), 0)
+    }
 }

@@ -5,25 +5,63 @@ use std::sync::Arc;
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_estimators::EstimatorSettings;
-use dynocar_shared::{PipelineKind, Quantity, TrainId};
-use serde::Serialize;
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, TrainId, Uncertain};
+use nalgebra::{Matrix4, Vector4};
 
 use super::bound::Bound;
-use super::drive::Drive;
-use super::rows::NamedScenario;
-use super::score::{Score, answer, least_deviation};
-use super::world::{LoadSource, Scenario, World};
+use super::drive::{Drive, Moment};
+use super::score::{Answer, COUNTS_MPS, Score, Scores};
+use super::world::{LoadSource, Scenario, Traffic, World};
 use crate::output::Record;
 use crate::parallel;
-use crate::statistics::median;
 
-/// Speed in m/s from which an answer counts.
-const COUNTS_MPS: f64 = 2.0;
 /// Time in s from which errors are compared with the bound, and how much later each next time.
 const COMPARED_FIRST_S: f64 = 60.0;
 const COMPARED_GROWTH: f64 = 1.35;
 /// What is asked for.
 const QUANTITIES: [Quantity; 2] = [Quantity::Resistance, Quantity::Mass];
+
+/// A scenario with the names of its traffic and of what is particular.
+pub type NamedScenario = ([&'static str; 2], Scenario);
+
+const TRAFFIC: [(&str, Traffic); 4] = [
+    ("metro", Traffic::Metro),
+    ("EMU", Traffic::Emu),
+    ("freight", Traffic::Freight),
+    ("high speed", Traffic::HighSpeed),
+];
+
+/// All rows: for each traffic each load, and the ordinary one with everything else varied.
+pub fn scenarios() -> Vec<NamedScenario> {
+    let of = |(name, traffic)| varied(traffic).map(|(what, scenario)| ([name, what], scenario));
+    TRAFFIC.into_iter().flat_map(of).collect()
+}
+
+fn varied(traffic: Traffic) -> [(&'static str, Scenario); 10] {
+    let usual = Scenario {
+        traffic,
+        load: LoadSource::Weighed(20),
+        jumps: false,
+        rate_hz: 10,
+        speed_noise_mps: 0.03,
+        position_noise_m: 2.0,
+        map_std_permille: 0.1,
+    };
+    let exact = Scenario { map_std_permille: 0.0, ..usual };
+    let quiet = Scenario { speed_noise_mps: 0.0, position_noise_m: 0.0, ..exact };
+    [
+        ("load exact", Scenario { load: LoadSource::Exact, ..usual }),
+        ("weighed 2 % wrong", usual),
+        ("weighed 5 % wrong", Scenario { load: LoadSource::Weighed(50), ..usual }),
+        ("load unknown", Scenario { load: LoadSource::Unknown, ..usual }),
+        ("load changes at stops", Scenario { load: LoadSource::Changing, ..usual }),
+        ("forces jump", Scenario { jumps: true, ..usual }),
+        ("5 Hz", Scenario { rate_hz: 5, ..usual }),
+        ("50 Hz", Scenario { rate_hz: 50, ..usual }),
+        ("map exact", exact),
+        ("free of noise", quiet),
+    ]
+}
 
 /// What is measured.
 pub struct Plan<'a> {
@@ -41,46 +79,16 @@ pub struct Plan<'a> {
     pub threads: usize,
 }
 
-/// One quantity of one pipeline in one scenario, over all drives.
-#[derive(Clone, Debug, Serialize)]
-pub struct ReportRow {
-    /// The scenario.
-    pub scenario: String,
-    /// The pipeline.
-    pub pipeline: &'static str,
-    /// The quantity.
-    pub quantity: &'static str,
-    /// Share of the moving time in which it may be used, in %.
-    pub usable_percent: f64,
-    /// Share of those cycles with the truth within the 95 % interval, in %.
-    pub covered_percent: f64,
-    /// Median time in s until the first use.
-    pub first_s: Option<f64>,
-    /// Changes of usable in an hour.
-    pub changes_per_h: f64,
-    /// Longest time in s with a usable answer more than 4 deviations off.
-    pub wrong_s: f64,
-    /// Root of the mean square of the usable answers' errors, in % of the truth.
-    pub error_percent: f64,
-    /// The same over the root of the mean square of their standard deviations.
-    pub error_over_deviation: f64,
-    /// Errors at some instants of the drive over the joint Cramér–Rao bound there.
-    pub error_over_bound: Option<f64>,
-}
-
-/// Measures everything.
+/// Measures everything: a row for each quantity that a pipeline answers in a scenario, over all drives.
 ///
 /// # Errors
 ///
 /// When a kind cannot be built.
-pub fn run(plan: &Plan<'_>) -> Result<Vec<ReportRow>, SettingError> {
-    let cases: Vec<(&NamedScenario, PipelineKind)> = plan
-        .scenarios
-        .iter()
-        .flat_map(|row| plan.kinds.iter().map(move |&kind| (row, kind)))
-        .collect();
-    let lines = parallel::over(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
-    Ok(lines.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
+pub fn run(plan: &Plan<'_>) -> Result<Vec<Record>, SettingError> {
+    let of = |row| plan.kinds.iter().map(move |&kind| (row, kind));
+    let cases: Vec<(&NamedScenario, PipelineKind)> = plan.scenarios.iter().flat_map(of).collect();
+    let rows = parallel::over(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
+    Ok(rows.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
 /// The settings that a user of the scenario has: load and map are known exactly where they are.
@@ -97,24 +105,22 @@ fn settings(kind: PipelineKind, scenario: &Scenario) -> Option<EstimatorSettings
 
 fn measure(
     plan: &Plan<'_>,
-    row: &NamedScenario,
+    (names, scenario): &NamedScenario,
     kind: PipelineKind,
-) -> Result<Vec<ReportRow>, SettingError> {
-    let Some(settings) = settings(kind, &row.scenario) else { return Ok(Vec::new()) };
-    let mut totals = QUANTITIES.map(|_| (Score::default(), Vec::new()));
+) -> Result<Vec<Record>, SettingError> {
+    let Some(settings) = settings(kind, scenario) else { return Ok(Vec::new()) };
+    let mut scores = QUANTITIES.map(|_| Vec::new());
     for seed in plan.first_seed..plan.first_seed + plan.seeds {
-        let world = World::draw(row.scenario, seed);
+        let world = World::draw(*scenario, seed);
         let train = Arc::new(world.declared.clone());
         let estimator = settings.build(&train)?;
         let pipeline = Pipeline::new(TrainId(1), 0, train, None, estimator);
-        for ((total, firsts), score) in totals.iter_mut().zip(driven(pipeline, world, plan.hours)) {
-            total.join(&score);
-            firsts.push(score.first_s.unwrap_or(f64::INFINITY));
+        for (all, score) in scores.iter_mut().zip(driven(pipeline, world, plan.hours)) {
+            all.push(score);
         }
     }
-    let answered = |quantity: &Quantity| settings.answers(*quantity);
-    let lines = QUANTITIES.iter().zip(totals).filter(|(quantity, _)| answered(quantity));
-    Ok(lines.map(|(quantity, total)| line(plan, row, kind, *quantity, total)).collect())
+    let rows = QUANTITIES.iter().zip(&scores).filter(|(it, _)| settings.answers(**it));
+    Ok(rows.map(|(quantity, scores)| record(plan, *names, kind, *quantity, scores)).collect())
 }
 
 /// One drive.
@@ -150,47 +156,55 @@ fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
     scores
 }
 
-fn line(
-    plan: &Plan<'_>,
-    row: &NamedScenario,
-    kind: PipelineKind,
-    quantity: Quantity,
-    (total, firsts): (Score, Vec<f64>),
-) -> ReportRow {
-    let usable = total.usable.max(1) as f64;
-    ReportRow {
-        scenario: row.name.clone(),
-        pipeline: kind.name(),
-        quantity: quantity.name(),
-        usable_percent: 100.0 * total.usable as f64 / total.cycles.max(1) as f64,
-        covered_percent: 100.0 * total.covered as f64 / usable,
-        first_s: median(firsts).filter(|it| it.is_finite()),
-        changes_per_h: total.changes as f64 / (plan.hours * plan.seeds as f64),
-        wrong_s: total.wrong_s,
-        error_percent: 100.0 * (total.error_square / usable).sqrt(),
-        error_over_deviation: (total.error_square / total.deviation_square.max(f64::MIN_POSITIVE))
-            .sqrt(),
-        error_over_bound: total.over_bound(),
+/// The resistance at the speed driven or the mass, if a snapshot may be used for it.
+fn answer(snapshot: &ParameterSnapshot, quantity: Quantity, moment: &Moment) -> Option<Answer> {
+    if !snapshot.is_usable_for(quantity) {
+        return None;
     }
+    let (found, truth) = if quantity == Quantity::Resistance {
+        let at = snapshot.resistance_at(moment.speed_mps)?;
+        (Uncertain::new(at.w0_n_per_kn, at.w0_std_n_per_kn), moment.w0_n_per_kn)
+    } else {
+        let mass_t = snapshot.value(Parameter::Mass)?;
+        (Uncertain::new(mass_t, snapshot.std(Parameter::Mass)?), 1e-3 * moment.mass_kg)
+    };
+    Some(Answer::of(found, truth, truth))
 }
 
-/// A line for people and for a file of CSV.
-pub fn record(plan: &Plan<'_>, line: &ReportRow) -> Record {
-    let (traffic, condition) = line.scenario.split_once(", ").unwrap_or((&line.scenario, ""));
-    let used = |value: f64| Some(value).filter(|_| line.usable_percent > 0.0);
-    Record::default()
+/// The least relative deviation of a quantity by the bound of the drive.
+fn least_deviation(bound: &Matrix4<f64>, quantity: Quantity, moment: &Moment) -> f64 {
+    let v = moment.speed_mps;
+    let row = match quantity {
+        Quantity::Resistance => Vector4::new(1.0, v, v * v, 0.0) / moment.w0_n_per_kn,
+        _ => Vector4::new(0.0, 0.0, 0.0, 1.0),
+    };
+    row.dot(&(bound * row)).max(0.0).sqrt()
+}
+
+/// One quantity of one pipeline in one scenario; `error_over_bound` is that at some instants of the drives.
+fn record(
+    plan: &Plan<'_>,
+    [traffic, condition]: [&str; 2],
+    kind: PipelineKind,
+    quantity: Quantity,
+    scores: &[Score],
+) -> Record {
+    let all = Scores(scores);
+    let coverage = Some(all.percent(|it| it.covered)).filter(|_| all.count(|it| it.usable) > 0);
+    let wrong_s = scores.iter().map(|it| it.wrong_s).fold(0.0, f64::max);
+    let hours = plan.hours * plan.seeds as f64;
+    let record = Record::default()
         .with("traffic", traffic)
         .with("condition", condition)
-        .with("pipeline", line.pipeline)
-        .with("quantity", line.quantity)
+        .with("pipeline", kind.name())
+        .with("quantity", quantity.name())
         .with("seeds", plan.seeds)
-        .with("first_seed", plan.first_seed)
-        .number("usable_percent", line.usable_percent, 1)
-        .number("coverage_percent", used(line.covered_percent), 1)
-        .number("first_use_s", line.first_s, 0)
-        .number("changes_per_h", line.changes_per_h, 1)
-        .number("longest_wrong_s", line.wrong_s, 1)
-        .number("error_percent", used(line.error_percent), 2)
-        .number("error_over_std", used(line.error_over_deviation), 2)
-        .number("error_over_bound", line.error_over_bound, 2)
+        .with("first_seed", plan.first_seed);
+    let record = all.usable(record).number("coverage_percent", coverage, 1);
+    all.first_use(record)
+        .number("changes_per_h", all.count(|it| it.changes) as f64 / hours, 1)
+        .number("longest_wrong_s", wrong_s, 1)
+        .number("error_percent", all.rms_percent(|it| it.error_square), 2)
+        .number("error_over_std", all.ratio(|it| it.error_square, |it| it.deviation_square), 2)
+        .number("error_over_bound", all.ratio(|it| it.compared_square, |it| it.least_square), 2)
 }

@@ -4,6 +4,7 @@ use dynocar_core::filter::{Mils, Penalty, RunningMedian, SquareRootInformation};
 use nalgebra::Vector3;
 
 use super::scenario::{Measured, ROTATING_MASS_FACTOR};
+use crate::statistics::{mean, straight_line};
 
 /// p0 of eq. 11.
 const START_VARIANCE: f64 = 1e6;
@@ -51,72 +52,50 @@ fn segments_of(run: &[Measured]) -> Vec<Segment> {
 }
 
 fn segment(samples: &[Measured]) -> Option<Segment> {
-    let count = samples.len() as f64;
     if samples.len() < 2 {
         return None;
     }
-    let mean_s = samples.iter().map(|sample| sample.time_s).sum::<f64>() / count;
-    let mean_kmh = samples.iter().map(|sample| sample.speed_kmh).sum::<f64>() / count;
-    let (mut product, mut spread) = (0.0, 0.0);
-    for sample in samples {
-        product += (sample.time_s - mean_s) * (sample.speed_kmh - mean_kmh);
-        spread += (sample.time_s - mean_s).powi(2);
-    }
-    let acceleration_mps2 = product / spread / 3.6;
+    let points: Vec<(f64, f64)> = samples.iter().map(|it| (it.time_s, it.speed_kmh)).collect();
+    let acceleration_mps2 = straight_line(&points).1 / 3.6;
+    let mean_kmh = mean(samples.iter().map(|it| it.speed_kmh));
     let w0_n_per_kn = -1000.0 * (1.0 + ROTATING_MASS_FACTOR) / 9.81 * acceleration_mps2;
     Some(Segment { speed_kmh: mean_kmh, w0_n_per_kn })
 }
 
 /// A method of Table 1, or V-MILS of section 4.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// Plain least squares, figure 3.
-    LeastSquares,
-    /// Recursive least squares, eq. 9-11.
-    Rls,
-    /// Multi-innovation least squares of an innovation length.
-    Mils(usize),
-    /// Interval-varying multi-innovation least squares of an innovation length.
-    VMils(usize),
+pub struct Method {
+    /// The paper's name.
+    pub name: &'static str,
+    /// Innovation length of the recursion of eq. 9-11 and its multi-innovation forms; none for plain least squares.
+    length: Option<usize>,
+    /// True for the interval-varying form.
+    is_gated: bool,
 }
 
+/// Every method that is compared.
+pub const METHODS: [Method; 6] = [
+    Method { name: "LS", length: None, is_gated: false },
+    Method { name: "RLS", length: Some(1), is_gated: false },
+    Method { name: "MILS p = 2", length: Some(2), is_gated: false },
+    Method { name: "MILS p = 4", length: Some(4), is_gated: false },
+    Method { name: "MILS p = 6", length: Some(6), is_gated: false },
+    Method { name: "V-MILS p = 4", length: Some(4), is_gated: true },
+];
+
 impl Method {
-    /// Every method that is compared.
-    pub const ALL: [Method; 6] = [
-        Method::LeastSquares,
-        Method::Rls,
-        Method::Mils(2),
-        Method::Mils(4),
-        Method::Mils(6),
-        Method::VMils(4),
-    ];
-
-    /// The paper's name.
-    pub fn name(self) -> String {
-        match self {
-            Method::LeastSquares => "LS".into(),
-            Method::Rls => "RLS".into(),
-            Method::Mils(length) => format!("MILS p = {length}"),
-            Method::VMils(length) => format!("V-MILS p = {length}"),
-        }
-    }
-
     /// a, b, c for speeds in km/h; `None` when the segments do not determine them.
     pub fn estimate(self, segments: &[Segment]) -> Option<[f64; 3]> {
-        let estimate = match self {
-            Method::LeastSquares => {
-                let none = Vector3::zeros();
-                let mut information = SquareRootInformation::<3>::new(&none, &none);
-                for segment in segments {
-                    information.update(&segment.features(), segment.w0_n_per_kn);
-                }
-                information.solve().ok()?
-            }
-            Method::Rls => recursion(segments, 1, None)?,
-            Method::Mils(length) => recursion(segments, length, None)?,
-            Method::VMils(length) => recursion(segments, length, Some(BAD_BEYOND))?,
-        };
-        Some(estimate.into())
+        if let Some(length) = self.length {
+            let gate = self.is_gated.then_some(BAD_BEYOND);
+            return Some(recursion(segments, length, gate)?.into());
+        }
+        let none = Vector3::zeros();
+        let mut information = SquareRootInformation::<3>::new(&none, &none);
+        for segment in segments {
+            information.update(&segment.features(), segment.w0_n_per_kn);
+        }
+        Some(information.solve().ok()?.into())
     }
 }
 
@@ -146,16 +125,12 @@ fn recursion(segments: &[Segment], length: usize, bad_beyond: Option<f64>) -> Op
 /// Variance of the segments' residuals in (N/kN)², Table 1's last column.
 pub fn residual_variance(segments: &[Segment], theta_kmh: [f64; 3]) -> f64 {
     let theta = Vector3::from(theta_kmh);
-    let sum: f64 = segments
-        .iter()
-        .map(|segment| (segment.w0_n_per_kn - segment.features().dot(&theta)).powi(2))
-        .sum();
-    sum / segments.len() as f64
+    mean(segments.iter().map(|it| (it.w0_n_per_kn - it.features().dot(&theta)).powi(2)))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::scenario::{Condition, RUNS_KMH, STEP_S, THETA_KMH, measure, truth};
+    use super::super::scenario::{CONDITIONS, RUNS_KMH, STEP_S, THETA_KMH, measure, truth};
     use super::*;
 
     #[test]
@@ -173,13 +148,13 @@ mod tests {
             .collect();
         let segments = segments(&runs);
         assert!(segments.len() > 150);
-        for method in Method::ALL {
+        for method in METHODS {
             let [a, b, c] = method.estimate(&segments).unwrap();
             for kmh in [45.0, 60.0, 70.0] {
                 let w0 = a + b * kmh + c * kmh * kmh;
                 let [a, b, c] = THETA_KMH;
                 let expected = a + b * kmh + c * kmh * kmh;
-                assert!((w0 / expected - 1.0).abs() < 5e-3, "{} at {kmh}", method.name());
+                assert!((w0 / expected - 1.0).abs() < 5e-3, "{} at {kmh}", method.name);
             }
         }
     }
@@ -188,13 +163,12 @@ mod tests {
     fn the_gate_of_v_mils_lessens_the_harm_of_outliers() {
         let rms_error = |method: Method| {
             let squares = (0..12).map(|seed| {
-                let [a, b, c] =
-                    method.estimate(&segments(&measure(Condition::Outliers, seed))).unwrap();
+                let [a, b, c] = method.estimate(&segments(&measure(CONDITIONS[1], seed))).unwrap();
                 (a + b * 55.0 + c * 55.0 * 55.0 - 7.5075).powi(2)
             });
             (squares.sum::<f64>() / 12.0).sqrt()
         };
-        let (gated, ungated) = (rms_error(Method::VMils(4)), rms_error(Method::Mils(4)));
+        let (gated, ungated) = (rms_error(METHODS[5]), rms_error(METHODS[3]));
         assert!(gated < 0.5 * ungated, "{gated} against {ungated} N/kN");
     }
 }

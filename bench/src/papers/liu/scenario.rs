@@ -1,11 +1,17 @@
-//! Liu's coasting runs, with what the paper leaves out.
+//! Liu's coasting runs, with what the paper leaves out, and the Cramér-Rao bound, computed.
+//!
+//! The speeds are noisy, sometimes wild, and rounded: a sample is the number of the step that it
+//! falls on. Its Fisher information about the true speed is the sum over steps of
+//! (dp/dspeed)² / p, averaged over where in a step the true speed lies.
 
 use dynocar_model::simulate::motion::{Motion, advance};
 use dynocar_model::train::Davis;
+use nalgebra::{Matrix3, SMatrix, SVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-use crate::statistics::normal;
+use crate::statistics::{jacobian, normal};
 
 /// Table 1's last row, near enough: w0 = 2.2 + 0.025 v + 0.0013 v² in N/kN, v in km/h.
 pub const THETA_KMH: [f64; 3] = [2.2, 0.025, 0.0013];
@@ -19,57 +25,30 @@ pub const QUANTUM_KMH: f64 = 0.1;
 pub const NOISE_KMH: f64 = 0.05;
 /// The two coasting runs: from and to, in km/h.
 pub const RUNS_KMH: [(f64, f64); 2] = [(72.0, 40.0), (68.0, 42.0)];
-/// Share of outliers.
-pub const OUTLIER_SHARE: f64 = 0.05;
+/// a, b, c and the start speed of each run.
+const UNKNOWNS: usize = 3 + RUNS_KMH.len();
 /// Outliers are off by 1 to 5 km/h, up or down.
 pub const OUTLIER_KMH: (f64, f64) = (1.0, 5.0);
-/// Share of missing samples.
-pub const MISSING_SHARE: f64 = 0.2;
-
-/// What is wrong with the data.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Condition {
-    /// Noise and rounding only.
-    Clean,
-    /// 5 % outliers besides.
-    Outliers,
-    /// 20 % of the samples are missing.
-    Missing,
-    /// Both.
-    Both,
-}
-
-impl Condition {
-    /// Every condition.
-    pub const ALL: [Condition; 4] =
-        [Condition::Clean, Condition::Outliers, Condition::Missing, Condition::Both];
-
+/// What is wrong with the data besides noise and rounding.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Condition {
     /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Condition::Clean => "clean",
-            Condition::Outliers => "5 % outliers",
-            Condition::Missing => "20 % missing",
-            Condition::Both => "5 % outliers, 20 % missing",
-        }
-    }
-
-    /// Share of outliers.
-    pub fn outlier_share(self) -> f64 {
-        match self {
-            Condition::Outliers | Condition::Both => OUTLIER_SHARE,
-            Condition::Clean | Condition::Missing => 0.0,
-        }
-    }
-
+    pub name: &'static str,
+    /// Share of outliers, which are off by [`OUTLIER_KMH`].
+    pub outlier_share: f64,
     /// Share of missing samples.
-    pub fn missing_share(self) -> f64 {
-        match self {
-            Condition::Missing | Condition::Both => MISSING_SHARE,
-            Condition::Clean | Condition::Outliers => 0.0,
-        }
-    }
+    pub missing_share: f64,
 }
+
+/// Every condition.
+pub const CONDITIONS: [Condition; 4] = [
+    Condition { name: "clean", outlier_share: 0.0, missing_share: 0.0 },
+    Condition { name: "5 % outliers", outlier_share: 0.05, missing_share: 0.0 },
+    Condition { name: "20 % missing", outlier_share: 0.0, missing_share: 0.2 },
+    Condition { name: "5 % outliers, 20 % missing", outlier_share: 0.05, missing_share: 0.2 },
+];
+/// Nothing is wrong.
+pub const CLEAN: Condition = CONDITIONS[0];
 
 /// A measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,12 +97,12 @@ pub fn measure(condition: Condition, seed: u64) -> Vec<Vec<Measured>> {
             let speeds = true_speeds_kmh(run, &truth());
             let samples = speeds.iter().enumerate().filter_map(|(index, &true_kmh)| {
                 let mut speed_kmh = true_kmh + NOISE_KMH * normal(&mut random);
-                if random.random::<f64>() < condition.outlier_share() {
+                if random.random::<f64>() < condition.outlier_share {
                     let (low, high) = OUTLIER_KMH;
                     let size = low + (high - low) * random.random::<f64>();
                     speed_kmh += if random.random() { size } else { -size };
                 }
-                let is_missing = random.random::<f64>() < condition.missing_share();
+                let is_missing = random.random::<f64>() < condition.missing_share;
                 let speed_kmh = (speed_kmh / QUANTUM_KMH).round() * QUANTUM_KMH;
                 (!is_missing).then_some(Measured { time_s: STEP_S * index as f64, speed_kmh })
             });
@@ -137,9 +116,95 @@ pub fn compared_speeds_mps() -> Vec<f64> {
     (40..=72).map(|kmh| f64::from(kmh) / 3.6).collect()
 }
 
+/// Fisher information of one rounded speed about the true speed, in 1/(km/h)².
+fn sample_information(outlier_share: f64) -> f64 {
+    let phases = 40;
+    let steps = ((OUTLIER_KMH.1 + 8.0 * NOISE_KMH) / QUANTUM_KMH).ceil() as i64 + 1;
+    let mut sum = 0.0;
+    for phase in 0..phases {
+        let speed_kmh = QUANTUM_KMH * ((f64::from(phase) + 0.5) / f64::from(phases) - 0.5);
+        for step in -steps..=steps {
+            let low = QUANTUM_KMH * (step as f64 - 0.5) - speed_kmh;
+            let high = low + QUANTUM_KMH;
+            let probability = distribution(high, outlier_share) - distribution(low, outlier_share);
+            // The error's distribution shifts against the speed.
+            let slope = density(low, outlier_share) - density(high, outlier_share);
+            if probability > 1e-300 {
+                sum += slope * slope / probability;
+            }
+        }
+    }
+    sum / f64::from(phases)
+}
+
+/// Probability that the error before rounding lies below `error_kmh`.
+fn distribution(error_kmh: f64, outlier_share: f64) -> f64 {
+    let sound = normal_distribution(error_kmh / NOISE_KMH);
+    // An outlier is the noise moved by a size between two bounds, up or down.
+    let (low, high) = OUTLIER_KMH;
+    let moved = |shift: f64| normal_integral((error_kmh - shift) / NOISE_KMH);
+    let up = (moved(low) - moved(high)) * NOISE_KMH / (high - low);
+    let down = (moved(-high) - moved(-low)) * NOISE_KMH / (high - low);
+    (1.0 - outlier_share) * sound + outlier_share * 0.5 * (up + down)
+}
+
+fn density(error_kmh: f64, outlier_share: f64) -> f64 {
+    let sound = normal_density(error_kmh / NOISE_KMH) / NOISE_KMH;
+    let (low, high) = OUTLIER_KMH;
+    let below = |shift: f64| normal_distribution((error_kmh - shift) / NOISE_KMH);
+    let up = (below(low) - below(high)) / (high - low);
+    let down = (below(-high) - below(-low)) / (high - low);
+    (1.0 - outlier_share) * sound + outlier_share * 0.5 * (up + down)
+}
+
+fn normal_density(x: f64) -> f64 {
+    Normal::standard().pdf(x)
+}
+
+fn normal_distribution(x: f64) -> f64 {
+    Normal::standard().cdf(x)
+}
+
+/// The integral of the standard normal distribution up to x.
+fn normal_integral(x: f64) -> f64 {
+    x * normal_distribution(x) + normal_density(x)
+}
+
+/// Bound of the covariance of a, b, c (for speeds in m/s) from the samples that there are, with each run's start
+/// speed unknown.
+pub fn bound(condition: Condition, runs: &[Vec<Measured>]) -> Matrix3<f64> {
+    // Per (m/s)².
+    let weight = sample_information(condition.outlier_share) * 3.6 * 3.6;
+    let mut information = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
+    for (run, (&speeds_kmh, samples)) in RUNS_KMH.iter().zip(runs).enumerate() {
+        let rows = derivatives(speeds_kmh);
+        let index = |sample: &Measured| (sample.time_s / STEP_S).round() as usize;
+        for row in samples.iter().filter_map(|sample| rows.get(index(sample))) {
+            let mut full = SVector::<f64, UNKNOWNS>::zeros();
+            full.as_mut_slice()[..3].copy_from_slice(&row[..3]);
+            full[3 + run] = row[3];
+            information += full * full.transpose() * weight;
+        }
+    }
+    let inverse = information.cholesky().expect("two long runs determine five unknowns").inverse();
+    inverse.fixed_view::<3, 3>(0, 0).into_owned()
+}
+
+/// Central differences of the speed in m/s by a, b, c and the start speed, at every sample of a run.
+fn derivatives((start_kmh, end_kmh): (f64, f64)) -> Vec<[f64; 4]> {
+    let count = true_speeds_kmh((start_kmh, end_kmh), &truth()).len();
+    jacobian([1e-4, 1e-5, 1e-6, 1e-4], |[da, db, dc, dv]| {
+        let Davis { a, b, c } = truth();
+        let davis = Davis { a: a + da, b: b + db, c: c + dc };
+        let speeds_kmh = true_speeds_kmh(((start_kmh / 3.6 + dv) * 3.6, 20.0), &davis);
+        speeds_kmh.iter().take(count).map(|speed_kmh| speed_kmh / 3.6).collect()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::papers::score::w0_std;
 
     #[test]
     fn the_runs_coast_between_the_speeds_they_should() {
@@ -152,8 +217,8 @@ mod tests {
     #[test]
     fn conditions_do_to_the_data_what_they_say() {
         let count = |condition| measure(condition, 3).iter().map(Vec::len).sum::<usize>() as f64;
-        let share = 1.0 - count(Condition::Missing) / count(Condition::Clean);
-        assert!((share - MISSING_SHARE).abs() < 0.05);
+        let share = 1.0 - count(CONDITIONS[2]) / count(CLEAN);
+        assert!((share - CONDITIONS[2].missing_share).abs() < 0.05);
         let wild = |condition| {
             let runs = measure(condition, 3);
             runs.iter()
@@ -161,8 +226,36 @@ mod tests {
                 .filter(|pair| (pair[1].speed_kmh - pair[0].speed_kmh).abs() > 0.8)
                 .count()
         };
-        assert_eq!(wild(Condition::Clean), 0);
-        assert!(wild(Condition::Outliers) > 40);
-        assert_eq!(measure(Condition::Both, 9), measure(Condition::Both, 9));
+        assert_eq!(wild(CLEAN), 0);
+        assert!(wild(CONDITIONS[1]) > 40);
+        assert_eq!(measure(CONDITIONS[3], 9), measure(CONDITIONS[3], 9));
+    }
+
+    #[test]
+    fn the_integral_of_the_normal_distribution_has_its_slope() {
+        let slope = (normal_integral(0.71) - normal_integral(0.69)) / 0.02;
+        assert!((slope - normal_distribution(0.7)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn rounding_costs_about_its_variance_and_outliers_about_their_share() {
+        let plain = 1.0 / (NOISE_KMH * NOISE_KMH);
+        let rounded = sample_information(0.0);
+        let approximate = 1.0 / (NOISE_KMH.powi(2) + QUANTUM_KMH.powi(2) / 12.0);
+        assert!(rounded < plain && (rounded / approximate - 1.0).abs() < 0.05);
+        let wild = sample_information(0.05);
+        assert!(wild < 0.96 * rounded && wild > 0.9 * rounded);
+    }
+
+    #[test]
+    fn fewer_samples_allow_less() {
+        let at_15 = |covariance| w0_std(&covariance, 15.0);
+        let runs = measure(CLEAN, 3);
+        let of_run = |run: &Vec<Measured>| run.iter().step_by(2).copied().collect();
+        let half: Vec<Vec<Measured>> = runs.iter().map(of_run).collect();
+        let all = at_15(bound(CLEAN, &runs));
+        let half = at_15(bound(CLEAN, &half));
+        assert!((half / all - 2.0_f64.sqrt()).abs() < 0.03);
+        assert!(all > 0.002 && all < 0.009, "{all} N/kN");
     }
 }

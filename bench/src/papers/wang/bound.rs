@@ -6,8 +6,7 @@ use dynocar_model::train::Davis;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector4};
 
-use super::disturbance::{GUST_STD_MPS, GUST_TIME_S, MEAN_WIND_STD_MPS};
-use super::sensor::speed_variance;
+use super::ride::{GUST_STD_MPS, GUST_TIME_S, MEAN_WIND_STD_MPS, speed_variance};
 use super::shuttle::{Instant, PERIOD_S, Shuttle};
 
 /// Unknowns: inverse mass relative to the true one, then z1, z2, z3 in a basis.
@@ -78,14 +77,11 @@ fn leg_information(
         let phi = basis.at(instant.speed_mps) * per_n_per_kn;
         let mut direct = SVector::<f64, WITH_START>::zeros();
         direct[0] = instant.force_n / instant.mass_kg;
-        for (i, share) in [1.0, shares.curve, shares.tunnel].into_iter().enumerate() {
+        for (i, share) in shares.into_iter().enumerate() {
             direct.fixed_rows_mut::<3>(1 + 3 * i).copy_from(&(phi * -share));
         }
         let slope = |davis: &Davis| davis.b + 2.0 * davis.c * instant.speed_mps;
-        let damping = per_n_per_kn
-            * (slope(&shuttle.truth.basic)
-                + shares.curve * slope(&shuttle.truth.curve)
-                + shares.tunnel * slope(&shuttle.truth.tunnel));
+        let damping = per_n_per_kn * shuttle.sum(instant.position_m, slope);
         if let Some((direct_before, damping_before)) = before {
             let mean_damping = 0.5 * (damping_before + damping);
             sensitivity *= (-PERIOD_S * mean_damping).exp();
@@ -113,9 +109,9 @@ pub fn mass_std_in_wind(shuttle: &Shuttle, leg: &[Instant]) -> f64 {
     let noise = Matrix4::from_diagonal(&Vector4::new(0.0, 0.0, 0.0, gusts));
     for instant in leg.iter().filter(|instant| instant.speed_mps > 0.0) {
         filter.measure(0, 0.0, speed_variance()).expect("a sound covariance");
-        let c = shuttle.truth.basic.c;
+        let c = shuttle.truth[0].c;
         let wind = -PERIOD_S * per_n_per_kn * 2.0 * c * instant.speed_mps;
-        let damping = per_n_per_kn * (shuttle.truth.basic.b + 2.0 * c * instant.speed_mps);
+        let damping = per_n_per_kn * (shuttle.truth[0].b + 2.0 * c * instant.speed_mps);
         #[rustfmt::skip]
         let transition = Matrix4::new(
             1.0 - PERIOD_S * damping, PERIOD_S * instant.force_n / instant.mass_kg, wind, wind,

@@ -9,13 +9,10 @@ use dynocar_core::pipeline::Estimator;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::leg::{kalman, known_resistance, leg};
-use super::line::STATIONS_M;
-use super::sensor::measure;
-use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, Shuttle, calm};
-use crate::papers::row::{Row, WANG};
-use crate::papers::seeds::Seeds;
-use crate::statistics::mean;
+use super::ride::{kalman, known_resistance, leg, measure};
+use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle, calm};
+use crate::papers::row::{Row, Seeds, WANG};
+use crate::statistics::{mean, straight_line};
 
 /// The fixed mass in kg that the controller assumes without learning.
 const ASSUMED_MASS_KG: f64 = 117_100.0;
@@ -25,21 +22,15 @@ const PUBLISHED_SAVING: f64 = 6.13;
 const CRUISE_MPS: f64 = 70.0 / 3.6;
 const ACCELERATION_MPS2: f64 = 0.7;
 const BRAKING_MPS2: f64 = 0.7;
-const SPEED_GAIN_PER_S: f64 = 0.5;
-
-/// How the controller turns its plan into force.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Control {
-    /// The force that the assumed mass needs for the planned acceleration at this place.
-    FeedForward,
-    /// The same, corrected by the error of the speed.
-    ClosedLoop,
-}
+/// Gain of the closed-loop control in 1/s: the feed-forward control has none.
+const CLOSED_LOOP_PER_S: f64 = 0.5;
 
 /// Who drives what.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Case {
-    control: Control,
+    /// The force is what the assumed mass needs for the planned acceleration at this place, corrected by the error
+    /// of the speed with this gain.
+    gain_per_s: f64,
     mass_kg: f64,
     assumed_kg: f64,
 }
@@ -58,19 +49,14 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     let learned_kg: Vec<f64> =
         (seeds.range()).map(|seed| learned_mass_kg(&shuttle, seed)).collect();
     let mut rows = Vec::new();
-    for (control, name) in
-        [(Control::ClosedLoop, "closed-loop"), (Control::FeedForward, "feed-forward")]
-    {
-        let fixed = Case { control, mass_kg: EMPTY_MASS_KG, assumed_kg: ASSUMED_MASS_KG };
+    for (gain_per_s, name) in [(CLOSED_LOOP_PER_S, "closed-loop"), (0.0, "feed-forward")] {
+        let fixed = Case { gain_per_s, mass_kg: EMPTY_MASS_KG, assumed_kg: ASSUMED_MASS_KG };
         let others = learned_kg.iter().map(|&assumed_kg| Case { assumed_kg, ..fixed });
         let text = format!("{name} control, 110 t: the learned mass instead of 117.1 t");
         rows.extend(comparison(&shuttle, &text, &fixed, others));
     }
-    let heavy = Case {
-        control: Control::ClosedLoop,
-        mass_kg: ASSUMED_MASS_KG,
-        assumed_kg: ASSUMED_MASS_KG,
-    };
+    let (gain_per_s, mass_kg) = (CLOSED_LOOP_PER_S, ASSUMED_MASS_KG);
+    let heavy = Case { gain_per_s, mass_kg, assumed_kg: mass_kg };
     let light = Case { mass_kg: EMPTY_MASS_KG, assumed_kg: EMPTY_MASS_KG, ..heavy };
     let text = "two trains: 110 t instead of 117.1 t, each controlled with its own mass";
     rows.extend(comparison(&shuttle, text, &heavy, [light].into_iter()));
@@ -121,14 +107,7 @@ fn energy_at_time(shuttle: &Shuttle, case: &Case, time_s: f64) -> f64 {
         .map(|k| drive(shuttle, case, CRUISE_MPS * (1.0 + 0.002 * f64::from(k))))
         .map(|driven| ((driven.time_s / time_s).ln(), driven.energy_j.ln()))
         .collect();
-    let count = points.len() as f64;
-    let (mean_x, mean_y) = (
-        points.iter().map(|p| p.0).sum::<f64>() / count,
-        points.iter().map(|p| p.1).sum::<f64>() / count,
-    );
-    let spread: f64 = points.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
-    let slope = points.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum::<f64>() / spread;
-    (mean_y - slope * mean_x).exp()
+    straight_line(&points).0.exp()
 }
 
 /// What the filter knows after the leg before.
@@ -186,10 +165,7 @@ fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &Instant, 
         let planned = Instant { speed_mps, mass_kg: case.assumed_kg, force_n: 0.0, ..*now };
         // The force at which the assumed train would just move as planned.
         let drag_mps2 = -shuttle.acceleration_mps2(&planned, 0.0);
-        let correction_mps2 = match case.control {
-            Control::FeedForward => 0.0,
-            Control::ClosedLoop => SPEED_GAIN_PER_S * (speed_mps - now.speed_mps),
-        };
+        let correction_mps2 = case.gain_per_s * (speed_mps - now.speed_mps);
         let wanted_n = case.assumed_kg * (acceleration_mps2 + drag_mps2 + correction_mps2);
         let most_n =
             shuttle.train.traction.as_ref().map_or(0.0, |curve| curve.force_n(now.speed_mps));

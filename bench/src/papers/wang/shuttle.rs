@@ -1,4 +1,4 @@
-//! The train, the line and the drive of Wang 2022's scenario.
+//! The train and the line of Wang 2022's scenario.
 //!
 //! The paper gives Table 1 (110 t empty) and Table 2 (z1, z2, z3), 200 ms and 28,000 samples a
 //! crossing. The line is synthetic: 28 km with four stations, gradients, curves and tunnels,
@@ -6,12 +6,14 @@
 
 use std::sync::Arc;
 
-use super::line::{CURVE_RADIUS_M, curves, gradients, tunnels};
-use crate::statistics::KMH;
 use dynocar_model::simulate::motion::{Motion, advance};
-use dynocar_model::track::Track;
+use dynocar_model::track::{Curve, Track, Tunnel};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::statistics::KMH;
 
 /// Time in s between two samples: the controller's period of the paper.
 pub const PERIOD_S: f64 = 0.2;
@@ -21,44 +23,17 @@ pub const EMPTY_MASS_KG: f64 = 110_000.0;
 /// Greatest brake force in N.
 pub const BRAKE_MAX_N: f64 = 110_000.0;
 
-/// Basic, curve and tunnel resistance as functions of speed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curves {
-    /// z1.
-    pub basic: Davis,
-    /// z2, whole train in a curve.
-    pub curve: Davis,
-    /// z3, whole train in a tunnel.
-    pub tunnel: Davis,
-}
-
-impl Curves {
-    /// Table 2's means, converted from km/h.
-    pub fn table_2() -> Self {
-        let from_kmh = |a: f64, b: f64, c: f64| Davis { a, b: b * 3.6, c: c * 12.96 };
-        Curves {
-            basic: from_kmh(2.845737, 0.015846, 0.000765),
-            curve: from_kmh(1.362406, 0.002273, 0.000228),
-            tunnel: from_kmh(0.609985, 0.022346, 0.001276),
-        }
+/// Table 2's means, converted from km/h: basic resistance z1, z2 of the whole train in a curve, z3 in a tunnel.
+pub const TABLE_2: [Davis; 3] = {
+    const fn from_kmh(a: f64, b: f64, c: f64) -> Davis {
+        Davis { a, b: b * 3.6, c: c * 12.96 }
     }
-
-    /// Resistance in N/kN of a train of which a share is in curves and a share in tunnels.
-    pub fn w_n_per_kn(&self, speed_mps: f64, shares: Shares) -> f64 {
-        self.basic.w0_n_per_kn(speed_mps)
-            + shares.curve * self.curve.w0_n_per_kn(speed_mps)
-            + shares.tunnel * self.tunnel.w0_n_per_kn(speed_mps)
-    }
-}
-
-/// Shares of the train in curves and in tunnels, 0 to 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shares {
-    /// In curves.
-    pub curve: f64,
-    /// In tunnels.
-    pub tunnel: f64,
-}
+    [
+        from_kmh(2.845737, 0.015846, 0.000765),
+        from_kmh(1.362406, 0.002273, 0.000228),
+        from_kmh(0.609985, 0.022346, 0.001276),
+    ]
+};
 
 /// The train and the line.
 #[derive(Clone, Debug)]
@@ -67,8 +42,8 @@ pub struct Shuttle {
     pub train: Arc<TrainModel>,
     /// The line as mapped.
     pub track: Arc<Track>,
-    /// The resistances that act.
-    pub truth: Curves,
+    /// The resistances that act: z1, z2 and z3.
+    pub truth: [Davis; 3],
     /// 1 + gamma as it is; the train is declared with gamma = 0.
     pub inertia_factor: f64,
 }
@@ -102,7 +77,6 @@ pub fn calm(_speed_mps: f64) -> f64 {
 impl Shuttle {
     /// The scenario's train and line; `curve_in_tunnel` adds a curve inside the middle tunnel.
     pub fn new(curve_in_tunnel: bool) -> Self {
-        let truth = Curves::table_2();
         let effort: Vec<(f64, f64)> = (0..=22)
             .map(|k| {
                 let speed_mps = f64::from(5 * k) * KMH;
@@ -114,7 +88,7 @@ impl Shuttle {
             cars: 4,
             traction: EffortCurve::new(effort),
             brake: EffortCurve::new(vec![(0.0, BRAKE_MAX_N)]),
-            ..TrainModel::bare("four-car airport train", EMPTY_MASS_KG, truth.basic)
+            ..TrainModel::bare("four-car airport train", EMPTY_MASS_KG, TABLE_2[0])
         };
         let track = Track::new(
             "synthetic 28 km shuttle".into(),
@@ -124,23 +98,28 @@ impl Shuttle {
             Some(tunnels()),
         )
         .expect("ordered lists");
-        Shuttle { train: Arc::new(train), track: Arc::new(track), truth, inertia_factor: 1.0 }
+        let (train, track) = (Arc::new(train), Arc::new(track));
+        Shuttle { train, track, truth: TABLE_2, inertia_factor: 1.0 }
     }
 
-    /// Shares of the train in curves and tunnels.
-    pub fn shares(&self, position_m: f64) -> Shares {
+    /// Shares of the train, 0 to 1, to which z1, z2 and z3 apply.
+    pub fn shares(&self, position_m: f64) -> [f64; 3] {
         let length_m = self.train.length_m;
         let curvature = self.track.curvature_per_m(position_m, length_m).unwrap_or(0.0);
-        Shares {
-            curve: CURVE_RADIUS_M * curvature,
-            tunnel: self.track.tunnel_share(position_m, length_m).unwrap_or(0.0),
-        }
+        let tunnel = self.track.tunnel_share(position_m, length_m).unwrap_or(0.0);
+        [1.0, CURVE_RADIUS_M * curvature, tunnel]
+    }
+
+    /// A figure of z1, z2 and z3, summed by the shares of a train at a chainage in m.
+    pub fn sum(&self, position_m: f64, of: impl Fn(&Davis) -> f64) -> f64 {
+        let shares = self.shares(position_m);
+        self.truth.iter().zip(shares).map(|(davis, share)| share * of(davis)).sum()
     }
 
     /// Acceleration in m/s² with `extra` N/kN of resistance.
     pub fn acceleration_mps2(&self, at: &Instant, extra_n_per_kn: f64) -> f64 {
         let gradient = self.track.gradient_permille(at.position_m, self.train.length_m);
-        let w = self.truth.w_n_per_kn(at.speed_mps, self.shares(at.position_m))
+        let w = self.sum(at.position_m, |davis| davis.w0_n_per_kn(at.speed_mps))
             + at.direction * gradient.unwrap_or(0.0)
             + extra_n_per_kn;
         (at.force_n / at.mass_kg - 1e-3 * STANDARD_GRAVITY_MPS2 * w) / self.inertia_factor
@@ -168,4 +147,50 @@ impl Shuttle {
     pub fn standing_at(&self, position_m: f64, mass_kg: f64) -> Instant {
         Instant { time_s: 0.0, position_m, speed_mps: 0.0, force_n: 0.0, direction: 1.0, mass_kg }
     }
+}
+
+/// Radius in m of every curve: z2 knows no radius.
+pub const CURVE_RADIUS_M: f64 = 500.0;
+/// Where the train stops, chainage in m.
+pub const STATIONS_M: [f64; 4] = [100.0, 3_100.0, 21_300.0, 27_900.0];
+
+/// (chainage in m, ‰): steps of 300 to 900 m, up to 12 ‰ either way.
+fn gradients() -> Vec<(f64, f64)> {
+    let mut random = ChaCha8Rng::seed_from_u64(28_000);
+    let mut list = vec![(0.0, 0.0)];
+    let mut at_m = 250.0;
+    while at_m < 27_700.0 {
+        list.push((at_m, (240.0 * random.random::<f64>() - 120.0).round() / 10.0));
+        at_m += (300.0 + 600.0 * random.random::<f64>()).round();
+    }
+    list.push((27_750.0, 0.0));
+    list
+}
+
+/// Curves of 250 to 600 m outside the tunnels; if wanted, two more inside.
+fn curves(curve_in_tunnel: bool) -> Vec<Curve> {
+    let mut random = ChaCha8Rng::seed_from_u64(28_001);
+    let mut list = Vec::new();
+    let mut start_m = 400.0;
+    while start_m < 27_000.0 {
+        let end_m = start_m + (250.0 + 350.0 * random.random::<f64>()).round();
+        let is_near =
+            |tunnel: &Tunnel| start_m < tunnel.end_m + 80.0 && end_m > tunnel.start_m - 80.0;
+        if !tunnels().iter().any(is_near) {
+            list.push(Curve { start_m, end_m, radius_m: CURVE_RADIUS_M });
+        }
+        start_m = end_m + (400.0 + 700.0 * random.random::<f64>()).round();
+    }
+    if curve_in_tunnel {
+        list.push(Curve { start_m: 11_700.0, end_m: 12_300.0, radius_m: CURVE_RADIUS_M });
+        list.push(Curve { start_m: 23_000.0, end_m: 23_400.0, radius_m: CURVE_RADIUS_M });
+    }
+    list
+}
+
+/// Four tunnels, a fifth of the line.
+fn tunnels() -> Vec<Tunnel> {
+    [(900.0, 2_300.0), (11_200.0, 12_900.0), (18_500.0, 19_600.0), (22_600.0, 24_000.0)]
+        .map(|(start_m, end_m)| Tunnel { start_m, end_m })
+        .to_vec()
 }

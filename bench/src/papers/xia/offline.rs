@@ -16,12 +16,13 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::bound::{davis_covariance, disturbed_davis_covariance};
 use super::ratio_posterior::likeliest_fit;
-use super::scenario::{CASES, Profile, Run, all_speeds_mps, drive, fast_speeds_mps};
-use crate::papers::row::{Row, XIA};
+use super::scenario::{
+    CASES, Profile, Run, all_speeds_mps, davis_covariance, disturbed_davis_covariance, drive,
+    fast_speeds_mps,
+};
+use crate::papers::row::{Row, Seeds, XIA};
 use crate::papers::score::{Score, w0_errors};
-use crate::papers::seeds::Seeds;
 use crate::statistics::root_mean_square;
 
 /// Identified a of Table 3, case by case.

@@ -17,15 +17,13 @@ use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::bound::disturbed_davis_covariance;
 use super::offline;
 use super::scenario::{
-    CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps, drive,
-    fast_speeds_mps,
+    CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps,
+    disturbed_davis_covariance, drive, fast_speeds_mps,
 };
-use crate::papers::row::{Row, XIA};
+use crate::papers::row::{Row, Seeds, XIA};
 use crate::papers::score::{Score, w0_std};
-use crate::papers::seeds::Seeds;
 use crate::statistics::{mean, normal, root_mean_square};
 
 /// Data capacity I of the paper's window.
@@ -72,8 +70,8 @@ fn settings(davis: Davis, std: Vector3<f64>) -> OnlineSettings {
     }
 }
 
-/// An estimate after each step: coefficients and, where the method has one, covariance.
-type Estimates = Vec<(Davis, Option<Matrix3<f64>>)>;
+/// An estimate after each step: coefficients and covariance; the paper's method has none.
+type Estimates = Vec<(Davis, Matrix3<f64>)>;
 
 /// Ours: the filter of `trajectory_kalman` with its default settings.
 fn ours(run: &Run, speeds_mps: &[f64], settings: OnlineSettings) -> Estimates {
@@ -83,8 +81,7 @@ fn ours(run: &Run, speeds_mps: &[f64], settings: OnlineSettings) -> Estimates {
     steps
         .map(|((step, &before_mps), &speed_mps)| {
             filter.advance(StepRule::Distance, step, step.size / before_mps, speed_mps);
-            let (davis, covariance) = filter.davis();
-            (davis, Some(covariance))
+            filter.davis()
         })
         .collect()
 }
@@ -117,7 +114,7 @@ fn informed(
             filter.noise.speed_variance = noise_mps(i + 1).powi(2);
             filter.predict(StepRule::Distance, step, step.size / run.speeds_mps[i], 0.0);
             filter.measure(speeds_mps[i + 1], &model, &no_outliers);
-            (filter.davis(), Some(filter.davis_covariance()))
+            (filter.davis(), filter.davis_covariance())
         })
         .collect()
 }
@@ -144,7 +141,7 @@ fn paper(run: &Run, speeds_mps: &[f64], seed: u64) -> Estimates {
                 )
                 .davis;
             }
-            (davis, None)
+            (davis, Matrix3::zeros())
         })
         .collect()
 }
@@ -170,10 +167,7 @@ impl Following {
             .collect();
         for i in (NOISY_FROM..errors.len()).filter(|i| !(820..820 + SETTLING_MAX).contains(i)) {
             self.errors.push(errors[i]);
-            if let Some(covariance) = estimates[i].1 {
-                let speed_mps = run.speeds_mps[i + 1];
-                self.deviations.push(w0_std(&covariance, speed_mps));
-            }
+            self.deviations.push(w0_std(&estimates[i].1, run.speeds_mps[i + 1]));
         }
         for (settling, (at, tolerance)) in self.settling_km.iter_mut().zip(SWITCHES) {
             let after = &errors[at..at + SETTLING_MAX];
@@ -182,12 +176,10 @@ impl Following {
         }
     }
 
-    fn settling_clean_km(&self) -> f64 {
-        0.5 * (mean(&self.settling_km[0]) + mean(&self.settling_km[1]))
-    }
-
-    fn settling_noisy_km(&self) -> f64 {
-        mean(&self.settling_km[2])
+    /// The mean settling after the switches without noise, and after the one with noise.
+    fn settling_km(&self) -> [f64; 2] {
+        let [one, other, noisy] = self.settling_km.each_ref().map(mean);
+        [0.5 * (one + other), noisy]
     }
 }
 
@@ -210,8 +202,11 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
             windows.push(&run, &paper(&run, &speeds, seed));
         }
     }
-    let line = |quantity: &str, unit| {
-        Row::new(
+    let row = |quantity: &str, unit, of: &dyn Fn(&Following) -> f64, least: f64| Row {
+        paper_method: Some(of(&windows)),
+        ours: Some(of(&filter)),
+        bound: Some(least),
+        ..Row::new(
             XIA,
             "Table 4",
             format!("{quantity} (paper's method: {paper_lines} lines)"),
@@ -219,25 +214,15 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
             seeds,
         )
     };
+    let settled = "w0 at the driven speed, noisy sections, settled";
+    let least = root_mean_square(&bound.deviations);
+    let clean = "settling to 0.1 N/kN after a switch, clean";
+    let noisy = "settling to 1 N/kN after a switch, noisy";
+    let [least_clean, least_noisy] = bound.settling_km();
     vec![
-        Row {
-            paper_method: Some(root_mean_square(&windows.errors)),
-            ours: Some(root_mean_square(&filter.errors)),
-            bound: Some(root_mean_square(&bound.deviations)),
-            ..line("w0 at the driven speed, noisy sections, settled", "N/kN")
-        },
-        Row {
-            paper_method: Some(windows.settling_clean_km()),
-            ours: Some(filter.settling_clean_km()),
-            bound: Some(bound.settling_clean_km()),
-            ..line("settling to 0.1 N/kN after a switch, clean", "km")
-        },
-        Row {
-            paper_method: Some(windows.settling_noisy_km()),
-            ours: Some(filter.settling_noisy_km()),
-            bound: Some(bound.settling_noisy_km()),
-            ..line("settling to 1 N/kN after a switch, noisy", "km")
-        },
+        row(settled, "N/kN", &|it| root_mean_square(&it.errors), least),
+        row(clean, "km", &|it| it.settling_km()[0], least_clean),
+        row(noisy, "km", &|it| it.settling_km()[1], least_noisy),
         exact_forces_row(seeds),
         disturbed_row(seeds),
     ]
@@ -277,12 +262,6 @@ fn drawn_row(
     score.row(Row::new(XIA, "Table 4", quantity, "N/kN", seeds))
 }
 
-/// The last estimate of a run.
-fn last(mut estimates: Estimates) -> Option<(Davis, Matrix3<f64>)> {
-    let (davis, covariance) = estimates.pop()?;
-    Some((davis, covariance?))
-}
-
 /// A full speed profile; the forces are exact, as the filter is set to assume.
 fn exact_forces_row(seeds: Seeds) -> Row {
     let (mean_davis, std) = constant_prior();
@@ -295,8 +274,8 @@ fn exact_forces_row(seeds: Seeds) -> Row {
         settings.noise.disturbance = 0.0;
         settings.noise.learns_disturbance = false;
         let noise_mps = |_| SPEED_NOISE_MPS;
-        let (_, bound) = last(informed(&run, &measured, constant_prior(), noise_mps, &[]))?;
-        Some((truth, last(ours(&run, &measured, settings))?, bound))
+        let (_, bound) = informed(&run, &measured, constant_prior(), noise_mps, &[]).pop()?;
+        Some((truth, ours(&run, &measured, settings).pop()?, bound))
     })
 }
 
@@ -316,6 +295,6 @@ fn disturbed_row(seeds: Seeds) -> Row {
         let truth = drawn(constant_prior(), random);
         let run = drive(Profile::Cruise, 120e3, 1, |_| truth).disturbed(&truth, random);
         let measured = run.measured_mps(0, random);
-        Some((truth, last(ours(&run, &measured, settings(mean_davis, std)))?, bound))
+        Some((truth, ours(&run, &measured, settings(mean_davis, std)).pop()?, bound))
     })
 }
