@@ -25,8 +25,10 @@ const FOLDERS: [&str; 17] = [
     "client/forward/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
-const CALLS: [(&str, &str); 13] = [
+const CALLS: [(&str, &str); 15] = [
     ("#[error(", ""),
+    (".problem(", "daemon"),
+    ("wrong(", "daemon"),
     ("Failure::Input(", "daemon/src/cli"),
     ("Failure::Work(", "daemon/src/cli"),
     ("Failure::Input(", "daemon/workshop/src/cli"),

@@ -151,21 +151,23 @@ pub(super) fn read(
     let rows = table.lines.rows;
     let has_speed = table.filled(Quantity::Speed).is_some();
     let resolved = Resolved::of(context, entry, table);
-    let refuse = |quantity, words: String| {
-        let column = context.manifest.mapping(quantity).map_or("", |it| &it.column);
-        Err(SourcePosition::whole(label).problem(format!("column '{column}': expected {words}")))
-    };
+    let column = |quantity| context.manifest.mapping(quantity).map_or("", |it| &it.column);
     for (quantity, is_there) in
         [(Quantity::Time, !resolved.times_s.is_empty()), (Quantity::Speed, has_speed)]
     {
         if !is_there {
-            return refuse(quantity, format!("values of {quantity}, found none in {rows} rows"));
+            return Err(SourcePosition::whole(label).problem(format!(
+                "column '{}': expected values of {quantity}, found none in {rows} rows",
+                column(quantity)
+            )));
         }
     }
     let (time_s, rows) = (resolved.times_s[0], resolved.times_s.len());
     if rows > 1 && resolved.times_s.iter().all(|&other| other == time_s) {
-        let words = format!("times that grow, found {time_s} s in all {rows} rows");
-        return refuse(Quantity::Time, words);
+        return Err(SourcePosition::whole(label).problem(format!(
+            "column '{}': expected times that grow, found {time_s} s in all {rows} rows",
+            column(Quantity::Time)
+        )));
     }
     let mut judge = Judge::new(context, resolved.position_source == PositionSource::Column);
     let samples: Vec<TrainSample> =

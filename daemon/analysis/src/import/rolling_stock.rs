@@ -70,8 +70,8 @@ pub(super) fn unique<'i, 't: 'i>(
 ) -> Result<(), DatasetError> {
     let Some((_, first)) = known.find(|(other, _)| *other == id) else { return Ok(()) };
     let (key, line) = (item.full("id"), first.place().line.unwrap_or(1));
-    let words = format!("expected another than in line {line}, which is the same");
-    Err(item.wrong(format!("{key} = '{id}': {words}")))
+    Err(item
+        .wrong(format!("{key} = '{id}': expected another than in line {line}, which is the same")))
 }
 
 fn formation<'v, 't>(
@@ -83,8 +83,10 @@ fn formation<'v, 't>(
     let find = |wanted: &Item| {
         let id = wanted.text(expected)?;
         vehicles.iter().find(|it| it.id == id).ok_or_else(|| {
-            let words = "is described in none of the files; give its file too";
-            wanted.wrong(format!("{}: the vehicle '{id}' {words}", wanted.path))
+            wanted.wrong(format!(
+                "{}: the vehicle '{id}' is described in none of the files; give its file too",
+                wanted.path
+            ))
         })
     };
     wanted.iter().map(find).collect()

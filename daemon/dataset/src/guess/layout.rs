@@ -67,9 +67,12 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, DatasetError> {
     };
     let Some(Block { header, units }) = *block else {
         let found = rows[0].cells[0].trim();
-        let words = "write the names into a line above";
-        let words = format!("expected names of columns, found '{found}': {words}");
-        return wrong(rows[0].line, words);
+        return wrong(
+            rows[0].line,
+            format!(
+                "expected names of columns, found '{found}': write the names into a line above"
+            ),
+        );
     };
     let (names, values) = (&rows[header], &rows[units.unwrap_or(header) + 1..]);
     if values.is_empty() {
@@ -77,9 +80,13 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, DatasetError> {
     }
     let (found, usual) = (names.cells.len(), usual_width(values).unwrap_or(0));
     if found < usual {
-        let words = "write a name for every column";
-        let above = format!("found {found} cells above rows of {usual}");
-        return wrong(names.line, format!("expected names of columns, {above}: {words}"));
+        return wrong(
+            names.line,
+            format!(
+                "expected names of columns, found {found} cells above rows of {usual}: write a name \
+                 for every column"
+            ),
+        );
     }
     let units = units.map(|units| &rows[units]);
     let name = |(index, cell): (usize, &String)| {

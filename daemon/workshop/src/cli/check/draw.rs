@@ -18,8 +18,9 @@ use dynocar::output::{report_line, write_in_folder};
 /// written.
 pub(super) fn draw(understood: &Understood, folder: &Path) -> Result<(), Failure> {
     if understood.daemon.is_some() {
-        let words = "expected a dataset, a train or a track, not a daemon's configuration";
-        return Err(Failure::Input(format!("--draw: {words}")));
+        return Err(Failure::Input(
+            "--draw: expected a dataset, a train or a track, not a daemon's configuration".into(),
+        ));
     }
     let (train, track) = (understood.train.as_deref(), understood.track.as_deref());
     let failed = |error| Failure::Work(format!("the drawing failed: {error}"));
