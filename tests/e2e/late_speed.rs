@@ -1,6 +1,6 @@
 //! A speed sensor that is late is reported as that, and no places are made up for what it does on gradients.
 
-use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
+use dynocar_analysis::explain::answer::{ExplainAnswer, ParameterValue, Verdict};
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{FileText, dataset_files, read_files};
@@ -17,6 +17,15 @@ fn answer(files: &[FileText]) -> ExplainAnswer {
 fn named(answer: &ExplainAnswer) -> Vec<&str> {
     let found = answer.effects.iter().map(|effect| effect.kind);
     found.chain(answer.ambiguous_with.iter().copied()).collect()
+}
+
+/// A parameter of the late speed and its standard deviation.
+fn number_of(answer: &ExplainAnswer, name: &str) -> [f64; 2] {
+    let effect = answer.effects.iter().find(|effect| effect.kind == "speed_delay").expect("found");
+    [&effect.parameters, &effect.std].map(|all| match all[name] {
+        ParameterValue::Number(value) => value,
+        ref other => panic!("{name}: a number, not {other:?}"),
+    })
 }
 
 fn simulated(seed: u64, effect: Effect, is_level_and_straight: bool) -> SimulatedDataset {
@@ -44,6 +53,10 @@ fn a_late_speed_is_named_whether_dead_time_or_lag_and_no_place_is_made_up() {
             "{seed}: {}",
             answer.statement
         );
+        for (name, truth) in [("delay_s", delay_s), ("lag_s", lag_s)] {
+            let [found, std] = number_of(&answer, name);
+            assert!((found - truth).abs() < 3.0 * std, "{seed}: {name} {found} ± {std}, {truth}");
+        }
         // Next to what the true model leaves of the noise.
         let left_mps = answer.rmse_after.unwrap();
         let true_mps = score(&dataset).full_run.true_mps;

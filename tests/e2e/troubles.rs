@@ -25,10 +25,13 @@ const FOLDERS: [&str; 17] = [
     "client/forward/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
-const CALLS: [(&str, &str); 15] = [
+const CALLS: [(&str, &str); 18] = [
     ("#[error(", ""),
     (".problem(", "daemon"),
     ("wrong(", "daemon"),
+    ("let words = format!(", "daemon/dataset/src"),
+    ("let text = format!(", "daemon/dataset/src"),
+    ("let words = format!(", "daemon/analysis/src/import"),
     ("Failure::Input(", "daemon/src/cli"),
     ("Failure::Work(", "daemon/src/cli"),
     ("Failure::Input(", "daemon/workshop/src/cli"),
@@ -65,7 +68,7 @@ fn sources_in(folder: &str, sources: &mut Vec<Source>) {
         let name = path.strip_prefix(&root).expect("of the workspace").display().to_string();
         if path.is_dir() {
             sources_in(&name, sources);
-        } else if name.ends_with(".rs") || name.ends_with(".py") {
+        } else if name.ends_with(".py") || name.ends_with(".rs") && !name.ends_with("tests.rs") {
             let text = std::fs::read_to_string(&path).expect("a source file");
             sources.push(Source::of(name, &text));
         }

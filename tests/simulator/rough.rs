@@ -9,7 +9,8 @@ use dynocar_tests::simulator::{
 };
 
 /// Kinds that no ordinary error of a declared figure looks like.
-const STRUCTURAL: [EffectKind; 6] = [
+const STRUCTURAL: [EffectKind; 7] = [
+    EffectKind::AmbientTemperature,
     EffectKind::TunnelDrag,
     EffectKind::DraggingBrake,
     EffectKind::LocalResistance,
@@ -55,7 +56,7 @@ fn a_dragging_brake_is_found_although_loads_winds_and_the_map_are_off() {
 
 #[test]
 fn cold_days_are_found_although_each_day_has_its_wind() {
-    for seed in [1_500_002, 2_100_003] {
+    for seed in [1_500_002, 2_100_003, 4_800_008] {
         let (_, answer) = explained(Some(EffectKind::AmbientTemperature), seed);
         let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
         assert!(
@@ -84,8 +85,9 @@ fn what_does_not_stand_beside_the_usual_errors_is_not_called_nothing() {
 
 #[test]
 fn what_is_a_little_off_is_no_structural_effect() {
-    // In the last of them one run seemed to have a law of its own.
-    for seed in [861_011, 861_015, 861_017, 3_300_017] {
+    // In the last three one run seemed to have a law of its own, tunnels to resist a little more, and six runs followed
+    // the outside temperature by chance.
+    for seed in [861_011, 861_015, 861_017, 3_300_017, 4_800_011, 4_800_042] {
         let (_, answer) = explained(None, seed);
         let structural: Vec<&str> = STRUCTURAL.iter().map(|kind| kind.name()).collect();
         let named = answer.effects.iter().map(|effect| effect.kind);

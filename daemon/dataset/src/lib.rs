@@ -153,6 +153,11 @@ pub struct Dataset {
 }
 
 impl Dataset {
+    /// The usual time in s between two samples, of the run whose samples are furthest apart.
+    pub fn step_s(&self) -> f64 {
+        self.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max)
+    }
+
     /// The same with forces that act `late_s` before their stamps taken where they act.
     pub fn with_forces_moved(&self, late_s: f64) -> Dataset {
         let mut dataset = self.clone();

@@ -111,8 +111,8 @@ const PERMILLE: &str = "[chainage_m, permille]";
 type Allowed = (String, (Bound<f64>, Bound<f64>));
 
 fn gradients(low: f64) -> Allowed {
-    let words = format!("from {low} to {GRADIENT_MAX_PERMILLE} permille");
-    (words, (Bound::Included(low), Bound::Included(GRADIENT_MAX_PERMILLE)))
+    let allowed = format!("from {low} to {GRADIENT_MAX_PERMILLE} permille");
+    (allowed, (Bound::Included(low), Bound::Included(GRADIENT_MAX_PERMILLE)))
 }
 
 /// A list of pairs of chainage in m and an allowed value, with the place of each.

@@ -61,7 +61,7 @@ impl Hypothesis for LateStamps {
 ///
 /// When a run has no usable sample.
 pub fn estimated(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
-    let step_s = dataset.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max);
+    let step_s = dataset.step_s();
     if step_s < STEP_MIN_S {
         return Ok(None);
     }

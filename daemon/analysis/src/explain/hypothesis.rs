@@ -296,7 +296,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         0.0
     }
 
-    /// Standard deviation that a sampling step in s adds to each parameter, which is taken as exact between samples.
+    /// Standard deviation of each parameter by what happens between samples so many s apart.
     fn sampling_error(&self, _step_s: f64) -> f64 {
         0.0
     }

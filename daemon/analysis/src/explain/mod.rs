@@ -113,7 +113,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    let deviations = usual_errors::given_usual_errors(&search, &mut outcome);
+    let deviations = usual_errors::given_usual_errors(&search, &mut outcome, dataset.step_s());
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);

@@ -5,13 +5,12 @@
 //! finished model is fitted once more with all of it beside it: what the data cannot distinguish from it is
 //! less sure, and what they can is surer.
 
-use super::evidence::RunData;
 use super::selection::{Deviations, Outcome, Search, deviations_beside};
 
 /// Moves the effects that were found to where they fit best beside the usual errors, and a, b and c to where
 /// they fit best beside the effects alone: what predicts runs knows of no usual errors. How surely the
-/// parameters are known then.
-pub fn given_usual_errors(search: &Search, outcome: &mut Outcome) -> Deviations {
+/// parameters are known then, from samples so many s apart.
+pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -> Deviations {
     let joint = search.beside_usual_errors(outcome);
     outcome.likeliest = outcome.fit.clone();
     let fit = &outcome.likeliest;
@@ -21,7 +20,6 @@ pub fn given_usual_errors(search: &Search, outcome: &mut Outcome) -> Deviations 
         outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
     }
     let mut deviations = deviations_beside(&joint.fit, count, joint.shared);
-    let step_s = search.problem.runs.iter().map(RunData::step_s).fold(0.0, f64::max);
     let model = &outcome.fit.model;
     for (effect, range) in model.effects.iter().zip(model.ranges()) {
         for std in &mut deviations.std[range.clone()] {

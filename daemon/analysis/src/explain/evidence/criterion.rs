@@ -5,7 +5,7 @@
 pub const SCORE_MIN: f64 = 3.0;
 /// Standard deviations by the scatter between the runs that a number on which they agree is away from none.
 pub const CERTAIN_STDS: f64 = 4.0;
-/// The same of what is one number a run, whose standard deviation stands for Student's quantile and counts only runs.
+/// The same of what is one number a run, for which no place, run or form was chosen.
 pub const CERTAIN_STDS_BY_RUN: f64 = 3.0;
 /// Evidence by which two explanations may differ and still explain the data equally well; what is added
 /// beside others explains this much more than its price.

@@ -123,18 +123,6 @@ impl RunData {
         self.bins.iter().map(|bin| time_s[bin.end - 1] - time_s[bin.first]).sum()
     }
 
-    /// The usual time in s between two samples.
-    pub fn step_s(&self) -> f64 {
-        let time_s = self.recording.time_s();
-        let mut steps_s: Vec<f64> = time_s.windows(2).map(|it| it[1] - it[0]).collect();
-        let middle = steps_s.len() / 2;
-        if steps_s.is_empty() {
-            0.0
-        } else {
-            *steps_s.select_nth_unstable_by(middle, f64::total_cmp).1
-        }
-    }
-
     /// Duration of the run in s.
     pub fn duration_s(&self) -> f64 {
         self.recording.time_s().last().copied().unwrap_or(0.0)

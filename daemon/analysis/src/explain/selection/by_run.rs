@@ -74,8 +74,8 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
     fit.runs.iter().map(moved).collect()
 }
 
-/// The form of an effect (a train of one piece, averages over bins, one number for a drive's efficiency) is itself good to this share
-/// of its size.
+/// The form of an effect (a train of one piece, averages over bins, one number for a drive's efficiency) is itself good
+/// to this share of its size.
 pub const FORM_SHARE: f64 = 0.01;
 
 /// Student's 97.5 % quantile over the normal one, so that 1.96 standard deviations make a 95 %

@@ -70,15 +70,16 @@ pub(super) fn is_certain(
         TunnelDrag if is_unmapped => is_beside_a_gradient || is_beside_usual_errors,
         _ => false,
     };
-    // In standard deviations from none; the size of a form hangs on its shape, what it explains does not.
-    let runs_agree = || {
-        let away = if effect.kind() == Unknown {
+    // The size of a form hangs on its shape, what it explains does not.
+    let runs_agree = || match effect.kind() {
+        Unknown => {
             let size = fit.model.ranges()[index].start;
-            (evidence + penalty(fit, index)).max(0.0).sqrt() / scatter_factor(fit, size)
-        } else {
-            stds_from_none(fit, index)
-        };
-        is_by_run || away > CERTAIN_STDS
+            let gain = (evidence + penalty(fit, index)).max(0.0);
+            gain.sqrt() > CERTAIN_STDS * scatter_factor(fit, size)
+        }
+        // Else it is not shown.
+        _ if is_by_run => true,
+        _ => stds_from_none(fit, index) > CERTAIN_STDS,
     };
     // At most 2.3 where nothing acts; beside the usual errors 2.0 for a brake, 0.3 for a form.
     let takes_enough = evidence * reduction > EQUAL;

@@ -13,9 +13,9 @@ mod grammar;
 mod known;
 mod numbers;
 mod outside;
-pub use outside::OUTSIDE_COST;
 mod shape;
 
+pub use self::outside::OUTSIDE_COST;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Effect, Proposal};
