@@ -5,7 +5,7 @@ use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{
-    Deviations, Effect, EffectRequest, SimulatedDataset, SimulatorSettings, simulate,
+    Deviations, Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, Unlisted, simulate,
 };
 
 /// Kinds that no ordinary error of a declared figure looks like.
@@ -24,13 +24,20 @@ fn explained(kind: Option<EffectKind>, seed: u64) -> (SimulatedDataset, ExplainA
 }
 
 fn explained_with(effects: EffectRequest, seed: u64) -> (SimulatedDataset, ExplainAnswer) {
-    let simulated = simulate(&SimulatorSettings {
-        deviations: Deviations::ROUGH,
-        ..SimulatorSettings::new(seed, effects)
-    });
+    explained_of(&SimulatorSettings::new(seed, effects))
+}
+
+fn explained_of(settings: &SimulatorSettings) -> (SimulatedDataset, ExplainAnswer) {
+    let simulated =
+        simulate(&SimulatorSettings { deviations: Deviations::ROUGH, ..settings.clone() });
     let dataset = read_files(&dataset_files(&simulated));
     let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
     (simulated, answer)
+}
+
+/// The kinds that were found.
+fn kinds(answer: &ExplainAnswer) -> Vec<&'static str> {
+    answer.effects.iter().map(|effect| effect.kind).collect()
 }
 
 /// What was found of a kind and its standard deviation.
@@ -58,12 +65,8 @@ fn a_dragging_brake_is_found_although_loads_winds_and_the_map_are_off() {
 fn cold_days_are_found_although_each_day_has_its_wind() {
     for seed in [1_500_002, 2_100_003, 4_800_008] {
         let (_, answer) = explained(Some(EffectKind::AmbientTemperature), seed);
-        let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
-        assert!(
-            kinds.contains(&EffectKind::AmbientTemperature.name()),
-            "seed {seed}: {}",
-            answer.statement
-        );
+        let is_found = kinds(&answer).contains(&EffectKind::AmbientTemperature.name());
+        assert!(is_found, "seed {seed}: {}", answer.statement);
     }
 }
 
@@ -71,9 +74,43 @@ fn cold_days_are_found_although_each_day_has_its_wind() {
 fn a_law_without_a_name_is_found_although_loads_and_winds_make_most_of_the_error() {
     for seed in [2_500_001, 3_600_008] {
         let (_, answer) = explained_with(EffectRequest::AnyLaw, seed);
-        let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
-        assert!(kinds.contains(&EffectKind::Unknown.name()), "seed {seed}: {}", answer.statement);
+        let is_found = kinds(&answer).contains(&EffectKind::Unknown.name());
+        assert!(is_found, "seed {seed}: {}", answer.statement);
     }
+}
+
+#[test]
+fn a_law_at_low_speed_stays_found_when_small_errors_leave_it_little_to_take() {
+    let law = Law::Slow { below_mps: 15.0, least_mps: 3.0 };
+    let slow = Effect::Unlisted(Unlisted { law, n_per_kn: 1.1 });
+    let (_, answer) = explained_with(EffectRequest::Exactly(vec![slow]), 5_000_001);
+    assert!(kinds(&answer).contains(&EffectKind::Unknown.name()), "{}", answer.statement);
+}
+
+#[test]
+fn a_wrong_wheel_stays_found_though_late_forces_take_its_place_and_leave() {
+    let both = [EffectKind::WheelDiameter, EffectKind::TunnelDrag];
+    let (_, answer) = explained_with(EffectRequest::Kinds(both.to_vec()), 4_600_003);
+    let are_found = both.iter().all(|kind| kinds(&answer).contains(&kind.name()));
+    assert!(are_found, "{}", answer.statement);
+}
+
+#[test]
+fn an_outside_temperature_falls_beside_the_brake_that_it_stood_for() {
+    let (_, answer) = explained(Some(EffectKind::DraggingBrake), 4_600_006);
+    let found = kinds(&answer);
+    assert!(found.contains(&EffectKind::DraggingBrake.name()), "{}", answer.statement);
+    assert!(!found.contains(&EffectKind::AmbientTemperature.name()), "{}", answer.statement);
+}
+
+#[test]
+fn a_tunnel_that_the_map_lacks_is_named_though_a_form_between_two_places_looks_like_it() {
+    let tunnel = EffectRequest::Kinds(vec![EffectKind::TunnelDrag]);
+    let settings = SimulatorSettings::new(5_000_008, tunnel);
+    let (_, answer) = explained_of(&SimulatorSettings { maps_tunnels: false, ..settings });
+    let found = kinds(&answer);
+    assert!(found.contains(&EffectKind::TunnelDrag.name()), "{}", answer.statement);
+    assert!(!found.contains(&EffectKind::Unknown.name()), "{}", answer.statement);
 }
 
 #[test]

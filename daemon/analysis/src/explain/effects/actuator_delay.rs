@@ -4,7 +4,7 @@ use dynocar_model::terms::delay;
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::proposal::{late_by_sampling_s, late_from};
+use super::proposal::{late_by_sampling_s, late_from, late_reported};
 use super::{Candidate, Effect, Hypothesis, Past, Proposal, ReportContext, Reported, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -96,7 +96,7 @@ impl Hypothesis for DelayAndLag {
     }
 
     fn report(&self, context: &ReportContext) -> Reported {
-        let mut reported = context.each_of(self.parameters());
+        let mut reported = late_reported(context, self.parameters());
         let together_s = context.parameters.iter().sum();
         reported.push(delay::TOGETHER, together_s, context.deviation_of_sum());
         reported

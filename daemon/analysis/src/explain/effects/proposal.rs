@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
+use dynocar_model::terms::Parameter;
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use crate::explain::hypothesis::{Hypothesis, SharedHypothesis};
+use crate::explain::hypothesis::{Hypothesis, ReportContext, Reported, SharedHypothesis};
 use crate::explain::scan::Scan;
 
 /// A hypothesis with values to start the fit from.
@@ -83,6 +85,20 @@ pub fn late_by_sampling_s(step_s: f64) -> f64 {
     step_s / 12_f64.sqrt()
 }
 
+/// A dead time and a lag, each with its standard deviation: neither is less than none nor more than both together,
+/// however little the data distinguish one from the other.
+pub fn late_reported(context: &ReportContext, parameters: &[Parameter]) -> Reported {
+    let most_s = context.parameters.iter().sum::<f64>() + HALF_95 * context.deviation_of_sum();
+    let mut reported = Reported::default();
+    for (parameter, (&value_s, &std_s)) in
+        parameters.iter().zip(context.parameters.iter().zip(context.deviations))
+    {
+        let widest_s = value_s.max(most_s - value_s) / HALF_95;
+        reported.push(parameter.name, value_s, std_s.min(widest_s));
+    }
+    reported
+}
+
 /// A kind of effect.
 pub trait Effect: Send + Sync {
     /// Its name.
@@ -95,5 +111,38 @@ pub trait Effect: Send + Sync {
     /// is none, and where the data do not allow to test it.
     fn whole(&self, _scan: &Scan) -> Option<Candidate> {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dynocar_model::terms::delay;
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::explain::answer::ParameterValue;
+
+    #[test]
+    fn neither_a_dead_time_nor_a_lag_is_more_than_both_or_less_than_none() {
+        // The sum of the two is known to 0.1 s, either to 2 s.
+        let covariance = DMatrix::from_row_slice(2, 2, &[4.0, -3.995, -3.995, 4.0]);
+        let context = ReportContext {
+            parameters: &[0.2, 0.1],
+            deviations: &[2.0, 2.0],
+            c: 0.0,
+            c_deviation: 0.0,
+            covariance: &covariance,
+            first: 0,
+            weight_kn: 1.0,
+            few_runs_factor: 1.0,
+        };
+        let reported = late_reported(&context, &delay::PARAMETERS);
+        let std_s = |name: &str| match reported.deviations[name] {
+            ParameterValue::Number(std_s) => std_s,
+            _ => panic!("{name} is a number"),
+        };
+        let most_s = 0.3 + HALF_95 * 0.1;
+        assert!((std_s("delay_s") - (most_s - 0.2) / HALF_95).abs() < 1e-9);
+        assert!((std_s("lag_s") - (most_s - 0.1) / HALF_95).abs() < 1e-9);
     }
 }

@@ -7,8 +7,10 @@ use dynocar_model::terms::{Entry, Parameter};
 use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::proposal::{late_by_sampling_s, late_from};
-use super::{Candidate, Effect, Hypothesis, OnOthers, Past, Proposal, Turn};
+use super::proposal::{late_by_sampling_s, late_from, late_reported};
+use super::{
+    Candidate, Effect, Hypothesis, OnOthers, Past, Proposal, ReportContext, Reported, Turn,
+};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -102,6 +104,10 @@ impl Hypothesis for DelayAndLag {
             (force.gradient_permille, force.resistance) =
                 late.resisting(at, (force.gradient_permille, force.resistance));
         }
+    }
+
+    fn report(&self, context: &ReportContext) -> Reported {
+        late_reported(context, self.parameters())
     }
 
     fn speed_late_s(&self, parameters: &[f64]) -> Option<f64> {

@@ -49,6 +49,16 @@ fn is_sought(kind: EffectKind) -> bool {
     )
 }
 
+/// Whether the place of a trial, if it has one, is that of a force: beside a wrong wheel or a gradient that was found,
+/// what the map seems to lack looks like an unmapped tunnel.
+fn may_have_a_place(outcome: &Outcome, trial: &Trial) -> bool {
+    use EffectKind::{GradientError, GradientShift, TunnelDrag, WheelDiameter};
+    let shifts_places = |kind| matches!(kind, GradientError | GradientShift | WheelDiameter);
+    let is_unmapped =
+        trial.kind == TunnelDrag && !trial.fit.model.effects[trial.last()].ends().is_empty();
+    !is_unmapped || !outcome.kinds().into_iter().any(shifts_places)
+}
+
 impl Search<'_> {
     /// What was found with the usual errors beside it.
     pub fn beside_usual_errors(&self, outcome: &mut Outcome) -> Arc<Beside> {
@@ -96,7 +106,8 @@ impl Search<'_> {
             Asked { is_asked: &|kind| is_sought(kind) && !fallen.contains(&kind), rivals_of: None },
         );
         let may_be = |trial: &&Trial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
-        let may_be_certain = tried.iter().filter(may_be);
+        let may_stand = |trial: &&Trial| may_be(trial) && may_have_a_place(outcome, trial);
+        let may_be_certain = tried.iter().filter(may_stand);
         let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
         let best = certain.max_by(|one, other| one.evidence.total_cmp(&other.evidence));
@@ -134,9 +145,11 @@ impl Search<'_> {
     }
 
     /// Drops what does not stand beside the usual errors: a force outside the library that explains no more than
-    /// chance there, and an effect of it that runs to a bound of what is looked for. False for nothing.
+    /// chance there, an effect of it that runs to a bound of what is looked for, and what was certain until others
+    /// came. False for nothing.
     pub(super) fn drop_fallen(&self, outcome: &mut Outcome) -> bool {
-        let beside = &self.beside_usual_errors(outcome).fit;
+        let joint = self.beside_usual_errors(outcome);
+        let beside = &joint.fit;
         let effects = &outcome.fit.model.effects;
         let refusal = |index: usize| {
             let kind = effects[index].kind();
@@ -146,6 +159,9 @@ impl Search<'_> {
             let is_form = kind == EffectKind::Unknown && !outcome.is_certain(kind);
             let decrease = || self.without(beside, index).cost - beside.cost;
             if is_form && decrease() <= penalty(beside, index) {
+                return Some((index, Refusal::Chance));
+            }
+            if outcome.is_certain(kind) && joint.holds_none(index) {
                 return Some((index, Refusal::Chance));
             }
             // A form may be greatest where what it follows ends.

@@ -41,7 +41,7 @@ pub fn deciding_score(
 /// else. One number a run (an outside temperature) is certain only there, too, where each run has its load and wind.
 /// Never certain are loads, winds and slippery rails, which change from run to run, a late speed, which late forces
 /// look like, a brake beside slippery rails and a local resistance or an unmapped tunnel beside gradients, whose ends
-/// and straight pieces leave such; beside the usual errors no unmapped tunnel at all.
+/// and straight pieces leave such.
 pub(super) fn is_certain(
     fit: &Fit,
     index: usize,
@@ -67,7 +67,8 @@ pub(super) fn is_certain(
         Unknown => !is_beside_usual_errors,
         _ if is_by_run => !is_beside_usual_errors,
         LocalResistance => is_beside_a_gradient,
-        TunnelDrag if is_unmapped => is_beside_a_gradient || is_beside_usual_errors,
+        // There the map's error is beside it.
+        TunnelDrag if is_unmapped => is_beside_a_gradient && !is_beside_usual_errors,
         _ => false,
     };
     // The size of a form hangs on its shape, what it explains does not.

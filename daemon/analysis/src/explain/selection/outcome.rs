@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::by_run::deviations_beside;
 use super::refusal::Refusal;
 use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::{Fit, acceptance_score};
@@ -64,6 +66,14 @@ impl Beside {
     pub(super) fn is_of(&self, fit: &Fit, from: &[f64]) -> bool {
         let mut effects = fit.model.effects.iter().zip(&self.fit.model.effects);
         fit.theta == from && effects.all(|(one, other)| Arc::ptr_eq(one, other))
+    }
+
+    /// Whether nothing is left of an effect: the 95 % interval of its size holds none.
+    pub(super) fn holds_none(&self, index: usize) -> bool {
+        let range = self.fit.model.ranges()[index].clone();
+        let size = self.fit.model.effects[index].size(&self.fit.theta[range.clone()]);
+        let std = deviations_beside(&self.fit, range.end, self.shared).std[range.start];
+        size.abs() < HALF_95 * std
     }
 }
 

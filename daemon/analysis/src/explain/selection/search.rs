@@ -60,11 +60,17 @@ impl Search<'_> {
             return outcome;
         }
         self.take_what_scores(&mut outcome);
-        while self.take_certain_beside(&mut outcome) || self.drop_fallen(&mut outcome) {
-            self.take_what_scores(&mut outcome);
+        loop {
+            while self.take_certain_beside(&mut outcome) || self.drop_fallen(&mut outcome) {
+                self.take_what_scores(&mut outcome);
+            }
+            // What was certain and small has joined since; what it leaves too little to take may be certain itself.
+            let before = outcome.kinds();
+            self.prune(&mut outcome);
+            if outcome.kinds() == before || !self.take_certain_beside(&mut outcome) {
+                break;
+            }
         }
-        // What was certain and small has joined since.
-        self.prune(&mut outcome);
         self.name_or_forget_small(&mut outcome);
         outcome
     }
@@ -88,10 +94,18 @@ impl Search<'_> {
             }
             let Some((kind, next)) = next else { break };
             let before = outcome.kinds();
-            outcome.fit = next;
-            if outcome.fit.model.effects.len() > 1 {
+            let tried = outcome.instead.clone();
+            outcome.fit = next.clone();
+            if next.model.effects.len() > 1 {
                 (self.progress)(round_share(outcome.rounds.len(), 0.0), "swapping effects");
-                self.swap(outcome, round);
+                self.swap(outcome, round.clone());
+                self.prune(outcome);
+            }
+            // What others take the place of, and leave themselves, is better than none of them.
+            if outcome.kinds() == before && Self::total(&next) < Self::total(&outcome.fit) - EQUAL {
+                outcome.fit = next;
+                outcome.instead = tried;
+                outcome.instead.push((kind, round));
                 self.prune(outcome);
             }
             if outcome.kinds() == before {

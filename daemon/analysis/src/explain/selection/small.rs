@@ -5,13 +5,9 @@
 //! them certain, and they take little from the open-loop error. Left out of the model they would stand in its
 //! noise and hide what matters.
 
-use std::ops::Range;
-
 use dynocar_model::terms::wind;
-use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::by_run::deviations_beside;
 use super::certainty::{CERTAIN, is_accepted};
 use super::outcome::{Outcome, Trial};
 use super::price::penalty;
@@ -118,13 +114,8 @@ impl Search<'_> {
             return Vec::new();
         }
         let beside = self.beside_usual_errors(outcome);
-        let fit = &outcome.fit;
-        let std = deviations_beside(&beside.fit, fit.theta.len(), beside.shared).std;
-        let scales = fit.model.effects.iter().zip(fit.model.ranges());
-        let is_none = |(effect, range): &(&SharedHypothesis, Range<usize>)| {
-            let size = effect.size(&beside.fit.theta[range.clone()]);
-            is_scale(effect) && size.abs() < HALF_95 * std[range.start]
-        };
-        scales.filter(is_none).map(|(effect, _)| effect.kind()).collect()
+        let scales = outcome.fit.model.effects.iter().enumerate();
+        let usual = scales.filter(|(index, effect)| is_scale(effect) && beside.holds_none(*index));
+        usual.map(|(_, effect)| effect.kind()).collect()
     }
 }
