@@ -1,4 +1,4 @@
-//! Two places of resistance close behind one another.
+//! Two places of resistance close behind one another, and places that a wrong wheel only seems to leave.
 
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
@@ -31,4 +31,14 @@ fn two_places_felt_together_are_reported_with_their_ends_and_are_no_tunnels() {
             assert!(error_m < END_ERROR_MAX_M, "{found_m} for {true_m} m");
         }
     }
+}
+
+#[test]
+fn a_wrong_wheel_leaves_no_force_where_gradients_change() {
+    // 14 and 22 ‰ at two places; by the wheel, positions there are 9 m off.
+    let effects = EffectRequest::Kinds(vec![EffectKind::WheelDiameter]);
+    let simulated = simulate(&SimulatorSettings::new(9003, effects));
+    let answer = explain(&read_files(&dataset_files(&simulated)), &|_, _| ()).unwrap().answer;
+    let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
+    assert_eq!(kinds, [EffectKind::WheelDiameter.name()], "{}", answer.statement);
 }

@@ -8,6 +8,8 @@ use dynocar_tests::simulator::run_maker::RunPlan;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
+use crate::statistics::mean;
+
 /// One parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterGrade {
@@ -42,7 +44,7 @@ pub fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec
         Effect::CurveResistance { k_n_per_kn_m } => {
             vec![one("k_n_per_kn_m", *k_n_per_kn_m, declared.curve_constant_n_per_kn_m)]
         }
-        Effect::Wind { wind_plus_mps, .. } => vec![one("wind_plus_mps", *wind_plus_mps, 0.0)],
+        Effect::Wind { .. } => vec![one("wind_plus_mps", wind_of_the_days(simulated), 0.0)],
         Effect::DraggingBrake { force_n, .. } => vec![one("force_n", *force_n, 0.0)],
         Effect::WheelDiameter { speed_scale } => vec![one("speed_scale", *speed_scale, 1.0)],
         Effect::GradientShift { shift_m } => vec![one("shift_m", *shift_m, 0.0)],
@@ -106,6 +108,13 @@ fn gradient_errors(
 fn disturbances(simulated: &SimulatedDataset, plan: &RunPlan) -> Disturbances {
     let SimulatedDataset { effects, train, line, settings, .. } = simulated;
     Disturbances::of(effects, train, line, plan, settings)
+}
+
+/// Mean wind in m/s towards direction -1 that blew in the fit runs: the effect's and each day's own.
+fn wind_of_the_days(simulated: &SimulatedDataset) -> f64 {
+    let fit_runs = simulated.runs.iter().filter(|run| !run.plan.is_holdout);
+    let winds_mps = fit_runs.map(|run| run.plan.direction * run.disturbances.headwind_mps);
+    mean(&winds_mps.collect::<Vec<f64>>())
 }
 
 /// True over declared mass of a run, the effects aside: how it was loaded that day.

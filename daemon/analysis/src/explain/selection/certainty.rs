@@ -4,7 +4,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::{deviations, scatter_factor};
 use super::price::{at_bound, penalty};
-use crate::explain::effects::OUTSIDE_COST;
+use crate::explain::effects::{OUTSIDE_COST, SharedHypothesis};
 use crate::explain::evidence::{
     CERTAIN_STDS, CERTAIN_STDS_BY_RUN, EQUAL, Fit, SCORE_MIN, acceptance_score,
 };
@@ -40,8 +40,8 @@ pub fn deciding_score(
 /// more from the error; among runs or forms, it is certain only beside the usual errors, which such choices stand for
 /// else. One number a run (an outside temperature) is certain only there, too, where each run has its load and wind.
 /// Never certain are loads, winds and slippery rails, which change from run to run, a late speed, which late forces
-/// look like, a brake beside slippery rails and a local resistance or an unmapped tunnel beside gradients, whose ends
-/// and straight pieces leave such.
+/// look like, a brake beside slippery rails and a local resistance or an unmapped tunnel beside gradients or a wrong
+/// wheel, which leave such where pieces of the line end.
 pub(super) fn is_certain(
     fit: &Fit,
     index: usize,
@@ -51,7 +51,7 @@ pub(super) fn is_certain(
 ) -> bool {
     use EffectKind::{
         DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, TunnelDrag, Unknown,
-        Wind,
+        WheelDiameter, Wind,
     };
     let effect = &fit.model.effects[index];
     // What acts where the map has its tunnels and curves is one number of the line.
@@ -59,16 +59,19 @@ pub(super) fn is_certain(
     let is_by_run = effect.is_one_number_a_run();
     let is_chosen_among_many =
         is_unmapped || matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
-    let is_beside_a_gradient = fit.model.effects.iter().any(|other| other.is_gradient());
+    // Between fixes a position is counted by the wheel.
+    let moves_places =
+        |other: &SharedHypothesis| other.is_gradient() || other.kind() == WheelDiameter;
+    let are_places_moved = fit.model.effects.iter().any(moves_places);
     let is_on_slippery_rails = fit.model.effects.iter().any(|other| other.kind() == LowAdhesion);
     let needs_the_score = match effect.kind() {
         LowAdhesion | MassChange | SpeedDelay | Wind => true,
         DraggingBrake => !is_beside_usual_errors || is_on_slippery_rails,
         Unknown => !is_beside_usual_errors,
         _ if is_by_run => !is_beside_usual_errors,
-        LocalResistance => is_beside_a_gradient,
+        LocalResistance => are_places_moved,
         // There the map's error is beside it.
-        TunnelDrag if is_unmapped => is_beside_a_gradient && !is_beside_usual_errors,
+        TunnelDrag if is_unmapped => are_places_moved && !is_beside_usual_errors,
         _ => false,
     };
     // The size of a form hangs on its shape, what it explains does not.
