@@ -114,7 +114,7 @@ fn disturbances(simulated: &SimulatedDataset, plan: &RunPlan) -> Disturbances {
 fn wind_of_the_days(simulated: &SimulatedDataset) -> f64 {
     let fit_runs = simulated.runs.iter().filter(|run| !run.plan.is_holdout);
     let winds_mps = fit_runs.map(|run| run.plan.direction * run.disturbances.headwind_mps);
-    mean(&winds_mps.collect::<Vec<f64>>())
+    mean(winds_mps.collect::<Vec<f64>>())
 }
 
 /// True over declared mass of a run, the effects aside: how it was loaded that day.

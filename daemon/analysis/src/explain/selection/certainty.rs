@@ -85,7 +85,7 @@ pub(super) fn is_certain(
         _ if is_by_run => true,
         _ => stds_from_none(fit, index) > CERTAIN_STDS,
     };
-    // At most 2.3 where nothing acts; beside the usual errors 2.0 for a brake, 0.3 for a form.
+    // At most 2.3 where nothing acts; beside the usual errors 2.3 for a brake, 2.8 for a tunnel, 0.3 for a form.
     let takes_enough = evidence * reduction > EQUAL;
     let is_sure = if is_by_run {
         // What else sets runs apart may follow what is measured: at most 9.6 where nothing acts.
