@@ -9,7 +9,7 @@ use std::sync::Arc;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{is_material, is_possible};
-use super::certainty::{CERTAIN_RUNS_MIN, is_certain};
+use super::certainty::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
 use super::outcome::{Beside, Outcome, Round, Trial};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
@@ -47,16 +47,6 @@ fn is_sought(kind: EffectKind) -> bool {
             | WheelDiameter
             | Wind
     )
-}
-
-/// Whether the place of a trial, if it has one, is that of a force: beside a wrong wheel or a gradient that was found,
-/// what the map seems to lack looks like an unmapped tunnel.
-fn may_have_a_place(outcome: &Outcome, trial: &Trial) -> bool {
-    use EffectKind::{GradientError, GradientShift, TunnelDrag, WheelDiameter};
-    let shifts_places = |kind| matches!(kind, GradientError | GradientShift | WheelDiameter);
-    let is_unmapped =
-        trial.kind == TunnelDrag && !trial.fit.model.effects[trial.last()].ends().is_empty();
-    !is_unmapped || !outcome.kinds().into_iter().any(shifts_places)
 }
 
 impl Search<'_> {
@@ -106,7 +96,11 @@ impl Search<'_> {
             Asked { is_asked: &|kind| is_sought(kind) && !fallen.contains(&kind), rivals_of: None },
         );
         let may_be = |trial: &&Trial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
-        let may_stand = |trial: &&Trial| may_be(trial) && may_have_a_place(outcome, trial);
+        // What a wrong wheel or gradient leaves looks like an unmapped tunnel.
+        let are_places_moved = outcome.fit.model.effects.iter().any(moves_places);
+        let is_unmapped =
+            |trial: &Trial| is_unmapped_tunnel(&trial.fit.model.effects[trial.last()]);
+        let may_stand = |trial: &&Trial| may_be(trial) && !(are_places_moved && is_unmapped(trial));
         let may_be_certain = tried.iter().filter(may_stand);
         let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));

@@ -51,17 +51,13 @@ pub(super) fn is_certain(
 ) -> bool {
     use EffectKind::{
         DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, TunnelDrag, Unknown,
-        WheelDiameter, Wind,
+        Wind,
     };
     let effect = &fit.model.effects[index];
-    // What acts where the map has its tunnels and curves is one number of the line.
-    let is_unmapped = effect.kind() == TunnelDrag && !effect.ends().is_empty();
+    let is_unmapped = is_unmapped_tunnel(effect);
     let is_by_run = effect.is_one_number_a_run();
     let is_chosen_among_many =
         is_unmapped || matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
-    // Between fixes a position is counted by the wheel.
-    let moves_places =
-        |other: &SharedHypothesis| other.is_gradient() || other.kind() == WheelDiameter;
     let are_places_moved = fit.model.effects.iter().any(moves_places);
     let is_on_slippery_rails = fit.model.effects.iter().any(|other| other.kind() == LowAdhesion);
     let needs_the_score = match effect.kind() {
@@ -97,6 +93,17 @@ pub(super) fn is_certain(
     };
     let has_runs = fit.runs.len() >= CERTAIN_RUNS_MIN;
     is_sure && !needs_the_score && has_runs && is_shown(fit, index) && runs_agree()
+}
+
+/// Whether an effect leaves a force where pieces of the line end: a gradient, or a wheel by which positions are counted
+/// between fixes.
+pub(super) fn moves_places(effect: &SharedHypothesis) -> bool {
+    effect.is_gradient() || effect.kind() == EffectKind::WheelDiameter
+}
+
+/// Whether an effect is the drag of a tunnel that was chosen; where the map has its tunnels, it is one number of the line.
+pub(super) fn is_unmapped_tunnel(effect: &SharedHypothesis) -> bool {
+    effect.kind() == EffectKind::TunnelDrag && !effect.ends().is_empty()
 }
 
 /// Size of an effect in standard deviations by the scatter between the runs.
