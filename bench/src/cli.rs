@@ -18,7 +18,7 @@ use crate::papers::PapersArguments;
 use crate::scenarios::ScenariosArguments;
 use crate::survey::SurveyArguments;
 
-/// Measures Dynocar: accuracy against the statistical bound, speed against peers.
+/// Measures Dynocar: accuracy against the statistical bound, speed, latency against the floor.
 #[derive(Debug, Parser)]
 #[command(name = "dynocar-bench", version, about)]
 struct Arguments {

@@ -2,7 +2,7 @@
 //!
 //! - [`cli`]: the commands of `dynocar-bench`
 //! - `drive`: what an automatic driver gains
-//! - `estimators`: speed of every estimator compared with peers
+//! - `estimators`: time of an update of every estimator and pipeline
 //! - `explain`: the search for undeclared effects on simulated datasets
 //! - `latency`: sample → snapshot through real processes, compared with the floor and alternatives
 //! - `load`: many trains against one daemon

@@ -38,6 +38,23 @@ pub fn named<T: Copy>(option: &str, name: &str, all: &[(&str, T)]) -> Result<T, 
     })
 }
 
+/// Those of all whose name contains a text.
+///
+/// # Errors
+///
+/// When none does.
+pub fn containing<T>(
+    option: &str,
+    text: &str,
+    mut all: Vec<T>,
+    name: impl Fn(&T) -> String,
+) -> Result<Vec<T>, Failure> {
+    all.retain(|it| name(it).contains(text));
+    let what = option.trim_start_matches('-');
+    expect(!all.is_empty(), || format!("{option} {text}: expected a part of a {what}'s name"))?;
+    Ok(all)
+}
+
 /// Says during what an error happened.
 pub fn during<E: Display>(what: impl Display) -> impl FnOnce(E) -> Failure {
     move |error| format!("{what}: {error}").into()

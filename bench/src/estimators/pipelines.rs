@@ -1,15 +1,23 @@
-//! Every kind of pipeline over a run of the demonstration dataset, from sample to snapshot.
+//! Every kind of pipeline over a run of the demonstration dataset, from sample to snapshot; and the filter of the mass
+//! over the same run.
 
+use std::hint::black_box;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use dynocar_analysis::dataset::{DATASET_TRAIN, DatasetError, DatasetHead};
 use dynocar_estimators::EstimatorSettings;
+use dynocar_estimators::wang::MassKalmanSettings;
+use dynocar_estimators::wang::bias_bank::{BiasBank, Dynamics};
+use dynocar_estimators::wang::inertia::Inertia;
+use dynocar_estimators::wang::line_resistance::LineResistance;
+use dynocar_estimators::wang::motion::Motion;
 use dynocar_model::track::Track;
 use dynocar_model::train::{BrakeGear, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 
-use super::measure::{Agreement, Case, Contender};
-use crate::rig::pipelines::default_pipeline;
+use super::measure::Case;
+use crate::rig::pipelines::{default_pipeline, resolving};
 
 /// The files of the dataset that is measured on.
 const FILES: &[(&str, &str)] = &[
@@ -19,10 +27,9 @@ const FILES: &[(&str, &str)] = &[
     ("runs/01.csv", include_str!("../../../config/demo/runs/01.csv")),
 ];
 
-/// A run with its train and line.
-pub struct DemoRun {
-    /// The train, with a brake gear, so that brake pipelines have something to learn.
-    pub train: Arc<TrainModel>,
+/// A run with its train, which has a brake gear, so that brake pipelines have something to learn, and its line.
+struct DemoRun {
+    train: Arc<TrainModel>,
     track: Option<Arc<Track>>,
     samples: Vec<TrainSample>,
 }
@@ -33,7 +40,7 @@ impl DemoRun {
     /// # Errors
     ///
     /// When the dataset is wrong.
-    pub fn read() -> Result<Arc<Self>, DatasetError> {
+    fn read() -> Result<Rc<Self>, DatasetError> {
         let head = DatasetHead::open(FILES)?;
         let run = head.read_run(FILES, 0)?;
         let mut train = (*head.train).clone();
@@ -47,32 +54,67 @@ impl DemoRun {
             pads: Some(48.0),
             friction_brake: None,
         };
-        Ok(Arc::new(DemoRun { train: Arc::new(train), track: head.track, samples: run.samples }))
+        Ok(Rc::new(DemoRun { train: Arc::new(train), track: head.track, samples: run.samples }))
     }
 
     /// Runs a pipeline over all samples.
     fn process(&self, kind: PipelineKind) -> ParameterSnapshot {
         let mut pipeline = default_pipeline(kind, DATASET_TRAIN, &self.train, self.track.clone());
         for sample in &self.samples {
-            std::hint::black_box(pipeline.process(sample));
+            black_box(pipeline.process(sample));
         }
         *pipeline.snapshot()
     }
+
+    /// The motion at every sample that has one.
+    fn motions(&self) -> Vec<Motion> {
+        let mut resolve = resolving(DATASET_TRAIN, &self.train, self.track.clone());
+        let motion = |sample| Motion::of(&resolve(sample)?).ok();
+        self.samples.iter().filter_map(motion).collect()
+    }
 }
 
-/// One case for each kind that can be built.
-pub fn cases(run: &Arc<DemoRun>) -> Vec<Case> {
-    let can_be_built = |kind: &&PipelineKind| EstimatorSettings::default_of(**kind).is_some();
-    let all = PipelineKind::ALL.iter().filter(can_be_built);
-    all.map(|&kind| {
-        let name = format!("pipeline {kind}");
-        let ours = Contender::new("ours", run.samples.len(), run, move |run| {
-            let snapshot = run.process(kind);
-            vec![snapshot.samples_used as f64, snapshot.updates as f64]
-        });
-        Case::new(name, Agreement::Absolute(0.0), ours)
+/// Every kind that can be built.
+fn kinds() -> impl Iterator<Item = PipelineKind> {
+    let can_be_built = |kind: &PipelineKind| EstimatorSettings::default_of(*kind).is_some();
+    PipelineKind::ALL.iter().copied().filter(can_be_built)
+}
+
+/// The filter of the mass, and one case for each kind of pipeline.
+///
+/// # Errors
+///
+/// When the dataset is wrong.
+pub fn cases() -> Result<Vec<Case>, DatasetError> {
+    let run = DemoRun::read()?;
+    let of = |kind: PipelineKind| {
+        let run = Rc::clone(&run);
+        Case::new(format!("pipeline {kind}"), run.samples.len(), move || run.process(kind))
+    };
+    Ok(std::iter::once(mass_filter(&run)).chain(kinds().map(of)).collect())
+}
+
+/// Variance of a measured speed in (m/s)².
+const SPEED_VARIANCE: f64 = 4e-4;
+/// Time in s between samples.
+const STEP_S: f64 = 0.2;
+
+/// Eight behaviours of a bias side by side.
+fn mass_filter(run: &DemoRun) -> Case {
+    let train = &run.train;
+    let dynamics =
+        Dynamics { resistance: LineResistance::declared(train), inertia: Inertia::of(train) };
+    let motions = run.motions();
+    Case::new("mass Kalman step, 8 behaviours", motions.len() - 1, move || {
+        let models = MassKalmanSettings::default().bias_models();
+        let mut bank = BiasBank::new(dynamics, models, (1.0, 0.2), 3000.0);
+        bank.restart_speed(motions[0].speed_mps, SPEED_VARIANCE);
+        for pair in motions.windows(2) {
+            bank.predict(&pair[0], &pair[1], STEP_S);
+            bank.measure(pair[1].speed_mps, SPEED_VARIANCE).expect("a sound speed");
+        }
+        bank.moments()
     })
-    .collect()
 }
 
 #[cfg(test)]
@@ -80,13 +122,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_pipeline_uses_samples_of_the_run() {
+    fn every_pipeline_uses_samples_of_the_run_and_the_train_moves_in_most() {
         let run = DemoRun::read().unwrap();
-        let mut cases = cases(&run);
-        assert!(cases.len() > 10);
-        for case in &mut cases {
-            let answer = (case.ours.pass)();
-            assert!(answer[0] > 0.0, "{}: {answer:?}", case.name);
+        assert!(kinds().count() > 10);
+        for kind in kinds() {
+            assert!(run.process(kind).samples_used > 0, "{kind}");
         }
+        assert!(2 * run.motions().len() > run.samples.len());
     }
 }

@@ -20,11 +20,16 @@ const TRAIN: TrainId = TrainId(1);
 /// Calls that are timed together, so that the clock's own cost is spread.
 const CALLS: u64 = 256;
 
+/// So many pipelines are many.
+pub const MANY: u32 = 16;
+
 /// Costs in ns, each the median over batches or calls.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Costs {
     /// One poll when nothing has come, one pipeline.
     pub poll_without_news_ns: f64,
+    /// The same of [`MANY`] pipelines.
+    pub poll_of_many_without_news_ns: f64,
     /// One poll that takes a snapshot.
     pub poll_with_news_ns: f64,
     /// One publish, to one awake pipeline thread.
@@ -33,7 +38,8 @@ pub struct Costs {
 
 /// Both ends of a train's channels in one process.
 struct Ends {
-    snapshots: Sender<ParameterSnapshot>,
+    /// One for each pipeline.
+    snapshots: Vec<Sender<ParameterSnapshot>>,
     samples: Receiver<TrainSample>,
     publisher: SamplePublisher,
     reader: SnapshotReader,
@@ -42,25 +48,32 @@ struct Ends {
 }
 
 impl Ends {
-    fn open() -> Result<Self, Failure> {
+    /// Of a train with so many pipelines, each of which has answered.
+    fn open(pipelines: u32) -> Result<Self, Failure> {
         let site = site();
         let transport = Transport::open(&site.host(), "dynocar-bench-costs")?;
         let mut snapshot = ParameterSnapshot::empty();
         snapshot.train_id = TRAIN.0;
         snapshot.pipeline_kind = PipelineKind::Rls as u32;
-        Ok(Ends {
-            snapshots: transport.sender(TRAIN)?,
+        let senders = (0..pipelines).map(|_| transport.sender(TRAIN));
+        let mut ends = Ends {
+            snapshots: senders.collect::<Result<_, _>>()?,
             samples: transport.receiver(TRAIN)?,
             publisher: SamplePublisher::open(&site.host(), TRAIN)?,
             reader: SnapshotReader::open(&site.host(), TRAIN)?,
             snapshot,
             _site: site,
-        })
+        };
+        for (sender, pipeline_index) in ends.snapshots.iter().zip(0..) {
+            sender.send(&ParameterSnapshot { pipeline_index, ..snapshot })?;
+        }
+        ends.reader.poll();
+        Ok(ends)
     }
 
     fn send_snapshot(&mut self) -> Result<(), Failure> {
         self.snapshot.sequence += 1;
-        Ok(self.snapshots.send(&self.snapshot)?)
+        Ok(self.snapshots[0].send(&self.snapshot)?)
     }
 }
 
@@ -70,7 +83,7 @@ impl Ends {
 ///
 /// When a channel cannot be used.
 pub fn measure(batches: usize) -> Result<Costs, Failure> {
-    let mut ends = Ends::open()?;
+    let (mut ends, mut of_many) = (Ends::open(1)?, Ends::open(MANY)?);
     let mut sample = TrainSample::empty(TRAIN);
     for _ in 0..100 {
         ends.send_snapshot()?;
@@ -83,6 +96,8 @@ pub fn measure(batches: usize) -> Result<Costs, Failure> {
     };
     let clock_ns = of_batches(&mut || _ = std::hint::black_box(monotonic_now_ns()));
     let poll_without_news_ns = of_batches(&mut || _ = std::hint::black_box(ends.reader.poll()));
+    let poll_of_many_without_news_ns =
+        of_batches(&mut || _ = std::hint::black_box(of_many.reader.poll()));
     let (mut with_news, mut publish) = (Vec::new(), Vec::new());
     for _ in 0..batches {
         for _ in 0..CALLS {
@@ -100,6 +115,7 @@ pub fn measure(batches: usize) -> Result<Costs, Failure> {
     }
     Ok(Costs {
         poll_without_news_ns,
+        poll_of_many_without_news_ns,
         poll_with_news_ns: median(with_news).map_or(f64::NAN, |ns| (ns - clock_ns).max(0.0)),
         publish_ns: median(publish).unwrap_or(f64::NAN),
     })

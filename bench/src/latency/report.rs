@@ -4,7 +4,7 @@ use hdrhistogram::Histogram;
 use serde_json::{Value, json};
 
 use super::case::{Case, Outcome};
-use super::costs::{AtRest, Costs};
+use super::costs::{AtRest, Costs, MANY};
 use super::schedule::{Schedule, Slice};
 use crate::output::{Record, table};
 use crate::rig::cores::Cores;
@@ -56,8 +56,12 @@ pub fn of(measured: &Measured) -> (Value, String) {
             table(&records)
         ),
         format!(
-            "One poll without news {:.0} ns, with news {:.0} ns; one publish {:.0} ns",
-            costs.poll_without_news_ns, costs.poll_with_news_ns, costs.publish_ns
+            "One poll without news {:.0} ns, of {MANY} pipelines {:.0} ns, with news {:.0} ns; one \
+             publish {:.0} ns",
+            costs.poll_without_news_ns,
+            costs.poll_of_many_without_news_ns,
+            costs.poll_with_news_ns,
+            costs.publish_ns
         ),
     ];
     let at_rest = at_rest.iter();

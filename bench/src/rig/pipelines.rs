@@ -5,9 +5,11 @@ use std::sync::Arc;
 use dynocar::config::is_slow;
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
+use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::{PipelineKind, TrainId};
+use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_shared::{PipelineKind, TrainId, TrainSample};
 
 use crate::output::{Failure, named};
 
@@ -25,6 +27,18 @@ pub fn default_pipeline(
     let settings = EstimatorSettings::default_of(kind).expect("the kind can be built");
     let estimator = settings.build(train).expect("default settings are in range");
     Pipeline::new(id, 0, Arc::clone(train), track, estimator)
+}
+
+/// From samples of a train to what its estimators take in; `None` for one that is refused.
+pub fn resolving(
+    id: TrainId,
+    train: &Arc<TrainModel>,
+    track: Option<Arc<Track>>,
+) -> impl FnMut(&TrainSample) -> Option<ResolvedSample> {
+    let limits = ValidationLimits::for_train(train.mass_kg);
+    let mut validator = Validator::new(id, train.mass_kg, limits);
+    let mut resolver = ForceResolver::new(Arc::clone(train), track);
+    move |sample| Some(resolver.resolve(&validator.check(sample).ok()?))
 }
 
 /// Every pipeline that estimates and whose step is short: they may share a thread.

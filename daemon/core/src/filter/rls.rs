@@ -198,6 +198,24 @@ mod tests {
     }
 
     #[test]
+    fn directional_forgetting_is_its_formula_with_an_inverse() {
+        let factor = 0.98;
+        let mut rls =
+            Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), Forgetting::Directional(factor));
+        let (mut theta, mut p) = (Vector3::zeros(), Matrix3::identity() * 1e4);
+        for (features, observed) in rows(200) {
+            rls.update(&features, observed).unwrap();
+            let held = features.dot(&(p.try_inverse().unwrap() * features));
+            p += features * features.transpose() * ((1.0 - factor) / (factor * held));
+            let gain = p * features / (1.0 + features.dot(&(p * features)));
+            theta += gain * (observed - features.dot(&theta));
+            p = (Matrix3::identity() - gain * features.transpose()) * p;
+        }
+        assert!((rls.estimate() - theta).norm() < 1e-6 * theta.norm());
+        assert!((rls.covariance() - p).norm() < 1e-6 * p.norm());
+    }
+
+    #[test]
     fn information_along_a_direction_is_that_of_the_inverse() {
         let covariance = Matrix3::new(4.0, 1.0, -0.5, 1.0, 3.0, 0.7, -0.5, 0.7, 2.0);
         let along = Vector3::new(0.3, -1.0, 2.0);
