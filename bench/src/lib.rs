@@ -13,8 +13,10 @@
 //! - `survey`: how the work of a survey grows with passes
 //! - [`output`]: results for people and for machines, and failures
 //! - `parallel`: the same work over many cases, on some threads
-//! - `statistics`: means, quantiles and random numbers over seeded runs
+//! - `statistics`: means and quantiles over seeded runs
+//! - `chance`: random numbers
 
+mod chance;
 pub mod cli;
 mod drive;
 mod estimators;

@@ -1,9 +1,6 @@
-//! Means, quantiles, differences and random numbers over seeded runs.
+//! Means, quantiles and differences over seeded runs.
 
 use std::borrow::Borrow;
-
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 /// m/s of one km/h.
 pub const KMH: f64 = 1.0 / 3.6;
@@ -65,12 +62,6 @@ pub fn jacobian<const N: usize>(
         }
     }
     rows
-}
-
-/// A standard normal number.
-pub fn normal(random: &mut ChaCha8Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
 }
 
 #[cfg(test)]

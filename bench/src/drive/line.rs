@@ -4,13 +4,11 @@ use dynocar_core::pipeline::braking::gear::DeclaredGear;
 use dynocar_model::train::{BrakeGear, EffortCurve, TrainModel};
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{RailCondition, Uncertain};
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::Ability;
+use crate::chance::Chance;
 use crate::output::Record;
 use crate::scenarios::world::{BRAKE_STD, LoadSource, Scenario, Traffic, World};
-use crate::statistics::normal;
 
 /// What is particular about brakes, rail or daemon.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -180,22 +178,22 @@ pub struct Hidden {
 
 impl Hidden {
     /// Draws it for a world.
-    pub fn draw(service: &Service, world: &World, random: &mut ChaCha8Rng) -> Self {
+    pub fn draw(service: &Service, world: &World, random: &mut Chance) -> Self {
         let end_m = world.stops_m[world.stops_m.len() - 1];
         let rail = match service.condition.is_wet {
-            true => (RailCondition::Wet, (0.75 + 0.1 * normal(random)).clamp(0.55, 1.0)),
-            false => (RailCondition::Dry, 1.0 + 0.05 * normal(random)),
+            true => (RailCondition::Wet, (0.75 + 0.1 * random.normal()).clamp(0.55, 1.0)),
+            false => (RailCondition::Dry, 1.0 + 0.05 * random.normal()),
         };
         let wind_std_mps = match service.traffic {
             Traffic::Metro => 0.0,
             Traffic::Emu | Traffic::Freight => 3.0,
             Traffic::HighSpeed => 5.0,
         };
-        let sections = |count: usize, lengths_m: (f64, f64), random: &mut ChaCha8Rng| {
+        let sections = |count: usize, lengths_m: (f64, f64), random: &mut Chance| {
             let piece_m = end_m / count.max(1) as f64;
             let draw = |k: usize| {
-                let length_m = lengths_m.0 + (lengths_m.1 - lengths_m.0) * random.random::<f64>();
-                let from_m = piece_m * k as f64 + 0.5 * random.random::<f64>() * piece_m;
+                let length_m = lengths_m.0 + (lengths_m.1 - lengths_m.0) * random.uniform();
+                let from_m = piece_m * k as f64 + 0.5 * random.uniform() * piece_m;
                 (from_m, from_m + length_m)
             };
             (0..count).map(draw).collect::<Vec<_>>()
@@ -205,15 +203,15 @@ impl Hidden {
         let curves = if service.traffic == Traffic::HighSpeed { 0.0 } else { end_m / 1500.0 };
         let curves_m = sections(curves as usize, (200.0, 600.0), random)
             .into_iter()
-            .map(|(from_m, to_m)| (from_m, to_m, 350.0 + 900.0 * random.random::<f64>()))
+            .map(|(from_m, to_m)| (from_m, to_m, 350.0 + 900.0 * random.uniform()))
             .collect();
         Hidden {
-            brake_scale: service.condition.brake_scale * (1.0 + BRAKE_STD * normal(random)),
+            brake_scale: service.condition.brake_scale * (1.0 + BRAKE_STD * random.normal()),
             rail,
-            wind_mps: wind_std_mps * normal(random),
+            wind_mps: wind_std_mps * random.normal(),
             tunnels_m,
             curves_m,
-            curve_constant: 600.0 * (1.0 + 0.15 * normal(random)),
+            curve_constant: 600.0 * (1.0 + 0.15 * random.normal()),
         }
     }
 
@@ -237,10 +235,10 @@ impl Hidden {
 }
 
 /// Gross mass in kg of the next load.
-pub fn next_load_kg(traffic: Traffic, before_kg: f64, random: &mut ChaCha8Rng) -> f64 {
+pub fn next_load_kg(traffic: Traffic, before_kg: f64, random: &mut Chance) -> f64 {
     match traffic {
         // From empty to full.
-        Traffic::Metro => traffic.declared().mass_kg * (0.8 + 0.5 * random.random::<f64>()),
+        Traffic::Metro => traffic.declared().mass_kg * (0.8 + 0.5 * random.uniform()),
         _ => before_kg,
     }
 }

@@ -1,12 +1,10 @@
 //! What the legs of all trains come to, with intervals.
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-
 use super::answers::ASKED;
 use super::journey::DrivenLeg;
 use super::line::Service;
 use super::run::{Driven, Informant};
+use crate::chance::Chance;
 use crate::output::Record;
 use crate::scenarios::score::{Score, Scores};
 use crate::statistics::quantiles;
@@ -51,9 +49,8 @@ fn figures<const N: usize>(
     statistics: impl Fn(&[usize]) -> [f64; N],
 ) -> [Figure; N] {
     let all: Vec<usize> = (0..trains).collect();
-    let mut random = ChaCha8Rng::seed_from_u64(95);
-    let mut draw =
-        || -> Vec<usize> { all.iter().map(|_| random.random_range(0..trains)).collect() };
+    let mut random = Chance::new(95);
+    let mut draw = || -> Vec<usize> { all.iter().map(|_| random.within(0..trains)).collect() };
     let draws: Vec<[f64; N]> = (0..DRAWS).map(|_| statistics(&draw())).collect();
     let values = statistics(&all);
     std::array::from_fn(|which| {

@@ -7,14 +7,12 @@ use dynocar_model::simulate::motion::{Motion, advance};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use super::knowledge::{Ability, Knowledge};
 use super::line::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::plan::{Leg, PIECE_M};
+use crate::chance::Chance;
 use crate::scenarios::world::{LoadSource, STOP_TO_STOP_STD, WEIGHING_STD, World};
-use crate::statistics::normal;
 
 /// Longest step of the simulation in s.
 const STEP_MAX_S: f64 = 0.02;
@@ -36,7 +34,7 @@ pub struct Train {
     /// What it can do, as declared.
     pub ability: Ability,
     seed: u64,
-    random: ChaCha8Rng,
+    random: Chance,
     next_stop: usize,
     direction: f64,
     start_m: f64,
@@ -59,7 +57,7 @@ impl Train {
     /// A train at the first stop.
     pub fn new(service: Service, seed: u64) -> Self {
         let world = World::draw(service.scenario(), seed);
-        let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x6472_6976_6572);
+        let mut random = Chance::new(seed ^ 0x6472_6976_6572);
         let hidden = Hidden::draw(&service, &world, &mut random);
         let declared = service.declared();
         let start_m = world.stops_m[0];
@@ -94,11 +92,11 @@ impl Train {
     fn load(&mut self) {
         self.legs += 1;
         let of_leg = self.seed ^ self.legs.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        self.random = ChaCha8Rng::seed_from_u64(of_leg);
+        self.random = Chance::new(of_leg);
         let random = &mut self.random;
         self.mass_kg = next_load_kg(self.service.traffic, self.mass_kg, random);
         let scale = match self.world.scenario.load {
-            LoadSource::Changing => 1.0 + WEIGHING_STD * normal(random),
+            LoadSource::Changing => 1.0 + WEIGHING_STD * random.normal(),
             LoadSource::Weighed(permille) => {
                 // One weighing, wrong the same way all day.
                 let sign = if self.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -107,8 +105,8 @@ impl Train {
             LoadSource::Exact | LoadSource::Unknown => 1.0,
         };
         self.weighed_kg = scale * self.mass_kg;
-        self.brake_scale = self.hidden.brake_scale * (1.0 + STOP_TO_STOP_STD * normal(random));
-        self.balise_m = BALISE_STD_M * normal(random);
+        self.brake_scale = self.hidden.brake_scale * (1.0 + STOP_TO_STOP_STD * random.normal());
+        self.balise_m = BALISE_STD_M * random.normal();
         self.energy_j = 0.0;
     }
 
@@ -242,12 +240,12 @@ impl Train {
         let World { scenario, speed_scale, .. } = &self.world;
         let speed_mps = match self.motion.speed_mps > 0.0 {
             true => {
-                let noise_mps = scenario.speed_noise_mps * normal(&mut self.random);
+                let noise_mps = scenario.speed_noise_mps * self.random.normal();
                 (speed_scale * self.motion.speed_mps + noise_mps).max(0.0)
             }
             false => 0.0,
         };
-        let noise_m = scenario.position_noise_m * normal(&mut self.random);
+        let noise_m = scenario.position_noise_m * self.random.normal();
         let place_m = self.chainage_m() + self.balise_m + noise_m;
         let mut sample = TrainSample::empty(TrainId(1));
         sample.time_ns =

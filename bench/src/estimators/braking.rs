@@ -3,7 +3,6 @@
 
 use std::rc::Rc;
 
-use dynocar_core::filter::random::Random;
 use dynocar_core::pipeline::braking::engine::{Engine, Observation};
 use dynocar_core::pipeline::braking::law::Law;
 use dynocar_core::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
@@ -12,6 +11,7 @@ use dynocar_estimators::xie::{EmModel, EmWindow, KalmanExpectation, ParticleExpe
 use dynocar_shared::Uncertain;
 
 use super::measure::Case;
+use crate::chance::Chance;
 
 /// Samples of a window.
 const SAMPLES: usize = 40;
@@ -45,7 +45,7 @@ const INPUTS: StepInputs = StepInputs {
 
 /// Observations of a braking with a constant coefficient.
 fn braking(samples: usize, seed: u64) -> Vec<Observation> {
-    let mut random = Random::new(seed);
+    let mut random = Chance::new(seed);
     let (mut distance_m, mut speed_mps) = (0.0, FIRST_MPS);
     let distance_std = (NOISE.distance_m2_per_s * INPUTS.step_s).sqrt();
     let speed_std = (NOISE.speed_m2_per_s3 * INPUTS.step_s).sqrt();

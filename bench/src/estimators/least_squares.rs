@@ -2,11 +2,11 @@
 
 use std::rc::Rc;
 
-use dynocar_core::filter::random::Random;
 use dynocar_core::filter::{Forgetting, Mils, Penalty, Rls};
 use nalgebra::Vector3;
 
 use super::measure::Case;
+use crate::chance::Chance;
 
 type Row = (Vector3<f64>, f64);
 
@@ -21,7 +21,7 @@ const FORGETTING: f64 = 0.9998;
 
 /// Resistance over speeds of 5 to 35 m/s in units of 20 m/s, as coasting shows it.
 fn rows() -> Rc<[Row]> {
-    let mut random = Random::new(7);
+    let mut random = Chance::new(7);
     (0..ROWS)
         .map(|_| {
             let speed = 0.25 + 1.5 * random.uniform();

@@ -2,7 +2,6 @@
 
 use std::rc::Rc;
 
-use dynocar_core::filter::random::Random;
 use dynocar_estimators::xia::trajectory::bank::{JumpBank, JumpModel};
 use dynocar_estimators::xia::trajectory::fit::{
     DavisPrior, FitSettings, MotionSegment, TrajectoryFitter,
@@ -16,6 +15,7 @@ use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::measure::Case;
+use crate::chance::Chance;
 
 /// Rotating-mass factor of every run.
 const ROTATING_MASS_FACTOR: f64 = 0.06;
@@ -56,7 +56,7 @@ fn run(
 
 /// The cases of this module.
 pub fn cases() -> Vec<Case> {
-    let mut random = Random::new(3);
+    let mut random = Chance::new(3);
     // Traction and coasting by turns; the resistance grows by half midway.
     let at = |index| {
         let rain = if index < STEPS / 2 { 1.0 } else { 1.5 };
@@ -141,7 +141,7 @@ const FIT_NOISE_MPS: f64 = 0.18;
 
 /// Fits over windows of so many samples, each from the coefficients that the window before gave.
 fn fit(samples: usize) -> Case {
-    let mut random = Random::new(samples as u64);
+    let mut random = Chance::new(samples as u64);
     let truth = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
     let at = |index| (if (index / 15) % 2 == 0 { 0.25 } else { 0.0 }, truth);
     // Of bounded size, so that nothing is an outlier.

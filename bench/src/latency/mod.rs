@@ -31,12 +31,10 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar::config::IdleStrategy;
 use dynocar::output::report_line;
-use rand::SeedableRng;
-use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 
 use self::report::Measured;
 use self::schedule::Schedule;
+use crate::chance::Chance;
 use crate::output::{Failure, expect, give};
 use crate::rig::cores::{CoreArguments, Cores, bind, in_thread, prioritise};
 
@@ -119,13 +117,11 @@ impl LatencyArguments {
             prioritise(cores.priority);
             costs::measure(choose(20.0, 400.0) as usize)
         })?;
-        let mut random = ChaCha8Rng::seed_from_u64(self.place.seed);
+        let mut random = Chance::new(self.place.seed);
         let rounds = self.rounds.unwrap_or(choose(1.0, 15.0) as usize);
         for round in 1..=rounds {
             report_line(&format!("round {round} of {rounds}"));
-            let mut order: Vec<usize> = (0..cases.len()).collect();
-            order.shuffle(&mut random);
-            for index in order {
+            for index in random.order(cases.len()) {
                 let outcome = in_thread(|| case::measure(&cases[index].0, cores, &schedule))?;
                 cases[index].1.push(outcome);
             }

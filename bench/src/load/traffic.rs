@@ -1,9 +1,8 @@
 //! When a train's samples leave, and which of them are bad.
 
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
+use crate::chance::Chance;
 use crate::rig::motion::Motion;
 
 /// The traffic of every train.
@@ -24,7 +23,7 @@ pub struct TrafficPlan {
 pub struct Traffic {
     plan: TrafficPlan,
     motion: Motion,
-    random: ChaCha8Rng,
+    random: Chance,
     start_ns: i64,
     number: u64,
     next_ns: i64,
@@ -34,7 +33,7 @@ impl Traffic {
     /// Traffic from a time on; trains start evenly spread over the first period.
     pub fn new(plan: TrafficPlan, train: TrainId, spread: f64, start_ns: i64, seed: u64) -> Self {
         let start_ns = start_ns + (spread * 1e9 / plan.rate_hz) as i64;
-        let random = ChaCha8Rng::seed_from_u64(seed ^ train.0.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let random = Chance::new(seed ^ train.0.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let mut traffic = Traffic {
             plan,
             motion: Motion::of(train, start_ns),
@@ -55,8 +54,8 @@ impl Traffic {
     /// The next sample, with the time it was to leave.
     pub fn take(&mut self) -> (TrainSample, i64) {
         let mut sample = self.motion.sample(self.measured_ns(self.number));
-        if self.plan.bad_share > 0.0 && self.random.random::<f64>() < self.plan.bad_share {
-            spoil(&mut sample, self.random.random_range(0..KINDS_OF_BAD));
+        if self.plan.bad_share > 0.0 && self.random.uniform() < self.plan.bad_share {
+            spoil(&mut sample, self.random.within(0..KINDS_OF_BAD));
         }
         let appointed_ns = self.next_ns;
         self.number += 1;
@@ -73,7 +72,7 @@ impl Traffic {
         let burst = self.plan.burst.max(1);
         let last_of_burst = (self.number / burst + 1) * burst - 1;
         let jitter_ns = match self.number % burst {
-            0 => self.random.random::<f64>() * self.plan.jitter * 1e9 / self.plan.rate_hz,
+            0 => self.random.uniform() * self.plan.jitter * 1e9 / self.plan.rate_hz,
             _ => 0.0,
         };
         let appointed_ns = self.measured_ns(last_of_burst) + jitter_ns as i64;

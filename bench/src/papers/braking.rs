@@ -10,10 +10,9 @@ use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::WalkSettings;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::RailCondition;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
-use crate::statistics::{KMH, normal};
+use crate::chance::Chance;
+use crate::statistics::KMH;
 
 /// Time in s between two measurements.
 pub const STEP_S: f64 = 0.2;
@@ -154,15 +153,15 @@ impl Braking {
 
     /// Simulates one braking.
     pub fn simulate(&self, seed: u64) -> Vec<Moment> {
-        self.integrate(&mut ChaCha8Rng::seed_from_u64(seed), 1.0)
+        self.integrate(&mut Chance::new(seed), 1.0)
     }
 
     /// The braking without process and measurement noise.
     pub fn nominal(&self) -> Vec<Moment> {
-        self.integrate(&mut ChaCha8Rng::seed_from_u64(0), 0.0)
+        self.integrate(&mut Chance::new(0), 0.0)
     }
 
-    fn integrate(&self, random: &mut ChaCha8Rng, noise: f64) -> Vec<Moment> {
+    fn integrate(&self, random: &mut Chance, noise: f64) -> Vec<Moment> {
         let train = train();
         let gravity_mps2 = 1000.0 * TrainModel::weight_kn(1.0);
         let full_mps2 = declared(BrakingCoefficient::Adhesion) * gravity_mps2;
@@ -172,7 +171,7 @@ impl Braking {
         let mut share = DRAWN_SHARE;
         let drawn = self.drawn.unwrap_or_default();
         let mut drift = match drawn.drift_std_per_s > 0.0 {
-            true => noise * drawn.drift_std_per_s * normal(random),
+            true => noise * drawn.drift_std_per_s * random.normal(),
             false => 0.0,
         };
         let mut moments = Vec::new();
@@ -191,19 +190,19 @@ impl Braking {
                 time_s,
                 speed_mps,
                 position_m,
-                measured_m: position_m + noise * POSITION_STD_M * normal(random),
-                measured_mps: speed_mps + noise * SPEED_NOISE_MPS * uniform(random),
+                measured_m: position_m + noise * POSITION_STD_M * random.normal(),
+                measured_mps: speed_mps + noise * SPEED_NOISE_MPS * random.either_way(),
                 truth,
                 is_scored: speed_mps <= self.scored_from_kmh * KMH && is_rail_limited,
             });
             let resistance = 1e-3 * gravity_mps2 * train.resistance.w0_n_per_kn(speed_mps);
             let after_mps = speed_mps - STEP_S * (achieved * full_mps2 + resistance);
-            position_m +=
-                0.5 * STEP_S * (speed_mps + after_mps) + noise * POSITION_NOISE_M * uniform(random);
-            speed_mps = after_mps + noise * SPEED_NOISE_MPS * uniform(random);
+            position_m += 0.5 * STEP_S * (speed_mps + after_mps)
+                + noise * POSITION_NOISE_M * random.either_way();
+            speed_mps = after_mps + noise * SPEED_NOISE_MPS * random.either_way();
             time_s += STEP_S;
             if self.drawn.is_some() {
-                let by_chance = noise * normal(random);
+                let by_chance = noise * random.normal();
                 share += STEP_S * drift + drawn.share_std * by_chance;
                 drift = drawn.kept * drift + drawn.gained_std_per_s * by_chance;
             }
@@ -223,9 +222,4 @@ pub fn declared(sought: BrakingCoefficient) -> f64 {
         BrakingCoefficient::Friction => gear.friction,
         BrakingCoefficient::Ratio => gear.ratio,
     }
-}
-
-/// Uniform in -1 to 1.
-pub fn uniform(random: &mut ChaCha8Rng) -> f64 {
-    2.0 * random.random::<f64>() - 1.0
 }

@@ -4,10 +4,8 @@ use std::collections::VecDeque;
 
 use dynocar_model::train::Davis;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use rand::RngExt;
 
 use super::world::{GUST_S, Habits, KNOT_OVER_MEAN, LoadSource, WEIGHING_STD, World};
-use crate::statistics::normal;
 
 /// Steps of the simulation per cycle of the controller.
 const STEPS: u32 = 10;
@@ -86,7 +84,7 @@ impl Drive {
     /// Begins at the first stop.
     pub fn new(mut world: World) -> Self {
         let habits = world.scenario.traffic.habits();
-        let acts_at = world.random.random_range(0..STEPS);
+        let acts_at = world.random.within(0..STEPS);
         let place_m = world.stops_m[0];
         let mass_kg = world.truth.mass_kg;
         let mut drive = Drive {
@@ -139,7 +137,7 @@ impl Drive {
     }
 
     fn next_gust_mps(&mut self) -> f64 {
-        KNOT_OVER_MEAN * self.world.gust_std_mps * normal(&mut self.world.random)
+        KNOT_OVER_MEAN * self.world.gust_std_mps * self.world.random.normal()
     }
 
     /// The gusts of a cycle later.
@@ -156,7 +154,7 @@ impl Drive {
         self.weighed_kg = match scenario.load {
             LoadSource::Exact | LoadSource::Unknown => self.mass_kg,
             LoadSource::Weighed(permille) => {
-                let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
+                let sign = random.sign();
                 // One weighing, wrong the same way for the whole drive.
                 if self.cycle == 0 {
                     self.mass_kg * (1.0 + sign * 1e-3 * f64::from(permille))
@@ -164,7 +162,7 @@ impl Drive {
                     self.weighed_kg
                 }
             }
-            LoadSource::Changing => self.mass_kg * (1.0 + WEIGHING_STD * normal(random)),
+            LoadSource::Changing => self.mass_kg * (1.0 + WEIGHING_STD * random.normal()),
         };
     }
 
@@ -244,8 +242,8 @@ impl Drive {
                 let wanted = 0.3 * (self.target_mps - self.speed_mps) + 0.03;
                 self.commanded_mps2 = wanted.clamp(-0.3 * brake, limit);
                 let is_there = self.speed_mps > self.target_mps - 0.3;
-                if is_there && self.world.random.random::<f64>() < cycle_s / 60.0 {
-                    let left_s = 15.0 + 60.0 * self.world.random.random::<f64>();
+                if is_there && self.world.random.uniform() < cycle_s / 60.0 {
+                    let left_s = 15.0 + 60.0 * self.world.random.uniform();
                     self.phase = Phase::Coasting { left_s };
                 }
             }
@@ -270,9 +268,9 @@ impl Drive {
     fn depart(&mut self) {
         self.phase = Phase::Driving;
         let World { random, brake_scale, stop_to_stop_std, .. } = &mut self.world;
-        self.brake_scale = *brake_scale * (1.0 + *stop_to_stop_std * normal(random));
+        self.brake_scale = *brake_scale * (1.0 + *stop_to_stop_std * random.normal());
         self.commanded_mps2 = 0.0;
-        self.target_mps = self.habits.top_mps * (0.75 + 0.25 * self.world.random.random::<f64>());
+        self.target_mps = self.habits.top_mps * (0.75 + 0.25 * self.world.random.uniform());
     }
 
     fn arrive(&mut self) {
@@ -280,7 +278,7 @@ impl Drive {
         self.phase = Phase::Standing { left_s: self.habits.standing_s };
         (self.next_stop, self.direction) = self.world.after_stop(self.next_stop, self.direction);
         if self.world.scenario.load == LoadSource::Changing {
-            let share = 0.24 * (self.world.random.random::<f64>() - 0.5);
+            let share = 0.24 * (self.world.random.uniform() - 0.5);
             self.mass_kg = self.world.declared.mass_kg * (1.0 + share);
             self.weigh();
         }
@@ -293,8 +291,8 @@ impl Drive {
         let w0_n_per_kn = truth.resistance.w0_n_per_kn(self.speed_mps);
         let force_n = self.reported_mps2 * inertial_kg;
         let random = &mut self.world.random;
-        let noise_mps = scenario.speed_noise_mps * normal(random);
-        let place_m = self.place_m + scenario.position_noise_m * normal(random);
+        let noise_mps = scenario.speed_noise_mps * random.normal();
+        let place_m = self.place_m + scenario.position_noise_m * random.normal();
         let measured_mps = match self.speed_mps > 0.0 {
             true => (speed_scale * self.speed_mps + noise_mps).max(0.0),
             false => 0.0,

@@ -1,11 +1,8 @@
 //! A train, its line, and the ordinary mistakes in what is declared of them.
 
+use crate::chance::Chance;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_tests::simulator::Deviations;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-
-use crate::statistics::normal;
 
 /// The kinds of traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,7 +149,7 @@ pub struct World {
     /// Where the train stops.
     pub stops_m: Vec<f64>,
     /// For the drive.
-    pub random: ChaCha8Rng,
+    pub random: Chance,
 }
 
 /// Length in m of a piece of the gradient profile.
@@ -161,11 +158,11 @@ const PIECE_M: f64 = 10.0;
 impl World {
     /// Draws the truth.
     pub fn draw(scenario: Scenario, seed: u64) -> Self {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut random = Chance::new(seed);
         let declared = scenario.traffic.declared();
         let habits = scenario.traffic.habits();
         let mut truth = declared.clone();
-        let mut near = |value: f64, share: f64| value * (1.0 + share * normal(&mut random));
+        let mut near = |value: f64, share: f64| value * (1.0 + share * random.normal());
         truth.resistance = Davis {
             a: near(declared.resistance.a, COEFFICIENT_SHARE).max(0.3),
             b: near(declared.resistance.b, COEFFICIENT_SHARE).max(0.0),
@@ -177,23 +174,19 @@ impl World {
         let delay_s = near(DELAY_S, DELAY_STD_S / DELAY_S).clamp(0.0, 0.25);
         truth.rotating_mass_factor += near(1.0, ROTATING_MASS_STD) - 1.0;
         truth.mass_kg *= match scenario.load {
-            LoadSource::Exact | LoadSource::Weighed(_) => {
-                1.0 + 0.3 * (random.random::<f64>() - 0.5)
-            }
-            LoadSource::Unknown | LoadSource::Changing => {
-                1.0 + 0.24 * (random.random::<f64>() - 0.5)
-            }
+            LoadSource::Exact | LoadSource::Weighed(_) => 1.0 + 0.3 * (random.uniform() - 0.5),
+            LoadSource::Unknown | LoadSource::Changing => 1.0 + 0.24 * (random.uniform() - 0.5),
         };
         let mut stops_m = vec![500.0];
         while stops_m[stops_m.len() - 1] < habits.line_m {
             let (least, most) = habits.stop_m;
             let last = stops_m[stops_m.len() - 1];
-            stops_m.push(last + least + (most - least) * random.random::<f64>());
+            stops_m.push(last + least + (most - least) * random.uniform());
         }
         let end_m = stops_m[stops_m.len() - 1] + 1000.0;
         let gradient = profile(&scenario, &habits, declared.length_m, end_m, &mut random);
-        let brake_scale = 1.0 + BRAKE_STD * normal(&mut random);
-        let wind_mps = usual.day_wind_mps * normal(&mut random);
+        let brake_scale = 1.0 + BRAKE_STD * random.normal();
+        let wind_mps = usual.day_wind_mps * random.normal();
         World {
             scenario,
             declared,
@@ -251,23 +244,23 @@ fn profile(
     habits: &Habits,
     train_length_m: f64,
     end_m: f64,
-    random: &mut ChaCha8Rng,
+    random: &mut Chance,
 ) -> Vec<[f64; 2]> {
     let pieces = (end_m / PIECE_M) as usize + 2;
     let (mut map, mut error) = (Vec::with_capacity(pieces), Vec::with_capacity(pieces));
     let mut steep = 0.0;
     let mut left_m = 0.0;
-    let (mut from, mut to) = (normal(random), normal(random));
+    let (mut from, mut to) = (random.normal(), random.normal());
     for piece in 0..pieces {
         if left_m <= 0.0 {
-            left_m = 300.0 + 900.0 * random.random::<f64>();
-            steep = 0.5 * habits.steep_permille * normal(random).clamp(-2.0, 2.0);
+            left_m = 300.0 + 900.0 * random.uniform();
+            steep = 0.5 * habits.steep_permille * random.normal().clamp(-2.0, 2.0);
         }
         left_m -= PIECE_M;
         map.push(steep);
         let at = (piece as f64 * PIECE_M / KNOT_M).fract();
         if piece > 0 && at < PIECE_M / KNOT_M - 1e-9 {
-            (from, to) = (to, normal(random));
+            (from, to) = (to, random.normal());
         }
         error.push(knot_std_permille(scenario.map_std_permille) * (from + at * (to - from)));
     }

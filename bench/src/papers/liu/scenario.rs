@@ -7,11 +7,10 @@
 use dynocar_model::simulate::motion::{Motion, advance};
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, SMatrix, SVector};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-use crate::statistics::{jacobian, normal};
+use crate::chance::Chance;
+use crate::statistics::jacobian;
 
 /// Table 1's last row, near enough: w0 = 2.2 + 0.025 v + 0.0013 v² in N/kN, v in km/h.
 pub const THETA_KMH: [f64; 3] = [2.2, 0.025, 0.0013];
@@ -87,22 +86,22 @@ pub fn true_speeds_kmh((from_kmh, to_kmh): (f64, f64), davis: &Davis) -> Vec<f64
 
 /// The measured runs of a seed.
 pub fn measure(condition: Condition, seed: u64) -> Vec<Vec<Measured>> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut random = Chance::new(seed);
     RUNS_KMH
         .iter()
         .map(|run| {
             // Where in the display's step a run begins is chance.
-            let shift_kmh = QUANTUM_KMH * (random.random::<f64>() - 0.5);
+            let shift_kmh = QUANTUM_KMH * (random.uniform() - 0.5);
             let run = (run.0 + shift_kmh, run.1);
             let speeds = true_speeds_kmh(run, &truth());
             let samples = speeds.iter().enumerate().filter_map(|(index, &true_kmh)| {
-                let mut speed_kmh = true_kmh + NOISE_KMH * normal(&mut random);
-                if random.random::<f64>() < condition.outlier_share {
+                let mut speed_kmh = true_kmh + NOISE_KMH * random.normal();
+                if random.uniform() < condition.outlier_share {
                     let (low, high) = OUTLIER_KMH;
-                    let size = low + (high - low) * random.random::<f64>();
-                    speed_kmh += if random.random() { size } else { -size };
+                    let size = low + (high - low) * random.uniform();
+                    speed_kmh += random.sign() * size;
                 }
-                let is_missing = random.random::<f64>() < condition.missing_share;
+                let is_missing = random.uniform() < condition.missing_share;
                 let speed_kmh = (speed_kmh / QUANTUM_KMH).round() * QUANTUM_KMH;
                 (!is_missing).then_some(Measured { time_s: STEP_S * index as f64, speed_kmh })
             });

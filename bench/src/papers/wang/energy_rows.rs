@@ -6,11 +6,10 @@
 //! before.
 
 use dynocar_core::pipeline::Estimator;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use super::ride::{kalman, known_resistance, leg, measure};
 use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle, calm};
+use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, WANG};
 use crate::statistics::{mean, straight_line};
 
@@ -114,7 +113,7 @@ fn energy_at_time(shuttle: &Shuttle, case: &Case, time_s: f64) -> f64 {
 fn learned_mass_kg(shuttle: &Shuttle, seed: u64) -> f64 {
     let ride = leg(shuttle, EMPTY_MASS_KG, &mut calm);
     let mut filter = kalman(shuttle, &known_resistance(shuttle));
-    for sample in measure(shuttle, &ride, &mut ChaCha8Rng::seed_from_u64(seed)) {
+    for sample in measure(shuttle, &ride, &mut Chance::new(seed)) {
         filter.update(&sample);
     }
     filter.mass_kg().0

@@ -4,13 +4,12 @@ use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_estimators::wang::MassRegression;
 use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_model::force::ResolvedSample;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use super::bound::{Information, mass_std_in_wind};
 use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::ride::{kalman, known_resistance, leg, measure, presumed, staged, there_and_back, wind};
 use super::shuttle::{Disturbance, EMPTY_MASS_KG, Shuttle, calm};
+use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, WANG};
 use crate::papers::score::Score;
 use crate::statistics::{mean, root_mean_square};
@@ -82,7 +81,7 @@ fn chain_row(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> Row {
     let ride = there_and_back(shuttle, mass_kg, &mut calm);
     let mut errors = Errors::default();
     for seed in seeds.range() {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut random = Chance::new(seed);
         let mut joint = joint_least_squares(shuttle);
         for sample in measure(shuttle, &crossing, &mut random) {
             joint.update(&sample);
@@ -183,7 +182,7 @@ fn run(
         let ride = there_and_back(shuttle, mass_kg, &mut *disturbance);
         // Its own noise for every mass and condition.
         let stream = seed + ((mass_kg as u64) << 20) + ((condition as u64) << 50);
-        let mut samples = measure(shuttle, &ride, &mut ChaCha8Rng::seed_from_u64(stream));
+        let mut samples = measure(shuttle, &ride, &mut Chance::new(stream));
         for sample in &mut samples {
             sample.traction_force_n = sample.traction_force_n.map(|force| force * force_gain);
             sample.brake_force_n = sample.brake_force_n.map(|force| force * force_gain);
@@ -225,7 +224,7 @@ fn step_row(shuttle: &Shuttle, seeds: Seeds) -> Row {
     let resistance = known_resistance(shuttle);
     let (mut paper, mut reverse, mut ours) = (Vec::new(), Vec::new(), Vec::new());
     for seed in seeds.range() {
-        let samples = measure(shuttle, &ride, &mut ChaCha8Rng::seed_from_u64(seed));
+        let samples = measure(shuttle, &ride, &mut Chance::new(seed));
         let (before, after) = samples.split_at(stop);
         for (regression, times) in [
             (MassRegression::ForceOnAcceleration, &mut paper),

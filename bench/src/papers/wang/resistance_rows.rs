@@ -11,12 +11,11 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::Vector3;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use super::bound::Information;
 use super::ride::measure;
 use super::shuttle::{Instant, Shuttle, calm};
+use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, WANG};
 use crate::papers::score::{Score, w0_errors};
 use crate::statistics::{mean, root_mean_square};
@@ -85,7 +84,7 @@ fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds
     let truths = &shuttle.truth;
     let mut errors: [Errors; 3] = Default::default();
     for seed in seeds.range() {
-        let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed));
+        let samples = measure(shuttle, ride, &mut Chance::new(seed));
         let mut staged = staged_descent(shuttle);
         let mut joint = joint_least_squares(shuttle);
         for sample in &samples {
@@ -114,7 +113,7 @@ pub fn joint_least_squares(shuttle: &Shuttle) -> JointLeastSquares {
 fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [Row; 2] {
     let (mut until, mut moved) = (Vec::new(), Vec::new());
     for seed in seeds.range() {
-        let samples = measure(shuttle, ride, &mut ChaCha8Rng::seed_from_u64(seed));
+        let samples = measure(shuttle, ride, &mut Chance::new(seed));
         let mut in_kmh = PrintedDescent::new(3.6, &shuttle.train);
         let mut in_mps = PrintedDescent::new(1.0, &shuttle.train);
         let start = in_mps.weights[0][0];

@@ -8,13 +8,12 @@ use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use super::shuttle::{
     BRAKE_MAX_N, CURVE_RADIUS_M, Disturbance, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle,
 };
-use crate::statistics::{KMH, normal};
+use crate::chance::Chance;
+use crate::statistics::KMH;
 
 const SERVICE_BRAKE_MPS2: f64 = 0.7;
 
@@ -210,13 +209,12 @@ pub const GUST_TIME_S: f64 = 8.0;
 /// Headwind: a mean for the leg and gusts, acting on the quadratic part of the resistance, the Davis coefficient c
 /// in N/kN per (m/s)².
 pub fn wind(quadratic: f64, seed: u64) -> impl FnMut(f64) -> f64 {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mean_mps = MEAN_WIND_STD_MPS * normal(&mut random);
-    let mut gust_mps = GUST_STD_MPS * normal(&mut random);
+    let mut random = Chance::new(seed);
+    let mean_mps = MEAN_WIND_STD_MPS * random.normal();
+    let mut gust_mps = GUST_STD_MPS * random.normal();
     let keep = (-PERIOD_S / GUST_TIME_S).exp();
     move |speed_mps| {
-        gust_mps =
-            keep * gust_mps + GUST_STD_MPS * (1.0 - keep * keep).sqrt() * normal(&mut random);
+        gust_mps = keep * gust_mps + GUST_STD_MPS * (1.0 - keep * keep).sqrt() * random.normal();
         let air_mps = speed_mps + mean_mps + gust_mps;
         quadratic * (air_mps * air_mps.abs() - speed_mps * speed_mps)
     }
@@ -227,11 +225,11 @@ pub fn wind(quadratic: f64, seed: u64) -> impl FnMut(f64) -> f64 {
 pub fn presumed(seed: u64) -> impl FnMut(f64) -> f64 {
     let models = MassKalmanSettings::default().bias_models();
     let model = models[(seed % models.len() as u64) as usize];
-    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0xb1a5);
-    let mut bias_mps2 = model.std_mps2 * normal(&mut random);
+    let mut random = Chance::new(seed ^ 0xb1a5);
+    let mut bias_mps2 = model.std_mps2 * random.normal();
     let keep = model.keep(PERIOD_S);
     move |speed_mps| {
-        bias_mps2 = keep * bias_mps2 + model.noise_variance(keep).sqrt() * normal(&mut random);
+        bias_mps2 = keep * bias_mps2 + model.noise_variance(keep).sqrt() * random.normal();
         -1e3 / STANDARD_GRAVITY_MPS2 * model.shape(speed_mps) * bias_mps2
     }
 }
@@ -247,11 +245,7 @@ pub fn speed_variance() -> f64 {
 }
 
 /// The samples of a drive with noise and rounding, through validation and force resolution.
-pub fn measure(
-    shuttle: &Shuttle,
-    ride: &[Instant],
-    random: &mut ChaCha8Rng,
-) -> Vec<ResolvedSample> {
+pub fn measure(shuttle: &Shuttle, ride: &[Instant], random: &mut Chance) -> Vec<ResolvedSample> {
     let train = &shuttle.train;
     let limits = ValidationLimits::for_train(train.mass_kg);
     let mut validator = Validator::new(TrainId(1), train.mass_kg, limits);
@@ -262,7 +256,7 @@ pub fn measure(
         let speed_mps = match is_standing {
             true => 0.0,
             false => {
-                let noisy = instant.speed_mps + SPEED_STD_MPS * normal(random);
+                let noisy = instant.speed_mps + SPEED_STD_MPS * random.normal();
                 ((noisy / SPEED_QUANTUM_MPS).round() * SPEED_QUANTUM_MPS).max(0.0)
             }
         };

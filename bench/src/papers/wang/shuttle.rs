@@ -10,9 +10,8 @@ use dynocar_model::simulate::motion::{Motion, advance};
 use dynocar_model::track::{Curve, Track, Tunnel};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
+use crate::chance::Chance;
 use crate::statistics::KMH;
 
 /// Time in s between two samples: the controller's period of the paper.
@@ -156,12 +155,12 @@ pub const STATIONS_M: [f64; 4] = [100.0, 3_100.0, 21_300.0, 27_900.0];
 
 /// (chainage in m, ‰): steps of 300 to 900 m, up to 12 ‰ either way.
 fn gradients() -> Vec<(f64, f64)> {
-    let mut random = ChaCha8Rng::seed_from_u64(28_000);
+    let mut random = Chance::new(28_000);
     let mut list = vec![(0.0, 0.0)];
     let mut at_m = 250.0;
     while at_m < 27_700.0 {
-        list.push((at_m, (240.0 * random.random::<f64>() - 120.0).round() / 10.0));
-        at_m += (300.0 + 600.0 * random.random::<f64>()).round();
+        list.push((at_m, (240.0 * random.uniform() - 120.0).round() / 10.0));
+        at_m += (300.0 + 600.0 * random.uniform()).round();
     }
     list.push((27_750.0, 0.0));
     list
@@ -169,17 +168,17 @@ fn gradients() -> Vec<(f64, f64)> {
 
 /// Curves of 250 to 600 m outside the tunnels; if wanted, two more inside.
 fn curves(curve_in_tunnel: bool) -> Vec<Curve> {
-    let mut random = ChaCha8Rng::seed_from_u64(28_001);
+    let mut random = Chance::new(28_001);
     let mut list = Vec::new();
     let mut start_m = 400.0;
     while start_m < 27_000.0 {
-        let end_m = start_m + (250.0 + 350.0 * random.random::<f64>()).round();
+        let end_m = start_m + (250.0 + 350.0 * random.uniform()).round();
         let is_near =
             |tunnel: &Tunnel| start_m < tunnel.end_m + 80.0 && end_m > tunnel.start_m - 80.0;
         if !tunnels().iter().any(is_near) {
             list.push(Curve { start_m, end_m, radius_m: CURVE_RADIUS_M });
         }
-        start_m = end_m + (400.0 + 700.0 * random.random::<f64>()).round();
+        start_m = end_m + (400.0 + 700.0 * random.uniform()).round();
     }
     if curve_in_tunnel {
         list.push(Curve { start_m: 11_700.0, end_m: 12_300.0, radius_m: CURVE_RADIUS_M });

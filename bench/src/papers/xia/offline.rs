@@ -13,14 +13,13 @@ use dynocar_estimators::xia::wolfe_newton::{
 };
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 use super::ratio_posterior::likeliest_fit;
 use super::scenario::{
     CASES, Profile, Run, all_speeds_mps, davis_covariance, disturbed_davis_covariance, drive,
     fast_speeds_mps,
 };
+use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, XIA};
 use crate::papers::score::{Score, w0_errors};
 use crate::statistics::root_mean_square;
@@ -39,10 +38,10 @@ pub fn bounds() -> ParameterBox<3> {
     bounds
 }
 
-fn random_start(random: &mut ChaCha8Rng) -> Davis {
+fn random_start(random: &mut Chance) -> Davis {
     let bounds = bounds();
     let theta: Vector3<f64> =
-        bounds.low + (bounds.high - bounds.low).map(|width| width * random.random::<f64>());
+        bounds.low + (bounds.high - bounds.low).map(|width| width * random.uniform());
     Davis { a: theta[0], b: theta[1], c: theta[2] }
 }
 
@@ -89,7 +88,7 @@ pub fn convergence_rows(seeds: Seeds) -> Vec<Row> {
             let mut converged = [0usize; 3];
             for seed in seeds.range() {
                 let run = drive(profile, length_m, seed, |_| *truth);
-                let start = random_start(&mut ChaCha8Rng::seed_from_u64(1000 + seed));
+                let start = random_start(&mut Chance::new(1000 + seed));
                 let speeds = &run.speeds_mps;
                 let never = newton(&run, speeds, &start, Restarts::Never, seed);
                 let stalled = newton(&run, speeds, &start, Restarts::WhenStalled, seed);
@@ -132,7 +131,7 @@ pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
                 let run = drive(profile, length_m, seed, |_| *truth);
                 let speeds = &run.speeds_mps;
                 if profile == Profile::Full {
-                    let start = random_start(&mut ChaCha8Rng::seed_from_u64(1000 + seed));
+                    let start = random_start(&mut Chance::new(1000 + seed));
                     let found = newton(&run, speeds, &start, Restarts::WhenStalled, seed);
                     if found.has_converged {
                         paper.push(found.davis.a - truth.a);
@@ -166,7 +165,7 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
     let (cruise_bound, full_bound) =
         (davis_covariance(&cruise, &truth), davis_covariance(&full, &truth));
     for seed in seeds.range() {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut random = Chance::new(seed);
         let speeds = cruise.measured_mps(0, &mut random);
         let errors = |davis: &Davis| w0_errors(davis, &truth, &fast);
         if let Some(found) = fit(&cruise, &speeds, None, anywhere()) {
@@ -266,7 +265,7 @@ fn disturbed_row(seeds: Seeds) -> Row {
     let bound = disturbed_davis_covariance(&cruise, &truth);
     let (mut output_error, mut ours) = (Score::default(), Score::default());
     for seed in seeds.range() {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut random = Chance::new(seed);
         let run = cruise.disturbed(&truth, &mut random);
         let speeds = run.measured_mps(0, &mut random);
         let segments = [MotionSegment { steps: &run.steps, speeds_mps: &speeds }];

@@ -14,17 +14,16 @@ use dynocar_estimators::xia::wolfe_newton::{NewtonSettings, RestartSource, wolfe
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 
 use super::offline;
 use super::scenario::{
     CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps,
     disturbed_davis_covariance, drive, fast_speeds_mps,
 };
+use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, XIA};
 use crate::papers::score::{Score, w0_std};
-use crate::statistics::{mean, normal, root_mean_square};
+use crate::statistics::{mean, root_mean_square};
 
 /// Data capacity I of the paper's window.
 const WINDOW: usize = 20;
@@ -191,7 +190,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     let paper_lines = seeds.count.div_ceil(10);
     for seed in seeds.range() {
         let run = drive(Profile::Cruise, 120e3, seed, table_4);
-        let mut random = ChaCha8Rng::seed_from_u64(5000 + seed);
+        let mut random = Chance::new(5000 + seed);
         let speeds = run.measured_mps(NOISY_FROM, &mut random);
         filter.push(&run, &ours(&run, &speeds, settings(davis, std)));
         let noise_mps = |i| if i >= NOISY_FROM { SPEED_NOISE_MPS } else { 1e-3 };
@@ -233,11 +232,11 @@ fn constant_prior() -> (Davis, Vector3<f64>) {
     (CASES[0], Vector3::new(0.3, 0.01, 0.0003))
 }
 
-fn drawn((mean, std): (Davis, Vector3<f64>), random: &mut ChaCha8Rng) -> Davis {
+fn drawn((mean, std): (Davis, Vector3<f64>), random: &mut Chance) -> Davis {
     Davis {
-        a: mean.a + std[0] * normal(random),
-        b: mean.b + std[1] * normal(random),
-        c: mean.c + std[2] * normal(random),
+        a: mean.a + std[0] * random.normal(),
+        b: mean.b + std[1] * random.normal(),
+        c: mean.c + std[2] * random.normal(),
     }
 }
 
@@ -249,11 +248,11 @@ fn drawn_row(
     quantity: &str,
     speeds_mps: &[f64],
     seeds: Seeds,
-    of_seed: impl Fn(u64, &mut ChaCha8Rng) -> Drawn,
+    of_seed: impl Fn(u64, &mut Chance) -> Drawn,
 ) -> Row {
     let mut score = Score::default();
     for seed in seeds.range() {
-        let mut random = ChaCha8Rng::seed_from_u64(9000 + seed);
+        let mut random = Chance::new(9000 + seed);
         if let Some((truth, (davis, covariance), bound)) = of_seed(seed, &mut random) {
             score.take_resistance((&davis, &covariance), &truth, speeds_mps);
             score.take_bound(&bound, speeds_mps);

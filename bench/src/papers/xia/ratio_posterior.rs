@@ -158,11 +158,9 @@ mod tests {
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
     use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
     use dynocar_model::force::balance::mps2_per_n_per_kn;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::statistics::normal;
+    use crate::chance::Chance;
 
     const FAST: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 
@@ -213,13 +211,13 @@ mod tests {
             let mut square = 0.0;
             let seeds = 60;
             for seed in 0..seeds {
-                let mut random = ChaCha8Rng::seed_from_u64(seed);
+                let mut random = Chance::new(seed);
                 let mut disturbed = steps.clone();
                 for step in &mut disturbed {
-                    step.drive_mps2 += disturbance * normal(&mut random) / step.size.sqrt();
+                    step.drive_mps2 += disturbance * random.normal() / step.size.sqrt();
                 }
                 let mut speeds = speeds(&disturbed, 12.0);
-                speeds.iter_mut().for_each(|speed| *speed += noise_mps * normal(&mut random));
+                speeds.iter_mut().for_each(|speed| *speed += noise_mps * random.normal());
                 let bounds =
                     ParameterBox { low: Vector3::repeat(-1e3), high: Vector3::repeat(1e3) };
                 let settings = FitSettings { bounds, ..FitSettings::new(StepRule::Time) };

@@ -11,10 +11,9 @@ use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::track::{Curve, Track};
 use dynocar_model::train::Davis;
 use nalgebra::{DMatrix, Matrix3};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
-use crate::statistics::{self, KMH, normal};
+use crate::chance::Chance;
+use crate::statistics::{self, KMH};
 
 /// Mass in t.
 pub const MASS_T: f64 = 981.7;
@@ -74,24 +73,24 @@ pub struct Run {
 
 impl Run {
     /// The speeds with white noise from a step on.
-    pub fn measured_mps(&self, noisy_from: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
-        let noise = |i: usize, random: &mut ChaCha8Rng| {
-            if i >= noisy_from { SPEED_NOISE_MPS * normal(random) } else { 0.0 }
+    pub fn measured_mps(&self, noisy_from: usize, random: &mut Chance) -> Vec<f64> {
+        let noise = |i: usize, random: &mut Chance| {
+            if i >= noisy_from { SPEED_NOISE_MPS * random.normal() } else { 0.0 }
         };
         self.speeds_mps.iter().enumerate().map(|(i, v)| v + noise(i, random)).collect()
     }
 
     /// The same reported forces, with a disturbance of the resistance that nobody reports: a
     /// first-order autoregression of [`DISTURBANCE_N_PER_KN`] and [`DISTURBANCE_S`].
-    pub fn disturbed(&self, davis: &Davis, random: &mut ChaCha8Rng) -> Run {
+    pub fn disturbed(&self, davis: &Davis, random: &mut Chance) -> Run {
         let mut speeds_mps = vec![self.speeds_mps[0]];
-        let mut disturbance = DISTURBANCE_N_PER_KN * normal(random);
+        let mut disturbance = DISTURBANCE_N_PER_KN * random.normal();
         for (i, step) in self.steps.iter().enumerate() {
             let disturbed = Davis { a: davis.a + disturbance, ..*davis };
             speeds_mps.push(next_speed_mps(step, &disturbed, speeds_mps[i]));
             let kept = (-step.size / (self.speeds_mps[i] * DISTURBANCE_S)).exp();
             disturbance = kept * disturbance
-                + (1.0 - kept * kept).sqrt() * DISTURBANCE_N_PER_KN * normal(random);
+                + (1.0 - kept * kept).sqrt() * DISTURBANCE_N_PER_KN * random.normal();
         }
         Run { steps: self.steps.clone(), speeds_mps }
     }
@@ -117,7 +116,7 @@ pub fn speeds_mps(steps: &[Step], initial_mps: f64, davis: &Davis) -> Vec<f64> {
 ///
 /// `davis_at` gives the coefficients by chainage in m.
 pub fn drive(profile: Profile, length_m: f64, seed: u64, davis_at: impl Fn(f64) -> Davis) -> Run {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut random = Chance::new(seed);
     let track = line(&mut random);
     let (mut speed_mps, phases) = match profile {
         Profile::Cruise => (288.0 * KMH, vec![]),
@@ -148,20 +147,20 @@ pub fn drive(profile: Profile, length_m: f64, seed: u64, davis_at: impl Fn(f64) 
 }
 
 /// Gradients within ±6 ‰ and curves of 7 to 12 km radius, as on a high-speed line.
-fn line(random: &mut ChaCha8Rng) -> Track {
+fn line(random: &mut Chance) -> Track {
     let mut gradient = Vec::new();
     let mut at_m = -1000.0;
     while at_m < 121_000.0 {
-        gradient.push((at_m, 12.0 * random.random::<f64>() - 6.0));
-        at_m += 800.0 + 2200.0 * random.random::<f64>();
+        gradient.push((at_m, 12.0 * random.uniform() - 6.0));
+        at_m += 800.0 + 2200.0 * random.uniform();
     }
     let mut curves = Vec::new();
-    let mut at_m = 2000.0 * random.random::<f64>();
+    let mut at_m = 2000.0 * random.uniform();
     while at_m < 118_000.0 {
-        let end_m = at_m + 800.0 + 1500.0 * random.random::<f64>();
-        let radius_m = 7000.0 + 5000.0 * random.random::<f64>();
+        let end_m = at_m + 800.0 + 1500.0 * random.uniform();
+        let radius_m = 7000.0 + 5000.0 * random.uniform();
         curves.push(Curve { start_m: at_m, end_m, radius_m });
-        at_m = end_m + 1000.0 + 5000.0 * random.random::<f64>();
+        at_m = end_m + 1000.0 + 5000.0 * random.uniform();
     }
     Track::new("seeded".into(), None, Some(&gradient), Some(curves), None)
         .expect("ordered, finite entries")
@@ -198,13 +197,13 @@ impl Driver {
         travelled_m: f64,
         speed_mps: f64,
         resisting_kn: f64,
-        random: &mut ChaCha8Rng,
+        random: &mut Chance,
     ) -> f64 {
         let phase = self.phases.iter().rev().find(|(from_m, _)| *from_m <= travelled_m);
         let phase = phase.map_or(Phase::Hold { speed_mps: self.cruise_mps }, |phase| phase.1);
         if self.phases.is_empty() && travelled_m >= self.next_change_m {
-            self.cruise_mps = (272.0 + 32.0 * random.random::<f64>()) * KMH;
-            self.next_change_m = travelled_m + 3000.0 + 5000.0 * random.random::<f64>();
+            self.cruise_mps = (272.0 + 32.0 * random.uniform()) * KMH;
+            self.next_change_m = travelled_m + 3000.0 + 5000.0 * random.uniform();
         }
         let traction_max_kn = f64::min(520.0, 18_240.0 / speed_mps);
         let inertia_t = MASS_T * (1.0 + ROTATING_MASS_FACTOR);
