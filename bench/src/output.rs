@@ -5,6 +5,7 @@ use std::error::Error;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
@@ -60,17 +61,39 @@ pub fn during<E: Display>(what: impl Display) -> impl FnOnce(E) -> Failure {
     move |error| format!("{what}: {error}").into()
 }
 
-/// Gives a result to machines where they want it, and to people unless standard output is taken.
+/// Where a result goes.
+#[derive(Debug, Args)]
+pub struct OutputArguments {
+    /// Write the result for machines; - for standard output
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl OutputArguments {
+    /// Gives a result to machines where they want it, and to people unless standard output is taken.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be written.
+    pub fn give(
+        &self,
+        result: &impl Serialize,
+        for_people: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        Ok(dynocar::output::give(self.json.as_deref(), result, for_people)?)
+    }
+}
+
+/// Fails with what went wrong, if anything did, line by line under what it is.
 ///
 /// # Errors
 ///
-/// When it cannot be written.
-pub fn give(
-    json: &Option<PathBuf>,
-    result: &impl Serialize,
-    for_people: impl FnOnce() -> String,
-) -> Result<(), Failure> {
-    Ok(dynocar::output::give(json.as_deref(), result, for_people)?)
+/// When there is a line.
+pub fn expect_none(what: &str, lines: Vec<String>) -> Result<(), Failure> {
+    match lines.is_empty() {
+        true => Ok(()),
+        false => Err(format!("{what}:\n{}", lines.join("\n")).into()),
+    }
 }
 
 /// A cell of a table: its column, what people read there, where it is for them, and what machines get.

@@ -11,7 +11,7 @@ use dynocar_tests::simulator::{
 };
 use dynocar_workshop::survey::read::{recordings, vehicle};
 
-use crate::output::{Failure, Record, give, table};
+use crate::output::{Failure, OutputArguments, Record, table};
 
 /// Seconds for each pass of a survey of a simulated line, for growing numbers of passes.
 #[derive(Debug, Args)]
@@ -22,9 +22,8 @@ pub struct SurveyArguments {
     /// Write the simulated recordings into this folder
     #[arg(long, value_name = "FOLDER")]
     write: Option<PathBuf>,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 /// Different recordings behind the passes: more passes repeat them.
@@ -66,6 +65,6 @@ impl SurveyArguments {
                 .number("ms a pass", 1e3 * total_s / passes as f64, 1);
             records.push(record);
         }
-        give(&self.json, &records, || table(&records))
+        self.output.give(&records, || table(&records))
     }
 }

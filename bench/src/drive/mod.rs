@@ -35,7 +35,9 @@ use serde_json::json;
 use self::line::{CONDITIONS, ORDINARY, Service};
 use self::run::{Extent, Informant};
 use self::score::Scored;
-use crate::output::{Failure, Record, expect, give, table, write_csv};
+use crate::output::{
+    Failure, OutputArguments, Record, containing, expect, expect_none, table, write_csv,
+};
 use crate::parallel;
 use crate::scenarios::world::Traffic;
 
@@ -63,9 +65,8 @@ pub struct DriveArguments {
     /// Scenarios at a time
     #[arg(long, default_value_t = 2)]
     threads: usize,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Write the drives as CSV; FILE_answers and FILE_differences beside it
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -93,11 +94,8 @@ impl DriveArguments {
     ///
     /// When the command line is wrong, a process fails, or the driver with Dynocar is worse.
     pub fn run(&self) -> Result<(), Failure> {
-        let mut chosen = services(self.cycle_ms);
-        chosen.retain(|service| service.name().contains(&self.scenario));
-        expect(!chosen.is_empty(), || {
-            format!("--scenario {}: expected a part of a scenario's name", self.scenario)
-        })?;
+        let all = services(self.cycle_ms);
+        let chosen = containing("--scenario", &self.scenario, all, Service::name)?;
         expect(self.trains > 0 && self.stops > 0, || {
             "--trains and --stops: expected more than 0".into()
         })?;
@@ -123,12 +121,9 @@ impl DriveArguments {
         }
         let [drives, answers, differences] = &tables;
         let all = json!({ "drives": drives, "answers": answers, "differences": differences });
-        give(&self.json, &all, || tables.each_ref().map(|it| table(it)).join("\n"))?;
-        let broken: Vec<&str> = scored.iter().filter_map(|it| it.broken.as_deref()).collect();
-        match broken.is_empty() {
-            true => Ok(()),
-            false => Err(format!("worse with Dynocar:\n{}", broken.join("\n")).into()),
-        }
+        self.output.give(&all, || tables.each_ref().map(|it| table(it)).join("\n"))?;
+        let broken = scored.into_iter().filter_map(|it| it.broken);
+        expect_none("worse with Dynocar", broken.collect())
     }
 }
 

@@ -18,7 +18,7 @@ use clap::Args;
 use dynocar_analysis::dataset::DatasetError;
 use serde_json::json;
 
-use crate::output::{Failure, Record, containing, give, table};
+use crate::output::{Failure, OutputArguments, Record, containing, table};
 use measure::{Case, Effort};
 
 /// Time of an update of every estimator and every pipeline.
@@ -33,9 +33,8 @@ pub struct EstimatorsArguments {
     /// Another build of this program, measured by turns with this one
     #[arg(long, value_name = "PROGRAM", requires = "case", conflicts_with = "quick")]
     beside: Option<PathBuf>,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl EstimatorsArguments {
@@ -48,12 +47,12 @@ impl EstimatorsArguments {
         let text = self.case.as_deref().unwrap_or_default();
         if let Some(other) = &self.beside {
             let cases = against::measure(other, text)?;
-            return give(&self.json, &cases, || table(&cases));
+            return self.output.give(&cases, || table(&cases));
         }
         let effort = if self.quick { Effort::QUICK } else { Effort::FULL };
         let chosen = containing("--case", text, cases()?, |case| case.name.clone())?;
         let records: Vec<Record> = chosen.into_iter().map(|it| it.measure(&effort)).collect();
-        give(&self.json, &json!({ "cases": records }), || table(&records))
+        self.output.give(&json!({ "cases": records }), || table(&records))
     }
 }
 

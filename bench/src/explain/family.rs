@@ -1,7 +1,7 @@
 //! Which simulated datasets explain and monitor work on.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use dynocar_analysis::dataset::Dataset;
@@ -12,7 +12,7 @@ use dynocar_tests::simulator::dataset_writer::{
 use dynocar_tests::simulator::{SimulatedDataset, SimulatorSettings, simulate};
 
 use super::scenario::{Scenario, World};
-use crate::output::{Failure, named};
+use crate::output::{Failure, OutputArguments, named};
 use crate::parallel;
 
 /// What is simulated.
@@ -71,9 +71,8 @@ pub struct FamilyArguments {
     /// Print the outcome of every dataset on standard error
     #[arg(long)]
     pub verbose: bool,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    #[command(flatten)]
+    pub output: OutputArguments,
 }
 
 impl FamilyArguments {

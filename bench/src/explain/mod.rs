@@ -27,7 +27,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use self::family::{Case, FamilyArguments, explained, read};
 use self::grade::{Grade, grade};
 use self::scenario::Scenario;
-use crate::output::{Failure, during, give, table};
+use crate::output::{Failure, during, table};
 
 /// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,
 /// confusions, localisation, parameters and their coverage.
@@ -56,7 +56,7 @@ impl ExplainArguments {
             use EffectKind::{DraggingBrake, None, TunnelDrag, Wind};
             let few = [None, TunnelDrag, DraggingBrake, Wind].map(Scenario::Kind).to_vec();
             let sizes = growth::measure(&family.scenarios(few)?, family.first_seed);
-            return give(&family.json, &sizes, || table(&sizes));
+            return family.output.give(&sizes, || table(&sizes));
         }
         let scenarios = family.scenarios(Scenario::all())?;
         if let Some(folder) = &self.write {
@@ -73,7 +73,7 @@ impl ExplainArguments {
             graded
         });
         let (all, words) = matrix::of(&grades);
-        give(&family.json, &all, || words)
+        family.output.give(&all, || words)
     }
 }
 

@@ -35,7 +35,7 @@ use dynocar::output::report_line;
 use self::report::Measured;
 use self::schedule::Schedule;
 use crate::chance::Chance;
-use crate::output::{Failure, expect, give};
+use crate::output::{Failure, OutputArguments, expect};
 use crate::rig::cores::{CoreArguments, Cores, bind, in_thread, prioritise};
 
 /// Sample → snapshot through real processes, compared with the floor and what a user would pick else.
@@ -64,9 +64,8 @@ pub struct LatencyArguments {
     shadow: bool,
     #[command(flatten)]
     place: CoreArguments,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Draw the distributions
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -91,7 +90,7 @@ impl LatencyArguments {
             plot::draw(&measured, file)?;
         }
         let (all, text) = report::of(&measured);
-        give(&self.json, &all, || text)
+        self.output.give(&all, || text)
     }
 
     fn measure(&self) -> Result<Measured, Failure> {

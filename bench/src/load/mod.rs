@@ -13,13 +13,11 @@ pub mod search;
 pub mod traffic;
 pub mod trial;
 
-use std::path::PathBuf;
-
-use clap::{Args, ValueEnum};
+use clap::Args;
 use dynocar::config::IdleStrategy;
 use serde_json::json;
 
-use crate::output::{Failure, expect, give, table};
+use crate::output::{Failure, OutputArguments, expect, named, table};
 use crate::rig::cores::{CoreArguments, Cores, HostGaps, in_thread};
 use crate::rig::pipelines;
 use traffic::TrafficPlan;
@@ -43,9 +41,10 @@ pub struct LoadArguments {
     /// The pipelines, by name and with commas between; fast, slow or all for the groups
     #[arg(long, value_delimiter = ',', default_value = "all", value_name = "NAMES")]
     pipelines: Vec<String>,
-    /// What the daemon's threads do while no sample comes
-    #[arg(long, value_enum, default_value_t = Idle::Adaptive)]
-    idle: Idle,
+    /// What the daemon's threads do while no sample comes: look all the time (busy: the lowest latency, a whole core),
+    /// look for a while (adaptive), or sleep until the controller wakes them (event)
+    #[arg(long, value_name = "STRATEGY", default_value = "adaptive")]
+    idle: String,
     /// Greatest delay of a sample, as a share of the period
     #[arg(long, default_value_t = 0.1, value_name = "SHARE")]
     jitter: f64,
@@ -63,21 +62,16 @@ pub struct LoadArguments {
     growth: bool,
     #[command(flatten)]
     place: CoreArguments,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
-/// An idle strategy on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Idle {
-    /// Look all the time: the lowest latency, a whole core
-    Busy,
-    /// Look for a while, then sleep until the controller wakes them
-    Adaptive,
-    /// Sleep until the controller wakes them
-    Event,
-}
+/// The idle strategies by name.
+const IDLE: [(&str, IdleStrategy); 3] = [
+    ("busy", IdleStrategy::Busy),
+    ("adaptive", IdleStrategy::Adaptive),
+    ("event", IdleStrategy::Event),
+];
 
 /// For so long at most the host is watched before and after a load, in s.
 const HOST_SECONDS: f64 = 3.0;
@@ -115,7 +109,7 @@ impl LoadArguments {
             text += &table(&sizes);
             all["growth"] = json!(sizes);
         }
-        give(&self.json, &all, || text)
+        self.output.give(&all, || text)
     }
 
     fn plan(&self) -> Result<TrialPlan, Failure> {
@@ -141,11 +135,7 @@ impl LoadArguments {
             traffic: TrafficPlan { rate_hz: rate, jitter: self.jitter, burst, bad_share: self.bad },
             seconds,
             pipelines: pipelines::by_names(&self.pipelines)?,
-            idle: match self.idle {
-                Idle::Busy => IdleStrategy::Busy,
-                Idle::Adaptive => IdleStrategy::Adaptive,
-                Idle::Event => IdleStrategy::Event,
-            },
+            idle: named("--idle", &self.idle, &IDLE)?,
             cores: Cores::choose(&self.place),
             seed: self.place.seed,
         })

@@ -15,7 +15,7 @@ use serde_json::json;
 use self::watch::{Watched, watch};
 use crate::explain::family::{Case, FamilyArguments};
 use crate::explain::scenario::Scenario;
-use crate::output::{Failure, Record, counts, give, table};
+use crate::output::{Failure, Record, counts, table};
 use crate::statistics::median;
 
 /// The live monitor on every kind of undeclared effect, and on nulls: seconds of motion from onset
@@ -55,7 +55,7 @@ impl MonitorArguments {
             "null_suspicions": suspicions,
             "per_100_h": per_100_h,
         });
-        give(&family.json, &all, || {
+        family.output.give(&all, || {
             let words = format!(
                 "nothing undeclared: {suspicions} suspicions in {hours:.0} h of motion, \
                  {per_100_h:.2} in 100 h\n"

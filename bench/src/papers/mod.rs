@@ -20,7 +20,7 @@ use clap::Args;
 use dynocar::output::report_line;
 use serde_json::json;
 
-use crate::output::{Failure, Record, expect, give, table, write_csv};
+use crate::output::{Failure, OutputArguments, Record, expect_none, named, table, write_csv};
 use promise::Verdict;
 use row::{Row, Seeds};
 
@@ -41,9 +41,8 @@ pub struct PapersArguments {
     /// Only this paper, as xia
     #[arg(long, value_name = "NAME")]
     paper: Option<String>,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Write the rows as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -70,12 +69,12 @@ impl PapersArguments {
     pub fn run(&self) -> Result<(), Failure> {
         let seeds =
             Seeds { first: self.first_seed, count: if self.quick { 8 } else { self.seeds } };
-        let is_chosen = |name: &str| self.paper.as_ref().is_none_or(|paper| paper == name);
-        expect(SOURCES.iter().any(|(name, _)| is_chosen(name)), || {
-            format!("--paper: expected one of {}", SOURCES.map(|(name, _)| name).join(", "))
-        })?;
+        let chosen: Vec<(&str, Measure)> = match &self.paper {
+            Some(name) => vec![(name, named("--paper", name, &SOURCES)?)],
+            None => SOURCES.to_vec(),
+        };
         let mut rows = Vec::new();
-        for (name, measure) in SOURCES.into_iter().filter(|(name, _)| is_chosen(name)) {
+        for (name, measure) in chosen {
             report_line(&format!("{name}: {} seeds from {}", seeds.count, seeds.first));
             rows.extend(measure(seeds));
         }
@@ -84,7 +83,7 @@ impl PapersArguments {
         let records: Vec<Record> = judged().map(|(row, verdict)| record(row, verdict)).collect();
         let promised: usize = verdicts.iter().map(|it| it.promised.len()).sum();
         let broken: usize = verdicts.iter().map(|it| it.broken.len()).sum();
-        give(&self.json, &json!({ "rows": records, "promised": promised }), || {
+        self.output.give(&json!({ "rows": records, "promised": promised }), || {
             table(&records) + &format!("promises: {promised}, {broken} broken\n")
         })?;
         if let Some(file) = &self.csv {
@@ -93,11 +92,7 @@ impl PapersArguments {
         let words = judged()
             .filter(|(_, it)| !it.broken.is_empty())
             .map(|(row, it)| format!("{}, {}: {}", row.paper, row.quantity, it.broken.join(", ")));
-        let words: Vec<String> = words.collect();
-        match words.is_empty() {
-            true => Ok(()),
-            false => Err(format!("broken promises:\n{}", words.join("\n")).into()),
-        }
+        expect_none("broken promises", words.collect())
     }
 }
 

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar_shared::PipelineKind;
 
-use crate::output::{self, Failure, expect, give, named, write_csv};
+use crate::output::{self, Failure, OutputArguments, containing, expect, named, write_csv};
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
 /// changes, and whether its intervals hold.
@@ -42,9 +42,8 @@ pub struct ScenariosArguments {
     /// Scenarios at a time
     #[arg(long, default_value_t = 2)]
     threads: usize,
-    /// Write the result for machines; - for standard output
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Write the result as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -57,11 +56,8 @@ impl ScenariosArguments {
     ///
     /// When the command line is wrong, or the result cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
-        let mut chosen = table::scenarios();
-        chosen.retain(|(names, _)| names.join(", ").contains(&self.scenario));
-        expect(!chosen.is_empty(), || {
-            format!("--scenario {}: expected a part of a scenario's name", self.scenario)
-        })?;
+        let all = table::scenarios();
+        let chosen = containing("--scenario", &self.scenario, all, |(it, _)| it.join(", "))?;
         let all: Vec<_> = PipelineKind::ALL.iter().map(|kind| (kind.name(), *kind)).collect();
         let kinds = self.pipelines.iter().map(|name| named("--pipeline", name, &all));
         let kinds = kinds.collect::<Result<Vec<_>, _>>()?;
@@ -78,6 +74,6 @@ impl ScenariosArguments {
         if let Some(file) = &self.csv {
             write_csv(file, &records)?;
         }
-        give(&self.json, &records, || output::table(&records))
+        self.output.give(&records, || output::table(&records))
     }
 }
