@@ -7,7 +7,7 @@ use super::run::{Driven, Informant};
 use crate::chance::Chance;
 use crate::output::Record;
 use crate::scenarios::score::{Score, Scores};
-use crate::statistics::quantiles;
+use crate::statistics::{mean, quantiles};
 
 /// Draws of the trains behind an interval.
 const DRAWS: usize = 400;
@@ -96,8 +96,7 @@ struct Drives<'a> {
 impl Drives<'_> {
     fn statistics(&self, trains: &[usize]) -> [f64; STATISTICS] {
         let legs = || trains.iter().flat_map(|&train| &self.own[train].legs);
-        let count = legs().count().max(1) as f64;
-        let mean = |of: &dyn Fn(&DrivenLeg) -> f64| legs().map(of).sum::<f64>() / count;
+        let mean = |of: &dyn Fn(&DrivenLeg) -> f64| mean(legs().map(of));
         let beyond_m = mean(&|leg| leg.beyond_m);
         let within =
             |most_m: f64| 100.0 * mean(&|leg| f64::from(u8::from(leg.beyond_m.abs() <= most_m)));

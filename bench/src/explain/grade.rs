@@ -30,13 +30,8 @@ pub struct Grade {
     pub parameters: Vec<ParameterGrade>,
     /// Evidence, error reduction and parameters of the named effects, for people.
     pub details: Vec<String>,
-    /// Share of the attainable reduction of the error on the holdout runs; `None` where the true model takes less than
-    /// a sixth of it.
-    pub share: Option<f64>,
-    /// Error on the holdout runs over that of the true model.
-    pub left_ratio: Option<f64>,
-    /// The same of the true law with estimated numbers, for a law that no library holds.
-    pub attainable_ratio: Option<f64>,
+    /// The answer against the true model; `None` where nothing acts or nothing moves.
+    pub attained: Option<Attained>,
     /// Greatest acceptance score of a candidate in the first round of the search.
     pub acceptance_score: f64,
 }
@@ -83,9 +78,7 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
         iou,
         ends_held,
         parameters,
-        share: attained.and_then(|attained| attained.share),
-        left_ratio: attained.map(|attained| attained.left_ratio),
-        attainable_ratio: attained.and_then(|attained| attained.attainable_ratio),
+        attained,
         acceptance_score: explanation.acceptance_score,
     }
 }
@@ -156,14 +149,14 @@ fn details(
 }
 
 /// An answer against the true model, on the holdout runs.
-#[derive(Clone, Copy)]
-struct Attained {
-    /// Share of the attainable reduction of the error, where there is much to reduce.
-    share: Option<f64>,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attained {
+    /// Share of the attainable reduction of the error; `None` where the true model takes less than a sixth of it.
+    pub share: Option<f64>,
     /// Error over that of the true model.
-    left_ratio: f64,
-    /// The same of the true law with estimated numbers.
-    attainable_ratio: Option<f64>,
+    pub left_ratio: f64,
+    /// The same of the true law with estimated numbers, for a law that no library holds.
+    pub attainable_ratio: Option<f64>,
 }
 
 fn attained(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<Attained> {

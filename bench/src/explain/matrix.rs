@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::grade::Grade;
+use super::grade::{Attained, Grade};
 use super::scenario::Scenario;
 use crate::output::{Record, counts, table};
-use crate::statistics::{mean, median, quantiles, root_mean_square};
+use crate::statistics::{median, quantiles, root_mean_square, share};
 
 /// An error at most so many times another is as good.
 const NEAR: f64 = 1.1;
@@ -19,7 +19,7 @@ pub fn of(grades: &[(Scenario, Vec<Grade>)]) -> (Value, String) {
     let kinds: Vec<Record> = grades.iter().map(|(kind, own)| record(kind.name(), own)).collect();
     let all = || grades.iter().flat_map(|(_, grades)| grades);
     let nulls = || grades.iter().filter(|(kind, _)| kind.is_null()).flat_map(|(_, own)| own);
-    let strong = || all().filter(|grade| grade.share.is_some());
+    let strong = || all().filter(|grade| grade.attained.is_some_and(|it| it.share.is_some()));
     let (many, found) = (strong().count(), strong().filter(|grade| grade.is_right).count());
     let (intervals, held) = intervals(all());
     let (runs, raised) = (nulls().count(), nulls().filter(|grade| !grade.is_right).count());
@@ -51,8 +51,8 @@ pub fn of(grades: &[(Scenario, Vec<Grade>)]) -> (Value, String) {
 }
 
 fn share_of(all: impl Iterator<Item = bool>) -> Option<f64> {
-    let all: Vec<f64> = all.map(|is_so| f64::from(u8::from(is_so))).collect();
-    (!all.is_empty()).then(|| mean(&all))
+    let mut all = all.peekable();
+    all.peek().is_some().then(|| share(all))
 }
 
 /// 95 % intervals of parameters, those of a profile or a list together as one, and how many of them hold the truth,
@@ -85,8 +85,8 @@ fn record(kind: &str, grades: &[Grade]) -> Record {
         share_of(grades.iter().filter_map(of).map(|ratio| ratio <= NEAR))
     };
     let beside = grades.iter().filter_map(|grade| {
-        let (left, attainable) = (grade.left_ratio?, grade.attainable_ratio?);
-        Some(left <= NEAR * attainable.max(1.0))
+        let Attained { left_ratio, attainable_ratio, .. } = grade.attained?;
+        Some(left_ratio <= NEAR * attainable_ratio?.max(1.0))
     });
     let of_right = |of: fn(&Grade) -> Option<f64>| {
         median(right.iter().filter_map(|grade| of(grade)).collect())
@@ -99,9 +99,9 @@ fn record(kind: &str, grades: &[Grade]) -> Record {
         .number("error", median(parameters.iter().map(|it| it.error.abs()).collect()), 3)
         .number("cover", share_of(parameters.iter().map(|it| it.is_held())), 3)
         .number("z", z, 3)
-        .number("share", of_right(|it| it.share), 3)
-        .number("tenth", near(|it| it.left_ratio), 3)
-        .number("of the law", near(|it| it.attainable_ratio), 3)
+        .number("share", of_right(|it| it.attained?.share), 3)
+        .number("tenth", near(|it| Some(it.attained?.left_ratio)), 3)
+        .number("of the law", near(|it| it.attained?.attainable_ratio), 3)
         .number("beside it", share_of(beside), 3)
         .with("named instead", counts(&instead))
 }

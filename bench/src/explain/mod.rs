@@ -95,7 +95,7 @@ fn print_case(case: &Case, grade: &Grade) {
         grade.iou,
         grade.ends_held.iter().filter(|held| **held).count(),
         grade.ends_held.len(),
-        grade.share,
+        grade.attained.and_then(|it| it.share),
         parameters.join(", ")
     ));
     report_line(&format!("    acceptance score {:.2}", grade.acceptance_score));

@@ -4,27 +4,9 @@ use dynocar_tests::simulator::run_file::run_file;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
-/// Total length of intervals that are cut into disjoint pieces by sampling.
-fn interval_iou(one: &[[f64; 2]], other: &[[f64; 2]]) -> f64 {
-    let ends = one.iter().chain(other).flatten().copied();
-    let low = ends.clone().fold(f64::INFINITY, f64::min);
-    let high = ends.fold(f64::NEG_INFINITY, f64::max);
-    let inside =
-        |set: &[[f64; 2]], at: f64| set.iter().any(|[from, to]| (*from..*to).contains(&at));
-    let (mut both, mut either) = (0, 0);
-    const POINTS: usize = 20_000;
-    for k in 0..POINTS {
-        let at = low + (high - low) * (k as f64 + 0.5) / POINTS as f64;
-        let (here, there) = (inside(one, at), inside(other, at));
-        both += usize::from(here && there);
-        either += usize::from(here || there);
-    }
-    both as f64 / either.max(1) as f64
-}
-
 fn pairs(value: &Value) -> Vec<[f64; 2]> {
-    let list = value.as_array().cloned().unwrap_or_default();
-    list.iter().filter_map(|pair| Some([pair[0].as_f64()?, pair[1].as_f64()?])).collect()
+    let list = value.as_array().into_iter().flatten();
+    list.filter_map(|pair| Some([pair[0].as_f64()?, pair[1].as_f64()?])).collect()
 }
 
 /// Intersection over union of the true and the found place, where the effect has one.
@@ -34,35 +16,32 @@ pub fn place_iou(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> 
             if !intervals_m.is_empty() =>
         {
             let truth: Vec<[f64; 2]> = intervals_m.iter().map(|&(from, to)| [from, to]).collect();
-            Some(interval_iou(&truth, &pairs(&own["where"]["intervals_m"])))
+            Some(iou(&truth, &pairs(&own["where"]["intervals_m"])))
         }
         Effect::DraggingBrake { windows, .. } => {
-            let mut truth = Vec::new();
-            let mut found = Vec::new();
+            let (mut truth, mut found) = (Vec::new(), Vec::new());
             for (number, run) in simulated.runs.iter().enumerate() {
                 if run.plan.is_holdout {
                     continue;
                 }
                 // One axis for all runs, each far from the next.
-                let offset = 1e5 * number as f64;
+                let on_axis = |ends_s: [f64; 2]| ends_s.map(|it| 1e5 * number as f64 + it);
                 let of_run = windows.iter().filter(|window| window.run == number);
-                truth.extend(of_run.map(|w| [offset + w.start_s, offset + w.end_s]));
+                truth.extend(of_run.map(|it| on_axis([it.start_s, it.end_s])));
                 let listed = own["where"]["windows"].as_array().into_iter().flatten();
-                for window in listed.filter(|window| window["run"] == run.plan.file()) {
-                    if let (Some(from), Some(to)) =
-                        (window["t_start_s"].as_f64(), window["t_end_s"].as_f64())
-                    {
-                        found.push([offset + from, offset + to]);
-                    }
-                }
+                let of_run = listed.filter(|window| window["run"] == run.plan.file());
+                let ends_s =
+                    |it: &Value| Some([it["t_start_s"].as_f64()?, it["t_end_s"].as_f64()?]);
+                found.extend(of_run.filter_map(ends_s).map(on_axis));
             }
-            Some(run_windows_iou(&truth, &found))
+            Some(iou(&truth, &found))
         }
         _ => None,
     }
 }
 
-fn run_windows_iou(truth: &[[f64; 2]], found: &[[f64; 2]]) -> f64 {
+/// Intersection over union of two sets of disjoint intervals.
+fn iou(truth: &[[f64; 2]], found: &[[f64; 2]]) -> f64 {
     let length = |set: &[[f64; 2]]| set.iter().map(|[from, to]| to - from).sum::<f64>();
     let both: f64 = truth
         .iter()

@@ -29,21 +29,17 @@ impl World {
 
     /// Kinds that are in this world, small, whatever else acts: to name them is no error.
     pub fn everyday(self) -> &'static [EffectKind] {
-        use EffectKind::{
-            ActuatorDelay, BearingTemperature, CurveResistance, GradientError, MassChange,
-            TractionGain, WheelDiameter, Wind,
-        };
         match self {
             World::Plain | World::Coupled => &[],
             World::Rough => &[
-                ActuatorDelay,
-                BearingTemperature,
-                CurveResistance,
-                GradientError,
-                MassChange,
-                TractionGain,
-                WheelDiameter,
-                Wind,
+                EffectKind::ActuatorDelay,
+                EffectKind::BearingTemperature,
+                EffectKind::CurveResistance,
+                EffectKind::GradientError,
+                EffectKind::MassChange,
+                EffectKind::TractionGain,
+                EffectKind::WheelDiameter,
+                EffectKind::Wind,
             ],
         }
     }

@@ -41,8 +41,7 @@ pub struct LoadArguments {
     /// The pipelines, by name and with commas between; fast, slow or all for the groups
     #[arg(long, value_delimiter = ',', default_value = "all", value_name = "NAMES")]
     pipelines: Vec<String>,
-    /// What the daemon's threads do while no sample comes: look all the time (busy: the lowest latency, a whole core),
-    /// look for a while (adaptive), or sleep until the controller wakes them (event)
+    /// What the daemon's threads do while no sample comes: busy, adaptive (look for a while, then sleep) or event
     #[arg(long, value_name = "STRATEGY", default_value = "adaptive")]
     idle: String,
     /// Greatest delay of a sample, as a share of the period

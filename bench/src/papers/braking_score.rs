@@ -11,7 +11,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::xie::EmSettings;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::{Parameter, ParameterSnapshot};
+use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot};
 
 use super::braking::{
     Braking, Moment, PRESSURE_PA, SPEED_NOISE_MPS, STEP_S, ShareStep, WINDOW, disc_friction, train,
@@ -152,7 +152,7 @@ impl Score {
         Score {
             relative_percent: mean(all().map(|it| 100.0 * (it.error / it.truth).abs())),
             rmse: mean(all().map(|it| it.error * it.error)).sqrt(),
-            coverage: share(all().map(|it| it.error.abs() <= 1.959_964 * it.std)),
+            coverage: share(all().map(|it| it.error.abs() <= HALF_95 * it.std)),
             nees: mean(all().map(nees)),
             nees_run_variance: mean(nees_of_runs.iter().map(|nees| (nees - centre).powi(2))),
             runs: nees_of_runs.len(),

@@ -1,13 +1,11 @@
 //! Errors of a method over the seeds, with what the method and the bound say of them.
 
 use dynocar_model::train::Davis;
+use dynocar_shared::HALF_95;
 use nalgebra::{Matrix3, Vector3};
 
 use super::row::Row;
 use crate::statistics::{mean, root_mean_square, share};
-
-/// Standard deviations to either side of an estimate that hold the truth with 95 %.
-const INTERVAL: f64 = 1.96;
 
 /// Errors, coverage and consistency of one method.
 #[derive(Clone, Debug, Default)]
@@ -26,7 +24,7 @@ impl Score {
     /// Takes in a number with its claimed standard deviation.
     pub fn take(&mut self, error: f64, std: f64) {
         self.errors.push(error);
-        self.covered.push(error.abs() <= INTERVAL * std);
+        self.covered.push(error.abs() <= HALF_95 * std);
         self.nees.push((error / std).powi(2));
         self.freedom += 1.0;
     }
@@ -41,7 +39,7 @@ impl Score {
     ) {
         for (error, &speed_mps) in w0_errors(found, truth, speeds_mps).into_iter().zip(speeds_mps) {
             self.errors.push(error);
-            self.covered.push(error.abs() <= INTERVAL * w0_std(covariance, speed_mps));
+            self.covered.push(error.abs() <= HALF_95 * w0_std(covariance, speed_mps));
         }
         let error = Vector3::new(found.a - truth.a, found.b - truth.b, found.c - truth.c);
         if let Some(factor) = covariance.cholesky() {

@@ -9,7 +9,7 @@ use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_tests::simulator::Deviations;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-use super::drive::Truth;
+use super::drive::Moment;
 use super::world::{
     BRAKE_STD, COEFFICIENT_SHARE, DELAY_STD_S, GUST_S, KNOT_M, KNOT_OVER_MEAN, LoadSource,
     ROTATING_MASS_STD, WEIGHING_STD, World, knot_std_permille,
@@ -50,7 +50,7 @@ pub struct Bound {
     gusts_from: usize,
     knots_from: usize,
     block_s: f64,
-    last: Option<Truth>,
+    last: Option<Moment>,
 }
 
 impl Bound {
@@ -107,7 +107,7 @@ impl Bound {
     }
 
     /// Takes in a cycle of a drive.
-    pub fn see(&mut self, world: &World, truth: &Truth, cycle_s: f64) {
+    pub fn see(&mut self, world: &World, truth: &Moment, cycle_s: f64) {
         let last = self.last.replace(*truth);
         if !truth.is_standing {
             let Some(last) = last else { return };
@@ -139,7 +139,7 @@ impl Bound {
     }
 
     /// What a step does to the speed by each unknown.
-    fn move_on(&mut self, world: &World, last: &Truth, truth: &Truth, step_s: f64) {
+    fn move_on(&mut self, world: &World, last: &Moment, truth: &Moment, step_s: f64) {
         let resistance = &world.truth.resistance;
         let gain = mps2_per_n_per_kn(world.truth.rotating_mass_factor);
         let speed_mps = truth.speed_mps;
@@ -172,7 +172,7 @@ impl Bound {
         }
     }
 
-    fn pass_knots(&mut self, length_m: f64, truth: &Truth, seconds_gain: f64) {
+    fn pass_knots(&mut self, length_m: f64, truth: &Moment, seconds_gain: f64) {
         let places = (length_m / UNDER_TRAIN_M).ceil() as usize + 1;
         let change_mps = -truth.direction * seconds_gain / places as f64;
         for place in 0..places {

@@ -31,15 +31,8 @@ pub struct Moment {
     pub w0_n_per_kn: f64,
     /// Speed in m/s.
     pub speed_mps: f64,
-}
-
-/// How the train truly moves.
-#[derive(Clone, Copy, Debug)]
-pub struct Truth {
-    /// True while it stands at a stop.
+    /// True while the train stands at a stop.
     pub is_standing: bool,
-    /// Speed in m/s.
-    pub speed_mps: f64,
     /// Acceleration in m/s² that the forces give.
     pub push_mps2: f64,
     /// Chainage in m of the train's centre.
@@ -116,19 +109,6 @@ impl Drive {
     /// The world that it drives in.
     pub fn world(&self) -> &World {
         &self.world
-    }
-
-    /// How the train moves now.
-    pub fn truth(&self) -> Truth {
-        Truth {
-            is_standing: matches!(self.phase, Phase::Standing { .. }),
-            speed_mps: self.speed_mps,
-            push_mps2: self.acting_mps2,
-            place_m: self.place_m,
-            direction: self.direction,
-            headwind_mps: self.headwind_mps(),
-            gust: self.gust,
-        }
     }
 
     fn headwind_mps(&self) -> f64 {
@@ -311,6 +291,17 @@ impl Drive {
         if scenario.load != LoadSource::Unknown {
             sample.set(SampleField::Mass, self.weighed_kg);
         }
-        Moment { sample, mass_kg: self.mass_kg, w0_n_per_kn, speed_mps: self.speed_mps }
+        Moment {
+            sample,
+            mass_kg: self.mass_kg,
+            w0_n_per_kn,
+            speed_mps: self.speed_mps,
+            is_standing: matches!(self.phase, Phase::Standing { .. }),
+            push_mps2: self.acting_mps2,
+            place_m: self.place_m,
+            direction: self.direction,
+            headwind_mps: self.headwind_mps(),
+            gust: self.gust,
+        }
     }
 }

@@ -133,7 +133,7 @@ fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
     for cycle in 0..(3600.0 * hours / cycle_s) as u64 {
         let (time_s, moment) = (cycle as f64 * cycle_s, drive.advance());
         if let Some(bound) = &mut bound {
-            bound.see(drive.world(), &drive.truth(), cycle_s);
+            bound.see(drive.world(), &moment, cycle_s);
         }
         let snapshot = pipeline.process(&moment.sample);
         if moment.speed_mps < COUNTS_MPS {

@@ -4,8 +4,7 @@
 use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_estimators::wang::{MassKalman, MassKalmanSettings};
 use dynocar_estimators::wang::{MassRegression, StagedDescent, StagedDescentSettings};
-use dynocar_model::force::{ForceResolver, ResolvedSample};
-use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_model::force::ResolvedSample;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
@@ -13,6 +12,7 @@ use super::shuttle::{
     BRAKE_MAX_N, CURVE_RADIUS_M, Disturbance, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle,
 };
 use crate::chance::Chance;
+use crate::rig::pipelines::resolving;
 use crate::statistics::KMH;
 
 const SERVICE_BRAKE_MPS2: f64 = 0.7;
@@ -246,10 +246,7 @@ pub fn speed_variance() -> f64 {
 
 /// The samples of a drive with noise and rounding, through validation and force resolution.
 pub fn measure(shuttle: &Shuttle, ride: &[Instant], random: &mut Chance) -> Vec<ResolvedSample> {
-    let train = &shuttle.train;
-    let limits = ValidationLimits::for_train(train.mass_kg);
-    let mut validator = Validator::new(TrainId(1), train.mass_kg, limits);
-    let mut resolver = ForceResolver::new(train.clone(), Some(shuttle.track.clone()));
+    let mut resolve = resolving(TrainId(1), &shuttle.train, Some(shuttle.track.clone()));
     let mut resolved = Vec::with_capacity(ride.len());
     for (index, instant) in ride.iter().enumerate() {
         let is_standing = instant.speed_mps <= 0.0;
@@ -268,8 +265,7 @@ pub fn measure(shuttle: &Shuttle, ride: &[Instant], random: &mut Chance) -> Vec<
         sample.time_ns = (instant.time_s * 1e9).round() as i64;
         sample.sequence = index as u64 + 1;
         sample.direction = instant.direction as i8;
-        let valid = validator.check(&sample).expect("a plausible sample");
-        resolved.push(resolver.resolve(&valid));
+        resolved.push(resolve(&sample).expect("a plausible sample"));
     }
     resolved
 }
