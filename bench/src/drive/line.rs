@@ -8,7 +8,8 @@ use dynocar_shared::{RailCondition, Uncertain};
 use super::knowledge::Ability;
 use crate::chance::Chance;
 use crate::output::Record;
-use crate::scenarios::world::{BRAKE_STD, LoadSource, Scenario, Traffic, World};
+use crate::scenarios::mistakes::Mistakes;
+use crate::scenarios::world::{LoadSource, Scenario, Traffic, World};
 
 /// What is particular about brakes, rail or daemon.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -206,7 +207,8 @@ impl Hidden {
             .map(|(from_m, to_m)| (from_m, to_m, 350.0 + 900.0 * random.uniform()))
             .collect();
         Hidden {
-            brake_scale: service.condition.brake_scale * (1.0 + BRAKE_STD * random.normal()),
+            brake_scale: service.condition.brake_scale
+                * (1.0 + Mistakes::USUAL.brake_share * random.normal()),
             rail,
             wind_mps: wind_std_mps * random.normal(),
             tunnels_m,

@@ -12,14 +12,15 @@ use super::knowledge::{Ability, Knowledge};
 use super::line::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::plan::{Leg, PIECE_M};
 use crate::chance::Chance;
-use crate::scenarios::world::{LoadSource, STOP_TO_STOP_STD, WEIGHING_STD, World};
+use crate::scenarios::mistakes::Mistakes;
+use crate::scenarios::world::{LoadSource, WEIGHING_STD, World};
 
 /// Longest step of the simulation in s.
 const STEP_MAX_S: f64 = 0.02;
 /// Standard deviation in m of the balises' places before a stop.
 const BALISE_STD_M: f64 = 0.08;
 /// Mean time in s by which acting forces are later than reported ones.
-const MEAN_DELAY_S: f64 = 0.1;
+const MEAN_DELAY_S: f64 = Mistakes::USUAL.mean_delay_s;
 
 /// A train on its line.
 pub struct Train {
@@ -56,7 +57,7 @@ pub struct Train {
 impl Train {
     /// A train at the first stop.
     pub fn new(service: Service, seed: u64) -> Self {
-        let world = World::draw(service.scenario(), seed);
+        let world = World::draw(service.scenario(), Mistakes::USUAL, seed);
         let mut random = Chance::new(seed ^ 0x6472_6976_6572);
         let hidden = Hidden::draw(&service, &world, &mut random);
         let declared = service.declared();
@@ -105,7 +106,8 @@ impl Train {
             LoadSource::Exact | LoadSource::Unknown => 1.0,
         };
         self.weighed_kg = scale * self.mass_kg;
-        self.brake_scale = self.hidden.brake_scale * (1.0 + STOP_TO_STOP_STD * random.normal());
+        self.brake_scale =
+            self.hidden.brake_scale * (1.0 + Mistakes::USUAL.stop_to_stop_share * random.normal());
         self.balise_m = BALISE_STD_M * random.normal();
         self.energy_j = 0.0;
     }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::grade::{Attained, Grade};
+use super::parameters::ParameterGrade;
 use super::scenario::Scenario;
 use crate::output::{Record, counts, table};
 use crate::statistics::{median, quantiles, root_mean_square, share};
@@ -32,9 +33,18 @@ pub fn of(grades: &[(Scenario, Vec<Grade>)]) -> (Value, String) {
             &format!("effects that make a sixth of the holdout error: {found} of {many} found\n");
     }
     if intervals > 0 {
-        let share = 100.0 * held / intervals as f64;
+        let percent = 100.0 * held / intervals as f64;
         text += &format!(
-            "95 % intervals of parameters that hold the truth: {share:.1} % of {intervals}\n"
+            "95 % intervals of parameters that hold the truth: {percent:.1} % of {intervals}\n"
+        );
+        let every: Vec<bool> = all()
+            .filter(|grade| grade.is_right)
+            .flat_map(|grade| grade.parameters.iter().map(ParameterGrade::is_held))
+            .collect();
+        text += &format!(
+            "the same, every value of a profile or list by itself: {:.1} % of {}\n",
+            100.0 * share(every.iter().copied()),
+            every.len()
         );
     }
     text += &format!("false alarms: {raised} of {runs}\n");

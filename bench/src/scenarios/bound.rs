@@ -6,13 +6,11 @@
 //! from how the true motion would differ.
 
 use dynocar_model::force::balance::mps2_per_n_per_kn;
-use dynocar_tests::simulator::Deviations;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::drive::Moment;
 use super::world::{
-    BRAKE_STD, COEFFICIENT_SHARE, DELAY_STD_S, GUST_S, KNOT_M, KNOT_OVER_MEAN, LoadSource,
-    ROTATING_MASS_STD, WEIGHING_STD, World, knot_std_permille,
+    GUST_S, KNOT_M, KNOT_OVER_MEAN, LoadSource, WEIGHING_STD, World, knot_std_permille,
 };
 
 /// Indices of the unknowns that every run shares, behind a, b and c; loads, brakes of each leg, gusts and knots
@@ -69,16 +67,17 @@ impl Bound {
         let gusts = (3600.0 * hours / GUST_S) as usize + 3;
         let end_m = world.stops_m[world.stops_m.len() - 1] + 1000.0;
         let knots = (end_m / KNOT_M) as usize + 3;
-        let (declared, usual) = (world.declared.resistance, Deviations::ROUGH);
-        let davis = [declared.a, declared.b, declared.c].map(|it| (COEFFICIENT_SHARE * it).powi(2));
+        let (declared, usual) = (world.declared.resistance, &world.mistakes);
+        let davis =
+            [declared.a, declared.b, declared.c].map(|it| (usual.coefficient_share * it).powi(2));
         let mut prior = davis.to_vec();
         prior.extend([
             usual.force_share.powi(2),
-            usual.force_share.powi(2) + BRAKE_STD.powi(2),
-            DELAY_STD_S.powi(2),
-            ROTATING_MASS_STD.powi(2),
+            usual.force_share.powi(2) + usual.brake_share.powi(2),
+            usual.delay_s.powi(2),
+            usual.rotating_mass.powi(2),
             usual.wheel_share.powi(2),
-            usual.day_wind_mps.powi(2),
+            usual.wind_mps.powi(2),
         ]);
         let mut add = |count: usize, std: f64| {
             let from = prior.len();
@@ -86,8 +85,8 @@ impl Bound {
             from
         };
         let load = add(loads, load_std);
-        let brakes_from = add(legs, world.stop_to_stop_std);
-        let gusts_from = add(gusts, KNOT_OVER_MEAN * world.gust_std_mps);
+        let brakes_from = add(legs, usual.stop_to_stop_share);
+        let gusts_from = add(gusts, KNOT_OVER_MEAN * usual.gust_mps);
         let knots_from = add(knots, knot_std_permille(scenario.map_std_permille));
         let count = prior.len();
         Bound {

@@ -117,7 +117,7 @@ impl Drive {
     }
 
     fn next_gust_mps(&mut self) -> f64 {
-        KNOT_OVER_MEAN * self.world.gust_std_mps * self.world.random.normal()
+        KNOT_OVER_MEAN * self.world.mistakes.gust_mps * self.world.random.normal()
     }
 
     /// The gusts of a cycle later.
@@ -247,8 +247,8 @@ impl Drive {
 
     fn depart(&mut self) {
         self.phase = Phase::Driving;
-        let World { random, brake_scale, stop_to_stop_std, .. } = &mut self.world;
-        self.brake_scale = *brake_scale * (1.0 + *stop_to_stop_std * random.normal());
+        let World { random, brake_scale, mistakes, .. } = &mut self.world;
+        self.brake_scale = *brake_scale * (1.0 + mistakes.stop_to_stop_share * random.normal());
         self.commanded_mps2 = 0.0;
         self.target_mps = self.habits.top_mps * (0.75 + 0.25 * self.world.random.uniform());
     }

@@ -1,7 +1,8 @@
 //! Every pipeline that answers resistance or mass, in a user's day: trains that stop, loads that are
 //! weighed wrong or not at all, maps, wheels, forces and clocks that are a little off.
 //!
-//! - [`world`]: a train, its line, and the ordinary mistakes in what is declared of them
+//! - [`mistakes`]: how wrong what is declared of them is
+//! - [`world`]: a train, its line and its day, drawn by those
 //! - [`drive`]: driving from stop to stop, and what the controller writes of it
 //! - [`bound`]: how well both can be known at best
 //! - [`score`]: what an answer was worth over a drive
@@ -9,6 +10,7 @@
 
 pub mod bound;
 pub mod drive;
+pub mod mistakes;
 pub mod score;
 pub mod table;
 pub mod world;
@@ -18,6 +20,7 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar_shared::PipelineKind;
 
+use self::mistakes::Mistakes;
 use crate::output::{self, Failure, OutputArguments, containing, expect, named, write_csv};
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
@@ -36,6 +39,9 @@ pub struct ScenariosArguments {
     /// Only scenarios whose name contains this, as metro
     #[arg(long, value_name = "TEXT", default_value = "")]
     scenario: String,
+    /// How large the mistakes are: those of careful declarations, or all that default settings expect
+    #[arg(long, value_enum, default_value_t = Size::Usual)]
+    mistakes: Size,
     /// A pipeline; may be repeated
     #[arg(long = "pipeline", value_name = "KIND", default_value = "train_kalman")]
     pipelines: Vec<String>,
@@ -47,6 +53,22 @@ pub struct ScenariosArguments {
     /// Write the result as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+}
+
+/// How large the mistakes are.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Size {
+    Usual,
+    Expected,
+}
+
+impl Size {
+    fn mistakes(self) -> Mistakes {
+        match self {
+            Size::Usual => Mistakes::USUAL,
+            Size::Expected => Mistakes::expected(),
+        }
+    }
 }
 
 impl ScenariosArguments {
@@ -69,6 +91,7 @@ impl ScenariosArguments {
             seeds: self.seeds,
             first_seed: self.first_seed,
             hours: self.hours,
+            mistakes: self.mistakes.mistakes(),
             threads: self.threads,
         })?;
         if let Some(file) = &self.csv {

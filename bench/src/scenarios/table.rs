@@ -10,6 +10,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::bound::Bound;
 use super::drive::{Drive, Moment};
+use super::mistakes::Mistakes;
 use super::score::{Answer, COUNTS_MPS, Score, Scores};
 use super::world::{LoadSource, Scenario, Traffic, World};
 use crate::output::Record;
@@ -75,6 +76,8 @@ pub struct Plan<'a> {
     pub first_seed: u64,
     /// Hours of each drive.
     pub hours: f64,
+    /// How large the mistakes are.
+    pub mistakes: Mistakes,
     /// Rows at a time.
     pub threads: usize,
 }
@@ -111,7 +114,7 @@ fn measure(
     let Some(settings) = settings(kind, scenario) else { return Ok(Vec::new()) };
     let mut scores = QUANTITIES.map(|_| Vec::new());
     for seed in plan.first_seed..plan.first_seed + plan.seeds {
-        let world = World::draw(*scenario, seed);
+        let world = World::draw(*scenario, plan.mistakes, seed);
         let train = Arc::new(world.declared.clone());
         let estimator = settings.build(&train)?;
         let pipeline = Pipeline::new(TrainId(1), 0, train, None, estimator);

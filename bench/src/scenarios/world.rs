@@ -1,8 +1,8 @@
 //! A train, its line, and the ordinary mistakes in what is declared of them.
 
+use super::mistakes::Mistakes;
 use crate::chance::Chance;
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_tests::simulator::Deviations;
 
 /// The kinds of traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,22 +95,10 @@ impl Traffic {
     }
 }
 
-/// Standard deviation of a, b, c as a share of what is declared.
-pub const COEFFICIENT_SHARE: f64 = 0.3;
-/// Standard deviation of the rotating mass as a share of the mass.
-pub const ROTATING_MASS_STD: f64 = 0.002;
-/// Mean delay of forces in s.
-const DELAY_S: f64 = 0.1;
-/// Standard deviation in s of the delay of forces.
-pub const DELAY_STD_S: f64 = 0.05;
 /// Standard deviation of a weighing as a share of the mass, where the load changes.
 pub const WEIGHING_STD: f64 = 0.03;
 /// Distance in m between the knots of the map's error.
 pub const KNOT_M: f64 = 200.0;
-/// Standard deviation of the brake's force from train to train.
-pub const BRAKE_STD: f64 = 0.02;
-/// Standard deviation of the brake's force from stop to stop.
-pub const STOP_TO_STOP_STD: f64 = 0.015;
 /// Time in s between the knots of the gusts.
 pub const GUST_S: f64 = 20.0;
 /// Standard deviation at knots of what straight lines between them carry on with that of 1.
@@ -126,6 +114,8 @@ pub fn knot_std_permille(map_std_permille: f64) -> f64 {
 pub struct World {
     /// The scenario.
     pub scenario: Scenario,
+    /// By what all was drawn.
+    pub mistakes: Mistakes,
     /// As declared.
     pub declared: TrainModel,
     /// The true train; its mass is that of the first load.
@@ -134,12 +124,8 @@ pub struct World {
     pub force_scale: [f64; 2],
     /// Exerted brake force over what the brake is taken to exert.
     pub brake_scale: f64,
-    /// Standard deviation of that from stop to stop.
-    pub stop_to_stop_std: f64,
-    /// Wind of the day in m/s along the growing chainage, and the standard deviation of its gusts.
+    /// Wind of the day in m/s along the growing chainage.
     pub wind_mps: f64,
-    /// See `wind_mps`.
-    pub gust_std_mps: f64,
     /// Measured speed over the true one.
     pub speed_scale: f64,
     /// How much later in s than reported forces act.
@@ -157,22 +143,21 @@ const PIECE_M: f64 = 10.0;
 
 impl World {
     /// Draws the truth.
-    pub fn draw(scenario: Scenario, seed: u64) -> Self {
+    pub fn draw(scenario: Scenario, mut mistakes: Mistakes, seed: u64) -> Self {
         let mut random = Chance::new(seed);
         let declared = scenario.traffic.declared();
         let habits = scenario.traffic.habits();
         let mut truth = declared.clone();
         let mut near = |value: f64, share: f64| value * (1.0 + share * random.normal());
         truth.resistance = Davis {
-            a: near(declared.resistance.a, COEFFICIENT_SHARE).max(0.3),
-            b: near(declared.resistance.b, COEFFICIENT_SHARE).max(0.0),
-            c: near(declared.resistance.c, COEFFICIENT_SHARE).max(1e-5),
+            a: near(declared.resistance.a, mistakes.coefficient_share).max(0.3),
+            b: near(declared.resistance.b, mistakes.coefficient_share).max(0.0),
+            c: near(declared.resistance.c, mistakes.coefficient_share).max(1e-5),
         };
-        let usual = Deviations::ROUGH;
-        let force_scale = [near(1.0, usual.force_share), near(1.0, usual.force_share)];
-        let speed_scale = near(1.0, usual.wheel_share);
-        let delay_s = near(DELAY_S, DELAY_STD_S / DELAY_S).clamp(0.0, 0.25);
-        truth.rotating_mass_factor += near(1.0, ROTATING_MASS_STD) - 1.0;
+        let force_scale = [near(1.0, mistakes.force_share), near(1.0, mistakes.force_share)];
+        let speed_scale = near(1.0, mistakes.wheel_share);
+        let delay_s = (mistakes.mean_delay_s + near(1.0, mistakes.delay_s) - 1.0).abs();
+        truth.rotating_mass_factor += near(1.0, mistakes.rotating_mass) - 1.0;
         truth.mass_kg *= match scenario.load {
             LoadSource::Exact | LoadSource::Weighed(_) => 1.0 + 0.3 * (random.uniform() - 0.5),
             LoadSource::Unknown | LoadSource::Changing => 1.0 + 0.24 * (random.uniform() - 0.5),
@@ -185,17 +170,19 @@ impl World {
         }
         let end_m = stops_m[stops_m.len() - 1] + 1000.0;
         let gradient = profile(&scenario, &habits, declared.length_m, end_m, &mut random);
-        let brake_scale = 1.0 + BRAKE_STD * random.normal();
-        let wind_mps = usual.day_wind_mps * random.normal();
+        let brake_scale = 1.0 + mistakes.brake_share * random.normal();
+        let wind_mps = mistakes.wind_mps * random.normal();
+        if scenario.speed_noise_mps == 0.0 {
+            mistakes.gust_mps = 0.0;
+        }
         World {
             scenario,
+            mistakes,
             declared,
             truth,
             force_scale,
             brake_scale,
-            stop_to_stop_std: STOP_TO_STOP_STD,
             wind_mps,
-            gust_std_mps: if scenario.speed_noise_mps > 0.0 { usual.gust_mps } else { 0.0 },
             speed_scale,
             delay_s,
             gradient,
@@ -210,9 +197,8 @@ impl World {
         self.truth = self.declared.clone();
         self.force_scale = [1.0, 1.0];
         self.brake_scale = 1.0;
-        self.stop_to_stop_std = 0.0;
+        self.mistakes = Mistakes::NONE;
         self.wind_mps = 0.0;
-        self.gust_std_mps = 0.0;
         self.speed_scale = 1.0;
         self.delay_s = 0.0;
         self.gradient.iter_mut().for_each(|[map, truth]| *truth = *map);

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use dynocar_bench::scenarios::drive::Drive;
+use dynocar_bench::scenarios::mistakes::Mistakes;
 use dynocar_bench::scenarios::table::{self, NamedScenario, Plan};
 use dynocar_bench::scenarios::world::World;
 use dynocar_core::pipeline::Pipeline;
@@ -32,6 +33,7 @@ fn in_an_hour_of_ordinary_driving_what_may_be_used_is_right_and_changes_seldom()
         seeds: 4,
         first_seed: 501,
         hours: 1.0,
+        mistakes: Mistakes::USUAL,
         threads: 2,
     })
     .unwrap();
@@ -50,12 +52,19 @@ fn in_an_hour_of_ordinary_driving_what_may_be_used_is_right_and_changes_seldom()
 fn a_strong_wind_on_a_train_of_more_air_resistance_than_declared_stays_in_the_interval() {
     // Drawn so: 3.6 m/s of wind and a c two thirds above the declared one, all the way in one direction.
     let scenarios = named(&["EMU, weighed 2 % wrong"]);
-    let world = World::draw(scenarios[0].1, 30_028);
+    let world = World::draw(scenarios[0].1, Mistakes::USUAL, 30_028);
     let c_share = world.truth.resistance.c / world.declared.resistance.c;
     assert!(world.wind_mps.abs() > 3.5 && c_share > 1.6, "{} {c_share}", world.wind_mps);
     let kinds = &[PipelineKind::TrainKalman];
-    let plan =
-        Plan { scenarios: &scenarios, kinds, seeds: 1, first_seed: 30_028, hours: 1.0, threads: 1 };
+    let plan = Plan {
+        scenarios: &scenarios,
+        kinds,
+        seeds: 1,
+        first_seed: 30_028,
+        hours: 1.0,
+        mistakes: Mistakes::USUAL,
+        threads: 1,
+    };
     for line in table::run(&plan).unwrap() {
         let of = |name: &str| line.value(name).expect(name);
         assert!(of("usable_percent") > 80.0 && of("longest_wrong_s") <= 1.0, "{line:?}");
@@ -66,7 +75,7 @@ fn a_strong_wind_on_a_train_of_more_air_resistance_than_declared_stays_in_the_in
 fn each_snapshot(mut look: impl FnMut(f64, &ParameterSnapshot)) {
     let mut scenario = named(&["EMU, load exact"])[0].1;
     scenario.position_noise_m = 0.5;
-    let world = World::draw(scenario, 77).without_mistakes();
+    let world = World::draw(scenario, Mistakes::USUAL, 77).without_mistakes();
     let train = Arc::new(world.declared.clone());
     let kinds = [
         PipelineKind::TrainKalman,

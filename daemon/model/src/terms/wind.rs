@@ -18,6 +18,10 @@ pub const WIND_PLUS: Key = Key {
 pub const PARAMETER: Parameter = Parameter::new("wind_plus_mps", (-35.0, 35.0), 0.05);
 /// Root mean square in m/s of the winds along a line on ordinary days, at most.
 pub const EVERYDAY_MPS: f64 = 2.5;
+/// Standard deviation of gusts over that of the wind from day to day.
+pub const GUST_SHARE: f64 = 0.5;
+/// Time in s over which a gust lasts on the average, seen from a moving train.
+pub const GUST_TIME_S: f64 = 10.0;
 /// Less wind than this is in the noise of any day.
 pub const LEAST_MPS: f64 = 1.0;
 

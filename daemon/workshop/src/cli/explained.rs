@@ -88,7 +88,7 @@ fn found(effect: &EffectAnswer) -> String {
         "removes",
         &match percent {
             0.5.. => format!("{percent:.0} % of the open-loop error of the fit runs"),
-            _ => "none of the open-loop error of the fit runs".into(),
+            _ => "none of the open-loop error, which each run's own load and wind make".into(),
         },
     );
     let means = effect_words::meaning(&effect.meaning);

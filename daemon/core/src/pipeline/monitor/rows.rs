@@ -1,5 +1,6 @@
 //! Blocks of momentum to independent rows of unit variance, with a column for each suspect.
 
+use dynocar_model::terms::wind;
 use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
 
@@ -14,8 +15,6 @@ use crate::pipeline::momentum::{MomentumBlock, UNKNOWNS};
 const COLUMNS: usize = 1 + PARAMETERS;
 /// Innovations beyond so many standard deviations count for less (Huber).
 const HUBER: f64 = 4.0;
-/// Gusts over the spread of the wind from day to day.
-const GUST_SHARE: f64 = 0.5;
 
 /// One value for each parameter.
 pub type Parameters = SVector<f64, PARAMETERS>;
@@ -61,7 +60,7 @@ impl Rows {
         Rows {
             floor_n_per_kn: settings.disturbance_n_per_kn.hypot(settings.map_std_permille),
             share: settings.disturbance_share,
-            gust_mps: GUST_SHARE * settings.wind_std_mps,
+            gust_mps: wind::GUST_SHARE * settings.wind_std_mps,
             time_s: settings.disturbance_time_s,
             declared,
             whitener: Whitener::new(SMatrix::zeros(), SMatrix::zeros()),

@@ -70,8 +70,8 @@ pub struct Step {
     pub traction_change: f64,
     /// Change of the brake force over the step in N/kN.
     pub brake_change: f64,
-    /// Variance in (N/kN s)² of the impulse by where on the line a known force acts.
-    pub place_variance: f64,
+    /// Variance in (N/kN s)² of the impulse by gusts, and by where on the line a known force acts.
+    pub impulse_variance: f64,
     /// Share of [`jump_variance`] that the forces of this train bring.
     pub jump_share: f64,
     /// Fastest change of force lately in N/kN per s.
@@ -106,7 +106,7 @@ impl Step {
             known: half_s * (from.known + to.known),
             traction_change: acting.changes[0],
             brake_change: acting.changes[1],
-            place_variance: 0.0,
+            impulse_variance: 0.0,
             jump_share: 1.0,
             force_rate: 0.0,
             map_std_permille: 0.0,
@@ -175,7 +175,7 @@ impl MotionFilter {
 
         let jump = step.jump_share * jump_variance(load * change, step.duration_s);
         self.jump_variance = jump * per_inertia * per_inertia;
-        let missed = step.place_variance + (INTEGRATION_SHARE * step.duration_s * w0).powi(2);
+        let missed = step.impulse_variance + (INTEGRATION_SHARE * step.duration_s * w0).powi(2);
         let variance = self.jump_variance + missed * per_inertia * per_inertia;
         let next_mps = start_mps + per_inertia * (impulse - step.duration_s * (w0 + wind));
         self.belief.rewrite(SPEED, next_mps, &gradient, variance);
@@ -218,7 +218,7 @@ mod tests {
             known: 0.9,
             traction_change: 4.0,
             brake_change: -1.5,
-            place_variance: 0.0,
+            impulse_variance: 0.0,
             jump_share: 0.0,
             force_rate: 0.0,
             map_std_permille: 0.0,

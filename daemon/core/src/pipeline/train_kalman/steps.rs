@@ -1,6 +1,7 @@
 //! From one sample to the next: forces as they act, and how fast forces and line change.
 
 use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::wind;
 
 use super::acting_forces::ActingForces;
 use super::motion_filter::{Step, wind_over};
@@ -68,12 +69,17 @@ impl Steps {
         let steps = (self.train_length_m / (speed_mps * duration_s)).max(1.0);
         let place_s = settings.position_std_m / speed_mps;
         let walk = settings.brake_scale_per_sqrt_min.powi(2) * duration_s / 60.0;
+        let by_place = steps * (place_s * self.known_rate * duration_s).powi(2);
+        // Over a time in which the speed's noise averages out gusts follow each other like noise.
+        let by_wind = air.by_wind(to.speed_mps);
+        let gust_n_per_kn = by_wind * wind::GUST_SHARE * settings.wind_std_mps;
+        let by_gusts = 2.0 * wind::GUST_TIME_S * gust_n_per_kn.powi(2) * duration_s;
         Step {
-            place_variance: steps * (place_s * self.known_rate * duration_s).powi(2),
+            impulse_variance: by_place + by_gusts,
             force_rate: self.force_rate,
             map_std_permille: sample.gradient_std_permille,
             drift_variance: settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0,
-            by_wind: sample.direction * air.by_wind(to.speed_mps),
+            by_wind: sample.direction * by_wind,
             by_wind_square: air.by_wind_square(),
             wind: wind_over(duration_s, settings.wind_std_mps),
             brake_variance: (walk, settings.brake_scale_std.powi(2)),
@@ -90,7 +96,7 @@ mod tests {
     /// Variance of the impulse over 20 s by where on the line a gradient changes by 6 ‰ under a train of
     /// 100 m, which passes it at 20 m/s.
     fn place_variance(rate_hz: i64, position_noise_m: f64) -> f64 {
-        let settings = TrainKalmanSettings::default();
+        let settings = TrainKalmanSettings { wind_std_mps: 0.0, ..Default::default() };
         let resistance = Resistance::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
         let mut steps = Steps::new(&settings, 100.0);
         let sample = |k: i64| {
@@ -112,9 +118,35 @@ mod tests {
         let of_step = |k: i64| {
             let (from, to) = (sample(k - 1), sample(k));
             steps.see(&to);
-            steps.to((&from, &to), &ResolvedSample::coasting(), 0.0, &resistance).place_variance
+            steps.to((&from, &to), &ResolvedSample::coasting(), 0.0, &resistance).impulse_variance
         };
         (1..20 * rate_hz).map(of_step).sum()
+    }
+
+    #[test]
+    fn gusts_are_noise_in_proportion_to_air_resistance_and_speed() {
+        let settings = TrainKalmanSettings { wind_std_mps: 2.0, ..Default::default() };
+        let variance = |c: f64, speed_mps: f64| {
+            let resistance = Resistance::declared(&Davis { a: 1.5, b: 0.02, c }, 0.4);
+            let sample = |time_ns: i64| UnitSample {
+                time_ns,
+                segment: 1,
+                speed_mps,
+                driving: 0.0,
+                traction: 0.0,
+                brake: 0.0,
+                known: 0.0,
+                inertia: 108.0,
+            };
+            let mut steps = Steps::new(&settings, 100.0);
+            let (from, to) = (sample(0), sample(100_000_000));
+            steps.see(&from);
+            steps.see(&to);
+            steps.to((&from, &to), &ResolvedSample::coasting(), 0.0, &resistance).impulse_variance
+        };
+        // Gusts of 1 m/s for 10 s each: 2 c v, over 0.1 s of independent ones.
+        assert!((variance(0.001, 30.0) - 0.06_f64.powi(2) * 2.0 * 10.0 * 0.1).abs() < 1e-9);
+        assert!((variance(0.002, 15.0) - variance(0.001, 30.0)).abs() < 1e-9);
     }
 
     #[test]

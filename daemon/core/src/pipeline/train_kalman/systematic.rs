@@ -49,9 +49,9 @@ impl Systematic {
         self.starts += 1.0;
     }
 
-    /// Least variance in (N/kN)² of w0 by the mean error of the map over the line driven, and over the
-    /// places where the train is slow: passing a place once more brings the same error again. Without
-    /// chainage every place counts as new.
+    /// Variance in (N/kN)² that the filter lacks of w0 by the mean error of the map over the line driven, and
+    /// over the places where the train is slow: passing a place once more brings the same error again, which
+    /// the filter takes for another one. Without chainage every place counts as new.
     fn map_variances(&self) -> (f64, f64) {
         let Some((low, high)) = self.driven_m else { return (0.0, 0.0) };
         let line_m = high - low;
@@ -59,7 +59,8 @@ impl Systematic {
         let pieces = (line_m / GRADIENT_ERROR_FREE_M).max(1.0);
         let stops = (line_m / between_stops_m.max(1.0)).clamp(1.0, self.starts.max(1.0));
         let variance = self.gradient_std_permille.powi(2);
-        (variance / pieces, variance / stops)
+        let repeated = 1.0 - (line_m / self.travelled_m.max(1.0)).min(1.0);
+        (variance * repeated / pieces, variance * repeated / stops)
     }
 
     /// Widens the covariance of a, b, c (scaled) and of the load factor.
@@ -87,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn passing_a_line_again_makes_nothing_better_known_and_more_line_does() {
+    fn passing_a_line_again_makes_nothing_better_known() {
         let widened = |lengths_m: &[f64]| {
             let mut systematic = Systematic::new(0.1, 0.0);
             for length_m in lengths_m {
@@ -101,9 +102,10 @@ mod tests {
             let top = Vector4::new(1.0, 1.0, 1.0, 0.0);
             top.dot(&(covariance * top))
         };
-        let once = widened(&[10e3]);
-        assert!((once - 0.01 / 50.0).abs() < 1e-12);
-        assert!((widened(&[10e3; 7]) - once).abs() < 1e-12);
-        assert!((widened(&[40e3]) - once / 4.0).abs() < 1e-12);
+        // The filter takes the passages for independent: of the error of one it has a seventh after seven.
+        let by_one = 0.01 / 50.0;
+        assert!((widened(&[10e3; 7]) + by_one / 7.0 - by_one).abs() < 1e-12);
+        assert!((widened(&[40e3; 7]) - widened(&[10e3; 7]) / 4.0).abs() < 1e-12);
+        assert_eq!(widened(&[10e3]), 0.0, "the filter has all of it");
     }
 }
