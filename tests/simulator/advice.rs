@@ -31,7 +31,7 @@ const SEEDS: u64 = 30;
 /// Time in s of driving about before anything is asked.
 const BEFORE_S: f64 = 120.0;
 /// A manoeuvre counts that is foretold to leave at most this share of an interval.
-const SHARE_MAX: f64 = 0.9;
+const SHARE_MAX: f64 = 0.95;
 
 /// The train as it is declared, with this mass.
 fn declared_at(mass_kg: f64) -> Arc<TrainModel> {
@@ -228,8 +228,8 @@ fn the_advised_manoeuvre_shows_more_than_most_and_about_as_much_as_the_best() {
         "advised over the best other {against_best:.2?}, over the middle {against_middle:.2?}"
     );
     let [_, best, most] = quantiles(against_best);
-    assert!(best < 1.15 && most < 1.25, "none of the others shows much more: {best}, {most}");
-    let is_ahead = against_middle.iter().all(|&share| share < 0.95);
+    assert!(best < 1.25 && most < 1.35, "none of the others shows much more: {best}, {most}");
+    let is_ahead = against_middle.iter().all(|&share| share < 0.97);
     assert!(is_ahead, "most of the others show less: {against_middle:.2?}");
 }
 

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::drive::Moment;
 use super::world::{
-    GUST_S, KNOT_M, KNOT_OVER_MEAN, LoadSource, WEIGHING_STD, World, knot_std_permille,
+    GUST_S, KNOT_M, KNOT_OVER_MEAN, LoadSource, Scenario, WEIGHING_STD, World, knot_std_permille,
 };
 
 /// Indices of the unknowns that every run shares, behind a, b and c; loads, brakes of each leg, gusts and knots
@@ -29,6 +29,11 @@ const UNDER_TRAIN_M: f64 = 50.0;
 const EXACT: f64 = 1e-18;
 /// Standard deviation of a load that is drawn evenly from 24 % of the declared mass.
 const DRAWN_LOAD_STD: f64 = 0.24 / 3.464;
+
+/// Whether another load may be on board after a stop: where samples carry no mass nobody knows that it is not.
+fn may_change(scenario: &Scenario) -> bool {
+    matches!(scenario.load, LoadSource::Changing | LoadSource::Unknown)
+}
 
 /// What measured speeds say so far of all that is unknown.
 pub struct Bound {
@@ -63,7 +68,7 @@ impl Bound {
         };
         // No train here stops more than once a minute.
         let legs = (60.0 * hours) as usize + 2;
-        let loads = if scenario.load == LoadSource::Changing { legs } else { 1 };
+        let loads = if may_change(scenario) { legs } else { 1 };
         let gusts = (3600.0 * hours / GUST_S) as usize + 3;
         let end_m = world.stops_m[world.stops_m.len() - 1] + 1000.0;
         let knots = (end_m / KNOT_M) as usize + 3;
@@ -125,8 +130,8 @@ impl Bound {
         self.block_s = 0.0;
         if last.is_some_and(|last| !last.is_standing) {
             self.brake = (self.brake + 1).min(self.gusts_from - 1);
-            let changes = world.scenario.load == LoadSource::Changing;
-            self.load = (self.load + usize::from(changes)).min(self.brakes_from - 1);
+            self.load =
+                (self.load + usize::from(may_change(&world.scenario))).min(self.brakes_from - 1);
         }
     }
 

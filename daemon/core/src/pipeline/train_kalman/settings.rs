@@ -2,7 +2,6 @@
 
 use dynocar_model::terms::{adhesion, delay, masses, traction};
 
-use crate::pipeline::motion::MOVING_MPS;
 use crate::settings;
 
 settings! {
@@ -43,7 +42,7 @@ settings! {
         speed_noise_mps: f64 = 0.05 => (0.001 to 1 "m/s");
         /// Standard deviation in m of the position against the gradient profile.
         position_std_m: f64 = 3.0 => (0 to 1000 "m");
-        /// Lowest speed in m/s that is used.
-        speed_min_mps: f64 = MOVING_MPS => (0.3 to 20 "m/s");
+        /// Lowest speed in m/s that is used: sensors miss slower wheels, and bearings stick.
+        speed_min_mps: f64 = 0.5 => (0.3 to 20 "m/s");
     }
 }
