@@ -11,9 +11,10 @@ import sys
 from pathlib import Path
 
 TAKEN = ["*.md", "LICENSE-*", "docs/**/*", "client/README.md", "client/examples/*", "client/include/*",
-         "config/dynocar.service", "config/dynocar-flight-recorder.service", "config/daemon.toml", "config/forward/*",
+         "config/dynocar.service", "config/dynocar-flight-recorder.service", "config/daemon.toml",
          "config/live/foxglove_layout.json", "config/live/plotjuggler_layout.xml",
-         "config/live/grafana_dashboard.json", "config/live/prometheus_alerts.yml"]
+         "config/live/grafana_dashboard.json", "config/live/prometheus_alerts.yml",
+         "config/live/telegraf.conf"]
 
 
 def fenced(language: str, text: str) -> str:

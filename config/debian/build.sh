@@ -1,12 +1,12 @@
 #!/bin/sh
 # Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-workshop must lie beside the program;
-# dynocar-watch, dynocar-recording, dynocar-live, dynocar-forward and dynocar-parquet go into it where they do.
+# dynocar-watch, dynocar-recording, dynocar-live and dynocar-parquet go into it where they do.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
 #   --libraries  where libdynocar_client.a and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
 # Build first: cargo build --release -p dynocar -p dynocar-workshop -p dynocar-watch -p dynocar-recording -p dynocar-live \
-#                  -p dynocar-forward -p dynocar-parquet &&
+#                  -p dynocar-parquet &&
 #              cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
 
@@ -55,15 +55,15 @@ put() { # SOURCE TARGET [MODE]
 # The programs, what shells offer for them, and their manual.
 put "$program" usr/bin/dynocar 755
 put "$workshop" usr/bin/dynocar-workshop 755
-for companion in dynocar-watch dynocar-recording dynocar-live dynocar-forward dynocar-parquet; do
+for companion in dynocar-watch dynocar-recording dynocar-live dynocar-parquet; do
     if [ -f "$(dirname "$program")/$companion" ]; then
         put "$(dirname "$program")/$companion" "usr/bin/$companion" 755
     else
         echo "build.sh: no $companion beside the program: the package goes without it" >&2
     fi
 done
-for layout in foxglove_layout.json plotjuggler_layout.xml grafana_dashboard.json prometheus_alerts.yml; do
-    put "$project/config/live/$layout" "usr/share/dynocar/live/$layout"
+for file in foxglove_layout.json plotjuggler_layout.xml grafana_dashboard.json prometheus_alerts.yml telegraf.conf; do
+    put "$project/config/live/$file" "usr/share/dynocar/live/$file"
 done
 completions() { # SHELL TARGET
     mkdir -p "$root/$(dirname "$2")"
@@ -118,10 +118,6 @@ unit_of() { # PROGRAM SOURCE
 }
 unit_of dynocar-recording config/dynocar-flight-recorder.service
 unit_of dynocar-recording config/dynocar-learn.service
-unit_of dynocar-forward config/forward/dynocar-forward.service
-if [ -f "$root/usr/bin/dynocar-forward" ]; then
-    put "$project/config/forward/mosquitto.conf" usr/share/doc/dynocar/mosquitto.conf
-fi
 put "$here/sysusers.conf" usr/lib/sysusers.d/dynocar.conf
 
 # What goes with it.

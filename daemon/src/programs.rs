@@ -18,14 +18,12 @@ pub const PARQUET: &str = "dynocar-parquet";
 pub const WATCH: &str = "dynocar-watch";
 /// The program that serves viewers.
 pub const LIVE: &str = "dynocar-live";
-/// The program that forwards to a broker.
-pub const FORWARD: &str = "dynocar-forward";
 
 /// The program that measures this project, which calls others.
 const BENCH: &str = "dynocar-bench";
 
 /// All of them.
-const PROGRAMS: [&str; 8] = [USUAL, WORKSHOP, RECORDING, PARQUET, WATCH, LIVE, FORWARD, BENCH];
+const PROGRAMS: [&str; 7] = [USUAL, WORKSHOP, RECORDING, PARQUET, WATCH, LIVE, BENCH];
 
 /// Bytes of a program's output that are read at once.
 const READ_AT_ONCE: usize = 1 << 16;

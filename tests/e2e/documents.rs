@@ -74,7 +74,6 @@ fn command_line(words: &[String]) -> (clap::Command, usize) {
         }
         Some("watch") => (dynocar_watch::cli::command(), 1),
         Some("live") => (dynocar_live::cli::command(), 1),
-        Some("forward") => (dynocar_forward::cli::command(), 1),
         Some(word) if dynocar_workshop::cli::commands().find_subcommand(word).is_some() => {
             (dynocar_workshop::cli::commands(), 0)
         }

@@ -16,7 +16,6 @@ use rustix::process::Signal;
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const RECORDING: &str = env!("CARGO_BIN_EXE_dynocar-recording-under-test");
 const LIVE: &str = env!("CARGO_BIN_EXE_dynocar-live-under-test");
-const FORWARD: &str = env!("CARGO_BIN_EXE_dynocar-forward-under-test");
 const WATCH: &str = env!("CARGO_BIN_EXE_dynocar-watch-under-test");
 const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
 const TRAIN: TrainId = TrainId(1);
@@ -41,11 +40,10 @@ const ENDS: [End; 6] = [
     End::ClosedPipes(Signal::TERM),
 ];
 
-/// A program at work on a site of its own, beside a controller and, where it needs one, a broker.
+/// A program at work on a site of its own, beside a controller.
 struct TestSite {
     site: Site,
     controller: Process,
-    broker: TcpListener,
     port: u16,
 }
 
@@ -56,10 +54,9 @@ impl TestSite {
         std::fs::create_dir(site.path().join("runs")).unwrap();
         let controller = site.start(PEER, &["controller", "1", "5000"]);
         controller.await_line("a sample", |line| !line.is_empty());
-        let broker = TcpListener::bind("127.0.0.1:0").unwrap();
         let free = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = free.local_addr().unwrap().port();
-        TestSite { site, controller, broker, port }
+        TestSite { site, controller, port }
     }
 
     fn at(&self, name: &str) -> PathBuf {
@@ -68,10 +65,8 @@ impl TestSite {
 
     /// The words of a command, `{…}` for what only the place knows.
     fn arguments(&self, words: &str) -> Vec<String> {
-        let broker = self.broker.local_addr().unwrap().to_string();
         let fill = |word: &str| {
             word.replace("{site}", &self.site.path().display().to_string())
-                .replace("{broker}", &broker)
                 .replace("{port}", &self.port.to_string())
         };
         words.split(' ').map(fill).collect()
@@ -123,17 +118,6 @@ const SERVE: Program = Program {
     name: LIVE,
     words: "--port {port}",
     is_at_work: |it| TcpStream::connect(("127.0.0.1", it.port)).is_ok(),
-    left: |_| {},
-};
-
-/// To a broker that takes connections and never answers.
-const FORWARDER: Program = Program {
-    name: FORWARD,
-    words: "--broker {broker}",
-    is_at_work: |it| {
-        it.broker.set_nonblocking(true).unwrap();
-        it.broker.accept().is_ok()
-    },
     left: |_| {},
 };
 
@@ -220,11 +204,6 @@ fn a_flight_recorder_ends_by_signals_and_with_its_terminal_and_its_files_are_who
 #[test]
 fn the_live_view_ends_by_signals_and_with_its_terminal() {
     ends_cleanly(&SERVE);
-}
-
-#[test]
-fn a_forwarder_ends_by_signals_and_with_its_terminal() {
-    ends_cleanly(&FORWARDER);
 }
 
 /// The screen or the lines of `dynocar watch` on a terminal, once they are there.

@@ -128,7 +128,7 @@ fn what_is_installed_next_to_a_controller_draws_zips_asks_and_imports_nothing() 
 
 #[test]
 fn the_workshop_has_no_network_and_no_format_of_recordings() {
-    assert_free_of("dynocar-workshop", &["tokio", "mqtt", "mcap", "prost", "parquet", "arrow"]);
+    assert_free_of("dynocar-workshop", &["tokio", "mcap", "prost", "parquet", "arrow"]);
 }
 
 #[test]
@@ -158,14 +158,6 @@ fn what_recordings_are_written_with_is_in_no_controller_and_no_daemon() {
         assert_free_of(package, &["dynocar-recording", "mcap", "prost", "parquet", "arrow"]);
     }
     assert_free_of("dynocar-recording", &["parquet", "arrow"]);
-}
-
-#[test]
-fn no_network_client_is_in_a_controller_or_a_daemon() {
-    for package in ["dynocar", "dynocar-client"].into_iter().chain(PURE) {
-        assert_free_of(package, &["dynocar-forward", "mqtt", "tokio"]);
-    }
-    assert_free_of("dynocar-forward", &["tokio", "rustls", "openssl"]);
 }
 
 #[test]

@@ -63,6 +63,35 @@ fn every_shipped_example_comes_to_a_usable_resistance_from_the_shipped_daemon() 
     }
 }
 
+/// What a configuration also offers in comments.
+fn with_its_offers(text: &str) -> String {
+    let offered = |line: &str| {
+        let rest = line.strip_prefix("# ")?;
+        (rest.starts_with('[') || rest.contains(" = ")).then(|| rest.to_owned())
+    };
+    let lines = text.lines().map(|line| offered(line).unwrap_or(line.to_owned()) + "\n");
+    lines.collect()
+}
+
+#[test]
+fn telegraf_reads_the_metrics_where_the_shipped_configuration_puts_them() {
+    let read = |path: &str| std::fs::read_to_string(shipped(path)).expect("a shipped file");
+    let daemon = read("config/daemon.toml");
+    let (_, after) = daemon.split_once("# [metrics]\n# listen = \"").expect("metrics are offered");
+    let (address, _) = after.split_once('"').expect("an address");
+    let text = read("config/live/telegraf.conf");
+    let telegraf: toml::Table = text.parse().expect("TOML");
+    let urls = telegraf["inputs"]["prometheus"][0]["urls"].as_array().expect("addresses");
+    assert_eq!(urls[..], [format!("http://{address}/metrics").into()]);
+    let topic = telegraf["outputs"]["mqtt"][0]["topic"].as_str().expect("a topic");
+    assert!(topic.contains("{{ .Tag \"train\" }}"), "{topic}");
+    // The broker stands there twice, with and without TLS.
+    let offers = with_its_offers(&text).replacen("servers = [\"tcp:", "# servers = [\"tcp:", 1);
+    let telegraf: toml::Table = offers.parse().expect("TOML with all that is offered");
+    assert!(telegraf["outputs"]["mqtt"][0]["tls_ca"].is_str(), "{offers}");
+    assert!(telegraf["processors"]["dedup"][0]["dedup_interval"].is_str(), "{offers}");
+}
+
 #[test]
 fn the_driver_example_keeps_the_timetable_once_the_shipped_daemon_has_learned() {
     let site = Site::new();

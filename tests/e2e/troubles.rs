@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
-const FOLDERS: [&str; 17] = [
+const FOLDERS: [&str; 16] = [
     "daemon/src",
     "daemon/workshop/src",
     "daemon/model/src",
@@ -22,10 +22,9 @@ const FOLDERS: [&str; 17] = [
     "client/parquet/src",
     "client/watch/src",
     "client/live/src",
-    "client/forward/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
-const CALLS: [(&str, &str); 18] = [
+const CALLS: [(&str, &str); 17] = [
     ("#[error(", ""),
     (".problem(", "daemon"),
     ("wrong(", "daemon"),
@@ -36,7 +35,6 @@ const CALLS: [(&str, &str); 18] = [
     ("Failure::Work(", "daemon/src/cli"),
     ("Failure::Input(", "daemon/workshop/src/cli"),
     ("Failure::Work(", "daemon/workshop/src/cli"),
-    ("Failure::Input(", "client/forward/src"),
     ("Failure::Work(", "client/recording/src/cli"),
     ("Error::new_err(", "client/python/src"),
     ("InputError(", "client/python/dynocar/fleet"),

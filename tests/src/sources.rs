@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 /// The source folders of all packages.
-pub const FOLDERS: [&str; 18] = [
+pub const FOLDERS: [&str; 17] = [
     "shared/src",
     "client/src",
-    "client/forward/src",
     "client/live/src",
     "client/parquet/src",
     "client/python/src",

@@ -92,7 +92,7 @@ impl Watcher {
         let name = model.as_ref().map(|model| model.name.clone());
         self.watched.push(Watched {
             state: TrainState::new(train, name),
-            observed: ObservedTrain::new(train, None),
+            observed: ObservedTrain::new(train),
             advisor: Advisor::new(model),
         });
     }

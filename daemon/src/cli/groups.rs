@@ -10,7 +10,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Drive, with a controller", &["run", "health", "replay"]),
     ("Learn, from recorded runs", &["identify", "explain", "survey", "stops", "learn", "models"]),
     ("Look, and keep", &["watch", "record", "flight-recorder", "keep", "recover", "convert"]),
-    ("Connect, with other programs", &["live", "forward", "fmu", "completions", "man"]),
+    ("Connect, with other programs", &["live", "fmu", "completions", "man"]),
 ];
 
 /// The program's command line with a help that lists its commands in groups.

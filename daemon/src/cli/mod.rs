@@ -26,7 +26,7 @@ pub use failure::Failure;
 use self::companion::{Passed, become_it};
 use crate::error_document::ErrorDocument;
 use crate::output::{OutputError, write_json};
-use crate::programs::{FORWARD, LIVE, RECORDING, WATCH, WORKSHOP};
+use crate::programs::{LIVE, RECORDING, WATCH, WORKSHOP};
 use crate::unpacking::program_for;
 
 /// Dynocar, a dynamometer car in software.
@@ -77,8 +77,6 @@ enum Command {
     Watch(Passed),
     /// Serve samples, snapshots and events live to Foxglove or Lichtblick
     Live(Passed),
-    /// Forward estimates and events to an MQTT broker, as Sparkplug B
-    Forward(Passed),
     /// Print the completions for a shell.
     Completions(Passed),
     /// Write the manual pages, one for every command.
@@ -116,7 +114,6 @@ impl Command {
             }
             Command::Watch(passed) => become_it(WATCH, None, passed),
             Command::Live(passed) => become_it(LIVE, None, passed),
-            Command::Forward(passed) => become_it(FORWARD, None, passed),
         }
     }
 

@@ -1,4 +1,4 @@
-//! The kinds of events, of recordings and of what is forwarded.
+//! The kinds of events.
 
 use dynocar_shared::vocabulary;
 use dynocar_shared::vocabulary::EffectKind;

@@ -29,26 +29,16 @@ pub struct ObservedTrain {
     /// The train.
     pub id: TrainId,
     reader: Option<SnapshotReader>,
-    /// The age in ns from which a pipeline counts as silent; `None` for that of every reader.
-    silent_after_ns: Option<i64>,
     daemon: Option<Announcement>,
     controller: Option<Announcement>,
     pipelines: [Option<SeenPipeline>; PIPELINES_MAX],
 }
 
 impl ObservedTrain {
-    /// A train whose snapshots are read as soon as a daemon serves it; its pipelines count as silent after so
-    /// many ns, or as every reader has it.
-    pub fn new(id: TrainId, silent_after_ns: Option<i64>) -> Self {
+    /// A train whose snapshots are read as soon as a daemon serves it.
+    pub fn new(id: TrainId) -> Self {
         let pipelines = [None; PIPELINES_MAX];
-        ObservedTrain {
-            id,
-            reader: None,
-            silent_after_ns,
-            daemon: None,
-            controller: None,
-            pipelines,
-        }
+        ObservedTrain { id, reader: None, daemon: None, controller: None, pipelines }
     }
 
     /// A train whose snapshots are read from now on.
@@ -58,7 +48,7 @@ impl ObservedTrain {
     /// When the channel cannot be opened.
     pub fn open(host: &Host, id: TrainId) -> Result<Self, ChannelError> {
         let reader = Some(SnapshotReader::open(host, id)?);
-        Ok(ObservedTrain { reader, ..ObservedTrain::new(id, None) })
+        Ok(ObservedTrain { reader, ..ObservedTrain::new(id) })
     }
 
     /// Who served the train at the last look.
@@ -69,11 +59,6 @@ impl ObservedTrain {
     /// Who drove it.
     pub fn controller(&self) -> Option<&Announcement> {
         self.controller.as_ref()
-    }
-
-    /// True when a pipeline was heard of.
-    pub fn is_heard(&self) -> bool {
-        self.pipelines.iter().any(Option::is_some)
     }
 
     /// Looks who serves and who drives the train, and opens the reader when it can be opened. Opens files: once in
@@ -102,8 +87,7 @@ impl ObservedTrain {
                 daemon.require_compatible(self.id, Role::Controller)?;
             }
             Peer::Compatible(_) if self.reader.is_none() => {
-                let reader = self.reader.insert(SnapshotReader::open(host, self.id)?);
-                self.silent_after_ns.into_iter().for_each(|it| reader.set_stale_after_ns(it));
+                self.reader = Some(SnapshotReader::open(host, self.id)?);
             }
             _ => {}
         }

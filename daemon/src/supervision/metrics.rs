@@ -2,7 +2,7 @@
 
 use dynocar_client::{Reading, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{Parameter, PipelineKind, Reason, RejectionReason, Status};
+use dynocar_shared::{Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status};
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
@@ -30,6 +30,7 @@ struct Families {
     updates: Counters,
     resets: Counters,
     status: Gauges,
+    usable: Gauges,
     vouched_age: Gauges,
     latency: Gauges,
     value: Gauges,
@@ -60,9 +61,14 @@ impl Families {
     }
 
     /// The same of what goes up and down.
-    fn gauges(&self) -> [(&'static str, &'static str, &Gauges); 14] {
+    fn gauges(&self) -> [(&'static str, &'static str, &Gauges); 15] {
         [
             ("status", "1 for the status that holds", &self.status),
+            (
+                "quantity_usable",
+                "1 while a controller may use the quantity that the pipeline answers",
+                &self.usable,
+            ),
             ("vouched_age_seconds", "Time since the snapshot was vouched for", &self.vouched_age),
             ("latency_seconds", "From sample to snapshot, the newest", &self.latency),
             ("parameter_value", "Value in the parameter's unit", &self.value),
@@ -138,6 +144,11 @@ impl Families {
             let holds = f64::from(u8::from(status == reading.status()));
             self.status.get_or_create(&with("status", status.name())).set(holds);
         }
+        for &quantity in Quantity::ALL.iter().filter(|&&quantity| it.answers(quantity)) {
+            let is_usable = Reading { quantity: Some(quantity), ..*reading }.is_usable();
+            let labels = with("quantity", quantity.name());
+            self.usable.get_or_create(&labels).set(f64::from(u8::from(is_usable)));
+        }
         self.vouched_age.get_or_create(&labels).set(reading.age_ns as f64 * 1e-9);
         if it.sample_sequence > 0 {
             let latency_ns = it.published_ns.saturating_sub(it.sample_published_ns);
@@ -194,12 +205,14 @@ mod tests {
     use std::collections::BTreeSet;
     use std::path::Path;
 
+    use dynocar_shared::ParameterSnapshot;
+
     use super::*;
 
-    /// The metrics that a shipped file names.
+    /// The metrics that a file of the project names.
     fn named(file: &str) -> BTreeSet<String> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/live").join(file);
-        let text = std::fs::read_to_string(path).expect("a shipped file");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file);
+        let text = std::fs::read_to_string(path).expect("a file of the project");
         let is_part = |it: char| it.is_ascii_alphanumeric() || it == '_';
         let words = text.split(|it| !is_part(it)).filter_map(|it| it.strip_prefix("dynocar_"));
         words.map(str::to_owned).collect()
@@ -211,8 +224,12 @@ mod tests {
         let counters = families.counters().map(|it| format!("{}_total", it.0));
         let gauges = families.gauges().map(|it| it.0.to_owned());
         let given: BTreeSet<String> = counters.into_iter().chain(gauges).collect();
-        let (alerts, shown) = (named("prometheus_alerts.yml"), named("grafana_dashboard.json"));
-        assert!(alerts.len() > 4 && alerts.is_subset(&given), "{alerts:?}");
+        let alerts = named("config/live/prometheus_alerts.yml");
+        let shown = named("config/live/grafana_dashboard.json");
+        let told = named("docs/guides/off_board.md");
+        for names in [&alerts, &told] {
+            assert!(names.len() > 4 && names.is_subset(&given), "{names:?}");
+        }
         assert!(shown.is_subset(&given), "{shown:?}");
         let hidden: Vec<_> = given.difference(&shown).collect();
         // Models on trial have pages of their own.
@@ -220,28 +237,60 @@ mod tests {
         assert_eq!(hidden.iter().filter(|it| !is_trial(it)).count(), 0, "{hidden:?}");
     }
 
-    #[test]
-    fn a_suspect_and_a_wanted_person_are_labelled() {
-        let mut snapshot = dynocar_shared::ParameterSnapshot::empty();
-        snapshot.status = Status::Degraded as u32;
-        snapshot.reason = Reason::InnovationsNotWhite as u32;
-        snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
-        snapshot.suspicion_age_s = 23;
+    /// The metrics of one snapshot.
+    fn text_of(snapshot: &ParameterSnapshot, is_stale: bool) -> String {
         let families = Families::default();
-        families.take(
-            &Reading { snapshot: &snapshot, age_ns: 0, is_stale: false, quantity: None },
-            "monitor",
-        );
+        families.take(&Reading { snapshot, age_ns: 0, is_stale, quantity: None }, "one");
         let mut registry = Registry::with_prefix("dynocar");
         families.register(&mut registry);
         let mut text = String::new();
         encode(&mut text, &registry).unwrap();
-        let has = |name: &str, label: &str, value: &str| {
-            text.lines().any(|it| {
-                it.starts_with(name) && it.contains(label) && it.ends_with(&format!("}} {value}"))
-            })
+        text
+    }
+
+    fn has(text: &str, name: &str, label: &str, value: &str) -> bool {
+        text.lines().any(|it| {
+            it.starts_with(name) && it.contains(label) && it.ends_with(&format!("}} {value}"))
+        })
+    }
+
+    #[test]
+    fn a_suspect_and_a_wanted_person_are_labelled() {
+        let mut snapshot = ParameterSnapshot::empty();
+        snapshot.status = Status::Degraded as u32;
+        snapshot.reason = Reason::InnovationsNotWhite as u32;
+        snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
+        snapshot.suspicion_age_s = 23;
+        let text = text_of(&snapshot, false);
+        assert!(
+            has(&text, "dynocar_suspected_seconds", "effect=\"dragging_brake\"", "23.0"),
+            "{text}"
+        );
+        assert!(
+            has(&text, "dynocar_attention", "reason=\"innovations_not_white\"", "1.0"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn the_pipeline_that_answers_is_named_with_what_a_controller_may_use() {
+        let mut snapshot = ParameterSnapshot::empty();
+        snapshot.status = Status::Estimated as u32;
+        snapshot.quantities = Quantity::Resistance.bit() | Quantity::Mass.bit();
+        snapshot.usable_quantities = Quantity::Mass.bit();
+        let shown = |is_stale| {
+            let text = text_of(&snapshot, is_stale);
+            Quantity::ALL
+                .iter()
+                .map(|it| format!("quantity=\"{it}\""))
+                .map(|label| {
+                    ["1.0", "0.0"].map(|it| has(&text, "dynocar_quantity_usable", &label, it))
+                })
+                .collect::<Vec<_>>()
         };
-        assert!(has("dynocar_suspected_seconds", "effect=\"dragging_brake\"", "23.0"), "{text}");
-        assert!(has("dynocar_attention", "reason=\"innovations_not_white\"", "1.0"), "{text}");
+        assert_eq!(Quantity::ALL[..2], [Quantity::Resistance, Quantity::Mass]);
+        assert_eq!(shown(false)[..2], [[false, true], [true, false]]);
+        assert_eq!(shown(true)[..2], [[false, true]; 2], "nobody may use what nobody vouches for");
+        assert!(shown(false)[2..].iter().all(|it| *it == [false; 2]), "others answer these");
     }
 }

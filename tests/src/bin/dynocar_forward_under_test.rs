@@ -1,7 +1,0 @@
-//! `dynocar-forward` as the tests start it.
-
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    dynocar_forward::cli::main()
-}
