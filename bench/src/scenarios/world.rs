@@ -1,8 +1,9 @@
 //! A train, its line, and the ordinary mistakes in what is declared of them.
 
+use dynocar_model::train::{Davis, TrainModel};
+
 use super::mistakes::Mistakes;
 use crate::chance::Chance;
-use dynocar_model::train::{Davis, TrainModel};
 
 /// The kinds of traffic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

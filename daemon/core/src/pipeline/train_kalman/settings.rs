@@ -28,7 +28,7 @@ settings! {
         brake_scale_std: f64 = adhesion::DECLARED_BRAKE_STD => (0.000001 to 0.5);
         /// Random walk of that scale over a minute: friction goes with heat, moisture and wear.
         brake_scale_per_sqrt_min: f64 = 0.015 => (0 to 0.5);
-        /// Standard deviation in m/s of the wind of the day along the line.
+        /// Standard deviation in m/s of the wind of the day along the line; gusts have half of it.
         wind_std_mps: f64 = 1.5 => (0 to 20 "m/s");
         /// Standard deviation in s of the delay of a force behind its report.
         force_delay_std_s: f64 = delay::USUAL_STD_S => (0.000001 to 5 "s");
