@@ -1,13 +1,11 @@
 //! Xia 2023: Davis coefficients by trajectory fit.
 //!
 //! - [`scenario`]: line, driver and truth, seeded, and the Cramér-Rao bound
-//! - [`offline`]: Table 3 (without noise) and Figure 4 (with noise); `ratio_posterior` is the fit with
-//!   an unknown disturbance
+//! - [`offline`]: Table 3 (without noise) and Figure 4 (with noise)
 //! - [`online`]: Table 4 (coefficients that switch on the way)
 
 mod offline;
 mod online;
-mod ratio_posterior;
 mod scenario;
 
 use super::row::{Row, Seeds};

@@ -14,10 +14,8 @@ use dynocar_estimators::xia::wolfe_newton::{
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
-use super::ratio_posterior::likeliest_fit;
 use super::scenario::{
-    CASES, Profile, Run, all_speeds_mps, davis_covariance, disturbed_davis_covariance, drive,
-    fast_speeds_mps,
+    CASES, Profile, Run, all_speeds_mps, davis_covariance, drive, fast_speeds_mps,
 };
 use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, XIA};
@@ -207,7 +205,6 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
             )
         },
         line("w0 over 30-300 km/h, full speed profile of 40 km, coefficients free", &profile),
-        disturbed_row(seeds),
     ]
 }
 
@@ -254,35 +251,4 @@ fn paper_minimum(
     let mut problem = PaperDeviation { run, speeds_mps };
     let found = minimise(&mut problem, &start, bounds, &settings)?.point;
     Some(Davis { a: found[0], b: found[1], c: found[2] })
-}
-
-/// Cruise under a disturbance that lasts for seconds: output error, as the paper fits, against
-/// the fit that estimates the disturbance, and generalised least squares that knows it.
-fn disturbed_row(seeds: Seeds) -> Row {
-    let truth = CASES[0];
-    let fast = fast_speeds_mps();
-    let cruise = drive(Profile::Cruise, 120e3, 1, |_| truth);
-    let bound = disturbed_davis_covariance(&cruise, &truth);
-    let (mut output_error, mut ours) = (Score::default(), Score::default());
-    for seed in seeds.range() {
-        let mut random = Chance::new(seed);
-        let run = cruise.disturbed(&truth, &mut random);
-        let speeds = run.measured_mps(0, &mut random);
-        let segments = [MotionSegment { steps: &run.steps, speeds_mps: &speeds }];
-        let settings = FitSettings { bounds: anywhere(), ..FitSettings::new(StepRule::Distance) };
-        let exact = TrajectoryFitter::default().fit(&segments, None, &settings);
-        let estimated = likeliest_fit(&segments, &settings);
-        for (found, score) in [(exact, &mut output_error), (estimated, &mut ours)] {
-            if let Ok(found) = found {
-                score.take_resistance((&found.davis, &found.covariance), &truth, &fast);
-                score.take_bound(&bound, &fast);
-            }
-        }
-    }
-    let quantity = "w0 over 270-305 km/h, cruise of 120 km, resistance disturbed by 0.25 N/kN for \
-                    5 s (AR 1); paper's method: output error with v_0 free";
-    Row {
-        paper_method: Some(root_mean_square(&output_error.errors)),
-        ..ours.row(Row::new(XIA, "Figure 4", quantity, "N/kN", seeds))
-    }
 }

@@ -136,12 +136,6 @@ pub struct TrajectoryFit {
     pub speed_noise_mps: f64,
     /// Standard deviation in m/s that the residuals show, outliers clipped.
     pub residual_std_mps: f64,
-    /// Logarithm of the likelihood, up to a constant of the data; to compare models by.
-    pub log_likelihood: f64,
-    /// The likelihood of what the fitted parameters leave over (Patterson, Thompson 1971): the
-    /// greatest likelihood itself takes the slow disturbances that coefficients and initial speeds
-    /// have absorbed for their absence.
-    pub restricted_log_likelihood: f64,
     /// Root of the mean squared residual in m/s; with exact forces that of the trajectory.
     pub rmse_mps: f64,
     /// Fitted speed in m/s at the end of the last segment.

@@ -72,10 +72,6 @@ pub struct Pass {
     pub clipped_square: f64,
     /// Sum of r² in (m/s)², not normalised.
     pub square_mps2: f64,
-    /// Sum of ln S̃ over the residuals, S̃ = innovation variance over that of the measurement.
-    pub log_variance: f64,
-    /// Sum of the logarithms of the eliminated pivots: of the information on initial speeds.
-    pub log_pivots: f64,
     /// Long-run variance of the residuals in standard deviations.
     pub long_run: LongRunVariance,
     /// Speed in m/s at the end of the last segment, led back to its measurement.
@@ -92,8 +88,6 @@ impl Pass {
             stalls: 0,
             clipped_square: 0.0,
             square_mps2: 0.0,
-            log_variance: 0.0,
-            log_pivots: 0.0,
             long_run: LongRunVariance::new(f64::INFINITY),
             end_speed_mps: 0.0,
             end_variance: 0.0,
@@ -185,7 +179,6 @@ impl LeastSquares<3> for Residuals<'_, '_> {
             for row in &factor[1..] {
                 joint.push(&[row[1], row[2], row[3], row[4]]);
             }
-            self.tried_pass.log_pivots += factor[0][0].abs().ln();
         }
         let mut system = TriangularSystem::from_rows(&mut joint);
         if let Some(prior) = &self.prior {
@@ -275,7 +268,6 @@ impl SegmentRows<'_> {
         self.pass.outliers += usize::from(is_outlier);
         self.pass.clipped_square += clipped * clipped;
         self.pass.square_mps2 += residual_mps * residual_mps;
-        self.pass.log_variance += if state.variance > 0.0 { spread.ln() } else { 0.0 };
         if let Some(record) = &mut self.record {
             record.push(residual_mps / spread.sqrt());
         }

@@ -24,8 +24,6 @@ pub struct Fitted {
     noise_mps: f64,
     /// Noise that the residuals show.
     shown_mps: f64,
-    log_likelihood: f64,
-    restricted_log_likelihood: f64,
 }
 
 impl Fitted {
@@ -115,20 +113,12 @@ impl<'a, 'b> Search<'a, 'b> {
         self.iterations += solution.iterations;
         let free = pass.count.saturating_sub(3 + self.segments.len()).max(1) as f64;
         let shown_mps = noise_mps * (pass.clipped_square / free).sqrt();
-        let count = pass.count as f64;
-        let log_likelihood =
-            -(solution.linearisation.cost + count * noise_mps.ln() + 0.5 * pass.log_variance);
-        let factor = &solution.linearisation.system.factor;
-        let log_information =
-            pass.log_pivots + (0..3).map(|i| factor[(i, i)].abs().ln()).sum::<f64>();
         Ok(Fitted {
             solution,
             pass,
             used_noise_mps: noise_mps,
             noise_mps: settings.speed_noise_mps.unwrap_or(shown_mps),
             shown_mps,
-            log_likelihood,
-            restricted_log_likelihood: log_likelihood - log_information,
         })
     }
 
@@ -164,8 +154,6 @@ impl<'a, 'b> Search<'a, 'b> {
             inflation,
             speed_noise_mps: fitted.noise_mps,
             residual_std_mps: fitted.shown_mps,
-            log_likelihood: fitted.log_likelihood,
-            restricted_log_likelihood: fitted.restricted_log_likelihood,
             rmse_mps: (pass.square_mps2 / pass.count as f64).sqrt(),
             end_speed_mps: pass.end_speed_mps,
             end_variance: pass.end_variance,
