@@ -192,20 +192,6 @@ impl World {
         }
     }
 
-    /// The same world with everything as declared.
-    #[must_use]
-    pub fn without_mistakes(mut self) -> Self {
-        self.truth = self.declared.clone();
-        self.force_scale = [1.0, 1.0];
-        self.brake_scale = 1.0;
-        self.mistakes = Mistakes::NONE;
-        self.wind_mps = 0.0;
-        self.speed_scale = 1.0;
-        self.delay_s = 0.0;
-        self.gradient.iter_mut().for_each(|[map, truth]| *truth = *map);
-        self
-    }
-
     /// The stop after one, and the direction there: at either end of the line the train turns.
     pub fn after_stop(&self, stop: usize, direction: f64) -> (usize, f64) {
         let direction = match stop {
