@@ -30,9 +30,15 @@ const EXACT: f64 = 1e-18;
 /// Standard deviation of a load that is drawn evenly from 24 % of the declared mass.
 const DRAWN_LOAD_STD: f64 = 0.24 / 3.464;
 
-/// Whether another load may be on board after a stop: where samples carry no mass nobody knows that it is not.
+/// Speed in m/s from which speeds count: sensors miss slower wheels, and bearings and holding brakes stick.
+const SPEED_MIN_MPS: f64 = 0.5;
+/// Standard deviation in m/s of the speed at which a run begins to count.
+const START_STD_MPS: f64 = 1.0;
+
+/// Whether another load may be on board after a stop. Nobody knows that it is not, unless the mass is exact: a
+/// weighing that did not change may be off by as much as any other.
 fn may_change(scenario: &Scenario) -> bool {
-    matches!(scenario.load, LoadSource::Changing | LoadSource::Unknown)
+    scenario.load != LoadSource::Exact
 }
 
 /// What measured speeds say so far of all that is unknown.
@@ -52,6 +58,9 @@ pub struct Bound {
     brakes_from: usize,
     gusts_from: usize,
     knots_from: usize,
+    /// Where the speeds at which runs begin to count stand among the unknowns, and that of the next run.
+    starts_from: usize,
+    start: usize,
     block_s: f64,
     last: Option<Moment>,
 }
@@ -93,6 +102,7 @@ impl Bound {
         let brakes_from = add(legs, usual.stop_to_stop_share);
         let gusts_from = add(gusts, KNOT_OVER_MEAN * usual.gust_mps);
         let knots_from = add(knots, knot_std_permille(scenario.map_std_permille));
+        let starts_from = add(legs, START_STD_MPS);
         let count = prior.len();
         Bound {
             prior,
@@ -105,6 +115,8 @@ impl Bound {
             brakes_from,
             gusts_from,
             knots_from,
+            starts_from,
+            start: starts_from,
             block_s: 0.0,
             last: None,
         }
@@ -113,26 +125,35 @@ impl Bound {
     /// Takes in a cycle of a drive.
     pub fn see(&mut self, world: &World, truth: &Moment, cycle_s: f64) {
         let last = self.last.replace(*truth);
-        if !truth.is_standing {
-            let Some(last) = last else { return };
-            self.move_on(world, &last, truth, cycle_s);
-            self.block_s += cycle_s;
-            if self.block_s >= BLOCK_S {
-                self.measure(world, truth.speed_mps, self.block_s / cycle_s);
-                self.block_s = 0.0;
-            }
-            return;
+        let was_standing = last.is_none_or(|last| last.is_standing);
+        if truth.is_standing && !was_standing {
+            self.brake = (self.brake + 1).min(self.gusts_from - 1);
+            self.load =
+                (self.load + usize::from(may_change(&world.scenario))).min(self.brakes_from - 1);
         }
+        let counts = |at: &Moment| !at.is_standing && at.speed_mps >= SPEED_MIN_MPS;
+        let Some(last) = last.filter(|last| counts(last) && counts(truth)) else {
+            return self.begin();
+        };
+        if self.met.is_empty() {
+            self.meet(self.start, 1.0);
+            self.start = (self.start + 1).min(self.prior.len() - 1);
+        }
+        self.move_on(world, &last, truth, cycle_s);
+        self.block_s += cycle_s;
+        if self.block_s >= BLOCK_S {
+            self.measure(world, truth.speed_mps, self.block_s / cycle_s);
+            self.block_s = 0.0;
+        }
+    }
+
+    /// Another run may begin.
+    fn begin(&mut self) {
         for index in self.met.drain(..) {
             self.sensitivity[index] = 0.0;
             self.is_met[index] = false;
         }
         self.block_s = 0.0;
-        if last.is_some_and(|last| !last.is_standing) {
-            self.brake = (self.brake + 1).min(self.gusts_from - 1);
-            self.load =
-                (self.load + usize::from(may_change(&world.scenario))).min(self.brakes_from - 1);
-        }
     }
 
     fn meet(&mut self, index: usize, change_mps: f64) {
@@ -183,7 +204,7 @@ impl Bound {
             let under = place as f64 / (places - 1) as f64 - 0.5;
             let at = ((truth.place_m + under * length_m) / KNOT_M).max(0.0);
             let (knot, share) = (self.knots_from + at as usize, at.fract());
-            if knot + 1 < self.prior.len() {
+            if knot + 1 < self.starts_from {
                 self.meet(knot, change_mps * (1.0 - share));
                 self.meet(knot + 1, change_mps * share);
             }
