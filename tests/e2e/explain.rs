@@ -381,6 +381,6 @@ fn a_scan_predicts_what_a_fit_then_gains() {
 #[test]
 fn every_kind_is_in_the_library_once() {
     for &kind in EffectKind::ALL.iter().filter(|kind| **kind != EffectKind::None) {
-        assert_eq!(LIBRARY.iter().filter(|effect| effect.kind() == kind).count(), 1, "{kind:?}");
+        assert_eq!(LIBRARY.iter().filter(|effect| effect.kind == kind).count(), 1, "{kind:?}");
     }
 }

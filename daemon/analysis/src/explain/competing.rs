@@ -55,7 +55,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         let taken_in = rounds.find(|round| round.iter().any(|trial| trial.kind == kind));
         let taken_in = taken_in.map_or(&[][..], |round| &round[..]);
         let twins: Vec<EffectKind> =
-            effect.twins().iter().copied().filter(is_large(kind)).collect();
+            effect.nature().twins.iter().copied().filter(is_large(kind)).collect();
         of(kind, instead.map_or(taken_in, |(_, tried)| tried), &twins)
     });
     each.filter(|competing| !competing.kinds.is_empty()).collect()
@@ -76,7 +76,7 @@ fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
         Some(_) => false,
     };
     trial.kind != EffectKind::Unknown
-        && trial.fit.model.effects[trial.last()].may_stand_for_others()
+        && trial.fit.model.effects[trial.last()].nature().may_stand_for_others
         && may_be
         && trial.bic_gain > accepted.bic_gain - EQUAL
         && trial.reduction > COMPETING_SHARE * accepted.reduction.max(0.0)

@@ -13,7 +13,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::answer::{DriveAnswer, WithStd};
-use super::effects::{AtBound, Hypothesis};
+use super::effects::{AtBound, Hypothesis, Nature, On};
 use super::evidence::{
     FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,
 };
@@ -108,23 +108,16 @@ impl OpenDrive {
 }
 
 impl Hypothesis for OpenDrive {
-    /// The kind that it would be taken for.
-    fn kind(&self) -> EffectKind {
-        EffectKind::TractionGain
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        if self.resting.is_some() { &PARAMETERS } else { &PARAMETERS[..1] }
-    }
-
-    /// A drive without losses.
-    fn none(&self) -> f64 {
-        1.0
-    }
-
-    /// What is fed at rest says what may be fed while driving.
-    fn prior_information(&self) -> Option<&DMatrix<f64>> {
-        Some(&self.prior)
+    fn nature(&self) -> Nature<'_> {
+        let parameters = if self.resting.is_some() { &PARAMETERS[..] } else { &PARAMETERS[..1] };
+        Nature {
+            // A drive without losses.
+            none: 1.0,
+            // What is fed at rest says what may be fed while driving.
+            prior: Some(&self.prior),
+            // The kind that it would be taken for.
+            ..Nature::of(EffectKind::TractionGain, parameters)
+        }
     }
 
     fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
@@ -138,7 +131,7 @@ impl Hypothesis for OpenDrive {
         run.power.is_some()
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let Some(power) = &run.power else { return };
         let drive = self.at(parameters);
         let rows = power.power_w.iter().zip(run.samples()).skip(first);

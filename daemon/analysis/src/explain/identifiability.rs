@@ -17,7 +17,7 @@ use super::selection::{Outcome, Search};
 /// The kinds that are one number of the whole train or line, and not found.
 fn whole_kinds(search: &Search, outcome: &Outcome) -> Vec<Candidate> {
     let Some(scan) = search.scan(&outcome.fit) else { return Vec::new() };
-    let others = LIBRARY.iter().filter(|effect| !is_in(&outcome.fit, effect.kind()));
+    let others = LIBRARY.iter().filter(|effect| !is_in(&outcome.fit, effect.kind));
     others.filter_map(|effect| effect.whole(&scan)).collect()
 }
 

@@ -3,7 +3,7 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::RunnerUp;
-use super::effects::{Proposal, UNKNOWN};
+use super::effects::UNKNOWN;
 use super::selection::{Outcome, Search, penalty};
 
 /// Runners-up at most.
@@ -30,7 +30,7 @@ pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
     let rest = search.without(fit, index);
     let onto = search.problem.again(&rest, fit.noise);
     let Some(scan) = search.scan(&onto) else { return Vec::new() };
-    let Proposal::Candidates(candidates) = UNKNOWN.propose(&scan) else { return Vec::new() };
+    let candidates = UNKNOWN.propose(&scan).unwrap_or_default();
     let mut others: Vec<RunnerUp> = candidates
         .into_iter()
         .filter_map(|candidate| {

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::evidence::{
     Adjoint, Bin, Fit, FitProblem, RUNS_A_TASK, RunData, SampleForces, coarse_step,
 };
-use super::hypothesis::{Hypothesis, Past};
+use super::hypothesis::{Hypothesis, On, Past};
 
 /// Inner products of a whitened regressor.
 #[derive(Clone, Debug)]
@@ -186,7 +186,7 @@ impl<'a> Scan<'a> {
             let (mut shape, mut middle) = (Vec::with_capacity(run.bins.len()), middles.next());
             for (i, declared) in run.declared.all().enumerate() {
                 let mut acting = [declared];
-                effect.apply_after(&mut past, parameters, run, i, &mut acting);
+                effect.apply(parameters, On { run, first: i, past: &mut past }, &mut acting);
                 if middle == Some(i) {
                     shape.push(change_mps2(run, i, [&declared, &acting[0]]));
                     middle = middles.next();

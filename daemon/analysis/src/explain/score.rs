@@ -100,7 +100,7 @@ impl FitErrors {
         let speed_mps = fit.open_loop_mps(|| open_loop_mps(problem, fit));
         let missed =
             |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
-        let has_speed_scale = fit.model.effects.iter().any(|it| it.changes_speed_scale());
+        let has_speed_scale = fit.model.effects.iter().any(|it| it.nature().changes_speed_scale);
         FitErrors {
             speed_mps,
             distance: problem.distance_ratio.map_or(0.0, missed),

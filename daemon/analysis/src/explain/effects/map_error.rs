@@ -3,7 +3,7 @@
 use dynocar_model::terms::Parameter;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, SharedHypothesis};
+use super::{Candidate, Handling, Hypothesis, Nature, On, Past, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
 
 /// The error of the map in the shape in which it was fitted, of any size: one number in the place of its many.
@@ -21,30 +21,23 @@ struct Fitted {
 }
 
 impl Hypothesis for Fitted {
-    fn kind(&self) -> EffectKind {
-        EffectKind::None
+    fn nature(&self) -> Nature<'_> {
+        Nature { handling: Handling::Gradient, ..Nature::of(EffectKind::None, &self.parameters) }
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]) {
         let mut with = forces.to_vec();
-        self.error.apply(&self.permille, run, first, &mut with);
+        self.error.apply(&self.permille, on, &mut with);
         for (force, with) in forces.iter_mut().zip(with) {
             force.gradient_permille +=
                 parameters[0] * (with.gradient_permille - force.gradient_permille);
         }
     }
 
-    fn is_gradient(&self) -> bool {
-        true
-    }
-
     fn gradient_permille(&self, _parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
         let mut with: Vec<SampleForces> = run.declared.all().collect();
-        self.error.apply(&self.permille, run, 0, &mut with);
+        let on = On { run, first: 0, past: &mut Past::default() };
+        self.error.apply(&self.permille, on, &mut with);
         let added = with.iter().zip(run.declared.all());
         permille.clear();
         permille.extend(added.map(|(with, own)| with.gradient_permille - own.gradient_permille));

@@ -6,8 +6,9 @@ use dynocar_model::terms::{Parameter, bearings, curve, delay, traction};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Candidate, Hypothesis, Past, Turn};
-use crate::explain::evidence::{RunData, SampleForces};
+use super::lateness::late_forces;
+use super::{Candidate, Hypothesis, Nature, On, Turn};
+use crate::explain::evidence::SampleForces;
 
 /// A figure that is usually a little wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,38 +75,17 @@ pub fn usual_errors(a_n_per_kn: f64, is_in: impl Fn(EffectKind) -> bool) -> Cand
 }
 
 impl Hypothesis for UsualErrors {
-    fn kind(&self) -> EffectKind {
-        EffectKind::None
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            prior: Some(&self.information),
+            turn: Turn::First,
+            looks_back: self.figures.contains(&Figure::Lateness),
+            ..Nature::of(EffectKind::None, &self.parameters)
+        }
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn prior_information(&self) -> Option<&DMatrix<f64>> {
-        Some(&self.information)
-    }
-
-    fn turn(&self) -> Turn {
-        Turn::First
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        self.apply_after(&mut Past::default(), parameters, run, first, forces);
-    }
-
-    fn looks_back(&self) -> bool {
-        self.figures.contains(&Figure::Lateness)
-    }
-
-    fn apply_after(
-        &self,
-        past: &mut Past,
-        parameters: &[f64],
-        run: &RunData,
-        first: usize,
-        forces: &mut [SampleForces],
-    ) {
+    fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]) {
+        let On { run, first, past } = on;
         for (figure, &error) in self.figures.iter().zip(parameters) {
             match figure {
                 Figure::Traction => forces.iter_mut().for_each(|it| it.traction_n *= 1.0 + error),
@@ -122,13 +102,8 @@ impl Hypothesis for UsualErrors {
                     }
                 }
                 Figure::Lateness => {
-                    let line = past.forces([error, 0.0], first);
-                    for (force, &at) in forces.iter_mut().zip(&run.stamps[first..]) {
-                        let now = Some([force.traction_n, force.brake_n]);
-                        if let Some(late) = line.acting(at, now) {
-                            [force.traction_n, force.brake_n] = late;
-                        }
-                    }
+                    let on = On { run, first, past: &mut *past };
+                    late_forces([error, 0.0], on, forces);
                 }
             }
         }
@@ -152,7 +127,7 @@ mod tests {
     #[test]
     fn nothing_acts_before_it_is_reported_and_the_prior_is_what_is_usual() {
         let errors = usual_errors(1.0, |_| false).hypothesis;
-        let prior = errors.prior_information().expect("a prior");
+        let prior = errors.nature().prior.expect("a prior");
         for (i, (figure, std)) in FIGURES.into_iter().enumerate() {
             assert!((prior[(i, i)] * std * std - 1.0).abs() < 1e-12);
             let has_a_sign = matches!(figure, Figure::Lateness | Figure::Warming);

@@ -47,12 +47,7 @@ impl UpdatedModel {
 
     /// What its effects do to those among them that only add something, at most.
     pub fn on_others(&self) -> OnOthers {
-        let all = |found: OnOthers| self.effects.iter().any(|effect| effect.on_others() == found);
-        match () {
-            () if all(OnOthers::Changes) => OnOthers::Changes,
-            () if all(OnOthers::Scales) => OnOthers::Scales,
-            () => OnOthers::Nothing,
-        }
+        self.effects.iter().map(|it| it.nature().on_others).max().unwrap_or(OnOthers::Nothing)
     }
 
     /// The factor on what the effects do that only add something.

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::ends::{Axis, End, Reach};
+use super::site::{Axis, End, Reach, Site};
 use crate::explain::answer::{PlaceUncertainty, WindowUncertainty};
 use crate::explain::evidence::{Fit, FitProblem, Nearby, UpdatedModel};
 use crate::explain::hypothesis::SharedHypothesis;
@@ -161,14 +161,15 @@ fn run_probability(
     index: usize,
 ) -> Option<BTreeMap<String, f64>> {
     let effect = &model.effects[index];
-    let chosen = effect.chosen_runs()?;
+    let site = effect.site()?;
+    let chosen = site.runs.as_ref()?;
     let mut probability = BTreeMap::new();
     for run in &problem.runs {
         let cost = |is_in: bool| {
             let mut files: Vec<String> =
                 chosen.iter().filter(|file| **file != run.file).cloned().collect();
             files.extend(is_in.then(|| run.file.clone()));
-            let elsewhere = effect.with_runs(files)?;
+            let elsewhere = effect.at_site(Site { runs: Some(files), ..site.clone() })?;
             nearby.cost(&replaced(model, index, elsewhere), Some(&run.file))
         };
         let (with, without) = (cost(true)?, cost(false)?);

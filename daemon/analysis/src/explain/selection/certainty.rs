@@ -55,7 +55,7 @@ pub(super) fn is_certain(
     };
     let effect = &fit.model.effects[index];
     let is_unmapped = is_unmapped_tunnel(effect);
-    let is_by_run = effect.is_one_number_a_run();
+    let is_by_run = effect.nature().is_one_number_a_run;
     let is_chosen_among_many =
         is_unmapped || matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
     let are_places_moved = fit.model.effects.iter().any(moves_places);
@@ -119,7 +119,7 @@ fn is_shown(fit: &Fit, index: usize) -> bool {
     let effect = &fit.model.effects[index];
     if fit.runs.len() < CERTAIN_RUNS_MIN {
         true
-    } else if effect.is_one_number_a_run() {
+    } else if effect.nature().is_one_number_a_run {
         stds_from_none(fit, index) > CERTAIN_STDS_BY_RUN
     } else {
         let size = fit.model.ranges()[index].start;

@@ -12,14 +12,14 @@ use crate::explain::evidence::Fit;
 /// Williams 2006, equation 3.32).
 pub fn penalty(fit: &Fit, index: usize) -> f64 {
     let effect = &fit.model.effects[index];
-    let narrowed = effect.prior_information().and_then(|prior| narrowed(fit, index, prior));
+    let narrowed = effect.nature().prior.and_then(|prior| narrowed(fit, index, prior));
     let by_count = || {
         let parameters = effect.parameters().len() as f64;
         let observations =
-            if effect.is_one_number_a_run() { fit.runs.len() } else { fit.observations() };
+            if effect.nature().is_one_number_a_run { fit.runs.len() } else { fit.observations() };
         parameters * (observations.max(2) as f64).ln()
     };
-    narrowed.unwrap_or_else(by_count) + effect.choice_cost()
+    narrowed.unwrap_or_else(by_count) + effect.nature().choice_cost
 }
 
 /// Logarithm of the determinant of the information about an effect's parameters, all others fitted,
@@ -40,7 +40,7 @@ fn narrowed(fit: &Fit, index: usize, prior: &DMatrix<f64>) -> Option<f64> {
 /// share would bring: (x/s)² becomes x²/(s² + e²), for each parameter.
 pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
     let effect = &fit.model.effects[index];
-    let shared = effect.shared_error();
+    let shared = effect.nature().shared_error;
     if shared == 0.0 || decrease <= 0.0 {
         return decrease;
     }

@@ -29,16 +29,12 @@ impl<'s> Steps<'s> {
     }
 
     /// Does one step for a kind.
-    pub fn done_with<'e, T>(
-        &self,
-        effect: &'e dyn Effect,
-        step: impl FnOnce(&'e dyn Effect) -> T,
-    ) -> T {
+    pub fn done_with<T>(&self, effect: &Effect, step: impl FnOnce() -> T) -> T {
         let share = || self.done.load(Ordering::Relaxed) as f64 / self.count as f64;
-        (self.progress)(round_share(self.round, share()), effect.kind().name());
-        let result = step(effect);
+        (self.progress)(round_share(self.round, share()), effect.kind.name());
+        let result = step();
         self.done.fetch_add(1, Ordering::Relaxed);
-        (self.progress)(round_share(self.round, share()), effect.kind().name());
+        (self.progress)(round_share(self.round, share()), effect.kind.name());
         result
     }
 }
@@ -56,7 +52,7 @@ mod tests {
         let progress = |share: f64, _: &str| shares.lock().unwrap().push(share);
         for round in 0..5 {
             let steps = Steps::of(&progress, round, 3);
-            (0..3).for_each(|_| steps.done_with(LIBRARY[0], |_| ()));
+            (0..3).for_each(|_| steps.done_with(&LIBRARY[0], || ()));
         }
         let shares = shares.into_inner().unwrap();
         assert_eq!(shares.len(), 30);

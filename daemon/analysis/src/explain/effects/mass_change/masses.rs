@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 
 use super::parts::Part;
 use crate::explain::answer::{Location, MassSection, MassWindow, ParameterValue, RunWindow};
-use crate::explain::effects::{Hypothesis, ReportContext, Reported, SharedHypothesis};
+use crate::explain::effects::{Hypothesis, Nature, On, ReportContext, Reported, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
 
@@ -66,24 +66,14 @@ impl Masses {
 }
 
 impl Hypothesis for Masses {
-    fn kind(&self) -> EffectKind {
-        EffectKind::MassChange
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn choice_cost(&self) -> f64 {
-        self.choice_cost
-    }
-
-    fn prior_information(&self) -> Option<&DMatrix<f64>> {
-        self.information.as_ref()
-    }
-
-    fn none(&self) -> f64 {
-        1.0
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            none: 1.0,
+            prior: self.information.as_ref(),
+            choice_cost: self.choice_cost,
+            affine_in: Some(f64::recip),
+            ..Nature::of(EffectKind::MassChange, &self.parameters)
+        }
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
@@ -94,11 +84,7 @@ impl Hypothesis for Masses {
         self.parts[parameter].is_in(run)
     }
 
-    fn affine_in(&self) -> Option<fn(f64) -> f64> {
-        Some(f64::recip)
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let parts = self.parts.iter().zip(parameters);
         for (part, factor) in parts.filter(|(part, _)| part.is_in(run)) {
             for (i, force) in (first..).zip(&mut *forces) {

@@ -5,32 +5,19 @@ mod masses;
 mod parts;
 mod search;
 
-use dynocar_shared::vocabulary::EffectKind;
-
-use super::{Candidate, Effect, Proposal};
+use super::Proposal;
 use crate::explain::scan::Scan;
-use search::{all_sections, all_windows, everywhere, grow};
+pub use search::everywhere;
+use search::{all_sections, all_windows, grow};
 
-/// The kind.
-pub struct MassChange;
-
-impl Effect for MassChange {
-    fn kind(&self) -> EffectKind {
-        EffectKind::MassChange
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let mut candidates = Vec::new();
+    let sections = all_sections(scan);
+    if !sections.is_empty() {
+        candidates.extend(grow(scan, &sections));
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let mut candidates = Vec::new();
-        let sections = all_sections(scan);
-        if !sections.is_empty() {
-            candidates.extend(grow(scan, &sections));
-        }
-        candidates.extend(grow(scan, &all_windows(scan)));
-        candidates.extend(self.whole(scan));
-        Proposal::Candidates(candidates)
-    }
-
-    fn whole(&self, scan: &Scan) -> Option<Candidate> {
-        everywhere(scan)
-    }
+    candidates.extend(grow(scan, &all_windows(scan)));
+    candidates.extend(everywhere(scan));
+    Ok(candidates)
 }

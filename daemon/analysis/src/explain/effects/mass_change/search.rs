@@ -195,7 +195,7 @@ mod tests {
         let candidate = every(&parts);
         assert_eq!(candidate.start, vec![1.0; 6]);
         assert_eq!(candidate.hypothesis.parameters().len(), 6);
-        let known = candidate.hypothesis.prior_information().unwrap();
+        let known = candidate.hypothesis.nature().prior.unwrap();
         assert!((known[(0, 0)] - 100.0).abs() < 1e-9 && known[(0, 1)] == 0.0);
     }
 }
