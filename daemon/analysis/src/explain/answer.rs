@@ -7,7 +7,7 @@ use dynocar_model::named;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
-use super::judged::Judged;
+use super::stop_to_stop::Judged;
 use super::stop_to_stop::StopToStop;
 use crate::dataset::DatasetDiagnostic;
 

@@ -19,6 +19,7 @@ use super::evidence::{
 };
 use super::selection::{FORM_SHARE, OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
+use crate::statistics::{rms, share_of};
 
 /// Efficiency, and what is fed beside the drive in kW beyond what is fed at rest.
 const PARAMETERS: [Parameter; 2] = [
@@ -44,7 +45,7 @@ impl Auxiliaries {
     /// never rest.
     fn of(powered: &[&RunData], declared: Drive) -> Self {
         let rows = powered.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
-        let mut resting_kw: Vec<f64> = rows
+        let resting_kw: Vec<f64> = rows
             .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
             .filter(|(sample, power_w)| sample.speed_mps < RESTING_MPS && power_w.is_finite())
             .map(|(_, power_w)| 1e-3 * power_w)
@@ -53,8 +54,7 @@ impl Auxiliaries {
             let power_kw = 1e-3 * declared.auxiliary_power_w;
             return Auxiliaries { power_kw, std_kw: PARAMETERS[1].upper };
         }
-        resting_kw.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| resting_kw[((resting_kw.len() - 1) as f64 * share) as usize];
+        let at = |share: f64| share_of(&resting_kw, share);
         let power_kw = at(0.5).max(0.0);
         let scatter_kw = 0.5 * (at(0.84) - at(0.16));
         Auxiliaries { power_kw, std_kw: scatter_kw.hypot(DRIVING_SHARE * power_kw).max(0.1) }
@@ -71,8 +71,7 @@ fn moving_power_kw(problem: &FitProblem) -> f64 {
     let moving = rows
         .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
         .filter(|(sample, power_w)| sample.speed_mps > RESTING_MPS && power_w.is_finite());
-    let (count, sum) = moving.fold((0.0, 0.0), |(n, sum), (_, w)| (n + 1.0, sum + w * w));
-    if count > 0.0 { 1e-3 * f64::sqrt(sum / count) } else { 0.0 }
+    1e-3 * rms(&moving.map(|(_, power_w)| *power_w).collect::<Vec<f64>>())
 }
 
 /// A drive with an efficiency, and auxiliaries where the power holds them, for unknown.

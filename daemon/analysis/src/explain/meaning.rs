@@ -5,6 +5,7 @@ use dynocar_model::units::J_PER_KWH;
 
 use super::answer::Meaning;
 use super::evidence::{Fit, FitProblem, RunData, UpdatedForces};
+use crate::statistics::rms;
 
 impl Meaning {
     /// That of one effect of a fitted model; `rest` is the model refitted without it.
@@ -73,8 +74,7 @@ fn distance_error_m(problem: &FitProblem, fit: &Fit) -> Option<f64> {
         prediction.simulate(&run.recording, &forces, Restart::WINDOW_60);
         errors_m.extend(minutes(run, &prediction));
     }
-    let squares: f64 = errors_m.iter().map(|error_m| error_m * error_m).sum();
-    (!errors_m.is_empty()).then(|| (squares / errors_m.len() as f64).sqrt())
+    (!errors_m.is_empty()).then(|| rms(&errors_m))
 }
 
 /// Predicted less measured distance in m of each minute of a run that is driven without a gap.

@@ -9,11 +9,12 @@
 //! - [`hypothesis`], [`effects`]: what an effect is to the others; the library, one file for each kind
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
-//! - [`selection`]: the search for effects, its significance, evidence by run
-//! - [`gradient_prior`], [`usual_errors`]: how maps err; the finished model beside what is usually wrong
-//! - [`score`], `stop_runs`, [`stop_to_stop`], [`judged`], `bootstrap`: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`meaning`], [`verdict`],
-//!   [`described`], [`answer`]: the statement
+//! - [`selection`]: the search for effects, its significance, evidence by run, the finished model beside what is
+//!   usually wrong
+//! - [`gradient_prior`]: how maps err
+//! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
+//! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
+//!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -30,20 +31,15 @@ pub mod force_time;
 pub mod gradient_prior;
 pub mod hypothesis;
 pub mod identifiability;
-pub mod informed;
-pub mod judged;
 pub mod meaning;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;
-pub mod runners_up;
 pub mod scan;
 pub mod score;
 pub mod selection;
-mod stop_runs;
 pub mod stop_to_stop;
 pub mod unexplained;
-pub mod usual_errors;
 pub mod verdict;
 
 use dynocar_core::plausibility::Severity;
@@ -113,7 +109,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    let deviations = usual_errors::given_usual_errors(&search, &mut outcome, dataset.step_s());
+    let deviations = selection::given_usual_errors(&search, &mut outcome, dataset.step_s());
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);

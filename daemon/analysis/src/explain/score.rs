@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, RunData, RunFactors, UpdatedForces};
-use super::judged::Judged;
 use super::selection::without_each_run;
-use super::stop_runs::stop_runs;
+use super::stop_to_stop::Judged;
+use super::stop_to_stop::stop_runs;
 use super::stop_to_stop::{self, StopToStop};
 
 /// Errors of the model without and with the effects.

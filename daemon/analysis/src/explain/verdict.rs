@@ -10,7 +10,9 @@ use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location, Meaning,
     PlaceUncertainty, Verdict,
 };
+use super::caveats::told_by_data;
 use super::caveats::{caveats, trimmed};
+use super::competing::runners_up;
 use super::competing::{
     CompetingHypotheses, competing_hypotheses, is_in, kinds_of, separating_run,
 };
@@ -18,8 +20,6 @@ use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
 use super::identifiability::identifiability;
-use super::informed::told_by_data;
-use super::runners_up::runners_up;
 use super::score::{self, Score};
 use super::selection::{
     Deviations, Outcome, Search, deciding_score, discounted, few_runs_factor, penalty,

@@ -12,7 +12,7 @@ use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
 use super::layout::{Course, HEIGHT_STEP_M, Layout};
 use super::normal::Normal;
-use super::quantile::middle;
+use crate::statistics::middle;
 
 /// Standard deviation in m of a row of GNSS altitude: far more than it errs, since its errors
 /// last for minutes.

@@ -7,6 +7,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::{Candidate, Hypothesis, Nature, On, Proposal, ReportContext, Reported};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
+use crate::statistics::span;
 
 /// Mean temperatures of the runs must differ by so many K.
 const SPREAD_MIN_K: f64 = 4.0;
@@ -30,11 +31,9 @@ pub fn propose(scan: &Scan) -> Proposal {
     let Some(means) = means else {
         return Err("ambient_temperature is not recorded in every run".into());
     };
-    let low = means.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if high - low < SPREAD_MIN_K {
-        let spread = high - low;
-        return Err(format!("the runs' outside temperatures differ by {spread:.1} K only"));
+    let spread_k = span(means.into_iter()).map_or(0.0, |[low, high]| high - low);
+    if spread_k < SPREAD_MIN_K {
+        return Err(format!("the runs' outside temperatures differ by {spread_k:.1} K only"));
     }
     Ok(vec![Candidate::new(Linear, vec![0.0])])
 }

@@ -23,6 +23,7 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::gradient_prior::{ErrorScale, MAP, UNSURVEYED};
 use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};
 use crate::explain::scan::Scan;
+use crate::statistics::rms;
 
 /// Nodes in the length over which the error changes.
 const NODES_A_LENGTH: f64 = 3.0;
@@ -97,11 +98,6 @@ fn prior_information(
         1 => -scale * rho,
         _ => 0.0,
     })
-}
-
-fn rms(values: &[f64]) -> f64 {
-    let squares: f64 = values.iter().map(|value| value * value).sum();
-    (squares / values.len() as f64).sqrt()
 }
 
 impl Profile {

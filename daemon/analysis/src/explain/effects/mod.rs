@@ -17,7 +17,6 @@ mod gradient_shift;
 mod lateness;
 mod local_resistance;
 mod low_adhesion;
-mod map_error;
 mod mass_change;
 mod proposal;
 mod rotating_mass;
@@ -37,9 +36,8 @@ pub use super::hypothesis::{
     SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
-pub use map_error::map_error_as_fitted;
 pub use proposal::{Candidate, Effect, Proposal, Whole};
-pub use usual_errors::usual_errors;
+pub use usual_errors::{map_error_as_fitted, usual_errors};
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
@@ -64,4 +62,4 @@ pub const LIBRARY: &[Effect] = &[
 ];
 /// What is in no library, by its form: tried where the library leaves a force.
 pub const UNKNOWN: &Effect = &Effect::new(Unknown, unknown::propose_forms, Whole::None);
-pub use unknown::{OUTSIDE_COST, a_form_explains_more, leaves_a_force};
+pub use unknown::{a_form_explains_more, leaves_a_force};

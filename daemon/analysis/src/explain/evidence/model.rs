@@ -4,9 +4,9 @@ use dynocar_model::simulate::{ForceModel, QuadraticForces};
 use dynocar_model::terms::wheel;
 use dynocar_model::train::Davis;
 
-use super::integral::{Integral, integrate_bins};
+use super::bins::Response;
+use super::bins::{Integral, integrate_bins};
 use super::pass::{Acting, Pass, blocks};
-use super::response::Response;
 use super::run_data::RunData;
 use super::run_scatter::{RunFactors, of_day};
 use super::sample_forces::SampleForces;

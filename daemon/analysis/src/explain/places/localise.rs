@@ -8,6 +8,7 @@ use super::site::Inside;
 use crate::explain::evidence::{Bin, RunData};
 use crate::explain::gradient_prior::SURVEYED;
 use crate::explain::scan::{Scan, Tuple};
+use crate::statistics::span;
 
 /// Shortest interval in m that is looked for.
 const SHORTEST_M: f64 = 150.0;
@@ -56,9 +57,7 @@ impl<'s, 'a> Places<'s, 'a> {
         let bins: Vec<Vec<(Option<f64>, f64)>> = scan.problem.runs.iter().map(at_bins).collect();
         let extent = |block: &[(Option<f64>, f64)]| {
             let known = block.iter().filter_map(|bin| bin.0);
-            known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
-                [low.min(at), high.max(at)]
-            })
+            span(known).unwrap_or([f64::INFINITY, f64::NEG_INFINITY])
         };
         let blocks = bins.iter().map(|run| run.chunks(BLOCK).map(extent).collect()).collect();
         Places { scan, inside, bins, blocks }
@@ -99,15 +98,9 @@ impl<'s, 'a> Places<'s, 'a> {
 
 /// The chainage in m over which the fit runs move.
 pub fn span_m(scan: &Scan) -> Option<[f64; 2]> {
-    let mut span: Option<[f64; 2]> = None;
-    for run in &scan.problem.runs {
-        for bin in &run.bins {
-            if let Some(at) = run.samples()[bin.middle()].position_m {
-                let [low, high] = span.unwrap_or([at, at]);
-                span = Some([low.min(at), high.max(at)]);
-            }
-        }
-    }
+    let runs = scan.problem.runs.iter();
+    let middles = runs.flat_map(|run| run.bins.iter().map(|bin| &run.samples()[bin.middle()]));
+    let span = span(middles.filter_map(|sample| sample.position_m));
     span.filter(|[low, high]| high - low > 4.0 * SHORTEST_M)
 }
 

@@ -5,6 +5,7 @@ use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use super::words::{self, joined, kind_name, number};
 use crate::explain::answer::{EffectAnswer, Location, Meaning, ParameterValue};
+use crate::statistics::span;
 
 /// Places named in a sentence at most.
 const PLACES_MAX: usize = 4;
@@ -47,10 +48,12 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
                 }
             }
             ParameterValue::ByRun(by_run) => {
-                let values = by_run.values().copied();
-                let low = values.clone().fold(f64::INFINITY, f64::min);
-                let high = values.fold(f64::NEG_INFINITY, f64::max);
-                sizes.push(format!("{words} {low:.1} to {high:.1}{unit}, run by run"));
+                let span = span(by_run.values().copied());
+                sizes.extend(
+                    span.map(|[low, high]| {
+                        format!("{words} {low:.1} to {high:.1}{unit}, run by run")
+                    }),
+                );
             }
             ParameterValue::Sections(sections) => {
                 let shown = sections.iter().take(PLACES_MAX);
@@ -192,10 +195,10 @@ pub fn placed(place: &Location) -> String {
 /// Stretches of the line; many are counted, not listed.
 fn sections(intervals_m: &[[f64; 2]]) -> String {
     let km = |m: f64| m / 1000.0;
-    if intervals_m.len() > PLACES_MAX {
-        let low = intervals_m.iter().map(|interval| interval[0]).fold(f64::INFINITY, f64::min);
-        let high = intervals_m.iter().map(|interval| interval[1]).fold(f64::NEG_INFINITY, f64::max);
-        let count = intervals_m.len();
+    let count = intervals_m.len();
+    if let Some([low, high]) = span(intervals_m.as_flattened().iter().copied())
+        && count > PLACES_MAX
+    {
         return format!("at {count} places between km {:.2} and {:.2}", km(low), km(high));
     }
     let listed: Vec<String> = intervals_m

@@ -7,9 +7,9 @@ use crate::dataset::Role;
 use crate::explain::Explanation;
 use crate::explain::bootstrap::intervals_95;
 use crate::explain::evidence::{Fit, RunData, UpdatedForces};
-use crate::explain::judged::Judged;
 use crate::explain::score;
 use crate::explain::score::run_error;
+use crate::explain::stop_to_stop::Judged;
 use crate::explain::stop_to_stop::{self, StopToStop};
 
 /// Length in s of the blocks of a single run.

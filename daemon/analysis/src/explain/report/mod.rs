@@ -26,7 +26,6 @@ mod estimate;
 pub mod line;
 pub mod panels;
 pub mod parameters;
-pub mod places;
 pub mod sentence;
 pub mod timeline;
 pub mod traces;
@@ -40,8 +39,7 @@ use errors::Errors;
 pub use estimate::Estimate;
 use line::AlongLine;
 use panels::Panel;
-use parameters::ParameterRow;
-use places::PlaceTable;
+use parameters::{ParameterRow, PlaceTable};
 use traces::Trace;
 
 /// Everything that a report shows beyond the answer and the dataset's own account.

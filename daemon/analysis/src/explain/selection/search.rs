@@ -1,16 +1,54 @@
 //! Forward search with a swap pass and pruning.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::acceptance::{is_accepted, may_be};
 use super::outcome::{Outcome, Round, Trial};
 use super::price::model_penalty;
-use super::steps::{Progress, round_share};
+use crate::explain::effects::Effect;
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, Noise, RunData, UpdatedModel};
 use crate::explain::scan::Scan;
+use crate::explain::score::reduction;
+
+/// Told how far the work is, by any thread: share done, and what is being done. It may unwind to end the
+/// work, which holds nothing that would have to be put right.
+pub type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
+
+/// How many steps of a round are done, by all threads together.
+pub struct Steps<'s> {
+    progress: Progress<'s>,
+    round: usize,
+    count: usize,
+    done: AtomicUsize,
+}
+
+/// Share done before a round ends: nobody knows how many there will be, and most have few.
+pub fn round_share(round: usize, done: f64) -> f64 {
+    let left = 0.5f64.powi(round as i32) * (1.0 - 0.5 * done);
+    0.05 + 0.9 * (1.0 - left)
+}
+
+impl<'s> Steps<'s> {
+    /// Of a round after so many effects, which takes this number of steps at most.
+    pub fn of(progress: Progress<'s>, round: usize, count: usize) -> Self {
+        Steps { progress, round, count, done: AtomicUsize::new(0) }
+    }
+
+    /// Does one step for a kind.
+    pub fn done_with<T>(&self, effect: &Effect, step: impl FnOnce() -> T) -> T {
+        let share = || self.done.load(Ordering::Relaxed) as f64 / self.count as f64;
+        (self.progress)(round_share(self.round, share()), effect.kind.name());
+        let result = step();
+        self.done.fetch_add(1, Ordering::Relaxed);
+        (self.progress)(round_share(self.round, share()), effect.kind.name());
+        result
+    }
+}
 
 /// Rounds at most: what is taken in and dropped again must come to an end.
 const ROUNDS_MAX: usize = 10;
@@ -148,5 +186,86 @@ impl Search<'_> {
         let kept = fit.theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
         let start = kept.map(|(_, value)| *value).collect();
         self.problem.fit_with_noise(&model, start, fit.noise)
+    }
+}
+
+impl Search<'_> {
+    /// Takes each effect out in turn and looks whether another kind does better in its place; what was
+    /// tried in the place of each kind that stands after it: of the last, while the others stay, in the round
+    /// that brought it.
+    pub(super) fn swap(&self, outcome: &mut Outcome, brought_last: Round) {
+        let mut tried = Vec::new();
+        let kinds = outcome.kinds();
+        let mut others_stay = true;
+        for (number, kind) in kinds.iter().enumerate() {
+            if number == kinds.len() - 1 && others_stay {
+                tried.push((*kind, brought_last));
+                break;
+            }
+            let index = outcome.fit.model.effects.iter().position(|own| own.kind() == *kind);
+            let Some(index) = index.filter(|_| outcome.is_on_trial(*kind)) else { continue };
+            let rest = self.without(&outcome.fit, index);
+            let trials = self.rivals(&rest, *kind);
+            let mut stands = *kind;
+            if let Some(best) = self.best(&trials, &outcome.fallen_kinds())
+                && Self::total(&best.fit) < Self::total(&outcome.fit) - EQUAL
+                && all_may_be(&best.fit)
+            {
+                outcome.fit = best.fit.clone();
+                stands = best.kind;
+                others_stay = false;
+            }
+            tried.push((stands, trials.into()));
+        }
+        outcome.instead = tried;
+    }
+
+    /// Drops effects that the others have made needless, and that none of the others stands in for against
+    /// what its own kind says: winds that blow ahead of every train instead of a tunnel's drag.
+    pub(super) fn prune(&self, outcome: &mut Outcome) {
+        let mut index = 0;
+        while index < outcome.fit.model.effects.len() && outcome.fit.model.effects.len() > 1 {
+            let fit = &outcome.fit;
+            if !outcome.is_on_trial(fit.model.effects[index].kind()) {
+                index += 1;
+                continue;
+            }
+            let rest = self.without(fit, index);
+            let evidence = Self::total(&rest) - Self::total(fit);
+            let reduction = reduction(self.problem, &rest, fit);
+            let is_needless = !is_accepted(fit, index, evidence, reduction) && all_may_be(&rest);
+            if is_needless || !may_be(fit, index) {
+                outcome.fit = rest;
+            } else {
+                index += 1;
+            }
+        }
+    }
+}
+
+/// Whether every effect of a fitted model may be what its kind says.
+fn all_may_be(fit: &Fit) -> bool {
+    (0..fit.model.effects.len()).all(|index| may_be(fit, index))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::explain::effects::LIBRARY;
+
+    #[test]
+    fn shares_grow_from_step_to_step_and_from_round_to_round() {
+        let shares = Mutex::new(Vec::new());
+        let progress = |share: f64, _: &str| shares.lock().unwrap().push(share);
+        for round in 0..5 {
+            let steps = Steps::of(&progress, round, 3);
+            (0..3).for_each(|_| steps.done_with(&LIBRARY[0], || ()));
+        }
+        let shares = shares.into_inner().unwrap();
+        assert_eq!(shares.len(), 30);
+        assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]), "{shares:?}");
+        assert!(shares[0] > 0.0 && shares[29] < 1.0);
     }
 }

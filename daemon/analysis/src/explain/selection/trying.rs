@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::outcome::Trial;
 use super::price::{discounted, penalty};
 use super::search::Search;
-use super::steps::Steps;
+use super::search::Steps;
 use crate::explain::effects::{Candidate, Effect, LIBRARY, UNKNOWN};
 use crate::explain::evidence::{Fit, Noise};
 use crate::explain::scan::Scan;

@@ -9,12 +9,12 @@ use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 
 use super::band_axis::{AXES, BandAxis};
-use super::outside::OUTSIDE_COST;
 use crate::explain::answer::{CovariateRange, Location};
 use crate::explain::effects::{Candidate, Handling, Hypothesis, Nature, On, SharedHypothesis};
-use crate::explain::evidence::{Bin, RunData, SampleForces};
+use crate::explain::evidence::{Bin, OUTSIDE_COST, RunData, SampleForces};
 use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
 use crate::explain::scan::{Scan, Tuple};
+use crate::statistics::span;
 
 /// Cells into which the range of a covariate is cut.
 const CELLS: usize = 20;
@@ -66,11 +66,7 @@ impl Cells {
                 middles.map(|i| axis.value(run, Some(number), i)).collect()
             })
             .collect();
-        let (low, high) = by_run
-            .iter()
-            .flatten()
-            .flatten()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (v.min(l), v.max(h)));
+        let [low, high] = span(by_run.iter().flatten().flatten().copied())?;
         if high - low < 1e-6 || !(high - low).is_finite() {
             return None;
         }

@@ -6,15 +6,15 @@ use dynocar_model::terms::extra::{self, Covariate, Extra, FORCE_MAX_N_PER_KN, Fa
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::numbers::{edges, fitted_numbers, is_exponent, named};
-use super::outside::OUTSIDE_COST;
+use super::known::{edges, fitted_numbers, is_exponent, named};
 use crate::explain::answer::{CovariateRange, Location, ParameterValue};
 use crate::explain::effects::{
     Candidate, Handling, Hypothesis, Nature, On, ReportContext, Reported, SharedHypothesis,
 };
-use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::evidence::{OUTSIDE_COST, RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
 use crate::explain::scan::Scan;
+use crate::statistics::span;
 
 /// A force counts from this size in N/kN on.
 const LEAST_N_PER_KN: f64 = 0.1;
@@ -117,11 +117,8 @@ fn lives(extra: &Extra, scan: &Scan) -> (f64, Location) {
     let greatest = of_bins().map(|(_, value)| value).fold(0.0, f64::max);
     let range = |of: Covariate| {
         let inside = of_bins().filter(|(_, value)| *value >= LIVES_SHARE * greatest);
-        inside
-            .filter_map(|(sample, _)| sample.covariate(of))
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-                [low.min(value), high.max(value)]
-            })
+        span(inside.filter_map(|(sample, _)| sample.covariate(of)))
+            .unwrap_or([f64::INFINITY, f64::NEG_INFINITY])
     };
     let mut place = Location::default();
     for factor in &extra.factors {

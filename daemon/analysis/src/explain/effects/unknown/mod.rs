@@ -3,7 +3,7 @@
 //!
 //! - [`grammar`]: which forms are tried, of what is [`known`] of a covariate; [`shape`]: what they
 //!   explain
-//! - [`form`]: a force of such a form, of which some [`numbers`] are estimated
+//! - [`form`]: a force of such a form, of which some numbers are estimated
 //! - [`band`]: a force in a range of a covariate ([`band_axis`])
 
 mod band;
@@ -11,11 +11,7 @@ mod band_axis;
 mod form;
 mod grammar;
 mod known;
-mod numbers;
-mod outside;
 mod shape;
-
-pub use self::outside::OUTSIDE_COST;
 
 use super::{Candidate, Proposal};
 use crate::explain::evidence::SCORE_MIN;

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::{Noise, RunScatter};
+use super::super::run_scatter::{RunFilters, SharedFilters};
 use super::super::run_scatter::{ScatterFilter, remove};
 use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::Plan;
-use super::robust::{RunFilters, SharedFilters};
 use super::{Fit, FitProblem};
 use crate::explain::hypothesis::SharedHypothesis;
 

@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use super::super::model::UpdatedModel;
 use super::super::noise::Noise;
 use super::super::run_scatter::WeightedFilter;
+use super::super::run_scatter::{RunFilters, SharedFilters, Whitened};
 use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::{At, Plan};
-use super::robust::{RunFilters, SharedFilters, Whitened};
 use super::{Column, Fit, FitProblem, RunNormal};
 
 /// What a model leaves of one run at given parameters.

@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 
+use super::super::bins::Response;
 use super::super::model::UpdatedModel;
-use super::super::response::Response;
 use super::super::run_data::RunData;
 use crate::explain::hypothesis::{Handling, OnOthers, SharedHypothesis};
 
