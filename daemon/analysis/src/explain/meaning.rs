@@ -5,6 +5,7 @@ use dynocar_model::units::J_PER_KWH;
 
 use super::answer::Meaning;
 use super::evidence::{Fit, FitProblem, RunData, UpdatedForces};
+use super::score::predicted;
 use crate::statistics::rms;
 
 impl Meaning {
@@ -69,9 +70,7 @@ impl Work {
 fn distance_error_m(problem: &FitProblem, fit: &Fit) -> Option<f64> {
     let mut errors_m = Vec::new();
     for run in &problem.runs {
-        let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
-        fit.model.forces(run, &fit.theta, &mut forces);
-        prediction.simulate(&run.recording, &forces, Restart::WINDOW_60);
+        let prediction = predicted(fit, run, Restart::WINDOW_60);
         errors_m.extend(minutes(run, &prediction));
     }
     (!errors_m.is_empty()).then(|| rms(&errors_m))

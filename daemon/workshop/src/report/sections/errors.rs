@@ -3,7 +3,7 @@
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::report::Estimate;
 use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors};
-use dynocar_analysis::explain::report::traces::Trace;
+use dynocar_analysis::explain::report::timeline::Trace;
 use dynocar_analysis::explain::stop_to_stop::Judged;
 use dynocar_analysis::explain::stop_to_stop::{StopToStop, reduction};
 

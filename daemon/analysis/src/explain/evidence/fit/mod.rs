@@ -14,9 +14,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use super::bins::Response;
-use super::positions::pooled_s;
 use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::{Noise, RunScatter};
+use super::positions::pooled_s;
 use super::run_data::RunData;
 use super::run_scatter::SharedFilters;
 use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns};
