@@ -25,14 +25,15 @@ fn proposed(look: impl Fn(&Explanation, &Scan, Vec<Candidate>)) {
         track: dataset.track.as_ref(),
         progress: &|_, _| (),
     };
-    let scan = search.scan(&explanation.base).unwrap();
+    let scan = search.scan(&explanation.outcome.base).unwrap();
     let candidates = LIBRARY.iter().flat_map(|kind| kind.propose(&scan).unwrap_or_default());
     look(&explanation, &scan, candidates.collect());
 }
 
 #[test]
 fn a_fit_that_goes_on_from_another_ends_where_one_from_the_start_does() {
-    proposed(|Explanation { problem, base, .. }, _, candidates| {
+    proposed(|Explanation { problem, outcome, .. }, _, candidates| {
+        let base = &outcome.base;
         let mut compared = 0;
         for candidate in candidates {
             let kind = candidate.hypothesis.kind().name();

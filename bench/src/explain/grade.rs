@@ -79,7 +79,7 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
         ends_held,
         parameters,
         attained,
-        acceptance_score: explanation.acceptance_score,
+        acceptance_score: Search::greatest_score(&explanation.outcome),
     }
 }
 

@@ -5,7 +5,7 @@ use dynocar_shared::vocabulary::{self, EffectKind};
 
 use super::answer::RunnerUp;
 use super::effects::UNKNOWN;
-use super::evidence::{EQUAL, Fit, SCORE_MIN};
+use super::evidence::{EQUAL, SCORE_MIN};
 use super::selection::{Outcome, Refusal, Search, Trial, is_certain_beside, penalty};
 
 /// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error, and has this
@@ -34,7 +34,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
             tried.iter().filter(|trial| own.is_some_and(|own| comes_close(trial, own, outcome)));
         let mut kinds: Vec<EffectKind> = Vec::new();
         for kind in twins.iter().copied().chain(close.map(|trial| trial.kind)) {
-            if !is_in(&outcome.fit, kind) && !kinds.contains(&kind) {
+            if !outcome.fit.model.has(kind) && !kinds.contains(&kind) {
                 kinds.push(kind);
             }
         }
@@ -43,7 +43,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
     let named = effects.iter().filter(|effect| outcome.is_named(effect.kind()));
     // A late speed of as little as these forces would be within usual errors itself.
     let is_large = |accepted: EffectKind| {
-        let index = effects.iter().position(|effect| effect.kind() == accepted);
+        let index = outcome.fit.model.position(accepted);
         let late_s: f64 =
             index.map_or(0.0, |index| outcome.fit.effect_parameters(index).iter().sum());
         move |twin: &EffectKind| *twin != EffectKind::SpeedDelay || late_s > speed_delay::LEAST_S
@@ -96,11 +96,6 @@ pub fn kinds_of(competing: &[CompetingHypotheses]) -> Vec<&'static str> {
     kinds
 }
 
-/// Whether a model has an effect of a kind.
-pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
-    fit.model.effects.iter().any(|effect| effect.kind() == kind)
-}
-
 /// What is known to separate the kinds that are easily confused.
 pub fn separating_run(kind: EffectKind, competing: &[EffectKind]) -> &'static str {
     vocabulary::separating_run(kind, competing)
@@ -122,10 +117,7 @@ fn form(formula: String) -> String {
 /// nothing outside the library was found.
 pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
     let fit = &outcome.fit;
-    let is_unknown = |kind: EffectKind| kind == EffectKind::Unknown;
-    let Some(index) = fit.model.effects.iter().position(|effect| is_unknown(effect.kind())) else {
-        return Vec::new();
-    };
+    let Some(index) = fit.model.position(EffectKind::Unknown) else { return Vec::new() };
     let found = fit.model.effects[index].formula(fit.effect_parameters(index)).map(form);
     let own = fit.cost + penalty(fit, index);
     let rest = search.without(fit, index);

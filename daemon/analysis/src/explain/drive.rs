@@ -14,9 +14,7 @@ use nalgebra::DMatrix;
 
 use super::answer::{DriveAnswer, WithStd};
 use super::effects::{AtBound, Hypothesis, Nature, On};
-use super::evidence::{
-    FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,
-};
+use super::evidence::{FitProblem, RunData, RunDataError, SampleForces, UpdatedModel, prepare};
 use super::selection::{FORM_SHARE, OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
 use crate::statistics::{rms, share_of};
@@ -184,11 +182,9 @@ fn reported_by(
     open: OpenDrive,
     declared: Option<Drive>,
 ) -> Option<EstimatedDrive> {
-    let start = problem.start(&open.start());
-    let open = Arc::new(open);
+    let (start, open) = (open.start(), Arc::new(open));
     let model = UpdatedModel::default().with(open.clone());
-    let first = problem.fit_with_noise(&model, start, Noise::START);
-    let fit = problem.with_own_noise(&first);
+    let fit = problem.fit_from_declared(&model, &start);
     if fit.observations() < OBSERVATIONS_MIN {
         return None;
     }

@@ -13,7 +13,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::WithStd;
 use super::effects::{Hypothesis, Nature, On};
-use super::evidence::{FitProblem, Noise, RunDataError, SampleForces, UpdatedModel, prepare};
+use super::evidence::{FitProblem, RunDataError, SampleForces, UpdatedModel, prepare};
 use super::selection::{OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
 
@@ -63,8 +63,7 @@ pub fn estimated(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
     runs.retain(|run| run.role == Role::Fit);
     let problem = FitProblem::new(runs, dataset.train.resistance);
     let model = UpdatedModel::default().with(Arc::new(LateStamps));
-    let first = problem.fit_with_noise(&model, problem.start(&[0.0]), Noise::START);
-    let fit = problem.with_own_noise(&first);
+    let fit = problem.fit_from_declared(&model, &[0.0]);
     if fit.observations() < OBSERVATIONS_MIN {
         return Ok(None);
     }

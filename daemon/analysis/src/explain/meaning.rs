@@ -41,11 +41,7 @@ impl Work {
     fn of(run: &RunData, fit: &Fit, index: usize) -> Self {
         let (mut with, mut without) = (UpdatedForces::default(), UpdatedForces::default());
         fit.model.forces(run, &fit.theta, &mut with);
-        let range = fit.model.ranges()[index].clone();
-        let mut others = fit.model.clone();
-        others.effects.remove(index);
-        let theta = fit.theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
-        let theta: Vec<f64> = theta.map(|(_, value)| *value).collect();
+        let (others, theta) = fit.model.without(&fit.theta, index);
         others.forces(run, &theta, &mut without);
         let (samples, time_s) = (run.recording.samples(), run.recording.time_s());
         let mut work = Work::default();

@@ -46,7 +46,7 @@ use dynocar_core::plausibility::Severity;
 
 use crate::dataset::{Dataset, Role};
 use answer::ExplainAnswer;
-use evidence::{Fit, FitProblem, RunData, RunDataError};
+use evidence::{FitProblem, RunData, RunDataError};
 use score::{PredictedRun, Score};
 use selection::{Deviations, Outcome, Progress, Search};
 use unexplained::Unexplained;
@@ -59,10 +59,6 @@ pub struct Explanation {
     pub problem: FitProblem,
     /// The runs set aside.
     pub holdout: Vec<RunData>,
-    /// The declared model with a, b, c refitted.
-    pub base: Fit,
-    /// The same with the effects.
-    pub grown: Fit,
     /// How surely its parameters are known.
     pub deviations: Deviations,
     /// Open-loop errors.
@@ -71,8 +67,6 @@ pub struct Explanation {
     pub predictions: Vec<PredictedRun>,
     /// What the search found.
     pub outcome: Outcome,
-    /// Greatest strength of a candidate in the first round of the search.
-    pub acceptance_score: f64,
 }
 
 /// Explains what the declared model of a dataset leaves.
@@ -122,19 +116,6 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         answer.add_caveat(&force_time::sentence(late));
         answer.force_late_s = Some(late);
     }
-    let acceptance_score = Search::greatest_score(&outcome);
     progress(1.0, "done");
-    let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
-    Ok(Explanation {
-        answer,
-        problem,
-        holdout,
-        base,
-        grown,
-        deviations,
-        score,
-        predictions,
-        outcome,
-        acceptance_score,
-    })
+    Ok(Explanation { answer, problem, holdout, deviations, score, predictions, outcome })
 }

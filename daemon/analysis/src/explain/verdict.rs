@@ -13,9 +13,7 @@ use super::answer::{
 use super::caveats::told_by_data;
 use super::caveats::{caveats, trimmed};
 use super::competing::runners_up;
-use super::competing::{
-    CompetingHypotheses, competing_hypotheses, is_in, kinds_of, separating_run,
-};
+use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, separating_run};
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
@@ -44,7 +42,7 @@ pub fn answer(
     let (fit, std) = (&outcome.fit, &deviations.std);
     let effects = effect_answers(search, outcome, known, deviations);
     // What has no name has no competing hypotheses either.
-    let is_unknown = is_in(fit, EffectKind::Unknown);
+    let is_unknown = fit.model.has(EffectKind::Unknown);
     let competing = if is_unknown { Vec::new() } else { competing_hypotheses(outcome) };
     let left = Unexplained::of(search, outcome);
     let verdict = verdict(search, outcome, &competing, left.as_ref());
@@ -219,9 +217,9 @@ fn verdict(
         let is_left = left.is_some_and(|left| !left.refused.is_empty());
         return if is_left { Verdict::Unknown } else { Verdict::None };
     }
-    if is_in(&outcome.fit, EffectKind::Unknown) {
+    if outcome.fit.model.has(EffectKind::Unknown) {
         let total = outcome.base.cost - outcome.fit.cost;
-        let index = effects.iter().position(|effect| effect.kind() == EffectKind::Unknown);
+        let index = outcome.fit.model.position(EffectKind::Unknown);
         let without = index.map(|index| search.without(&outcome.fit, index));
         let library = without.map_or(0.0, |fit| outcome.base.cost - fit.cost);
         if library < LIBRARY_SHARE_MIN * total {
@@ -236,7 +234,7 @@ fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Consi
     if let Some(last) = outcome.rounds.last() {
         for trial in last.iter() {
             let fallen = outcome.fallen.iter().find(|(kind, _)| *kind == trial.kind);
-            let reason = if is_in(&outcome.fit, trial.kind) {
+            let reason = if outcome.fit.model.has(trial.kind) {
                 "found".into()
             } else if let Some((_, refusal)) = fallen {
                 format!("found, but beside the usual errors: {refusal}")
@@ -302,7 +300,7 @@ fn statement(
         }
         Verdict::Effect => (format!("Found: {described}.{undetermined}"), None),
         Verdict::Unknown => {
-            let text = if is_in(&outcome.fit, EffectKind::Unknown) {
+            let text = if outcome.fit.model.has(EffectKind::Unknown) {
                 format!(
                     "The residual is real, but no effect of the library explains it; it lives \
                      here: {described}.{undetermined}"

@@ -31,7 +31,7 @@ pub use criterion::{
     acceptance_score, p_value,
 };
 pub use fade::Fade;
-pub use fit::{Fit, FitProblem, Nearby, RunNormal};
+pub use fit::{Fit, FitProblem, RunNormal};
 pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RUNS_A_TASK, RunScatter, coarse_step};
 pub use run_data::{RunData, RunDataError, RunPower, prepare};

@@ -3,6 +3,7 @@
 use dynocar_model::simulate::{ForceModel, QuadraticForces};
 use dynocar_model::terms::wheel;
 use dynocar_model::train::Davis;
+use dynocar_shared::vocabulary::EffectKind;
 
 use super::bins::Response;
 use super::bins::{Integral, integrate_bins};
@@ -25,6 +26,24 @@ impl UpdatedModel {
         let mut grown = self.clone();
         grown.effects.push(effect);
         grown
+    }
+
+    /// The number of its effect of a kind; `None` where it has none.
+    pub fn position(&self, kind: EffectKind) -> Option<usize> {
+        self.effects.iter().position(|effect| effect.kind() == kind)
+    }
+
+    /// Whether it has an effect of a kind.
+    pub fn has(&self, kind: EffectKind) -> bool {
+        self.position(kind).is_some()
+    }
+
+    /// The model without one effect, and its parameters.
+    pub fn without(&self, theta: &[f64], index: usize) -> (Self, Vec<f64>) {
+        let (mut model, range) = (self.clone(), self.ranges()[index].clone());
+        model.effects.remove(index);
+        let kept = theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
+        (model, kept.map(|(_, value)| *value).collect())
     }
 
     /// Number of parameters: a, b, c and those of the effects.

@@ -71,7 +71,7 @@ pub struct Errors {
 impl Errors {
     /// The errors of an explanation's models.
     pub fn of(explanation: &Explanation) -> Self {
-        let (before, after) = (&explanation.base, &explanation.grown);
+        let (before, after) = (&explanation.outcome.base, &explanation.outcome.fit);
         let (fit, holdout) = (&explanation.problem.runs[..], &explanation.holdout[..]);
         let pair = |runs: &[RunData], restart| error_pair(runs, before, after, restart);
         let mut scored = pair(holdout, Restart::FullRun);

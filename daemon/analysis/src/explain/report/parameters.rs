@@ -28,7 +28,7 @@ pub struct ParameterRow {
 /// a, b, c and the parameters of all effects.
 pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
     let declared = dataset.train.resistance;
-    let before = deviations(&explanation.base).std;
+    let before = deviations(&explanation.outcome.base).std;
     let davis = [
         ("a", "constant part", "N/kN", declared.a),
         ("b", "part that grows with speed", "N/kN per m/s", declared.b),
@@ -43,8 +43,8 @@ pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
             meaning: meaning.into(),
             unit,
             declared: Some(value),
-            before: Some(estimate(&explanation.base.theta, &before)),
-            after: estimate(&explanation.grown.theta, &explanation.deviations.std),
+            before: Some(estimate(&explanation.outcome.base.theta, &before)),
+            after: estimate(&explanation.outcome.fit.theta, &explanation.deviations.std),
         }
     });
     let of_effects = explanation.answer.effects.iter().flat_map(|e| effect_rows(dataset, e));

@@ -111,8 +111,8 @@ impl Timeline {
 impl RunTimeline {
     fn of(number: u32, run: &RunData, explanation: &Explanation) -> Self {
         let simulated = (0..run.samples().len()).filter(|&i| run.recording.is_simulated(i));
-        let [base, grown] =
-            [&explanation.base, &explanation.grown].map(|it| missing_resistance(it, run));
+        let [base, grown] = [&explanation.outcome.base, &explanation.outcome.fit]
+            .map(|it| missing_resistance(it, run));
         let residuals = base.into_iter().zip(grown).map(|((span, before), (_, after))| {
             let bins = &run.bins[span.0..span.1];
             ResidualWindow {
@@ -138,7 +138,7 @@ fn speeds<'r>(
     explanation: &Explanation,
     run: &'r RunData,
 ) -> impl Fn(usize) -> SpeedPoint + use<'r> {
-    let [before, after] = [&explanation.base, &explanation.grown]
+    let [before, after] = [&explanation.outcome.base, &explanation.outcome.fit]
         .map(|fit| predicted(fit, run, Restart::AtDepartures));
     move |i| SpeedPoint {
         time_s: run.offset_s + run.recording.time_s()[i],
@@ -201,7 +201,7 @@ pub fn traces(explanation: &Explanation) -> Vec<Trace> {
     let mut ranked: Vec<(f64, &RunData)> = runs
         .iter()
         .map(|run| {
-            let error = run_error(&explanation.base, run, Restart::AtDepartures);
+            let error = run_error(&explanation.outcome.base, run, Restart::AtDepartures);
             (error.rmse_mps().unwrap_or(0.0), run)
         })
         .collect();
@@ -231,7 +231,9 @@ fn trace(explanation: &Explanation, run: &RunData, zones: &Zones) -> Trace {
         file: run.file.clone(),
         role: run.role,
         pieces,
-        rmse_mps: rmse(&explanation.base).zip(rmse(&explanation.grown)).map(|(b, a)| [b, a]),
+        rmse_mps: rmse(&explanation.outcome.base)
+            .zip(rmse(&explanation.outcome.fit))
+            .map(|(b, a)| [b, a]),
         acting_s: zones.times_s(run),
     }
 }

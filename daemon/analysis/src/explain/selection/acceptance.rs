@@ -69,7 +69,7 @@ impl Search<'_> {
         } else if !is_accepted(&trial.fit, trial.last(), trial.evidence, trial.reduction) {
             Some(Refusal::Weak(trial.reduction))
         } else {
-            contradiction(trial)
+            contradiction_of(&trial.fit, trial.last())
                 .map(Refusal::Contradiction)
                 .or_else(|| at_bound(&trial.fit, trial.last()).map(Refusal::AtBound))
         }
@@ -96,11 +96,6 @@ pub(super) fn is_material(trial: &Trial) -> bool {
 /// Whether the last effect of a trial may be what its kind says.
 pub(super) fn is_possible(trial: &Trial) -> bool {
     may_be(&trial.fit, trial.last())
-}
-
-/// Why the last effect of a trial is not what its kind says.
-fn contradiction(trial: &Trial) -> Option<&'static str> {
-    contradiction_of(&trial.fit, trial.last())
 }
 
 /// Evidence beyond which one number of the whole train or line is certain. Where nothing acts it is at most 2, and
@@ -153,7 +148,7 @@ pub(super) fn is_certain(
     let is_chosen_among_many =
         is_unmapped || matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
     let are_places_moved = fit.model.effects.iter().any(moves_places);
-    let is_on_slippery_rails = fit.model.effects.iter().any(|other| other.kind() == LowAdhesion);
+    let is_on_slippery_rails = fit.model.has(LowAdhesion);
     let needs_the_score = match effect.kind() {
         LowAdhesion | MassChange | SpeedDelay | Wind => true,
         DraggingBrake => !is_beside_usual_errors || is_on_slippery_rails,

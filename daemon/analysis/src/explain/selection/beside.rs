@@ -59,8 +59,7 @@ impl Search<'_> {
         {
             return beside.clone();
         }
-        let is_in = |kind| fit.model.effects.iter().any(|own| own.kind() == kind);
-        let usual = usual_errors(fit.theta[0], is_in);
+        let usual = usual_errors(fit.theta[0], |kind| fit.model.has(kind));
         let shared = usual.start.len();
         let errors = self.map_errors(fit).into_iter().chain([usual]).map(Candidate::parts);
         let fit = self.problem.with_runs_apart(&self.problem.grown(fit, errors));

@@ -38,10 +38,10 @@ impl Search<'_> {
         base: &Fit,
         trials: &mut Vec<(Trial, &'static Effect)>,
     ) {
-        let is_unknown = |kind: EffectKind| kind == EffectKind::Unknown;
-        if base.model.effects.iter().any(|own| is_unknown(own.kind())) {
+        if base.model.has(EffectKind::Unknown) {
             return;
         }
+        let is_unknown = |kind: EffectKind| kind == EffectKind::Unknown;
         let Some(form) = self.form_that_noise_holds(base, trials) else { return };
         let own = trials.iter().find(|(trial, _)| is_unknown(trial.kind));
         if own.is_none_or(|(own, _)| own.bic_gain < form.bic_gain) {
@@ -76,7 +76,7 @@ impl Search<'_> {
     pub fn look_under_noise(&self, outcome: &mut Outcome) {
         let models = [outcome.base.clone(), outcome.fit.clone()];
         for base in models.iter().take(1 + usize::from(!outcome.fit.model.effects.is_empty())) {
-            if base.model.effects.iter().any(|own| own.kind() == EffectKind::Unknown) {
+            if base.model.has(EffectKind::Unknown) {
                 continue;
             }
             let before = FitErrors::of(self.problem, base);

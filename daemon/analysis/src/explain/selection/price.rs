@@ -28,8 +28,7 @@ fn narrowed(fit: &Fit, index: usize, prior: &DMatrix<f64>) -> Option<f64> {
     let own = fit.model.ranges()[index].clone();
     let information = fit.information();
     let others: Vec<usize> = (0..fit.theta.len()).filter(|i| !own.contains(i)).collect();
-    let rest =
-        DMatrix::from_fn(others.len(), others.len(), |i, j| information[(others[i], others[j])]);
+    let rest = information.select_rows(&others).select_columns(&others);
     let log_determinant =
         |matrix: DMatrix<f64>| Some(2.0 * Cholesky::new(matrix)?.l().diagonal().map(f64::ln).sum());
     let all = log_determinant(information)?;

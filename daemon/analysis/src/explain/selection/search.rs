@@ -10,8 +10,9 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::acceptance::{is_accepted, may_be};
 use super::outcome::{Outcome, Round, Trial};
 use super::price::model_penalty;
+use super::trying::Asked;
 use crate::explain::effects::Effect;
-use crate::explain::evidence::{EQUAL, Fit, FitProblem, Noise, RunData, UpdatedModel};
+use crate::explain::evidence::{EQUAL, Fit, FitProblem, RunData, UpdatedModel};
 use crate::explain::scan::Scan;
 use crate::explain::score::reduction;
 
@@ -73,10 +74,7 @@ impl Search<'_> {
     /// The declared model with a, b, c refitted, and no search for effects.
     pub fn base(&self) -> Outcome {
         (self.progress)(0.05, "fitting a, b, c");
-        let declared = UpdatedModel::default();
-        let start = self.problem.start(&[]);
-        let first = self.problem.fit_with_noise(&declared, start, Noise::START);
-        let base = self.problem.with_own_noise(&first);
+        let base = self.problem.fit_from_declared(&UpdatedModel::default(), &[]);
         Outcome {
             base: base.clone(),
             likeliest: base.clone(),
@@ -120,7 +118,7 @@ impl Search<'_> {
         // And kinds that others took the place of at once.
         let mut fruitless = outcome.fallen_kinds();
         while !outcome.is_full() && outcome.rounds.len() < most {
-            let trials = self.round(&outcome.fit, &mut outcome.not_testable);
+            let trials = self.round_of(&outcome.fit, &mut outcome.not_testable, Asked::ALL);
             let next = self.best(&trials, &fruitless).map(|trial| (trial.kind, trial.fit.clone()));
             let small = next.is_none().then(|| self.with_certain_and_small(&trials)).flatten();
             let round = Round::from(trials);
@@ -180,11 +178,7 @@ impl Search<'_> {
 
     /// The model without one effect, refitted.
     pub fn without(&self, fit: &Fit, index: usize) -> Fit {
-        let range = fit.model.ranges()[index].clone();
-        let mut model = fit.model.clone();
-        model.effects.remove(index);
-        let kept = fit.theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
-        let start = kept.map(|(_, value)| *value).collect();
+        let (model, start) = fit.model.without(&fit.theta, index);
         self.problem.fit_with_noise(&model, start, fit.noise)
     }
 }
@@ -202,10 +196,11 @@ impl Search<'_> {
                 tried.push((*kind, brought_last));
                 break;
             }
-            let index = outcome.fit.model.effects.iter().position(|own| own.kind() == *kind);
+            let index = outcome.fit.model.position(*kind);
             let Some(index) = index.filter(|_| outcome.is_on_trial(*kind)) else { continue };
             let rest = self.without(&outcome.fit, index);
-            let trials = self.rivals(&rest, *kind);
+            let rivals = Asked { rivals_of: Some(*kind), ..Asked::ALL };
+            let trials = self.round_of(&rest, &mut Vec::new(), rivals);
             let mut stands = *kind;
             if let Some(best) = self.best(&trials, &outcome.fallen_kinds())
                 && Self::total(&best.fit) < Self::total(&outcome.fit) - EQUAL

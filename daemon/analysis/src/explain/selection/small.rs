@@ -86,7 +86,7 @@ impl Search<'_> {
         }
         for kind in kinds {
             let fit = &outcome.fit;
-            let index = fit.model.effects.iter().position(|effect| effect.kind() == kind);
+            let index = fit.model.position(kind);
             let Some(index) = index.filter(|_| !outcome.is_named(kind)) else { continue };
             let rest = self.without(fit, index);
             let evidence = rest.cost - fit.cost - penalty(fit, index);

@@ -33,6 +33,12 @@ impl FitProblem {
         self.with_own_noise(&self.fit(model, start, noise))
     }
 
+    /// Fits a model from the declared a, b and c and a start of its effects, with the noise that it leaves.
+    pub fn fit_from_declared(&self, model: &UpdatedModel, start: &[f64]) -> Fit {
+        let first = self.fit_with_noise(model, self.start(start), Noise::START);
+        self.with_own_noise(&first)
+    }
+
     /// The noise that a fit's residuals show, and its model fitted again.
     pub fn with_own_noise(&self, fit: &Fit) -> Fit {
         self.again(fit, self.noise_left_by(fit))

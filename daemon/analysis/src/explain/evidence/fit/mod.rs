@@ -3,7 +3,6 @@
 mod descent;
 mod linearised;
 mod memory;
-mod nearby;
 mod plan;
 mod prior;
 
@@ -23,7 +22,6 @@ use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scat
 use super::whitener::Whitener;
 use crate::statistics::median;
 use memory::RunMemory;
-pub use nearby::Nearby;
 
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
 /// directions apart which the runs do not excite.
