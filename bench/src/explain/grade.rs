@@ -2,6 +2,7 @@
 
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::ExplainAnswer;
+use dynocar_analysis::explain::selection::Search;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};

@@ -51,18 +51,13 @@ pub fn answer(
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
     let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
     let left = left.as_ref();
-    let Words { verdict_words, caveats, experiment } = match impossible(&diagnostics) {
-        Some(words) => words,
-        None => {
-            let (verdict_words, experiment) =
-                statement(search, outcome, verdict, &effects, &competing, left);
-            let caveats = if is_enough {
-                caveats(search, outcome, &effects, score, std, &identifiability)
-            } else {
-                Vec::new()
-            };
-            Words { verdict_words, caveats, experiment }
-        }
+    let words = impossible(&diagnostics);
+    let is_told = words.is_none() && is_enough;
+    let (verdict_words, experiment) =
+        words.unwrap_or_else(|| statement(search, outcome, verdict, &effects, &competing, left));
+    let caveats = match is_told {
+        true => caveats(search, outcome, &effects, score, std, &identifiability),
+        false => Vec::new(),
     };
     ExplainAnswer {
         verdict,
@@ -99,22 +94,16 @@ pub fn answer(
     }
 }
 
-/// What the verdict is in words.
-struct Words {
-    verdict_words: String,
-    caveats: Vec<String>,
-    experiment: Option<String>,
-}
+/// The verdict in words, and what to do.
+type Words = (String, Option<String>);
 
 /// The words where the data cannot be true.
 fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
     let fundamental = diagnostics.iter().filter(|it| it.severity == Severity::Fundamental);
     let faults: Vec<String> = fundamental.map(ToString::to_string).collect();
-    (!faults.is_empty()).then(|| Words {
-        verdict_words: format!("The data cannot be true as described: {}", faults.join("; ")),
-        caveats: Vec::new(),
-        experiment: Some("Set right what is named and run this again.".into()),
-    })
+    let words = || format!("The data cannot be true as described: {}", faults.join("; "));
+    let to_do = "Set right what is named and run this again.";
+    (!faults.is_empty()).then(|| (words(), Some(to_do.into())))
 }
 
 /// Why nothing was scored, and what is known instead; `None` when something was.
@@ -270,7 +259,7 @@ fn statement(
     effects: &[EffectAnswer],
     competing: &[CompetingHypotheses],
     left: Option<&Unexplained>,
-) -> (String, Option<String>) {
+) -> Words {
     let described: Vec<String> = effects.iter().map(describe).collect();
     let described = described.join("; ");
     let undetermined = left.map(Unexplained::undetermined).unwrap_or_default();

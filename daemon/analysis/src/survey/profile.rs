@@ -179,7 +179,7 @@ impl Evidence {
         for (height, change) in state.heights_m.iter_mut().zip(&step.heights_m) {
             *height += change;
         }
-        state.common.add(&step.common);
+        state.common.0 += step.common.0;
         state.common_std = step.common_std();
         if wants_std {
             state.gradient_var = self.layout.gradient_variances(&step);

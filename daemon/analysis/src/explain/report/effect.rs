@@ -4,7 +4,9 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use super::words::{self, joined, kind_name, number};
-use crate::explain::answer::{EffectAnswer, Location, Meaning, ParameterValue};
+use crate::explain::answer::{
+    EffectAnswer, Location, MassWindow, Meaning, ParameterValue, RunWindow,
+};
 use crate::statistics::span;
 
 /// Places named in a sentence at most.
@@ -69,20 +71,19 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
             }
             ParameterValue::Formula(formula) => sizes.insert(0, formula.clone()),
             ParameterValue::Windows(windows) => {
-                sizes.extend(in_order(windows, |w| (&w.run, w.t_start_s)).take(PLACES_MAX).map(
-                    |w| {
-                        let percent =
-                            format!("{:+.1} %", 100.0 * (w.mass_factor - 1.0)).replace('-', "−");
-                        let is_one = windows.iter().filter(|it| it.run == w.run).count() == 1;
-                        let (from_s, to_s) = (w.t_start_s, w.t_end_s);
-                        let time = if is_one {
-                            String::new()
-                        } else {
-                            format!(" from {from_s:.0} to {to_s:.0} s")
-                        };
-                        format!("{percent} in {}{time}", w.run)
-                    },
-                ));
+                let all = in_order(windows, |it| (&it.window.run, it.window.t_start_s));
+                sizes.extend(all.take(PLACES_MAX).map(|MassWindow { window, mass_factor }| {
+                    let percent =
+                        format!("{:+.1} %", 100.0 * (mass_factor - 1.0)).replace('-', "−");
+                    let RunWindow { run, t_start_s, t_end_s } = window;
+                    let is_one = windows.iter().filter(|it| it.window.run == *run).count() == 1;
+                    let time = if is_one {
+                        String::new()
+                    } else {
+                        format!(" from {t_start_s:.0} to {t_end_s:.0} s")
+                    };
+                    format!("{percent} in {run}{time}")
+                }));
             }
             ParameterValue::List(_) | ParameterValue::Profile(_) => {}
         }
@@ -211,7 +212,7 @@ fn sections(intervals_m: &[[f64; 2]]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explain::answer::{CovariateRange, RunWindow};
+    use crate::explain::answer::CovariateRange;
 
     #[test]
     fn what_an_effect_means_is_said_in_kwh_and_metres() {

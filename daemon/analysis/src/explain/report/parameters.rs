@@ -3,7 +3,7 @@
 use super::{Estimate, words};
 use crate::dataset::Dataset;
 use crate::explain::Explanation;
-use crate::explain::answer::{EffectAnswer, ParameterValue, PlaceUncertainty};
+use crate::explain::answer::{EffectAnswer, ParameterValue, PlaceUncertainty, RunWindow};
 use crate::explain::selection::deviations;
 
 /// A parameter of the model.
@@ -102,8 +102,8 @@ fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) 
             (which, s.mass_factor)
         })),
         ParameterValue::Windows(windows) => each(&mut windows.iter().map(|w| {
-            let (run, from, to) = (&w.run, w.t_start_s, w.t_end_s);
-            (format!("mass factor in {run}, {from:.0} to {to:.0} s"), w.mass_factor)
+            let RunWindow { run, t_start_s, t_end_s } = &w.window;
+            (format!("mass factor in {run}, {t_start_s:.0} to {t_end_s:.0} s"), w.mass_factor)
         })),
         // The formula stands with the effect; its numbers stand here.
         ParameterValue::Formula(_) => Vec::new(),

@@ -15,7 +15,7 @@ use crate::explain::hypothesis::SharedHypothesis;
 use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
 use masses::Masses;
-use parts::{Part, STATION_M, STOP_MIN_S, stations, stops};
+use parts::{Along, Part, STATION_M, STOP_MIN_S, stations, stops};
 
 /// Sections or windows at most.
 const PARTS_MAX: usize = 5;
@@ -48,10 +48,9 @@ fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
     let stations = stations(scan);
     let mut sections = Vec::new();
     for direction in [Some(1.0), Some(-1.0)] {
-        let part = |from: usize, to: usize| Part::Section {
-            from_m: stations[from],
-            to_m: stations[to],
-            direction,
+        let part = |from: usize, to: usize| Part {
+            ends: [stations[from], stations[to]],
+            along: Along::Line(direction),
         };
         let elementary: Vec<Tuple> = (0..stations.len().saturating_sub(1))
             .map(|k| part_tuple(scan, &part(k, k + 1)))
@@ -95,7 +94,7 @@ fn joined(
 /// Every section between neighbouring stations with a factor of its own: loads that change at every stop.
 fn every(parts: &[(Part, Tuple)]) -> Candidate {
     let is_within = |part: &Part, other: &Part| {
-        let ([from, to], [low, high]) = (part.ends(), other.ends());
+        let ([from, to], [low, high]) = (part.ends, other.ends);
         !part.is_apart(other) && from <= low && high <= to && part != other
     };
     let is_least = |part: &&Part| !parts.iter().any(|(other, _)| is_within(part, other));
@@ -110,7 +109,8 @@ pub fn everywhere(scan: &Scan) -> Option<Candidate> {
     let runs = &scan.problem.runs;
     let first = runs.first()?.direction;
     let direction = runs.iter().all(|run| run.direction == first).then_some(first);
-    let part = Part::Section { from_m: low - STATION_M, to_m: high + STATION_M, direction };
+    let ends = [low - STATION_M, high + STATION_M];
+    let part = Part { ends, along: Along::Line(direction) };
     let (_, estimate) = scan.gain(&scan.tuple(shape));
     let start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
     let choice_cost = 2.0 * std::f64::consts::LN_2;
@@ -125,11 +125,9 @@ fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
         edges.extend(stops(run).iter().map(|stop| 0.5 * (stop.0 + stop.1)));
         edges.push(run.duration_s());
         edges.dedup_by(|one, other| *one - *other < STOP_MIN_S);
-        let part = |from: usize, to: usize| Part::Window {
-            run: run.file.clone(),
-            from_s: edges[from],
-            to_s: edges[to],
-            offset_s: run.offset_s,
+        let part = |from: usize, to: usize| Part {
+            ends: [edges[from], edges[to]],
+            along: Along::Run(run.file.clone(), run.offset_s),
         };
         let elementary: Vec<Tuple> =
             (0..edges.len() - 1).map(|k| part_tuple(scan, &part(k, k + 1))).collect();
@@ -181,8 +179,8 @@ fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
             _ => break,
         }
     }
-    let is_everywhere =
-        masses.parts().len() == PARTS_MAX && matches!(masses.parts(), [Part::Section { .. }, ..]);
+    let is_everywhere = masses.parts().len() == PARTS_MAX
+        && matches!(masses.parts(), [Part { along: Along::Line(_), .. }, ..]);
     let mut candidates = vec![Candidate::new(masses, start)];
     candidates.extend(is_everywhere.then(|| every(parts)));
     candidates
@@ -195,10 +193,9 @@ mod tests {
     #[test]
     fn every_section_between_neighbouring_stations_is_there_once() {
         let ends = [0.0, 900.0, 2100.0, 3000.0];
-        let section = |from: usize, to: usize, towards: f64| Part::Section {
-            from_m: ends[from],
-            to_m: ends[to],
-            direction: Some(towards),
+        let section = |from: usize, to: usize, towards: f64| Part {
+            ends: [ends[from], ends[to]],
+            along: Along::Line(Some(towards)),
         };
         let mut parts = Vec::new();
         for towards in [1.0, -1.0] {
