@@ -5,8 +5,8 @@ use dynocar_model::terms::wheel;
 use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::bins::Response;
-use super::bins::{Integral, integrate_bins};
+use super::integral::Response;
+use super::integral::{Integral, integrate_bins};
 use super::pass::{Acting, Pass, blocks};
 use super::run_data::RunData;
 use super::run_scatter::{RunFactors, of_day};

@@ -8,12 +8,12 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::Refusal;
 use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
 use super::acceptance::{is_material, is_possible};
 use super::by_run::{Deviations, deviations_beside};
 use super::outcome::{Beside, Outcome, Round, Trial};
 use super::price::{at_bound, penalty};
+use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{Candidate, map_error, map_error_as_fitted, usual_errors};

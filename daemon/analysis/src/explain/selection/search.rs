@@ -7,14 +7,11 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{is_accepted, may_be};
 use super::outcome::{Outcome, Round, Trial};
 use super::price::model_penalty;
-use super::trying::Asked;
 use crate::explain::effects::Effect;
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, RunData, UpdatedModel};
 use crate::explain::scan::Scan;
-use crate::explain::score::reduction;
 
 /// Told how far the work is, by any thread: share done, and what is being done. It may unwind to end the
 /// work, which holds nothing that would have to be put right.
@@ -118,7 +115,7 @@ impl Search<'_> {
         // And kinds that others took the place of at once.
         let mut fruitless = outcome.fallen_kinds();
         while !outcome.is_full() && outcome.rounds.len() < most {
-            let trials = self.round_of(&outcome.fit, &mut outcome.not_testable, Asked::ALL);
+            let trials = self.round(&outcome.fit, &mut outcome.not_testable);
             let next = self.best(&trials, &fruitless).map(|trial| (trial.kind, trial.fit.clone()));
             let small = next.is_none().then(|| self.with_certain_and_small(&trials)).flatten();
             let round = Round::from(trials);
@@ -181,66 +178,6 @@ impl Search<'_> {
         let (model, start) = fit.model.without(&fit.theta, index);
         self.problem.fit_with_noise(&model, start, fit.noise)
     }
-}
-
-impl Search<'_> {
-    /// Takes each effect out in turn and looks whether another kind does better in its place; what was
-    /// tried in the place of each kind that stands after it: of the last, while the others stay, in the round
-    /// that brought it.
-    pub(super) fn swap(&self, outcome: &mut Outcome, brought_last: Round) {
-        let mut tried = Vec::new();
-        let kinds = outcome.kinds();
-        let mut others_stay = true;
-        for (number, kind) in kinds.iter().enumerate() {
-            if number == kinds.len() - 1 && others_stay {
-                tried.push((*kind, brought_last));
-                break;
-            }
-            let index = outcome.fit.model.position(*kind);
-            let Some(index) = index.filter(|_| outcome.is_on_trial(*kind)) else { continue };
-            let rest = self.without(&outcome.fit, index);
-            let rivals = Asked { rivals_of: Some(*kind), ..Asked::ALL };
-            let trials = self.round_of(&rest, &mut Vec::new(), rivals);
-            let mut stands = *kind;
-            if let Some(best) = self.best(&trials, &outcome.fallen_kinds())
-                && Self::total(&best.fit) < Self::total(&outcome.fit) - EQUAL
-                && all_may_be(&best.fit)
-            {
-                outcome.fit = best.fit.clone();
-                stands = best.kind;
-                others_stay = false;
-            }
-            tried.push((stands, trials.into()));
-        }
-        outcome.instead = tried;
-    }
-
-    /// Drops effects that the others have made needless, and that none of the others stands in for against
-    /// what its own kind says: winds that blow ahead of every train instead of a tunnel's drag.
-    pub(super) fn prune(&self, outcome: &mut Outcome) {
-        let mut index = 0;
-        while index < outcome.fit.model.effects.len() && outcome.fit.model.effects.len() > 1 {
-            let fit = &outcome.fit;
-            if !outcome.is_on_trial(fit.model.effects[index].kind()) {
-                index += 1;
-                continue;
-            }
-            let rest = self.without(fit, index);
-            let evidence = Self::total(&rest) - Self::total(fit);
-            let reduction = reduction(self.problem, &rest, fit);
-            let is_needless = !is_accepted(fit, index, evidence, reduction) && all_may_be(&rest);
-            if is_needless || !may_be(fit, index) {
-                outcome.fit = rest;
-            } else {
-                index += 1;
-            }
-        }
-    }
-}
-
-/// Whether every effect of a fitted model may be what its kind says.
-fn all_may_be(fit: &Fit) -> bool {
-    (0..fit.model.effects.len()).all(|index| may_be(fit, index))
 }
 
 #[cfg(test)]

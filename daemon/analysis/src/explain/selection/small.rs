@@ -8,10 +8,10 @@
 use dynocar_model::terms::wind;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::Refusal;
 use super::acceptance::{CERTAIN, is_accepted};
 use super::outcome::{Outcome, Trial};
 use super::price::penalty;
+use super::refusal::Refusal;
 use super::search::Search;
 use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::Fit;

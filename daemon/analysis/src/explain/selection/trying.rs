@@ -38,11 +38,6 @@ pub(super) struct Asked<'a> {
     pub rivals_of: Option<EffectKind>,
 }
 
-impl Asked<'_> {
-    /// Every kind.
-    pub const ALL: Self = Asked { is_asked: &|_| true, rivals_of: None };
-}
-
 /// The best candidate of a kind, if any, by this kind or its forms; or why the data do not allow to test it.
 type Tried = (&'static Effect, Result<Option<Trial>, String>);
 
@@ -54,6 +49,21 @@ fn may_be_evident(trial: &Trial) -> bool {
 }
 
 impl Search<'_> {
+    /// Tries every kind that the model does not have yet; the strongest first.
+    pub(super) fn round(
+        &self,
+        base: &Fit,
+        not_testable: &mut Vec<(EffectKind, String)>,
+    ) -> Vec<Trial> {
+        self.round_of(base, not_testable, Asked { is_asked: &|_| true, rivals_of: None })
+    }
+
+    /// Tries a kind and what could stand in its place.
+    pub(super) fn rivals(&self, base: &Fit, kind: EffectKind) -> Vec<Trial> {
+        let asked = Asked { is_asked: &|_| true, rivals_of: Some(kind) };
+        self.round_of(base, &mut Vec::new(), asked)
+    }
+
     /// Tries those of some kinds that the model does not have yet; the strongest first.
     pub(super) fn round_of(
         &self,

@@ -12,7 +12,7 @@ use dynocar_model::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
-use super::bins::Response;
+use super::integral::Response;
 use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::{Noise, RunScatter};
 use super::positions::pooled_s;

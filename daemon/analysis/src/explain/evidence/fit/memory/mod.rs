@@ -9,8 +9,8 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::super::bins::Response;
-use super::super::bins::integrate_bins;
+use super::super::integral::Response;
+use super::super::integral::integrate_bins;
 use super::super::model::UpdatedForces;
 use super::super::run_data::RunData;
 use super::plan::{At, Plan};

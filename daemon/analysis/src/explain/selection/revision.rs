@@ -1,0 +1,67 @@
+//! What was accepted on trial again, beside what came after it.
+
+use super::acceptance::{is_accepted, may_be};
+use super::outcome::{Outcome, Round};
+use super::search::Search;
+use crate::explain::evidence::{EQUAL, Fit};
+use crate::explain::score::reduction;
+
+impl Search<'_> {
+    /// Takes each effect out in turn and looks whether another kind does better in its place; what was
+    /// tried in the place of each kind that stands after it: of the last, while the others stay, in the round
+    /// that brought it.
+    pub(super) fn swap(&self, outcome: &mut Outcome, brought_last: Round) {
+        let mut tried = Vec::new();
+        let kinds = outcome.kinds();
+        let mut others_stay = true;
+        for (number, kind) in kinds.iter().enumerate() {
+            if number == kinds.len() - 1 && others_stay {
+                tried.push((*kind, brought_last));
+                break;
+            }
+            let index = outcome.fit.model.position(*kind);
+            let Some(index) = index.filter(|_| outcome.is_on_trial(*kind)) else { continue };
+            let rest = self.without(&outcome.fit, index);
+
+            let trials = self.rivals(&rest, *kind);
+            let mut stands = *kind;
+            if let Some(best) = self.best(&trials, &outcome.fallen_kinds())
+                && Self::total(&best.fit) < Self::total(&outcome.fit) - EQUAL
+                && all_may_be(&best.fit)
+            {
+                outcome.fit = best.fit.clone();
+                stands = best.kind;
+                others_stay = false;
+            }
+            tried.push((stands, trials.into()));
+        }
+        outcome.instead = tried;
+    }
+
+    /// Drops effects that the others have made needless, and that none of the others stands in for against
+    /// what its own kind says: winds that blow ahead of every train instead of a tunnel's drag.
+    pub(super) fn prune(&self, outcome: &mut Outcome) {
+        let mut index = 0;
+        while index < outcome.fit.model.effects.len() && outcome.fit.model.effects.len() > 1 {
+            let fit = &outcome.fit;
+            if !outcome.is_on_trial(fit.model.effects[index].kind()) {
+                index += 1;
+                continue;
+            }
+            let rest = self.without(fit, index);
+            let evidence = Self::total(&rest) - Self::total(fit);
+            let reduction = reduction(self.problem, &rest, fit);
+            let is_needless = !is_accepted(fit, index, evidence, reduction) && all_may_be(&rest);
+            if is_needless || !may_be(fit, index) {
+                outcome.fit = rest;
+            } else {
+                index += 1;
+            }
+        }
+    }
+}
+
+/// Whether every effect of a fitted model may be what its kind says.
+fn all_may_be(fit: &Fit) -> bool {
+    (0..fit.model.effects.len()).all(|index| may_be(fit, index))
+}
