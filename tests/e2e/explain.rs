@@ -60,7 +60,7 @@ fn a_number_is_no_surer_than_the_map_that_all_runs_share() {
     let ParameterValue::Number(stated) = effect.std["rotating_mass_factor"] else {
         panic!("a standard deviation is a number");
     };
-    let by_runs_alone = deviations(&explanation.grown).covariance[(3, 3)].sqrt();
+    let by_runs_alone = deviations(&explanation.outcome.fit).covariance[(3, 3)].sqrt();
     assert!(stated > 1.1 * by_runs_alone, "{stated}, and {by_runs_alone} by the runs alone");
 }
 
@@ -243,8 +243,8 @@ fn nothing_at_a_bound_of_what_is_looked_for_is_found() {
     };
     let explanation = explained(&simulate(&settings), folder.path());
     let answer = &explanation.answer;
-    for (index, effect) in explanation.grown.model.effects.iter().enumerate() {
-        let parameters = explanation.grown.effect_parameters(index);
+    for (index, effect) in explanation.outcome.fit.model.effects.iter().enumerate() {
+        let parameters = explanation.outcome.fit.effect_parameters(index);
         assert_eq!(effect.at_bound(parameters), None, "{}", answer.statement);
     }
     let is_found = answer.effects.iter().any(|effect| effect.kind == "rotating_mass");
@@ -361,7 +361,7 @@ fn a_scan_predicts_what_a_fit_then_gains() {
     let simulated = with_kinds(&[EffectKind::TunnelDrag]);
     let explanation = explained(&simulated, folder.path());
     let dataset = dataset::load(folder.path()).unwrap();
-    let (problem, base) = (&explanation.problem, &explanation.base);
+    let (problem, base) = (&explanation.problem, &explanation.outcome.base);
     let scan = Scan::new(problem, &explanation.holdout, &dataset.train, None, base).unwrap();
     let tuple = scan.tuple(|run, i| {
         let sample = &run.samples()[i];
@@ -370,7 +370,7 @@ fn a_scan_predicts_what_a_fit_then_gains() {
         -scan.per_unit_resistance_mps2(sample) * share * speed * speed
     });
     let (_, expected_by_advice) = scan.gain(&tuple);
-    let grown = explanation.grown.effect_parameters(0)[0];
+    let grown = explanation.outcome.fit.effect_parameters(0)[0];
     // The scan is linear and keeps the noise of the smaller model.
     assert!(
         (expected_by_advice - grown).abs() < 0.25 * grown,
@@ -381,6 +381,6 @@ fn a_scan_predicts_what_a_fit_then_gains() {
 #[test]
 fn every_kind_is_in_the_library_once() {
     for &kind in EffectKind::ALL.iter().filter(|kind| **kind != EffectKind::None) {
-        assert_eq!(LIBRARY.iter().filter(|effect| effect.kind() == kind).count(), 1, "{kind:?}");
+        assert_eq!(LIBRARY.iter().filter(|effect| effect.kind == kind).count(), 1, "{kind:?}");
     }
 }

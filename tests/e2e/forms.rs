@@ -25,7 +25,7 @@ fn explained(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<Extra>, f64) {
     let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");
     let answer = explanation.answer;
     assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
-    let grown = explanation.grown;
+    let grown = explanation.outcome.fit;
     let entries = grown.model.effects.iter().enumerate().flat_map(|(index, effect)| {
         effect.entries(grown.effect_parameters(index)).expect("a form that files can hold")
     });

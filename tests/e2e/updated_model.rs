@@ -1,7 +1,7 @@
 //! What `explain` fits, written as files, is what the daemon then applies, to the bit.
 
 use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
-use dynocar_analysis::explain::effects::{Candidate, LIBRARY, Proposal, UNKNOWN};
+use dynocar_analysis::explain::effects::{Candidate, LIBRARY, On, Past, UNKNOWN};
 use dynocar_analysis::explain::evidence::prepare;
 use dynocar_analysis::explain::evidence::{
     Fit, FitProblem, Noise, RunData, SampleForces, UpdatedForces, UpdatedModel,
@@ -43,7 +43,8 @@ fn fitted_forces(fit: &Fit, run: &RunData) -> (Vec<SampleForces>, f64) {
     let mut forces: Vec<SampleForces> = run.declared.all().collect();
     let mut speed_scale = 1.0;
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
-        effect.apply(&fit.theta[range.clone()], run, 0, &mut forces);
+        let on = On { run, first: 0, past: &mut Past::default() };
+        effect.apply(&fit.theta[range.clone()], on, &mut forces);
         speed_scale *= effect.speed_scale(&fit.theta[range]);
     }
     (forces, speed_scale)
@@ -79,9 +80,8 @@ fn every_kind_written_as_an_updated_model_is_applied_to_the_bit() {
     let track = dataset.track.as_ref();
     let scan = Scan::new(&problem, &[], &dataset.train, track, &base).expect("a sound fit");
     let mut applied = Vec::new();
-    for effect in LIBRARY.iter().copied().chain([UNKNOWN]) {
-        let Proposal::Candidates(candidates) = effect.propose(&scan) else { continue };
-        for Candidate { hypothesis, start } in candidates {
+    for effect in LIBRARY.iter().chain([UNKNOWN]) {
+        for Candidate { hypothesis, start } in effect.propose(&scan).unwrap_or_default() {
             let theta = base.theta.iter().chain(&start).copied().collect();
             let fit = problem.fit(&base.model.with(hypothesis), theta, base.noise);
             let mut train_table = text(&files, "train.toml").parse().expect("TOML");
@@ -97,9 +97,9 @@ fn every_kind_written_as_an_updated_model_is_applied_to_the_bit() {
                 Dataset { train: train.into(), track: Some(track.into()), ..dataset.clone() };
             let grown = prepare(&grown).expect("usable runs");
             for (declared, grown) in runs.iter().zip(&grown) {
-                assert_same_forces(effect.kind(), &fit, declared, grown);
+                assert_same_forces(effect.kind, &fit, declared, grown);
             }
-            applied.push(effect.kind());
+            applied.push(effect.kind);
         }
     }
     applied.sort_unstable();
@@ -120,12 +120,9 @@ fn what_a_fit_remembers_is_what_all_effects_do_at_the_samples() {
     let track = dataset.track.as_ref();
     let scan = Scan::new(&problem, &[], &dataset.train, track, &base).expect("a sound fit");
     let candidates = |kind: EffectKind| {
-        let mut effects = LIBRARY.iter().copied().chain([UNKNOWN]);
-        let effect = effects.find(|effect| effect.kind() == kind).expect("a kind");
-        match effect.propose(&scan) {
-            Proposal::Candidates(candidates) => candidates,
-            Proposal::NotTestable(_) => Vec::new(),
-        }
+        let mut effects = LIBRARY.iter().chain([UNKNOWN]);
+        let effect = effects.find(|effect| effect.kind == kind).expect("a kind");
+        effect.propose(&scan).unwrap_or_default()
     };
     let beside = [EffectKind::WheelDiameter, EffectKind::RotatingMass, EffectKind::ActuatorDelay];
     let mut looked_at = 0;

@@ -1,8 +1,8 @@
 //! Fits that go on from another, and effects that act block by block, against the same from the start and at once.
 
-use dynocar_analysis::explain::effects::{Candidate, LIBRARY, Proposal};
+use dynocar_analysis::explain::effects::{Candidate, LIBRARY};
 use dynocar_analysis::explain::evidence::SampleForces;
-use dynocar_analysis::explain::hypothesis::Past;
+use dynocar_analysis::explain::hypothesis::{On, Past};
 use dynocar_analysis::explain::scan::Scan;
 use dynocar_analysis::explain::selection::Search;
 use dynocar_analysis::explain::{Explanation, explain};
@@ -25,17 +25,15 @@ fn proposed(look: impl Fn(&Explanation, &Scan, Vec<Candidate>)) {
         track: dataset.track.as_ref(),
         progress: &|_, _| (),
     };
-    let scan = search.scan(&explanation.base).unwrap();
-    let candidates = LIBRARY.iter().flat_map(|kind| match kind.propose(&scan) {
-        Proposal::Candidates(candidates) => candidates,
-        Proposal::NotTestable(_) => Vec::new(),
-    });
+    let scan = search.scan(&explanation.outcome.base).unwrap();
+    let candidates = LIBRARY.iter().flat_map(|kind| kind.propose(&scan).unwrap_or_default());
     look(&explanation, &scan, candidates.collect());
 }
 
 #[test]
 fn a_fit_that_goes_on_from_another_ends_where_one_from_the_start_does() {
-    proposed(|Explanation { problem, base, .. }, _, candidates| {
+    proposed(|Explanation { problem, outcome, .. }, _, candidates| {
+        let base = &outcome.base;
         let mut compared = 0;
         for candidate in candidates {
             let kind = candidate.hypothesis.kind().name();
@@ -62,21 +60,23 @@ fn a_fit_that_goes_on_from_another_ends_where_one_from_the_start_does() {
 fn what_looks_back_does_the_same_block_by_block() {
     proposed(|Explanation { problem, .. }, _, candidates| {
         let looking_back: Vec<Candidate> =
-            candidates.into_iter().filter(|it| it.hypothesis.looks_back()).collect();
+            candidates.into_iter().filter(|it| it.hypothesis.nature().looks_back).collect();
         assert_eq!(looking_back.len(), 2, "late forces and a late speed");
         for (Candidate { hypothesis, .. }, run) in
             looking_back.iter().zip([&problem.runs[0], &problem.runs[1]])
         {
             let parameters = [0.37, 0.6];
             let mut at_once: Vec<SampleForces> = run.declared.all().collect();
-            hypothesis.apply(&parameters, run, 0, &mut at_once);
+            let on = On { run, first: 0, past: &mut Past::default() };
+            hypothesis.apply(&parameters, on, &mut at_once);
             // What a run before left is forgotten.
             let mut past = Past::default();
             for run in [&problem.runs[2], run] {
                 let declared: Vec<SampleForces> = run.declared.all().collect();
                 let mut by_blocks = declared.clone();
                 for (number, block) in by_blocks.chunks_mut(100).enumerate() {
-                    hypothesis.apply_after(&mut past, &parameters, run, 100 * number, block);
+                    let on = On { run, first: 100 * number, past: &mut past };
+                    hypothesis.apply(&parameters, on, block);
                 }
                 assert!(run.file != problem.runs[2].file || by_blocks != declared);
                 assert!(run.file == problem.runs[2].file || by_blocks == at_once, "{}", run.file);

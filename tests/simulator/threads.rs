@@ -29,7 +29,7 @@ fn the_answer_is_the_same_on_one_two_and_three_threads() {
     let on = |threads: usize| {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let explained = pool.install(|| explain(&dataset, &|_, _| {})).expect("usable runs");
-        let theta: Vec<u64> = explained.grown.theta.iter().map(|it| it.to_bits()).collect();
+        let theta: Vec<u64> = explained.outcome.fit.theta.iter().map(|it| it.to_bits()).collect();
         (format!("{:?}", explained.answer), theta)
     };
     let one = on(1);

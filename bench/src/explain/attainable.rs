@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::effects::Hypothesis;
-use dynocar_analysis::explain::evidence::{Noise, RunData, SampleForces, UpdatedModel};
+use dynocar_analysis::explain::effects::{Hypothesis, Nature, On};
+use dynocar_analysis::explain::evidence::{Noise, SampleForces, UpdatedModel};
 use dynocar_analysis::explain::score::run_error;
 use dynocar_model::simulate::{Restart, SpeedError};
 use dynocar_model::terms::Parameter;
@@ -58,15 +58,11 @@ impl TrueLaw {
 }
 
 impl Hypothesis for TrueLaw {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Unknown
+    fn nature(&self) -> Nature<'_> {
+        Nature::of(EffectKind::Unknown, &self.parameters)
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let law = with_numbers(self.law, &parameters[1..]);
         let unlisted = Unlisted { law, n_per_kn: parameters[0] };
         let samples = run.samples()[first..].iter().zip(&run.recording.time_s()[first..]);

@@ -2,6 +2,7 @@
 
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::ExplainAnswer;
+use dynocar_analysis::explain::selection::Search;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
@@ -79,7 +80,7 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
         ends_held,
         parameters,
         attained,
-        acceptance_score: explanation.acceptance_score,
+        acceptance_score: Search::greatest_score(&explanation.outcome),
     }
 }
 

@@ -122,7 +122,7 @@ impl UpdatedTables {
         let declared = track.map(|text| table(text, labels.1)).transpose()?;
         let is_declared = declared.is_some();
         let mut track = declared.unwrap_or_default();
-        let not_expressed = grow(&explanation.grown, &mut train, &mut track);
+        let not_expressed = grow(&explanation.outcome.fit, &mut train, &mut track);
         if let Some(drive) = explanation.answer.drive.as_ref().filter(|it| it.at_bound.is_none()) {
             set(&mut train, "traction", "efficiency", drive.efficiency.value);
             if let Some(known) = drive.auxiliary_power_kw {

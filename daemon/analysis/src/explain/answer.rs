@@ -7,7 +7,7 @@ use dynocar_model::named;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
-use super::judged::Judged;
+use super::stop_to_stop::Judged;
 use super::stop_to_stop::StopToStop;
 use crate::dataset::DatasetDiagnostic;
 
@@ -146,12 +146,9 @@ pub struct MassSection {
 /// A mass that holds for some time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MassWindow {
-    /// The run's file.
-    pub run: String,
-    /// Start in s.
-    pub t_start_s: f64,
-    /// End in s.
-    pub t_end_s: f64,
+    /// When.
+    #[serde(flatten)]
+    pub window: RunWindow,
     /// True over declared mass.
     pub mass_factor: f64,
 }

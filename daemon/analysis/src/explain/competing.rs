@@ -1,10 +1,12 @@
-//! Kinds that could stand in the place of an accepted effect.
+//! Kinds that could stand in the place of an accepted effect, and other forms that a force outside the library may have.
 
 use dynocar_model::terms::speed_delay;
 use dynocar_shared::vocabulary::{self, EffectKind};
 
-use super::evidence::{EQUAL, Fit, SCORE_MIN};
-use super::selection::{Outcome, Refusal, Search, Trial, is_certain_beside};
+use super::answer::RunnerUp;
+use super::effects::UNKNOWN;
+use super::evidence::{EQUAL, SCORE_MIN};
+use super::selection::{Outcome, Refusal, Search, Trial, is_certain_beside, penalty};
 
 /// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error, and has this
 /// share of the least score.
@@ -32,7 +34,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
             tried.iter().filter(|trial| own.is_some_and(|own| comes_close(trial, own, outcome)));
         let mut kinds: Vec<EffectKind> = Vec::new();
         for kind in twins.iter().copied().chain(close.map(|trial| trial.kind)) {
-            if !is_in(&outcome.fit, kind) && !kinds.contains(&kind) {
+            if !outcome.fit.model.has(kind) && !kinds.contains(&kind) {
                 kinds.push(kind);
             }
         }
@@ -41,7 +43,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
     let named = effects.iter().filter(|effect| outcome.is_named(effect.kind()));
     // A late speed of as little as these forces would be within usual errors itself.
     let is_large = |accepted: EffectKind| {
-        let index = effects.iter().position(|effect| effect.kind() == accepted);
+        let index = outcome.fit.model.position(accepted);
         let late_s: f64 =
             index.map_or(0.0, |index| outcome.fit.effect_parameters(index).iter().sum());
         move |twin: &EffectKind| *twin != EffectKind::SpeedDelay || late_s > speed_delay::LEAST_S
@@ -55,7 +57,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         let taken_in = rounds.find(|round| round.iter().any(|trial| trial.kind == kind));
         let taken_in = taken_in.map_or(&[][..], |round| &round[..]);
         let twins: Vec<EffectKind> =
-            effect.twins().iter().copied().filter(is_large(kind)).collect();
+            effect.nature().twins.iter().copied().filter(is_large(kind)).collect();
         of(kind, instead.map_or(taken_in, |(_, tried)| tried), &twins)
     });
     each.filter(|competing| !competing.kinds.is_empty()).collect()
@@ -76,7 +78,7 @@ fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
         Some(_) => false,
     };
     trial.kind != EffectKind::Unknown
-        && trial.fit.model.effects[trial.last()].may_stand_for_others()
+        && trial.fit.model.effects[trial.last()].nature().may_stand_for_others
         && may_be
         && trial.bic_gain > accepted.bic_gain - EQUAL
         && trial.reduction > COMPETING_SHARE * accepted.reduction.max(0.0)
@@ -94,15 +96,48 @@ pub fn kinds_of(competing: &[CompetingHypotheses]) -> Vec<&'static str> {
     kinds
 }
 
-/// Whether a model has an effect of a kind.
-pub fn is_in(fit: &Fit, kind: EffectKind) -> bool {
-    fit.model.effects.iter().any(|effect| effect.kind() == kind)
-}
-
 /// What is known to separate the kinds that are easily confused.
 pub fn separating_run(kind: EffectKind, competing: &[EffectKind]) -> &'static str {
     vocabulary::separating_run(kind, competing)
         .unwrap_or("Drive again with other speeds, loads, directions and weather.")
+}
+
+/// Runners-up at most.
+const SHOWN: usize = 3;
+
+/// A formula without its numbers.
+fn form(formula: String) -> String {
+    formula
+        .chars()
+        .filter(|letter| !(letter.is_ascii_digit() || ".-+−".contains(*letter)))
+        .collect()
+}
+
+/// The forms next best to the one that was found, each fitted with everything else; empty where
+/// nothing outside the library was found.
+pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
+    let fit = &outcome.fit;
+    let Some(index) = fit.model.position(EffectKind::Unknown) else { return Vec::new() };
+    let found = fit.model.effects[index].formula(fit.effect_parameters(index)).map(form);
+    let own = fit.cost + penalty(fit, index);
+    let rest = search.without(fit, index);
+    let onto = search.problem.again(&rest, fit.noise);
+    let Some(scan) = search.scan(&onto) else { return Vec::new() };
+    let candidates = UNKNOWN.propose(&scan).unwrap_or_default();
+    let mut others: Vec<RunnerUp> = candidates
+        .into_iter()
+        .filter_map(|candidate| {
+            let other = search.problem.grown(&onto, [candidate.parts()]);
+            let last = other.model.effects.len() - 1;
+            let formula = other.model.effects[last].formula(other.effect_parameters(last))?;
+            let evidence_less = other.cost + penalty(&other, last) - own;
+            Some(RunnerUp { formula, evidence_less })
+        })
+        .filter(|other| found != Some(form(other.formula.clone())))
+        .collect();
+    others.sort_by(|one, other| one.evidence_less.total_cmp(&other.evidence_less));
+    others.truncate(SHOWN);
+    others
 }
 
 #[cfg(test)]

@@ -13,12 +13,11 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::answer::{DriveAnswer, WithStd};
-use super::effects::{AtBound, Hypothesis};
-use super::evidence::{
-    FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,
-};
+use super::effects::{AtBound, Hypothesis, Nature, On};
+use super::evidence::{FitProblem, RunData, RunDataError, SampleForces, UpdatedModel, prepare};
 use super::selection::{FORM_SHARE, OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
+use crate::statistics::{rms, share_of};
 
 /// Efficiency, and what is fed beside the drive in kW beyond what is fed at rest.
 const PARAMETERS: [Parameter; 2] = [
@@ -44,7 +43,7 @@ impl Auxiliaries {
     /// never rest.
     fn of(powered: &[&RunData], declared: Drive) -> Self {
         let rows = powered.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
-        let mut resting_kw: Vec<f64> = rows
+        let resting_kw: Vec<f64> = rows
             .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
             .filter(|(sample, power_w)| sample.speed_mps < RESTING_MPS && power_w.is_finite())
             .map(|(_, power_w)| 1e-3 * power_w)
@@ -53,8 +52,7 @@ impl Auxiliaries {
             let power_kw = 1e-3 * declared.auxiliary_power_w;
             return Auxiliaries { power_kw, std_kw: PARAMETERS[1].upper };
         }
-        resting_kw.sort_unstable_by(f64::total_cmp);
-        let at = |share: f64| resting_kw[((resting_kw.len() - 1) as f64 * share) as usize];
+        let at = |share: f64| share_of(&resting_kw, share);
         let power_kw = at(0.5).max(0.0);
         let scatter_kw = 0.5 * (at(0.84) - at(0.16));
         Auxiliaries { power_kw, std_kw: scatter_kw.hypot(DRIVING_SHARE * power_kw).max(0.1) }
@@ -71,8 +69,7 @@ fn moving_power_kw(problem: &FitProblem) -> f64 {
     let moving = rows
         .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
         .filter(|(sample, power_w)| sample.speed_mps > RESTING_MPS && power_w.is_finite());
-    let (count, sum) = moving.fold((0.0, 0.0), |(n, sum), (_, w)| (n + 1.0, sum + w * w));
-    if count > 0.0 { 1e-3 * f64::sqrt(sum / count) } else { 0.0 }
+    1e-3 * rms(&moving.map(|(_, power_w)| *power_w).collect::<Vec<f64>>())
 }
 
 /// A drive with an efficiency, and auxiliaries where the power holds them, for unknown.
@@ -108,23 +105,16 @@ impl OpenDrive {
 }
 
 impl Hypothesis for OpenDrive {
-    /// The kind that it would be taken for.
-    fn kind(&self) -> EffectKind {
-        EffectKind::TractionGain
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        if self.resting.is_some() { &PARAMETERS } else { &PARAMETERS[..1] }
-    }
-
-    /// A drive without losses.
-    fn none(&self) -> f64 {
-        1.0
-    }
-
-    /// What is fed at rest says what may be fed while driving.
-    fn prior_information(&self) -> Option<&DMatrix<f64>> {
-        Some(&self.prior)
+    fn nature(&self) -> Nature<'_> {
+        let parameters = if self.resting.is_some() { &PARAMETERS[..] } else { &PARAMETERS[..1] };
+        Nature {
+            // A drive without losses.
+            none: 1.0,
+            // What is fed at rest says what may be fed while driving.
+            prior: Some(&self.prior),
+            // The kind that it would be taken for.
+            ..Nature::of(EffectKind::TractionGain, parameters)
+        }
     }
 
     fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
@@ -138,7 +128,7 @@ impl Hypothesis for OpenDrive {
         run.power.is_some()
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let Some(power) = &run.power else { return };
         let drive = self.at(parameters);
         let rows = power.power_w.iter().zip(run.samples()).skip(first);
@@ -192,11 +182,9 @@ fn reported_by(
     open: OpenDrive,
     declared: Option<Drive>,
 ) -> Option<EstimatedDrive> {
-    let start = problem.start(&open.start());
-    let open = Arc::new(open);
+    let (start, open) = (open.start(), Arc::new(open));
     let model = UpdatedModel::default().with(open.clone());
-    let first = problem.fit_with_noise(&model, start, Noise::START);
-    let fit = problem.with_own_noise(&first);
+    let fit = problem.fit_from_declared(&model, &start);
     if fit.observations() < OBSERVATIONS_MIN {
         return None;
     }

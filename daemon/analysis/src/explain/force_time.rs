@@ -12,10 +12,8 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::WithStd;
-use super::effects::Hypothesis;
-use super::evidence::{
-    FitProblem, Noise, RunData, RunDataError, SampleForces, UpdatedModel, prepare,
-};
+use super::effects::{Hypothesis, Nature, On};
+use super::evidence::{FitProblem, RunDataError, SampleForces, UpdatedModel, prepare};
 use super::selection::{OBSERVATIONS_MIN, deviations};
 use crate::dataset::{Dataset, Role};
 
@@ -32,16 +30,12 @@ const PARAMETERS: [Parameter; 1] = [Parameter::new("force_late_s", (-1.0, 1.0), 
 struct LateStamps;
 
 impl Hypothesis for LateStamps {
-    fn kind(&self) -> EffectKind {
-        EffectKind::ActuatorDelay
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &PARAMETERS
+    fn nature(&self) -> Nature<'_> {
+        Nature::of(EffectKind::ActuatorDelay, &PARAMETERS)
     }
 
     /// Nothing acts before it: what it finds around a sample is what is declared.
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let (late_s, time_s) = (parameters[0], run.recording.time_s());
         for (i, force) in (first..).zip(forces) {
             let other = if late_s >= 0.0 { i + 1 } else { i.wrapping_sub(1) };
@@ -69,8 +63,7 @@ pub fn estimated(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
     runs.retain(|run| run.role == Role::Fit);
     let problem = FitProblem::new(runs, dataset.train.resistance);
     let model = UpdatedModel::default().with(Arc::new(LateStamps));
-    let first = problem.fit_with_noise(&model, problem.start(&[0.0]), Noise::START);
-    let fit = problem.with_own_noise(&first);
+    let fit = problem.fit_from_declared(&model, &[0.0]);
     if fit.observations() < OBSERVATIONS_MIN {
         return Ok(None);
     }

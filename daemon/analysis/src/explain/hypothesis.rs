@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use dynocar_model::terms::delay::DelayLine;
 use dynocar_model::terms::speed_delay::LateSpeed;
-use dynocar_model::terms::{Entry, Parameter};
+use dynocar_model::terms::{Entry, Key, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::answer::{Location, ParameterValue};
 use super::evidence::{RunData, SampleForces};
-use super::places::End;
+use super::places::{End, Site};
 
 /// An effect with its structure (places, windows, runs) fixed, shared by models.
 pub type SharedHypothesis = Arc<dyn Hypothesis>;
@@ -87,7 +87,7 @@ impl ReportContext<'_> {
 }
 
 /// What an effect does to others that only add a resistance or a gradient.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum OnOthers {
     /// Nothing.
     Nothing,
@@ -137,43 +137,129 @@ impl Past {
     }
 }
 
+/// Some samples of a run that follow each other, with what an effect remembers of those before.
+pub struct On<'a> {
+    /// The run.
+    pub run: &'a RunData,
+    /// Number of the first of them.
+    pub first: usize,
+    /// What an effect that looks back remembers; anything where the first is the run's own.
+    pub past: &'a mut Past,
+}
+
+/// How an effect is handled in a fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handling {
+    /// Together with the others.
+    Together,
+    /// As a resistance of its own: it adds one in proportion to how far its first parameter is from none, and
+    /// nothing else.
+    Added,
+    /// As gradients: each of its parameters adds one in proportion to it, and nothing else.
+    Gradient,
+}
+
+/// What a structure is, whatever the values of its parameters.
+#[derive(Clone, Copy)]
+pub struct Nature<'h> {
+    /// The kind it belongs to.
+    pub kind: EffectKind,
+    /// Its parameters, in order.
+    pub parameters: &'h [Parameter],
+    /// What each of them is in the file of a train, where it is a number there.
+    pub keys: &'static [&'static Key],
+    /// The value of each parameter at which there is no effect.
+    pub none: f64,
+    /// The [size](Hypothesis::size) up to which declared figures are usually no better.
+    pub least: Option<f64>,
+    /// Information about its parameters before the data, around no effect; `None` for a flat prior.
+    pub prior: Option<&'h DMatrix<f64>>,
+    /// Twice the logarithm of the number of structures it was chosen from.
+    pub choice_cost: f64,
+    /// Standard deviation of the first parameter by errors that all runs share, which no number
+    /// of runs averages out.
+    pub shared_error: f64,
+    /// When it acts among others.
+    pub turn: Turn,
+    /// What it does to other effects that only add a resistance or a gradient.
+    pub on_others: OnOthers,
+    /// How it is handled where no other effect hinders that.
+    pub handling: Handling,
+    /// A function of each parameter in which the declared forces with this effect are affine, each by
+    /// itself; `None` where there is none.
+    pub affine_in: Option<fn(f64) -> f64>,
+    /// True where what it only resists with follows the speed.
+    pub feels_speed: bool,
+    /// True when its first parameter is the speed scale.
+    pub changes_speed_scale: bool,
+    /// True when what it does at a sample takes something of those before.
+    pub looks_back: bool,
+    /// True when what it follows is one number a run: then a run is one observation of it, however long.
+    pub is_one_number_a_run: bool,
+    /// Whether it could act in the place of another effect.
+    pub may_stand_for_others: bool,
+    /// Kinds that none of the runs at hand could distinguish from it.
+    pub twins: &'static [EffectKind],
+}
+
+impl<'h> Nature<'h> {
+    /// Of a kind with these parameters, none of which does anything unusual.
+    pub const fn of(kind: EffectKind, parameters: &'h [Parameter]) -> Self {
+        Nature {
+            kind,
+            parameters,
+            keys: &[],
+            none: 0.0,
+            least: None,
+            prior: None,
+            choice_cost: 0.0,
+            shared_error: 0.0,
+            turn: Turn::Usual,
+            on_others: OnOthers::Nothing,
+            handling: Handling::Together,
+            affine_in: None,
+            feels_speed: false,
+            changes_speed_scale: false,
+            looks_back: false,
+            is_one_number_a_run: false,
+            may_stand_for_others: true,
+            twins: &[],
+        }
+    }
+}
+
 /// A structure that a kind proposes: everything but the values of its parameters.
 pub trait Hypothesis: Send + Sync + std::fmt::Debug {
+    /// What it is, whatever the values of its parameters.
+    fn nature(&self) -> Nature<'_>;
+
     /// The kind it belongs to.
-    fn kind(&self) -> EffectKind;
+    fn kind(&self) -> EffectKind {
+        self.nature().kind
+    }
 
     /// Its parameters, in order.
-    fn parameters(&self) -> &[Parameter];
-
-    /// Changes the forces at some samples of a run, which follow each other from number `first` on; from
-    /// the first of all where it [looks back](Hypothesis::looks_back).
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]);
-
-    /// True when what it does at a sample takes something of those before.
-    fn looks_back(&self) -> bool {
-        false
+    fn parameters(&self) -> &[Parameter] {
+        self.nature().parameters
     }
 
-    /// The same behind the samples before, of which `past` is what it remembers.
-    fn apply_after(
-        &self,
-        _past: &mut Past,
-        parameters: &[f64],
-        run: &RunData,
-        first: usize,
-        forces: &mut [SampleForces],
-    ) {
-        self.apply(parameters, run, first, forces);
-    }
-
-    /// False when a parameter changes nothing on a fit run.
-    fn touches(&self, _parameter: usize, _run: &RunData) -> bool {
-        true
+    /// The value of each parameter at which there is no effect.
+    fn none(&self) -> f64 {
+        self.nature().none
     }
 
     /// True when each parameter adds a gradient in proportion to it, and nothing else.
     fn is_gradient(&self) -> bool {
-        false
+        self.nature().handling == Handling::Gradient
+    }
+
+    /// Changes the forces at some samples of a run, block by block from the first of all where it
+    /// [looks back](Nature::looks_back).
+    fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]);
+
+    /// False when a parameter changes nothing on a fit run.
+    fn touches(&self, _parameter: usize, _run: &RunData) -> bool {
+        true
     }
 
     /// The gradient in ‰ along the travel that a unit of a parameter adds at each sample of a run.
@@ -182,20 +268,9 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         permille.resize(run.samples().len(), 0.0);
     }
 
-    /// What it does to other effects that only add a resistance or a gradient.
-    fn on_others(&self) -> OnOthers {
-        OnOthers::Nothing
-    }
-
     /// The factor on what they do, where it [scales](OnOthers::Scales) them.
     fn scale_of_others(&self, _parameters: &[f64]) -> f64 {
         1.0
-    }
-
-    /// True when it adds a resistance in proportion to how far its first parameter is from none, and nothing
-    /// else.
-    fn only_resists(&self) -> bool {
-        false
     }
 
     /// That resistance in N/kN at each sample of a run, for a first parameter of 1 above none and given others.
@@ -218,25 +293,9 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         }
     }
 
-    /// True where what it only resists with follows the speed.
-    fn feels_speed(&self) -> bool {
-        false
-    }
-
-    /// A function of each parameter in which the declared forces with this effect are affine, each by
-    /// itself; `None` where there is none.
-    fn affine_in(&self) -> Option<fn(f64) -> f64> {
-        None
-    }
-
     /// Measured over true speed.
     fn speed_scale(&self, _parameters: &[f64]) -> f64 {
         1.0
-    }
-
-    /// True when its first parameter is the speed scale.
-    fn changes_speed_scale(&self) -> bool {
-        false
     }
 
     /// By how many s the measured speed is late, the sum of its parameters; `None` for what makes none late.
@@ -244,24 +303,29 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         None
     }
 
-    /// When it acts among others.
-    fn turn(&self) -> Turn {
-        Turn::Usual
+    /// The site at which it was found; `None` for what has none.
+    fn site(&self) -> Option<&Site> {
+        None
+    }
+
+    /// The same structure at another site.
+    fn at_site(&self, _site: Site) -> Option<SharedHypothesis> {
+        None
     }
 
     /// Where it acts.
     fn place(&self) -> Location {
-        Location::default()
+        self.site().map_or_else(Location::default, Site::place)
     }
 
     /// The ends of its places that were estimated from the speeds.
     fn ends(&self) -> Vec<End> {
-        Vec::new()
+        self.site().map_or_else(Vec::new, Site::ends)
     }
 
     /// The same structure with one of its ends elsewhere; `None` where that makes no place.
-    fn with_end(&self, _end: &End, _at: f64) -> Option<SharedHypothesis> {
-        None
+    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+        self.at_site(self.site()?.moved(end, at)?)
     }
 
     /// True when it acts in certain runs only: an event, and no property of train or line.
@@ -270,50 +334,19 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         place.windows.is_some() || place.runs.is_some()
     }
 
-    /// Files of the fit runs in which it acts, where these were chosen.
-    fn chosen_runs(&self) -> Option<&[String]> {
-        None
-    }
-
-    /// The same structure in other runs.
-    fn with_runs(&self, _runs: Vec<String>) -> Option<SharedHypothesis> {
-        None
-    }
-
-    /// True when what it follows is one number a run: then a run is one observation of it, however long.
-    fn is_one_number_a_run(&self) -> bool {
-        false
-    }
-
-    /// Twice the logarithm of the number of structures it was chosen from.
-    fn choice_cost(&self) -> f64 {
-        0.0
-    }
-
-    /// Standard deviation of the first parameter by errors that all runs share, which no number
-    /// of runs averages out.
-    fn shared_error(&self) -> f64 {
-        0.0
-    }
-
     /// Standard deviation of each parameter by what happens between samples so many s apart.
     fn sampling_error(&self, _step_s: f64) -> f64 {
         0.0
     }
 
     /// Whether the effect is larger than what declared figures are usually good for.
-    fn is_material(&self, _parameters: &[f64], _c: f64) -> bool {
-        true
+    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
+        self.nature().least.is_none_or(|least| self.size(parameters).abs() > least)
     }
 
     /// Why parameters like these are not what the kind says, whatever speaks for them.
     fn contradiction(&self, _parameters: &[f64]) -> Option<&'static str> {
         None
-    }
-
-    /// The value of each parameter at which there is no effect.
-    fn none(&self) -> f64 {
-        0.0
     }
 
     /// The first parameter that lies at a bound of what is looked for, other than at no effect: the
@@ -332,25 +365,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         parameters[0] - self.none()
     }
 
-    /// Information about its parameters before the data, around no effect; `None` for a flat
-    /// prior.
-    fn prior_information(&self) -> Option<&DMatrix<f64>> {
-        None
-    }
-
-    /// Kinds that none of the runs at hand could distinguish from it.
-    fn twins(&self) -> &[EffectKind] {
-        &[]
-    }
-
-    /// Whether it could act in the place of another effect.
-    fn may_stand_for_others(&self) -> bool {
-        true
-    }
-
     /// What the effect is in the files of a train and a line; `None` where these cannot hold it.
-    fn entries(&self, _parameters: &[f64]) -> Option<Vec<Entry>> {
-        None
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+        let each = self.nature().keys.iter().zip(parameters);
+        let numbers: Vec<Entry> = each.map(|(key, value)| Entry::Number(key, *value)).collect();
+        (!numbers.is_empty()).then_some(numbers)
     }
 
     /// The law in a formula, for what has no name.

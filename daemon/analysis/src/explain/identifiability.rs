@@ -6,10 +6,10 @@
 
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::Cholesky;
 
 use super::answer::Identifiability;
-use super::competing::{is_in, separating_run};
+use super::competing::separating_run;
 use super::effects::{Candidate, LIBRARY};
 use super::report::words::number;
 use super::selection::{Outcome, Search};
@@ -17,7 +17,7 @@ use super::selection::{Outcome, Search};
 /// The kinds that are one number of the whole train or line, and not found.
 fn whole_kinds(search: &Search, outcome: &Outcome) -> Vec<Candidate> {
     let Some(scan) = search.scan(&outcome.fit) else { return Vec::new() };
-    let others = LIBRARY.iter().filter(|effect| !is_in(&outcome.fit, effect.kind()));
+    let others = LIBRARY.iter().filter(|effect| !outcome.fit.model.has(effect.kind));
     others.filter_map(|effect| effect.whole(&scan)).collect()
 }
 
@@ -36,7 +36,7 @@ pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiabilit
     let std = |own: usize, beside: Option<usize>| {
         let free: Vec<usize> =
             (0..fitted).chain(beside.map(|k| fitted + k)).chain([fitted + own]).collect();
-        let part = DMatrix::from_fn(free.len(), free.len(), |i, j| information[(free[i], free[j])]);
+        let part = information.select_rows(&free).select_columns(&free);
         let covariance = Cholesky::new(part)?.inverse();
         let last = free.len() - 1;
         Some(covariance[(last, last)].sqrt()).filter(|std| std.is_finite())

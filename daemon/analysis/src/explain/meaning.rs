@@ -5,6 +5,8 @@ use dynocar_model::units::J_PER_KWH;
 
 use super::answer::Meaning;
 use super::evidence::{Fit, FitProblem, RunData, UpdatedForces};
+use super::score::predicted;
+use crate::statistics::rms;
 
 impl Meaning {
     /// That of one effect of a fitted model; `rest` is the model refitted without it.
@@ -39,11 +41,7 @@ impl Work {
     fn of(run: &RunData, fit: &Fit, index: usize) -> Self {
         let (mut with, mut without) = (UpdatedForces::default(), UpdatedForces::default());
         fit.model.forces(run, &fit.theta, &mut with);
-        let range = fit.model.ranges()[index].clone();
-        let mut others = fit.model.clone();
-        others.effects.remove(index);
-        let theta = fit.theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
-        let theta: Vec<f64> = theta.map(|(_, value)| *value).collect();
+        let (others, theta) = fit.model.without(&fit.theta, index);
         others.forces(run, &theta, &mut without);
         let (samples, time_s) = (run.recording.samples(), run.recording.time_s());
         let mut work = Work::default();
@@ -68,13 +66,10 @@ impl Work {
 fn distance_error_m(problem: &FitProblem, fit: &Fit) -> Option<f64> {
     let mut errors_m = Vec::new();
     for run in &problem.runs {
-        let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
-        fit.model.forces(run, &fit.theta, &mut forces);
-        prediction.simulate(&run.recording, &forces, Restart::WINDOW_60);
+        let prediction = predicted(fit, run, Restart::WINDOW_60);
         errors_m.extend(minutes(run, &prediction));
     }
-    let squares: f64 = errors_m.iter().map(|error_m| error_m * error_m).sum();
-    (!errors_m.is_empty()).then(|| (squares / errors_m.len() as f64).sqrt())
+    (!errors_m.is_empty()).then(|| rms(&errors_m))
 }
 
 /// Predicted less measured distance in m of each minute of a run that is driven without a gap.

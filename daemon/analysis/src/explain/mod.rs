@@ -9,11 +9,12 @@
 //! - [`hypothesis`], [`effects`]: what an effect is to the others; the library, one file for each kind
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or
 //!   time, would explain
-//! - [`selection`]: the search for effects, its significance, evidence by run
-//! - [`gradient_prior`], [`usual_errors`]: how maps err; the finished model beside what is usually wrong
-//! - [`score`], `stop_runs`, [`stop_to_stop`], [`judged`], `bootstrap`: open-loop prediction of fit and holdout runs
-//! - [`unexplained`], [`informed`], [`identifiability`], [`competing`], [`runners_up`], [`meaning`], [`verdict`],
-//!   [`described`], [`answer`]: the statement
+//! - [`selection`]: the search for effects, its significance, evidence by run, the finished model beside what is
+//!   usually wrong
+//! - [`gradient_prior`]: how maps err
+//! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
+//! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
+//!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
 //! [`explain`] runs it all.
@@ -30,27 +31,22 @@ pub mod force_time;
 pub mod gradient_prior;
 pub mod hypothesis;
 pub mod identifiability;
-pub mod informed;
-pub mod judged;
 pub mod meaning;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;
-pub mod runners_up;
 pub mod scan;
 pub mod score;
 pub mod selection;
-mod stop_runs;
 pub mod stop_to_stop;
 pub mod unexplained;
-pub mod usual_errors;
 pub mod verdict;
 
 use dynocar_core::plausibility::Severity;
 
 use crate::dataset::{Dataset, Role};
 use answer::ExplainAnswer;
-use evidence::{Fit, FitProblem, RunData, RunDataError};
+use evidence::{FitProblem, RunData, RunDataError};
 use score::{PredictedRun, Score};
 use selection::{Deviations, Outcome, Progress, Search};
 use unexplained::Unexplained;
@@ -63,10 +59,6 @@ pub struct Explanation {
     pub problem: FitProblem,
     /// The runs set aside.
     pub holdout: Vec<RunData>,
-    /// The declared model with a, b, c refitted.
-    pub base: Fit,
-    /// The same with the effects.
-    pub grown: Fit,
     /// How surely its parameters are known.
     pub deviations: Deviations,
     /// Open-loop errors.
@@ -75,8 +67,6 @@ pub struct Explanation {
     pub predictions: Vec<PredictedRun>,
     /// What the search found.
     pub outcome: Outcome,
-    /// Greatest strength of a candidate in the first round of the search.
-    pub acceptance_score: f64,
 }
 
 /// Explains what the declared model of a dataset leaves.
@@ -113,7 +103,7 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    let deviations = usual_errors::given_usual_errors(&search, &mut outcome, dataset.step_s());
+    let deviations = selection::given_usual_errors(&search, &mut outcome, dataset.step_s());
     progress(0.95, "scoring the holdout runs");
     let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
     let predictions = score::predictions(&problem, &holdout, &outcome.fit);
@@ -126,19 +116,6 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         answer.add_caveat(&force_time::sentence(late));
         answer.force_late_s = Some(late);
     }
-    let acceptance_score = Search::greatest_score(&outcome);
     progress(1.0, "done");
-    let (base, grown) = (outcome.base.clone(), outcome.fit.clone());
-    Ok(Explanation {
-        answer,
-        problem,
-        holdout,
-        base,
-        grown,
-        deviations,
-        score,
-        predictions,
-        outcome,
-        acceptance_score,
-    })
+    Ok(Explanation { answer, problem, holdout, deviations, score, predictions, outcome })
 }

@@ -2,6 +2,7 @@
 
 use super::answer::RunWindow;
 use super::evidence::RunData;
+use crate::statistics::middle;
 
 /// After the brake force is gone, the cylinders get this time in s to empty.
 const RELEASE_S: f64 = 6.0;
@@ -30,11 +31,6 @@ fn released(run: &RunData) -> Vec<(f64, f64)> {
     points
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
 /// The instant from which the pressure of one run is higher for good.
 fn onset_s(points: &[(f64, f64)], baseline_pa: f64) -> Option<f64> {
     if points.len() < 2 * SAMPLES_MIN {
@@ -56,12 +52,15 @@ fn onset_s(points: &[(f64, f64)], baseline_pa: f64) -> Option<f64> {
     }
     let (_, split) = best?;
     let (before, after) = points.split_at(split);
-    let low = median(before.iter().map(|point| point.1).collect());
-    let high = median(after.iter().map(|point| point.1).collect());
-    let deviation = |half: &[(f64, f64)], middle: f64| {
-        1.48 * median(half.iter().map(|point| (point.1 - middle).abs()).collect())
+    let pressures =
+        |points: &[(f64, f64)]| points.iter().map(|point| point.1).collect::<Vec<f64>>();
+    let [mut before_pa, mut after_pa] = [before, after].map(pressures);
+    let (low, high) = (middle(&mut before_pa)?, middle(&mut after_pa)?);
+    let deviation = |half: &[f64], level: f64| {
+        let mut away: Vec<f64> = half.iter().map(|pressure| (pressure - level).abs()).collect();
+        Some(1.48 * middle(&mut away)?)
     };
-    let spread = deviation(before, low).max(deviation(after, high));
+    let spread = deviation(&before_pa, low)?.max(deviation(&after_pa, high)?);
     let is_step = high - low > STEP_MIN_PA.max(STEP_SPREADS * spread);
     if is_step {
         return Some(points[split].0);
@@ -78,7 +77,9 @@ pub fn windows<'r>(runs: impl Iterator<Item = &'r RunData> + Clone) -> Option<Ve
     let medians: Vec<f64> = points
         .iter()
         .filter(|(_, points)| points.len() >= SAMPLES_MIN)
-        .map(|(_, points)| median(points.iter().map(|point| point.1).collect()))
+        .filter_map(|(_, points)| {
+            middle(&mut points.iter().map(|point| point.1).collect::<Vec<f64>>())
+        })
         .collect();
     let baseline_pa = medians.iter().copied().fold(f64::INFINITY, f64::min);
     let windows: Vec<RunWindow> = points

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::evidence::{
     Adjoint, Bin, Fit, FitProblem, RUNS_A_TASK, RunData, SampleForces, coarse_step,
 };
-use super::hypothesis::{Hypothesis, Past};
+use super::hypothesis::{Hypothesis, On, Past};
 
 /// Inner products of a whitened regressor.
 #[derive(Clone, Debug)]
@@ -89,16 +89,11 @@ impl<'a> Scan<'a> {
 
     /// Time in s of used motion where a condition on the sample holds.
     pub fn seconds_where(&self, condition: impl Fn(&RunData, &ResolvedSample) -> bool) -> f64 {
-        self.bin_seconds_where(|run, i| condition(run, &run.samples()[i]))
-    }
-
-    /// Time in s of used motion where a condition on run and sample number holds.
-    pub fn bin_seconds_where(&self, condition: impl Fn(&RunData, usize) -> bool) -> f64 {
         let mut total_s = 0.0;
         for run in &self.problem.runs {
             let time_s = run.recording.time_s();
             for bin in &run.bins {
-                if condition(run, bin.middle()) {
+                if condition(run, &run.samples()[bin.middle()]) {
                     total_s += time_s[bin.end - 1] - time_s[bin.first];
                 }
             }
@@ -108,7 +103,7 @@ impl<'a> Scan<'a> {
 
     /// The tuple of a force shape over all runs: `acceleration(run, sample)` in m/s² per unit.
     pub fn tuple(&self, acceleration: impl Fn(&RunData, usize) -> f64 + Sync) -> Tuple {
-        self.over_runs(|index, _| self.run_tuple(index, &acceleration))
+        self.over_each_run(1, |index, _| self.run_tuple(index, &acceleration))
     }
 
     /// Where a fit may start from: the tuple of a force shape over some of many runs, as if over all.
@@ -116,12 +111,7 @@ impl<'a> Scan<'a> {
         self.over_some_runs(|index, _| self.run_tuple(index, &acceleration))
     }
 
-    /// The sum of a tuple of each run.
-    fn over_runs(&self, of_run: impl Fn(usize, &RunData) -> Tuple + Sync) -> Tuple {
-        self.over_each_run(1, of_run)
-    }
-
-    /// The same over some of many runs, evenly chosen, as if over all.
+    /// The sum of a tuple of each of some of many runs, evenly chosen, as if over all.
     fn over_some_runs(&self, of_run: impl Fn(usize, &RunData) -> Tuple + Sync) -> Tuple {
         let runs = self.problem.runs.len();
         let step = coarse_step(runs);
@@ -186,7 +176,7 @@ impl<'a> Scan<'a> {
             let (mut shape, mut middle) = (Vec::with_capacity(run.bins.len()), middles.next());
             for (i, declared) in run.declared.all().enumerate() {
                 let mut acting = [declared];
-                effect.apply_after(&mut past, parameters, run, i, &mut acting);
+                effect.apply(parameters, On { run, first: i, past: &mut past }, &mut acting);
                 if middle == Some(i) {
                     shape.push(change_mps2(run, i, [&declared, &acting[0]]));
                     middle = middles.next();
@@ -214,13 +204,5 @@ impl<'a> Scan<'a> {
     /// Decrease of the cost when the shape acts with the factor 1.
     pub fn decrease_at_one(&self, tuple: &Tuple) -> f64 {
         2.0 * tuple.score - self.free_square(tuple)
-    }
-
-    /// Mean weight in kN of the fit runs.
-    pub fn weight_kn(&self) -> f64 {
-        let runs = &self.problem.runs;
-        let weights: Vec<f64> =
-            runs.iter().filter_map(|run| Some(run.samples().first()?.weight_kn)).collect();
-        weights.iter().sum::<f64>() / weights.len().max(1) as f64
     }
 }

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, RunData, RunFactors, UpdatedForces};
-use super::judged::Judged;
 use super::selection::without_each_run;
-use super::stop_runs::stop_runs;
+use super::stop_to_stop::Judged;
+use super::stop_to_stop::stop_runs;
 use super::stop_to_stop::{self, StopToStop};
 
 /// Errors of the model without and with the effects.
@@ -34,24 +34,22 @@ pub struct PredictedRun {
     pub speed_mps: Vec<f64>,
 }
 
+/// Speeds of a run predicted open loop.
+pub fn predicted(fit: &Fit, run: &RunData, restart: Restart) -> Prediction {
+    let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
+    fit.model.forces(run, &fit.theta, &mut forces);
+    prediction.simulate(&run.recording, &forces, restart);
+    prediction
+}
+
 /// Error of a model over one run.
 pub fn run_error(fit: &Fit, run: &RunData, restart: Restart) -> SpeedError {
-    let [error] = errors_at(fit, &fit.theta, run, [restart]);
+    let [error] = errors_at(fit, &fit.theta, (run, &RunFactors::zeros()), [restart]);
     error
 }
 
-/// Errors with some parameters, restarted in some ways.
+/// Errors with some parameters and with what differs from run to run, restarted in some ways.
 fn errors_at<const N: usize>(
-    fit: &Fit,
-    theta: &[f64],
-    run: &RunData,
-    restarts: [Restart; N],
-) -> [SpeedError; N] {
-    errors_on_day(fit, theta, (run, &RunFactors::zeros()), restarts)
-}
-
-/// The same with what differs from run to run.
-fn errors_on_day<const N: usize>(
     fit: &Fit,
     theta: &[f64],
     (run, own): (&RunData, &RunFactors),
@@ -69,9 +67,7 @@ fn errors_on_day<const N: usize>(
 /// where none of them goes from stop to stop.
 pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopToStop> {
     let errors_mps = |fit: &Fit, run: &RunData| {
-        let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
-        fit.model.forces(run, &fit.theta, &mut forces);
-        prediction.simulate(&run.recording, &forces, Restart::AtDepartures);
+        let prediction = predicted(fit, run, Restart::AtDepartures);
         let within = |part| SpeedError::within(&run.recording, &prediction, part).rmse_mps();
         stop_runs(&run.recording).into_iter().filter_map(within).collect::<Vec<f64>>()
     };
@@ -100,7 +96,7 @@ impl FitErrors {
         let speed_mps = fit.open_loop_mps(|| open_loop_mps(problem, fit));
         let missed =
             |(ratio, deviation): (f64, f64)| (ratio - 1.0 / fit.speed_scale()).hypot(deviation);
-        let has_speed_scale = fit.model.effects.iter().any(|it| it.changes_speed_scale());
+        let has_speed_scale = fit.model.effects.iter().any(|it| it.nature().changes_speed_scale);
         FitErrors {
             speed_mps,
             distance: problem.distance_ratio.map_or(0.0, missed),
@@ -135,10 +131,11 @@ fn open_loop_mps(problem: &FitProblem, fit: &Fit) -> [[f64; 3]; 2] {
         let each = problem.runs.par_iter().zip(&theta).enumerate();
         let each: Vec<[SpeedError; 3]> = each
             .map(|(index, (run, theta))| {
-                let [full, window] = errors_at(fit, theta, run, restarts);
+                let none = RunFactors::zeros();
+                let [full, window] = errors_at(fit, theta, (run, &none), restarts);
                 let on_day = || {
                     let own = fit.own_factors(index);
-                    let [error] = errors_on_day(fit, theta, (run, own), [Restart::FullRun]);
+                    let [error] = errors_at(fit, theta, (run, own), [Restart::FullRun]);
                     error
                 };
                 let is_beside = fit.is_beside_loads_and_winds();
@@ -159,21 +156,20 @@ pub fn reduction(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
 
 /// Predictions of all runs, fit and holdout.
 pub fn predictions(problem: &FitProblem, holdout: &[RunData], fit: &Fit) -> Vec<PredictedRun> {
-    problem
-        .runs
-        .iter()
-        .chain(holdout)
-        .map(|run| {
-            let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
-            fit.model.forces(run, &fit.theta, &mut forces);
-            prediction.simulate(&run.recording, &forces, Restart::FullRun);
-            PredictedRun {
-                file: run.file.clone(),
-                time_s: run.recording.time_s().iter().map(|time| run.offset_s + time).collect(),
-                speed_mps: prediction.speed_mps().to_vec(),
-            }
-        })
-        .collect()
+    let of_run = |run: &RunData| PredictedRun {
+        file: run.file.clone(),
+        time_s: run.recording.time_s().iter().map(|time| run.offset_s + time).collect(),
+        speed_mps: predicted(fit, run, Restart::FullRun).speed_mps().to_vec(),
+    };
+    problem.runs.iter().chain(holdout).map(of_run).collect()
+}
+
+/// Errors without and with the effects over some parts together, in m/s, and what is taken away.
+pub fn pooled(parts: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> {
+    let sum =
+        parts.fold([SpeedError::default(); 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+    let [before, after] = [sum[0].rmse_mps()?, sum[1].rmse_mps()?];
+    Some([before, after, stop_to_stop::reduction([before, after])])
 }
 
 impl Score {
@@ -223,11 +219,7 @@ impl Score {
     /// away.
     fn intervals(&self) -> Option<[[f64; 2]; 3]> {
         intervals_95(&self.holdout_runs, |drawn| {
-            let sum = drawn
-                .iter()
-                .fold([SpeedError::default(); 2], |sum, run| [sum[0] + run[0], sum[1] + run[1]]);
-            let [before, after] = [sum[0].rmse_mps()?, sum[1].rmse_mps()?];
-            (before > 0.0).then(|| [before, after, stop_to_stop::reduction([before, after])])
+            pooled(drawn.iter().map(|run| **run)).filter(|[before, ..]| *before > 0.0)
         })
     }
 }

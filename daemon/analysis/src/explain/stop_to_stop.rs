@@ -1,9 +1,49 @@
-//! Errors from stop to stop: each run from a departure to the next standstill for itself, since a
-//! pooled error is ruled by a few runs that creep.
+//! Errors from stop to stop, and the error by which a model is judged: that of runs from stop to stop where there
+//! are any, each from a departure, at the last sample at rest, to the next standstill for itself, since a pooled error is
+//! ruled by a few runs that creep.
+//!
+//! Over a whole run every error is carried on: where a stop is cut off or shorter than it was, the
+//! predicted train runs on with a speed that the measured one does not have, and the error of all
+//! that follows says nothing of the forces there.
 
+use std::ops::Range;
+
+use dynocar_model::simulate::{Recording, STANDING_MPS, departs};
 use serde::Serialize;
 
 use super::bootstrap::intervals_95;
+use crate::statistics::{median, rms};
+
+/// A run that moves for less time in s is a shunt in a queue, and says little.
+const STOP_RUN_MOVING_MIN_S: f64 = 10.0;
+
+/// The runs from stop to stop that can be simulated from departure to standstill: first sample,
+/// at rest, and one past the last, at rest again.
+pub fn stop_runs(recording: &Recording) -> Vec<Range<usize>> {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let mut runs = Vec::new();
+    let mut from = None;
+    for index in 0..samples.len() {
+        let is_lost = !recording.is_simulated(index) || (index > 0 && recording.starts(index));
+        if is_lost {
+            from = None;
+        } else if let Some(start) = from
+            && samples[index].speed_mps <= STANDING_MPS
+        {
+            let moving = |at: &usize| samples[*at].speed_mps > STANDING_MPS;
+            let moving_s: f64 =
+                (start + 1..=index).filter(moving).map(|at| time_s[at] - time_s[at - 1]).sum();
+            if moving_s >= STOP_RUN_MOVING_MIN_S {
+                runs.push(start..index + 1);
+            }
+            from = None;
+        }
+        if departs(samples, index) && recording.is_simulated(index) {
+            from = Some(index);
+        }
+    }
+    runs
+}
 
 /// The middle of the errors of the runs from stop to stop, without and with the effects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -38,16 +78,19 @@ impl StopToStop {
         if let [only] = &by_run[..] {
             by_run = only.iter().map(|pair| vec![*pair]).collect();
         }
-        let sides_of = |drawn: &[&Vec<[f64; 2]>], of: fn(Vec<f64>) -> f64| {
+        let sides_of = |drawn: &[&Vec<[f64; 2]>], of: fn(&mut [f64]) -> f64| {
             [0, 1].map(|side| {
-                of(drawn.iter().flat_map(|errors| errors.iter().map(|it| it[side])).collect())
+                let own = drawn.iter().flat_map(|errors| errors.iter().map(|it| it[side]));
+                of(&mut own.collect::<Vec<f64>>())
             })
         };
+        let (median, rms) =
+            (|own: &mut [f64]| median(own).unwrap_or(0.0), |own: &mut [f64]| rms(own));
         let all: Vec<&Vec<[f64; 2]>> = by_run.iter().collect();
         let runs = all.iter().map(|errors| errors.len()).sum();
         let intervals = intervals_95(&by_run, |drawn| {
-            let ([median, median_after], rms) = (sides_of(drawn, median), sides_of(drawn, rms));
-            Some([median, median_after, rms[0], rms[1], reduction(rms)])
+            let ([before, after], rms) = (sides_of(drawn, median), sides_of(drawn, rms));
+            Some([before, after, rms[0], rms[1], reduction(rms)])
         });
         (runs > 0).then_some(StopToStop {
             runs,
@@ -66,24 +109,146 @@ pub fn reduction([before, after]: [f64; 2]) -> f64 {
     if before > 0.0 { 1.0 - after / before } else { 0.0 }
 }
 
-/// Root mean square; 0 of none.
-fn rms(values: Vec<f64>) -> f64 {
-    let squares: f64 = values.iter().map(|value| value * value).sum();
-    (squares / values.len().max(1) as f64).sqrt()
+/// What of the runs is predicted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Metric {
+    /// Each part from a departure to the next standstill, from rest: root mean square of their errors.
+    StopToStop,
+    /// Whole runs from their first sample to their end, pooled.
+    FullRun,
 }
 
-/// The middle value, the mean of the two middle ones of an even number; 0 of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    match values.len() {
-        0 => 0.0,
-        count => 0.5 * (values[(count - 1) / 2] + values[count / 2]),
+/// An error without and with the effects.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Judged {
+    /// What was predicted.
+    pub metric: Metric,
+    /// Number of parts from stop to stop, or of runs.
+    pub count: usize,
+    /// Error in m/s: before and after.
+    pub error_mps: [f64; 2],
+    /// 95 % intervals of the two; absent where nothing gives them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval_95_mps: Option<[[f64; 2]; 2]>,
+    /// 1 - after / before.
+    pub reduction: f64,
+    /// Its 95 % interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reduction_interval_95: Option<[f64; 2]>,
+}
+
+impl Judged {
+    /// By whole runs, with the intervals of before, after and reduction.
+    pub fn by_full_runs(
+        count: usize,
+        error_mps: [f64; 2],
+        intervals_95: Option<[[f64; 2]; 3]>,
+    ) -> Self {
+        Judged {
+            metric: Metric::FullRun,
+            count,
+            error_mps,
+            interval_95_mps: intervals_95.map(|[before, after, _]| [before, after]),
+            reduction: reduction(error_mps),
+            reduction_interval_95: intervals_95.map(|it| it[2]),
+        }
+    }
+
+    /// What was predicted, in words that follow "runs".
+    pub fn predicted(&self) -> String {
+        match (self.metric, self.count) {
+            (Metric::FullRun, _) => String::new(),
+            (Metric::StopToStop, 1) => ", from stop to stop".into(),
+            (Metric::StopToStop, count) => format!(", from stop to stop ({count} sections)"),
+        }
+    }
+}
+
+impl From<&StopToStop> for Judged {
+    fn from(found: &StopToStop) -> Self {
+        Judged {
+            metric: Metric::StopToStop,
+            count: found.runs,
+            error_mps: found.rms_mps,
+            interval_95_mps: found.rms_interval_95_mps,
+            reduction: reduction(found.rms_mps),
+            reduction_interval_95: found.reduction_interval_95,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use dynocar_model::force::ResolvedSample;
+    use dynocar_model::simulate::{BridgeLimits, Prediction, QuadraticForces, Restart, SpeedError};
+    use dynocar_model::train::Davis;
+
     use super::*;
+    use crate::explain::evidence::coasting;
+
+    fn recorded(samples: Vec<ResolvedSample>) -> Recording {
+        Recording::new(samples, BridgeLimits::default()).unwrap()
+    }
+
+    fn predict(recording: &Recording, restart: Restart) -> Prediction {
+        let mut prediction = Prediction::new();
+        let davis = Davis { a: 1.5, b: 0.02, c: 0.004 };
+        prediction.simulate(recording, &QuadraticForces::declared(recording, davis), restart);
+        prediction
+    }
+
+    #[test]
+    fn a_run_from_stop_to_stop_is_predicted_from_its_departure() {
+        // Two runs of a minute between stands; a force of 1 kN too much is reported in the second.
+        let pulled = |k: usize| {
+            let second = k as f64 * 0.2;
+            let within_s = second % 120.0;
+            let (traction_n, brake_n) = match within_s {
+                ..20.0 => (0.0, 60e3),
+                ..50.0 => (60e3, 0.0),
+                ..60.0 => (0.0, 0.0),
+                _ => (0.0, 60e3),
+            };
+            let forces = (Some(traction_n), Some(brake_n));
+            ResolvedSample {
+                traction_force_n: forces.0,
+                brake_force_n: forces.1,
+                speed_mps: 0.0,
+                time_ns: (second * 1e9).round() as i64,
+                ..coasting()
+            }
+        };
+        let made = recorded((0..1200).map(pulled).collect());
+        let true_mps = predict(&made, Restart::FullRun).speed_mps().to_vec();
+        let with = |gain: f64| {
+            let samples = (0..1200).map(|k| {
+                let sample = ResolvedSample { speed_mps: true_mps[k], ..pulled(k) };
+                let gain = if k >= 600 { gain } else { 1.0 };
+                let traction_force_n = sample.traction_force_n.map(|force| gain * force);
+                ResolvedSample { traction_force_n, ..sample }
+            });
+            recorded(samples.collect())
+        };
+        let wrong = with(1.1);
+        let runs = stop_runs(&wrong);
+        assert_eq!(runs.len(), 2, "{runs:?}");
+        for run in &runs {
+            assert!(true_mps[run.start] <= 0.3 && true_mps[run.start + 1] > 0.3);
+            assert!(true_mps[run.end - 1] <= 0.3 && true_mps[run.end - 2] > 0.3);
+        }
+        let prediction = predict(&wrong, Restart::AtDepartures);
+        let error = |run| SpeedError::within(&wrong, &prediction, run).rmse_mps().unwrap();
+        let errors_mps: Vec<f64> = runs.into_iter().map(error).collect();
+        assert!(errors_mps[0] < 0.01 && errors_mps[1] > 0.3, "{errors_mps:?}");
+        // A run that starts in motion or ends in it is none, nor is one with a gap of the forces.
+        let mut gap: Vec<_> = with(1.0).samples().to_vec();
+        for sample in &mut gap[150..180] {
+            sample.traction_force_n = None;
+        }
+        assert_eq!(stop_runs(&recorded(gap)).len(), 1);
+        assert_eq!(stop_runs(&recorded(with(1.0).samples()[150..600].to_vec())), Vec::new());
+    }
 
     #[test]
     fn the_median_is_of_all_runs_from_stop_to_stop_and_lies_in_its_interval() {

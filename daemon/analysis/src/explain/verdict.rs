@@ -10,16 +10,14 @@ use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location, Meaning,
     PlaceUncertainty, Verdict,
 };
+use super::caveats::told_by_data;
 use super::caveats::{caveats, trimmed};
-use super::competing::{
-    CompetingHypotheses, competing_hypotheses, is_in, kinds_of, separating_run,
-};
+use super::competing::runners_up;
+use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, separating_run};
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
 use super::identifiability::identifiability;
-use super::informed::told_by_data;
-use super::runners_up::runners_up;
 use super::score::{self, Score};
 use super::selection::{
     Deviations, Outcome, Search, deciding_score, discounted, few_runs_factor, penalty,
@@ -44,7 +42,7 @@ pub fn answer(
     let (fit, std) = (&outcome.fit, &deviations.std);
     let effects = effect_answers(search, outcome, known, deviations);
     // What has no name has no competing hypotheses either.
-    let is_unknown = is_in(fit, EffectKind::Unknown);
+    let is_unknown = fit.model.has(EffectKind::Unknown);
     let competing = if is_unknown { Vec::new() } else { competing_hypotheses(outcome) };
     let left = Unexplained::of(search, outcome);
     let verdict = verdict(search, outcome, &competing, left.as_ref());
@@ -53,18 +51,13 @@ pub fn answer(
     let [rmse_before, rmse_after] = score.holdout_rmse_mps();
     let pair = |errors: [SpeedError; 2]| Some([errors[0].rmse_mps()?, errors[1].rmse_mps()?]);
     let left = left.as_ref();
-    let Words { verdict_words, caveats, experiment } = match impossible(&diagnostics) {
-        Some(words) => words,
-        None => {
-            let (verdict_words, experiment) =
-                statement(search, outcome, verdict, &effects, &competing, left);
-            let caveats = if is_enough {
-                caveats(search, outcome, &effects, score, std, &identifiability)
-            } else {
-                Vec::new()
-            };
-            Words { verdict_words, caveats, experiment }
-        }
+    let words = impossible(&diagnostics);
+    let is_told = words.is_none() && is_enough;
+    let (verdict_words, experiment) =
+        words.unwrap_or_else(|| statement(search, outcome, verdict, &effects, &competing, left));
+    let caveats = match is_told {
+        true => caveats(search, outcome, &effects, score, std, &identifiability),
+        false => Vec::new(),
     };
     ExplainAnswer {
         verdict,
@@ -101,22 +94,16 @@ pub fn answer(
     }
 }
 
-/// What the verdict is in words.
-struct Words {
-    verdict_words: String,
-    caveats: Vec<String>,
-    experiment: Option<String>,
-}
+/// The verdict in words, and what to do.
+type Words = (String, Option<String>);
 
 /// The words where the data cannot be true.
 fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
     let fundamental = diagnostics.iter().filter(|it| it.severity == Severity::Fundamental);
     let faults: Vec<String> = fundamental.map(ToString::to_string).collect();
-    (!faults.is_empty()).then(|| Words {
-        verdict_words: format!("The data cannot be true as described: {}", faults.join("; ")),
-        caveats: Vec::new(),
-        experiment: Some("Set right what is named and run this again.".into()),
-    })
+    let words = || format!("The data cannot be true as described: {}", faults.join("; "));
+    let to_do = "Set right what is named and run this again.";
+    (!faults.is_empty()).then(|| (words(), Some(to_do.into())))
 }
 
 /// Why nothing was scored, and what is known instead; `None` when something was.
@@ -219,9 +206,9 @@ fn verdict(
         let is_left = left.is_some_and(|left| !left.refused.is_empty());
         return if is_left { Verdict::Unknown } else { Verdict::None };
     }
-    if is_in(&outcome.fit, EffectKind::Unknown) {
+    if outcome.fit.model.has(EffectKind::Unknown) {
         let total = outcome.base.cost - outcome.fit.cost;
-        let index = effects.iter().position(|effect| effect.kind() == EffectKind::Unknown);
+        let index = outcome.fit.model.position(EffectKind::Unknown);
         let without = index.map(|index| search.without(&outcome.fit, index));
         let library = without.map_or(0.0, |fit| outcome.base.cost - fit.cost);
         if library < LIBRARY_SHARE_MIN * total {
@@ -236,7 +223,7 @@ fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Consi
     if let Some(last) = outcome.rounds.last() {
         for trial in last.iter() {
             let fallen = outcome.fallen.iter().find(|(kind, _)| *kind == trial.kind);
-            let reason = if is_in(&outcome.fit, trial.kind) {
+            let reason = if outcome.fit.model.has(trial.kind) {
                 "found".into()
             } else if let Some((_, refusal)) = fallen {
                 format!("found, but beside the usual errors: {refusal}")
@@ -272,7 +259,7 @@ fn statement(
     effects: &[EffectAnswer],
     competing: &[CompetingHypotheses],
     left: Option<&Unexplained>,
-) -> (String, Option<String>) {
+) -> Words {
     let described: Vec<String> = effects.iter().map(describe).collect();
     let described = described.join("; ");
     let undetermined = left.map(Unexplained::undetermined).unwrap_or_default();
@@ -302,7 +289,7 @@ fn statement(
         }
         Verdict::Effect => (format!("Found: {described}.{undetermined}"), None),
         Verdict::Unknown => {
-            let text = if is_in(&outcome.fit, EffectKind::Unknown) {
+            let text = if outcome.fit.model.has(EffectKind::Unknown) {
                 format!(
                     "The residual is real, but no effect of the library explains it; it lives \
                      here: {described}.{undetermined}"

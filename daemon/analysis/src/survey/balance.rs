@@ -8,8 +8,8 @@
 //! acceleration weighted by a triangle over both, and so are the forces.
 
 use super::chainage::Chained;
-use super::quantile::middle;
 use super::recording::RawRecording;
+use crate::statistics::middle;
 
 /// Below this speed in m/s holding brakes and stiction act.
 const MOVING_MPS: f64 = 0.8;

@@ -1,8 +1,8 @@
 //! Whether both directions take one track, and which.
 
 use super::alignment::Alignment;
-use super::quantile::share_of;
 use super::recording_parts::SAME_ALIGNMENT_M;
+use crate::statistics::share_of;
 
 /// Both directions take the same way when so much of what both drive lies within `SAME_TRACK_M`.
 const SAME_TRACK_SHARE: f64 = 0.97;

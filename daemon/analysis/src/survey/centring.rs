@@ -5,6 +5,7 @@ use super::banded::Banded;
 use super::recording::Recording;
 use super::silence::GAP_MAX_M;
 use super::tracking::{Placed, follow};
+use crate::statistics::median;
 
 /// Standard deviation in m of a fix, which fades slowly.
 pub const FIX_STD_M: f64 = 4.0;
@@ -92,26 +93,13 @@ fn moved(alignment: &Alignment, placed: &[Vec<Placed>], speed_mps: f64) -> Optio
         .enumerate()
         .map(|(node, lefts)| {
             let [x, y] = alignment.direction(node as f64 * alignment.step_m());
-            let middle_m = middle(lefts)?;
+            let middle_m = median(lefts)?;
             let at = alignment.nodes_m()[node];
             Some(([at[0] - middle_m * y, at[1] + middle_m * x], lefts.len() as f64))
         })
         .collect();
     let kept_share = (-alignment.step_m() / (FIX_FADING_S * speed_mps)).exp();
     Alignment::through(&smoothed(&targets, alignment.nodes_m(), kept_share)?)
-}
-
-/// Median of three or more, mean of fewer.
-fn middle(values: &mut [f64]) -> Option<f64> {
-    match values.len() {
-        0 => None,
-        1 | 2 => Some(values.iter().sum::<f64>() / values.len() as f64),
-        count => {
-            values.sort_unstable_by(f64::total_cmp);
-            let (low, high) = (values[(count - 1) / 2], values[count / 2]);
-            Some(0.5 * (low + high))
-        }
-    }
 }
 
 /// Nodes that bend little and differ from their targets by an error that fades along the alignment by

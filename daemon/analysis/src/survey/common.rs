@@ -36,11 +36,6 @@ impl Common {
     pub fn passenger_kg(&self) -> f64 {
         self.0[5]
     }
-
-    /// Moves by a step.
-    pub fn add(&mut self, step: &Common) {
-        self.0 += step.0;
-    }
 }
 
 /// What is declared of a vehicle, and how far it is trusted.

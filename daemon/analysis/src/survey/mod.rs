@@ -10,8 +10,8 @@
 //! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
 //! - `recording_parts`, [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`mod@line`]: the line that
 //!   is driven repeatedly
-//! - [`chainage`]: a chainage for every row; [`stops`], [`curves`]: what it shows
-//! - [`balance`], [`common`], [`profile`], [`friction`], [`learn`]: gradient, resistance, mass,
+//! - [`chainage`]: a chainage for every row; [`stops`]: what it shows
+//! - [`balance`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
 //!   `normal`, [`banded`]: its equations and their solver
 //! - [`survey()`]: all of it in turn
@@ -23,15 +23,12 @@ mod both_directions;
 mod centring;
 pub mod chainage;
 pub mod common;
-pub mod curves;
-pub mod friction;
 pub mod geodesy;
 pub mod layout;
 pub mod learn;
 pub mod line;
 mod normal;
 pub mod profile;
-pub mod quantile;
 pub mod recording;
 mod recording_parts;
 mod silence;

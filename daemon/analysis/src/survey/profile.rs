@@ -12,7 +12,7 @@ use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
 use super::layout::{Course, HEIGHT_STEP_M, Layout};
 use super::normal::Normal;
-use super::quantile::middle;
+use crate::statistics::middle;
 
 /// Standard deviation in m of a row of GNSS altitude: far more than it errs, since its errors
 /// last for minutes.
@@ -179,7 +179,7 @@ impl Evidence {
         for (height, change) in state.heights_m.iter_mut().zip(&step.heights_m) {
             *height += change;
         }
-        state.common.add(&step.common);
+        state.common.0 += step.common.0;
         state.common_std = step.common_std();
         if wants_std {
             state.gradient_var = self.layout.gradient_variances(&step);

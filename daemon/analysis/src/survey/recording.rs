@@ -1,7 +1,7 @@
 //! A raw recording, and what is computed from it once.
 
 use super::geodesy::{LocalPlane, between};
-use super::quantile::middle;
+use crate::statistics::middle;
 
 /// Fixes closer in time than this many s say the same: their errors fade over seconds.
 const FIX_STEP_MIN_S: f64 = 0.95;

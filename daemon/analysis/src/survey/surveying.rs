@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
+use super::alignment::{FoundCurve, curves, turning_rad};
 use super::balance::{Observation, observations};
 use super::banded::NotPositive;
 use super::chainage::WheelsAndLag;
 use super::common::Prior;
-use super::curves::{FoundCurve, curves, turning_rad};
-use super::friction::acting_from_pa;
 use super::geodesy::LocalPlane;
 use super::layout::{Course, Layout};
+use super::learn::acting_from_pa;
 use super::learn::{Learned, learn};
 use super::line::{Alignments, find, pass_of};
 use super::profile::{Altitude, Evidence, is_one_of_few};
@@ -17,6 +17,7 @@ use super::recording::{RawRecording, Recording, plane_of};
 use super::recording_parts::{RecordingPart, recording_parts};
 use super::stops::{Stop, stands, stops};
 use super::trips::{NotUsed, Trip, not_used, trips};
+use crate::statistics::rms;
 
 /// Lateral uncertainty in m of an alignment: what the wheels roll differs from it by so much times the
 /// turning.
@@ -237,7 +238,8 @@ fn profile(
     if evidence.observations.is_empty() {
         return Err(SurveyError::NoForces);
     }
-    evidence.prior.speed_mps = typical_speed(&evidence.observations);
+    let speeds_mps: Vec<f64> = evidence.observations.iter().map(|it| it.speed_mps).collect();
+    evidence.prior.speed_mps = rms(&speeds_mps);
     let learned = learn(&mut evidence, released_pa)?;
     Ok(SurveyedProfile { learned, curves, trips: fit })
 }
@@ -268,11 +270,6 @@ fn course(direction: i8, alignments: &Alignments) -> Course {
         (_, true) => Course { block: 0, against_from_m: Some(alignments.growing.length_m()) },
         (_, false) => Course { block: 1, against_from_m: None },
     }
-}
-
-fn typical_speed(observations: &[Observation]) -> f64 {
-    let squares: f64 = observations.iter().map(|it| it.speed_mps * it.speed_mps).sum();
-    (squares / observations.len() as f64).sqrt()
 }
 
 /// Mean curvature in 1/m along a vehicle.

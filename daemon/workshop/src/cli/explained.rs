@@ -5,8 +5,8 @@ use dynocar_analysis::explain::answer::{
     Considered, EffectAnswer, ExplainAnswer, RunnerUp, Verdict,
 };
 use dynocar_analysis::explain::described::precision;
-use dynocar_analysis::explain::judged::Metric;
 use dynocar_analysis::explain::report::{effect as effect_words, words};
+use dynocar_analysis::explain::stop_to_stop::Metric;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 

@@ -1,8 +1,8 @@
 //! The result of a survey for machines.
 
 use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::statistics::middle;
 use dynocar_analysis::survey::chainage::Estimate;
-use dynocar_analysis::survey::quantile::middle;
 use dynocar_analysis::survey::stops::Stop;
 use dynocar_analysis::survey::{NotUsed, Survey, Trip, Vehicle};
 use serde::Serialize;

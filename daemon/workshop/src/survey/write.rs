@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use dynocar_analysis::dataset::DatasetFiles;
-use dynocar_analysis::survey::curves::FoundCurve;
+use dynocar_analysis::survey::alignment::FoundCurve;
 use dynocar_analysis::survey::layout::HEIGHT_STEP_M;
 use dynocar_analysis::survey::stops::Stop;
 use dynocar_analysis::survey::{Survey, SurveyedProfile};

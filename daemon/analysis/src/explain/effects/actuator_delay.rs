@@ -1,12 +1,11 @@
 //! Forces that act later than reported: a dead time, then a first-order lag.
 
 use dynocar_model::terms::delay;
-use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::proposal::{late_by_sampling_s, late_from, late_reported};
-use super::{Candidate, Effect, Hypothesis, Past, Proposal, ReportContext, Reported, Turn};
-use crate::explain::evidence::{RunData, SampleForces};
+use super::lateness::{late_by_sampling_s, late_forces, late_from, late_reported};
+use super::{Candidate, Hypothesis, Nature, On, Proposal, ReportContext, Reported, Turn};
+use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
 /// Where positions are integrated from the speed, they are late with it; where nothing of the line is felt,
@@ -15,27 +14,19 @@ const NEVER_REPORTED: [EffectKind; 1] = [EffectKind::SpeedDelay];
 /// Delay and lag in s that a fit may start from.
 const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
 
-/// The kind.
-pub struct ActuatorDelay;
-
 #[derive(Debug, Default)]
 struct DelayAndLag {
     twins: &'static [EffectKind],
 }
 
-impl Effect for ActuatorDelay {
-    fn kind(&self) -> EffectKind {
-        EffectKind::ActuatorDelay
-    }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let start = late_from(&STARTS, |start| decrease(scan, start));
-        let is_any_recorded = scan.problem.runs.iter().any(|run| run.is_position_recorded);
-        let is_level = scan.track.is_none_or(|track| track.is_level());
-        let is_known = is_any_recorded && !is_level || scan.problem.is_position_ahead();
-        let twins: &[EffectKind] = if is_known { &[] } else { &NEVER_REPORTED };
-        Proposal::Candidates(vec![Candidate::new(DelayAndLag { twins }, start)])
-    }
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let start = late_from(&STARTS, |start| decrease(scan, start));
+    let is_any_recorded = scan.problem.runs.iter().any(|run| run.is_position_recorded);
+    let is_level = scan.track.is_none_or(|track| track.is_level());
+    let is_known = is_any_recorded && !is_level || scan.problem.is_position_ahead();
+    let twins: &[EffectKind] = if is_known { &[] } else { &NEVER_REPORTED };
+    Ok(vec![Candidate::new(DelayAndLag { twins }, start)])
 }
 
 /// Decrease of the cost when the forces act with this delay and lag.
@@ -47,12 +38,14 @@ fn decrease(scan: &Scan, start: [f64; 2]) -> f64 {
 }
 
 impl Hypothesis for DelayAndLag {
-    fn kind(&self) -> EffectKind {
-        EffectKind::ActuatorDelay
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &delay::PARAMETERS
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            keys: &[&delay::DELAY, &delay::LAG],
+            turn: Turn::First,
+            looks_back: true,
+            twins: self.twins,
+            ..Nature::of(EffectKind::ActuatorDelay, &delay::PARAMETERS)
+        }
     }
 
     fn sampling_error(&self, step_s: f64) -> f64 {
@@ -63,36 +56,8 @@ impl Hypothesis for DelayAndLag {
         parameters[0] + parameters[1] > delay::LEAST_S
     }
 
-    fn turn(&self) -> Turn {
-        Turn::First
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        self.apply_after(&mut Past::default(), parameters, run, first, forces);
-    }
-
-    fn looks_back(&self) -> bool {
-        true
-    }
-
-    fn apply_after(
-        &self,
-        past: &mut Past,
-        parameters: &[f64],
-        run: &RunData,
-        first: usize,
-        forces: &mut [SampleForces],
-    ) {
-        let line = past.forces([parameters[0], parameters[1]], first);
-        for (force, &at) in forces.iter_mut().zip(&run.stamps[first..]) {
-            if let Some(late) = line.acting(at, Some([force.traction_n, force.brake_n])) {
-                [force.traction_n, force.brake_n] = late;
-            }
-        }
-    }
-
-    fn twins(&self) -> &[EffectKind] {
-        self.twins
+    fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]) {
+        late_forces([parameters[0], parameters[1]], on, forces);
     }
 
     fn report(&self, context: &ReportContext) -> Reported {
@@ -100,12 +65,5 @@ impl Hypothesis for DelayAndLag {
         let together_s = context.parameters.iter().sum();
         reported.push(delay::TOGETHER, together_s, context.deviation_of_sum());
         reported
-    }
-
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
-        Some(vec![
-            Entry::Number(&delay::DELAY, parameters[0]),
-            Entry::Number(&delay::LAG, parameters[1]),
-        ])
     }
 }

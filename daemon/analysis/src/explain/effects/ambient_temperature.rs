@@ -1,18 +1,16 @@
 //! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Entry, Parameter, ambient};
+use dynocar_model::terms::{Entry, ambient};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
+use super::{Candidate, Hypothesis, Nature, On, Proposal, ReportContext, Reported};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
+use crate::statistics::span;
 
 /// Mean temperatures of the runs must differ by so many K.
 const SPREAD_MIN_K: f64 = 4.0;
-
-/// The kind.
-pub struct AmbientTemperature;
 
 #[derive(Debug)]
 struct Linear;
@@ -27,56 +25,30 @@ fn mean_degc(run: &RunData) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-impl Effect for AmbientTemperature {
-    fn kind(&self) -> EffectKind {
-        EffectKind::AmbientTemperature
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let means: Option<Vec<f64>> = scan.problem.runs.iter().map(mean_degc).collect();
+    let Some(means) = means else {
+        return Err("ambient_temperature is not recorded in every run".into());
+    };
+    let spread_k = span(means.into_iter()).map_or(0.0, |[low, high]| high - low);
+    if spread_k < SPREAD_MIN_K {
+        return Err(format!("the runs' outside temperatures differ by {spread_k:.1} K only"));
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let means: Option<Vec<f64>> = scan.problem.runs.iter().map(mean_degc).collect();
-        let Some(means) = means else {
-            return Proposal::NotTestable(
-                "ambient_temperature is not recorded in every run".into(),
-            );
-        };
-        let low = means.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if high - low < SPREAD_MIN_K {
-            let spread = high - low;
-            return Proposal::NotTestable(format!(
-                "the runs' outside temperatures differ by {spread:.1} K only"
-            ));
-        }
-        Proposal::Candidates(vec![Candidate::new(Linear, vec![0.0])])
-    }
-
-    fn whole(&self, scan: &Scan) -> Option<Candidate> {
-        self.propose(scan).first()
-    }
+    Ok(vec![Candidate::new(Linear, vec![0.0])])
 }
 
 impl Hypothesis for Linear {
-    fn kind(&self) -> EffectKind {
-        EffectKind::AmbientTemperature
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            least: Some(ambient::LEAST_PER_K),
+            is_one_number_a_run: true,
+            affine_in: Some(|value| value),
+            ..Nature::of(EffectKind::AmbientTemperature, &ambient::PARAMETERS)
+        }
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        &ambient::PARAMETERS
-    }
-
-    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        parameters[0].abs() > ambient::LEAST_PER_K
-    }
-
-    fn is_one_number_a_run(&self) -> bool {
-        true
-    }
-
-    fn affine_in(&self) -> Option<fn(f64) -> f64> {
-        Some(|value| value)
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         for (force, degc) in forces.iter_mut().zip(run.known(Covariate::Temperature, first)) {
             ambient::act(parameters[0], ambient::REFERENCE_K, degc, &mut force.resistance);
         }

@@ -1,58 +1,46 @@
 //! Cold bearings that warm up.
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Entry, Parameter, Resistance, bearings};
+use dynocar_model::terms::{Resistance, bearings};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal};
+use super::{Candidate, Handling, Hypothesis, Nature, On, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
-
-/// The kind.
-pub struct BearingTemperature;
 
 #[derive(Debug)]
 struct Warming;
 
-impl Effect for BearingTemperature {
-    fn kind(&self) -> EffectKind {
-        EffectKind::BearingTemperature
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let longest_s = scan.problem.runs.iter().map(RunData::duration_s).fold(0.0, f64::max);
+    if longest_s < 240.0 {
+        return Err("runs are too short for bearings to warm up".into());
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let longest_s = scan.problem.runs.iter().map(RunData::duration_s).fold(0.0, f64::max);
-        if longest_s < 240.0 {
-            return Proposal::NotTestable("runs are too short for bearings to warm up".into());
-        }
-        let best = [80.0, 160.0, 300.0, 600.0, 1200.0]
-            .into_iter()
-            .map(|tau_s| {
-                let tuple = scan.tuple(|run, i| {
-                    let sample = &run.samples()[i];
-                    let mut cold = Resistance::BASIC;
-                    bearings::act(1.0, tau_s, sample.since_cold_s, &mut cold);
-                    -cold.bearing_n_per_kn * scan.per_unit_resistance_mps2(sample)
-                });
-                let (gain, estimate) = scan.gain(&tuple);
-                (if estimate > 0.0 { gain } else { 0.0 }, estimate, tau_s)
-            })
-            .max_by(|one, other| one.0.total_cmp(&other.0));
-        let Some((_, delta, tau_s)) = best else { return Proposal::Candidates(Vec::new()) };
-        Proposal::Candidates(vec![Candidate::new(Warming, vec![delta.clamp(0.05, 10.0), tau_s])])
-    }
+    let best = [80.0, 160.0, 300.0, 600.0, 1200.0]
+        .into_iter()
+        .map(|tau_s| {
+            let tuple = scan.tuple(|run, i| {
+                let sample = &run.samples()[i];
+                let mut cold = Resistance::BASIC;
+                bearings::act(1.0, tau_s, sample.since_cold_s, &mut cold);
+                -cold.bearing_n_per_kn * scan.per_unit_resistance_mps2(sample)
+            });
+            let (gain, estimate) = scan.gain(&tuple);
+            (if estimate > 0.0 { gain } else { 0.0 }, estimate, tau_s)
+        })
+        .max_by(|one, other| one.0.total_cmp(&other.0));
+    let Some((_, delta, tau_s)) = best else { return Ok(Vec::new()) };
+    Ok(vec![Candidate::new(Warming, vec![delta.clamp(0.05, 10.0), tau_s])])
 }
 
 impl Hypothesis for Warming {
-    fn kind(&self) -> EffectKind {
-        EffectKind::BearingTemperature
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &bearings::PARAMETERS
-    }
-
-    fn only_resists(&self) -> bool {
-        true
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            keys: &[&bearings::DELTA_A, &bearings::TAU],
+            handling: Handling::Added,
+            ..Nature::of(EffectKind::BearingTemperature, &bearings::PARAMETERS)
+        }
     }
 
     fn unit_n_per_kn(&self, others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
@@ -65,17 +53,10 @@ impl Hypothesis for Warming {
         }));
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let since_cold_s = &run.covariate(Covariate::TimeSinceStart)[first..];
         for (force, &since_cold_s) in forces.iter_mut().zip(since_cold_s) {
             bearings::act(parameters[0], parameters[1], since_cold_s, &mut force.resistance);
         }
-    }
-
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
-        Some(vec![
-            Entry::Number(&bearings::DELTA_A, parameters[0]),
-            Entry::Number(&bearings::TAU, parameters[1]),
-        ])
     }
 }

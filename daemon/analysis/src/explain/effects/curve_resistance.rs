@@ -1,16 +1,13 @@
 //! Curve resistance k/R in N/kN with another k than declared (Röckl, Schmidt; declared k = 600).
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_model::terms::{Entry, Parameter, curve};
+use dynocar_model::terms::curve;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal};
+use super::{Candidate, Handling, Hypothesis, Nature, On, Proposal};
 use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
-
-/// The kind.
-pub struct CurveResistance;
 
 #[derive(Debug)]
 struct Curves {
@@ -18,52 +15,29 @@ struct Curves {
     intervals_m: Vec<[f64; 2]>,
 }
 
-impl Effect for CurveResistance {
-    fn kind(&self) -> EffectKind {
-        EffectKind::CurveResistance
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let in_curve_s = scan
+        .seconds_where(|_, sample| sample.curvature_per_m.is_some_and(|curvature| curvature > 0.0));
+    if in_curve_s < 20.0 {
+        return Err("no curves known on the way".into());
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let in_curve_s = scan.seconds_where(|_, sample| {
-            sample.curvature_per_m.is_some_and(|curvature| curvature > 0.0)
-        });
-        if in_curve_s < 20.0 {
-            return Proposal::NotTestable("no curves known on the way".into());
-        }
-        let declared_k = scan.train.curve_constant_n_per_kn_m;
-        let intervals_m = scan.track.map_or_else(Vec::new, |track| {
-            track.curves().iter().map(|curve| [curve.start_m, curve.end_m]).collect()
-        });
-        Proposal::Candidates(vec![Candidate::new(
-            Curves { declared_k, intervals_m },
-            vec![declared_k],
-        )])
-    }
-
-    fn whole(&self, scan: &Scan) -> Option<Candidate> {
-        self.propose(scan).first()
-    }
+    let declared_k = scan.train.curve_constant_n_per_kn_m;
+    let intervals_m = scan.track.map_or_else(Vec::new, |track| {
+        track.curves().iter().map(|curve| [curve.start_m, curve.end_m]).collect()
+    });
+    Ok(vec![Candidate::new(Curves { declared_k, intervals_m }, vec![declared_k])])
 }
 
 impl Hypothesis for Curves {
-    fn kind(&self) -> EffectKind {
-        EffectKind::CurveResistance
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &curve::PARAMETERS
-    }
-
-    fn none(&self) -> f64 {
-        self.declared_k
-    }
-
-    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        (parameters[0] - self.declared_k).abs() > curve::LEAST_N_PER_KN_M
-    }
-
-    fn only_resists(&self) -> bool {
-        true
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            keys: &[&curve::CONSTANT],
+            none: self.declared_k,
+            least: Some(curve::LEAST_N_PER_KN_M),
+            handling: Handling::Added,
+            ..Nature::of(EffectKind::CurveResistance, &curve::PARAMETERS)
+        }
     }
 
     fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
@@ -72,14 +46,10 @@ impl Hypothesis for Curves {
         n_per_kn.extend(run.samples().iter().map(of_one));
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         for (force, sample) in forces.iter_mut().zip(&run.samples()[first..]) {
             curve::act(parameters[0], sample.curvature_per_m, &mut force.resistance);
         }
-    }
-
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
-        Some(vec![Entry::Number(&curve::CONSTANT, parameters[0])])
     }
 
     fn place(&self) -> Location {

@@ -17,12 +17,13 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::unknown::leaves_a_force;
-use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
+use super::{Candidate, Handling, Hypothesis, Nature, On, Proposal, ReportContext, Reported};
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::gradient_prior::{ErrorScale, MAP, UNSURVEYED};
 use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};
 use crate::explain::scan::Scan;
+use crate::statistics::rms;
 
 /// Nodes in the length over which the error changes.
 const NODES_A_LENGTH: f64 = 3.0;
@@ -31,9 +32,6 @@ const NODES_MIN: f64 = 4.0;
 const NODES_MAX: f64 = 160.0;
 /// What is tied to the line shows in so many runs.
 const RUNS_MIN: usize = 2;
-
-/// The kind.
-pub struct GradientError;
 
 #[derive(Debug)]
 struct Profile {
@@ -45,41 +43,35 @@ struct Profile {
     choice_cost: f64,
 }
 
-impl Effect for GradientError {
-    fn kind(&self) -> EffectKind {
-        EffectKind::GradientError
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let runs = &scan.problem.runs;
+    let span_m = span_m(scan).filter(|_| scan.problem.distance_ratio.is_some());
+    let Some(span_m) = span_m.filter(|[low, high]| high > low) else {
+        return Err("positions are not measured".into());
+    };
+    if runs.len() < RUNS_MIN {
+        return Err("one passage does not show what stays".into());
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let runs = &scan.problem.runs;
-        let span_m = span_m(scan).filter(|_| scan.problem.distance_ratio.is_some());
-        let Some(span_m) = span_m.filter(|[low, high]| high > low) else {
-            return Proposal::NotTestable("positions are not measured".into());
-        };
-        if runs.len() < RUNS_MIN {
-            return Proposal::NotTestable("one passage does not show what stays".into());
+    let is_one_way = runs.iter().all(|run| run.direction == runs[0].direction);
+    let mut profiles = vec![Profile::new(span_m, MAP, 1, is_one_way)];
+    let is_level = scan.track.is_none_or(|track| track.is_level());
+    if is_level && leaves_a_force(scan) {
+        let towards = |direction| runs.iter().filter(|run| run.direction == direction).count();
+        let may_part = towards(1.0).min(towards(-1.0)) >= RUNS_MIN;
+        let directions = if may_part { 1..=2 } else { 1..=1 };
+        for scale in UNSURVEYED {
+            let of = |directions| Profile::new(span_m, scale, directions, false);
+            profiles.extend(directions.clone().map(of).filter(|it| it.apart_m() <= scale.length_m));
         }
-        let is_one_way = runs.iter().all(|run| run.direction == runs[0].direction);
-        let mut profiles = vec![Profile::new(span_m, MAP, 1, is_one_way)];
-        let is_level = scan.track.is_none_or(|track| track.is_level());
-        if is_level && leaves_a_force(scan) {
-            let towards = |direction| runs.iter().filter(|run| run.direction == direction).count();
-            let may_part = towards(1.0).min(towards(-1.0)) >= RUNS_MIN;
-            let directions = if may_part { 1..=2 } else { 1..=1 };
-            for scale in UNSURVEYED {
-                let of = |directions| Profile::new(span_m, scale, directions, false);
-                profiles
-                    .extend(directions.clone().map(of).filter(|it| it.apart_m() <= scale.length_m));
-            }
-        }
-        let choice_cost = 2.0 * (profiles.len() as f64).ln();
-        let candidate = |mut profile: Profile| {
-            profile.choice_cost = choice_cost;
-            let start = vec![0.0; profile.parameters.len()];
-            Candidate::new(profile, start)
-        };
-        Proposal::Candidates(profiles.into_iter().map(candidate).collect())
     }
+    let choice_cost = 2.0 * (profiles.len() as f64).ln();
+    let candidate = |mut profile: Profile| {
+        profile.choice_cost = choice_cost;
+        let start = vec![0.0; profile.parameters.len()];
+        Candidate::new(profile, start)
+    };
+    Ok(profiles.into_iter().map(candidate).collect())
 }
 
 /// The map's own small error, at none: no effect, but what the finished model is fitted beside.
@@ -106,11 +98,6 @@ fn prior_information(
         1 => -scale * rho,
         _ => 0.0,
     })
-}
-
-fn rms(values: &[f64]) -> f64 {
-    let squares: f64 = values.iter().map(|value| value * value).sum();
-    (squares / values.len() as f64).sqrt()
 }
 
 impl Profile {
@@ -161,36 +148,20 @@ impl Profile {
 }
 
 impl Hypothesis for Profile {
-    fn kind(&self) -> EffectKind {
-        EffectKind::GradientError
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            least: Some(gradient::ERROR_LEAST_PERMILLE),
+            prior: Some(&self.information),
+            choice_cost: self.choice_cost,
+            shared_error: MAP_ERROR_PERMILLE,
+            handling: Handling::Gradient,
+            twins: if self.is_one_way { &[EffectKind::LocalResistance] } else { &[] },
+            ..Nature::of(EffectKind::GradientError, &self.parameters)
+        }
     }
 
     fn size(&self, parameters: &[f64]) -> f64 {
         rms(parameters)
-    }
-
-    fn prior_information(&self) -> Option<&DMatrix<f64>> {
-        Some(&self.information)
-    }
-
-    fn twins(&self) -> &[EffectKind] {
-        if self.is_one_way { &[EffectKind::LocalResistance] } else { &[] }
-    }
-
-    fn shared_error(&self) -> f64 {
-        MAP_ERROR_PERMILLE
-    }
-
-    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        rms(parameters) > gradient::ERROR_LEAST_PERMILLE
-    }
-
-    fn choice_cost(&self) -> f64 {
-        self.choice_cost
     }
 
     fn touches(&self, parameter: usize, run: &RunData) -> bool {
@@ -204,7 +175,7 @@ impl Hypothesis for Profile {
         run.span_m.is_some_and(|[low, high]| low <= to_m && from_m <= high)
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let Some(error) = self.error(parameters) else { return };
         let places = run.known(Covariate::Chainage, first).zip(&run.directions[first..]);
         for (force, (position_m, direction)) in forces.iter_mut().zip(places) {
@@ -213,10 +184,6 @@ impl Hypothesis for Profile {
                 gradient::err(&error, at, &mut force.gradient_permille);
             }
         }
-    }
-
-    fn is_gradient(&self) -> bool {
-        true
     }
 
     fn gradient_permille(&self, parameter: usize, run: &RunData, permille: &mut Vec<f64>) {

@@ -3,26 +3,19 @@
 use std::sync::Arc;
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Entry, Parameter, place};
+use dynocar_model::terms::{Entry, place};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
+use super::{Candidate, Handling, Hypothesis, Nature, On, Proposal, SharedHypothesis};
 use crate::explain::answer::{Location, RunWindow};
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::places::{End, Inside, Intervals, find};
+use crate::explain::places::{Inside, Site, find};
 use crate::explain::scan::Scan;
-
-/// The kind.
-pub struct LocalResistance;
 
 #[derive(Clone, Debug)]
 struct Local {
-    sections: Intervals,
+    site: Site,
     length_m: f64,
-    /// Files of the runs; `None` for all.
-    runs: Option<Vec<String>>,
-    choice_cost: f64,
-    map_error: f64,
     /// The only fit run, whose passage could as well be an interval of time.
     only: Option<Arc<Passage>>,
 }
@@ -55,41 +48,27 @@ impl Passage {
     }
 }
 
-impl Effect for LocalResistance {
-    fn kind(&self) -> EffectKind {
-        EffectKind::LocalResistance
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    if scan.problem.distance_ratio.is_none() {
+        return Err("positions are not measured".into());
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        if scan.problem.distance_ratio.is_none() {
-            return Proposal::NotTestable("positions are not measured".into());
-        }
-        let shape = |run: &RunData, i: usize| -scan.per_unit_resistance_mps2(&run.samples()[i]);
-        let inside = Inside::Share { length_m: scan.train.length_m };
-        let Some(found) = find(scan, &shape, inside, true) else {
-            return Proposal::Candidates(Vec::new());
-        };
-        let only = match &scan.problem.runs[..] {
-            [run] => Some(Arc::new(Passage::of(run))),
-            _ => None,
-        };
-        let candidate = |runs: Option<Vec<String>>| {
-            let hypothesis = Local {
-                sections: found.sections(),
-                length_m: scan.train.length_m,
-                runs,
-                choice_cost: found.choice_cost,
-                map_error: found.map_error,
-                only: only.clone(),
-            };
-            Candidate::new(hypothesis, vec![found.estimate])
-        };
-        let mut candidates = vec![candidate(found.files(scan))];
-        if found.runs.is_some() {
-            candidates.push(candidate(None));
-        }
-        Proposal::Candidates(candidates)
-    }
+    let shape = |run: &RunData, i: usize| -scan.per_unit_resistance_mps2(&run.samples()[i]);
+    let inside = Inside::Share { length_m: scan.train.length_m };
+    let Some(found) = find(scan, &shape, inside) else {
+        return Ok(Vec::new());
+    };
+    let only = match &scan.problem.runs[..] {
+        [run] => Some(Arc::new(Passage::of(run))),
+        _ => None,
+    };
+    let candidate = |site: Site| {
+        let hypothesis = Local { site, length_m: scan.train.length_m, only: only.clone() };
+        Candidate::new(hypothesis, vec![found.estimate])
+    };
+    let site = found.site(scan);
+    let everywhere = site.runs.is_some().then(|| Site { runs: None, ..site.clone() });
+    Ok([site].into_iter().chain(everywhere).map(candidate).collect())
 }
 
 impl Local {
@@ -102,10 +81,10 @@ impl Local {
         of_samples: &mut [T],
         act: impl Fn(&mut T, f64),
     ) {
-        if self.runs.as_ref().is_some_and(|runs| !runs.contains(&run.file)) {
+        if !self.site.is_in(run) {
             return;
         }
-        let Ok(profile) = place::profile(&self.sections.intervals_m, n_per_kn) else { return };
+        let Ok(profile) = place::profile(self.site.intervals_m(), n_per_kn) else { return };
         for (own, position_m) in of_samples.iter_mut().zip(run.known(Covariate::Chainage, first)) {
             if let Some(position_m) = position_m {
                 act(own, profile.mean_around(position_m, self.length_m));
@@ -115,24 +94,16 @@ impl Local {
 }
 
 impl Hypothesis for Local {
-    fn kind(&self) -> EffectKind {
-        EffectKind::LocalResistance
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &place::PARAMETERS
-    }
-
-    fn choice_cost(&self) -> f64 {
-        self.choice_cost
-    }
-
-    fn shared_error(&self) -> f64 {
-        self.map_error
-    }
-
-    fn only_resists(&self) -> bool {
-        true
+    fn nature(&self) -> Nature<'_> {
+        let twins: &[EffectKind] =
+            if self.only.is_some() { &[EffectKind::DraggingBrake] } else { &[] };
+        Nature {
+            choice_cost: self.site.choice_cost,
+            shared_error: self.site.map_error,
+            handling: Handling::Added,
+            twins,
+            ..Nature::of(EffectKind::LocalResistance, &place::PARAMETERS)
+        }
     }
 
     fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
@@ -141,7 +112,7 @@ impl Hypothesis for Local {
         self.each(1.0, run, 0, n_per_kn, |own, extra_n_per_kn| *own = extra_n_per_kn);
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         self.each(parameters[0], run, first, forces, |force, extra_n_per_kn| {
             place::act(extra_n_per_kn, &mut force.resistance);
         });
@@ -149,37 +120,24 @@ impl Hypothesis for Local {
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
         let row = |&[from_m, to_m]: &[f64; 2]| vec![from_m, to_m, parameters[0]];
-        let rows = self.sections.intervals_m.iter().map(row).collect();
-        self.runs.is_none().then(|| vec![Entry::Rows(place::LIST, rows)])
+        let rows = self.site.intervals_m().iter().map(row).collect();
+        self.site.runs.is_none().then(|| vec![Entry::Rows(place::LIST, rows)])
     }
 
-    fn ends(&self) -> Vec<End> {
-        self.sections.ends()
+    fn site(&self) -> Option<&Site> {
+        Some(&self.site)
     }
 
-    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
-        Some(Arc::new(Local { sections: self.sections.moved(end, at)?, ..self.clone() }))
-    }
-
-    fn chosen_runs(&self) -> Option<&[String]> {
-        self.runs.as_deref()
-    }
-
-    fn with_runs(&self, runs: Vec<String>) -> Option<SharedHypothesis> {
-        Some(Arc::new(Local { runs: Some(runs), ..self.clone() }))
-    }
-
-    fn twins(&self) -> &[EffectKind] {
-        if self.only.is_some() { &[EffectKind::DraggingBrake] } else { &[] }
+    fn at_site(&self, site: Site) -> Option<SharedHypothesis> {
+        Some(Arc::new(Local { site, ..self.clone() }))
     }
 
     fn is_event(&self) -> bool {
-        self.runs.is_some()
+        self.site.runs.is_some()
     }
 
     fn place(&self) -> Location {
-        let intervals_m = &self.sections.intervals_m;
-        let windows = self.only.as_ref().map(|only| only.windows(intervals_m));
-        Location { runs: self.runs.clone(), windows, ..Location::of_intervals(intervals_m.clone()) }
+        let windows = self.only.as_ref().map(|only| only.windows(self.site.intervals_m()));
+        Location { windows, ..self.site.place() }
     }
 }

@@ -14,9 +14,9 @@ mod curve_resistance;
 mod dragging_brake;
 mod gradient_error;
 mod gradient_shift;
+mod lateness;
 mod local_resistance;
 mod low_adhesion;
-mod map_error;
 mod mass_change;
 mod proposal;
 mod rotating_mass;
@@ -28,35 +28,38 @@ mod usual_errors;
 mod wheel_diameter;
 mod wind;
 
+use EffectKind::*;
+use dynocar_shared::vocabulary::EffectKind;
+
 pub use super::hypothesis::{
-    AtBound, Hypothesis, OnOthers, Past, ReportContext, Reported, SharedHypothesis, Turn,
+    AtBound, Handling, Hypothesis, Nature, On, OnOthers, Past, ReportContext, Reported,
+    SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
-pub use map_error::map_error_as_fitted;
-pub use proposal::{Candidate, Effect, Proposal};
-pub use usual_errors::usual_errors;
+pub use proposal::{Candidate, Effect, Proposal, Whole};
+pub use usual_errors::{map_error_as_fitted, usual_errors};
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
-pub const LIBRARY: &[&dyn Effect] = &[
-    &actuator_delay::ActuatorDelay,
-    &speed_delay::SpeedDelay,
-    &wheel_diameter::WheelDiameter,
-    &traction_gain::TractionGain,
-    &mass_change::MassChange,
-    &rotating_mass::RotatingMass,
-    &gradient_shift::GradientShift,
-    &gradient_error::GradientError,
-    &curve_resistance::CurveResistance,
-    &tunnel_drag::TunnelDrag,
-    &local_resistance::LocalResistance,
-    &wind::Wind,
-    &ambient_temperature::AmbientTemperature,
-    &bearing_temperature::BearingTemperature,
-    &dragging_brake::DraggingBrake,
-    &low_adhesion::LowAdhesion,
-    &unknown::Bands,
+pub const LIBRARY: &[Effect] = &[
+    Effect::new(ActuatorDelay, actuator_delay::propose, Whole::None),
+    Effect::new(SpeedDelay, speed_delay::propose, Whole::None),
+    Effect::new(WheelDiameter, wheel_diameter::propose, Whole::First),
+    Effect::new(TractionGain, traction_gain::propose, Whole::First),
+    Effect::new(MassChange, mass_change::propose, Whole::Of(mass_change::everywhere)),
+    Effect::new(RotatingMass, rotating_mass::propose, Whole::First),
+    Effect::new(GradientShift, gradient_shift::propose, Whole::Of(gradient_shift::whole)),
+    Effect::new(GradientError, gradient_error::propose, Whole::None),
+    Effect::new(CurveResistance, curve_resistance::propose, Whole::First),
+    Effect::new(TunnelDrag, tunnel_drag::propose, Whole::Of(tunnel_drag::whole)),
+    Effect::new(LocalResistance, local_resistance::propose, Whole::None),
+    Effect::new(Wind, wind::propose, Whole::First),
+    Effect::new(AmbientTemperature, ambient_temperature::propose, Whole::First),
+    Effect::new(BearingTemperature, bearing_temperature::propose, Whole::None),
+    Effect::new(DraggingBrake, dragging_brake::propose, Whole::None),
+    Effect::new(LowAdhesion, low_adhesion::propose, Whole::None),
+    Effect::new(Unknown, unknown::propose_bands, Whole::None),
 ];
 /// What is in no library, by its form: tried where the library leaves a force.
-pub const UNKNOWN: &dyn Effect = &unknown::Forms;
-pub use unknown::{OUTSIDE_COST, a_form_explains_more, leaves_a_force};
+pub const UNKNOWN: &Effect = &Effect::new(Unknown, unknown::propose_forms, Whole::None);
+pub use unknown::{a_form_explains_more, leaves_a_force};

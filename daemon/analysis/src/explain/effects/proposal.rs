@@ -2,11 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_model::terms::Parameter;
-use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use crate::explain::hypothesis::{Hypothesis, ReportContext, Reported, SharedHypothesis};
+use crate::explain::hypothesis::{Handling, Hypothesis, SharedHypothesis};
 use crate::explain::scan::Scan;
 
 /// A hypothesis with values to start the fit from.
@@ -32,13 +30,17 @@ impl Candidate {
 
     /// Whether its structure is the only one, whatever is left to explain.
     pub fn is_fixed(&self) -> bool {
-        !self.is_chosen_among_many() && self.hypothesis.choice_cost() == 0.0
+        !self.is_chosen_among_many() && self.hypothesis.nature().choice_cost == 0.0
     }
 
     /// The structure, and no effect where a fit comes to its values in one step: it is linear in them.
     pub fn from_none(self) -> (SharedHypothesis, Vec<f64>) {
         let effect = &self.hypothesis;
-        let is_linear = effect.is_gradient() || effect.only_resists() && self.start.len() == 1;
+        let is_linear = match effect.nature().handling {
+            Handling::Gradient => true,
+            Handling::Added => self.start.len() == 1,
+            Handling::Together => false,
+        };
         let start = if is_linear { vec![effect.none(); self.start.len()] } else { self.start };
         (self.hypothesis, start)
     }
@@ -49,100 +51,45 @@ impl Candidate {
     }
 }
 
-/// What a kind makes of the data.
-#[derive(Clone, Debug)]
-pub enum Proposal {
-    /// Structures worth a fit.
-    Candidates(Vec<Candidate>),
-    /// The data do not allow to test it: why.
-    NotTestable(String),
-}
+/// What a kind makes of the data: structures worth a fit, or why the data do not allow to test it.
+pub type Proposal = Result<Vec<Candidate>, String>;
 
-impl Proposal {
-    /// The first structure, where there is one.
-    pub fn first(self) -> Option<Candidate> {
-        match self {
-            Proposal::Candidates(candidates) => candidates.into_iter().next(),
-            Proposal::NotTestable(_) => None,
-        }
-    }
-}
-
-/// Delay and lag in s near none: where a fit begins whose other starts are all worse than none.
-const NEAR_NONE_S: [f64; 2] = [0.05, 0.05];
-
-/// The delay and lag in s that a fit begins from: of some starts the one that explains most, given by how much each
-/// decreases the cost.
-pub fn late_from(starts_s: &[[f64; 2]], decrease: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
-    let each = starts_s.iter().map(|start_s| (decrease(*start_s), *start_s));
-    let best = each.max_by(|one, other| one.0.total_cmp(&other.0));
-    best.filter(|(decrease, _)| *decrease > 0.0).map_or(NEAR_NONE_S, |(_, start_s)| start_s).into()
-}
-
-/// Standard deviation in s of a dead time and of a lag by the sampling step. Between samples forces are taken to change
-/// evenly, so that each of the two may be off by any part of a step; their sum is known better.
-pub fn late_by_sampling_s(step_s: f64) -> f64 {
-    step_s / 12_f64.sqrt()
-}
-
-/// A dead time and a lag, each with its standard deviation: neither is less than none nor more than both together,
-/// however little the data distinguish one from the other.
-pub fn late_reported(context: &ReportContext, parameters: &[Parameter]) -> Reported {
-    let most_s = context.parameters.iter().sum::<f64>() + HALF_95 * context.deviation_of_sum();
-    let mut reported = Reported::default();
-    for (parameter, (&value_s, &std_s)) in
-        parameters.iter().zip(context.parameters.iter().zip(context.deviations))
-    {
-        let widest_s = value_s.max(most_s - value_s) / HALF_95;
-        reported.push(parameter.name, value_s, std_s.min(widest_s));
-    }
-    reported
+/// The kind as one number of the whole train or line, with no place or run chosen.
+pub enum Whole {
+    /// It is none.
+    None,
+    /// Its first structure is.
+    First,
+    /// By a search of its own; `None` where the data do not allow to test it.
+    Of(fn(&Scan) -> Option<Candidate>),
 }
 
 /// A kind of effect.
-pub trait Effect: Send + Sync {
+pub struct Effect {
     /// Its name.
-    fn kind(&self) -> EffectKind;
+    pub kind: EffectKind,
+    propose: fn(&Scan) -> Proposal,
+    whole: Whole,
+}
+
+impl Effect {
+    /// A kind with its search.
+    pub const fn new(kind: EffectKind, propose: fn(&Scan) -> Proposal, whole: Whole) -> Self {
+        Effect { kind, propose, whole }
+    }
 
     /// Structures for the data at hand, given what the current model leaves.
-    fn propose(&self, scan: &Scan) -> Proposal;
+    pub fn propose(&self, scan: &Scan) -> Proposal {
+        (self.propose)(scan)
+    }
 
     /// The kind as one number of the whole train or line, with no place or run chosen; `None` where it
     /// is none, and where the data do not allow to test it.
-    fn whole(&self, _scan: &Scan) -> Option<Candidate> {
-        None
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use dynocar_model::terms::delay;
-    use nalgebra::DMatrix;
-
-    use super::*;
-    use crate::explain::answer::ParameterValue;
-
-    #[test]
-    fn neither_a_dead_time_nor_a_lag_is_more_than_both_or_less_than_none() {
-        // The sum of the two is known to 0.1 s, either to 2 s.
-        let covariance = DMatrix::from_row_slice(2, 2, &[4.0, -3.995, -3.995, 4.0]);
-        let context = ReportContext {
-            parameters: &[0.2, 0.1],
-            deviations: &[2.0, 2.0],
-            c: 0.0,
-            c_deviation: 0.0,
-            covariance: &covariance,
-            first: 0,
-            weight_kn: 1.0,
-            few_runs_factor: 1.0,
-        };
-        let reported = late_reported(&context, &delay::PARAMETERS);
-        let std_s = |name: &str| match reported.deviations[name] {
-            ParameterValue::Number(std_s) => std_s,
-            _ => panic!("{name} is a number"),
-        };
-        let most_s = 0.3 + HALF_95 * 0.1;
-        assert!((std_s("delay_s") - (most_s - 0.2) / HALF_95).abs() < 1e-9);
-        assert!((std_s("lag_s") - (most_s - 0.1) / HALF_95).abs() < 1e-9);
+    pub fn whole(&self, scan: &Scan) -> Option<Candidate> {
+        match self.whole {
+            Whole::None => None,
+            Whole::First => self.propose(scan).ok()?.into_iter().next(),
+            Whole::Of(whole) => whole(scan),
+        }
     }
 }

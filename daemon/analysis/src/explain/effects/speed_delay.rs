@@ -3,42 +3,31 @@
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::speed_delay;
-use dynocar_model::terms::{Entry, Parameter};
 use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::proposal::{late_by_sampling_s, late_from, late_reported};
-use super::{
-    Candidate, Effect, Hypothesis, OnOthers, Past, Proposal, ReportContext, Reported, Turn,
-};
-use crate::explain::evidence::{RunData, SampleForces};
+use super::lateness::{late_by_sampling_s, late_from, late_reported};
+use super::{Candidate, Hypothesis, Nature, On, OnOthers, Proposal, ReportContext, Reported, Turn};
+use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
 /// Delay and lag in s that a fit may start from.
 const STARTS: [[f64; 2]; 4] = [[0.6, 0.1], [0.1, 0.6], [1.2, 0.3], [0.3, 1.2]];
 
-/// The kind.
-pub struct SpeedDelay;
-
 #[derive(Debug)]
 struct DelayAndLag;
 
-impl Effect for SpeedDelay {
-    fn kind(&self) -> EffectKind {
-        EffectKind::SpeedDelay
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    if !scan.problem.runs.iter().any(|run| run.is_position_recorded) {
+        return Err(
+            "positions are integrated from the speed and late with it, so that forces that act \
+             late look the same"
+                .into(),
+        );
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        if !scan.problem.runs.iter().any(|run| run.is_position_recorded) {
-            return Proposal::NotTestable(
-                "positions are integrated from the speed and late with it, so that forces that act \
-                 late look the same"
-                    .into(),
-            );
-        }
-        let start = late_from(&STARTS, |start| decrease(scan, start));
-        Proposal::Candidates(vec![Candidate::new(DelayAndLag, start)])
-    }
+    let start = late_from(&STARTS, |start| decrease(scan, start));
+    Ok(vec![Candidate::new(DelayAndLag, start)])
 }
 
 /// Decrease of the cost when the speed is late by this delay and lag.
@@ -56,12 +45,14 @@ fn decrease(scan: &Scan, start: [f64; 2]) -> f64 {
 }
 
 impl Hypothesis for DelayAndLag {
-    fn kind(&self) -> EffectKind {
-        EffectKind::SpeedDelay
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &speed_delay::PARAMETERS
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            keys: &[&speed_delay::DELAY, &speed_delay::LAG],
+            turn: Turn::Last,
+            on_others: OnOthers::Changes,
+            looks_back: true,
+            ..Nature::of(EffectKind::SpeedDelay, &speed_delay::PARAMETERS)
+        }
     }
 
     fn sampling_error(&self, step_s: f64) -> f64 {
@@ -72,26 +63,8 @@ impl Hypothesis for DelayAndLag {
         parameters[0] + parameters[1] > speed_delay::LEAST_S
     }
 
-    fn on_others(&self) -> OnOthers {
-        OnOthers::Changes
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        self.apply_after(&mut Past::default(), parameters, run, first, forces);
-    }
-
-    fn looks_back(&self) -> bool {
-        true
-    }
-
-    fn apply_after(
-        &self,
-        past: &mut Past,
-        parameters: &[f64],
-        run: &RunData,
-        first: usize,
-        forces: &mut [SampleForces],
-    ) {
+    fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]) {
+        let On { run, first, past } = on;
         let late = past.speed([parameters[0], parameters[1]], first);
         let speeds_mps = &run.covariate(Covariate::Speed)[first..];
         for (force, (&at, &speed_mps)) in
@@ -112,16 +85,5 @@ impl Hypothesis for DelayAndLag {
 
     fn speed_late_s(&self, parameters: &[f64]) -> Option<f64> {
         Some(parameters.iter().sum())
-    }
-
-    fn turn(&self) -> Turn {
-        Turn::Last
-    }
-
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
-        Some(vec![
-            Entry::Number(&speed_delay::DELAY, parameters[0]),
-            Entry::Number(&speed_delay::LAG, parameters[1]),
-        ])
     }
 }

@@ -7,14 +7,16 @@
 use std::sync::Arc;
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Entry, Parameter, place, tunnel};
+use dynocar_model::terms::{Entry, place, tunnel};
 use dynocar_model::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported, SharedHypothesis};
+use super::{
+    Candidate, Hypothesis, Nature, On, Proposal, ReportContext, Reported, SharedHypothesis,
+};
 use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::places::{End, Inside, Intervals, find};
+use crate::explain::places::{Inside, Site, find};
 use crate::explain::scan::Scan;
 
 /// Motion in s inside mapped tunnels that says something of them.
@@ -22,61 +24,47 @@ const MAPPED_MIN_S: f64 = 10.0;
 /// A tunnel that nobody mapped is less likely than some resistance at a place.
 const UNMAPPED_COST: f64 = 4.0;
 
-/// The kind.
-pub struct TunnelDrag;
-
 #[derive(Clone, Debug)]
 struct Tunnels {
-    /// Where they were found; `None`: the mapped ones.
-    found: Option<Intervals>,
+    /// Where they were found; without sections the mapped ones.
+    site: Site,
     length_m: f64,
     mapped_m: Vec<[f64; 2]>,
-    choice_cost: f64,
-    map_error: f64,
 }
 
-impl Effect for TunnelDrag {
-    fn kind(&self) -> EffectKind {
-        EffectKind::TunnelDrag
-    }
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let length_m = scan.train.length_m;
+    let Some(track) = scan.track else {
+        return Err("the line is not known".into());
+    };
+    let mut candidates: Vec<Candidate> = whole(scan).into_iter().collect();
+    let inside = Inside::Share { length_m };
+    let shape = |run: &RunData, i: usize| {
+        let speed = run.smooth_mps[i];
+        -scan.per_unit_resistance_mps2(&run.samples()[i]) * speed * speed
+    };
+    let Some(found) = find(scan, &shape, inside).filter(|found| found.runs.is_none()) else {
+        return Ok(candidates);
+    };
+    let hypothesis = Tunnels {
+        site: Site { choice_cost: found.choice_cost + UNMAPPED_COST, ..found.site(scan) },
+        length_m,
+        mapped_m: mapped_m(track),
+    };
+    candidates.push(Candidate::new(hypothesis, vec![found.estimate]));
+    Ok(candidates)
+}
 
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let length_m = scan.train.length_m;
-        let Some(track) = scan.track else {
-            return Proposal::NotTestable("the line is not known".into());
-        };
-        let mut candidates: Vec<Candidate> = self.whole(scan).into_iter().collect();
-        let inside = Inside::Share { length_m };
-        let shape = |run: &RunData, i: usize| {
-            let speed = run.smooth_mps[i];
-            -scan.per_unit_resistance_mps2(&run.samples()[i]) * speed * speed
-        };
-        let Some(found) = find(scan, &shape, inside, true).filter(|found| found.runs.is_none())
-        else {
-            return Proposal::Candidates(candidates);
-        };
-        let hypothesis = Tunnels {
-            found: Some(found.sections()),
-            length_m,
-            mapped_m: mapped_m(track),
-            choice_cost: found.choice_cost + UNMAPPED_COST,
-            map_error: found.map_error,
-        };
-        candidates.push(Candidate::new(hypothesis, vec![found.estimate]));
-        Proposal::Candidates(candidates)
-    }
-
-    fn whole(&self, scan: &Scan) -> Option<Candidate> {
-        let inside_s = scan.seconds_where(|_, sample| sample.tunnel_share.is_some_and(|s| s > 0.0));
-        let mapped = Tunnels {
-            found: None,
-            length_m: scan.train.length_m,
-            mapped_m: mapped_m(scan.track?),
-            choice_cost: 0.0,
-            map_error: 0.0,
-        };
-        (inside_s > MAPPED_MIN_S).then(|| Candidate::new(mapped, vec![0.0]))
-    }
+/// The kind as one number of the whole train or line.
+pub fn whole(scan: &Scan) -> Option<Candidate> {
+    let inside_s = scan.seconds_where(|_, sample| sample.tunnel_share.is_some_and(|s| s > 0.0));
+    let mapped = Tunnels {
+        site: Site::default(),
+        length_m: scan.train.length_m,
+        mapped_m: mapped_m(scan.track?),
+    };
+    (inside_s > MAPPED_MIN_S).then(|| Candidate::new(mapped, vec![0.0]))
 }
 
 /// Chainages in m of the mapped tunnels.
@@ -85,32 +73,22 @@ fn mapped_m(track: &Track) -> Vec<[f64; 2]> {
 }
 
 impl Hypothesis for Tunnels {
-    fn kind(&self) -> EffectKind {
-        EffectKind::TunnelDrag
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &tunnel::PARAMETERS
-    }
-
-    fn choice_cost(&self) -> f64 {
-        self.choice_cost
-    }
-
-    fn shared_error(&self) -> f64 {
-        self.map_error
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            choice_cost: self.site.choice_cost,
+            shared_error: self.site.map_error,
+            affine_in: Some(|value| value),
+            ..Nature::of(EffectKind::TunnelDrag, &tunnel::PARAMETERS)
+        }
     }
 
     fn is_material(&self, parameters: &[f64], c: f64) -> bool {
         parameters[0] > tunnel::LEAST_SHARE_OF_C * c
     }
 
-    fn affine_in(&self) -> Option<fn(f64) -> f64> {
-        Some(|value| value)
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        let found = self.found.as_ref().map(|found| place::profile(&found.intervals_m, 1.0));
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
+        let found = self.site.sections.as_ref();
+        let found = found.map(|found| place::profile(&found.intervals_m, 1.0));
         let places = run.known(Covariate::Chainage, first).zip(&run.tunnel_share[first..]);
         for (force, (position_m, &mapped)) in forces.iter_mut().zip(places) {
             let share = match &found {
@@ -128,7 +106,7 @@ impl Hypothesis for Tunnels {
 
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
         let mut entries = vec![Entry::Number(&tunnel::DC, parameters[0])];
-        if let Some(found) = &self.found {
+        if let Some(found) = &self.site.sections {
             // The files know one greater c for all tunnels.
             if !self.mapped_m.is_empty() {
                 return None;
@@ -139,18 +117,19 @@ impl Hypothesis for Tunnels {
         Some(entries)
     }
 
-    fn ends(&self) -> Vec<End> {
-        self.found.as_ref().map_or_else(Vec::new, Intervals::ends)
+    fn site(&self) -> Option<&Site> {
+        Some(&self.site)
     }
 
-    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
-        let found = Some(self.found.as_ref()?.moved(end, at)?);
-        Some(Arc::new(Tunnels { found, ..self.clone() }))
+    fn at_site(&self, site: Site) -> Option<SharedHypothesis> {
+        Some(Arc::new(Tunnels { site, ..self.clone() }))
     }
 
     fn place(&self) -> Location {
-        let found = self.found.as_ref().map(|sections| &sections.intervals_m);
-        Location::of_intervals(found.unwrap_or(&self.mapped_m).clone())
+        if self.site.sections.is_some() {
+            return self.site.place();
+        }
+        Location::of_intervals(self.mapped_m.clone())
     }
 
     fn report(&self, context: &ReportContext) -> Reported {

@@ -1,12 +1,14 @@
 //! What is a little wrong in every train's figures: scales of the reported forces, how late they act, the
-//! curve constant. No effect, but what a finished model is fitted beside.
+//! curve constant; and the map's own small error where its shape is known. No effects, but what others are looked for
+//! and a finished model is fitted beside.
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Parameter, bearings, curve, delay, traction};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Candidate, Hypothesis, Past, Turn};
+use super::lateness::late_forces;
+use super::{Candidate, Handling, Hypothesis, Nature, On, Past, SharedHypothesis, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 
 /// A figure that is usually a little wrong.
@@ -74,38 +76,17 @@ pub fn usual_errors(a_n_per_kn: f64, is_in: impl Fn(EffectKind) -> bool) -> Cand
 }
 
 impl Hypothesis for UsualErrors {
-    fn kind(&self) -> EffectKind {
-        EffectKind::None
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            prior: Some(&self.information),
+            turn: Turn::First,
+            looks_back: self.figures.contains(&Figure::Lateness),
+            ..Nature::of(EffectKind::None, &self.parameters)
+        }
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn prior_information(&self) -> Option<&DMatrix<f64>> {
-        Some(&self.information)
-    }
-
-    fn turn(&self) -> Turn {
-        Turn::First
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
-        self.apply_after(&mut Past::default(), parameters, run, first, forces);
-    }
-
-    fn looks_back(&self) -> bool {
-        self.figures.contains(&Figure::Lateness)
-    }
-
-    fn apply_after(
-        &self,
-        past: &mut Past,
-        parameters: &[f64],
-        run: &RunData,
-        first: usize,
-        forces: &mut [SampleForces],
-    ) {
+    fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]) {
+        let On { run, first, past } = on;
         for (figure, &error) in self.figures.iter().zip(parameters) {
             match figure {
                 Figure::Traction => forces.iter_mut().for_each(|it| it.traction_n *= 1.0 + error),
@@ -122,16 +103,49 @@ impl Hypothesis for UsualErrors {
                     }
                 }
                 Figure::Lateness => {
-                    let line = past.forces([error, 0.0], first);
-                    for (force, &at) in forces.iter_mut().zip(&run.stamps[first..]) {
-                        let now = Some([force.traction_n, force.brake_n]);
-                        if let Some(late) = line.acting(at, now) {
-                            [force.traction_n, force.brake_n] = late;
-                        }
-                    }
+                    let on = On { run, first, past: &mut *past };
+                    late_forces([error, 0.0], on, forces);
                 }
             }
         }
+    }
+}
+
+/// The error of the map in the shape in which it was fitted, of any size: one number in the place of its many.
+pub fn map_error_as_fitted(error: SharedHypothesis, permille: &[f64]) -> Candidate {
+    let parameters = [Parameter::new("share", (-10.0, 10.0), 0.1)];
+    Candidate::new(Fitted { error, permille: permille.to_vec(), parameters }, vec![1.0])
+}
+
+#[derive(Debug)]
+struct Fitted {
+    error: SharedHypothesis,
+    /// Its parameters.
+    permille: Vec<f64>,
+    parameters: [Parameter; 1],
+}
+
+impl Hypothesis for Fitted {
+    fn nature(&self) -> Nature<'_> {
+        Nature { handling: Handling::Gradient, ..Nature::of(EffectKind::None, &self.parameters) }
+    }
+
+    fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]) {
+        let mut with = forces.to_vec();
+        self.error.apply(&self.permille, on, &mut with);
+        for (force, with) in forces.iter_mut().zip(with) {
+            force.gradient_permille +=
+                parameters[0] * (with.gradient_permille - force.gradient_permille);
+        }
+    }
+
+    fn gradient_permille(&self, _parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
+        let mut with: Vec<SampleForces> = run.declared.all().collect();
+        let on = On { run, first: 0, past: &mut Past::default() };
+        self.error.apply(&self.permille, on, &mut with);
+        let added = with.iter().zip(run.declared.all());
+        permille.clear();
+        permille.extend(added.map(|(with, own)| with.gradient_permille - own.gradient_permille));
     }
 }
 
@@ -152,7 +166,7 @@ mod tests {
     #[test]
     fn nothing_acts_before_it_is_reported_and_the_prior_is_what_is_usual() {
         let errors = usual_errors(1.0, |_| false).hypothesis;
-        let prior = errors.prior_information().expect("a prior");
+        let prior = errors.nature().prior.expect("a prior");
         for (i, (figure, std)) in FIGURES.into_iter().enumerate() {
             assert!((prior[(i, i)] * std * std - 1.0).abs() < 1e-12);
             let has_a_sign = matches!(figure, Figure::Lateness | Figure::Warming);

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_model::terms::{Entry, Parameter, wind};
+use dynocar_model::terms::{Parameter, wind};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Effect, Hypothesis, Proposal, ReportContext, Reported};
+use super::{Candidate, Hypothesis, Nature, On, Proposal, ReportContext, Reported};
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{CERTAIN_STDS, RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -14,13 +14,8 @@ use crate::explain::scan::Scan;
 /// the scatter of the winds.
 const AHEAD_MAX: f64 = 3.0;
 
-/// The kind.
-pub struct Wind;
-
 #[derive(Debug)]
-struct Steady {
-    parameters: [Parameter; 1],
-}
+struct Steady;
 
 #[derive(Debug)]
 struct ByRun {
@@ -29,33 +24,21 @@ struct ByRun {
     parameters: Vec<Parameter>,
 }
 
-impl Effect for Wind {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Wind
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let runs = &scan.problem.runs;
+    if runs.iter().all(|run| run.direction == runs[0].direction) {
+        return Err("all runs go in one direction, where wind looks like b and c".into());
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let runs = &scan.problem.runs;
-        if runs.iter().all(|run| run.direction == runs[0].direction) {
-            return Proposal::NotTestable(
-                "all runs go in one direction, where wind looks like b and c".into(),
-            );
-        }
-        let by_run = ByRun {
-            runs: runs.iter().map(|run| (run.file.clone(), run.direction)).collect(),
-            parameters: vec![wind::PARAMETER; runs.len()],
-        };
-        let mut candidates =
-            vec![Candidate::new(Steady { parameters: [wind::PARAMETER] }, vec![0.0])];
-        if runs.len() >= 3 {
-            candidates.push(Candidate::new(by_run, vec![0.0; runs.len()]));
-        }
-        Proposal::Candidates(candidates)
+    let by_run = ByRun {
+        runs: runs.iter().map(|run| (run.file.clone(), run.direction)).collect(),
+        parameters: vec![wind::PARAMETER; runs.len()],
+    };
+    let mut candidates = vec![Candidate::new(Steady, vec![0.0])];
+    if runs.len() >= 3 {
+        candidates.push(Candidate::new(by_run, vec![0.0; runs.len()]));
     }
-
-    fn whole(&self, scan: &Scan) -> Option<Candidate> {
-        self.propose(scan).first()
-    }
+    Ok(candidates)
 }
 
 /// The wind to expect in a run that was not fitted: the mean of the others, as far as their scatter
@@ -75,34 +58,22 @@ fn blow(wind_plus_mps: f64, directions: &[f64], forces: &mut [SampleForces]) {
 }
 
 impl Hypothesis for Steady {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Wind
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            keys: &[&wind::WIND_PLUS],
+            least: Some(wind::LEAST_MPS),
+            ..Nature::of(EffectKind::Wind, &[wind::PARAMETER])
+        }
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        parameters[0].abs() > wind::LEAST_MPS
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         blow(parameters[0], &run.directions[first..], forces);
-    }
-
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
-        Some(vec![Entry::Number(&wind::WIND_PLUS, parameters[0])])
     }
 }
 
 impl Hypothesis for ByRun {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Wind
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
+    fn nature(&self) -> Nature<'_> {
+        Nature::of(EffectKind::Wind, &self.parameters)
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
@@ -133,7 +104,7 @@ impl Hypothesis for ByRun {
         self.runs[parameter].0 == run.file
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let own = self.runs.iter().position(|(file, _)| *file == run.file);
         let wind_plus_mps =
             own.map_or_else(|| of_another_run(parameters), |index| parameters[index]);

@@ -2,6 +2,8 @@
 
 use dynocar_model::simulate::Recording;
 
+use crate::statistics::{middle, span};
+
 /// Width in s of a bin over which speeds are averaged.
 const BIN_S: f64 = 2.0;
 /// A bin is at least this many sampling periods wide.
@@ -43,11 +45,7 @@ impl Bin {
 /// Median time in s between samples.
 pub(super) fn sampling_period_s(time_s: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() {
-        return BIN_S;
-    }
-    let at = steps.len() / 2;
-    *steps.select_nth_unstable_by(at, f64::total_cmp).1
+    middle(&mut steps).unwrap_or(BIN_S)
 }
 
 /// The bins of all segments of motion, in order of time.
@@ -123,9 +121,5 @@ fn jump_mps2(recording: &Recording, from: usize, to: usize) -> f64 {
         let force_n = sample.traction_force_n.unwrap_or(0.0) - sample.brake_force_n.unwrap_or(0.0);
         force_n / sample.mass_kg
     });
-    let (least, most) = accelerations
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), it| {
-            (least.min(it), most.max(it))
-        });
-    most - least
+    span(accelerations).map_or(0.0, |[least, most]| most - least)
 }

@@ -2,6 +2,8 @@
 
 use dynocar_model::force::ResolvedSample;
 
+use crate::statistics::middle;
+
 /// Samples to each side that a value is compared with.
 const HALF_WINDOW: usize = 3;
 /// So many times the usual deviation from the median around is an outlier.
@@ -11,12 +13,6 @@ const OUTLIER_SPREADS: f64 = 8.0;
 const SPARSE_S: f64 = 0.5;
 /// The sharpest bend of a speed curve in m/s².
 const SPEED_BEND_MPS2: f64 = 1.5;
-
-/// The median of a window; reorders it.
-fn median(window: &mut [f64]) -> f64 {
-    window.sort_unstable_by(f64::total_cmp);
-    window[window.len() / 2]
-}
 
 /// Replaces outliers by the median around them; returns how many. `least` is the difference
 /// below which nothing is an outlier.
@@ -28,9 +24,9 @@ pub(super) fn replace_outliers(values: &mut [f64], least: f64) -> usize {
     let mut window = [0.0; 2 * HALF_WINDOW + 1];
     let medians: Vec<f64> = original
         .windows(window.len())
-        .map(|around| {
+        .filter_map(|around| {
             window.copy_from_slice(around);
-            median(&mut window)
+            middle(&mut window)
         })
         .collect();
     let mut differences: Vec<f64> =

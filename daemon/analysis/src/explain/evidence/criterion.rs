@@ -10,6 +10,8 @@ pub const CERTAIN_STDS_BY_RUN: f64 = 3.0;
 /// Evidence by which two explanations may differ and still explain the data equally well; what is added
 /// beside others explains this much more than its price.
 pub const EQUAL: f64 = 6.0;
+/// The library comes first: what is outside must explain more than a known kind.
+pub const OUTSIDE_COST: f64 = 10.0;
 /// Strength of the strongest candidate of a search where nothing acts, fitted to the quantiles that
 /// `dynocar-bench explain --kind none --kind none_poor_recording --seeds 200 --first-seed 2001` prints: 0.10,
 /// 0.20, 0.44 and 0.88 for shares of 0.05, 0.02, 0.01 and 0.0025.

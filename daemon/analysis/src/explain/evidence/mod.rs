@@ -11,16 +11,14 @@ mod adjoint;
 mod bins;
 mod cleaning;
 mod criterion;
-mod distance_ratio;
 mod fade;
 mod fit;
 mod integral;
-mod late_speed;
 mod model;
 mod noise;
 mod noise_search;
 mod pass;
-mod response;
+mod positions;
 mod run_data;
 mod run_scatter;
 mod sample_forces;
@@ -31,11 +29,11 @@ mod whitener;
 pub use adjoint::Adjoint;
 pub use bins::Bin;
 pub use criterion::{
-    CERTAIN_STDS, CERTAIN_STDS_BY_RUN, EQUAL, NULL_SCORE, NullScore, SCORE_MIN, acceptance_score,
-    p_value,
+    CERTAIN_STDS, CERTAIN_STDS_BY_RUN, EQUAL, NULL_SCORE, NullScore, OUTSIDE_COST, SCORE_MIN,
+    acceptance_score, p_value,
 };
 pub use fade::Fade;
-pub use fit::{Fit, FitProblem, Nearby, RunNormal};
+pub use fit::{Fit, FitProblem, RunNormal};
 pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RunScatter};
 pub use noise_search::{RUNS_A_TASK, coarse_step};

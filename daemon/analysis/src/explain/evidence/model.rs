@@ -3,10 +3,11 @@
 use dynocar_model::simulate::{ForceModel, QuadraticForces};
 use dynocar_model::terms::wheel;
 use dynocar_model::train::Davis;
+use dynocar_shared::vocabulary::EffectKind;
 
+use super::integral::Response;
 use super::integral::{Integral, integrate_bins};
 use super::pass::{Acting, Pass, blocks};
-use super::response::Response;
 use super::run_data::RunData;
 use super::run_scatter::{RunFactors, of_day};
 use super::sample_forces::SampleForces;
@@ -25,6 +26,24 @@ impl UpdatedModel {
         let mut grown = self.clone();
         grown.effects.push(effect);
         grown
+    }
+
+    /// The number of its effect of a kind; `None` where it has none.
+    pub fn position(&self, kind: EffectKind) -> Option<usize> {
+        self.effects.iter().position(|effect| effect.kind() == kind)
+    }
+
+    /// Whether it has an effect of a kind.
+    pub fn has(&self, kind: EffectKind) -> bool {
+        self.position(kind).is_some()
+    }
+
+    /// The model without one effect, and its parameters.
+    pub fn without(&self, theta: &[f64], index: usize) -> (Self, Vec<f64>) {
+        let (mut model, range) = (self.clone(), self.ranges()[index].clone());
+        model.effects.remove(index);
+        let kept = theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
+        (model, kept.map(|(_, value)| *value).collect())
     }
 
     /// Number of parameters: a, b, c and those of the effects.
@@ -47,12 +66,7 @@ impl UpdatedModel {
 
     /// What its effects do to those among them that only add something, at most.
     pub fn on_others(&self) -> OnOthers {
-        let all = |found: OnOthers| self.effects.iter().any(|effect| effect.on_others() == found);
-        match () {
-            () if all(OnOthers::Changes) => OnOthers::Changes,
-            () if all(OnOthers::Scales) => OnOthers::Scales,
-            () => OnOthers::Nothing,
-        }
+        self.effects.iter().map(|it| it.nature().on_others).max().unwrap_or(OnOthers::Nothing)
     }
 
     /// The factor on what the effects do that only add something.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::bins::Bin;
 use super::run_data::RunData;
 use super::sample_forces::SampleForces;
-use crate::explain::hypothesis::{Past, SharedHypothesis};
+use crate::explain::hypothesis::{On, Past, SharedHypothesis};
 
 /// Samples that are looked at together.
 const BLOCK: usize = 128;
@@ -28,8 +28,8 @@ impl<'m> Pass<'m> {
     /// Of effects in the order of the model.
     pub fn of(effects: impl Iterator<Item = (&'m SharedHypothesis, Range<usize>)>) -> Self {
         let mut order: Vec<_> = effects.collect();
-        order.sort_by_key(|(effect, _)| effect.turn());
-        let looks_back = order.iter().any(|(effect, _)| effect.looks_back());
+        order.sort_by_key(|(effect, _)| effect.nature().turn);
+        let looks_back = order.iter().any(|(effect, _)| effect.nature().looks_back);
         Pass { order, looks_back }
     }
 
@@ -65,7 +65,7 @@ impl<'m> Pass<'m> {
         pasts.resize_with(pasts.len().max(past + self.order.len()), Past::default);
         let own = self.order[turns.clone()].iter().zip(&mut pasts[past + turns.start..]);
         for ((effect, range), past) in own {
-            effect.apply_after(past, &theta[range.clone()], run, first, samples);
+            effect.apply(&theta[range.clone()], On { run, first, past }, samples);
         }
     }
 }

@@ -8,11 +8,11 @@ use dynocar_model::validation::{ValidationLimits, Validator};
 use dynocar_shared::TrainSample;
 
 use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};
+use crate::statistics::span;
 
 use super::bins::{self, Bin};
 use super::cleaning;
-use super::distance_ratio::distance_ratio;
-use super::late_speed;
+use super::positions::{by_part_s, distance_ratio};
 use super::sample_forces::DeclaredForces;
 
 /// A run, ready for fitting and for open-loop simulation.
@@ -171,15 +171,12 @@ fn prepare_run(
     let stamps =
         recording.samples().iter().map(|sample| (sample.time_ns, sample.segment)).collect();
     let positions_m = recording.samples().iter().filter_map(|sample| sample.position_m);
-    let span_m = positions_m.fold(None, |span: Option<[f64; 2]>, at_m| {
-        let [low, high] = span.unwrap_or([at_m; 2]);
-        Some([low.min(at_m), high.max(at_m)])
-    });
+    let span_m = span(positions_m);
     let bins = bins::bins(&recording);
     let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
     let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
     let speed_late_s = match is_position_recorded {
-        true => late_speed::by_part_s(&recording),
+        true => by_part_s(&recording),
         false => Vec::new(),
     };
     let power = RunPower::of(run, recording.samples());

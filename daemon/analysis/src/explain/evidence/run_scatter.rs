@@ -15,7 +15,7 @@ use nalgebra::{SMatrix, SVector};
 use super::integral::integrate_bins;
 use super::noise::RunScatter;
 use super::run_data::RunData;
-use super::whitener::Whitener;
+use super::whitener::{Whitener, robust_weight};
 
 /// A run's own deviations: of the factors on the control force and on the basic resistance from
 /// 1, the headwind in m/s, and the delay of the force in s.
@@ -209,5 +209,40 @@ impl WeightedFilter {
     /// Weights of the innovations.
     pub fn weights(&self) -> &[f64] {
         &self.weights
+    }
+}
+
+/// The filters of one run under a noise.
+#[derive(Clone)]
+pub(super) struct RunFilters {
+    pub whitener: Whitener,
+    pub scatter: ScatterFilter,
+}
+
+/// Those of all runs.
+pub(super) type SharedFilters = Arc<[RunFilters]>;
+
+/// Innovations of one run and what follows from them.
+pub(super) struct Whitened {
+    pub innovations: Vec<f64>,
+    pub filter: WeightedFilter,
+    pub factors: RunFactors,
+    pub cost: f64,
+}
+
+impl RunFilters {
+    /// Robust innovations of a series of bin differences.
+    pub fn whitened(&self, residual: &[f64], scratch: &mut Vec<f64>) -> Whitened {
+        self.whitener.whiten(residual, scratch);
+        let weights = |series: &[f64]| series.iter().map(|&nu| robust_weight(nu)).collect();
+        let rough = self.scatter.weighted(weights(scratch));
+        let less = rough.remove(scratch, &rough.factors(scratch));
+        let filter = self.scatter.weighted(weights(&less));
+        let factors = filter.factors(scratch);
+        let innovations = filter.remove(scratch, &factors);
+        let cost = self.whitener.minus_two_log_likelihood(&innovations)
+            + self.scatter.prior_cost(&factors)
+            + filter.log_determinant;
+        Whitened { innovations, filter, factors, cost }
     }
 }

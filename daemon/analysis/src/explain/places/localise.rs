@@ -3,12 +3,12 @@
 use dynocar_model::track::Track;
 use rayon::prelude::*;
 
-use super::found::Found;
-use super::inside::Inside;
-use super::runs::best_runs;
+use super::runs::{Found, best_runs};
+use super::site::Inside;
 use crate::explain::evidence::{Bin, RunData};
 use crate::explain::gradient_prior::SURVEYED;
 use crate::explain::scan::{Scan, Tuple};
+use crate::statistics::span;
 
 /// Shortest interval in m that is looked for.
 const SHORTEST_M: f64 = 150.0;
@@ -37,7 +37,6 @@ pub type Shape<'s> = &'s (dyn Fn(&RunData, usize) -> f64 + Sync);
 struct Places<'s, 'a> {
     scan: &'s Scan<'a>,
     inside: Inside,
-    positive: bool,
     /// By run and bin: chainage in m and acceleration in m/s² per unit.
     bins: Vec<Vec<(Option<f64>, f64)>>,
     /// By run, for each [`BLOCK`] of bins: least and greatest chainage in m.
@@ -50,7 +49,7 @@ const TUPLES_A_TASK: usize = 64;
 const BLOCK: usize = 16;
 
 impl<'s, 'a> Places<'s, 'a> {
-    fn new(scan: &'s Scan<'a>, shape: Shape, inside: Inside, positive: bool) -> Self {
+    fn new(scan: &'s Scan<'a>, shape: Shape, inside: Inside) -> Self {
         let at_bins = |run: &RunData| {
             let middles = run.bins.iter().map(Bin::middle);
             middles.map(|i| (run.samples()[i].position_m, shape(run, i))).collect()
@@ -58,12 +57,10 @@ impl<'s, 'a> Places<'s, 'a> {
         let bins: Vec<Vec<(Option<f64>, f64)>> = scan.problem.runs.iter().map(at_bins).collect();
         let extent = |block: &[(Option<f64>, f64)]| {
             let known = block.iter().filter_map(|bin| bin.0);
-            known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
-                [low.min(at), high.max(at)]
-            })
+            span(known).unwrap_or([f64::INFINITY, f64::NEG_INFINITY])
         };
         let blocks = bins.iter().map(|run| run.chunks(BLOCK).map(extent).collect()).collect();
-        Places { scan, inside, positive, bins, blocks }
+        Places { scan, inside, bins, blocks }
     }
 
     fn run_tuple(&self, index: usize, intervals_m: &[[f64; 2]]) -> Tuple {
@@ -101,15 +98,9 @@ impl<'s, 'a> Places<'s, 'a> {
 
 /// The chainage in m over which the fit runs move.
 pub fn span_m(scan: &Scan) -> Option<[f64; 2]> {
-    let mut span: Option<[f64; 2]> = None;
-    for run in &scan.problem.runs {
-        for bin in &run.bins {
-            if let Some(at) = run.samples()[bin.middle()].position_m {
-                let [low, high] = span.unwrap_or([at, at]);
-                span = Some([low.min(at), high.max(at)]);
-            }
-        }
-    }
+    let runs = scan.problem.runs.iter();
+    let middles = runs.flat_map(|run| run.bins.iter().map(|bin| &run.samples()[bin.middle()]));
+    let span = span(middles.filter_map(|sample| sample.position_m));
     span.filter(|[low, high]| high - low > 4.0 * SHORTEST_M)
 }
 
@@ -129,20 +120,18 @@ fn cells(places: &Places, [low, high]: [f64; 2]) -> Vec<Cell> {
     intervals_m.into_par_iter().map(cell).collect()
 }
 
-/// Finds the intervals and runs in which a common factor on a shape explains most.
+/// Finds the intervals and runs in which a common positive factor on a shape explains most.
 ///
-/// `positive` asks for a positive factor. Intervals are added while each explains more than the
+/// Intervals are added while each explains more than the
 /// choice among all of them does by chance.
-pub fn find(scan: &Scan, shape: Shape, inside: Inside, positive: bool) -> Option<Found> {
+pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<Found> {
     let span = span_m(scan)?;
-    let places = Places::new(scan, shape, inside, positive);
+    let places = Places::new(scan, shape, inside);
     let cells = cells(&places, span);
     let interval_cost = 2.0 * (cells.len().max(2) as f64).ln();
     let runs_min = PLACE_RUNS_MIN.min(scan.problem.runs.len());
-    let by_runs: Vec<_> = cells
-        .par_iter()
-        .map(|cell| (cell, best_runs(scan, &cell.runs, positive, runs_min)))
-        .collect();
+    let by_runs: Vec<_> =
+        cells.par_iter().map(|cell| (cell, best_runs(scan, &cell.runs, runs_min))).collect();
     let best = by_runs
         .into_iter()
         .max_by(|one, other| (one.1.1 - one.1.3).total_cmp(&(other.1.1 - other.1.3)))?;
@@ -275,7 +264,7 @@ impl Places<'_, '_> {
         let value = |interval: [f64; 2]| {
             let together = [&others[..], &[interval]].concat();
             let (gain, estimate) = self.scan.gain(&self.over(&together, &found.runs));
-            if self.positive && estimate <= 0.0 { (0.0, estimate) } else { (gain, estimate) }
+            if estimate <= 0.0 { (0.0, estimate) } else { (gain, estimate) }
         };
         let tries_a_task = TUPLES_A_TASK.div_ceil(self.bins.len());
         let mut best = (own, value(own));

@@ -2,20 +2,16 @@
 //!
 //! - [`Inside`]: how much of a train is at a place
 //! - [`find`]: the intervals and runs in which a force of some shape explains most
-//! - [`End`], [`Intervals`]: ends that were estimated, and where else they could be
+//! - [`Site`], [`End`]: where and in which runs that is, ends that were estimated, and where else they could be
 //! - [`settle`]: every end at the middle of what the data allow, with its interval, and for every
 //!   run how likely it takes part
 
-mod ends;
-mod found;
-mod inside;
 mod localise;
 mod runs;
 mod settle;
+mod site;
 
-pub use ends::{Axis, End, Intervals, Reach};
-pub use found::Found;
-pub use inside::Inside;
 pub use localise::{MAP_ERROR_PERMILLE, find, span_m};
-pub use runs::best_of_runs;
+pub use runs::{Found, best_of_runs};
 pub use settle::settle;
+pub use site::{Axis, End, Inside, Intervals, Reach, Site};

@@ -1,14 +1,44 @@
-//! In which runs a force acts.
+//! What was found of a force, and in which runs it acts.
 
-use super::found::Found;
+use super::site::{Intervals, Site};
 use crate::explain::evidence::EQUAL;
 use crate::explain::scan::{Scan, Tuple};
 
-/// The runs, as a set of numbers, whose common factor explains most after the cost of choosing.
+/// A set of intervals and runs with what a common factor on the shape there explains.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Disjoint intervals in m, by chainage.
+    pub intervals_m: Vec<[f64; 2]>,
+    /// The chainage in m over which the runs move.
+    pub span_m: [f64; 2],
+    /// Fit runs by number; `None` for all that pass.
+    pub runs: Option<Vec<usize>>,
+    /// Decrease of the cost.
+    pub gain: f64,
+    /// The factor.
+    pub estimate: f64,
+    /// Twice the logarithm of the number of structures this was chosen from.
+    pub choice_cost: f64,
+    /// Standard deviation of the factor by the error of the gradient map, which all passes share.
+    pub map_error: f64,
+}
+
+impl Found {
+    /// The site of it.
+    pub fn site(&self, scan: &Scan) -> Site {
+        let Found { span_m, choice_cost, map_error, .. } = *self;
+        let intervals_m = self.intervals_m.clone();
+        let file = |&index: &usize| scan.problem.runs[index].file.clone();
+        let runs = self.runs.as_ref().map(|runs| runs.iter().map(file).collect());
+        let sections = (!intervals_m.is_empty()).then_some(Intervals { intervals_m, span_m });
+        Site { sections, runs, choice_cost, map_error }
+    }
+}
+
+/// The runs, as a set of numbers, whose common positive factor explains most after the cost of choosing.
 pub(super) fn best_runs(
     scan: &Scan,
     tuples: &[Tuple],
-    positive: bool,
     runs_min: usize,
 ) -> (Option<Vec<usize>>, f64, f64, f64) {
     let mut order: Vec<(usize, f64, f64)> = tuples
@@ -26,37 +56,34 @@ pub(super) fn best_runs(
     if passing < runs_min {
         return best;
     }
-    let signs: &[f64] = if positive { &[1.0] } else { &[1.0, -1.0] };
-    for &sign in signs {
-        let mut sum = Tuple::zero(scan.fit.theta.len());
-        let mut chosen = Vec::new();
-        // A chosen run shows the force by itself.
-        let speaks_for_it = |own: &&(usize, f64, f64)| own.1 > EQUAL && own.2 * sign > 0.0;
-        for &(index, _, _) in order.iter().filter(speaks_for_it) {
-            sum.add(&tuples[index]);
-            chosen.push(index);
-            let (gain, estimate) = scan.gain(&sum);
-            let cost = subset_cost(passing, chosen.len());
-            let is_set = chosen.len() >= runs_min && chosen.len() < passing;
-            if is_set && estimate * sign > 0.0 && gain - cost > best.1 - best.3 {
-                let mut runs = chosen.clone();
-                runs.sort_unstable();
-                best = (Some(runs), gain, estimate, cost);
-            }
+    let mut sum = Tuple::zero(scan.fit.theta.len());
+    let mut chosen = Vec::new();
+    // A chosen run shows the force by itself.
+    let speaks_for_it = |own: &&(usize, f64, f64)| own.1 > EQUAL && own.2 > 0.0;
+    for &(index, _, _) in order.iter().filter(speaks_for_it) {
+        sum.add(&tuples[index]);
+        chosen.push(index);
+        let (gain, estimate) = scan.gain(&sum);
+        let cost = subset_cost(passing, chosen.len());
+        let is_set = chosen.len() >= runs_min && chosen.len() < passing;
+        if is_set && estimate > 0.0 && gain - cost > best.1 - best.3 {
+            let mut runs = chosen.clone();
+            runs.sort_unstable();
+            best = (Some(runs), gain, estimate, cost);
         }
-        let mut all = Tuple::zero(scan.fit.theta.len());
-        order.iter().for_each(|&(index, _, _)| all.add(&tuples[index]));
-        let (gain, estimate) = scan.gain(&all);
-        if estimate * sign > 0.0 && gain > best.1 - best.3 {
-            best = (None, gain, estimate, 0.0);
-        }
+    }
+    let mut all = Tuple::zero(scan.fit.theta.len());
+    order.iter().for_each(|&(index, _, _)| all.add(&tuples[index]));
+    let (gain, estimate) = scan.gain(&all);
+    if estimate > 0.0 && gain > best.1 - best.3 {
+        best = (None, gain, estimate, 0.0);
     }
     best
 }
 
 /// The runs in which a common positive factor on a shape explains most, wherever they are.
 pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
-    let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, true, 1);
+    let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, 1);
     Found {
         intervals_m: Vec::new(),
         span_m: [0.0; 2],

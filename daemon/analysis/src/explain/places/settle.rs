@@ -7,9 +7,9 @@
 
 use std::collections::BTreeMap;
 
-use super::ends::{Axis, End, Reach};
+use super::site::{Axis, End, Reach, Site};
 use crate::explain::answer::{PlaceUncertainty, WindowUncertainty};
-use crate::explain::evidence::{Fit, FitProblem, Nearby, UpdatedModel};
+use crate::explain::evidence::{Fit, FitProblem, UpdatedModel};
 use crate::explain::hypothesis::SharedHypothesis;
 
 /// A cost above the least by this is out of the question.
@@ -29,7 +29,6 @@ struct Belief {
 /// Moves the ends of all places of a fit to the medians of their posteriors, fits again, and says
 /// for each effect how surely its place is known; `None` for one whose place was not estimated.
 pub fn settle(problem: &FitProblem, fit: &mut Fit) -> Vec<Option<PlaceUncertainty>> {
-    let nearby = Nearby::new(problem, fit);
     let mut model = fit.model.clone();
     let mut known = Vec::new();
     let mut moved = 0;
@@ -40,7 +39,7 @@ pub fn settle(problem: &FitProblem, fit: &mut Fit) -> Vec<Option<PlaceUncertaint
             let end = &effect.ends()[end];
             let mut cost = |at: f64| {
                 let elsewhere = effect.with_end(end, at)?;
-                nearby.cost(&replaced(&model, index, elsewhere), end.run.as_deref())
+                problem.cost_nearby(fit, &replaced(&model, index, elsewhere), end.run.as_deref())
             };
             let Some(belief) = belief(end, &mut cost) else { continue };
             uncertainty.add(problem, end, belief.interval);
@@ -49,7 +48,7 @@ pub fn settle(problem: &FitProblem, fit: &mut Fit) -> Vec<Option<PlaceUncertaint
                 moved += 1;
             }
         }
-        let runs = run_probability(problem, &nearby, &model, index);
+        let runs = run_probability(problem, fit, &model, index);
         known.push(uncertainty.finished(runs));
     }
     if moved > 0 {
@@ -156,20 +155,21 @@ fn discrete(points: &[(f64, f64)]) -> Belief {
 /// or none is as likely beforehand.
 fn run_probability(
     problem: &FitProblem,
-    nearby: &Nearby,
+    fit: &Fit,
     model: &UpdatedModel,
     index: usize,
 ) -> Option<BTreeMap<String, f64>> {
     let effect = &model.effects[index];
-    let chosen = effect.chosen_runs()?;
+    let site = effect.site()?;
+    let chosen = site.runs.as_ref()?;
     let mut probability = BTreeMap::new();
     for run in &problem.runs {
         let cost = |is_in: bool| {
             let mut files: Vec<String> =
                 chosen.iter().filter(|file| **file != run.file).cloned().collect();
             files.extend(is_in.then(|| run.file.clone()));
-            let elsewhere = effect.with_runs(files)?;
-            nearby.cost(&replaced(model, index, elsewhere), Some(&run.file))
+            let elsewhere = effect.at_site(Site { runs: Some(files), ..site.clone() })?;
+            problem.cost_nearby(fit, &replaced(model, index, elsewhere), Some(&run.file))
         };
         let (with, without) = (cost(true)?, cost(false)?);
         let known = 1.0 / (1.0 + (0.5 * (with - without)).exp());

@@ -39,24 +39,39 @@ pub enum Covariate {
     TimeInRun(usize),
 }
 
-impl Covariate {
-    /// Those that every window of every run may have, in the order of the page.
-    pub const COMMON: [Covariate; 13] = [
-        Covariate::Chainage,
-        Covariate::Speed,
-        Covariate::TimeSinceStart,
-        Covariate::Run,
-        Covariate::Direction,
-        Covariate::Gradient,
-        Covariate::Curvature,
-        Covariate::TunnelShare,
-        Covariate::ControlForce,
-        Covariate::ForceChange,
-        Covariate::Acceleration,
-        Covariate::Temperature,
-        Covariate::CylinderPressure,
-    ];
+/// A covariate for people.
+pub struct Row {
+    /// Which.
+    pub covariate: Covariate,
+    title: &'static str,
+    unit: &'static str,
+    per_unit: f64,
+}
 
+const fn row(covariate: Covariate, title: &'static str, unit: &'static str, per_unit: f64) -> Row {
+    Row { covariate, title, unit, per_unit }
+}
+
+/// Those that every window of every run may have, in the order of the page.
+pub const COMMON: [Row; 13] = [
+    row(Covariate::Chainage, "Chainage", "km", 1000.0),
+    row(Covariate::Speed, "Speed", "m/s", 1.0),
+    row(Covariate::TimeSinceStart, "Time since start", "s", 1.0),
+    row(Covariate::Run, "Run", "", 1.0),
+    row(Covariate::Direction, "Direction of travel", "", 1.0),
+    row(Covariate::Gradient, "Gradient along the travel", "‰", 1.0),
+    row(Covariate::Curvature, "Curvature", "1/km", 0.001),
+    row(Covariate::TunnelShare, "Share of the train in tunnels", "", 1.0),
+    row(Covariate::ControlForce, "Traction minus brake force", "kN", 1000.0),
+    row(Covariate::ForceChange, "Change of force", "kN/s", 1000.0),
+    row(Covariate::Acceleration, "Acceleration", "m/s²", 1.0),
+    row(Covariate::Temperature, "Outside temperature", "°C", 1.0),
+    row(Covariate::CylinderPressure, "Brake-cylinder pressure", "kPa", 1000.0),
+];
+/// Of one run only.
+const TIME_IN_RUN: Row = row(Covariate::TimeInRun(0), "Time in the run", "s", 1.0);
+
+impl Covariate {
     /// Always shown when the data have them.
     pub const ALWAYS: [Covariate; 4] =
         [Covariate::Chainage, Covariate::Speed, Covariate::TimeSinceStart, Covariate::Run];
@@ -83,53 +98,24 @@ impl Covariate {
         })
     }
 
+    fn row(self) -> &'static Row {
+        let own = |row: &&Row| row.covariate == self;
+        COMMON.iter().find(own).unwrap_or(&TIME_IN_RUN)
+    }
+
     /// Name for people.
     pub fn title(self) -> &'static str {
-        match self {
-            Covariate::Chainage => "Chainage",
-            Covariate::Speed => "Speed",
-            Covariate::TimeSinceStart => "Time since start",
-            Covariate::Run => "Run",
-            Covariate::Direction => "Direction of travel",
-            Covariate::Gradient => "Gradient along the travel",
-            Covariate::Curvature => "Curvature",
-            Covariate::TunnelShare => "Share of the train in tunnels",
-            Covariate::ControlForce => "Traction minus brake force",
-            Covariate::ForceChange => "Change of force",
-            Covariate::Acceleration => "Acceleration",
-            Covariate::Temperature => "Outside temperature",
-            Covariate::CylinderPressure => "Brake-cylinder pressure",
-            Covariate::TimeInRun(_) => "Time in the run",
-        }
+        self.row().title
     }
 
     /// Unit of its values; empty for numbers and names.
     pub fn unit(self) -> &'static str {
-        match self {
-            Covariate::Chainage => "km",
-            Covariate::Speed => "m/s",
-            Covariate::TimeSinceStart | Covariate::TimeInRun(_) => "s",
-            Covariate::Run | Covariate::Direction | Covariate::TunnelShare => "",
-            Covariate::Gradient => "‰",
-            Covariate::Curvature => "1/km",
-            Covariate::ControlForce => "kN",
-            Covariate::ForceChange => "kN/s",
-            Covariate::Acceleration => "m/s²",
-            Covariate::Temperature => "°C",
-            Covariate::CylinderPressure => "kPa",
-        }
+        self.row().unit
     }
 
     /// SI value over the value in [`Covariate::unit`].
     pub fn per_unit(self) -> f64 {
-        match self {
-            Covariate::Chainage
-            | Covariate::ControlForce
-            | Covariate::ForceChange
-            | Covariate::CylinderPressure => 1000.0,
-            Covariate::Curvature => 0.001,
-            _ => 1.0,
-        }
+        self.row().per_unit
     }
 
     /// True when its values are names, not quantities.

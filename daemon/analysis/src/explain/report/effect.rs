@@ -4,7 +4,10 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use super::words::{self, joined, kind_name, number};
-use crate::explain::answer::{EffectAnswer, Location, Meaning, ParameterValue};
+use crate::explain::answer::{
+    EffectAnswer, Location, MassWindow, Meaning, ParameterValue, RunWindow,
+};
+use crate::statistics::span;
 
 /// Places named in a sentence at most.
 const PLACES_MAX: usize = 4;
@@ -47,10 +50,12 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
                 }
             }
             ParameterValue::ByRun(by_run) => {
-                let values = by_run.values().copied();
-                let low = values.clone().fold(f64::INFINITY, f64::min);
-                let high = values.fold(f64::NEG_INFINITY, f64::max);
-                sizes.push(format!("{words} {low:.1} to {high:.1}{unit}, run by run"));
+                let span = span(by_run.values().copied());
+                sizes.extend(
+                    span.map(|[low, high]| {
+                        format!("{words} {low:.1} to {high:.1}{unit}, run by run")
+                    }),
+                );
             }
             ParameterValue::Sections(sections) => {
                 let shown = sections.iter().take(PLACES_MAX);
@@ -66,20 +71,19 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
             }
             ParameterValue::Formula(formula) => sizes.insert(0, formula.clone()),
             ParameterValue::Windows(windows) => {
-                sizes.extend(in_order(windows, |w| (&w.run, w.t_start_s)).take(PLACES_MAX).map(
-                    |w| {
-                        let percent =
-                            format!("{:+.1} %", 100.0 * (w.mass_factor - 1.0)).replace('-', "−");
-                        let is_one = windows.iter().filter(|it| it.run == w.run).count() == 1;
-                        let (from_s, to_s) = (w.t_start_s, w.t_end_s);
-                        let time = if is_one {
-                            String::new()
-                        } else {
-                            format!(" from {from_s:.0} to {to_s:.0} s")
-                        };
-                        format!("{percent} in {}{time}", w.run)
-                    },
-                ));
+                let all = in_order(windows, |it| (&it.window.run, it.window.t_start_s));
+                sizes.extend(all.take(PLACES_MAX).map(|MassWindow { window, mass_factor }| {
+                    let percent =
+                        format!("{:+.1} %", 100.0 * (mass_factor - 1.0)).replace('-', "−");
+                    let RunWindow { run, t_start_s, t_end_s } = window;
+                    let is_one = windows.iter().filter(|it| it.window.run == *run).count() == 1;
+                    let time = if is_one {
+                        String::new()
+                    } else {
+                        format!(" from {t_start_s:.0} to {t_end_s:.0} s")
+                    };
+                    format!("{percent} in {run}{time}")
+                }));
             }
             ParameterValue::List(_) | ParameterValue::Profile(_) => {}
         }
@@ -192,10 +196,10 @@ pub fn placed(place: &Location) -> String {
 /// Stretches of the line; many are counted, not listed.
 fn sections(intervals_m: &[[f64; 2]]) -> String {
     let km = |m: f64| m / 1000.0;
-    if intervals_m.len() > PLACES_MAX {
-        let low = intervals_m.iter().map(|interval| interval[0]).fold(f64::INFINITY, f64::min);
-        let high = intervals_m.iter().map(|interval| interval[1]).fold(f64::NEG_INFINITY, f64::max);
-        let count = intervals_m.len();
+    let count = intervals_m.len();
+    if let Some([low, high]) = span(intervals_m.as_flattened().iter().copied())
+        && count > PLACES_MAX
+    {
         return format!("at {count} places between km {:.2} and {:.2}", km(low), km(high));
     }
     let listed: Vec<String> = intervals_m
@@ -208,7 +212,7 @@ fn sections(intervals_m: &[[f64; 2]]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explain::answer::{CovariateRange, RunWindow};
+    use crate::explain::answer::CovariateRange;
 
     #[test]
     fn what_an_effect_means_is_said_in_kwh_and_metres() {

@@ -1,16 +1,15 @@
 //! Open-loop errors before and after, with intervals by bootstrap.
 
-use dynocar_model::simulate::{Prediction, Restart, SpeedError};
+use dynocar_model::simulate::{Restart, SpeedError};
 
 use super::Estimate;
 use crate::dataset::Role;
 use crate::explain::Explanation;
 use crate::explain::bootstrap::intervals_95;
-use crate::explain::evidence::{Fit, RunData, UpdatedForces};
-use crate::explain::judged::Judged;
-use crate::explain::score;
-use crate::explain::score::run_error;
-use crate::explain::stop_to_stop::{self, StopToStop};
+use crate::explain::evidence::{Fit, RunData};
+use crate::explain::score::{self, pooled, predicted, run_error};
+use crate::explain::stop_to_stop::Judged;
+use crate::explain::stop_to_stop::StopToStop;
 
 /// Length in s of the blocks of a single run.
 const BLOCK_S: f64 = 60.0;
@@ -72,7 +71,7 @@ pub struct Errors {
 impl Errors {
     /// The errors of an explanation's models.
     pub fn of(explanation: &Explanation) -> Self {
-        let (before, after) = (&explanation.base, &explanation.grown);
+        let (before, after) = (&explanation.outcome.base, &explanation.outcome.fit);
         let (fit, holdout) = (&explanation.problem.runs[..], &explanation.holdout[..]);
         let pair = |runs: &[RunData], restart| error_pair(runs, before, after, restart);
         let mut scored = pair(holdout, Restart::FullRun);
@@ -155,10 +154,8 @@ fn blocks(run: &RunData, before: &Fit, after: &Fit, restart: Restart) -> Vec<[Sp
     let (samples, time_s) = (run.samples(), run.recording.time_s());
     let count = (run.duration_s() / BLOCK_S) as usize + 1;
     let mut blocks = vec![[SpeedError::default(); 2]; count];
-    let (mut forces, mut prediction) = (UpdatedForces::default(), Prediction::new());
     for (side, fit) in [before, after].into_iter().enumerate() {
-        fit.model.forces(run, &fit.theta, &mut forces);
-        prediction.simulate(&run.recording, &forces, restart);
+        let prediction = predicted(fit, run, restart);
         for (i, sample) in samples.iter().enumerate() {
             if sample.speed_mps > dynocar_model::simulate::MOVING_SPEED_MPS
                 && run.recording.is_simulated(i)
@@ -171,13 +168,6 @@ fn blocks(run: &RunData, before: &Fit, after: &Fit, restart: Restart) -> Vec<[Sp
     }
     blocks.retain(|block| block[0].count > 0);
     blocks
-}
-
-fn pooled(units: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> {
-    let sum =
-        units.fold([SpeedError::default(); 2], |sum, unit| [sum[0] + unit[0], sum[1] + unit[1]]);
-    let [before, after] = [sum[0].rmse_mps()?, sum[1].rmse_mps()?];
-    Some([before, after, stop_to_stop::reduction([before, after])])
 }
 
 /// Percentile bootstrap over units; the two models are always judged on the same draw.

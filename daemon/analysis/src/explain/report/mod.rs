@@ -6,11 +6,10 @@
 //! - [`sentence`]: the verdict in a plain sentence
 //! - [`effect`]: an effect in words
 //! - [`errors`]: open-loop errors before and after, with bootstrap intervals
-//! - [`traces`]: measured and predicted speeds of runs
 //! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
 //!   covariates
 //! - [`mod@line`]: the same along the line, by direction, with the places found
-//! - [`timeline`]: the explanation as events and series in time
+//! - [`timeline`]: the explanation as events and series in time, speeds of runs
 //! - [`parameters`]: what was fitted, with uncertainty
 //! - [`candidates`]: what else was considered
 //!
@@ -26,10 +25,8 @@ mod estimate;
 pub mod line;
 pub mod panels;
 pub mod parameters;
-pub mod places;
 pub mod sentence;
 pub mod timeline;
-pub mod traces;
 pub mod windows;
 pub mod words;
 
@@ -40,9 +37,8 @@ use errors::Errors;
 pub use estimate::Estimate;
 use line::AlongLine;
 use panels::Panel;
-use parameters::ParameterRow;
-use places::PlaceTable;
-use traces::Trace;
+use parameters::{ParameterRow, PlaceTable};
+use timeline::Trace;
 
 /// Everything that a report shows beyond the answer and the dataset's own account.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +68,7 @@ impl ReportData {
         let windows = windows::windows(explanation);
         ReportData {
             sentence: sentence::sentence(&explanation.answer, &errors),
-            traces: traces::traces(explanation),
+            traces: timeline::traces(explanation),
             panels: panels::panels(dataset, explanation, &windows),
             line: AlongLine::of(explanation, &windows),
             parameters: parameters::rows(dataset, explanation),

@@ -5,7 +5,7 @@ use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::covariates::Covariate;
+use super::covariates::{COMMON, Covariate};
 use super::windows::Window;
 use crate::dataset::{Dataset, Role};
 use crate::explain::Explanation;
@@ -97,11 +97,7 @@ impl Zones {
                     self.intervals_m.extend(sections.iter().map(|s| [s.from_m, s.to_m]));
                 }
                 ParameterValue::Windows(windows) => {
-                    self.windows.extend(windows.iter().map(|w| RunWindow {
-                        run: w.run.clone(),
-                        t_start_s: w.t_start_s,
-                        t_end_s: w.t_end_s,
-                    }));
+                    self.windows.extend(windows.iter().map(|it| it.window.clone()));
                 }
                 _ => {}
             }
@@ -194,8 +190,7 @@ pub fn panels(dataset: &Dataset, explanation: &Explanation, windows: &[Window]) 
         let acting = zones.on(covariate, runs, &numbers);
         (bins.len() > 1).then_some(Panel { covariate, file, bins, acting })
     };
-    let mut list: Vec<Panel> =
-        Covariate::COMMON.iter().filter_map(|&covariate| panel(covariate, None)).collect();
+    let mut list: Vec<Panel> = COMMON.iter().filter_map(|row| panel(row.covariate, None)).collect();
     let leading = leading(explanation);
     let rank = |panel: &Panel| {
         if leading.contains(&panel.covariate) {

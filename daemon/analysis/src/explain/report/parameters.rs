@@ -1,9 +1,9 @@
-//! What was fitted, with its uncertainty.
+//! What was fitted, with its uncertainty: parameters, and where effects act.
 
 use super::{Estimate, words};
 use crate::dataset::Dataset;
 use crate::explain::Explanation;
-use crate::explain::answer::{EffectAnswer, ParameterValue};
+use crate::explain::answer::{EffectAnswer, ParameterValue, PlaceUncertainty, RunWindow};
 use crate::explain::selection::deviations;
 
 /// A parameter of the model.
@@ -28,7 +28,7 @@ pub struct ParameterRow {
 /// a, b, c and the parameters of all effects.
 pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
     let declared = dataset.train.resistance;
-    let before = deviations(&explanation.base).std;
+    let before = deviations(&explanation.outcome.base).std;
     let davis = [
         ("a", "constant part", "N/kN", declared.a),
         ("b", "part that grows with speed", "N/kN per m/s", declared.b),
@@ -43,8 +43,8 @@ pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
             meaning: meaning.into(),
             unit,
             declared: Some(value),
-            before: Some(estimate(&explanation.base.theta, &before)),
-            after: estimate(&explanation.grown.theta, &explanation.deviations.std),
+            before: Some(estimate(&explanation.outcome.base.theta, &before)),
+            after: estimate(&explanation.outcome.fit.theta, &explanation.deviations.std),
         }
     });
     let of_effects = explanation.answer.effects.iter().flat_map(|e| effect_rows(dataset, e));
@@ -102,8 +102,8 @@ fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) 
             (which, s.mass_factor)
         })),
         ParameterValue::Windows(windows) => each(&mut windows.iter().map(|w| {
-            let (run, from, to) = (&w.run, w.t_start_s, w.t_end_s);
-            (format!("mass factor in {run}, {from:.0} to {to:.0} s"), w.mass_factor)
+            let RunWindow { run, t_start_s, t_end_s } = &w.window;
+            (format!("mass factor in {run}, {t_start_s:.0} to {t_end_s:.0} s"), w.mass_factor)
         })),
         // The formula stands with the effect; its numbers stand here.
         ParameterValue::Formula(_) => Vec::new(),
@@ -128,5 +128,90 @@ fn declared(dataset: &Dataset, name: &str) -> Option<f64> {
         "speed_scale" | "gain" | "c_factor" | "mass_factor" | "achieved_ratio" => Some(1.0),
         "shift_m" | "delay_and_lag_s" | "delay_s" | "lag_s" => Some(0.0),
         _ => None,
+    }
+}
+
+/// One end of a place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaceRow {
+    /// The kind of effect, in words.
+    pub group: String,
+    /// What ends here.
+    pub end: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Where, with the 95 % interval.
+    pub at: Estimate,
+}
+
+/// In which fit runs an effect acts, where the runs were chosen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaceRuns {
+    /// The kind of effect, in words.
+    pub group: String,
+    /// Every fit run with the probability that it acts there.
+    pub runs: Vec<(String, f64)>,
+}
+
+/// The places of all effects, as far as they were estimated.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlaceTable {
+    /// Their ends.
+    pub ends: Vec<PlaceRow>,
+    /// Their runs.
+    pub runs: Vec<PlaceRuns>,
+}
+
+impl PlaceTable {
+    /// The places in an answer.
+    pub fn of(explanation: &Explanation) -> Self {
+        let mut table = PlaceTable::default();
+        for effect in &explanation.answer.effects {
+            if let Some(known) = &effect.place.uncertainty_95 {
+                table.add(effect, known);
+            }
+        }
+        table
+    }
+
+    /// True when no place was estimated.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty() && self.runs.is_empty()
+    }
+
+    fn add(&mut self, effect: &EffectAnswer, known: &PlaceUncertainty) {
+        let group = words::kind_name(effect.kind).to_string();
+        let mut push = |end: String, unit: &'static str, value: f64, interval: [f64; 2]| {
+            let at = Estimate { value, interval: Some(interval) };
+            self.ends.push(PlaceRow { group: group.clone(), end, unit, at });
+        };
+        let intervals = effect.place.intervals_m.iter().flatten();
+        let many = effect.place.intervals_m.as_ref().is_some_and(|all| all.len() > 1);
+        for (k, (at_m, of_ends)) in intervals.zip(known.intervals_m.iter().flatten()).enumerate() {
+            let which = if many { format!(", place {}", k + 1) } else { String::new() };
+            push(format!("lower end{which}"), "m", at_m[0], of_ends[0]);
+            push(format!("upper end{which}"), "m", at_m[1], of_ends[1]);
+        }
+        for (window, of_ends) in
+            effect.place.windows.iter().flatten().zip(known.windows.iter().flatten())
+        {
+            push(format!("start in {}", window.run), "s", window.t_start_s, of_ends.t_start_s);
+            if let Some(interval) = of_ends.t_end_s {
+                push(format!("end in {}", window.run), "s", window.t_end_s, interval);
+            }
+        }
+        if let (Some(covariate), Some(of_ends)) = (&effect.place.covariate, &known.range) {
+            for (which, (at, interval)) in
+                ["least", "greatest"].into_iter().zip(covariate.range.into_iter().zip(of_ends))
+            {
+                if let Some(interval) = interval {
+                    push(format!("{which} {}", covariate.name), "", at, *interval);
+                }
+            }
+        }
+        if let Some(probability) = &known.run_probability {
+            let runs = probability.iter().map(|(run, known)| (run.clone(), *known)).collect();
+            self.runs.push(PlaceRuns { group: group.clone(), runs });
+        }
     }
 }

@@ -1,15 +1,17 @@
-//! An explanation as events and series in time, run by run: what lies beside the data on a timeline.
+//! An explanation as events and series in time, run by run: what lies beside the data on a timeline; measured and
+//! predicted speeds of some runs, thinned for drawing.
 
+use dynocar_model::simulate::Restart;
 use serde::{Deserialize, Serialize};
 
 use super::effect::described;
-use super::panels::Zones;
-use super::traces::predicted;
+use super::panels::{Zones, zones};
 use super::windows::missing_resistance;
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, Role};
 use crate::explain::Explanation;
 use crate::explain::answer::Verdict;
-use crate::explain::evidence::RunData;
+use crate::explain::evidence::{Fit, RunData};
+use crate::explain::score::{predicted, run_error};
 
 /// An explanation in time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -108,17 +110,9 @@ impl Timeline {
 
 impl RunTimeline {
     fn of(number: u32, run: &RunData, explanation: &Explanation) -> Self {
-        let [before, after] = [&explanation.base, &explanation.grown].map(|it| predicted(it, run));
-        let (samples, time_s) = (run.samples(), run.recording.time_s());
-        let simulated = (0..samples.len()).filter(|&i| run.recording.is_simulated(i));
-        let speeds = simulated.map(|i| SpeedPoint {
-            time_s: run.offset_s + time_s[i],
-            measured_mps: samples[i].speed_mps,
-            before_mps: before.speed_mps()[i],
-            after_mps: after.speed_mps()[i],
-        });
-        let [base, grown] =
-            [&explanation.base, &explanation.grown].map(|it| missing_resistance(it, run));
+        let simulated = (0..run.samples().len()).filter(|&i| run.recording.is_simulated(i));
+        let [base, grown] = [&explanation.outcome.base, &explanation.outcome.fit]
+            .map(|it| missing_resistance(it, run));
         let residuals = base.into_iter().zip(grown).map(|((span, before), (_, after))| {
             let bins = &run.bins[span.0..span.1];
             ResidualWindow {
@@ -131,10 +125,26 @@ impl RunTimeline {
         RunTimeline {
             file: run.file.clone(),
             number,
-            speeds: speeds.collect(),
+            speeds: simulated.map(speeds(explanation, run)).collect(),
             residuals: residuals.collect(),
             effects: acting(run, explanation),
         }
+    }
+}
+
+/// Speeds at the samples of a run, by number; predicted open loop from its first sample to its last, anew from each
+/// standstill.
+fn speeds<'r>(
+    explanation: &Explanation,
+    run: &'r RunData,
+) -> impl Fn(usize) -> SpeedPoint + use<'r> {
+    let [before, after] = [&explanation.outcome.base, &explanation.outcome.fit]
+        .map(|fit| predicted(fit, run, Restart::AtDepartures));
+    move |i| SpeedPoint {
+        time_s: run.offset_s + run.recording.time_s()[i],
+        measured_mps: run.samples()[i].speed_mps,
+        before_mps: before.speed_mps()[i],
+        after_mps: after.speed_mps()[i],
     }
 }
 
@@ -160,4 +170,70 @@ fn acting(run: &RunData, explanation: &Explanation) -> Vec<ActingEffect> {
         }
     }
     acting
+}
+
+/// Runs shown at most.
+const TRACES_MAX: usize = 3;
+/// Points of a run at most.
+const POINTS_MAX: usize = 450;
+
+/// One run, open loop from its first sample to its last and anew from each standstill.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trace {
+    /// The run's file.
+    pub file: String,
+    /// Fit or holdout.
+    pub role: Role,
+    /// Stretches without a break, in order of time.
+    pub pieces: Vec<Vec<SpeedPoint>>,
+    /// Root mean square errors of these predictions in m/s without and with the effects.
+    pub rmse_mps: Option<[f64; 2]>,
+    /// Stretches of time in s in which an effect acts.
+    pub acting_s: Vec<[f64; 2]>,
+}
+
+/// The holdout runs with the greatest error before, the greatest first; fit runs when nothing was
+/// held out.
+pub fn traces(explanation: &Explanation) -> Vec<Trace> {
+    let holdout = &explanation.holdout;
+    let runs = if holdout.is_empty() { &explanation.problem.runs } else { holdout };
+    let zones = zones(explanation);
+    let mut ranked: Vec<(f64, &RunData)> = runs
+        .iter()
+        .map(|run| {
+            let error = run_error(&explanation.outcome.base, run, Restart::AtDepartures);
+            (error.rmse_mps().unwrap_or(0.0), run)
+        })
+        .collect();
+    ranked.sort_by(|one, other| other.0.total_cmp(&one.0));
+    ranked.iter().take(TRACES_MAX).map(|(_, run)| trace(explanation, run, &zones)).collect()
+}
+
+fn trace(explanation: &Explanation, run: &RunData, zones: &Zones) -> Trace {
+    let speeds = speeds(explanation, run);
+    let count = run.samples().len();
+    let every = count.div_ceil(POINTS_MAX).max(1);
+    let mut pieces: Vec<Vec<SpeedPoint>> = vec![Vec::new()];
+    for i in (0..count).step_by(every) {
+        if !run.recording.is_simulated(i) {
+            if pieces.last().is_some_and(|piece| !piece.is_empty()) {
+                pieces.push(Vec::new());
+            }
+            continue;
+        }
+        if let Some(piece) = pieces.last_mut() {
+            piece.push(speeds(i));
+        }
+    }
+    pieces.retain(|piece| piece.len() > 1);
+    let rmse = |fit: &Fit| run_error(fit, run, Restart::AtDepartures).rmse_mps();
+    Trace {
+        file: run.file.clone(),
+        role: run.role,
+        pieces,
+        rmse_mps: rmse(&explanation.outcome.base)
+            .zip(rmse(&explanation.outcome.fit))
+            .map(|(b, a)| [b, a]),
+        acting_s: zones.times_s(run),
+    }
 }

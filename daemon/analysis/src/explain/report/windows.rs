@@ -53,7 +53,7 @@ fn slope(bins: &[Bin], values: &[f64]) -> f64 {
 
 /// All windows of the fit runs.
 pub fn windows(explanation: &Explanation) -> Vec<Window> {
-    let (before, after) = (&explanation.base, &explanation.grown);
+    let (before, after) = (&explanation.outcome.base, &explanation.outcome.fit);
     let mut windows = Vec::new();
     for (index, run) in explanation.problem.runs.iter().enumerate() {
         let columns = columns(after, run);

@@ -8,8 +8,9 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
 use super::acceptance::{is_material, is_possible};
-use super::certainty::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
+use super::by_run::{Deviations, deviations_beside};
 use super::outcome::{Beside, Outcome, Round, Trial};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
@@ -58,8 +59,7 @@ impl Search<'_> {
         {
             return beside.clone();
         }
-        let is_in = |kind| fit.model.effects.iter().any(|own| own.kind() == kind);
-        let usual = usual_errors(fit.theta[0], is_in);
+        let usual = usual_errors(fit.theta[0], |kind| fit.model.has(kind));
         let shared = usual.start.len();
         let errors = self.map_errors(fit).into_iter().chain([usual]).map(Candidate::parts);
         let fit = self.problem.with_runs_apart(&self.problem.grown(fit, errors));
@@ -168,4 +168,26 @@ impl Search<'_> {
         outcome.fit = self.without(&outcome.fit, index);
         true
     }
+}
+
+/// Moves the effects that were found to where they fit best beside the usual errors, and a, b and c to where
+/// they fit best beside the effects alone: what predicts runs knows of no usual errors. How surely the
+/// parameters are known then, from samples so many s apart.
+pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -> Deviations {
+    let joint = search.beside_usual_errors(outcome);
+    outcome.likeliest = outcome.fit.clone();
+    let fit = &outcome.likeliest;
+    let count = fit.theta.len();
+    if !fit.model.effects.is_empty() {
+        let theta = joint.fit.theta[..count].to_vec();
+        outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
+    }
+    let mut deviations = deviations_beside(&joint.fit, count, joint.shared);
+    let model = &outcome.fit.model;
+    for (effect, range) in model.effects.iter().zip(model.ranges()) {
+        for std in &mut deviations.std[range.clone()] {
+            *std = std.hypot(effect.sampling_error(step_s));
+        }
+    }
+    deviations
 }

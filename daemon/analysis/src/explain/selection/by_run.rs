@@ -173,7 +173,7 @@ fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
         // What all passages share of a map's error lies on the size, or on every gradient.
         let last = if effect.is_gradient() { range.end } else { range.start + 1 };
         for std in &mut std[range.start..last] {
-            *std = std.hypot(effect.shared_error());
+            *std = std.hypot(effect.nature().shared_error);
         }
     }
     Deviations { std, covariance: scaled, c: fit.theta[2] }

@@ -3,7 +3,6 @@
 mod acceptance;
 mod beside;
 mod by_run;
-mod certainty;
 mod outcome;
 mod outside;
 mod price;
@@ -11,16 +10,14 @@ mod refusal;
 mod revision;
 mod search;
 mod small;
-mod steps;
 mod trying;
 
-pub use beside::is_certain_beside;
+pub use acceptance::deciding_score;
+pub use beside::{given_usual_errors, is_certain_beside};
 pub use by_run::{
     Deviations, FORM_SHARE, deviations, deviations_beside, few_runs_factor, without_each_run,
 };
-pub use certainty::deciding_score;
 pub use outcome::{Outcome, Trial};
 pub use price::{discounted, model_penalty, penalty};
 pub use refusal::Refusal;
-pub use search::{OBSERVATIONS_MIN, Search};
-pub use steps::Progress;
+pub use search::{OBSERVATIONS_MIN, Progress, Search};

@@ -23,7 +23,7 @@ const COARSE_SHARE: f64 = 0.25;
 impl Search<'_> {
     /// Whether a form explains more than the kind of the library that explains most, or that kind
     /// leaves a force that has some form.
-    pub(super) fn asks_for_a_form(&self, scan: &Scan, trials: &[(Trial, &dyn Effect)]) -> bool {
+    pub(super) fn asks_for_a_form(&self, scan: &Scan, trials: &[(Trial, &Effect)]) -> bool {
         let best = best_possible(trials);
         let explained = best.map_or(0.0, |best| best.bic_gain);
         let left = self.scan(best.map_or(scan.fit, |best| &best.fit));
@@ -36,12 +36,12 @@ impl Search<'_> {
     pub(super) fn take_form_that_noise_holds(
         &self,
         base: &Fit,
-        trials: &mut Vec<(Trial, &dyn Effect)>,
+        trials: &mut Vec<(Trial, &'static Effect)>,
     ) {
-        let is_unknown = |kind: EffectKind| kind == EffectKind::Unknown;
-        if base.model.effects.iter().any(|own| is_unknown(own.kind())) {
+        if base.model.has(EffectKind::Unknown) {
             return;
         }
+        let is_unknown = |kind: EffectKind| kind == EffectKind::Unknown;
         let Some(form) = self.form_that_noise_holds(base, trials) else { return };
         let own = trials.iter().find(|(trial, _)| is_unknown(trial.kind));
         if own.is_none_or(|(own, _)| own.bic_gain < form.bic_gain) {
@@ -53,7 +53,7 @@ impl Search<'_> {
     /// The best form under a noise too small to hold a force, where the noise of a fit may hold one
     /// and some form explains more under the small one than the kind of the library that explains
     /// most.
-    fn form_that_noise_holds(&self, base: &Fit, trials: &[(Trial, &dyn Effect)]) -> Option<Trial> {
+    fn form_that_noise_holds(&self, base: &Fit, trials: &[(Trial, &Effect)]) -> Option<Trial> {
         let (_, share) = self.problem.noise_n_per_kn(base.noise, NOISE_OVER_S)?;
         if share < HOLDS_A_FORCE {
             return None;
@@ -76,7 +76,7 @@ impl Search<'_> {
     pub fn look_under_noise(&self, outcome: &mut Outcome) {
         let models = [outcome.base.clone(), outcome.fit.clone()];
         for base in models.iter().take(1 + usize::from(!outcome.fit.model.effects.is_empty())) {
-            if base.model.effects.iter().any(|own| own.kind() == EffectKind::Unknown) {
+            if base.model.has(EffectKind::Unknown) {
                 continue;
             }
             let before = FitErrors::of(self.problem, base);
@@ -93,7 +93,7 @@ impl Search<'_> {
 }
 
 /// The trial that explains most of those that may be what their kinds say.
-fn best_possible<'t>(trials: &'t [(Trial, &dyn Effect)]) -> Option<&'t Trial> {
+fn best_possible<'t>(trials: &'t [(Trial, &Effect)]) -> Option<&'t Trial> {
     let trials = trials.iter().map(|(trial, _)| trial);
     let possible =
         trials.filter(|it| it.bic_gain > 0.0 && it.kind != EffectKind::Unknown && is_possible(it));

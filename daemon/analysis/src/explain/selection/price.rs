@@ -12,14 +12,14 @@ use crate::explain::evidence::Fit;
 /// Williams 2006, equation 3.32).
 pub fn penalty(fit: &Fit, index: usize) -> f64 {
     let effect = &fit.model.effects[index];
-    let narrowed = effect.prior_information().and_then(|prior| narrowed(fit, index, prior));
+    let narrowed = effect.nature().prior.and_then(|prior| narrowed(fit, index, prior));
     let by_count = || {
         let parameters = effect.parameters().len() as f64;
         let observations =
-            if effect.is_one_number_a_run() { fit.runs.len() } else { fit.observations() };
+            if effect.nature().is_one_number_a_run { fit.runs.len() } else { fit.observations() };
         parameters * (observations.max(2) as f64).ln()
     };
-    narrowed.unwrap_or_else(by_count) + effect.choice_cost()
+    narrowed.unwrap_or_else(by_count) + effect.nature().choice_cost
 }
 
 /// Logarithm of the determinant of the information about an effect's parameters, all others fitted,
@@ -28,8 +28,7 @@ fn narrowed(fit: &Fit, index: usize, prior: &DMatrix<f64>) -> Option<f64> {
     let own = fit.model.ranges()[index].clone();
     let information = fit.information();
     let others: Vec<usize> = (0..fit.theta.len()).filter(|i| !own.contains(i)).collect();
-    let rest =
-        DMatrix::from_fn(others.len(), others.len(), |i, j| information[(others[i], others[j])]);
+    let rest = information.select_rows(&others).select_columns(&others);
     let log_determinant =
         |matrix: DMatrix<f64>| Some(2.0 * Cholesky::new(matrix)?.l().diagonal().map(f64::ln).sum());
     let all = log_determinant(information)?;
@@ -40,7 +39,7 @@ fn narrowed(fit: &Fit, index: usize, prior: &DMatrix<f64>) -> Option<f64> {
 /// share would bring: (x/s)² becomes x²/(s² + e²), for each parameter.
 pub fn discounted(fit: &Fit, index: usize, decrease: f64) -> f64 {
     let effect = &fit.model.effects[index];
-    let shared = effect.shared_error();
+    let shared = effect.nature().shared_error;
     if shared == 0.0 || decrease <= 0.0 {
         return decrease;
     }

@@ -1,6 +1,6 @@
 //! What was accepted on trial again, beside what came after it.
 
-use super::certainty::{is_accepted, may_be};
+use super::acceptance::{is_accepted, may_be};
 use super::outcome::{Outcome, Round};
 use super::search::Search;
 use crate::explain::evidence::{EQUAL, Fit};
@@ -19,9 +19,10 @@ impl Search<'_> {
                 tried.push((*kind, brought_last));
                 break;
             }
-            let index = outcome.fit.model.effects.iter().position(|own| own.kind() == *kind);
+            let index = outcome.fit.model.position(*kind);
             let Some(index) = index.filter(|_| outcome.is_on_trial(*kind)) else { continue };
             let rest = self.without(&outcome.fit, index);
+
             let trials = self.rivals(&rest, *kind);
             let mut stands = *kind;
             if let Some(best) = self.best(&trials, &outcome.fallen_kinds())

@@ -1,6 +1,7 @@
 //! Forward search with a swap pass and pruning.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
@@ -8,9 +9,44 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::outcome::{Outcome, Round, Trial};
 use super::price::model_penalty;
-use super::steps::{Progress, round_share};
-use crate::explain::evidence::{EQUAL, Fit, FitProblem, Noise, RunData, UpdatedModel};
+use crate::explain::effects::Effect;
+use crate::explain::evidence::{EQUAL, Fit, FitProblem, RunData, UpdatedModel};
 use crate::explain::scan::Scan;
+
+/// Told how far the work is, by any thread: share done, and what is being done. It may unwind to end the
+/// work, which holds nothing that would have to be put right.
+pub type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
+
+/// How many steps of a round are done, by all threads together.
+pub struct Steps<'s> {
+    progress: Progress<'s>,
+    round: usize,
+    count: usize,
+    done: AtomicUsize,
+}
+
+/// Share done before a round ends: nobody knows how many there will be, and most have few.
+pub fn round_share(round: usize, done: f64) -> f64 {
+    let left = 0.5f64.powi(round as i32) * (1.0 - 0.5 * done);
+    0.05 + 0.9 * (1.0 - left)
+}
+
+impl<'s> Steps<'s> {
+    /// Of a round after so many effects, which takes this number of steps at most.
+    pub fn of(progress: Progress<'s>, round: usize, count: usize) -> Self {
+        Steps { progress, round, count, done: AtomicUsize::new(0) }
+    }
+
+    /// Does one step for a kind.
+    pub fn done_with<T>(&self, effect: &Effect, step: impl FnOnce() -> T) -> T {
+        let share = || self.done.load(Ordering::Relaxed) as f64 / self.count as f64;
+        (self.progress)(round_share(self.round, share()), effect.kind.name());
+        let result = step();
+        self.done.fetch_add(1, Ordering::Relaxed);
+        (self.progress)(round_share(self.round, share()), effect.kind.name());
+        result
+    }
+}
 
 /// Rounds at most: what is taken in and dropped again must come to an end.
 const ROUNDS_MAX: usize = 10;
@@ -35,10 +71,7 @@ impl Search<'_> {
     /// The declared model with a, b, c refitted, and no search for effects.
     pub fn base(&self) -> Outcome {
         (self.progress)(0.05, "fitting a, b, c");
-        let declared = UpdatedModel::default();
-        let start = self.problem.start(&[]);
-        let first = self.problem.fit_with_noise(&declared, start, Noise::START);
-        let base = self.problem.with_own_noise(&first);
+        let base = self.problem.fit_from_declared(&UpdatedModel::default(), &[]);
         Outcome {
             base: base.clone(),
             likeliest: base.clone(),
@@ -142,11 +175,29 @@ impl Search<'_> {
 
     /// The model without one effect, refitted.
     pub fn without(&self, fit: &Fit, index: usize) -> Fit {
-        let range = fit.model.ranges()[index].clone();
-        let mut model = fit.model.clone();
-        model.effects.remove(index);
-        let kept = fit.theta.iter().enumerate().filter(|(i, _)| !range.contains(i));
-        let start = kept.map(|(_, value)| *value).collect();
+        let (model, start) = fit.model.without(&fit.theta, index);
         self.problem.fit_with_noise(&model, start, fit.noise)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::explain::effects::LIBRARY;
+
+    #[test]
+    fn shares_grow_from_step_to_step_and_from_round_to_round() {
+        let shares = Mutex::new(Vec::new());
+        let progress = |share: f64, _: &str| shares.lock().unwrap().push(share);
+        for round in 0..5 {
+            let steps = Steps::of(&progress, round, 3);
+            (0..3).for_each(|_| steps.done_with(&LIBRARY[0], || ()));
+        }
+        let shares = shares.into_inner().unwrap();
+        assert_eq!(shares.len(), 30);
+        assert!(shares.windows(2).all(|pair| pair[0] <= pair[1]), "{shares:?}");
+        assert!(shares[0] > 0.0 && shares[29] < 1.0);
     }
 }

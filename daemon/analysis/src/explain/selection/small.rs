@@ -8,7 +8,7 @@
 use dynocar_model::terms::wind;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::certainty::{CERTAIN, is_accepted};
+use super::acceptance::{CERTAIN, is_accepted};
 use super::outcome::{Outcome, Trial};
 use super::price::penalty;
 use super::refusal::Refusal;
@@ -16,6 +16,7 @@ use super::search::Search;
 use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::Fit;
 use crate::explain::score::reduction;
+use crate::statistics::rms;
 
 /// Kinds by which clocks, wheels and force sensors are always a little off, the most usual first.
 const EVERYDAY: [EffectKind; 5] = [
@@ -31,9 +32,7 @@ const LATE: [EffectKind; 2] = [EffectKind::ActuatorDelay, EffectKind::SpeedDelay
 
 /// Whether winds are such as blow on ordinary days.
 fn is_everyday_wind(trial: &Trial) -> bool {
-    let winds_mps = trial.fit.effect_parameters(trial.last());
-    let square = winds_mps.iter().map(|wind| wind * wind).sum::<f64>() / winds_mps.len() as f64;
-    square.sqrt() <= wind::EVERYDAY_MPS
+    rms(trial.fit.effect_parameters(trial.last())) <= wind::EVERYDAY_MPS
 }
 
 /// Whether an everyday kind is certain, and only for its size no effect.
@@ -87,7 +86,7 @@ impl Search<'_> {
         }
         for kind in kinds {
             let fit = &outcome.fit;
-            let index = fit.model.effects.iter().position(|effect| effect.kind() == kind);
+            let index = fit.model.position(kind);
             let Some(index) = index.filter(|_| !outcome.is_named(kind)) else { continue };
             let rest = self.without(fit, index);
             let evidence = rest.cost - fit.cost - penalty(fit, index);

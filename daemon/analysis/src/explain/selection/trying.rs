@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::outcome::Trial;
 use super::price::{discounted, penalty};
 use super::search::Search;
-use super::steps::Steps;
-use crate::explain::effects::{Candidate, Effect, LIBRARY, Proposal, UNKNOWN};
+use super::search::Steps;
+use crate::explain::effects::{Candidate, Effect, LIBRARY, UNKNOWN};
 use crate::explain::evidence::{Fit, Noise};
 use crate::explain::scan::Scan;
 use crate::explain::score::FitErrors;
@@ -38,31 +38,8 @@ pub(super) struct Asked<'a> {
     pub rivals_of: Option<EffectKind>,
 }
 
-/// What trying a kind brought.
-enum Tried<'e> {
-    /// The data do not allow to test it, and why.
-    NotTestable(EffectKind, String),
-    /// Its best candidate, if any, by this kind or its forms.
-    Best(Option<Box<Trial>>, &'e dyn Effect),
-}
-
-impl<'e> Tried<'e> {
-    /// Among the trials, or what cannot be tested.
-    fn take(
-        self,
-        trials: &mut Vec<(Trial, &'e dyn Effect)>,
-        not_testable: &mut Vec<(EffectKind, String)>,
-    ) {
-        match self {
-            Tried::Best(best, effect) => trials.extend(best.map(|trial| (*trial, effect))),
-            Tried::NotTestable(kind, reason) => {
-                if !not_testable.iter().any(|(other, _)| *other == kind) {
-                    not_testable.push((kind, reason));
-                }
-            }
-        }
-    }
-}
+/// The best candidate of a kind, if any, by this kind or its forms; or why the data do not allow to test it.
+type Tried = (&'static Effect, Result<Option<Trial>, String>);
 
 /// Whether a trial would be more than chance with so many times the evidence: what errors that all runs share hold
 /// most of does not become so by another place or noise.
@@ -87,7 +64,7 @@ impl Search<'_> {
         self.round_of(base, &mut Vec::new(), asked)
     }
 
-    /// Tries some kinds; the strongest first.
+    /// Tries those of some kinds that the model does not have yet; the strongest first.
     pub(super) fn round_of(
         &self,
         base: &Fit,
@@ -101,7 +78,7 @@ impl Search<'_> {
         let by_advantage = |one: &Trial, other: &Trial| other.bic_gain.total_cmp(&one.bic_gain);
         let before = FitErrors::of(self.problem, base);
         let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
-        let measure = |trials: &mut [(Trial, &dyn Effect)], is_asked: fn(f64) -> bool| {
+        let measure = |trials: &mut [(Trial, &Effect)], is_asked: fn(f64) -> bool| {
             trials
                 .par_iter_mut()
                 .filter(|(trial, _)| is_asked(trial.bic_gain))
@@ -132,7 +109,7 @@ impl Search<'_> {
                 if !is_finalist {
                     return trial;
                 }
-                let trial = steps.done_with(effect, |effect| self.finalist(base, trial, effect));
+                let trial = steps.done_with(effect, || self.finalist(base, trial, effect));
                 Trial { reduction: reduction(&trial.fit), ..trial }
             })
             .collect();
@@ -141,37 +118,39 @@ impl Search<'_> {
     }
 
     /// Tries every kind that the model does not have yet, what is outside the library last.
-    fn try_all<'e>(
+    fn try_all(
         &self,
         base: &Fit,
         scan: &Scan,
         steps: &Steps,
         not_testable: &mut Vec<(EffectKind, String)>,
         Asked { is_asked, rivals_of }: Asked,
-    ) -> Vec<(Trial, &'e dyn Effect)> {
-        let is_new = |effect: &&dyn Effect| {
-            is_asked(effect.kind())
-                && !base.model.effects.iter().any(|own| own.kind() == effect.kind())
+    ) -> Vec<(Trial, &'static Effect)> {
+        let is_new = |effect: &&Effect| is_asked(effect.kind) && !base.model.has(effect.kind);
+        let (outside, library): (Vec<&Effect>, Vec<&Effect>) =
+            LIBRARY.iter().filter(is_new).partition(|it| it.kind == EffectKind::Unknown);
+        let (own, library): (Vec<&Effect>, Vec<&Effect>) =
+            library.into_iter().partition(|it| rivals_of == Some(it.kind));
+        let try_kind = |effect: &'static Effect, least| -> Tried {
+            (effect, steps.done_with(effect, || self.try_kind((base, least), scan, effect)))
         };
-        let (outside, library): (Vec<&dyn Effect>, Vec<&dyn Effect>) =
-            LIBRARY.iter().copied().filter(is_new).partition(|it| it.kind() == EffectKind::Unknown);
-        let (own, library): (Vec<&dyn Effect>, Vec<&dyn Effect>) =
-            library.into_iter().partition(|it| rivals_of == Some(it.kind()));
-        let try_kind = |effect, least| {
-            steps.done_with(effect, |effect| self.try_kind((base, least), scan, effect))
-        };
-        let mut trials = Vec::new();
-        own.into_iter().for_each(|own| try_kind(own, 0.0).take(&mut trials, not_testable));
-        let gains = trials.iter().map(|(own, _): &(Trial, _)| RIVAL_SHARE * own.bic_gain);
+        let mut trials: Vec<(Trial, &Effect)> = Vec::new();
+        let mut take =
+            |trials: &mut Vec<(Trial, &'static Effect)>, (effect, tried): Tried| match tried {
+                Ok(best) => trials.extend(best.map(|trial| (trial, effect))),
+                Err(_) if not_testable.iter().any(|(kind, _)| *kind == effect.kind) => {}
+                Err(reason) => not_testable.push((effect.kind, reason)),
+            };
+        own.into_iter().for_each(|own| take(&mut trials, try_kind(own, 0.0)));
+        let gains = trials.iter().map(|(own, _)| RIVAL_SHARE * own.bic_gain);
         let least = gains.fold(0.0, f64::max);
         let tried: Vec<Tried> =
             library.into_par_iter().map(|effect| try_kind(effect, least)).collect();
-        tried.into_iter().for_each(|tried| tried.take(&mut trials, not_testable));
+        tried.into_iter().for_each(|tried| take(&mut trials, tried));
         let mut has_forms = false;
         for effect in outside {
             has_forms = self.asks_for_a_form(scan, &trials);
-            let effect = if has_forms { UNKNOWN } else { effect };
-            try_kind(effect, least).take(&mut trials, not_testable);
+            take(&mut trials, try_kind(if has_forms { UNKNOWN } else { effect }, least));
         }
         if !has_forms {
             self.take_form_that_noise_holds(base, &mut trials);
@@ -181,21 +160,16 @@ impl Search<'_> {
 
     /// The best candidate of a kind, beside everything accepted so far; what promises less than a gain is not
     /// fitted to its end.
-    fn try_kind<'e>(
+    fn try_kind(
         &self,
-        (base, least): (&Fit, f64),
+        base: (&Fit, f64),
         scan: &Scan,
-        effect: &'e dyn Effect,
-    ) -> Tried<'e> {
-        match effect.propose(scan) {
-            Proposal::NotTestable(reason) => Tried::NotTestable(effect.kind(), reason),
-            Proposal::Candidates(candidates) => {
-                let is_only = candidates.len() == 1 && candidates.iter().all(Candidate::is_fixed);
-                let best = self.best_attempt((base, least), base, candidates);
-                let best = best.map(|trial| Box::new(Trial { is_only, ..trial }));
-                Tried::Best(best, effect)
-            }
-        }
+        effect: &Effect,
+    ) -> Result<Option<Trial>, String> {
+        let candidates = effect.propose(scan)?;
+        let is_only = candidates.len() == 1 && candidates.iter().all(Candidate::is_fixed);
+        let best = self.best_attempt(base, base.0, candidates);
+        Ok(best.map(|trial| Trial { is_only, ..trial }))
     }
 
     /// The candidate that explains most for its price, fitted on top of a fit.
@@ -235,7 +209,7 @@ impl Search<'_> {
     /// Gives a trial the noise that remains under it and lets its kind look again for places and windows
     /// under that noise: the noise of the smaller model holds the effect itself. Where there are many to
     /// choose from, it looks under stiff noises too; where there is one, its fit goes on.
-    fn finalist(&self, base: &Fit, trial: Trial, effect: &dyn Effect) -> Trial {
+    fn finalist(&self, base: &Fit, trial: Trial, effect: &Effect) -> Trial {
         let with_own_noise =
             |fit: &Fit| Self::trial(base, self.problem.with_own_noise(fit), trial.kind);
         let mut best = with_own_noise(&trial.fit);
@@ -269,11 +243,11 @@ impl Search<'_> {
         &self,
         base: &Fit,
         noise: Noise,
-        effect: &dyn Effect,
+        effect: &Effect,
     ) -> Option<(Trial, bool)> {
         let onto = self.problem.again(base, noise);
         let scan = self.scan(&onto)?;
-        let Proposal::Candidates(candidates) = effect.propose(&scan) else { return None };
+        let candidates = effect.propose(&scan).ok()?;
         let many = candidates.len() > 1 || candidates.iter().any(Candidate::is_chosen_among_many);
         let best = self.best_attempt((base, 0.0), &onto, candidates)?;
         Some((Self::trial(base, self.problem.with_own_noise(&best.fit), best.kind), many))

@@ -1,6 +1,6 @@
 //! Measured and predicted speed of a run, and the error of the prediction below it.
 
-use dynocar_analysis::explain::report::traces::{Trace, TracePoint};
+use dynocar_analysis::explain::report::timeline::{SpeedPoint, Trace};
 use plotters::element::PathElement;
 use plotters::style::RGBColor;
 
@@ -81,10 +81,10 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
 }
 
 /// One of the speeds of a point.
-type Speed = fn(&TracePoint) -> f64;
+type Speed = fn(&SpeedPoint) -> f64;
 
 fn readings(trace: &Trace, has_effect: bool) -> Vec<Reading> {
-    let values = |value: &dyn Fn(&TracePoint) -> f64| -> Vec<f64> {
+    let values = |value: &dyn Fn(&SpeedPoint) -> f64| -> Vec<f64> {
         // Nothing is read between two pieces.
         trace.pieces.iter().flat_map(|it| it.iter().map(value).chain([f64::NAN])).collect()
     };
@@ -106,7 +106,7 @@ fn lines(
     trace: &Trace,
     colour: RGBColor,
     width_px: f64,
-    value: impl Fn(&TracePoint) -> f64,
+    value: impl Fn(&SpeedPoint) -> f64,
 ) -> Result<(), DrawError> {
     chart.draw_series(trace.pieces.iter().map(|piece| {
         let line: Vec<(f64, f64)> = piece.iter().map(|p| (p.time_s, value(p))).collect();

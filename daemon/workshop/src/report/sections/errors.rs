@@ -1,10 +1,10 @@
 //! Error before and after, and the speeds behind it.
 
 use dynocar_analysis::dataset::Role;
-use dynocar_analysis::explain::judged::Judged;
 use dynocar_analysis::explain::report::Estimate;
 use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors};
-use dynocar_analysis::explain::report::traces::Trace;
+use dynocar_analysis::explain::report::timeline::Trace;
+use dynocar_analysis::explain::stop_to_stop::Judged;
 use dynocar_analysis::explain::stop_to_stop::{StopToStop, reduction};
 
 use super::Section;

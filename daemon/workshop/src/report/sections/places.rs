@@ -1,6 +1,6 @@
 //! Where the effects act, and how surely that is known.
 
-use dynocar_analysis::explain::report::places::{PlaceRow, PlaceRuns};
+use dynocar_analysis::explain::report::parameters::{PlaceRow, PlaceRuns};
 use dynocar_analysis::explain::report::words::joined;
 
 use crate::report::Subject;

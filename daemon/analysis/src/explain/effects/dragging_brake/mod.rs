@@ -7,23 +7,19 @@ mod onsets;
 
 use std::sync::Arc;
 
-use dynocar_model::terms::Parameter;
 use dynocar_model::terms::brake::{self, BUILD_UP_S, build_up};
 use dynocar_shared::vocabulary::EffectKind;
 
 use self::onsets::{GRID_MIN_S, TAIL_MIN_S, by_speed, onset_tuple};
-use super::{Candidate, Effect, Hypothesis, Proposal, SharedHypothesis};
+use super::{Candidate, Hypothesis, Nature, On, Proposal, SharedHypothesis};
 use crate::explain::answer::{Location, RunWindow};
-use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::evidence::SampleForces;
 use crate::explain::places::{Axis, End, Reach};
 use crate::explain::residual_pressure;
 use crate::explain::scan::{Scan, Tuple};
 
 /// So many brakes, and in most runs, do not happen to stick equally long after a departure.
 const CLOCKED_RUNS_MIN: usize = 3;
-
-/// The kind.
-pub struct DraggingBrake;
 
 #[derive(Clone, Debug)]
 struct Dragging {
@@ -36,33 +32,28 @@ struct Dragging {
     choice_cost: f64,
 }
 
-impl Effect for DraggingBrake {
-    fn kind(&self) -> EffectKind {
-        EffectKind::DraggingBrake
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let mut candidates = Vec::new();
+    let runs = &scan.problem.runs;
+    let fit_runs = runs.len();
+    let by_pressure = residual_pressure::windows(runs.iter().chain(scan.holdout));
+    let fitted = |windows: &[RunWindow]| {
+        windows.iter().any(|window| runs.iter().any(|run| run.file == window.run))
+    };
+    if let Some(windows) = by_pressure.clone().filter(|windows| fitted(windows)) {
+        let tuple = window_tuple(scan, &windows);
+        let (_, estimate) = scan.gain(&tuple);
+        let hypothesis = Dragging { windows, by_speed: Vec::new(), fit_runs, choice_cost: 2.0 };
+        candidates.push(Candidate::new(hypothesis, vec![estimate.max(0.0)]));
     }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let mut candidates = Vec::new();
-        let runs = &scan.problem.runs;
-        let fit_runs = runs.len();
-        let by_pressure = residual_pressure::windows(runs.iter().chain(scan.holdout));
-        let fitted = |windows: &[RunWindow]| {
-            windows.iter().any(|window| runs.iter().any(|run| run.file == window.run))
-        };
-        if let Some(windows) = by_pressure.clone().filter(|windows| fitted(windows)) {
-            let tuple = window_tuple(scan, &windows);
-            let (_, estimate) = scan.gain(&tuple);
-            let hypothesis = Dragging { windows, by_speed: Vec::new(), fit_runs, choice_cost: 2.0 };
-            candidates.push(Candidate::new(hypothesis, vec![estimate.max(0.0)]));
-        }
-        if let Some((windows, estimate, choice_cost)) = by_speed(scan) {
-            let by_speed = windows.iter().map(|window| spanned(scan, window)).collect();
-            let windows = with_holdout(scan, windows, by_pressure);
-            let hypothesis = Dragging { windows, by_speed, fit_runs, choice_cost };
-            candidates.push(Candidate::new(hypothesis, vec![estimate]));
-        }
-        Proposal::Candidates(candidates)
+    if let Some((windows, estimate, choice_cost)) = by_speed(scan) {
+        let by_speed = windows.iter().map(|window| spanned(scan, window)).collect();
+        let windows = with_holdout(scan, windows, by_pressure);
+        let hypothesis = Dragging { windows, by_speed, fit_runs, choice_cost };
+        candidates.push(Candidate::new(hypothesis, vec![estimate]));
     }
+    Ok(candidates)
 }
 
 /// Time in s of the first sample of a window's run, and the run's duration in s.
@@ -103,23 +94,15 @@ fn with_holdout(
 }
 
 impl Hypothesis for Dragging {
-    fn kind(&self) -> EffectKind {
-        EffectKind::DraggingBrake
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            choice_cost: self.choice_cost,
+            affine_in: Some(|value| value),
+            ..Nature::of(EffectKind::DraggingBrake, &brake::PARAMETERS)
+        }
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        &brake::PARAMETERS
-    }
-
-    fn choice_cost(&self) -> f64 {
-        self.choice_cost
-    }
-
-    fn affine_in(&self) -> Option<fn(f64) -> f64> {
-        Some(|value| value)
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         for window in self.windows.iter().filter(|window| window.run == run.file) {
             let onset_s = window.t_start_s - run.offset_s;
             for (force, time_s) in forces.iter_mut().zip(&run.recording.time_s()[first..]) {

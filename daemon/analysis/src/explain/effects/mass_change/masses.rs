@@ -6,9 +6,9 @@ use dynocar_model::terms::{Entry, Parameter, masses};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
-use super::parts::Part;
+use super::parts::{Along, Part};
 use crate::explain::answer::{Location, MassSection, MassWindow, ParameterValue, RunWindow};
-use crate::explain::effects::{Hypothesis, ReportContext, Reported, SharedHypothesis};
+use crate::explain::effects::{Hypothesis, Nature, On, ReportContext, Reported, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
 
@@ -66,24 +66,14 @@ impl Masses {
 }
 
 impl Hypothesis for Masses {
-    fn kind(&self) -> EffectKind {
-        EffectKind::MassChange
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn choice_cost(&self) -> f64 {
-        self.choice_cost
-    }
-
-    fn prior_information(&self) -> Option<&DMatrix<f64>> {
-        self.information.as_ref()
-    }
-
-    fn none(&self) -> f64 {
-        1.0
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            none: 1.0,
+            prior: self.information.as_ref(),
+            choice_cost: self.choice_cost,
+            affine_in: Some(f64::recip),
+            ..Nature::of(EffectKind::MassChange, &self.parameters)
+        }
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
@@ -94,11 +84,7 @@ impl Hypothesis for Masses {
         self.parts[parameter].is_in(run)
     }
 
-    fn affine_in(&self) -> Option<fn(f64) -> f64> {
-        Some(f64::recip)
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let parts = self.parts.iter().zip(parameters);
         for (part, factor) in parts.filter(|(part, _)| part.is_in(run)) {
             for (i, force) in (first..).zip(&mut *forces) {
@@ -112,9 +98,9 @@ impl Hypothesis for Masses {
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
         let mut rows = Vec::new();
         for (part, &factor) in self.parts.iter().zip(parameters) {
-            let Part::Section { from_m, to_m, direction } = *part else { return None };
-            let towards = direction.map_or(vec![1.0, -1.0], |direction| vec![direction]);
-            rows.extend(towards.into_iter().map(|towards| vec![from_m, to_m, towards, factor]));
+            let Part { ends: [from_m, to_m], along: Along::Line(_) } = *part else { return None };
+            let towards = part.directions().into_iter();
+            rows.extend(towards.map(|towards| vec![from_m, to_m, towards, factor]));
         }
         Some(vec![Entry::Rows(masses::LIST, rows)])
     }
@@ -122,11 +108,11 @@ impl Hypothesis for Masses {
     fn ends(&self) -> Vec<End> {
         let mut ends = Vec::new();
         for (part, (own, edges)) in self.parts.iter().zip(&self.edges).enumerate() {
-            let (axis, run) = match own {
-                Part::Section { .. } => (Axis::Chainage, None),
-                Part::Window { run, .. } => (Axis::Time, Some(run.clone())),
+            let (axis, run) = match &own.along {
+                Along::Line(_) => (Axis::Chainage, None),
+                Along::Run(file, _) => (Axis::Time, Some(file.clone())),
             };
-            for (is_upper, at) in [false, true].into_iter().zip(own.ends()) {
+            for (is_upper, at) in [false, true].into_iter().zip(own.ends) {
                 if !edges.is_empty() {
                     let (reach, run) = (Reach::OneOf(edges.clone()), run.clone());
                     ends.push(End { axis, part, is_upper, at, reach, fine: 0.0, run });
@@ -145,26 +131,9 @@ impl Hypothesis for Masses {
     }
 
     fn place(&self) -> Location {
-        let windows: Vec<RunWindow> = self
-            .parts
-            .iter()
-            .filter_map(|part| match part {
-                Part::Window { run, from_s, to_s, offset_s } => Some(RunWindow {
-                    run: run.clone(),
-                    t_start_s: offset_s + from_s,
-                    t_end_s: offset_s + to_s,
-                }),
-                Part::Section { .. } => None,
-            })
-            .collect();
-        let intervals: Vec<[f64; 2]> = self
-            .parts
-            .iter()
-            .filter_map(|part| match part {
-                Part::Section { from_m, to_m, .. } => Some([*from_m, *to_m]),
-                Part::Window { .. } => None,
-            })
-            .collect();
+        let windows: Vec<RunWindow> = self.parts.iter().filter_map(Part::window).collect();
+        let on_line = self.parts.iter().filter(|part| matches!(part.along, Along::Line(_)));
+        let intervals: Vec<[f64; 2]> = on_line.map(|part| part.ends).collect();
         Location {
             windows: (!windows.is_empty()).then_some(windows),
             intervals_m: (!intervals.is_empty()).then_some(intervals),
@@ -175,28 +144,15 @@ impl Hypothesis for Masses {
     fn report(&self, context: &ReportContext) -> Reported {
         let (mut sections, mut windows, mut deviations) = (Vec::new(), Vec::new(), Vec::new());
         for (k, part) in self.parts.iter().enumerate() {
-            let mass_factor = context.parameters[k];
-            match part {
-                Part::Section { from_m, to_m, direction } => {
-                    for towards in direction.map_or(vec![1.0, -1.0], |direction| vec![direction]) {
-                        sections.push(MassSection {
-                            from_m: *from_m,
-                            to_m: *to_m,
-                            direction: towards as i8,
-                            mass_factor,
-                        });
-                        deviations.push(context.deviations[k]);
-                    }
-                }
-                Part::Window { run, from_s, to_s, offset_s } => {
-                    windows.push(MassWindow {
-                        run: run.clone(),
-                        t_start_s: offset_s + from_s,
-                        t_end_s: offset_s + to_s,
-                        mass_factor,
-                    });
-                    deviations.push(context.deviations[k]);
-                }
+            let (mass_factor, [from_m, to_m]) = (context.parameters[k], part.ends);
+            for towards in part.directions() {
+                let direction = towards as i8;
+                sections.push(MassSection { from_m, to_m, direction, mass_factor });
+                deviations.push(context.deviations[k]);
+            }
+            if let Some(window) = part.window() {
+                windows.push(MassWindow { window, mass_factor });
+                deviations.push(context.deviations[k]);
             }
         }
         let mut reported = Reported::default();

@@ -3,34 +3,212 @@
 
 mod masses;
 mod parts;
-mod search;
 
-use dynocar_shared::vocabulary::EffectKind;
+use std::sync::Arc;
 
-use super::{Candidate, Effect, Proposal};
-use crate::explain::scan::Scan;
-use search::{all_sections, all_windows, everywhere, grow};
+use dynocar_model::terms::masses::LEAST_SHARE;
+use rayon::prelude::*;
 
-/// The kind.
-pub struct MassChange;
+use super::{Candidate, Proposal};
+use crate::explain::evidence::{EQUAL, RunData};
+use crate::explain::hypothesis::SharedHypothesis;
+use crate::explain::places::span_m;
+use crate::explain::scan::{Scan, Tuple};
+use masses::Masses;
+use parts::{Along, Part, STATION_M, STOP_MIN_S, stations, stops};
 
-impl Effect for MassChange {
-    fn kind(&self) -> EffectKind {
-        EffectKind::MassChange
+/// Sections or windows at most.
+const PARTS_MAX: usize = 5;
+
+/// Structures for the data at hand.
+pub fn propose(scan: &Scan) -> Proposal {
+    let mut candidates = Vec::new();
+    let sections = all_sections(scan);
+    if !sections.is_empty() {
+        candidates.extend(grow(scan, &sections));
     }
+    candidates.extend(grow(scan, &all_windows(scan)));
+    candidates.extend(everywhere(scan));
+    Ok(candidates)
+}
 
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let mut candidates = Vec::new();
-        let sections = all_sections(scan);
-        if !sections.is_empty() {
-            candidates.extend(grow(scan, &sections));
+/// What a mass factor slightly above 1 does: traction and brake force move more mass, while all
+/// that goes with the weight stays.
+fn shape(run: &RunData, index: usize) -> f64 {
+    let sample = &run.samples()[index];
+    -sample.control_force_n().unwrap_or(0.0) / sample.inertial_mass_kg
+}
+
+/// Every section between two stations in one direction, with its tuple; none where positions are not
+/// measured, for then the runs share no places.
+fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
+    if scan.problem.distance_ratio.is_none() {
+        return Vec::new();
+    }
+    let stations = stations(scan);
+    let mut sections = Vec::new();
+    for direction in [Some(1.0), Some(-1.0)] {
+        let part = |from: usize, to: usize| Part {
+            ends: [stations[from], stations[to]],
+            along: Along::Line(direction),
+        };
+        let elementary: Vec<Tuple> = (0..stations.len().saturating_sub(1))
+            .map(|k| part_tuple(scan, &part(k, k + 1)))
+            .collect();
+        sections.extend(joined(&elementary, part));
+    }
+    sections
+}
+
+/// The tuple of another mass in a part.
+fn part_tuple(scan: &Scan, part: &Part) -> Tuple {
+    let mut sum = Tuple::zero(scan.fit.theta.len());
+    for (index, run) in scan.problem.runs.iter().enumerate() {
+        if part.is_in(run) {
+            let masked =
+                |run: &RunData, i: usize| if part.holds(run, i) { shape(run, i) } else { 0.0 };
+            sum.add(&scan.run_tuple(index, masked));
         }
-        candidates.extend(grow(scan, &all_windows(scan)));
-        candidates.extend(self.whole(scan));
-        Proposal::Candidates(candidates)
     }
+    sum
+}
 
-    fn whole(&self, scan: &Scan) -> Option<Candidate> {
-        everywhere(scan)
+/// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
+fn joined(
+    elementary: &[Tuple],
+    part: impl Fn(usize, usize) -> Part,
+) -> impl Iterator<Item = (Part, Tuple)> {
+    (0..elementary.len()).flat_map(move |from| {
+        let mut sum = Tuple::zero(elementary[from].cross.len());
+        let mut rows = Vec::new();
+        for to in from..elementary.len() {
+            sum.add(&elementary[to]);
+            if elementary[to].square > 0.0 && elementary[from].square > 0.0 {
+                rows.push((part(from, to + 1), sum.clone()));
+            }
+        }
+        rows
+    })
+}
+
+/// Every section between neighbouring stations with a factor of its own: loads that change at every stop.
+fn every(parts: &[(Part, Tuple)]) -> Candidate {
+    let is_within = |part: &Part, other: &Part| {
+        let ([from, to], [low, high]) = (part.ends, other.ends);
+        !part.is_apart(other) && from <= low && high <= to && part != other
+    };
+    let is_least = |part: &&Part| !parts.iter().any(|(other, _)| is_within(part, other));
+    let least: Vec<Part> = parts.iter().map(|(part, _)| part).filter(is_least).cloned().collect();
+    let start = vec![1.0; least.len()];
+    Candidate::new(Masses::of_all(least), start)
+}
+
+/// One factor in all runs: nothing to choose but whether there are parts at all.
+pub fn everywhere(scan: &Scan) -> Option<Candidate> {
+    let [low, high] = span_m(scan)?;
+    let runs = &scan.problem.runs;
+    let first = runs.first()?.direction;
+    let direction = runs.iter().all(|run| run.direction == first).then_some(first);
+    let ends = [low - STATION_M, high + STATION_M];
+    let part = Part { ends, along: Along::Line(direction) };
+    let (_, estimate) = scan.gain(&scan.tuple(shape));
+    let start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
+    let choice_cost = 2.0 * std::f64::consts::LN_2;
+    Some(Candidate::new(Masses::new(part, Vec::new(), choice_cost), start))
+}
+
+/// Every section between two stops of a run, with its tuple.
+fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
+    let mut windows = Vec::new();
+    for run in &scan.problem.runs {
+        let mut edges = vec![0.0];
+        edges.extend(stops(run).iter().map(|stop| 0.5 * (stop.0 + stop.1)));
+        edges.push(run.duration_s());
+        edges.dedup_by(|one, other| *one - *other < STOP_MIN_S);
+        let part = |from: usize, to: usize| Part {
+            ends: [edges[from], edges[to]],
+            along: Along::Run(run.file.clone(), run.offset_s),
+        };
+        let elementary: Vec<Tuple> =
+            (0..edges.len() - 1).map(|k| part_tuple(scan, &part(k, k + 1))).collect();
+        windows.extend(joined(&elementary, part));
+    }
+    windows
+}
+
+/// Adds parts one by one, each fitted with a factor of its own, while they explain something; where no end
+/// of it comes in sight on the line, all of them besides.
+fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
+    let part_cost = 2.0 * (parts.len().max(2) as f64).ln();
+    let best = |scan: &Scan, tuples: &mut dyn Iterator<Item = (Part, Tuple)>| {
+        tuples
+            .map(|(part, tuple)| {
+                let (gain, estimate) = scan.gain(&tuple);
+                (gain, estimate, part)
+            })
+            .filter(|(_, estimate, _)| estimate.abs() > LEAST_SHARE)
+            .max_by(|one, other| one.0.total_cmp(&other.0))
+    };
+    let Some((_, estimate, part)) = best(scan, &mut parts.iter().cloned()) else {
+        return Vec::new();
+    };
+    let edges = |part: &Part| part.edges(parts.iter().map(|(other, _)| other));
+    let mut masses = Masses::new(part.clone(), edges(&part), part_cost);
+    let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
+    while masses.parts().len() < PARTS_MAX {
+        let hypothesis = Arc::new(masses.clone());
+        let more: [(SharedHypothesis, Vec<f64>); 1] = [(hypothesis, start)];
+        let fit = scan.problem.grown(scan.fit, more);
+        start = fit.theta[scan.fit.theta.len()..].to_vec();
+        let Some(next) = Scan::new(scan.problem, scan.holdout, scan.train, scan.track, &fit) else {
+            break;
+        };
+        let free = parts
+            .par_iter()
+            .filter(|(part, _)| masses.parts().iter().all(|own| own.is_apart(part)));
+        let fresh: Vec<(Part, Tuple)> =
+            free.map(|(part, _)| (part.clone(), part_tuple(&next, part))).collect();
+        match best(&next, &mut fresh.into_iter()) {
+            Some((gain, estimate, part))
+                if gain > part_cost + EQUAL && estimate.abs() > LEAST_SHARE =>
+            {
+                let edges = edges(&part);
+                masses.push(part, edges, part_cost);
+                start.push((1.0 + estimate).clamp(0.7, 1.5));
+            }
+            _ => break,
+        }
+    }
+    let is_everywhere = masses.parts().len() == PARTS_MAX
+        && matches!(masses.parts(), [Part { along: Along::Line(_), .. }, ..]);
+    let mut candidates = vec![Candidate::new(masses, start)];
+    candidates.extend(is_everywhere.then(|| every(parts)));
+    candidates
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_section_between_neighbouring_stations_is_there_once() {
+        let ends = [0.0, 900.0, 2100.0, 3000.0];
+        let section = |from: usize, to: usize, towards: f64| Part {
+            ends: [ends[from], ends[to]],
+            along: Along::Line(Some(towards)),
+        };
+        let mut parts = Vec::new();
+        for towards in [1.0, -1.0] {
+            for from in 0..3 {
+                for to in from + 1..=3 {
+                    parts.push((section(from, to, towards), Tuple::zero(3)));
+                }
+            }
+        }
+        let candidate = every(&parts);
+        assert_eq!(candidate.start, vec![1.0; 6]);
+        assert_eq!(candidate.hypothesis.parameters().len(), 6);
+        let known = candidate.hypothesis.nature().prior.unwrap();
+        assert!((known[(0, 0)] - 100.0).abs() < 1e-9 && known[(0, 1)] == 0.0);
     }
 }

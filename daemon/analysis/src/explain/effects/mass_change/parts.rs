@@ -3,6 +3,7 @@
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::track::MassSection;
 
+use crate::explain::answer::RunWindow;
 use crate::explain::evidence::RunData;
 use crate::explain::places::span_m;
 use crate::explain::scan::Scan;
@@ -12,78 +13,75 @@ pub const STOP_MIN_S: f64 = 8.0;
 /// Stops within this distance in m are one station.
 pub const STATION_M: f64 = 350.0;
 
-/// Where one factor holds.
+/// Where one factor holds: from one end to the other.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Part {
-    /// Without a direction: the same in both.
-    Section {
-        from_m: f64,
-        to_m: f64,
-        direction: Option<f64>,
-    },
-    Window {
-        run: String,
-        from_s: f64,
-        to_s: f64,
-        offset_s: f64,
-    },
+pub struct Part {
+    /// Both ends: chainages in m or times in s since the run's first sample.
+    pub ends: [f64; 2],
+    /// Along what.
+    pub along: Along,
+}
+
+/// What a part lies along.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Along {
+    /// The line; without a direction the same in both.
+    Line(Option<f64>),
+    /// The time of a run, by its file; with the time in s of its first sample in the recording's own count.
+    Run(String, f64),
 }
 
 impl Part {
     /// True when it may hold in a run.
     pub fn is_in(&self, run: &RunData) -> bool {
-        match self {
-            Part::Section { .. } => true,
-            Part::Window { run: file, .. } => *file == run.file,
+        match &self.along {
+            Along::Line(_) => true,
+            Along::Run(file, _) => *file == run.file,
         }
     }
 
     /// True when sample number `index` of a run in which it may hold lies in it.
     #[inline]
     pub fn holds(&self, run: &RunData, index: usize) -> bool {
-        match self {
-            Part::Section { from_m, to_m, direction } => {
-                let (from_m, to_m, towards) = (*from_m, *to_m, run.directions[index]);
+        let [from, to] = self.ends;
+        match &self.along {
+            Along::Line(direction) => {
+                let (from_m, to_m, towards) = (from, to, run.directions[index]);
                 let direction = direction.unwrap_or(towards);
                 let section = MassSection { from_m, to_m, direction, mass_factor: 1.0 };
                 let at_m = run.covariate(Covariate::Chainage)[index];
                 !at_m.is_nan() && section.holds(at_m, towards)
             }
-            Part::Window { from_s, to_s, .. } => {
-                (*from_s..=*to_s).contains(&run.recording.time_s()[index])
-            }
+            Along::Run(..) => (from..=to).contains(&run.recording.time_s()[index]),
         }
     }
 
-    /// Both ends: chainages in m or times in s since the run's first sample.
-    pub fn ends(&self) -> [f64; 2] {
-        match self {
-            Part::Section { from_m, to_m, .. } => [*from_m, *to_m],
-            Part::Window { from_s, to_s, .. } => [*from_s, *to_s],
+    /// The directions in which a section holds; none of a window.
+    pub fn directions(&self) -> Vec<f64> {
+        match self.along {
+            Along::Line(direction) => direction.map_or(vec![1.0, -1.0], |it| vec![it]),
+            Along::Run(..) => Vec::new(),
         }
+    }
+
+    /// The window of a run; `None` for a section of the line.
+    pub fn window(&self) -> Option<RunWindow> {
+        let Along::Run(run, offset_s) = &self.along else { return None };
+        let [t_start_s, t_end_s] = self.ends.map(|at_s| offset_s + at_s);
+        Some(RunWindow { run: run.clone(), t_start_s, t_end_s })
     }
 
     /// The same with one end elsewhere; `None` when nothing would be left.
     pub fn with_end(&self, is_upper: bool, at: f64) -> Option<Part> {
         let mut moved = self.clone();
-        let (from, to) = match &mut moved {
-            Part::Section { from_m, to_m, .. } => (from_m, to_m),
-            Part::Window { from_s, to_s, .. } => (from_s, to_s),
-        };
-        *(if is_upper { &mut *to } else { &mut *from }) = at;
-        (*from < *to).then_some(moved)
+        moved.ends[usize::from(is_upper)] = at;
+        (moved.ends[0] < moved.ends[1]).then_some(moved)
     }
 
     /// Ends of those of some parts that lie along the same axis, in ascending order.
     pub fn edges<'p>(&self, parts: impl Iterator<Item = &'p Part>) -> Vec<f64> {
-        let along = |other: &&Part| match (self, *other) {
-            (Part::Section { direction, .. }, Part::Section { direction: towards, .. }) => {
-                direction == towards
-            }
-            (Part::Window { run, .. }, Part::Window { run: file, .. }) => run == file,
-            _ => false,
-        };
-        let mut edges: Vec<f64> = parts.filter(along).flat_map(Part::ends).collect();
+        let same = parts.filter(|other| self.along == other.along);
+        let mut edges: Vec<f64> = same.flat_map(|part| part.ends).collect();
         edges.sort_unstable_by(f64::total_cmp);
         edges.dedup();
         edges
@@ -91,18 +89,13 @@ impl Part {
 
     /// True when two parts share no sample.
     pub fn is_apart(&self, other: &Part) -> bool {
-        match (self, other) {
-            (
-                Part::Section { from_m, to_m, direction },
-                Part::Section { from_m: from, to_m: to, direction: towards },
-            ) => {
-                let opposite = direction.zip(*towards).is_some_and(|(one, other)| one != other);
-                opposite || to_m <= from || to <= from_m
+        let ([from, to], [other_from, other_to]) = (self.ends, other.ends);
+        let do_not_meet = to <= other_from || other_to <= from;
+        match (&self.along, &other.along) {
+            (Along::Line(one), Along::Line(other)) => {
+                do_not_meet || one.zip(*other).is_some_and(|(one, other)| one != other)
             }
-            (
-                Part::Window { run, from_s, to_s, .. },
-                Part::Window { run: file, from_s: from, to_s: to, .. },
-            ) => run != file || to_s <= from || to <= from_s,
+            (Along::Run(one, _), Along::Run(other, _)) => one != other || do_not_meet,
             _ => false,
         }
     }

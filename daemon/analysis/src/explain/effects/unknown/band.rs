@@ -4,18 +4,17 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use dynocar_model::terms::Parameter;
 use dynocar_model::terms::extra::Covariate;
 use dynocar_shared::vocabulary::EffectKind;
 use rayon::prelude::*;
 
 use super::band_axis::{AXES, BandAxis};
-use super::outside::OUTSIDE_COST;
 use crate::explain::answer::{CovariateRange, Location};
-use crate::explain::effects::{Candidate, Hypothesis, SharedHypothesis};
-use crate::explain::evidence::{Bin, RunData, SampleForces};
+use crate::explain::effects::{Candidate, Handling, Hypothesis, Nature, On, SharedHypothesis};
+use crate::explain::evidence::{Bin, OUTSIDE_COST, RunData, SampleForces};
 use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
 use crate::explain::scan::{Scan, Tuple};
+use crate::statistics::span;
 
 /// Cells into which the range of a covariate is cut.
 const CELLS: usize = 20;
@@ -67,11 +66,7 @@ impl Cells {
                 middles.map(|i| axis.value(run, Some(number), i)).collect()
             })
             .collect();
-        let (low, high) = by_run
-            .iter()
-            .flatten()
-            .flatten()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (v.min(l), v.max(h)));
+        let [low, high] = span(by_run.iter().flatten().flatten().copied())?;
         if high - low < 1e-6 || !(high - low).is_finite() {
             return None;
         }
@@ -150,21 +145,17 @@ impl Band {
 }
 
 impl Hypothesis for Band {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Unknown
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        self.axis.parameters()
-    }
-
-    fn choice_cost(&self) -> f64 {
-        self.choice_cost
-    }
-
-    fn shared_error(&self) -> f64 {
-        // A band of chainage is an error of the map, which every passage has in full.
-        if self.axis == BandAxis::Of(Covariate::Chainage) { MAP_ERROR_PERMILLE } else { 0.0 }
+    fn nature(&self) -> Nature<'_> {
+        let is_on_line = self.axis == BandAxis::Of(Covariate::Chainage);
+        let is_force = self.axis.is_force();
+        Nature {
+            choice_cost: self.choice_cost,
+            // A band of chainage is an error of the map, which every passage has in full.
+            shared_error: if is_on_line { MAP_ERROR_PERMILLE } else { 0.0 },
+            handling: if is_force { Handling::Together } else { Handling::Added },
+            affine_in: Some(|value| value),
+            ..Nature::of(EffectKind::Unknown, self.axis.parameters())
+        }
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
@@ -178,7 +169,7 @@ impl Hypothesis for Band {
         (least..most).contains(&parameters[0].abs())
     }
 
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let number = self.number(run);
         for (i, force) in (first..).zip(forces) {
             if !self.holds(run, number, i) {
@@ -193,14 +184,6 @@ impl Hypothesis for Band {
                 _ => force.resistance.other_n_per_kn += parameters[0],
             }
         }
-    }
-
-    fn affine_in(&self) -> Option<fn(f64) -> f64> {
-        Some(|value| value)
-    }
-
-    fn only_resists(&self) -> bool {
-        !self.axis.is_force()
     }
 
     fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {

@@ -6,13 +6,15 @@ use dynocar_model::terms::extra::{self, Covariate, Extra, FORCE_MAX_N_PER_KN, Fa
 use dynocar_model::terms::{Entry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::numbers::{edges, fitted_numbers, is_exponent, named};
-use super::outside::OUTSIDE_COST;
+use super::known::{edges, fitted_numbers, is_exponent, named};
 use crate::explain::answer::{CovariateRange, Location, ParameterValue};
-use crate::explain::effects::{Candidate, Hypothesis, ReportContext, Reported, SharedHypothesis};
-use crate::explain::evidence::{RunData, SampleForces};
+use crate::explain::effects::{
+    Candidate, Handling, Hypothesis, Nature, On, ReportContext, Reported, SharedHypothesis,
+};
+use crate::explain::evidence::{OUTSIDE_COST, RunData, SampleForces};
 use crate::explain::places::{Axis, End, Reach};
 use crate::explain::scan::Scan;
+use crate::statistics::span;
 
 /// A force counts from this size in N/kN on.
 const LEAST_N_PER_KN: f64 = 0.1;
@@ -115,11 +117,8 @@ fn lives(extra: &Extra, scan: &Scan) -> (f64, Location) {
     let greatest = of_bins().map(|(_, value)| value).fold(0.0, f64::max);
     let range = |of: Covariate| {
         let inside = of_bins().filter(|(_, value)| *value >= LIVES_SHARE * greatest);
-        inside
-            .filter_map(|(sample, _)| sample.covariate(of))
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-                [low.min(value), high.max(value)]
-            })
+        span(inside.filter_map(|(sample, _)| sample.covariate(of)))
+            .unwrap_or([f64::INFINITY, f64::NEG_INFINITY])
     };
     let mut place = Location::default();
     for factor in &extra.factors {
@@ -135,29 +134,22 @@ fn lives(extra: &Extra, scan: &Scan) -> (f64, Location) {
 }
 
 impl Hypothesis for FormForce {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Unknown
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            choice_cost: self.choice_cost,
+            handling: Handling::Added,
+            feels_speed: self.factors.iter().any(|factor| factor.of == Covariate::Speed),
+            ..Nature::of(EffectKind::Unknown, &self.parameters)
+        }
     }
 
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn apply(&self, parameters: &[f64], run: &RunData, first: usize, forces: &mut [SampleForces]) {
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
         let extra = [self.extra(parameters)];
         let speed_mps = run.covariate(Covariate::Speed);
         for (i, force) in (first..).zip(forces) {
             let known = |of: Covariate| Some(run.covariate(of)[i]).filter(|it| !it.is_nan());
             extra::act(&extra, speed_mps[i], known, &mut force.resistance);
         }
-    }
-
-    fn only_resists(&self) -> bool {
-        true
-    }
-
-    fn feels_speed(&self) -> bool {
-        self.factors.iter().any(|factor| factor.of == Covariate::Speed)
     }
 
     fn unit_n_per_kn(&self, others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {
@@ -183,10 +175,6 @@ impl Hypothesis for FormForce {
                 slope.push(product * at[factor].1[number]);
             }
         }
-    }
-
-    fn choice_cost(&self) -> f64 {
-        self.choice_cost
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {

@@ -3,7 +3,7 @@
 //!
 //! - [`grammar`]: which forms are tried, of what is [`known`] of a covariate; [`shape`]: what they
 //!   explain
-//! - [`form`]: a force of such a form, of which some [`numbers`] are estimated
+//! - [`form`]: a force of such a form, of which some numbers are estimated
 //! - [`band`]: a force in a range of a covariate ([`band_axis`])
 
 mod band;
@@ -11,26 +11,15 @@ mod band_axis;
 mod form;
 mod grammar;
 mod known;
-mod numbers;
-mod outside;
 mod shape;
 
-pub use self::outside::OUTSIDE_COST;
-use dynocar_shared::vocabulary::EffectKind;
-
-use super::{Candidate, Effect, Proposal};
+use super::{Candidate, Proposal};
 use crate::explain::evidence::SCORE_MIN;
 use crate::explain::scan::Scan;
 
 /// Bands and forms that are worth a fit.
 const BANDS_MAX: usize = 2;
 const FORMS_MAX: usize = 4;
-
-/// The kind, as bands alone: what is tried beside every kind of the library.
-pub struct Bands;
-
-/// The kind, as forms and bands: where the library leaves something.
-pub struct Forms;
 
 /// Whether some range of some covariate holds a force that would be accepted: whatever has a form
 /// shows there too.
@@ -46,29 +35,16 @@ pub fn a_form_explains_more(scan: &Scan, than: f64) -> bool {
 /// Whether a band explains its price, and as much more as an effect needs at least.
 fn counts(scan: &Scan, (gain, band): &(f64, Candidate)) -> bool {
     let size = (scan.fit.observations().max(2) as f64).ln();
-    *gain > band.hypothesis.choice_cost() + size + SCORE_MIN
+    *gain > band.hypothesis.nature().choice_cost + size + SCORE_MIN
 }
 
-impl Effect for Bands {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Unknown
-    }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let bands = band::bands(scan).into_iter().map(|(_, candidate)| candidate);
-        Proposal::Candidates(bands.take(BANDS_MAX).collect())
-    }
+/// Bands alone: what is tried beside every kind of the library.
+pub fn propose_bands(scan: &Scan) -> Proposal {
+    Ok(band::bands(scan).into_iter().map(|(_, candidate)| candidate).take(BANDS_MAX).collect())
 }
 
-impl Effect for Forms {
-    fn kind(&self) -> EffectKind {
-        EffectKind::Unknown
-    }
-
-    fn propose(&self, scan: &Scan) -> Proposal {
-        let bands = band::bands(scan).into_iter().map(|(_, candidate)| candidate).take(BANDS_MAX);
-        Proposal::Candidates(
-            grammar::forms(scan).into_iter().take(FORMS_MAX).chain(bands).collect(),
-        )
-    }
+/// Forms and bands: where the library leaves something.
+pub fn propose_forms(scan: &Scan) -> Proposal {
+    let forms = grammar::forms(scan).into_iter().take(FORMS_MAX);
+    Ok(forms.chain(propose_bands(scan)?).collect())
 }

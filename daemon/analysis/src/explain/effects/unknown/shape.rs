@@ -3,7 +3,7 @@
 use dynocar_model::terms::extra::{Covariate, Factor};
 
 use super::known::Known;
-use super::numbers::{estimated, is_exponent};
+use super::known::{estimated, is_exponent};
 use crate::explain::scan::{Scan, Tuple};
 
 /// Steps of the search for numbers, as shares of the range, one after the other.

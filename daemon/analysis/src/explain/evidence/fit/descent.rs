@@ -5,11 +5,11 @@ use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::{Noise, RunScatter};
+use super::super::run_scatter::{RunFilters, SharedFilters};
 use super::super::run_scatter::{ScatterFilter, remove};
 use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::Plan;
-use super::robust::{RunFilters, SharedFilters};
 use super::{Fit, FitProblem};
 use crate::explain::hypothesis::SharedHypothesis;
 
@@ -31,6 +31,12 @@ impl FitProblem {
     /// One turn only: under an undeclared force further turns would take ever more of it for noise.
     pub fn fit_with_noise(&self, model: &UpdatedModel, start: Vec<f64>, noise: Noise) -> Fit {
         self.with_own_noise(&self.fit(model, start, noise))
+    }
+
+    /// Fits a model from the declared a, b and c and a start of its effects, with the noise that it leaves.
+    pub fn fit_from_declared(&self, model: &UpdatedModel, start: &[f64]) -> Fit {
+        let first = self.fit_with_noise(model, self.start(start), Noise::START);
+        self.with_own_noise(&first)
     }
 
     /// The noise that a fit's residuals show, and its model fitted again.

@@ -4,16 +4,17 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use dynocar_core::filter::lanes::dot;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::Noise;
+use super::super::run_data::RunData;
 use super::super::run_scatter::WeightedFilter;
+use super::super::run_scatter::{RunFilters, SharedFilters, Whitened};
 use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::{At, Plan};
-use super::robust::{RunFilters, SharedFilters, Whitened};
 use super::{Column, Fit, FitProblem, RunNormal};
 
 /// What a model leaves of one run at given parameters.
@@ -140,8 +141,32 @@ impl FitProblem {
         grown
     }
 
+    /// Cost that a model, in which only places differ from those of a fit, reaches when all parameters are fitted again, to second order; `run` is
+    /// the only run in which it differs from the fit's, by file, `None` when it may in all.
+    /// `None` when the parameters are not determined.
+    pub fn cost_nearby(&self, fit: &Fit, model: &UpdatedModel, run: Option<&str>) -> Option<f64> {
+        let theta = &fit.theta;
+        let (mut information, mut score, mut cost) = self.prior(model, theta);
+        let moved = |(index, own): (usize, &RunData)| {
+            let may_differ = run.is_none_or(|run| run == own.file);
+            may_differ.then(|| self.run_normal(index, model, theta, &fit.run_filters[index]))
+        };
+        let moved: Vec<_> = self.runs.par_iter().enumerate().map(moved).collect();
+        for (moved, fitted) in moved.iter().zip(&fit.runs) {
+            let normal = moved.as_ref().unwrap_or(fitted);
+            information += &normal.information;
+            score += &normal.score;
+            cost += normal.cost;
+        }
+        for (i, held) in fit.held_information.iter().enumerate() {
+            information[(i, i)] += held;
+        }
+        let step = Cholesky::new(information)?.solve(&score);
+        Some(cost - score.dot(&step)).filter(|reached| reached.is_finite())
+    }
+
     /// Normal equations of one run, by number.
-    pub(super) fn run_normal(
+    fn run_normal(
         &self,
         index: usize,
         model: &UpdatedModel,

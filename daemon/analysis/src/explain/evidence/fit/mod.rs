@@ -3,10 +3,8 @@
 mod descent;
 mod linearised;
 mod memory;
-mod nearby;
 mod plan;
 mod prior;
-mod robust;
 
 use std::sync::{Arc, OnceLock};
 
@@ -14,16 +12,16 @@ use dynocar_model::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
-use super::late_speed;
+use super::integral::Response;
 use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::{Noise, RunScatter};
-use super::response::Response;
+use super::positions::pooled_s;
 use super::run_data::RunData;
+use super::run_scatter::SharedFilters;
 use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns};
 use super::whitener::Whitener;
+use crate::statistics::median;
 use memory::RunMemory;
-pub use nearby::Nearby;
-use robust::SharedFilters;
 
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
 /// directions apart which the runs do not excite.
@@ -178,7 +176,7 @@ impl FitProblem {
         let distance_ratio = pooled_distance_ratio(&runs);
         let parts: Vec<f64> =
             runs.iter().flat_map(|run| run.speed_late_s.iter().copied()).collect();
-        let speed_late_s = late_speed::pooled_s(&parts);
+        let speed_late_s = pooled_s(&parts);
         let scatter_columns = runs.iter().map(|run| scatter_columns(run, declared)).collect();
         let declared_responses = runs.par_iter().map(declared_response).collect();
         FitProblem {
@@ -259,16 +257,7 @@ fn declared_response(run: &RunData) -> Response {
 fn pooled_distance_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
     const COMMON: f64 = 0.001;
     let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.distance_ratio?.0)).collect();
-    if ratios.is_empty() {
-        return None;
-    }
-    ratios.sort_unstable_by(f64::total_cmp);
-    let middle = ratios.len() / 2;
-    let median = if ratios.len() % 2 == 1 {
-        ratios[middle]
-    } else {
-        0.5 * (ratios[middle - 1] + ratios[middle])
-    };
+    let median = median(&mut ratios)?;
     let mean_var: f64 =
         runs.iter().filter_map(|run| Some(run.distance_ratio?.1.powi(2))).sum::<f64>()
             / ratios.len() as f64;

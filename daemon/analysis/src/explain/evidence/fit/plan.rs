@@ -7,21 +7,10 @@ use std::ops::Range;
 
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 
+use super::super::integral::Response;
 use super::super::model::UpdatedModel;
-use super::super::response::Response;
 use super::super::run_data::RunData;
-use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
-
-/// How an effect is handled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Handling {
-    /// Together with the others.
-    Together,
-    /// As a resistance of its own.
-    Added,
-    /// As gradients in proportion to its parameters.
-    Gradient,
-}
+use crate::explain::hypothesis::{Handling, OnOthers, SharedHypothesis};
 
 /// An effect with the ranges of its parameters, and the function of each in which the forces are affine.
 pub(super) type Affine<'m> = (&'m SharedHypothesis, Range<usize>, fn(f64) -> f64);
@@ -39,14 +28,12 @@ impl<'m> Plan<'m> {
         let on_others = model.on_others();
         let is_apart = |effect: &SharedHypothesis| match on_others {
             OnOthers::Nothing => true,
-            OnOthers::Scales => !effect.feels_speed(),
+            OnOthers::Scales => !effect.nature().feels_speed,
             OnOthers::Changes => false,
         };
-        let handling = |effect: &SharedHypothesis| match () {
-            () if !is_apart(effect) => Handling::Together,
-            () if effect.is_gradient() => Handling::Gradient,
-            () if effect.only_resists() => Handling::Added,
-            () => Handling::Together,
+        let handling = |effect: &SharedHypothesis| match is_apart(effect) {
+            true => effect.nature().handling,
+            false => Handling::Together,
         };
         Plan {
             model,
@@ -99,7 +86,7 @@ impl<'m> Plan<'m> {
     pub fn affine(&self, run: &RunData) -> Option<Affine<'_>> {
         let mut together = self.acting(run);
         let (_, effect, range) = together.next()?;
-        let affine_in = effect.affine_in()?;
+        let affine_in = effect.nature().affine_in?;
         together.next().is_none().then_some((effect, range, affine_in))
     }
 }

@@ -24,7 +24,7 @@ impl FitProblem {
             cost += weight * away * away;
         }
         for (effect, range) in model.effects.iter().zip(model.ranges()) {
-            let Some(own) = effect.prior_information() else { continue };
+            let Some(own) = effect.nature().prior else { continue };
             let at = DVector::from_column_slice(&theta[range.clone()]).add_scalar(-effect.none());
             let pull = own * &at;
             cost += at.dot(&pull);
@@ -50,7 +50,7 @@ impl FitProblem {
             let mut at = None;
             for (effect, range) in model.effects.iter().zip(model.ranges()) {
                 let own = effect.speed_scale(&theta[range.clone()]);
-                if own != 1.0 || effect.changes_speed_scale() {
+                if own != 1.0 || effect.nature().changes_speed_scale {
                     at = Some(range.start);
                 }
                 scale *= own;

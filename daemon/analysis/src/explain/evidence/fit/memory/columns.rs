@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::super::super::integral::integrate_bins;
-use super::super::plan::{At, Handling};
+use super::super::plan::At;
 use super::{RunMemory, Scratch, Together, is_near, with_scratch};
-use crate::explain::hypothesis::{OnOthers, SharedHypothesis};
+use crate::explain::hypothesis::{Handling, OnOthers, SharedHypothesis};
 
 impl RunMemory {
     /// By parameter what a unit of it changes, not whitened: a, b, c and gradients by their slopes, the
@@ -83,7 +83,7 @@ impl RunMemory {
         }
         let effects = at.plan.model.effects.iter().zip(&at.plan.ranges).enumerate();
         let scaling = effects.filter(|(number, (effect, _))| {
-            is_asked(*number) && effect.on_others() == OnOthers::Scales
+            is_asked(*number) && effect.nature().on_others == OnOthers::Scales
         });
         let mut elsewhere = at.theta.to_vec();
         for i in scaling.flat_map(|(_, (_, range))| range.clone()) {

@@ -9,12 +9,12 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::super::integral::Response;
 use super::super::integral::integrate_bins;
 use super::super::model::UpdatedForces;
-use super::super::response::Response;
 use super::super::run_data::RunData;
-use super::plan::{At, Handling, Plan};
-use crate::explain::hypothesis::SharedHypothesis;
+use super::plan::{At, Plan};
+use crate::explain::hypothesis::{Handling, SharedHypothesis};
 
 /// The speed in m/s at which a, b and c are compared, and the share of the resistance that changes no slope.
 const USUAL_MPS: f64 = 20.0;
@@ -230,7 +230,7 @@ fn affine(
             let mut slope = Response::default();
             plan.model.response((run, &elsewhere), plan.acts_together(run), forces, &mut slope);
             elsewhere[i] = effect.none();
-            let affine_in = effect.affine_in().unwrap_or(|it| it);
+            let affine_in = effect.nature().affine_in.unwrap_or(|it| it);
             slope.become_slope_from(&none, affine_in(far) - affine_in(effect.none()));
             slope
         })

@@ -1,4 +1,4 @@
-//! The position against the integrated speed, in time: what shows a speed that is late.
+//! What positions show of the speed: its scale, which is a wheel's diameter, and how late it is.
 //!
 //! Behind a speed that is late by some time, the distance by position is ahead of the distance by integrated
 //! speed by as much as the train drives in that time: more, the faster it is. An odometer that is late
@@ -9,6 +9,66 @@ use dynocar_model::terms::speed_delay;
 use nalgebra::{Matrix3, Vector3};
 
 use super::bins::SEGMENT_GAP_MAX_S;
+
+/// Distance by position over distance by integrated speed, and its standard deviation.
+///
+/// Balises correct the position while the odometer shares the error of the wheel diameter, so
+/// that the ratio over many kilometres shows the diameter. Between two corrections the odometer
+/// drifts by that error, so that what lies before the first and behind the last says nothing, and
+/// would show a wheel nearer to the declared one than it is.
+pub(super) fn distance_ratio(recording: &Recording) -> Option<(f64, f64)> {
+    const END_ERROR_M: f64 = 10.0;
+    const CORRECTION_MIN_M: f64 = 1.0;
+    const DISTANCE_MIN_M: f64 = 1500.0;
+    let steps = distances(recording);
+    let is_corrected =
+        |step: &Distances| (step.by_position_m - step.by_speed_m).abs() > CORRECTION_MIN_M;
+    let first = steps.iter().position(is_corrected).map_or(0, |at| at + 1);
+    let end = steps.iter().rposition(is_corrected).map_or(0, |at| at + 1);
+    let total = |steps: &[Distances]| {
+        steps.iter().fold(Distances::default(), |sum, step| Distances {
+            by_position_m: sum.by_position_m + step.by_position_m,
+            by_speed_m: sum.by_speed_m + step.by_speed_m,
+        })
+    };
+    let between = total(steps.get(first..end).unwrap_or_default());
+    let compared = if between.by_speed_m < DISTANCE_MIN_M { total(&steps) } else { between };
+    if compared.by_speed_m < DISTANCE_MIN_M || compared.by_position_m < 0.5 * compared.by_speed_m {
+        return None;
+    }
+    Some((
+        compared.by_position_m / compared.by_speed_m,
+        END_ERROR_M * std::f64::consts::SQRT_2 / compared.by_speed_m,
+    ))
+}
+
+/// A way in m by position and by integrated speed.
+#[derive(Clone, Copy, Default)]
+struct Distances {
+    by_position_m: f64,
+    by_speed_m: f64,
+}
+
+/// The distances between samples with a position.
+fn distances(recording: &Recording) -> Vec<Distances> {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let mut distances = Vec::with_capacity(samples.len());
+    let mut last: Option<(usize, f64)> = None;
+    for (i, sample) in samples.iter().enumerate() {
+        let Some(position_m) = sample.position_m else { continue };
+        if let Some((k, before_m)) = last
+            && time_s[i] - time_s[k] <= SEGMENT_GAP_MAX_S
+        {
+            let mean_mps = 0.5 * (sample.speed_mps + samples[k].speed_mps);
+            distances.push(Distances {
+                by_position_m: sample.direction * (position_m - before_m),
+                by_speed_m: mean_mps * (time_s[i] - time_s[k]),
+            });
+        }
+        last = Some((i, position_m));
+    }
+    distances
+}
 
 /// Least time in s and range of speeds in m/s of a part from stand to stand that says.
 const PART_MIN_S: f64 = 20.0;
@@ -85,10 +145,46 @@ pub(super) fn pooled_s(parts: &[f64]) -> Option<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::coasting;
-    use super::*;
     use dynocar_model::force::ResolvedSample;
     use dynocar_model::simulate::BridgeLimits;
+
+    use super::super::coasting;
+    use super::*;
+
+    const SCALE: f64 = 1.02;
+
+    /// A train at 20 m/s whose wheels count 2 % too much, with balises at some chainages.
+    fn recording(balises_m: &[f64]) -> Recording {
+        let mut odometer_m = 0.0;
+        let sample = |k: i32| {
+            let (time_s, true_m) = (0.2 * f64::from(k), 4.0 * f64::from(k));
+            odometer_m += 4.0 * SCALE;
+            if balises_m.iter().any(|at_m| (true_m - 4.0..true_m).contains(at_m)) {
+                odometer_m = true_m;
+            }
+            ResolvedSample {
+                time_ns: (time_s * 1e9).round() as i64,
+                speed_mps: 20.0 * SCALE,
+                position_m: Some(odometer_m),
+                ..coasting()
+            }
+        };
+        Recording::new((0..2500).map(sample).collect(), BridgeLimits::default()).unwrap()
+    }
+
+    #[test]
+    fn between_the_first_and_the_last_balise_the_ratio_is_that_of_the_wheels() {
+        // 3 km before the first and 2.5 km behind the last, of 10 km.
+        let (ratio, _) = distance_ratio(&recording(&[3001.0, 5001.0, 7501.0])).unwrap();
+        assert!((ratio * SCALE - 1.0).abs() < 1e-9, "{ratio}");
+    }
+
+    #[test]
+    fn an_odometer_that_nothing_corrects_says_what_its_wheels_say() {
+        let (ratio, deviation) = distance_ratio(&recording(&[])).unwrap();
+        assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
+        assert!(deviation > 1e-3, "{deviation}");
+    }
 
     /// Speed and distance of a train that goes from stand to stand in 120 s.
     fn true_motion(time_s: f64) -> (f64, f64) {
@@ -96,7 +192,7 @@ mod tests {
         (10.0 * (1.0 - angle.cos()), 10.0 * (time_s.clamp(0.0, 120.0) - angle.sin() * 19.098_593))
     }
 
-    fn recording(late_s: f64, odometer_late_s: f64, scale: f64) -> Recording {
+    fn late_recording(late_s: f64, odometer_late_s: f64, scale: f64) -> Recording {
         let sample = |k: i32| {
             let time_s = 0.2 * f64::from(k);
             ResolvedSample {
@@ -126,7 +222,7 @@ mod tests {
         for (late_s, odometer_late_s, scale) in
             [(0.8, 0.0, 1.0), (0.8, 0.0, 1.02), (0.0, 0.0, 1.0), (0.8, 0.8, 1.0), (0.0, 0.4, 1.0)]
         {
-            let [found_s] = by_part_s(&recording(late_s, odometer_late_s, scale))[..] else {
+            let [found_s] = by_part_s(&late_recording(late_s, odometer_late_s, scale))[..] else {
                 panic!("one part")
             };
             let expected_s = late_s - odometer_late_s;

@@ -1,4 +1,7 @@
-//! Ends of places that were estimated from the speeds.
+//! A site: where along the line, and in which runs, something was found; its ends, estimated from the speeds.
+
+use crate::explain::answer::Location;
+use crate::explain::evidence::RunData;
 
 /// An interval is not shorter than this in m.
 const SHORTEST_M: f64 = 100.0;
@@ -81,6 +84,92 @@ impl Intervals {
         let ascends = moved.intervals_m.iter().flatten().is_sorted();
         let [from_m, to_m] = moved.intervals_m[end.part];
         (ascends && from_m < to_m).then_some(moved)
+    }
+}
+
+/// Where along the line and in which runs something was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Site {
+    /// `None` for everywhere.
+    pub sections: Option<Intervals>,
+    /// Files of the runs; `None` for all that pass.
+    pub runs: Option<Vec<String>>,
+    /// Twice the logarithm of the number of structures this was chosen from.
+    pub choice_cost: f64,
+    /// Standard deviation of the factor by the error of the gradient map, which all passes share.
+    pub map_error: f64,
+}
+
+impl Site {
+    /// Its intervals in m; none where it is everywhere.
+    pub fn intervals_m(&self) -> &[[f64; 2]] {
+        self.sections.as_ref().map_or(&[], |sections| &sections.intervals_m)
+    }
+
+    /// Whether it may be in a run.
+    pub fn is_in(&self, run: &RunData) -> bool {
+        self.runs.as_ref().is_none_or(|runs| runs.contains(&run.file))
+    }
+
+    /// All ends of its intervals.
+    pub fn ends(&self) -> Vec<End> {
+        self.sections.as_ref().map_or_else(Vec::new, Intervals::ends)
+    }
+
+    /// The same with one end elsewhere; `None` where that makes no place.
+    pub fn moved(&self, end: &End, at_m: f64) -> Option<Self> {
+        let sections = Some(self.sections.as_ref()?.moved(end, at_m)?);
+        Some(Site { sections, ..self.clone() })
+    }
+
+    /// As the answer says it.
+    pub fn place(&self) -> Location {
+        let intervals_m = self.sections.as_ref().map(|sections| sections.intervals_m.clone());
+        Location { runs: self.runs.clone(), intervals_m, ..Location::default() }
+    }
+}
+
+/// How much of a train counts as inside an interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Inside {
+    /// The part of the train's length inside.
+    Share {
+        /// The train's length in m.
+        length_m: f64,
+    },
+    /// All of it while its centre is inside.
+    Centre,
+}
+
+impl Inside {
+    /// How far in m from its centre a train is inside a place.
+    pub fn reach_m(self) -> f64 {
+        match self {
+            Inside::Share { length_m } => 0.5 * length_m.max(1.0),
+            Inside::Centre => 0.0,
+        }
+    }
+
+    /// The share of the train inside any of some disjoint intervals, 0 to 1, by the chainage of
+    /// its centre; 0 where that is not known.
+    #[inline]
+    pub fn share(self, centre_m: Option<f64>, intervals_m: &[[f64; 2]]) -> f64 {
+        let Some(centre_m) = centre_m else { return 0.0 };
+        match self {
+            Inside::Centre => {
+                let inside = intervals_m.iter().any(|&[from, to]| (from..=to).contains(&centre_m));
+                f64::from(u8::from(inside))
+            }
+            Inside::Share { length_m } => {
+                let length_m = length_m.max(1.0);
+                let (rear, front) = (centre_m - 0.5 * length_m, centre_m + 0.5 * length_m);
+                let inside: f64 = intervals_m
+                    .iter()
+                    .map(|&[from, to]| (front.min(to) - rear.max(from)).max(0.0))
+                    .sum();
+                inside / length_m
+            }
+        }
     }
 }
 

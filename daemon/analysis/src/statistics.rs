@@ -1,0 +1,37 @@
+//! The middle of values and what lies below others, their root mean square and their span.
+
+/// The middle of some values, the upper one of two; `None` of none.
+pub fn middle(values: &mut [f64]) -> Option<f64> {
+    let index = values.len() / 2;
+    match values {
+        [] => None,
+        values => Some(*values.select_nth_unstable_by(index, f64::total_cmp).1),
+    }
+}
+
+/// The middle of some values, the mean of two; `None` of none.
+pub fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some(0.5 * (values[last / 2] + values[values.len() / 2]))
+}
+
+/// The value below which a share of some values lies; 0 of none.
+pub fn share_of(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let index = (share * sorted.len().saturating_sub(1) as f64) as usize;
+    sorted.get(index).copied().unwrap_or(0.0)
+}
+
+/// Root mean square; 0 of none.
+pub fn rms(values: &[f64]) -> f64 {
+    let squares: f64 = values.iter().map(|value| value * value).sum();
+    (squares / values.len().max(1) as f64).sqrt()
+}
+
+/// Least and greatest of some values; `None` of none.
+pub fn span(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let ends = values.map(|value| [value; 2]);
+    ends.reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
+}
