@@ -19,11 +19,9 @@
 
 pub mod conclusion;
 mod error;
-pub mod errors_by_day;
 pub mod finding;
 pub mod learner;
 pub mod memory;
-pub mod overlay;
 pub mod page;
 pub mod pool;
 pub mod recordings;
