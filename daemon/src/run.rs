@@ -18,20 +18,21 @@ use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns}
 use dynocar_shared::{Quantity, TrainId};
 use tracing::{info, warn};
 
+use super::runtime::system::{
+    STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, set_fifo_priority,
+};
 use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
 use crate::ending::{self, EndingError};
 use crate::models::Store;
 use crate::pipelines::{SettingRefused, build_pipeline};
-use crate::runtime::affinity::pin_to_core;
 use crate::runtime::exchange::Exchange;
-use crate::runtime::memory::{STACK_BYTES, lock_all_memory, prefault_stack};
-use crate::runtime::scheduling::set_fifo_priority;
 use crate::runtime::tally::Tally;
 use crate::runtime::watch::{Watch, WatchedPipeline};
 use crate::runtime::worker::{ChannelPlan, Worker, WorkerPlan};
 use crate::shadow::train::Placed;
 use crate::shadow::{self, Board, ShadowTrain};
-use crate::state::{self, keeper::Keeper};
+use crate::state;
+use crate::state::keeper::Keeper;
 use crate::supervision::listener;
 use crate::supervision::notify::{Supervisor, Watchdog};
 

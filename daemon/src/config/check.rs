@@ -9,14 +9,13 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 
-use super::apart;
-use super::checker::Checker;
+use super::error::Checker;
 use super::raw::{
     RawConfig, RawMetrics, RawPipeline, RawQuantities, RawState, RawThread, RawTrain,
 };
 use super::{
     Answers, ConfigError, DaemonConfig, IdleStrategy, PipelineConfig, StateConfig, ThreadConfig,
-    TrainConfig,
+    TrainConfig, apart,
 };
 use crate::dataset::LoadError;
 use crate::models::ModelText;

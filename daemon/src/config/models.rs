@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::checker::Checker;
+use super::error::Checker;
 use super::raw::RawModels;
 use super::{ConfigError, ModelsConfig};
 use crate::models::ModelHash;

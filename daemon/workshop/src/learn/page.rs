@@ -17,11 +17,12 @@ use dynocar_shared::TrainId;
 use super::error::LearnError;
 use super::learner::Learner;
 use super::memory::OpenQuestion;
-use crate::report::html;
 use crate::report::html::Column::{Numbers, Words};
-use crate::report::html::{TableColumn, chance, document, escape, legend, marked_table, table};
-use crate::report::plots::series::Day;
-use crate::report::plots::{PlotError, figure, series, wide_and_narrow};
+use crate::report::html::{
+    self, TableColumn, chance, document, escape, legend, marked_table, table,
+};
+use crate::report::plots::series::{self, Day};
+use crate::report::plots::{PlotError, figure, wide_and_narrow};
 use crate::report::provenance::Provenance;
 
 /// The page on what a learner's store holds.

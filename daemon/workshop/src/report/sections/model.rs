@@ -8,9 +8,9 @@ use dynocar_analysis::explain::report::places::{PlaceRow, PlaceRuns};
 use dynocar_analysis::explain::report::words::{joined, number};
 
 use super::Section;
+use crate::report::Subject;
 use crate::report::html::Column::{Numbers, Words};
-use crate::report::html::{TableColumn, escape, estimate, marked_table, minus};
-use crate::report::{Subject, html};
+use crate::report::html::{self, TableColumn, escape, estimate, marked_table, minus};
 
 /// The section.
 pub fn parameters(subject: &Subject) -> Section {
