@@ -70,7 +70,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let mut config = config.clone();
     shadow::in_force::settle(&mut config);
     let config = &config;
-    let host = Host::of(config.root.as_deref())?;
+    let host = Host::of(config.process.root.as_deref())?;
     let stop = ending::flag()?;
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
     let _roles = trains
@@ -83,7 +83,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .collect::<Result<Vec<_>, _>>()?;
     // Grows with every start: the monotonic clock is common to all processes of the host.
     let epoch = monotonic_now_ns() as u64;
-    if config.lock_memory {
+    if config.process.lock_memory {
         lock_memory();
     }
     let state = state::Taken::up(config);
@@ -167,8 +167,8 @@ fn plan_workers(
             thread: thread.clone(),
             host: host.clone(),
             epoch,
-            spin_us: config.spin_us,
-            heartbeat_ms: config.heartbeat_ms,
+            spin_us: config.process.spin_us,
+            heartbeat_ms: config.process.heartbeat_ms,
             channels: Vec::new(),
             stop: Arc::clone(stop),
         })

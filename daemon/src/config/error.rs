@@ -46,6 +46,11 @@ pub(super) struct Checker<'a> {
 }
 
 impl Checker<'_> {
+    /// What file names in the configuration are relative to.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new("."))
+    }
+
     pub fn refuse<T>(
         &self,
         key: impl Into<String>,

@@ -6,15 +6,16 @@
 mod apart;
 mod check;
 mod error;
-mod models;
 mod parts;
 mod quantities;
 mod raw;
 
 pub use apart::is_slow;
 pub use error::ConfigError;
-pub use parts::{DaemonConfig, TrainConfig};
-pub use parts::{IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, StateConfig, ThreadConfig};
+pub use parts::{
+    DaemonConfig, IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig,
+    StateConfig, ThreadConfig, TrainConfig,
+};
 pub use quantities::Answers;
 
 use std::path::Path;
