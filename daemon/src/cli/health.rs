@@ -61,7 +61,7 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
 
 fn lines_of(health: &TrainHealth) -> String {
     let daemon = health.daemon.as_deref().unwrap_or("nobody serves it");
-    let mut text = format!("train {}: {}: {daemon}\n", health.train, health.verdict);
+    let mut text = format!("train {}: {}: {daemon}\n", health.train, health.verdict.name());
     for it in &health.pipelines {
         let reason = it.reason.map_or("unknown", dynocar_shared::Reason::name);
         let (kind, status, age_ms) = (it.kind, it.status, it.age_ms);

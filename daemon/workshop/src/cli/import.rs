@@ -9,10 +9,10 @@ use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::{parse_track, parse_train};
 use dynocar_analysis::import::{Format, Reading, Source, import};
 
-use super::train_text::{TRAIN_FILE, TrainArguments};
-use crate::track_text::TRACK_FILE;
+use super::train_text::TrainArguments;
 use dynocar::cli::Failure;
 use dynocar::dataset::labelled_text;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 
 /// Import trains and lines of railtoolkit, TTOBench or OSRD.

@@ -10,11 +10,11 @@ use dynocar_analysis::dataset::guess::{Guess, Recording, guess};
 use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity};
 use toml::Value;
 
-use super::train_text::{Found, TRAIN_FILE, TrainText};
-use crate::track_text::TRACK_FILE;
+use super::train_text::{Found, TrainText};
 pub use arguments::InitArguments;
 use dynocar::cli::Failure;
 use dynocar::dataset::labelled_text;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 use recordings::Draft;
 use summary::{DAEMON_FILE, Described};

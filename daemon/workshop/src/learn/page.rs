@@ -113,7 +113,7 @@ fn models(history: &History) -> String {
     let columns: [TableColumn<ModelRow>; 6] = [
         ("Model", Words, &|it| format!("{}<code>{}</code>", indent(it.2), it.0.hash)),
         ("Made, UTC", Words, &|it| minute(it.0.origin.made)),
-        ("State", Words, &|it| it.1.words().into()),
+        ("State", Words, &|it| it.1.name().into()),
         ("Adds", Words, &|it| adds(&it.0.origin)),
         ("Before, m/s", Numbers, &|it| error(it.0, |error| error.before_mps)),
         ("After, m/s", Numbers, &|it| error(it.0, |error| error.after_mps)),

@@ -7,8 +7,9 @@ use dynocar_analysis::dataset::DatasetDiagnostic;
 use dynocar_analysis::import::{Account, FieldOutcome, ImportedLine, ImportedTrain};
 use toml::Value;
 
-use crate::cli::text::{TextTable, comment, diagnostics, entry, for_shell, on_one_line};
+use crate::cli::text::{TextTable, comment, diagnostics, entry, on_one_line};
 use crate::cli::train_text::{Found, TrainArguments, TrainText, converted};
+use crate::report::provenance::for_shell;
 use crate::track_text::TrackText;
 
 /// The `train.toml`; what the file does not give and nobody says is a marked default.

@@ -12,7 +12,8 @@ use dynocar_analysis::dataset::guess::GivenColumn;
 use dynocar_model::units::Unit;
 
 use super::summary::DAEMON_FILE;
-use crate::cli::train_text::{QUESTIONS, TRAIN_FILE, TrainArguments};
+use crate::cli::train_text::{QUESTIONS, TrainArguments};
+use dynocar::models::text::TRAIN_FILE;
 
 /// The folder for the files where somebody who is asked says no other.
 pub const FOLDER_DEFAULT: &str = "my_train";

@@ -1,15 +1,15 @@
-//! What `dynocar init` says on the terminal: every guess, what is doubtful, and what to do next.
-//!
-//! What is written, and what was understood of recordings.
+//! What `dynocar init` says on the terminal: what is written, every guess, what is doubtful, what to do next.
 
 use std::path::Path;
 
+use dynocar::models::text::TRAIN_FILE;
 use dynocar_analysis::dataset::guess::Guess;
 use dynocar_analysis::dataset::{DatasetDiagnostic, MANIFEST_FILE};
 use encoding_rs::UTF_8;
 
-use crate::cli::text::{TextTable, diagnostics, entry, for_shell};
-use crate::cli::train_text::{TRAIN_FILE, TrainText};
+use crate::cli::text::{TextTable, diagnostics, entry};
+use crate::cli::train_text::TrainText;
+use crate::report::provenance::for_shell;
 
 /// What was written, understood and is left to do.
 pub fn text(folder: &Path, train: &TrainText, described: Option<&Described>) -> String {

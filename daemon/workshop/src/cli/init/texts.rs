@@ -9,8 +9,7 @@ use encoding_rs::UTF_8;
 use toml::Value;
 
 use crate::cli::text::comment;
-use crate::cli::train_text::TRAIN_FILE;
-use crate::track_text::TRACK_FILE;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 
 /// A name for a dataset: its folder's.
 pub fn name_of(folder: &Path) -> String {

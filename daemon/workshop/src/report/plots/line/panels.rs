@@ -1,8 +1,4 @@
-//! A property of the line: its data, their range, what a pointer reads of them.
-//!
-//! What is declared of a line, as lines over its chainage.
-//!
-//! What was found along a line: places with their intervals, errors of the gradient, the residual.
+//! The properties of a line, declared and found: their data, their range, what a pointer reads of them.
 
 use dynocar_analysis::explain::report::line::{AlongLine, MarkedInterval};
 use dynocar_analysis::explain::report::panels::PanelBin;
