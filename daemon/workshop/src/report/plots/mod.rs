@@ -9,7 +9,6 @@ pub mod effort;
 pub mod line;
 pub mod panel;
 pub mod reading;
-pub mod runs;
 pub mod series;
 pub mod speeds;
 

@@ -82,7 +82,7 @@ impl Ground<'_> {
     ) -> Result<Chart<'a, 't>, DrawError> {
         let (x, y) = (self.x, panel.range(self.has_effect));
         let below = if is_last { self.x_title() } else { String::new() };
-        let labels = if self.width == Width::Wide { 10 } else { 5 };
+        let labels = self.width.labels();
         let x_axis = Axis { range: x, title: &below, labels, is_whole: false };
         let is_lane = matches!(panel.content, Content::Places(_));
         let (title, labels) = (panel.title(), if is_lane { 0 } else { 5 });
@@ -100,14 +100,14 @@ impl Ground<'_> {
             }
         };
         let ranges: Vec<[f64; 2]> = ranges_m.iter().map(|it| it.map(|at_m| at_m / 1e3)).collect();
-        shade(&mut chart, colour, &ranges, x, y)?;
+        shade(&mut chart, colour, &ranges)?;
         if let Content::Line { points, halves } = &panel.content
             && !halves.is_empty()
         {
-            band(&mut chart, points, halves, y)?;
+            band(&mut chart, points, halves)?;
         }
         if !is_lane {
-            zero_line(&mut chart, x)?;
+            zero_line(&mut chart)?;
         }
         self.stops(&mut chart, y, is_first)?;
         match &panel.content {
