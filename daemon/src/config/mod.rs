@@ -9,14 +9,15 @@ mod error;
 mod parts;
 mod quantities;
 mod raw;
+mod whole;
 
 pub use apart::is_slow;
 pub use error::ConfigError;
 pub use parts::{
-    DaemonConfig, IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig,
-    StateConfig, ThreadConfig, TrainConfig,
+    IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig, StateConfig, ThreadConfig,
 };
 pub use quantities::Answers;
+pub use whole::{DaemonConfig, TrainConfig};
 
 use std::path::Path;
 
