@@ -6,14 +6,13 @@
 //! - [`columns_stream`]: columns of numbers from one program to another
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
-//! - [`error_document`]: a failure for machines
 //! - [`ending`]: when a long-running program ends
 //! - [`models`]: a store of models
 //! - [`observing`]: what an observer of trains sees, in one vocabulary
 //! - [`operator`]: what an operator reads, in one place
 //! - [`output`]: where results go
 //! - [`pipelines`]: the pipelines that a configuration asks for
-//! - [`programs`]: commands that are programs of their own
+//! - [`programs`]: commands that are programs of their own, and their failures
 //! - [`demo`]: the main job as a show
 //! - [`redrawn`]: lines on a terminal that later ones are written over
 //! - [`run`]: the daemon, every stage on one screen
@@ -32,7 +31,6 @@ pub mod config;
 pub mod dataset;
 pub mod demo;
 pub mod ending;
-pub mod error_document;
 pub mod models;
 pub mod observing;
 pub mod operator;

@@ -1,4 +1,6 @@
 //! Programs beside this one: what they are built on is nothing that a daemon needs.
+//!
+//! A failure for machines: for whoever asked for a result as JSON, and for a program of ours that called another.
 
 use std::ffi::{OsStr, OsString};
 use std::io::{self, BufRead, BufReader, Read};
@@ -6,7 +8,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use crate::error_document::ErrorDocument;
+use serde::{Deserialize, Serialize};
 
 /// The program of what is done away from the controller.
 pub const WORKSHOP: &str = "dynocar-workshop";
@@ -150,6 +152,26 @@ pub fn not_started(package: &str, error: &io::Error) -> String {
         );
     }
     format!("{package} cannot be started: {error}")
+}
+
+/// A failure for machines.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ErrorAnswer {
+    /// As on standard error.
+    pub message: String,
+    /// The file where it is, when one is wrong.
+    pub file: Option<String>,
+    /// Line in the file, from 1.
+    pub line: Option<usize>,
+    /// Exit status of the command.
+    pub exit_status: u8,
+}
+
+/// What stands in the place of a result.
+#[derive(Serialize, Deserialize)]
+pub struct ErrorDocument {
+    /// Why there is none.
+    pub error: ErrorAnswer,
 }
 
 #[cfg(test)]

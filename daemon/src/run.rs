@@ -18,20 +18,21 @@ use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns}
 use dynocar_shared::{Quantity, TrainId};
 use tracing::{info, warn};
 
+use super::runtime::system::{
+    STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, set_fifo_priority,
+};
 use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
 use crate::ending::{self, EndingError};
 use crate::models::Store;
 use crate::pipelines::{SettingRefused, build_pipeline};
-use crate::runtime::affinity::pin_to_core;
 use crate::runtime::exchange::Exchange;
-use crate::runtime::memory::{STACK_BYTES, lock_all_memory, prefault_stack};
-use crate::runtime::scheduling::set_fifo_priority;
 use crate::runtime::tally::Tally;
 use crate::runtime::watch::{Watch, WatchedPipeline};
 use crate::runtime::worker::{ChannelPlan, Worker, WorkerPlan};
 use crate::shadow::train::Placed;
 use crate::shadow::{self, Board, ShadowTrain};
-use crate::state::{self, keeper::Keeper};
+use crate::state;
+use crate::state::keeper::Keeper;
 use crate::supervision::listener;
 use crate::supervision::notify::{Supervisor, Watchdog};
 
@@ -69,7 +70,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let mut config = config.clone();
     shadow::in_force::settle(&mut config);
     let config = &config;
-    let host = Host::of(config.root.as_deref())?;
+    let host = Host::of(config.process.root.as_deref())?;
     let stop = ending::flag()?;
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
     let _roles = trains
@@ -82,7 +83,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .collect::<Result<Vec<_>, _>>()?;
     // Grows with every start: the monotonic clock is common to all processes of the host.
     let epoch = monotonic_now_ns() as u64;
-    if config.lock_memory {
+    if config.process.lock_memory {
         lock_memory();
     }
     let state = state::Taken::up(config);
@@ -166,8 +167,8 @@ fn plan_workers(
             thread: thread.clone(),
             host: host.clone(),
             epoch,
-            spin_us: config.spin_us,
-            heartbeat_ms: config.heartbeat_ms,
+            spin_us: config.process.spin_us,
+            heartbeat_ms: config.process.heartbeat_ms,
             channels: Vec::new(),
             stop: Arc::clone(stop),
         })

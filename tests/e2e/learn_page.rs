@@ -4,8 +4,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use dynocar::models::decision::Choice;
-use dynocar::models::event::EventWindow;
-use dynocar::models::origin::HeldOutError;
+use dynocar::models::origin::{EventWindow, HeldOutError};
 use dynocar::models::{
     Figure, FoundEffect, MaintenanceEvent, ModelHash, ModelText, Moment, NewDecision, NewModel,
     Origin, Store, TrainModels,

@@ -4,8 +4,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use dynocar::output::report_line;
-use dynocar::runtime::affinity::pin_to_core;
-use dynocar::runtime::scheduling::set_fifo_priority;
+use dynocar::runtime::system::{pin_to_core, set_fifo_priority};
 use serde::Serialize;
 
 use crate::parallel;

@@ -14,7 +14,7 @@ use dynocar::programs::{PARQUET, called_as};
 use dynocar_recording::cli::{ConvertArguments, VerifyArguments};
 use dynocar_recording::convert::{from_dataset, unpack};
 
-use crate::back::write_mcap;
+use super::reading::write_mcap;
 use crate::numbers::{Wanted, send_columns};
 use crate::reading::{Content, read};
 use crate::writing::{Written, write_folder};

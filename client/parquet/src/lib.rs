@@ -7,18 +7,15 @@
 //! # Layout
 //!
 //! - [`cells`]: the columns of `dynocar_recording::columns` as Arrow has them
-//! - [`error`]: why a file is none that can be read
-//! - [`guarded`]: what a damaged file does to the library that reads it
+//! - [`error`]: why a file is none that can be read, and what a damaged one does to its library
 //! - [`writing`]: MCAP to Parquet
-//! - [`reading`], [`table`]: Parquet to what a recording holds, [`back`]: and to MCAP
+//! - [`reading`], [`table`]: Parquet to what a recording holds, and to MCAP
 //! - [`numbers`]: a Parquet file of anybody as columns of numbers
 //! - [`cli`]: the command line
 
-pub mod back;
 pub mod cells;
 pub mod cli;
 pub mod error;
-pub mod guarded;
 pub mod numbers;
 pub mod reading;
 pub mod table;

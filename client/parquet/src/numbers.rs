@@ -16,8 +16,8 @@ use dynocar::columns_stream::Sender;
 use dynocar_model::units::{Dimension, Unit};
 use parquet::arrow::ProjectionMask;
 
+use super::error::guarded;
 use crate::error::{TableError, TableProblem};
-use crate::guarded::guarded;
 use crate::reading::open;
 
 /// A column that is wanted.

@@ -1,8 +1,8 @@
 //! The command line: `dynocar record`, `recover`, `convert` and `replay --verify` become this program.
+//!
+//! What a failure is to the command line: wrong input, or work that could not be done.
 
 mod annotate;
-mod failure;
-mod flight_recorder;
 mod record;
 
 use std::path::{Path, PathBuf};
@@ -14,13 +14,17 @@ use dynocar::config::DaemonConfig;
 use dynocar::output::{print, report_line, require_new};
 use dynocar::programs::{RECORDING, called_as};
 
-use crate::convert::{ModelFiles, Unpacked, from_dataset, to_dataset};
-use crate::copying::recover;
-use crate::error::CopyError;
-use crate::page::page;
-use crate::reading::Ending;
-use crate::recording::Recording;
-use crate::verify::{Configurations, Outcome, overlay, text, verify};
+use super::annotate::AnnotateError;
+use super::convert::{
+    FromDatasetError, ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset,
+};
+use super::copying::recover;
+use super::error::CopyError;
+use super::page::page;
+use super::reading::Ending;
+use super::record::{KeepError, RecordError};
+use super::recording::Recording;
+use super::verify::{Configurations, Outcome, overlay, text, verify};
 
 pub use record::WantedArguments;
 
@@ -38,8 +42,8 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Record(record::RecordArguments),
-    FlightRecorder(flight_recorder::FlightRecorderArguments),
-    Keep(flight_recorder::KeepArguments),
+    FlightRecorder(record::FlightRecorderArguments),
+    Keep(record::KeepArguments),
     Recover(RecoverArguments),
     Convert(ConvertArguments),
     #[command(hide = true)]
@@ -145,8 +149,8 @@ pub fn main() -> ExitCode {
         |it: &Arguments| it.json.as_deref(),
         |arguments| match &arguments.command {
             Command::Record(arguments) => record::execute(arguments),
-            Command::FlightRecorder(arguments) => flight_recorder::execute(arguments),
-            Command::Keep(arguments) => flight_recorder::execute_keep(arguments),
+            Command::FlightRecorder(arguments) => record::execute_flight_recorder(arguments),
+            Command::Keep(arguments) => record::execute_keep(arguments),
             Command::Recover(arguments) => execute_recover(arguments),
             Command::Convert(arguments) => execute_convert(arguments),
             Command::Annotate(arguments) => annotate::execute(arguments),
@@ -237,6 +241,59 @@ impl VerifyArguments {
             Ok(())
         } else {
             Err(Failure::Verdict(1))
+        }
+    }
+}
+
+/// A file that is no recording is wrong input; one that cannot be written is not.
+impl From<CopyError> for Failure {
+    fn from(error: CopyError) -> Self {
+        match error {
+            CopyError::Read(error) => Failure::input(error),
+            CopyError::Write(error) => Failure::work(error),
+        }
+    }
+}
+
+/// A dataset that makes no recording is wrong input; a recording that cannot be written is not.
+impl From<FromDatasetError> for Failure {
+    fn from(error: FromDatasetError) -> Self {
+        match error {
+            FromDatasetError::Dataset(error) => error.into(),
+            FromDatasetError::Write(_) => Failure::work(error),
+            error => Failure::input(error),
+        }
+    }
+}
+
+/// A recording that makes no dataset is wrong input; a dataset that cannot be written is not.
+impl From<ToDatasetError> for Failure {
+    fn from(error: ToDatasetError) -> Self {
+        match error {
+            ToDatasetError::Output(error) => error.into(),
+            error => Failure::input(error),
+        }
+    }
+}
+
+/// A recording that is another than the one explained is wrong input.
+impl From<AnnotateError> for Failure {
+    fn from(error: AnnotateError) -> Self {
+        match error {
+            AnnotateError::Copy(error) => error.into(),
+            error => Failure::input(error),
+        }
+    }
+}
+
+/// A name that is taken is wrong input.
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        match error {
+            RecordError::Taken { .. } | RecordError::Ring(KeepError::Taken { .. }) => {
+                Failure::input(error)
+            }
+            error => Failure::work(error),
         }
     }
 }

@@ -6,7 +6,7 @@ use dynocar_shared::schema::{Field, unit_of};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, Reason, Status};
 
-use crate::annotate::schema::MESSAGES;
+use super::annotate::messages::MESSAGES;
 use crate::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
 use crate::event::{Event, EventKind};
 use crate::message::MessageField;

@@ -11,8 +11,7 @@
 //! - [`publisher`], [`reader`]: the two ends a controller holds
 //! - [`snapshot`]: resistance, parameters and covariances out of a copied snapshot
 //! - [`stopping`]: braking distance and time with a bound
-//! - [`about`]: clock, versions, and who serves a train
-//! - [`names`]: the vocabularies' names
+//! - [`about`]: clock, versions, who serves a train, and the vocabularies' names
 //!
 //! # Safety
 //!
@@ -27,7 +26,6 @@
 pub mod about;
 pub mod error;
 pub mod handle;
-pub mod names;
 pub mod publisher;
 pub mod reader;
 pub mod snapshot;

@@ -12,7 +12,7 @@ use std::ptr::null_mut;
 use dynocar_client::ffi::publisher::*;
 use dynocar_client::ffi::reader::*;
 use dynocar_client::ffi::snapshot::*;
-use dynocar_client::ffi::{ReadingCopy, Resistance, about, error, names};
+use dynocar_client::ffi::{ReadingCopy, Resistance, about, error};
 use dynocar_shared::{PipelineKind, Quantity, TrainSample};
 
 use crate::support::{Link, PlayedDaemon, Program, TRAIN, client_directory};
@@ -93,7 +93,7 @@ fn cycle(ends: &Ends) -> ((u64, usize), [(u64, usize); 6]) {
             }),
             allocations_of(|| {
                 error::dynocar_code_text(0);
-                names::dynocar_status_name(reading.status);
+                about::dynocar_status_name(reading.status);
                 0
             }),
         ];

@@ -49,7 +49,7 @@ pub fn main() -> ExitCode {
 fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
     let trains = wanted(arguments, config.as_ref())?;
-    let root = config.as_ref().and_then(|config| config.root.as_deref());
+    let root = config.as_ref().and_then(|config| config.process.root.as_deref());
     let host = Host::of(root).map_err(Failure::work)?;
     let ending = Ending::begin().map_err(Failure::work)?;
     terminal::end_though_stuck(Arc::clone(&ending.flag))

@@ -7,8 +7,7 @@
 //!
 //! - [`cli`]: the command line
 //! - [`watcher`]: trains that are observed, and what is shown of them
-//! - [`state`]: a train as it is shown, without any clock or channel
-//! - [`history`]: the last minutes, for plots
+//! - [`state`]: a train as it is shown and its last minutes, without any clock or channel
 //! - [`advisor`]: what to drive next, now and then
 //! - [`words`]: numbers with intervals and units, a train's lines
 //! - [`screen`]: the screen, drawn from a [`state`]
@@ -17,7 +16,6 @@
 
 pub mod advisor;
 pub mod cli;
-pub mod history;
 pub mod plain;
 pub mod screen;
 pub mod state;

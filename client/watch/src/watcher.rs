@@ -8,8 +8,8 @@ use dynocar::observing::{ObservedTrain, Wanted};
 use dynocar_client::{Host, Role, monotonic_now_ns};
 use dynocar_shared::TrainId;
 
+use super::state::History;
 use crate::advisor::Advisor;
-use crate::history::History;
 use crate::state::{Daemon, PipelineState, TrainState};
 
 /// How often daemons are looked for, and points of the plots taken.

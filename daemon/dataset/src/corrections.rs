@@ -1,6 +1,9 @@
-//! `[corrections]` of a `train.toml`: what measured runs have added to the declared model.
+//! `[corrections]` and `[[extra]]` of a `train.toml`: what measured runs add to the declared model.
 
 use dynocar_model::terms::CORRECTIONS;
+use dynocar_model::terms::extra::{
+    Covariate, Extra, FACTORS, FACTORS_MAX, FORCE, FORCE_MAX_N_PER_KN, Factor, Form, TABLES,
+};
 use dynocar_model::train::TrainModel;
 
 use super::document::Item;
@@ -16,6 +19,48 @@ pub(super) fn read_corrections(section: &Item, train: &mut TrainModel) -> Result
         }
     }
     Ok(())
+}
+
+/// Reads the tables of a train file; none where none stand there.
+pub(super) fn read_extra(root: &Item) -> Result<Vec<Extra>, DatasetError> {
+    root.tables(TABLES)?.iter().map(extra).collect()
+}
+
+fn extra(section: &Item) -> Result<Extra, DatasetError> {
+    section.allow(&[FORCE, FACTORS])?;
+    let range = -FORCE_MAX_N_PER_KN..=FORCE_MAX_N_PER_KN;
+    let n_per_kn = section.required(FORCE, "N/kN, from -100 to 100", range)?;
+    let tables = section.tables(FACTORS)?;
+    if tables.is_empty() || tables.len() > FACTORS_MAX {
+        let found = format!("{} of them", tables.len());
+        return Err(section.key_out_of_range(FACTORS, &found, "one or two tables"));
+    }
+    let factors = tables.iter().map(factor).collect::<Result<_, _>>()?;
+    Ok(Extra { n_per_kn, factors })
+}
+
+fn factor(section: &Item) -> Result<Factor, DatasetError> {
+    let (covariate, covariates) =
+        (("covariate", "a covariate"), Covariate::ALL.map(Covariate::name));
+    let of = section.need_named("of", covariate, Covariate::from_name, covariates)?;
+    let forms = Form::ALL.map(Form::name);
+    let form = section.need_named("form", ("form", "a form"), Form::from_name, forms)?;
+    let keys: Vec<&str> = ["of", "form"].iter().chain(form.numbers()).copied().collect();
+    section.allow(&keys)?;
+    let mut numbers = [0.0; 2];
+    for (number, name) in numbers.iter_mut().zip(form.numbers()) {
+        *number = section.required(name, "a number", ..)?;
+    }
+    match form.refusal(numbers) {
+        None => Ok(Factor { of, form, numbers }),
+        Some(expected) => {
+            let named = form.numbers().iter().zip(numbers);
+            let found: Vec<String> =
+                named.map(|(name, number)| format!("{name} = {number}")).collect();
+            let found = format!("{} with {}", form.name(), found.join(", "));
+            Err(section.key_out_of_range("form", &found, expected))
+        }
+    }
 }
 
 #[cfg(test)]
@@ -42,5 +87,48 @@ mod tests {
             parse_train("train.toml", &text).unwrap_err().to_string(),
             "train.toml:10: corrections.speed_scale = 98: expected from 0.8 to 1.25"
         );
+    }
+}
+
+#[cfg(test)]
+mod extra_tests {
+    use crate::parse_train;
+    use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
+
+    const TRAIN: &str = "[train]\nmass_t = 10\nlength_m = 1\nrotating_mass_factor = 0\n\
+                         [resistance]\na = 1\nb = 0\nc = 0\n[[extra]]\nn_per_kn = 0.8\n";
+
+    fn refusal(extra: &str) -> String {
+        parse_train("train.toml", &format!("{TRAIN}{extra}")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_force_with_two_factors_is_read() {
+        let text = "[[extra.factor]]\nof = \"speed_mps\"\nform = \"hyperbola\"\nbelow = 15\n\
+                    least = 3\n[[extra.factor]]\nof = \"ambient_temperature_degc\"\n\
+                    form = \"below\"\nuntil = 5\nspan = 10\n";
+        let train = parse_train("train.toml", &format!("{TRAIN}{text}")).unwrap();
+        let hyperbola =
+            Factor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
+        let below = Factor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
+        assert_eq!(train.extra, [Extra { n_per_kn: 0.8, factors: vec![hyperbola, below] }]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_line_and_choices() {
+        let no_factor = refusal("");
+        assert!(no_factor.contains("train.toml:"), "{no_factor}");
+        assert!(no_factor.contains("expected one or two tables"), "{no_factor}");
+        let factor = "[[extra.factor]]\nof = \"speed_mps\"\n";
+        let misspelt = refusal(&factor.replace("speed_mps", "sped_mps"));
+        assert!(misspelt.contains("did you mean 'speed_mps'?"), "{misspelt}");
+        let form = refusal(&format!("{factor}form = \"sine\"\n"));
+        assert!(form.contains("unknown form 'sine'"), "{form}");
+        let number = refusal(&format!("{factor}form = \"hyperbola\"\nbelow = 15\n"));
+        assert!(number.contains("least"), "{number}");
+        let order = refusal(&format!("{factor}form = \"hyperbola\"\nbelow = 2\nleast = 3\n"));
+        assert!(order.contains("below = 2, least = 3"), "{order}");
+        let further = refusal(&format!("{factor}form = \"decay\"\nover = 2\nleast = 3\n"));
+        assert!(further.contains("unknown key 'least'"), "{further}");
     }
 }

@@ -5,8 +5,7 @@ use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
 use dynocar_model::train::Drive;
 use toml::Value;
 
-use super::diagnostic::Diagnostic;
-use super::fault_unit::read_as;
+use super::diagnostic::{Diagnostic, read_as};
 use super::forces::{Force, ForceSource};
 use super::motion::PositionSource;
 use super::quality::RunQuality;

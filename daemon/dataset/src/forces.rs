@@ -1,10 +1,11 @@
-//! Traction and brake force of a run's rows.
+//! Traction and brake force of a run's rows, and the electric power that the first may come from.
+
+use std::borrow::Cow;
 
 use dynocar_model::train::{Drive, EffortCurve, TrainModel};
 use serde::Serialize;
 
 use super::order::{TimeOrder, quantile};
-use super::power;
 use super::quantity::Quantity;
 use super::spikes::spikes;
 use super::table::Table;
@@ -168,7 +169,7 @@ fn by_power(
     train: &TrainModel,
     (traction, brake): (&mut Force, &mut Force),
 ) {
-    let Some(power_w) = power::recorded_w(table) else { return };
+    let Some(power_w) = recorded_w(table) else { return };
     let drive = train.drive.unwrap_or(Drive::USUAL);
     let control = power_w.iter().zip(speed_mps);
     let control: Vec<f64> =
@@ -222,6 +223,22 @@ fn hand_over(force_n: f64, noise_n: f64, row: usize, from: &mut Force, to: &mut 
         from.force_n[row] -= force_n;
         to.force_n[row] -= force_n;
     }
+}
+
+/// A run's power in W, row by row, `NaN` where missing, what is fed back negative: the drive's own
+/// power, else the line's.
+pub(super) fn recorded_w(table: &Table) -> Option<Cow<'_, [f64]>> {
+    table.filled(Quantity::TractionPower).map(Cow::from).or_else(|| line_power_w(table))
+}
+
+/// Power from the line in W, by its own column, else by voltage and current.
+pub(super) fn line_power_w(table: &Table) -> Option<Cow<'_, [f64]>> {
+    if let Some(power_w) = table.filled(Quantity::LinePower) {
+        return Some(power_w.into());
+    }
+    let (volts, amperes) =
+        table.filled(Quantity::LineVoltage).zip(table.filled(Quantity::LineCurrent))?;
+    Some(volts.iter().zip(amperes).map(|(volts, amperes)| volts * amperes).collect())
 }
 
 #[cfg(test)]

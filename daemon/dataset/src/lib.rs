@@ -15,8 +15,8 @@
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
 //! - `run_content`: what a run's file holds, text or columns
-//! - `plain_number`, `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
-//! - `order`, `spikes`, `motion`, `power`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
+//! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
+//! - `order`, `spikes`, `motion`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], `judge`, [`diagnostic`], `diagnosing`, `declared`: samples,
 //!   counts and warnings
@@ -33,8 +33,6 @@ pub mod diagnostic;
 pub mod document;
 pub mod encoding;
 pub mod error;
-mod extra;
-mod fault_unit;
 mod forces;
 pub mod guess;
 mod header;
@@ -45,8 +43,6 @@ mod motion;
 mod names;
 pub mod node;
 mod order;
-mod plain_number;
-mod power;
 pub mod quality;
 pub mod quantity;
 mod resolved;

@@ -6,11 +6,10 @@ use dynocar_shared::{SampleField, TrainSample};
 use super::diagnosing::diagnostics;
 use super::diagnostic::Diagnostic;
 use super::error::{DatasetError, SourcePosition};
-use super::forces::ForceSource;
+use super::forces::{self, ForceSource};
 use super::judge::Judge;
 use super::manifest::{Manifest, Role, RunEntry};
 use super::motion::PositionSource;
-use super::power;
 use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
@@ -239,7 +238,7 @@ fn extras(table: &Table) -> Vec<(Quantity, Extra)> {
     let held = |&it: &f64| (!it.is_nan()).then_some(it);
     let extra = |(quantity, _): (Quantity, _)| {
         let values = match quantity {
-            Quantity::LinePower => power::line_power_w(table)?,
+            Quantity::LinePower => forces::line_power_w(table)?,
             quantity => table.column(quantity)?.into(),
         };
         Some((quantity, values.iter().map(held).collect()))

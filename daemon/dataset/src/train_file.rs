@@ -7,10 +7,9 @@ use dynocar_model::train::{
     BrakeGear, Corrections, Davis, Drive, EffortCurve, FrictionBrake, TrainModel,
 };
 
-use super::corrections::read_corrections;
+use super::corrections::{read_corrections, read_extra};
 use super::document::{Item, above_zero};
 use super::error::DatasetError;
-use super::extra::read_extra;
 use super::node::Node;
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.

@@ -1,13 +1,14 @@
-//! A model's table of variables as `modelDescription.xml`, by the FMI standard 2.0, and as a page.
+//! The library's two models as `modelDescription.xml`, by the FMI standard 2.0, and as pages.
 
 use std::fmt::Write as _;
 
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, Status};
 
-use crate::estimators::ESTIMATORS;
-use crate::units;
-use crate::variables::{Begins, Interface, Kind, MISSING, Meaning, Variable, Vocabulary};
+use super::estimators::{self, ESTIMATORS};
+use super::plant::{self, PLANT};
+use super::units;
+use super::variables::{Begins, Interface, Kind, MISSING, Meaning, Variable, Vocabulary};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -192,10 +193,16 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
+/// Both models.
+pub const INTERFACES: [&Interface; 2] = [&ESTIMATORS, &PLANT];
+
+/// Their GUIDs as a symbol, so that a library shows its own without being loaded.
+#[unsafe(no_mangle)]
+pub static DYNOCAR_FMU_GUIDS: [[u8; 16]; 2] = [estimators::GUID_DIGITS, plant::GUID_DIGITS];
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interfaces::INTERFACES;
 
     #[test]
     fn the_description_has_every_variable_under_its_reference() {
@@ -227,5 +234,27 @@ mod tests {
     fn text_in_quotes_stays_text() {
         assert_eq!(escaped("a < b & \"c\""), "a &lt; b &amp; &quot;c&quot;");
         assert!(documentation(&ESTIMATORS).contains("resistance.w0_std"));
+    }
+}
+
+#[cfg(test)]
+mod interfaces_tests {
+    use super::*;
+    use crate::units;
+
+    #[test]
+    fn names_are_unique_and_units_known() {
+        for Interface { variables, .. } in INTERFACES {
+            for (reference, variable) in variables.iter().enumerate() {
+                assert!(variables[..reference].iter().all(|it| it.name != variable.name));
+                assert!(variable.unit == units::NONE || units::ALL.contains(&variable.unit));
+            }
+        }
+    }
+
+    #[test]
+    fn no_model_is_taken_for_the_other() {
+        assert_ne!(ESTIMATORS.guid, PLANT.guid);
+        assert_ne!(ESTIMATORS.identifier, PLANT.identifier);
     }
 }

@@ -1,7 +1,8 @@
-//! The files that describe train and line, and the models for them.
+//! Where the FMU was unpacked, the files that describe train and line, and the models for them.
 
-use std::ffi::{CStr, CString};
+use std::ffi::{CStr, CString, OsString};
 use std::io::ErrorKind;
+use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,10 +14,9 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId};
 
-use crate::error::ModelError;
-use crate::estimators::{Estimators, PIPELINES};
-use crate::location::folder_of;
-use crate::variables::ModelFile;
+use super::error::ModelError;
+use super::estimators::{Estimators, PIPELINES};
+use super::variables::ModelFile;
 
 /// The train of an instance; there is no other in it.
 pub const TRAIN: TrainId = TrainId(1);
@@ -139,4 +139,55 @@ impl Files {
 fn text_of(path: &Path) -> Result<String, ModelError> {
     let unreadable = |source| ModelError::Unreadable { path: path.into(), source };
     std::fs::read_to_string(path).map_err(unreadable)
+}
+
+/// The folder that a `file:` URI means (RFC 8089), or a plain absolute path; `None` for any other.
+pub fn folder_of(location: &str) -> Option<PathBuf> {
+    let Some(rest) = location.strip_prefix("file:") else {
+        return location.starts_with('/').then(|| location.into());
+    };
+    let path = match rest.strip_prefix("//") {
+        Some(rest) => rest.strip_prefix("localhost").unwrap_or(rest),
+        None => rest,
+    };
+    let bytes = percent_decoded(path.as_bytes())?;
+    bytes.starts_with(b"/").then(|| OsString::from_vec(bytes).into())
+}
+
+/// `None` where a percent sign is followed by no two hexadecimal digits.
+fn percent_decoded(text: &[u8]) -> Option<Vec<u8>> {
+    let mut decoded = Vec::with_capacity(text.len());
+    let mut rest = text.iter();
+    while let Some(&byte) = rest.next() {
+        let mut digit = || char::from(*rest.next()?).to_digit(16);
+        decoded.push(if byte == b'%' { (16 * digit()? + digit()?) as u8 } else { byte });
+    }
+    Some(decoded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_found_by_any_way_of_writing_its_uri() {
+        let expected = Some(PathBuf::from("/tmp/a b/é#1"));
+        for location in [
+            "file:///tmp/a%20b/%C3%A9%231",
+            "file://localhost/tmp/a%20b/%c3%a9%231",
+            "file:/tmp/a%20b/é%231",
+            "/tmp/a b/é#1",
+        ] {
+            assert_eq!(folder_of(location), expected, "{location}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_local_folder_is_none() {
+        for location in
+            ["", "resources", "https://host/a", "file://host/a", "file:///a%2", "file:///%zz"]
+        {
+            assert_eq!(folder_of(location), None, "{location}");
+        }
+    }
 }

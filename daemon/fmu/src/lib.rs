@@ -10,12 +10,10 @@
 //!
 //! - [`variables`]: what a variable can be
 //! - [`estimators`], [`plant`]: the two models, each with its table of variables
-//! - [`interfaces`]: both of them
 //! - [`units`]: their units
-//! - [`description`]: a table as `modelDescription.xml` and as a page for people
-//! - [`location`]: where the FMU was unpacked
+//! - [`description`]: both of them, as `modelDescription.xml` and as pages for people
 //! - [`error`]: why a call is refused
-//! - [`files`]: the files of train and line, and the models for them
+//! - [`files`]: where the FMU was unpacked, the files of train and line, and the models for them
 //! - [`inputs`]: what acts during a step
 //! - [`model`]: what stands behind an instance: inputs, one of the models, the order of calls
 //! - [`ffi`]: the functions that a simulator calls
@@ -26,16 +24,14 @@ pub mod estimators;
 pub mod ffi;
 pub mod files;
 pub mod inputs;
-pub mod interfaces;
-pub mod location;
 pub mod model;
 pub mod plant;
 pub mod units;
 pub mod variables;
 
+pub use crate::description::INTERFACES;
 pub use description::{documentation, model_description};
 pub use estimators::ESTIMATORS;
-pub use interfaces::INTERFACES;
 pub use model::Model;
 pub use plant::PLANT;
 pub use variables::{Interface, MISSING};

@@ -8,15 +8,14 @@ use clap::Args;
 use dynocar_dataset::{DatasetDiagnostic, top_keys};
 use serde::Serialize;
 
-pub use daemon::{DaemonAnswer, answer, read, report};
-
 use super::Failure;
 use super::companion::{become_it, words_of_command};
 use crate::config::DaemonConfig;
 use crate::dataset::{FileKind, is_recording, kind_of, labelled_text};
-use crate::error_document::ErrorAnswer;
 use crate::output::{give, report_line, require_file, write_json};
-use crate::programs::WORKSHOP;
+use crate::programs::{ErrorAnswer, WORKSHOP};
+
+pub use daemon::{DaemonAnswer, answer, read, report};
 
 /// Check a dataset, train, track or configuration, and report what was understood.
 #[derive(Clone, Debug, Args)]

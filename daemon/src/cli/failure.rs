@@ -8,8 +8,8 @@ use dynocar_dataset::{DatasetError, SourcePosition};
 
 use crate::config::ConfigError;
 use crate::dataset::LoadError;
-use crate::error_document::{ErrorAnswer, ErrorDocument};
 use crate::output::{OutputError, report_line, require_file, write_json};
+use crate::programs::{ErrorAnswer, ErrorDocument};
 use crate::unpacking::UnpackError;
 
 /// Why a command ended without a result; says which exit status follows.

@@ -33,7 +33,7 @@ pub struct HealthArguments {
 /// The worst verdict of all trains unless it is ok; an unusable configuration or directory.
 pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
     let config = arguments.config.as_deref().map(DaemonConfig::load).transpose()?;
-    let root = config.as_ref().and_then(|config| config.root.as_deref());
+    let root = config.as_ref().and_then(|config| config.process.root.as_deref());
     let host = Host::of(root).map_err(Failure::work)?;
     let trains: Vec<TrainId> = match (arguments.train, &config) {
         (Some(train), _) => vec![TrainId(train)],
@@ -61,7 +61,7 @@ pub fn execute(arguments: &HealthArguments) -> Result<(), Failure> {
 
 fn lines_of(health: &TrainHealth) -> String {
     let daemon = health.daemon.as_deref().unwrap_or("nobody serves it");
-    let mut text = format!("train {}: {}: {daemon}\n", health.train, health.verdict);
+    let mut text = format!("train {}: {}: {daemon}\n", health.train, health.verdict.name());
     for it in &health.pipelines {
         let reason = it.reason.map_or("unknown", dynocar_shared::Reason::name);
         let (kind, status, age_ms) = (it.kind, it.status, it.age_ms);

@@ -24,7 +24,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 pub use failure::Failure;
 
 use self::companion::{Passed, become_it};
-use crate::error_document::ErrorDocument;
+use super::programs::ErrorDocument;
 use crate::output::{OutputError, write_json};
 use crate::programs::{LIVE, RECORDING, WATCH, WORKSHOP};
 use crate::unpacking::program_for;

@@ -205,7 +205,7 @@ fn list(models: &TrainModels, history: &History) -> String {
             "{}  {}  {:9}  {error:17}  {}",
             stored.hash,
             origin.made,
-            state.words(),
+            state.name(),
             origin.adds()
         );
         if let Some(tried) = on_trial {
@@ -217,8 +217,7 @@ fn list(models: &TrainModels, history: &History) -> String {
 
 fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
     let origin = &stored.origin;
-    let mut text =
-        format!("model {} of train {}: {}\n", stored.hash, models.train(), state.words());
+    let mut text = format!("model {} of train {}: {}\n", stored.hash, models.train(), state.name());
     let mut row = |name: &str, value: &str| {
         let _ = writeln!(text, "{name:10} {value}");
     };

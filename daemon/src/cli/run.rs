@@ -39,11 +39,11 @@ pub fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
         .with_ansi(false)
         // A log that cannot be written is reported nowhere, and ends no daemon.
         .log_internal_errors(false);
-    let log = match config.log_format {
+    let log = match config.process.log_format {
         LogFormat::Text => log.with_target(false).boxed(),
         LogFormat::Json => log.json().boxed(),
     };
-    tracing_subscriber::registry().with(filter(&config.log)?).with(log).init();
+    tracing_subscriber::registry().with(filter(&config.process.log)?).with(log).init();
     Ok(())
 }
 

@@ -9,17 +9,17 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, TrainId};
 
-use super::apart;
-use super::checker::Checker;
+use super::error::Checker;
 use super::raw::{
-    RawConfig, RawMetrics, RawPipeline, RawQuantities, RawState, RawThread, RawTrain,
+    RawConfig, RawMetrics, RawModels, RawPipeline, RawQuantities, RawThread, RawTrain,
 };
 use super::{
-    Answers, ConfigError, DaemonConfig, IdleStrategy, PipelineConfig, StateConfig, ThreadConfig,
-    TrainConfig,
+    Answers, ConfigError, DaemonConfig, IdleStrategy, ModelsConfig, PipelineConfig, StateConfig,
+    ThreadConfig, TrainConfig, apart,
 };
 use crate::dataset::LoadError;
-use crate::models::ModelText;
+use crate::models::{ModelHash, ModelText};
+use crate::shadow::rule::Rule;
 
 /// The most pipeline threads that one sample channel serves.
 const THREADS_MAX: usize = 10;
@@ -33,9 +33,9 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
     let checker = Checker { path };
     let (mut trains, named): (Vec<_>, Vec<_>) =
         check_trains(&checker, raw.trains)?.into_iter().unzip();
-    let mut threads = check_threads(&checker, raw.threads, raw.daemon.idle)?;
-    let pipelines =
-        check_pipelines(&checker, raw.pipelines, &trains, &mut threads, raw.daemon.idle)?;
+    let process = raw.daemon;
+    let mut threads = check_threads(&checker, raw.threads, process.idle)?;
+    let pipelines = check_pipelines(&checker, raw.pipelines, &trains, &mut threads, process.idle)?;
     for (train, named) in trains.iter_mut().zip(&named) {
         train.answers = Answers::settle(&checker, train.id, named, &raw.quantities, &pipelines)?;
     }
@@ -48,7 +48,7 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
         let allowed = format!("at most {THREADS_MAX} threads; let pipelines share one");
         return checker.refuse("threads", threads.len(), allowed);
     }
-    let models = raw.models.map(|it| super::models::check(&checker, it)).transpose()?;
+    let models = raw.models.map(|it| check_models(&checker, it)).transpose()?;
     if models.is_none() && trains.iter().any(|train| train.candidates.is_some()) {
         return checker.refuse("trains.candidates", "models", "a store of models, [models]");
     }
@@ -57,13 +57,10 @@ pub fn check(path: &Path, text: &str) -> Result<DaemonConfig, ConfigError> {
             format!("at most {} threads beside the one that tries models", THREADS_MAX - 1);
         return checker.refuse("threads", threads.len(), allowed);
     }
+    checker.range("daemon.spin_us", process.spin_us, 0, 1_000_000)?;
+    checker.range("daemon.heartbeat_ms", process.heartbeat_ms, 5, 100)?;
     Ok(DaemonConfig {
-        root: raw.daemon.root,
-        log: raw.daemon.log,
-        log_format: raw.daemon.log_format,
-        spin_us: checker.range("daemon.spin_us", raw.daemon.spin_us, 0, 1_000_000)?,
-        heartbeat_ms: checker.range("daemon.heartbeat_ms", raw.daemon.heartbeat_ms, 5, 100)?,
-        lock_memory: raw.daemon.lock_memory,
+        process,
         metrics: raw.metrics.map(|metrics| check_metrics(&checker, metrics)).transpose()?,
         state: check_state(&checker, raw.state)?,
         models,
@@ -85,18 +82,28 @@ fn check_metrics(checker: &Checker, raw: RawMetrics) -> Result<SocketAddr, Confi
 }
 
 /// Checks where estimates are kept, if they are; a directory that is named must be there.
-fn check_state(checker: &Checker, raw: RawState) -> Result<Option<StateConfig>, ConfigError> {
-    let folder = checker.path.parent().unwrap_or(Path::new("."));
-    let directory = raw.directory.as_ref().map(|named| folder.join(named));
-    if let Some(named) = directory.as_ref().filter(|it| !it.is_dir()) {
+fn check_state(
+    checker: &Checker,
+    mut state: StateConfig,
+) -> Result<Option<StateConfig>, ConfigError> {
+    state.directory = state.directory.map(|named| checker.folder().join(named));
+    if let Some(named) = state.directory.as_ref().filter(|it| !it.is_dir()) {
         return checker.refuse("state.directory", named.display(), "an existing directory");
     }
-    let state = StateConfig {
-        directory,
-        interval_s: checker.range("state.interval_s", raw.interval_s, 1, 3_600)?,
-        age_max_h: checker.range("state.age_max_h", raw.age_max_h, 1, 10_000)?,
-    };
-    Ok(raw.keep.then_some(state))
+    checker.range("state.interval_s", state.interval_s, 1, 3_600)?;
+    checker.range("state.age_max_h", state.age_max_h, 1, 10_000)?;
+    Ok(state.keep.then_some(state))
+}
+
+/// Checks that this machine has a processor core.
+fn check_core(checker: &Checker, key: &str, core: Option<usize>) -> Result<(), ConfigError> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    match core.filter(|&core| core >= cores) {
+        Some(core) => {
+            checker.refuse(key, core, format!("a core of this machine, 0 to {}", cores - 1))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Checks the trains; which pipelines answer for them is known only with the pipelines.
@@ -107,7 +114,7 @@ fn check_trains(
     if raw.is_empty() {
         return checker.refuse("trains", "none", "at least one [[trains]] table");
     }
-    let folder = checker.path.parent().unwrap_or(Path::new("."));
+    let folder = checker.folder();
     let mut ids = HashSet::new();
     raw.into_iter()
         .map(|train| {
@@ -124,7 +131,7 @@ fn check_trains(
                 track: track.map(Arc::new),
                 model_hash: text.hash(),
                 text,
-                candidates: super::models::candidates(checker, train.candidates)?,
+                candidates: check_candidates(checker, train.candidates)?,
                 wheel_set: train.wheel_set,
                 answers: Answers::default(),
             };
@@ -138,14 +145,10 @@ fn check_threads(
     raw: Vec<RawThread>,
     idle: IdleStrategy,
 ) -> Result<Vec<ThreadConfig>, ConfigError> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let mut names = HashSet::new();
     raw.into_iter()
         .map(|thread| {
-            if let Some(core) = thread.core.filter(|&core| core >= cores) {
-                let allowed = format!("a core of this machine, 0 to {}", cores - 1);
-                return checker.refuse("threads.core", core, allowed);
-            }
+            check_core(checker, "threads.core", thread.core)?;
             if !names.insert(thread.name.clone()) {
                 return checker.refuse("threads.name", thread.name, "a name of its own");
             }
@@ -250,4 +253,61 @@ fn check_pipeline_trains(
             checker.refuse(format!("pipelines.{name}.trains"), id, allowed)
         })
         .collect()
+}
+
+/// Checks the store and what becomes of models on trial; the directory must be there when the daemon starts.
+fn check_models(checker: &Checker, raw: RawModels) -> Result<ModelsConfig, ConfigError> {
+    let directory = checker.folder().join(&raw.directory);
+    if !directory.is_dir() {
+        let given = raw.directory.display();
+        return checker.refuse("models.directory", given, "an existing directory");
+    }
+    let is_within = |value: f64, low: f64, high: f64| (low..=high).contains(&value);
+    if !is_within(raw.least_gain, 0.0, 0.9) {
+        let allowed = "a share of the error, 0 to 0.9";
+        return checker.refuse("models.least_gain", raw.least_gain, allowed);
+    }
+    if !is_within(raw.trips_between_mistakes, 20.0, 1e12) {
+        let (key, given) = ("models.trips_between_mistakes", raw.trips_between_mistakes);
+        return checker.refuse(key, given, "20 to 1e12 trips");
+    }
+    for (key, [low, high]) in &raw.bounds {
+        if !(low.is_finite() && high.is_finite() && low <= high) {
+            let key = format!("models.bounds.{key:?}");
+            return checker.refuse(
+                key,
+                format!("[{low}, {high}]"),
+                "the least value, then the greatest",
+            );
+        }
+    }
+    check_core(checker, "models.core", raw.core)?;
+    Ok(ModelsConfig {
+        directory,
+        rule: Rule {
+            adopt: raw.adopt,
+            least_gain: raw.least_gain,
+            trips_between_mistakes: raw.trips_between_mistakes,
+            bounds: raw.bounds,
+        },
+        candidates_max: checker.range("models.candidates_max", raw.candidates_max, 0, 8)? as usize,
+        core: raw.core,
+        interval_s: checker.range("models.interval_s", raw.interval_s, 1, 3_600)?,
+    })
+}
+
+/// Checks the models that a train names to be tried.
+fn check_candidates(
+    checker: &Checker,
+    names: Option<Vec<String>>,
+) -> Result<Option<Vec<ModelHash>>, ConfigError> {
+    let hash = |name: String| match name.parse() {
+        Ok(hash) => Ok(hash),
+        Err(_) => checker.refuse(
+            "trains.candidates",
+            name,
+            "the hash of a model, 16 hexadecimal digits, as `dynocar models list` names it",
+        ),
+    };
+    names.map(|names| names.into_iter().map(hash).collect()).transpose()
 }

@@ -1,6 +1,6 @@
-//! Why a configuration is refused.
+//! How a configuration refuses a value, and why it is refused.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use dynocar_dataset::FileProblem;
 
@@ -38,4 +38,37 @@ pub enum ConfigError {
     /// A train or track file is wrong; the message names it.
     #[error(transparent)]
     Model(#[from] crate::dataset::LoadError),
+}
+
+/// Names the configuration's file in every refusal.
+pub(super) struct Checker<'a> {
+    pub path: &'a Path,
+}
+
+impl Checker<'_> {
+    /// What file names in the configuration are relative to.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new("."))
+    }
+
+    pub fn refuse<T>(
+        &self,
+        key: impl Into<String>,
+        value: impl ToString,
+        allowed: impl Into<String>,
+    ) -> Result<T, ConfigError> {
+        Err(ConfigError::OutOfRange {
+            path: self.path.into(),
+            key: key.into(),
+            value: value.to_string(),
+            allowed: allowed.into(),
+        })
+    }
+
+    pub fn range(&self, key: &str, value: u64, low: u64, high: u64) -> Result<u64, ConfigError> {
+        if (low..=high).contains(&value) {
+            return Ok(value);
+        }
+        self.refuse(key, value, format!("a whole number from {low} to {high}"))
+    }
 }

@@ -5,18 +5,17 @@
 
 mod apart;
 mod check;
-mod checker;
 mod error;
-mod models;
-mod pace;
 mod parts;
 mod quantities;
 mod raw;
 mod whole;
 
+pub use apart::is_slow;
 pub use error::ConfigError;
-pub use pace::is_slow;
-pub use parts::{IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, StateConfig, ThreadConfig};
+pub use parts::{
+    IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig, StateConfig, ThreadConfig,
+};
 pub use quantities::Answers;
 pub use whole::{DaemonConfig, TrainConfig};
 

@@ -1,4 +1,4 @@
-//! The parts of a configuration: threads, pipelines, what is kept.
+//! The parts of a configuration: process, threads, pipelines, what is kept.
 
 use std::path::PathBuf;
 
@@ -40,15 +40,68 @@ pub enum LogFormat {
     Json,
 }
 
+/// The process: what `[daemon]` says.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProcessConfig {
+    /// Run-time directory; the environment's when absent.
+    pub root: Option<PathBuf>,
+    /// Level of the log, as `info` or `dynocar=debug`.
+    pub log: String,
+    /// Form of the log.
+    pub log_format: LogFormat,
+    /// What threads do while no sample comes, where they say nothing else.
+    pub idle: IdleStrategy,
+    /// How long an adaptive thread looks for samples before it sleeps, in µs.
+    pub spin_us: u64,
+    /// How often a snapshot is vouched for while no sample comes, in ms.
+    pub heartbeat_ms: u64,
+    /// Keeps all memory of the daemon resident, so that no thread waits for a page.
+    pub lock_memory: bool,
+}
+
+impl Default for ProcessConfig {
+    fn default() -> Self {
+        ProcessConfig {
+            root: None,
+            log: "info".into(),
+            log_format: LogFormat::Text,
+            idle: IdleStrategy::Adaptive,
+            spin_us: 2_000,
+            heartbeat_ms: 50,
+            lock_memory: false,
+        }
+    }
+}
+
 /// Where and how estimates are kept over restarts.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct StateConfig {
+    /// Whether they are.
+    pub keep: bool,
     /// Directory of the state files; the usual one of the service or user when absent.
     pub directory: Option<PathBuf>,
     /// How often they are written, in s.
     pub interval_s: u64,
     /// An older estimate is not taken up, in h.
     pub age_max_h: u64,
+}
+
+impl Default for StateConfig {
+    fn default() -> Self {
+        StateConfig {
+            keep: true,
+            directory: None,
+            interval_s: default_interval_s(),
+            age_max_h: 7 * 24,
+        }
+    }
+}
+
+/// How often what outlives the daemon is written, in s.
+pub(super) const fn default_interval_s() -> u64 {
+    30
 }
 
 /// The store of models, and what becomes of those on trial.

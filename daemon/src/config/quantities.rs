@@ -3,7 +3,7 @@
 use dynocar_core::pipeline::quantities::candidates;
 use dynocar_shared::{Quantity, TrainId};
 
-use super::checker::Checker;
+use super::error::Checker;
 use super::raw::RawQuantities;
 use super::{ConfigError, PipelineConfig};
 

@@ -5,14 +5,15 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use super::{IdleStrategy, LogFormat};
+use super::parts::default_interval_s;
+use super::{IdleStrategy, ProcessConfig, StateConfig};
 use crate::shadow::rule::Adopt;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RawConfig {
     #[serde(default)]
-    pub daemon: RawDaemon,
+    pub daemon: ProcessConfig,
     #[serde(default)]
     pub trains: Vec<RawTrain>,
     #[serde(default)]
@@ -22,7 +23,7 @@ pub struct RawConfig {
     #[serde(default)]
     pub quantities: RawQuantities,
     #[serde(default)]
-    pub state: RawState,
+    pub state: StateConfig,
     pub metrics: Option<RawMetrics>,
     pub models: Option<RawModels>,
 }
@@ -31,32 +32,6 @@ pub struct RawConfig {
 #[serde(deny_unknown_fields)]
 pub struct RawMetrics {
     pub listen: String,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RawDaemon {
-    pub root: Option<PathBuf>,
-    pub log: String,
-    pub log_format: LogFormat,
-    pub idle: IdleStrategy,
-    pub spin_us: u64,
-    pub heartbeat_ms: u64,
-    pub lock_memory: bool,
-}
-
-impl Default for RawDaemon {
-    fn default() -> Self {
-        RawDaemon {
-            root: None,
-            log: "info".into(),
-            log_format: LogFormat::Text,
-            idle: IdleStrategy::Adaptive,
-            spin_us: 2_000,
-            heartbeat_ms: 50,
-            lock_memory: false,
-        }
-    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -74,26 +49,6 @@ pub struct RawTrain {
 
 /// Name of the pipeline that answers, by the quantity's name.
 pub type RawQuantities = BTreeMap<String, String>;
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RawState {
-    pub keep: bool,
-    pub directory: Option<PathBuf>,
-    pub interval_s: u64,
-    pub age_max_h: u64,
-}
-
-impl Default for RawState {
-    fn default() -> Self {
-        RawState {
-            keep: true,
-            directory: None,
-            interval_s: default_interval_s(),
-            age_max_h: 7 * 24,
-        }
-    }
-}
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -129,10 +84,6 @@ const fn default_trips_between_mistakes() -> f64 {
 
 const fn default_candidates_max() -> u64 {
     2
-}
-
-const fn default_interval_s() -> u64 {
-    30
 }
 
 #[derive(Debug, Deserialize)]

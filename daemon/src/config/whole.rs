@@ -1,13 +1,13 @@
 //! A configuration and its trains.
 
-use std::path::PathBuf;
+use std::net::SocketAddr;
 use std::sync::Arc;
 
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainId;
 
-use super::parts::{LogFormat, ModelsConfig, PipelineConfig, StateConfig, ThreadConfig};
+use super::parts::{ModelsConfig, PipelineConfig, ProcessConfig, StateConfig, ThreadConfig};
 use super::quantities::Answers;
 use crate::models::{ModelHash, ModelText};
 
@@ -35,24 +35,14 @@ pub struct TrainConfig {
 /// A configuration, checked as a whole.
 #[derive(Clone, Debug)]
 pub struct DaemonConfig {
-    /// Run-time directory; the environment's when absent.
-    pub root: Option<PathBuf>,
-    /// Level of the log, as `info` or `dynocar=debug`.
-    pub log: String,
-    /// Form of the log.
-    pub log_format: LogFormat,
-    /// How long an adaptive thread looks for samples before it sleeps, in µs.
-    pub spin_us: u64,
-    /// How often a snapshot is vouched for while no sample comes, in ms.
-    pub heartbeat_ms: u64,
-    /// Keeps all memory of the daemon resident, so that no thread waits for a page.
-    pub lock_memory: bool,
+    /// The process.
+    pub process: ProcessConfig,
     /// The trains.
     pub trains: Vec<TrainConfig>,
     /// The threads.
     pub threads: Vec<ThreadConfig>,
     /// Loopback address that hands out metrics; none when absent.
-    pub metrics: Option<std::net::SocketAddr>,
+    pub metrics: Option<SocketAddr>,
     /// Estimates that outlive the daemon; none are kept when absent.
     pub state: Option<StateConfig>,
     /// The store of models; without it what is declared stays in force.

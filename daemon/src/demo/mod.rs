@@ -3,8 +3,6 @@
 //! A controller process replays an embedded recorded run into shared memory, a daemon process
 //! estimates, and this process is the client that polls each control cycle.
 
-mod embedded;
-mod latency;
 mod stage;
 mod summary;
 mod view;
@@ -21,8 +19,8 @@ use dynocar_dataset::Dataset;
 
 use crate::dataset::{self, LoadError};
 use crate::ending::{self, EndingError};
-use latency::Latencies;
 use stage::{Stage, StageError};
+use summary::Latencies;
 use view::View;
 
 /// Number of the demo's train on the channels.

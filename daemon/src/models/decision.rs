@@ -1,30 +1,22 @@
 //! Who put which model in force, who took it back, and what follows from that.
 
+use dynocar_model::named;
 use serde::{Deserialize, Serialize};
 
 use super::moment::Moment;
 use super::text::ModelHash;
 
-/// What is decided of a model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Action {
-    /// It is put in force.
-    Adopted,
-    /// What is in force is taken back; what was in force before it is so again.
-    RolledBack,
-    /// It is not wanted: it is no candidate any more.
-    Rejected,
-}
-
-impl Action {
-    /// Its name, as in the files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Action::Adopted => "adopted",
-            Action::RolledBack => "rolled_back",
-            Action::Rejected => "rejected",
-        }
+named! {
+    /// What is decided of a model.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    Action ("as in the files") {
+        /// It is put in force.
+        Adopted "adopted";
+        /// What is in force is taken back; what was in force before it is so again.
+        RolledBack "rolled_back";
+        /// It is not wanted: it is no candidate any more.
+        Rejected "rejected";
     }
 }
 

@@ -1,39 +1,28 @@
 //! What each model of a train is now, by what was decided.
 
+use dynocar_model::named;
+
 use super::decision::{Action, Decision};
 use super::error::ModelsError;
 use super::numbered::Numbered;
 use super::store::{Listing, Stored, TrainModels};
 use super::text::ModelHash;
 
-/// What a model is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
-    /// It is in force.
-    InForce,
-    /// It grew from the model in force, and nothing was decided on it.
-    Candidate,
-    /// It was in force.
-    Earlier,
-    /// It is not wanted.
-    Rejected,
-    /// Somebody declared it, and it is not in force.
-    Declared,
-    /// It grew from a model that is not in force.
-    Aside,
-}
-
-impl State {
-    /// In words.
-    pub const fn words(self) -> &'static str {
-        match self {
-            State::InForce => "in force",
-            State::Candidate => "candidate",
-            State::Earlier => "earlier",
-            State::Rejected => "rejected",
-            State::Declared => "declared",
-            State::Aside => "aside",
-        }
+named! {
+    /// What a model is.
+    State ("in words") {
+        /// It is in force.
+        InForce "in force";
+        /// It grew from the model in force, and nothing was decided on it.
+        Candidate "candidate";
+        /// It was in force.
+        Earlier "earlier";
+        /// It is not wanted.
+        Rejected "rejected";
+        /// Somebody declared it, and it is not in force.
+        Declared "declared";
+        /// It grew from a model that is not in force.
+        Aside "aside";
     }
 }
 

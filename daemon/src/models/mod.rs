@@ -15,10 +15,9 @@
 //!
 //! - [`text`]: a model's files as text, and their hash
 //! - [`moment`]: a time in UTC
-//! - [`origin`]: where a model came from
+//! - [`origin`]: where a model came from; maintenance events
 //! - [`numbered`]: records with numbers: decisions, events
 //! - [`decision`]: what was decided, and what follows from it
-//! - [`event`]: maintenance events
 //! - [`store`]: the directory
 //! - [`history`]: what each model is now
 //! - [`difference`]: in which keys two models differ
@@ -26,7 +25,6 @@
 pub mod decision;
 pub mod difference;
 mod error;
-pub mod event;
 pub mod history;
 pub mod moment;
 pub mod numbered;
@@ -36,9 +34,9 @@ pub mod text;
 
 pub use decision::{Action, Decision, NewDecision};
 pub use error::ModelsError;
-pub use event::MaintenanceEvent;
 pub use history::{History, State};
 pub use moment::Moment;
+pub use origin::MaintenanceEvent;
 pub use origin::{Figure, FoundEffect, Origin};
 pub use store::{Listing, NewModel, Store, Stored, TrainModels};
 pub use text::{ModelHash, ModelText};

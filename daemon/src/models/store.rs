@@ -10,10 +10,9 @@ use dynocar_shared::TrainId;
 
 use super::decision::{Action, Choice, Decision, NewDecision, in_force_after};
 use super::error::ModelsError;
-use super::event::MaintenanceEvent;
 use super::moment::Moment;
 use super::numbered::{self, Numbered, names_in, read_record, text_of};
-use super::origin::Origin;
+use super::origin::{MaintenanceEvent, Origin};
 use super::text::{ModelHash, ModelText, TRACK_FILE, TRAIN_FILE};
 use crate::storage::{Disk, Storage, make_once, part_of};
 

@@ -14,8 +14,7 @@ use dynocar_shared::vocabulary::{EffectKind, KindRow};
 use dynocar_shared::{Reason, RejectionReason, Status, TrainId};
 use tracing::{info, warn};
 
-use super::refusal_log::RefusalLog;
-use super::status_log::{State, StatusLog};
+use super::status_log::{RefusalLog, State, StatusLog};
 use super::tally::{Tally, TallyReading};
 use crate::operator::{refusals, refused_words};
 use crate::supervision::health::Verdict;

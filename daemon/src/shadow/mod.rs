@@ -11,8 +11,7 @@
 //! # Layout
 //!
 //! - [`in_force`]: which model a train has when the daemon starts
-//! - [`rivals`]: which models are on trial
-//! - [`rule`]: when a rule adopts or takes back, and which bounds no model may leave
+//! - [`rule`]: which models are on trial, when a rule adopts or takes back, and which bounds no model may leave
 //! - [`train`]: one train's trials, and its change of models
 //! - [`record`]: what the trials measured, as a file that outlives the daemon
 //! - [`figures`]: the same for those who watch the daemon
@@ -21,7 +20,6 @@
 pub mod figures;
 pub mod in_force;
 pub mod record;
-pub mod rivals;
 pub mod rule;
 pub mod thread;
 pub mod train;

@@ -13,8 +13,7 @@ use tracing::{info, warn};
 use super::figures::Board;
 use super::train::ShadowTrain;
 use crate::config::ModelsConfig;
-use crate::runtime::affinity::pin_to_core;
-use crate::runtime::scheduling::stand_back;
+use crate::runtime::system::{pin_to_core, stand_back};
 
 /// How long it sleeps while samples gather; a channel holds more than come meanwhile.
 const NAP: Duration = Duration::from_millis(20);

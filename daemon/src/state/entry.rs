@@ -7,8 +7,8 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::Parameter;
 use serde::{Deserialize, Serialize};
 
-use super::StateError;
 use super::file::checksum;
+use super::{StateError, StateProblem};
 use crate::config::TrainConfig;
 
 /// What an estimate holds for: another train, other wheels or another model is another key.
@@ -114,7 +114,7 @@ impl StateContent {
     ///
     /// When a key or value is not what was expected.
     pub fn from_text(path: &Path, text: &str) -> Result<Self, StateError> {
-        let malformed = |message: String| StateError::Malformed { path: path.into(), message };
+        let malformed = |message: String| StateProblem::Malformed(message).at(path);
         let raw: RawState =
             toml::from_str(text).map_err(|error| malformed(error.message().to_owned()))?;
         let hash = |text: &str| {
@@ -123,12 +123,8 @@ impl StateContent {
         };
         let ours = env!("CARGO_PKG_VERSION");
         if raw.version != ours {
-            return Err(StateError::Foreign {
-                path: path.into(),
-                what: "release",
-                saved: raw.version,
-                ours: ours.to_owned(),
-            });
+            let (what, ours) = ("release", ours.to_owned());
+            return Err(StateProblem::Foreign { what, saved: raw.version, ours }.at(path));
         }
         let key = ModelKey { train: raw.train, wheel_set: raw.wheel_set, model: hash(&raw.model)? };
         let stored = |it: RawEstimate| {
@@ -166,9 +162,7 @@ impl StateContent {
         ];
         match parts.into_iter().find(|(_, saved, ours)| saved != ours) {
             None => Ok(()),
-            Some((what, saved, ours)) => {
-                Err(StateError::Foreign { path: path.into(), what, saved, ours })
-            }
+            Some((what, saved, ours)) => Err(StateProblem::Foreign { what, saved, ours }.at(path)),
         }
     }
 }

@@ -10,8 +10,8 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-use super::StateError;
-use crate::storage::{self, Disk, Rights, Storage, StorageError};
+use super::{StateError, StateProblem};
+use crate::storage::{self, Disk, Rights, Storage};
 
 /// Version of the state file.
 pub const SCHEMA: u32 = 1;
@@ -49,25 +49,25 @@ pub fn read(path: &Path) -> Result<Option<String>, StateError> {
 ///
 /// When they are not a whole state file of this schema.
 pub fn content_of(path: &Path, bytes: &[u8]) -> Result<String, StateError> {
-    let none = || StateError::NotAState { path: path.into() };
+    let none = || StateProblem::NotAState.at(path);
     let end = bytes.iter().position(|&byte| byte == b'\n').ok_or_else(none)?;
     let header = std::str::from_utf8(&bytes[..end]).map_err(|_| none())?;
     let words: Vec<&str> = header.split(' ').collect();
     let [MAGIC, schema, rest @ ..] = &words[..] else { return Err(none()) };
     if *schema != SCHEMA.to_string() {
         let found = (*schema).to_owned();
-        return Err(StateError::Schema { path: path.into(), found, expected: SCHEMA });
+        return Err(StateProblem::Schema { found, expected: SCHEMA }.at(path));
     }
     let [length, sum] = rest else { return Err(none()) };
     let expected: usize = length.parse().map_err(|_| none())?;
     let saved = u64::from_str_radix(sum, 16).map_err(|_| none())?;
     let content = &bytes[end + 1..];
     if content.len() != expected {
-        return Err(StateError::Torn { path: path.into(), expected, found: content.len() });
+        return Err(StateProblem::Torn { expected, found: content.len() }.at(path));
     }
     let calculated = checksum(content);
     if calculated != saved {
-        return Err(StateError::Corrupt { path: path.into(), saved, calculated });
+        return Err(StateProblem::Corrupt { saved, calculated }.at(path));
     }
     String::from_utf8(content.to_vec()).map_err(|_| none())
 }
@@ -94,9 +94,8 @@ pub fn replace(path: &Path, content: &str) -> Result<(), StateError> {
 /// As [`replace`].
 pub fn replace_on(storage: &impl Storage, path: &Path, content: &str) -> Result<(), StateError> {
     let new = (&bytes_of(content)[..], &Rights::Owner);
-    storage::replace(storage, path, &beside(path), new).map_err(
-        |StorageError { path, action, source }| StateError::System { path, action, source },
-    )
+    storage::replace(storage, path, &beside(path), new)
+        .map_err(|error| failed(&error.path, error.action)(error.source))
 }
 
 /// One name for each state file, so that dead writers leave at most one behind; a train has one
@@ -109,7 +108,7 @@ fn failed<'a>(
     path: &'a Path,
     action: &'static str,
 ) -> impl FnOnce(std::io::Error) -> StateError + 'a {
-    move |source| StateError::System { path: path.to_path_buf(), action, source }
+    move |source| StateProblem::System { action, source }.at(path)
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use dynocar_shared::ParameterSnapshot;
 use tracing::{info, warn};
 
 use super::entry::{ModelKey, StateContent, StoredEstimate, settings_hash};
-use super::{StateError, file, path_of, unix_now_s};
+use super::{StateProblem, file, path_of, unix_now_s};
 use crate::config::DaemonConfig;
 
 /// How often the keeper looks whether to stop.
@@ -110,10 +110,7 @@ impl Keeper {
             let written = train
                 .content
                 .to_text()
-                .map_err(|error| StateError::Malformed {
-                    path: path.clone(),
-                    message: error.to_string(),
-                })
+                .map_err(|error| StateProblem::Malformed(error.to_string()).at(&path))
                 .and_then(|text| file::replace(&path, &text));
             match written {
                 Ok(()) => train.is_changed = false,

@@ -28,7 +28,7 @@ use dynocar_shared::TrainId;
 use tracing::{info, warn};
 
 use crate::config::{DaemonConfig, PipelineConfig, StateConfig, TrainConfig};
-pub use error::StateError;
+pub use error::{StateError, StateProblem};
 
 use entry::{ModelKey, StateContent, StoredEstimate};
 

@@ -1,10 +1,10 @@
 //! One verdict on the daemon of a train, seen as a controller sees it.
 
-use std::fmt;
 use std::time::{Duration, Instant};
 
 use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
 use dynocar_core::remedy::{of_reason, of_refusal};
+use dynocar_model::named;
 use dynocar_shared::vocabulary::KindRow;
 use dynocar_shared::{PipelineKind, Reason, RejectionReason, Status, TrainId};
 
@@ -14,19 +14,21 @@ use crate::operator::suspicion::Suspicion;
 /// How long a first snapshot is waited for; a daemon vouches for its snapshots each 0.1 s.
 const PATIENCE: Duration = Duration::from_millis(1_500);
 
-/// How well a train is served; the worse, the greater.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Verdict {
-    /// Every pipeline is vouched for, none with a reservation.
-    Ok,
-    /// A pipeline is degraded or invalid, or fed with samples that cannot be true.
-    Degraded,
-    /// There is a daemon, but a pipeline, or all, have not been heard of lately.
-    Stale,
-    /// The daemon there shares no memory format with this program.
-    Incompatible,
-    /// There is no daemon.
-    NoDaemon,
+named! {
+    /// How well a train is served; the worse, the greater.
+    #[derive(PartialOrd, Ord)]
+    Verdict ("in words") {
+        /// Every pipeline is vouched for, none with a reservation.
+        Ok "ok";
+        /// A pipeline is degraded or invalid, or fed with samples that cannot be true.
+        Degraded "degraded";
+        /// There is a daemon, but a pipeline, or all, have not been heard of lately.
+        Stale "stale";
+        /// The daemon there shares no memory format with this program.
+        Incompatible "incompatible";
+        /// There is no daemon.
+        NoDaemon "no daemon";
+    }
 }
 
 impl Verdict {
@@ -61,18 +63,6 @@ impl Verdict {
             Verdict::Incompatible => 5,
             Verdict::NoDaemon => 6,
         }
-    }
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Verdict::Ok => "ok",
-            Verdict::Degraded => "degraded",
-            Verdict::Stale => "stale",
-            Verdict::Incompatible => "incompatible",
-            Verdict::NoDaemon => "no daemon",
-        })
     }
 }
 

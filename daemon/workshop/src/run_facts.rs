@@ -1,6 +1,6 @@
 //! What is shown of a recorded run wherever it is listed.
 
-use dynocar_analysis::dataset::Run;
+use dynocar_analysis::dataset::{ForceSource, GradientSource, PositionSource, Run};
 
 use dynocar::models::Moment;
 
@@ -27,6 +27,30 @@ pub fn recorded(run: &Run) -> Option<Moment> {
 /// The same in words, as people write it.
 pub fn recorded_in_words(run: &Run) -> String {
     recorded(run).map_or_else(|| "–".into(), |at| at.to_string().replace('T', " ").replace('Z', ""))
+}
+
+/// Where a run's position, gradient, traction force and brake force come from, in words.
+pub fn sources(run: &Run) -> [&'static str; 4] {
+    let position = match run.position_source {
+        PositionSource::Column => "as recorded",
+        PositionSource::IntegratedSpeed => "integrated from the speed",
+    };
+    let gradient = match run.gradient_source {
+        GradientSource::Track => "from the track",
+        GradientSource::Column => "as recorded",
+        GradientSource::SpecificForce => "from the accelerometer: specific_force minus dv/dt",
+        GradientSource::Altitude => "from the altitude",
+        GradientSource::Unknown => "unknown, taken as level",
+    };
+    let force = |source: ForceSource| match source {
+        ForceSource::Column => "as recorded",
+        ForceSource::ControlForce => "from the signed control_force",
+        ForceSource::Handle => "from the handle's share of the effort curve",
+        ForceSource::Pressure => "from the friction brake's pressure",
+        ForceSource::Power => "from the drive's power over the speed",
+        ForceSource::None => "not recorded",
+    };
+    [position, gradient, force(run.traction_source), force(run.brake_source)]
 }
 
 #[cfg(test)]

@@ -2,9 +2,6 @@
 
 use std::fmt::{Display, Write as _};
 
-/// Name of the line's file.
-pub const TRACK_FILE: &str = "track.toml";
-
 /// A `track.toml` that is being written.
 #[derive(Clone, Debug)]
 pub struct TrackText {

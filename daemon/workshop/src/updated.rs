@@ -7,7 +7,6 @@
 //! needs one. What belongs to certain runs is an event and no property of a train or a line: it is
 //! listed, so that nobody takes the files for more than they are.
 
-mod error;
 mod runs;
 
 use std::path::{Path, PathBuf};
@@ -22,8 +21,8 @@ use dynocar::dataset::open;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::write_in_folder;
 
-pub use error::{UPDATED_MARK, UpdatedModelError};
 pub use runs::name_model;
+pub use runs::{UPDATED_MARK, UpdatedModelError};
 
 /// The files of an updated model: the train, the line where something is known of it, and the dataset.
 pub const UPDATED_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];

@@ -4,11 +4,11 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_int, c_void};
 
 use dynocar_fmu::ffi::Status;
+use dynocar_fmu::ffi::instance::{CO_SIMULATION, CallbackFunctions, Component, Logger, Text};
 use dynocar_fmu::ffi::life::{
     fmi2DoStep, fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2FreeInstance,
     fmi2Instantiate, fmi2SetupExperiment,
 };
-use dynocar_fmu::ffi::types::{CO_SIMULATION, CallbackFunctions, Component, Logger, Text};
 use dynocar_fmu::ffi::values::{
     fmi2GetInteger, fmi2GetReal, fmi2SetBoolean, fmi2SetInteger, fmi2SetReal,
     fmi2SetRealInputDerivatives, fmi2SetString,

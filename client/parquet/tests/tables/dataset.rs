@@ -8,7 +8,7 @@ use arrow_array::{
     Int16Array, StringArray, Time32MillisecondArray, TimestampMicrosecondArray, UInt64Array,
 };
 use dynocar::columns_stream;
-use dynocar::error_document::ErrorDocument;
+use dynocar::programs::ErrorDocument;
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, FileProblem, Manifest, is_parquet};
 use dynocar_dataset::{RunColumn, RunContent};
 use dynocar_parquet::numbers::{Wanted, send_columns};

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_parquet::back::write_mcap;
-use dynocar_parquet::reading::read;
+use dynocar_parquet::reading::{read, write_mcap};
 use dynocar_parquet::writing::write_folder;
 use dynocar_recording::columns::Row;
 use dynocar_recording::event::Event;

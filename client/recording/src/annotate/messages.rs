@@ -1,6 +1,12 @@
-//! What an explanation adds to a recording, as messages.
+//! What an explanation adds to a recording, as messages, and their schema in a file of its own.
 
-use crate::message::message;
+use std::sync::LazyLock;
+
+use prost::Message;
+use prost_types::{FileDescriptorProto, FileDescriptorSet};
+
+use crate::message::{MessageField, message};
+use crate::schema::{fields_of, message};
 
 message! {
     /// What `explain` says of a recording.
@@ -71,3 +77,23 @@ message! {
         5 error_after_mps: f64 = double;
     }
 }
+
+/// The messages with their names, what they are and their fields.
+pub const MESSAGES: [(&str, &str, &[MessageField]); 4] = [
+    (Verdict::NAME, Verdict::MEANING, Verdict::FIELDS),
+    (Effect::NAME, Effect::MEANING, Effect::FIELDS),
+    (Residual::NAME, Residual::MEANING, Residual::FIELDS),
+    (PredictedSpeed::NAME, PredictedSpeed::MEANING, PredictedSpeed::FIELDS),
+];
+
+/// The messages as the bytes that an MCAP schema holds.
+pub static DESCRIPTORS: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let file = FileDescriptorProto {
+        name: Some("dynocar/explanation.proto".into()),
+        package: Some("dynocar".into()),
+        syntax: Some("proto3".into()),
+        message_type: MESSAGES.iter().map(|it| message(it.0, fields_of(it.2))).collect(),
+        ..Default::default()
+    };
+    FileDescriptorSet { file: vec![file] }.encode_to_vec()
+});

@@ -13,9 +13,8 @@ use dynocar_shared::TrainId;
 use mcap::McapError;
 
 use super::configuration::Configuration;
-use super::housekeeping::{Housekeeper, Task};
+use super::housekeeping::{Housekeeper, Rotation, Task, next};
 use super::keeping::{self, Keeper};
-use super::rotation::{Rotation, next};
 use super::{RecordError, Recorded};
 use crate::event::{Event, EventKind};
 use crate::topic::Message;

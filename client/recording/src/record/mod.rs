@@ -6,14 +6,13 @@ mod files;
 mod housekeeping;
 mod keeping;
 mod kept_event;
-mod maintenance;
-mod rotation;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use configuration::{Configuration, Maintenance};
 use dynocar::output::report_line;
 use dynocar::storage::{Disk, SharedStorage, folder_of};
 use dynocar_client::ChannelError;
@@ -23,12 +22,10 @@ use mcap::McapError;
 use crate::event::{Event, EventKind};
 use crate::topic::Message;
 use crate::train_channels::{PAUSE, Sink, TrainChannels, Wanted};
-use configuration::Configuration;
-use maintenance::Maintenance;
 
 pub use files::Files;
+pub use housekeeping::Rotation;
 pub use keeping::{KeepError, Keeper, Keeping, request as request_keeping};
-pub use rotation::Rotation;
 
 /// How often what was taken is handed to the system: what a kill costs at most.
 const FLUSH: Duration = Duration::from_millis(400);

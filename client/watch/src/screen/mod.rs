@@ -3,7 +3,6 @@
 //! 80 x 24 hold everything; larger terminals get the resistance at more speeds and plots.
 
 mod overview;
-mod pipelines;
 mod plots;
 mod style;
 
@@ -95,7 +94,7 @@ pub fn draw(
         let help = Paragraph::new(HELP).wrap(Wrap { trim: false });
         frame.render_widget(help.style(palette.plain()), body);
     } else if choice.view == View::Pipelines {
-        pipelines::draw(frame, body, train, palette);
+        overview::draw_pipelines(frame, body, train, palette);
     } else {
         overview::draw(frame, body, train, palette);
     }

@@ -1,6 +1,6 @@
-//! Quantities, residual, what to drive next; plots where there is room.
+//! Quantities, residual, what to drive next and every pipeline with its samples; plots where there is room.
 
-use dynocar::operator::duration;
+use dynocar::operator::{duration, refusals, refused_words};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
@@ -8,8 +8,7 @@ use ratatui::widgets::{Paragraph, Wrap};
 
 use super::plots::{self, sparkline};
 use super::style::{Palette, heading};
-use crate::history::Point;
-use crate::state::TrainState;
+use crate::state::{PipelineState, Point, TrainState};
 use crate::words::{Row, residual, rows};
 
 /// Columns of the table after the number: interval and unit, status, reason; the age takes the rest.
@@ -129,4 +128,43 @@ fn advice(train: &TrainState) -> Vec<Line<'static>> {
         return vec![Line::raw(words)];
     }
     train.advice.iter().map(|words| Line::raw(words.clone())).collect()
+}
+
+/// Draws the view.
+pub fn draw_pipelines(frame: &mut Frame<'_>, area: Rect, train: &TrainState, palette: Palette) {
+    let mut lines = vec![heading("pipelines", area.width, palette)];
+    for pipeline in &train.pipelines {
+        lines.extend(lines_of(pipeline, palette));
+    }
+    if train.pipelines.is_empty() {
+        lines.push(Line::raw("nothing has come yet"));
+    }
+    frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), area);
+}
+
+fn lines_of(pipeline: &PipelineState, palette: Palette) -> Vec<Line<'static>> {
+    let it = &pipeline.snapshot;
+    let rate = pipeline.history.rate_hz().map_or("…".to_owned(), |rate| format!("{rate:.1}"));
+    let age = pipeline.sample_age_s.map_or("no sample".to_owned(), duration);
+    let name = match pipeline.name == pipeline.kind() {
+        true => pipeline.name.clone(),
+        false => format!("{} ({})", pipeline.name, pipeline.kind()),
+    };
+    let latency_us = 1e-3 * it.published_ns.saturating_sub(it.sample_published_ns) as f64;
+    let mut lines = vec![
+        Line::from(vec![
+            Span::styled(format!("{} {name}  ", it.pipeline_index), palette.strong()),
+            Span::styled(pipeline.status.name(), palette.status(pipeline.status)),
+            Span::raw(format!(" ({})", pipeline.reason_name())),
+        ]),
+        Line::raw(format!(
+            "  {rate}/s, newest {age} ago, answered in {latency_us:.0} µs; used {}, rejected {}, lost {}",
+            it.samples_used, it.samples_rejected, it.samples_lost
+        )),
+    ];
+    let why = refused_words(&refusals(&it.rejected_by_reason));
+    if !why.is_empty() {
+        lines.push(Line::raw(format!("  rejected: {why}")));
+    }
+    lines
 }

@@ -2,10 +2,6 @@
 //!
 //! The screens lie in `drawn`; a test that fails prints the one it has drawn.
 
-use crate::history::History;
-use crate::plain;
-use crate::screen::{Choice, Palette, View, draw};
-use crate::state::{Daemon, PipelineState, TrainState};
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
@@ -15,6 +11,10 @@ use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Buffer;
 use ratatui::style::Color;
+
+use crate::plain;
+use crate::screen::{Choice, Palette, View, draw};
+use crate::state::{Daemon, History, PipelineState, TrainState};
 
 fn pipeline(
     index: u32,

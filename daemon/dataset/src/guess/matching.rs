@@ -2,8 +2,7 @@
 
 use super::facts::Facts;
 use super::guessed::GuessedColumn;
-use super::name::{Name, readings};
-use super::spelling::{self, Spelled};
+use super::name::{self, Name, Spelled, readings};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
 use crate::names::nearest;
@@ -97,7 +96,7 @@ fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
         .max_by_key(|(it, _)| it.score);
     let Some((mut best, words)) = best else { return by_unit_alone(name, quantity).map(Ok) };
     if let Some(text) = &name.unit {
-        let Some(unit) = spelling::find(quantity.dimension(), text) else {
+        let Some(unit) = name::find(quantity.dimension(), text) else {
             return Some(Err(format!("its unit '{text}' is none of {quantity}")));
         };
         best.unit = Some(unit);
@@ -184,7 +183,7 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
 /// A column of which only the unit speaks: of what trains record in km/h it is the speed; and T is
 /// a temperature beside the unit of one.
 fn by_unit_alone(name: &Name, quantity: Quantity) -> Option<Match> {
-    let unit = spelling::find(quantity.dimension(), name.unit.as_ref()?)?;
+    let unit = name::find(quantity.dimension(), name.unit.as_ref()?)?;
     let is_known = match quantity {
         Quantity::Speed => contradiction(&name.words, quantity).is_none(),
         Quantity::AmbientTemperature => name.words == ["t"],

@@ -8,23 +8,20 @@
 //! # Layout, in the order of the work
 //!
 //! - `layout`, `columns`, `facts`: delimiter, decimal mark, names and units; what the values are like
-//! - `name`, `spelling`, `vocabulary`: a name in words, units as people write them, what recorders
+//! - `name`, `vocabulary`: a name in words, units as people write them, what recorders
 //!   call the quantities
 //! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
-//! - `assignment`, `forces`, `correction`: one column for each quantity, and what cannot stand
-//! - [`guessed`]: what comes out
+//! - `assignment`: one column for each quantity, and what cannot stand
+//! - [`guessed`]: what comes out, and its correction
 
 mod assignment;
 mod columns;
-mod correction;
 mod facts;
-mod forces;
 pub mod guessed;
 mod layout;
 mod matching;
 mod name;
 mod plausible;
-mod spelling;
 mod vocabulary;
 
 #[cfg(test)]
@@ -46,7 +43,7 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
     let read = columns::Columns::read(files)?;
     let label = files.first().map_or("", |file| file.label);
     let mut assignment = assignment::Assignment::new(&read, given, label)?;
-    forces::settle(&mut assignment);
+    assignment::settle(&mut assignment);
     for quantity in [Quantity::Time, Quantity::Speed] {
         if !assignment.has(quantity) {
             let near = match assignment.near(quantity).join("; ") {

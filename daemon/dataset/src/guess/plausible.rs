@@ -3,7 +3,7 @@
 use dynocar_model::units::Unit;
 
 use super::facts::Facts;
-use super::spelling::Spelled;
+use super::name::Spelled;
 use super::vocabulary::{Measure, Usual, usual};
 use crate::Quantity;
 
@@ -129,7 +129,7 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::guess::spelling::find;
+    use crate::guess::name::find;
 
     /// Values from 0 up to a top.
     fn ramp(top: f64) -> Facts {

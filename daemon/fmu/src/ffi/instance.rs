@@ -1,9 +1,8 @@
-//! What an `fmi2Component` points to, and the wall that panics do not pass.
+//! The FMI standard 2.0's types, what an `fmi2Component` points to, and the wall that panics do not pass.
 
-use std::ffi::{CStr, CString, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::types::{CallbackFunctions, Component, Logger, Status, Text};
 use crate::error::ModelError;
 use crate::model::Model;
 
@@ -112,6 +111,46 @@ pub(super) unsafe fn take_back(component: Component) {
 pub(super) unsafe fn text<'a>(place: Text) -> Option<&'a CStr> {
     // SAFETY: a text that is not NULL ends with a NUL byte.
     (!place.is_null()).then(|| unsafe { CStr::from_ptr(place) })
+}
+
+/// `fmi2Component`: an instance, see [`Instance`].
+pub type Component = *mut c_void;
+/// `fmi2String`: UTF-8, ends with NUL.
+pub type Text = *const c_char;
+/// `fmi2Boolean`: 0 is false.
+pub type Boolean = c_int;
+
+/// `fmi2Status`: how a call went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i32)]
+pub enum Status {
+    /// All well.
+    Ok = 0,
+    /// The call was refused; the logger was given the reason.
+    Error = 3,
+}
+
+/// `fmi2CoSimulation` of `fmi2Type`.
+pub const CO_SIMULATION: c_int = 1;
+
+/// `fmi2CallbackLogger`: environment, name of the instance, status, category, format and what the
+/// format asks for.
+pub type Logger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text, ...);
+
+/// `fmi2CallbackFunctions`: what the simulator lends an instance. Only the logger is used.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct CallbackFunctions {
+    /// Takes messages.
+    pub logger: Option<Logger>,
+    /// Gives memory.
+    pub allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
+    /// Takes memory back.
+    pub free_memory: Option<unsafe extern "C" fn(*mut c_void)>,
+    /// Hears of the end of a step that goes on in the background.
+    pub step_finished: Option<unsafe extern "C" fn(*mut c_void, c_int)>,
+    /// Handed to each of them.
+    pub component_environment: *mut c_void,
 }
 
 #[cfg(test)]

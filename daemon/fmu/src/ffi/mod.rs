@@ -6,11 +6,9 @@
 //!
 //! # Layout
 //!
-//! - [`types`]: the standard's types
-//! - [`instance`]: what an `fmi2Component` points to, and the wall that panics do not pass
-//! - [`life`]: from instantiation to the end, and the steps between
+//! - [`instance`]: the standard's types, what an `fmi2Component` points to, and the wall that panics do not pass
+//! - [`life`]: from instantiation to the end, the steps between, and what the description does not promise
 //! - [`values`]: setting and getting variables
-//! - [`unsupported`]: functions that the description does not promise
 //!
 //! # Safety
 //!
@@ -25,8 +23,6 @@
 
 pub mod instance;
 pub mod life;
-pub mod types;
-pub mod unsupported;
 pub mod values;
 
-pub use types::Status;
+pub use instance::Status;

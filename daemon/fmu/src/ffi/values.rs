@@ -4,8 +4,7 @@
 
 use std::ffi::c_int;
 
-use super::instance::{call, text};
-use super::types::{Boolean, Component, Status, Text};
+use super::instance::{Boolean, Component, Status, Text, call, text};
 use crate::error::ModelError;
 use crate::model::Model;
 

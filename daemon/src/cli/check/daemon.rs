@@ -35,11 +35,14 @@ pub fn read(path: &Path) -> Result<DaemonConfig, Failure> {
 /// The configuration in words and columns.
 pub fn report(config: &DaemonConfig) -> String {
     let mut text = String::from("daemon\n");
-    let root = config.root.as_ref().map(|root| root.display().to_string());
+    let root = config.process.root.as_ref().map(|root| root.display().to_string());
     text += &line("root", root.as_deref().unwrap_or("DYNOCAR_ROOT, else /tmp/dynocar-<user>"));
-    text += &line("adaptive", &format!("looks for samples for {} µs, then sleeps", config.spin_us));
-    text += &line("heartbeat", &format!("every {} ms", config.heartbeat_ms));
-    let memory = if config.lock_memory { "locked" } else { "may be paged" };
+    text += &line(
+        "adaptive",
+        &format!("looks for samples for {} µs, then sleeps", config.process.spin_us),
+    );
+    text += &line("heartbeat", &format!("every {} ms", config.process.heartbeat_ms));
+    let memory = if config.process.lock_memory { "locked" } else { "may be paged" };
     text += &line("memory", memory);
     if let Some(models) = &config.models {
         let rule = &models.rule;

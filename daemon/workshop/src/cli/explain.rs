@@ -14,11 +14,10 @@ use dynocar_analysis::explain::{Explanation, explain};
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub use super::explained::text;
-use super::text::for_shell;
 use super::threads::Threads;
 use crate::annotation::annotate;
 use crate::report;
-use crate::report::provenance::{Provenance, own_command_line};
+use crate::report::provenance::{Provenance, for_shell, own_command_line};
 use crate::updated::{UPDATED_FILES, UPDATED_MARK, UpdatedFiles, UpdatedModelError, write_updated};
 use dynocar::cli::Failure;
 use dynocar::dataset::{self, DatasetFolder};

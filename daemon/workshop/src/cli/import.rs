@@ -1,7 +1,6 @@
 //! `dynocar import`: a train and a line out of other projects' files.
 
-mod files;
-mod summary;
+mod answer;
 
 use std::path::PathBuf;
 
@@ -10,10 +9,10 @@ use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::{parse_track, parse_train};
 use dynocar_analysis::import::{Format, Reading, Source, import};
 
-use super::train_text::{TRAIN_FILE, TrainArguments};
-use crate::track_text::TRACK_FILE;
+use super::train_text::TrainArguments;
 use dynocar::cli::Failure;
 use dynocar::dataset::labelled_text;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
 
 /// Import trains and lines of railtoolkit, TTOBench or OSRD.
@@ -68,9 +67,9 @@ pub fn execute(arguments: &ImportArguments) -> Result<(), Failure> {
                 .into(),
         ));
     }
-    let train = train.map(|it| files::train(it, &arguments.train).map(|text| (it, text)));
+    let train = train.map(|it| answer::train(it, &arguments.train).map(|text| (it, text)));
     let train = train.transpose()?;
-    let line = line.map(|it| (it, files::track(it)));
+    let line = line.map(|it| (it, answer::track(it)));
     let mut written = Vec::new();
     written.extend(train.as_ref().map(|(_, made)| (TRAIN_FILE, made.text.as_str())));
     written.extend(line.as_ref().map(|(_, text)| (TRACK_FILE, text.as_str())));
@@ -84,7 +83,7 @@ pub fn execute(arguments: &ImportArguments) -> Result<(), Failure> {
         model.map(|model| diagnostics(&model, track.as_ref(), [])).unwrap_or_default();
     write_new_in_folder(out, &written)?;
     let names: Vec<&str> = written.iter().map(|(name, _)| *name).collect();
-    Ok(print(&summary::text(out, train.as_ref(), line.as_ref(), &diagnostics, &names))?)
+    Ok(print(&answer::text(out, train.as_ref(), line.as_ref(), &diagnostics, &names))?)
 }
 
 /// The one of several that is wanted; `None` where there is none.

@@ -1,28 +1,23 @@
 //! `dynocar init`: the first description of a train and of its recordings.
 
 mod arguments;
-mod ask;
-mod daemon_text;
-mod dataset_text;
-mod described;
-mod draft;
-mod letters;
-mod paths;
+mod recordings;
 mod summary;
+mod texts;
 
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::guess::{Guess, Recording, guess};
 use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity};
 use toml::Value;
 
-use super::train_text::{Found, TRAIN_FILE, TrainText};
-use crate::track_text::TRACK_FILE;
+use super::train_text::{Found, TrainText};
 pub use arguments::InitArguments;
-use described::{DAEMON_FILE, Described};
-use draft::Draft;
 use dynocar::cli::Failure;
 use dynocar::dataset::labelled_text;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{print, require_folder, require_new, write_new_in_folder};
+use recordings::Draft;
+use summary::{DAEMON_FILE, Described};
 
 const WRITER: &str = "dynocar init";
 /// Units that the values did not reveal are set right so many times at most.
@@ -35,7 +30,7 @@ const CORRECTIONS_MAX: usize = 4;
 /// An input failure where a recording or a figure of the train is wrong, or a file is there already;
 /// a failure of the work where a file cannot be written.
 pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
-    let arguments = &ask::complete(arguments)?;
+    let arguments = &arguments::complete(arguments)?;
     let folder = arguments.folder();
     require_folder(folder)?;
     let with_dataset = !arguments.csv.is_empty();
@@ -53,7 +48,7 @@ pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
         true => Some(describe(arguments, &mut train, has_track)?),
         false => None,
     };
-    let daemon = daemon_text::daemon(has_track);
+    let daemon = texts::daemon(has_track);
     let mut files = vec![(TRAIN_FILE, train.text.as_str()), (DAEMON_FILE, daemon.as_str())];
     files.extend(described.as_ref().map(|it| (MANIFEST_FILE, it.text.as_str())));
     write_new_in_folder(folder, &files)?;
@@ -66,8 +61,8 @@ fn describe(
     train: &mut TrainText,
     has_track: bool,
 ) -> Result<Described, Failure> {
-    let (texts, encoding) = letters::texts(&arguments.csv)?;
-    let files = paths::from_folder(arguments.folder(), &arguments.csv)?;
+    let (texts, encoding) = recordings::texts(&arguments.csv)?;
+    let files = recordings::from_folder(arguments.folder(), &arguments.csv)?;
     let recordings: Vec<Recording> =
         texts.iter().map(|(label, text)| Recording { label, text }).collect();
     let mut guess = guess(&recordings, &arguments.column)?;
@@ -81,11 +76,11 @@ fn describe(
         let figures = vec![("mass_t", Value::Float(mass_t), from)];
         *train = arguments.train.text(WRITER, &Found { figures, traction: None })?;
     }
-    let name = dataset_text::name_of(arguments.folder());
+    let name = texts::name_of(arguments.folder());
     let folder = arguments.folder();
     let mut corrections = 0;
     loop {
-        let text = dataset_text::dataset(&guess, &name, &files, has_track);
+        let text = texts::dataset(&guess, &name, &files, has_track);
         let mut draft = vec![(MANIFEST_FILE, None, &text[..]), (TRAIN_FILE, None, &train.text)];
         draft.extend(track.as_deref().map(|track| (TRACK_FILE, None, track)));
         let runs = files.iter().zip(&recordings);

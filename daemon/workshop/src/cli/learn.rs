@@ -84,7 +84,7 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
         write_report(report, &learner)?;
         return Ok(print(&lines_of(&round))?);
     }
-    let host = Host::of(config.root.as_deref()).map_err(Failure::work)?;
+    let host = Host::of(config.process.root.as_deref()).map_err(Failure::work)?;
     let suspicions = config.trains.iter().map(|train| {
         ObservedTrain::open(&host, train.id).map(Suspicions::new).map_err(Failure::work)
     });

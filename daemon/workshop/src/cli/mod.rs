@@ -2,7 +2,7 @@
 //! other callers, too. A user calls them as `dynocar`'s.
 
 pub mod check;
-mod completions;
+mod documents;
 pub mod explain;
 mod explained;
 mod fmu;
@@ -10,7 +10,6 @@ pub mod identify;
 mod import;
 mod init;
 mod learn;
-mod man;
 mod stops;
 mod survey;
 mod text;
@@ -43,8 +42,8 @@ enum Command {
     Survey(survey::SurveyArguments),
     Fmu(fmu::FmuArguments),
     Learn(learn::LearnArguments),
-    Completions(completions::CompletionsArguments),
-    Man(man::ManArguments),
+    Completions(documents::CompletionsArguments),
+    Man(documents::ManArguments),
 }
 
 impl Command {
@@ -59,8 +58,8 @@ impl Command {
             Command::Survey(arguments) => survey::execute(arguments),
             Command::Fmu(arguments) => fmu::execute(arguments),
             Command::Learn(arguments) => learn::execute(arguments),
-            Command::Completions(arguments) => completions::execute(arguments, all_commands()),
-            Command::Man(arguments) => man::execute(arguments, all_commands()),
+            Command::Completions(arguments) => documents::complete(arguments, all_commands()),
+            Command::Man(arguments) => documents::write_manual(arguments, all_commands()),
         }
     }
 

@@ -33,24 +33,3 @@ pub fn entry(indent: &str, words: &str) -> String {
     let lines = wrap(words, WIDTH - indent.len());
     format!("{indent}{}\n", lines.join(&format!("\n{indent}  ")))
 }
-
-/// A path as a shell takes it.
-pub fn for_shell(path: &str) -> String {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+@%:,".contains(letter);
-    if !path.is_empty() && path.chars().all(is_plain) {
-        return path.into();
-    }
-    format!("'{}'", path.replace('\'', "'\\''"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn paths_are_quoted_for_a_shell_where_they_must_be() {
-        assert_eq!(for_shell("a/b-1.toml"), "a/b-1.toml");
-        assert_eq!(for_shell("my train"), "'my train'");
-        assert_eq!(for_shell("it's"), "'it'\\''s'");
-    }
-}

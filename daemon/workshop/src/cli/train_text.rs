@@ -7,9 +7,6 @@ use toml::Value;
 use super::text::{comment, on_one_line};
 use dynocar::cli::Failure;
 
-/// Name of the train's file.
-pub const TRAIN_FILE: &str = "train.toml";
-
 /// Mass of a metre of train in t/m, where only one of mass and length is known.
 const MASS_PER_LENGTH_T_PER_M: f64 = 2.0;
 /// Mass in t of a train of which nothing is known: a regional multiple unit.

@@ -16,8 +16,7 @@ use super::pool::Pool;
 use crate::report;
 use crate::report::provenance::{FileDigest, Provenance, hex};
 use crate::updated::{UpdatedTexts, updated_texts};
-use dynocar::models::event::EventWindow;
-use dynocar::models::origin::SourceFile;
+use dynocar::models::origin::{EventWindow, SourceFile};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::models::{
     MaintenanceEvent, ModelHash, ModelText, Moment, NewModel, Origin, TrainModels,

@@ -10,8 +10,7 @@ use dynocar_shared::TrainId;
 
 use super::memory::OpenQuestion;
 use super::pool::Pool;
-use dynocar::models::event::EventWindow;
-use dynocar::models::origin::HeldOutError;
+use dynocar::models::origin::{EventWindow, HeldOutError};
 use dynocar::models::{Figure, FoundEffect, MaintenanceEvent, ModelHash, Moment};
 
 /// Kinds that act in the runs in which they are found and in no others, wherever the answer names none.

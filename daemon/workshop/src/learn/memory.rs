@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use tracing::warn;
 
 use dynocar::models::{ModelHash, Moment};
-use dynocar::state::{StateError, file};
+use dynocar::state::{StateError, StateProblem, file};
 
 /// The file of the memory.
 const FILE: &str = "learn.state";
@@ -108,10 +108,8 @@ impl Memory {
         let surplus = self.open.len().saturating_sub(REPORTED_MAX);
         self.open.drain(..surplus);
         let path = folder.join(FILE);
-        let text = toml::to_string(self).map_err(|error| StateError::Malformed {
-            path: path.clone(),
-            message: error.to_string(),
-        })?;
+        let text = toml::to_string(self)
+            .map_err(|error| StateProblem::Malformed(error.to_string()).at(&path))?;
         file::replace(&path, &text)
     }
 

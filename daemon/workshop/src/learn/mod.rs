@@ -9,21 +9,18 @@
 //! - [`memory`]: what is remembered from round to round
 //! - [`recordings`]: recordings, unpacked once
 //! - [`source`]: the runs that there are
-//! - [`overlay`]: a dataset with the model in force as its train and line
-//! - [`pool`]: which runs are explained together
+//! - [`pool`]: which runs are explained together, with the model in force as their train and line
 //! - [`finding`]: what an explanation means: a candidate, events, an open question
 //! - [`conclusion`]: what of it goes into the store
 //! - [`learner`]: a round
 //! - [`mod@watch`]: when there is one
-//! - [`page`]: the history as a page, with the errors that the daemon's trials measured ([`errors_by_day`])
+//! - [`page`]: the history as a page, with the errors that the daemon's trials measured ([`page::errors_by_day`])
 
 pub mod conclusion;
 mod error;
-pub mod errors_by_day;
 pub mod finding;
 pub mod learner;
 pub mod memory;
-pub mod overlay;
 pub mod page;
 pub mod pool;
 pub mod recordings;

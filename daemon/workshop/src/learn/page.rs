@@ -1,22 +1,29 @@
 //! The history of all trains' models as one page: what grew from what, what was decided, what happened in
 //! certain runs, what is open.
+//!
+//! The error of a train's models by day, as the daemon's trials measured it.
 
+use std::collections::BTreeSet;
 use std::time::SystemTime;
 
-use dynocar_shared::TrainId;
-
-use super::error::LearnError;
-use super::errors_by_day;
-use super::learner::Learner;
-use super::memory::OpenQuestion;
-use crate::report::html::Column::{Numbers, Words};
-use crate::report::html::{self, TableColumn, chance, document, escape, marked_table, table};
-use crate::report::provenance::Provenance;
+use dynocar::models::decision::in_force_after;
 use dynocar::models::history::{History, State};
 use dynocar::models::numbered::Numbered;
 use dynocar::models::origin::HeldOutError;
-use dynocar::models::{Decision, MaintenanceEvent, ModelHash, Moment, Origin, Stored};
+use dynocar::models::{Action, Decision, MaintenanceEvent, ModelHash, Moment, Origin, Stored};
 use dynocar::shadow::record::Trials;
+use dynocar_shared::TrainId;
+
+use super::error::LearnError;
+use super::learner::Learner;
+use super::memory::OpenQuestion;
+use crate::report::html::Column::{Numbers, Words};
+use crate::report::html::{
+    self, TableColumn, chance, document, escape, legend, marked_table, table,
+};
+use crate::report::plots::series::{self, Day};
+use crate::report::plots::{PlotError, figure, wide_and_narrow};
+use crate::report::provenance::Provenance;
 
 /// The page on what a learner's store holds.
 ///
@@ -40,7 +47,7 @@ pub fn html(learner: &Learner, now: SystemTime) -> Result<String, LearnError> {
         let models = settings.store.train(train);
         let (history, events) = (History::of(&models)?, models.events()?);
         let open: Vec<&OpenQuestion> = learner.memory().open_of(train).collect();
-        let errors = errors_by_day::html(&history, &Trials::read(models.folder()))
+        let errors = errors_by_day(&history, &Trials::read(models.folder()))
             .map_err(|error| LearnError::Report(error.to_string()))?;
         main += &of_train(train, &history, (&events, &open, errors));
     }
@@ -106,7 +113,7 @@ fn models(history: &History) -> String {
     let columns: [TableColumn<ModelRow>; 6] = [
         ("Model", Words, &|it| format!("{}<code>{}</code>", indent(it.2), it.0.hash)),
         ("Made, UTC", Words, &|it| minute(it.0.origin.made)),
-        ("State", Words, &|it| it.1.words().into()),
+        ("State", Words, &|it| it.1.name().into()),
         ("Adds", Words, &|it| adds(&it.0.origin)),
         ("Before, m/s", Numbers, &|it| error(it.0, |error| error.before_mps)),
         ("After, m/s", Numbers, &|it| error(it.0, |error| error.after_mps)),
@@ -193,4 +200,52 @@ fn of_questions(open: &[&OpenQuestion]) -> String {
         );
     }
     html + "</ul>\n"
+}
+
+const DAY_S: u64 = 86_400;
+
+/// The plot, as HTML; empty where nothing was measured.
+///
+/// # Errors
+///
+/// When it cannot be drawn.
+fn errors_by_day(history: &History, trials: &Trials) -> Result<String, PlotError> {
+    let measured = trials.models.iter().flat_map(|tried| tried.ledger.days.keys().copied());
+    let numbers: BTreeSet<i64> = measured.collect();
+    let Some(&first) = numbers.first() else { return Ok(String::new()) };
+    let declared = history.models.iter().find(|(stored, _)| stored.origin.parent.is_none());
+    let declared = declared.map(|(stored, _)| stored.hash);
+    let error_mps = |model: Option<ModelHash>, number: i64| {
+        trials.of(model?)?.ledger.days.get(&number)?.rmse_mps()
+    };
+    let days: Vec<Day> = numbers
+        .iter()
+        .map(|&number| Day {
+            day: (number - first) as f64,
+            declared_mps: error_mps(declared, number),
+            in_force_mps: error_mps(in_force_on(history, number).or(declared), number),
+        })
+        .collect();
+    let is_change = |action: Action| action != Action::Rejected;
+    let last = numbers.last().map_or(first, |last| last + 1);
+    let changes: Vec<f64> = history
+        .decisions
+        .iter()
+        .filter(|(_, it)| is_change(it.action))
+        .map(|(_, it)| it.at.unix_s as f64 / DAY_S as f64 - first as f64)
+        .filter(|at| (-1.0..=(last - first) as f64).contains(at))
+        .collect();
+    let name = Moment { unix_s: first as u64 * DAY_S }.day();
+    let plots = wide_and_narrow(|width| series::days(&days, &changes, &name, width))?;
+    let key = legend(&[("dot after", "in force"), ("ring before", "declared")]);
+    let caption = "Open-loop error on the trips that were driven, by day; an upright line where \
+                   another model came in force";
+    Ok(figure("trace", caption, &key, &plots))
+}
+
+/// The model that the decisions had put in force at the end of a day; `None` for what was declared.
+fn in_force_on(history: &History, number: i64) -> Option<ModelHash> {
+    let end_s = (number + 1) as u64 * DAY_S;
+    let before = history.decisions.iter().map(|(_, it)| it).filter(|it| it.at.unix_s < end_s);
+    in_force_after(before).pop()
 }

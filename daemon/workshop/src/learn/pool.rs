@@ -1,18 +1,25 @@
 //! Which runs are explained together, within bounds of memory and time.
+//!
+//! A dataset as it is under the model in force: its runs, with that model's train and line.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use dynocar_analysis::dataset::{Dataset, DatasetHead, Role, Run};
+use dynocar::dataset::{DatasetFolder, LoadError};
+use dynocar::models::ModelText;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar_analysis::dataset::{
+    Dataset, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest, Role, Run, RunContent,
+};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
+use toml::Table;
 
 use super::memory::Memory;
-use super::overlay::Overlay;
 use super::source::{FoundRun, report_unusable};
-use dynocar::models::ModelText;
+use crate::updated::name_model;
 
 /// Bounds of what is explained together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,6 +178,53 @@ fn duration_s(run: &Run) -> f64 {
     match (run.samples.first(), run.samples.last()) {
         (Some(first), Some(last)) => (last.time_ns - first.time_ns) as f64 * 1e-9,
         _ => 0.0,
+    }
+}
+
+/// The files of a dataset, but for those of train and line.
+#[derive(Debug)]
+pub struct Overlay<'a> {
+    dataset: DatasetFolder,
+    model: &'a ModelText,
+}
+
+impl<'a> Overlay<'a> {
+    /// The dataset in a folder with a model.
+    ///
+    /// # Errors
+    ///
+    /// When there is no dataset.
+    pub fn at(folder: &Path, model: &'a ModelText) -> Result<Self, LoadError> {
+        Ok(Overlay { dataset: DatasetFolder::at(folder)?, model })
+    }
+
+    /// The description, which names the files of the model.
+    fn described(&self, text: String) -> String {
+        let Ok(mut table) = text.parse::<Table>() else { return text };
+        name_model(&mut table, self.model.track.is_some());
+        table.to_string()
+    }
+}
+
+impl DatasetFiles for Overlay<'_> {
+    fn read(&self, path: &str) -> Result<String, FileProblem> {
+        match (path, &self.model.track) {
+            (TRAIN_FILE, _) => Ok(self.model.train.clone()),
+            (TRACK_FILE, Some(track)) => Ok(track.clone()),
+            (MANIFEST_FILE, _) => self.dataset.read(path).map(|text| self.described(text)),
+            _ => self.dataset.read(path),
+        }
+    }
+
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
+        self.dataset.read_run(path, manifest)
+    }
+
+    fn label(&self, path: &str) -> String {
+        match path {
+            TRAIN_FILE | TRACK_FILE => format!("{path} of the model in force"),
+            _ => self.dataset.label(path),
+        }
     }
 }
 

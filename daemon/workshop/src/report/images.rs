@@ -6,7 +6,7 @@ use dynocar_analysis::explain::report::panels::Panel;
 
 use super::Subject;
 use super::plots::speeds::Width;
-use super::plots::{Plot, PlotError, as_file, line, panel, runs, speeds};
+use super::plots::{Plot, PlotError, as_file, line, panel, series, speeds};
 
 /// Names and SVG of every plot of the report: the errors of the runs, the line with what was found along it, the
 /// speeds of runs, the residual against covariates.
@@ -25,7 +25,10 @@ pub fn images(
     for role in [Role::Holdout, Role::Fit] {
         let own = subject.errors_of(role);
         if !own.is_empty() {
-            keep(format!("errors_{}.svg", role.name()), runs::draw(&own, role, has_effect)?);
+            keep(
+                format!("errors_{}.svg", role.name()),
+                series::errors_of_runs(&own, role, has_effect)?,
+            );
         }
     }
     let track = dataset.track.as_deref();

@@ -11,9 +11,7 @@ use super::Subject;
 use super::html::{chance, document, escape, section};
 use super::plots::PlotError;
 use super::provenance::Provenance;
-use super::sections::{
-    Section, candidates, errors, line, parameters, quality, reproduce, residual,
-};
+use super::sections::{Section, errors, model, quality, residual};
 use crate::run_facts::tonnes;
 
 /// The page.
@@ -23,13 +21,13 @@ use crate::run_facts::tonnes;
 /// When a plot cannot be drawn.
 pub fn html(subject: &Subject, provenance: &Provenance) -> Result<String, PlotError> {
     let mut sections = vec![errors::section(subject)?];
-    sections.extend(line::section(subject)?);
+    sections.extend(residual::line(subject)?);
     sections.extend([
         residual::section(subject)?,
-        parameters::section(subject),
-        candidates::section(subject),
+        model::parameters(subject),
+        model::candidates(subject),
         quality::section(subject),
-        reproduce::section(provenance),
+        quality::reproduce(provenance),
     ]);
     let name = escape(&subject.dataset.name);
     let mut main = diagnostics(subject) + &verdict(subject) + &contents(&sections);

@@ -63,7 +63,7 @@ impl Provenance {
 
     /// A shell command that gives the same hash in the dataset's folder.
     pub fn check_command(&self) -> String {
-        let paths: Vec<String> = self.files.iter().map(|file| quoted(&file.path)).collect();
+        let paths: Vec<String> = self.files.iter().map(|file| for_shell(&file.path)).collect();
         format!("sha256sum {} | sha256sum", paths.join(" "))
     }
 }
@@ -94,13 +94,13 @@ pub fn own_command_line() -> String {
 
 /// A command line of the program with these arguments, as one would type it.
 pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
-    let words = arguments.into_iter().map(|argument| quoted(&argument));
+    let words = arguments.into_iter().map(|argument| for_shell(&argument));
     std::iter::once("dynocar".to_string()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// A word for a shell.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
+/// A word, or a path, as a shell takes it.
+pub fn for_shell(word: &str) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "-_./=:,+@%".contains(letter);
     if !word.is_empty() && word.chars().all(is_plain) {
         return word.into();
     }
@@ -115,6 +115,13 @@ mod tests {
     fn a_command_line_can_be_typed_again() {
         let arguments = ["explain", "my data", "it's", "--report", "a.html"].map(String::from);
         assert_eq!(command_line(arguments), r"dynocar explain 'my data' 'it'\''s' --report a.html");
+    }
+
+    #[test]
+    fn paths_are_quoted_for_a_shell_where_they_must_be() {
+        assert_eq!(for_shell("a/b-1.toml"), "a/b-1.toml");
+        assert_eq!(for_shell("my train"), "'my train'");
+        assert_eq!(for_shell("it's"), "'it'\\''s'");
     }
 
     #[test]

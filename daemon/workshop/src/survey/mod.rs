@@ -5,14 +5,75 @@
 //! - `folder`: all of it in turn; [`material`]: what the files are made of, why nothing comes of it
 //! - [`answer`]: the result for machines
 //! - [`page`]: the result as a page
+//!
+//! A folder of raw recordings, surveyed or mapped, written as a dataset of trips.
 
 pub mod answer;
-mod folder;
 pub mod material;
 pub mod page;
 pub mod read;
 pub mod trip_rows;
 pub mod write;
 
-pub use folder::{Surveyed, survey_folder};
+use std::path::{Path, PathBuf};
+
+use dynocar::dataset::load;
+use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::survey::stops::Stop;
+use dynocar_analysis::survey::{Survey, survey};
+
+use answer::SurveyAnswer;
+use material::Material;
+use write::write;
+
 pub use material::SurveyFailure;
+
+/// Stops nearer than this many m to one of a known line have its name.
+const SAME_STOP_M: f64 = 25.0;
+
+/// A survey that was made and written.
+pub struct Surveyed {
+    /// The raw recordings.
+    pub raw: Dataset,
+    /// What was found.
+    pub survey: Survey,
+    /// The same for machines.
+    pub answer: SurveyAnswer,
+    /// The files of the dataset of trips.
+    pub files: Vec<PathBuf>,
+}
+
+/// Surveys the raw recordings of a folder, or maps them on a line surveyed before, and writes the
+/// dataset of trips.
+///
+/// # Errors
+///
+/// When the recordings or the line cannot be read, hold no line, or a file cannot be written.
+pub fn survey_folder(
+    source: &Path,
+    line: Option<&Path>,
+    out: &Path,
+) -> Result<Surveyed, SurveyFailure> {
+    let raw = load(source)?;
+    let known = line.map(read::known_line).transpose()?;
+    let (recordings, vehicle) = (read::recordings(&raw), read::vehicle(&raw));
+    let mut survey = survey(&recordings, &vehicle, known.as_ref().map(|(known, _)| known))?;
+    if let Some((_, track)) = &known {
+        name_stops(&mut survey.stops, &track.survey.stops);
+    }
+    let material = Material { source, dataset: &raw, vehicle: &vehicle, survey: &survey, line };
+    let files = write(&material, out)?;
+    let answer = SurveyAnswer::of(&raw, &vehicle, &survey);
+    Ok(Surveyed { raw, survey, answer, files })
+}
+
+/// Stops of a known line keep their names.
+fn name_stops(stops: &mut [Stop], known: &[(f64, String)]) {
+    for stop in stops {
+        let away = |known: &&(f64, String)| (known.0 - stop.chainage_m).abs();
+        let nearest = known.iter().min_by(|one, other| away(one).total_cmp(&away(other)));
+        if let Some(nearest) = nearest.filter(|nearest| away(nearest) < SAME_STOP_M) {
+            stop.name.clone_from(&nearest.1);
+        }
+    }
+}

@@ -12,7 +12,7 @@ use super::answer::{SurveyAnswer, TripAnswer};
 use super::write::gradient_entries;
 use crate::report::html::Column::{Names, Numbers, Words};
 use crate::report::html::{self, TableColumn, document, escape, table};
-use crate::report::plots::{PlotError, figure, gradient, wide_and_narrow};
+use crate::report::plots::{PlotError, figure, series, wide_and_narrow};
 use crate::report::provenance::Provenance;
 
 /// Width and height of the map.
@@ -140,7 +140,7 @@ fn scale_bar(span: f64) -> String {
 }
 
 fn profile_plots(entries: &[(f64, f64, f64)], direction: &str) -> Result<String, PlotError> {
-    let plots = wide_and_narrow(|width| gradient::draw(entries, direction, width))?;
+    let plots = wide_and_narrow(|width| series::gradient(entries, direction, width))?;
     Ok(figure("trace", &format!("For {direction}"), "", &plots))
 }
 

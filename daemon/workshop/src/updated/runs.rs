@@ -1,16 +1,16 @@
 //! The runs of a grown dataset, and what else it names: where they lie, seen from its folder.
+//!
+//! How grown files begin, and why they cannot be written.
 
 use std::path::Path;
 
-use toml::{Table, Value};
-
-use dynocar_analysis::dataset::DatasetFiles;
-
-use super::error::{UPDATED_MARK, UpdatedModelError};
-use crate::paths::from_folder;
-use dynocar::dataset::{DatasetFolder, read_text};
+use dynocar::dataset::{DatasetFolder, LoadError, read_text};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{OutputError, require_new, write_in_folder};
+use dynocar_analysis::dataset::DatasetFiles;
+use toml::{Table, Value};
+
+use crate::paths::from_folder;
 
 /// Names the grown train and, where there is one, its line.
 pub fn name_model(manifest: &mut Table, has_track: bool) {
@@ -86,3 +86,25 @@ fn is_updated(file: &Path) -> bool {
 fn seen_from(folder: &Path, file: &Path) -> String {
     from_folder(folder, file).display().to_string()
 }
+
+/// Why the grown files cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum UpdatedModelError {
+    /// The dataset cannot be read.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// A declared file is not there any more or is no TOML.
+    #[error("{label}: expected a TOML file, got {problem}")]
+    Declared {
+        /// The file.
+        label: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// How a grown file begins.
+pub const UPDATED_MARK: &str = "# Grown from ";

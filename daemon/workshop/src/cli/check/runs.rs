@@ -4,13 +4,12 @@ use std::iter;
 
 use dynocar_analysis::dataset::quality::{QuantityCount, ReasonCount};
 use dynocar_analysis::dataset::{
-    DatasetDiagnostic, DatasetError, ForceSource, GradientSource, Manifest, Phases, PositionSource,
-    Quantity, Role, Run, RunQuality, is_parquet,
+    DatasetDiagnostic, DatasetError, Manifest, Phases, Quantity, Role, Run, RunQuality, is_parquet,
 };
 use dynocar_core::plausibility::InputFault;
 
 use crate::cli::text::{TextTable, WIDTH, short, wrap};
-use crate::run_facts::{mass_t, recorded, recorded_in_words};
+use crate::run_facts::{self, mass_t, recorded, recorded_in_words};
 
 type Read = Result<Run, DatasetError>;
 
@@ -111,52 +110,33 @@ fn data_table(runs: &[Read]) -> TextTable {
 
 /// Where position, gradient and forces come from, with the runs where that differs.
 fn sources(runs: &[Read]) -> String {
-    let position = |run: &Run| match run.position_source {
-        PositionSource::Column => "as recorded",
-        PositionSource::IntegratedSpeed => "integrated from the speed",
-    };
-    let gradient = |run: &Run| match run.gradient_source {
-        GradientSource::Track => "from the track",
-        GradientSource::Column => "as recorded",
-        GradientSource::SpecificForce => "from the accelerometer: specific_force minus dv/dt",
-        GradientSource::Altitude => "from the altitude",
-        GradientSource::Unknown => "unknown",
-    };
-    let force = |source: ForceSource| match source {
-        ForceSource::Column => "as recorded",
-        ForceSource::ControlForce => "from the signed control_force",
-        ForceSource::Handle => "from the handle's share of the effort curve",
-        ForceSource::Pressure => "from the friction brake's pressure",
-        ForceSource::Power => "from the drive's power over the speed",
-        ForceSource::None => "not recorded",
-    };
     let mut text = String::from("sources\n");
-    text += &source("position", runs, position);
-    text += &source("gradient", runs, gradient);
-    text += &source("traction", runs, |run| force(run.traction_source));
-    text += &source("brake", runs, |run| force(run.brake_source));
+    for (place, name) in ["position", "gradient", "traction", "brake"].into_iter().enumerate() {
+        let mut groups: Groups<&str> = Vec::new();
+        for run in runs.iter().flatten() {
+            put(&mut groups, run_facts::sources(run)[place], run.number.to_string());
+        }
+        let with_runs = |(words, numbers): &(&str, Vec<String>)| {
+            format!("{words} (runs {})", numbers.join(", "))
+        };
+        let parts: Vec<String> = match &groups[..] {
+            [(words, _)] => vec![(*words).into()],
+            groups => groups.iter().map(with_runs).collect(),
+        };
+        text += &format!("  {name:12}{}\n", parts.join("; "));
+    }
     text
 }
 
-fn source(name: &str, runs: &[Read], of: impl Fn(&Run) -> &'static str) -> String {
-    let mut groups: Vec<(&str, Vec<String>)> = Vec::new();
-    for run in runs.iter().flatten() {
-        let words = of(run);
-        match groups.iter_mut().find(|(other, _)| *other == words) {
-            Some((_, numbers)) => numbers.push(run.number.to_string()),
-            None => groups.push((words, vec![run.number.to_string()])),
-        }
+/// What holds for runs, each with their numbers.
+type Groups<T> = Vec<(T, Vec<String>)>;
+
+/// Puts a run's number to what holds for it.
+fn put<T: PartialEq>(groups: &mut Groups<T>, what: T, number: String) {
+    match groups.iter_mut().find(|(other, _)| *other == what) {
+        Some((_, numbers)) => numbers.push(number),
+        None => groups.push((what, vec![number])),
     }
-    let parts: Vec<String> = match &groups[..] {
-        [(words, _)] => vec![(*words).into()],
-        groups => {
-            let with_runs = |(words, numbers): &(&str, Vec<String>)| {
-                format!("{words} (runs {})", numbers.join(", "))
-            };
-            groups.iter().map(with_runs).collect()
-        }
-    };
-    format!("  {name:12}{}\n", parts.join("; "))
 }
 
 /// What to know, each diagnostic once with its runs, first what cannot be true; nothing when all is well.
@@ -171,7 +151,7 @@ fn diagnostics(manifest: &Manifest, runs: &[Read], of_dataset: &[DatasetDiagnost
     let reported_first = of_dataset
         .iter()
         .filter(|diagnostic| diagnostic.runs.is_empty() || is_input_fault(diagnostic));
-    let mut diagnostics: Vec<(String, Vec<String>)> = reported_first
+    let mut diagnostics: Groups<String> = reported_first
         .map(|diagnostic| (diagnostic.text.clone(), diagnostic.runs.iter().map(number).collect()))
         .collect();
     for (index, run) in runs.iter().enumerate() {
@@ -179,12 +159,8 @@ fn diagnostics(manifest: &Manifest, runs: &[Read], of_dataset: &[DatasetDiagnost
             Ok(run) => diagnostics_of(manifest, run),
             Err(error) => vec![error.to_string()],
         };
-        let number = (index + 1).to_string();
         for diagnostic in of_run {
-            match diagnostics.iter_mut().find(|(other, _)| *other == diagnostic) {
-                Some((_, numbers)) => numbers.push(number.clone()),
-                None => diagnostics.push((diagnostic, vec![number.clone()])),
-            }
+            put(&mut diagnostics, diagnostic, (index + 1).to_string());
         }
     }
     let mut text = String::new();

@@ -1,12 +1,15 @@
-//! What `dynocar init` says on the terminal: every guess, what is doubtful, and what to do next.
+//! What `dynocar init` says on the terminal: what is written, every guess, what is doubtful, what to do next.
 
 use std::path::Path;
 
-use super::described::{DAEMON_FILE, Described};
-use crate::cli::text::{TextTable, diagnostics, entry, for_shell};
-use crate::cli::train_text::{TRAIN_FILE, TrainText};
-use dynocar_analysis::dataset::MANIFEST_FILE;
+use dynocar::models::text::TRAIN_FILE;
+use dynocar_analysis::dataset::guess::Guess;
+use dynocar_analysis::dataset::{DatasetDiagnostic, MANIFEST_FILE};
 use encoding_rs::UTF_8;
+
+use crate::cli::text::{TextTable, diagnostics, entry};
+use crate::cli::train_text::TrainText;
+use crate::report::provenance::for_shell;
 
 /// What was written, understood and is left to do.
 pub fn text(folder: &Path, train: &TrainText, described: Option<&Described>) -> String {
@@ -104,4 +107,19 @@ fn next(folder: &Path, described: Option<&Described>) -> String {
         text += &format!("  {command}    # {what}\n");
     }
     text
+}
+
+/// Name of the daemon's configuration.
+pub const DAEMON_FILE: &str = "daemon.toml";
+
+/// What was understood of the recordings.
+pub struct Described {
+    /// Which column was taken for what.
+    pub guess: Guess,
+    /// The runs' files, as the dataset names them.
+    pub files: Vec<String>,
+    /// What cannot be true of the runs as they were understood, the worst first.
+    pub diagnostics: Vec<DatasetDiagnostic>,
+    /// `dataset.toml`.
+    pub text: String,
 }

@@ -134,15 +134,14 @@ pub(super) fn shade(
     chart: &mut Chart,
     colour: RGBColor,
     ranges: &[[f64; 2]],
-    x: [f64; 2],
-    y: [f64; 2],
 ) -> Result<(), DrawError> {
+    let (x, y) = (chart.x_range(), chart.y_range());
     let inside = ranges
         .iter()
-        .map(|range| range.map(|value| value.clamp(x[0], x[1])))
+        .map(|range| range.map(|value| value.clamp(x.start, x.end)))
         .filter(|[from, to]| to > from);
     chart.draw_series(
-        inside.map(|[from, to]| Rectangle::new([(from, y[0]), (to, y[1])], colour.filled())),
+        inside.map(|[from, to]| Rectangle::new([(from, y.start), (to, y.end)], colour.filled())),
     )?;
     Ok(())
 }
@@ -152,11 +151,11 @@ pub(super) fn band(
     chart: &mut Chart,
     line: &[(f64, f64)],
     halves: &[f64],
-    y: [f64; 2],
 ) -> Result<(), DrawError> {
+    let y = chart.y_range();
     let edge = |side: f64| {
         let both = line.iter().zip(halves);
-        both.map(move |((at, value), half)| (*at, (value + side * half).clamp(y[0], y[1])))
+        both.map(move |((at, value), half)| (*at, (value + side * half).clamp(y.start, y.end)))
     };
     let outline: Vec<(f64, f64)> = edge(1.0).chain(edge(-1.0).rev()).collect();
     chart.draw_series([Polygon::new(outline, BAND.filled())])?;
@@ -164,8 +163,9 @@ pub(super) fn band(
 }
 
 /// Draws a horizontal line at zero.
-pub(super) fn zero_line(chart: &mut Chart, x: [f64; 2]) -> Result<(), DrawError> {
-    let line = vec![(x[0], 0.0), (x[1], 0.0)];
+pub(super) fn zero_line(chart: &mut Chart) -> Result<(), DrawError> {
+    let x = chart.x_range();
+    let line = vec![(x.start, 0.0), (x.end, 0.0)];
     chart.draw_series([plotters::element::PathElement::new(line, stroke(AXIS, 1.0))])?;
     Ok(())
 }

@@ -5,13 +5,11 @@
 //! replaces each by a variable ([`colour_rules`]), so that they follow the reader's scheme.
 
 mod axes;
-pub mod days;
 pub mod effort;
-pub mod gradient;
 pub mod line;
 pub mod panel;
 pub mod reading;
-pub mod runs;
+pub mod series;
 pub mod speeds;
 
 use std::fmt::Write as _;

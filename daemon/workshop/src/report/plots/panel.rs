@@ -37,15 +37,15 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
         let y_axis =
             Axis { range: y, title: "Missing resistance, N/kN", labels: 5, is_whole: false };
         let mut chart = chart(area, &x_axis, &y_axis)?;
-        shade(&mut chart, ACTING, &panel.acting, x, y)?;
-        zero_line(&mut chart, x)?;
+        shade(&mut chart, ACTING, &panel.acting)?;
+        zero_line(&mut chart)?;
         if has_effect && !is_category {
             let (line, halves): (Vec<(f64, f64)>, Vec<f64>) = panel
                 .bins
                 .iter()
                 .map(|bin| ((bin.at, bin.effect_n_per_kn.0), bin.effect_n_per_kn.1))
                 .unzip();
-            band(&mut chart, &line, &halves, y)?;
+            band(&mut chart, &line, &halves)?;
             chart.draw_series([PathElement::new(line, stroke(BEFORE, 1.0))])?;
         }
         means(&mut chart, &panel.bins, has_effect, x)?;

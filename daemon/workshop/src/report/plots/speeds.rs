@@ -28,6 +28,14 @@ impl Width {
         }
     }
 
+    /// Labels of a horizontal axis at most.
+    pub(super) fn labels(self) -> usize {
+        match self {
+            Width::Wide => 10,
+            Width::Narrow => 5,
+        }
+    }
+
     pub(super) fn class(self) -> &'static str {
         match self {
             Width::Wide => "wide",
@@ -48,7 +56,7 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
         let (speeds, errors) = area.split_vertically(above * SCALE);
         let points = || trace.pieces.iter().flatten();
         let x = padded(points().map(|point| point.time_s), 0.01);
-        let labels = if width == Width::Wide { 10 } else { 5 };
+        let labels = width.labels();
         let x_axis = |title| Axis { range: x, title, labels, is_whole: true };
 
         let all = points().flat_map(|p| [p.measured_mps, p.before_mps, p.after_mps]);
@@ -56,10 +64,9 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
         let y = [0.0, y[1]];
         let y_axis = Axis { range: y, title: "Speed, m/s", labels: 5, is_whole: false };
         let mut upper = chart(&speeds, &x_axis(""), &y_axis)?;
-        shade(&mut upper, ACTING, &trace.acting_s, x, y)?;
-        lines(&mut upper, trace, BEFORE, 1.2, |point| point.before_mps)?;
-        if has_effect {
-            lines(&mut upper, trace, AFTER, 1.2, |point| point.after_mps)?;
+        shade(&mut upper, ACTING, &trace.acting_s)?;
+        for (_, colour, speed) in predicted(has_effect) {
+            lines(&mut upper, trace, colour, 1.2, speed)?;
         }
         lines(&mut upper, trace, MEASURED, 1.4, |point| point.measured_mps)?;
 
@@ -69,19 +76,27 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
         let y_axis =
             Axis { range: y, title: "Predicted minus measured, m/s", labels: 5, is_whole: false };
         let mut lower = chart(&errors, &x_axis("Time in the recording, s"), &y_axis)?;
-        shade(&mut lower, ACTING, &trace.acting_s, x, y)?;
-        zero_line(&mut lower, x)?;
-        lines(&mut lower, trace, BEFORE, 1.4, |p| p.before_mps - p.measured_mps)?;
-        if has_effect {
-            lines(&mut lower, trace, AFTER, 1.4, |p| p.after_mps - p.measured_mps)?;
+        shade(&mut lower, ACTING, &trace.acting_s)?;
+        zero_line(&mut lower)?;
+        for (_, colour, speed) in predicted(has_effect) {
+            lines(&mut lower, trace, colour, 1.4, |p| speed(p) - p.measured_mps)?;
         }
         Ok(vec![frame(&upper), frame(&lower)])
     })?;
     Ok(Plot { svg, readings: readings(trace, has_effect) })
 }
 
-/// One of the speeds of a point.
-type Speed = fn(&SpeedPoint) -> f64;
+/// One of the speeds of a point, its name and its colour.
+type Predicted = (&'static str, RGBColor, fn(&SpeedPoint) -> f64);
+
+/// The predictions that are shown.
+fn predicted(has_effect: bool) -> impl Iterator<Item = Predicted> {
+    let both: [Predicted; 2] = [
+        (before_name(has_effect), BEFORE, |point| point.before_mps),
+        ("after", AFTER, |point| point.after_mps),
+    ];
+    both.into_iter().take(1 + usize::from(has_effect))
+}
 
 fn readings(trace: &Trace, has_effect: bool) -> Vec<Reading> {
     let values = |value: &dyn Fn(&SpeedPoint) -> f64| -> Vec<f64> {
@@ -91,11 +106,9 @@ fn readings(trace: &Trace, has_effect: bool) -> Vec<Reading> {
     let time = || Reading::new("Time in the recording", "s", false, values(&|p| p.time_s));
     let (mut speeds, mut errors) =
         (time().with("measured", "m/s", values(&|p| p.measured_mps), Vec::new()), time());
-    let sides: [(&str, Speed); 2] =
-        [(before_name(has_effect), |p| p.before_mps), ("after", |p| p.after_mps)];
-    for (name, value) in sides.into_iter().take(1 + usize::from(has_effect)) {
-        let away = values(&|p| value(p) - p.measured_mps);
-        speeds = speeds.with(name, "m/s", values(&value), Vec::new());
+    for (name, _, speed) in predicted(has_effect) {
+        let away = values(&|p| speed(p) - p.measured_mps);
+        speeds = speeds.with(name, "m/s", values(&speed), Vec::new());
         errors = errors.with(format!("{name} − measured"), "m/s", away, Vec::new());
     }
     vec![speeds, errors]

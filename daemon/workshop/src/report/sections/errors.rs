@@ -13,7 +13,7 @@ use crate::report::html::Column::{Names, Numbers, Words};
 use crate::report::html::{
     TableColumn, details, escape, estimate, legend, marked_table, percent, table,
 };
-use crate::report::plots::{PlotError, figure, runs, speeds, wide_and_narrow};
+use crate::report::plots::{PlotError, figure, series, speeds, wide_and_narrow};
 
 /// The section.
 ///
@@ -128,7 +128,8 @@ fn by_run(subject: &Subject) -> Result<String, PlotError> {
     for (role, name) in [(Role::Holdout, "Holdout runs"), (Role::Fit, "Fit runs")] {
         let own = subject.errors_of(role);
         if !own.is_empty() {
-            figures += &figure("", name, "", &[runs::draw(&own, role, subject.has_effect())?]);
+            figures +=
+                &figure("", name, "", &[series::errors_of_runs(&own, role, subject.has_effect())?]);
         }
     }
     let side = |errors: Option<[f64; 2]>, side: usize| match errors {

@@ -1,12 +1,8 @@
 //! The parts of the page.
 
-pub mod candidates;
 pub mod errors;
-pub mod line;
-pub mod parameters;
-pub mod places;
+pub mod model;
 pub mod quality;
-pub mod reproduce;
 pub mod residual;
 
 /// A part of the page.

@@ -1,15 +1,16 @@
-//! What the data are like.
+//! What the data are like, and how to get the same again.
 
 use std::collections::BTreeMap;
 
-use dynocar_analysis::dataset::{ForceSource, GradientSource, OrderCounts, PositionSource, Run};
+use dynocar_analysis::dataset::{OrderCounts, Run};
 use dynocar_analysis::explain::evidence::RunData;
 
 use super::Section;
 use crate::report::Subject;
 use crate::report::html::Column::{Names, Numbers, Words};
-use crate::report::html::{TableColumn, count, escape, grouped, table};
-use crate::run_facts::{mass_t, recorded, recorded_in_words};
+use crate::report::html::{TableColumn, count, details, escape, grouped, table};
+use crate::report::provenance::{FileDigest, Provenance};
+use crate::run_facts::{self, mass_t, recorded, recorded_in_words};
 
 /// The section.
 pub fn section(subject: &Subject) -> Section {
@@ -122,36 +123,14 @@ fn counts_table(used: &[UsedRun]) -> String {
 
 fn sources(subject: &Subject) -> String {
     let runs = &subject.dataset.runs;
-    let force = |source: ForceSource| match source {
-        ForceSource::Column => "as recorded",
-        ForceSource::ControlForce => "from the signed control force",
-        ForceSource::Handle => "from the handle's share of the effort curve",
-        ForceSource::Pressure => "from the friction brake's pressure",
-        ForceSource::Power => "from the drive's power over the speed",
-        ForceSource::None => "not recorded",
-    };
-    let position = |run: &Run| match run.position_source {
-        PositionSource::Column => "as recorded",
-        PositionSource::IntegratedSpeed => "integrated from the speed",
-    };
-    let gradient = |run: &Run| match run.gradient_source {
-        GradientSource::Track => "from the line's file",
-        GradientSource::Column => "as recorded",
-        GradientSource::SpecificForce => "from the accelerometer",
-        GradientSource::Altitude => "from the altitude",
-        GradientSource::Unknown => "unknown, taken as level",
-    };
-    let line = |name: &str, of: &dyn Fn(&Run) -> &'static str| {
-        let mut words: Vec<&str> = runs.iter().map(of).collect();
+    let mut html = String::from("<dl class=\"sources\">\n");
+    let names = ["Position", "Gradient", "Traction force", "Brake force"];
+    for (place, name) in names.into_iter().enumerate() {
+        let mut words: Vec<&str> = runs.iter().map(|run| run_facts::sources(run)[place]).collect();
         words.sort_unstable();
         words.dedup();
-        format!("<div><dt>{name}</dt><dd>{}</dd></div>\n", words.join("; "))
-    };
-    let mut html = String::from("<dl class=\"sources\">\n");
-    html += &line("Position", &position);
-    html += &line("Gradient", &gradient);
-    html += &line("Traction force", &|run| force(run.traction_source));
-    html += &line("Brake force", &|run| force(run.brake_source));
+        html += &format!("<div><dt>{name}</dt><dd>{}</dd></div>\n", words.join("; "));
+    }
     html + "</dl>\n"
 }
 
@@ -170,4 +149,29 @@ fn diagnostics(subject: &Subject) -> String {
         html += &format!("<li>Run {}: {}</li>\n", runs.join(", "), escape(&text));
     }
     html + "</ul>\n"
+}
+
+/// The section.
+pub fn reproduce(provenance: &Provenance) -> Section {
+    let mut body = format!(
+        "<p>The same dataset and version give the same numbers: nothing is drawn at random without \
+         a fixed seed.</p>\n<dl class=\"sources\">\n\
+         <div><dt>Command</dt><dd><code>{}</code></dd></div>\n\
+         <div><dt>Program</dt><dd>dynocar {}, {}</dd></div>\n\
+         <div><dt>Dataset</dt><dd>SHA-256 <code class=\"hash\">{}</code></dd></div>\n\
+         <div><dt>To check it, in the dataset's folder</dt><dd><code>{}</code></dd></div>\n</dl>\n",
+        escape(&provenance.command),
+        provenance.version,
+        escape(&provenance.machine),
+        provenance.sha256,
+        escape(&provenance.check_command())
+    );
+    let columns: [TableColumn<FileDigest>; 3] = [
+        ("File", Names, &|file| escape(&file.path)),
+        ("Bytes", Numbers, &|file| grouped(file.bytes)),
+        ("SHA-256", Words, &|file| format!("<code class=\"hash\">{}</code>", file.sha256)),
+    ];
+    let title = "The files that were read";
+    body += &details(title, &table(title, &columns, &provenance.files));
+    Section { id: "reproduce", title: "How to reproduce", body }
 }

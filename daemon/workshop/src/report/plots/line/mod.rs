@@ -1,9 +1,7 @@
 //! A line over its chainage: what is declared of it (height, gradient, curves, permitted speed, with
 //! tunnels and stops), and below it what was found.
 
-mod declared;
-mod found;
-mod panel;
+mod panels;
 
 use dynocar_analysis::explain::report::line::AlongLine;
 use dynocar_model::track::Track;
@@ -16,7 +14,7 @@ use super::axes::{
 use super::panel::means;
 use super::speeds::Width;
 use super::{ACTING, AFTER, AXIS, DrawError, Plot, PlotError, SCALE, TUNNEL, picture};
-use panel::{Content, Panel};
+use panels::{Content, Panel};
 
 /// Nominal width in px of the letters of a stop's name, and of the gap to the next.
 const LETTER_PX: f64 = 7.0;
@@ -43,12 +41,12 @@ pub fn draw(
     has_effect: bool,
     width: Width,
 ) -> Result<Option<Plot>, PlotError> {
-    let declared_m = track.and_then(declared::ends_m);
+    let declared_m = track.and_then(panels::ends_m);
     let driven = found.residual.iter().flat_map(|it| it.1.iter().map(|bin| 1e3 * bin.at));
     let ends_m = padded(declared_m.into_iter().flatten().chain(driven), 0.0);
-    let mut panels = found::panels(found);
+    let mut panels = panels::found(found);
     if let (Some(track), Some(_)) = (track, declared_m) {
-        panels.splice(0..0, declared::panels(track, ends_m));
+        panels.splice(0..0, panels::declared(track, ends_m));
     }
     if panels.is_empty() {
         return Ok(None);
@@ -84,7 +82,7 @@ impl Ground<'_> {
     ) -> Result<Chart<'a, 't>, DrawError> {
         let (x, y) = (self.x, panel.range(self.has_effect));
         let below = if is_last { self.x_title() } else { String::new() };
-        let labels = if self.width == Width::Wide { 10 } else { 5 };
+        let labels = self.width.labels();
         let x_axis = Axis { range: x, title: &below, labels, is_whole: false };
         let is_lane = matches!(panel.content, Content::Places(_));
         let (title, labels) = (panel.title(), if is_lane { 0 } else { 5 });
@@ -102,14 +100,14 @@ impl Ground<'_> {
             }
         };
         let ranges: Vec<[f64; 2]> = ranges_m.iter().map(|it| it.map(|at_m| at_m / 1e3)).collect();
-        shade(&mut chart, colour, &ranges, x, y)?;
+        shade(&mut chart, colour, &ranges)?;
         if let Content::Line { points, halves } = &panel.content
             && !halves.is_empty()
         {
-            band(&mut chart, points, halves, y)?;
+            band(&mut chart, points, halves)?;
         }
         if !is_lane {
-            zero_line(&mut chart, x)?;
+            zero_line(&mut chart)?;
         }
         self.stops(&mut chart, y, is_first)?;
         match &panel.content {
@@ -117,7 +115,7 @@ impl Ground<'_> {
                 let line = PathElement::new(points.clone(), stroke(AFTER, 1.4));
                 chart.draw_series([line])?;
             }
-            Content::Places(sections) => found::bars(&mut chart, sections, x[0])?,
+            Content::Places(sections) => panels::bars(&mut chart, sections, x[0])?,
             Content::Means(_, bins) => means(&mut chart, bins, self.has_effect, x)?,
         }
         Ok(chart)
@@ -255,7 +253,7 @@ mod tests {
         let track = parse_track("track.toml", &joined).unwrap();
         let corners = [(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (0.6, 1.0), (0.6, 2.0), (0.7, 2.0)];
         let rest = [(0.7, 0.0), (2.0, 0.0)];
-        assert_eq!(declared::curvature(&track, [0.0, 2000.0]), [&corners[..], &rest].concat());
+        assert_eq!(panels::curvature(&track, [0.0, 2000.0]), [&corners[..], &rest].concat());
     }
 
     #[test]

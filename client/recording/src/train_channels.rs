@@ -1,17 +1,129 @@
+//! What a recorder and a live view read: one more reader of the trains' channels, which nobody waits
+//! for.
+//!
+//! Samples are taken at least every few milliseconds, for a channel holds the newest 512 of them; what
+//! is passed over is counted and reported.
+//!
+//! Who takes what is read.
+//!
 //! The channels of one train.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use dynocar::observing::{Change, ObservedTrain};
+use dynocar::observing::{self, Change, ObservedTrain};
 use dynocar::output::report_line;
 use dynocar_client::channel::{Receiver, Transport};
-use dynocar_client::{ChannelError, Host, monotonic_now_ns};
+use dynocar_client::{ChannelError, Host, Role, monotonic_now_ns};
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
 use dynocar_shared::{TrainId, TrainSample};
 
-use super::sink::Sink;
-use crate::event::{Event, EventKind};
-use crate::topic::Message;
+use super::event::{Event, EventKind};
+use super::topic::Message;
+
+/// How long a reader sleeps between two looks at the channels: at 1 kHz a buffer of 512 samples
+/// leaves it a hundred times as long.
+pub const PAUSE: Duration = Duration::from_millis(5);
+/// How often it looks who is there.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// What is to be read.
+#[derive(Clone, Debug)]
+pub struct Wanted {
+    /// The trains.
+    pub trains: observing::Wanted,
+    /// A pipeline's snapshot is taken when the last is so old, or its status is another.
+    pub snapshot_interval: Duration,
+}
+
+/// The trains that are read.
+pub struct TrainChannels {
+    wanted: Wanted,
+    name: &'static str,
+    channels: Vec<TrainChannel>,
+    looked: Option<Instant>,
+}
+
+impl TrainChannels {
+    /// Opens the trains that were named; `name` is what the reader's places are called.
+    ///
+    /// # Errors
+    ///
+    /// When a channel cannot be opened or all its places are taken.
+    pub fn open<S: Sink>(
+        wanted: Wanted,
+        name: &'static str,
+        sink: &mut S,
+    ) -> Result<Self, S::Error> {
+        let named = wanted.trains.trains.clone();
+        let mut channels = TrainChannels { wanted, name, channels: Vec::new(), looked: None };
+        named.into_iter().try_for_each(|train| channels.add(train, sink))?;
+        Ok(channels)
+    }
+
+    /// The trains that are read by now.
+    pub fn trains(&self) -> impl Iterator<Item = TrainId> {
+        self.channels.iter().map(TrainChannel::train)
+    }
+
+    /// Hands on what has come, and looks from time to time who is there.
+    ///
+    /// # Errors
+    ///
+    /// When a newcomer's channels cannot be opened, or nothing more is taken.
+    pub fn take<S: Sink>(&mut self, sink: &mut S) -> Result<(), S::Error> {
+        self.channels.iter_mut().try_for_each(|channel| channel.take(sink))?;
+        if self.looked.is_some_and(|it| it.elapsed() < LOOK) {
+            return Ok(());
+        }
+        let is_known = |train| self.trains().any(|known| known == train);
+        let roles = [Role::Daemon, Role::Controller];
+        for train in self.wanted.trains.newcomers(&roles, is_known)? {
+            self.add(train, sink)?;
+        }
+        let host = &self.wanted.trains.host;
+        self.channels.iter_mut().try_for_each(|channel| channel.look(host, sink))?;
+        self.looked = Some(Instant::now());
+        Ok(())
+    }
+
+    fn add<S: Sink>(&mut self, train: TrainId, sink: &mut S) -> Result<(), S::Error> {
+        let Wanted { trains, snapshot_interval } = &self.wanted;
+        let channel = TrainChannel::open(&trains.host, train, *snapshot_interval, self.name)?;
+        self.channels.push(channel);
+        sink.opened(train)
+    }
+}
+
+/// Where that goes what is read: into a recording, to viewers.
+pub trait Sink {
+    /// Why nothing more is taken.
+    type Error: From<ChannelError>;
+
+    /// Takes a message.
+    ///
+    /// # Errors
+    ///
+    /// When nothing more is taken; so for all else.
+    fn take(&mut self, message: Message<'_>) -> Result<(), Self::Error>;
+
+    /// The channels of a train are open.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn opened(&mut self, _train: TrainId) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// A daemon of this process has come; the event follows.
+    ///
+    /// # Errors
+    ///
+    /// As above.
+    fn daemon_came(&mut self, _train: TrainId, _process: u32) -> Result<(), Self::Error> {
+        Ok(())
+    }
+}
 
 /// The most samples taken in a row, before the other trains have their turn.
 const TURN: usize = 4 * SAMPLE_BUFFER;

@@ -1,12 +1,12 @@
-//! `dynocar man`: a page of the manual for every command.
+//! What the command line says of itself: `dynocar completions` to a shell, `dynocar man` in the manual.
 
 use std::path::PathBuf;
 
 use clap::{Args, Command};
+use clap_complete::Shell;
 use clap_mangen::Man;
-
 use dynocar::cli::Failure;
-use dynocar::output::{report_line, require_folder, write_in_folder};
+use dynocar::output::{print, report_line, require_folder, write_in_folder};
 
 /// Write the manual pages, one for every command.
 #[derive(Debug, Args)]
@@ -21,7 +21,7 @@ pub struct ManArguments {
 /// # Errors
 ///
 /// When a page cannot be written.
-pub fn execute(arguments: &ManArguments, commands: Command) -> Result<(), Failure> {
+pub fn write_manual(arguments: &ManArguments, commands: Command) -> Result<(), Failure> {
     require_folder(&arguments.out)?;
     let pages = pages(commands)?;
     for (name, page) in &pages {
@@ -47,4 +47,23 @@ fn page(command: Command) -> Result<(String, String), Failure> {
     let mut text = Vec::new();
     page.render(&mut text).map_err(|error| Failure::Work(format!("{name}: {error}")))?;
     Ok((name, String::from_utf8_lossy(&text).into_owned()))
+}
+
+/// Print the completions for a shell.
+#[derive(Debug, Args)]
+pub struct CompletionsArguments {
+    /// The shell
+    shell: Shell,
+}
+
+/// Prints a shell's completions of these commands.
+///
+/// # Errors
+///
+/// When standard output cannot be written.
+pub fn complete(arguments: &CompletionsArguments, mut commands: Command) -> Result<(), Failure> {
+    let name = commands.get_name().to_owned();
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut commands, name, &mut script);
+    Ok(print(&String::from_utf8_lossy(&script))?)
 }

@@ -1,0 +1,136 @@
+//! Recordings that nobody described: their letters, their names as a dataset has them, and the dataset that they would be.
+
+use std::path::{Path, PathBuf};
+
+use dynocar::cli::Failure;
+use dynocar::text_file::{read_beginning, read_bytes};
+use dynocar_analysis::dataset::encoding::{decoded, guessed};
+use dynocar_analysis::dataset::{DatasetFiles, DatasetHead, FileProblem, Run, SourcePosition};
+use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
+
+use crate::paths::{self, real};
+
+/// Name and text of a file.
+pub type NamedText = (String, String);
+
+/// Files in the encoding that they share, and that.
+///
+/// # Errors
+///
+/// When one cannot be read, or is written in other letters than the others.
+pub fn texts(paths: &[PathBuf]) -> Result<(Vec<NamedText>, &'static Encoding), Failure> {
+    let mut files = Vec::new();
+    for path in paths {
+        let label = path.display().to_string();
+        let unread = |problem: FileProblem| problem.of(&label);
+        // In UTF-16 every other byte may be 0, which is a mark of other formats elsewhere.
+        let begins = guessed(&read_beginning(path, 2).map_err(unread)?);
+        let is_wide = [UTF_16LE, UTF_16BE].contains(&begins);
+        let bytes = read_bytes(path, if is_wide { begins } else { UTF_8 }).map_err(unread)?;
+        files.push((label, guessed(&bytes), bytes));
+    }
+    // What holds plain letters only is written in any of them.
+    let is_plain = |bytes: &[u8]| bytes.is_ascii();
+    let special = files.iter().find(|(_, _, bytes)| !is_plain(bytes));
+    let (first, encoding) =
+        special.map_or((String::new(), UTF_8), |(label, encoding, _)| (label.clone(), *encoding));
+    let mut texts = Vec::new();
+    for (label, own, bytes) in files {
+        if own != encoding && !is_plain(&bytes) {
+            let words = format!(
+                "{label}: the encoding is {}, but {} in {first}: files of one dataset are laid out \
+                 alike",
+                own.name(),
+                encoding.name()
+            );
+            return Err(Failure::At(SourcePosition::whole(&label), words));
+        }
+        let text = decoded(bytes, encoding).map_err(|problem| problem.of(&label))?;
+        texts.push((label, text));
+    }
+    Ok((texts, encoding))
+}
+
+/// The paths of existing files from a folder that need not be there yet.
+///
+/// # Errors
+///
+/// A file that is given twice, or whose name no TOML file can hold, is an input failure.
+pub fn from_folder(folder: &Path, files: &[PathBuf]) -> Result<Vec<String>, Failure> {
+    let mut seen: Vec<PathBuf> = Vec::new();
+    let mut paths = Vec::new();
+    for file in files {
+        let refuse = |words: &str| {
+            let label = file.display().to_string();
+            Failure::At(SourcePosition::whole(&label), format!("{label}: {words}"))
+        };
+        let full = real(file);
+        if seen.contains(&full) {
+            return Err(refuse("expected every run once, found the file twice"));
+        }
+        let path = paths::from_folder(folder, file);
+        let text = path.to_str().ok_or_else(|| refuse("expected a name in UTF-8"))?;
+        paths.push(text.into());
+        seen.push(full);
+    }
+    Ok(paths)
+}
+
+/// The dataset's files.
+pub struct Draft<'t> {
+    /// Where they will be.
+    pub folder: &'t Path,
+    /// Path of each as the dataset names it, its name in messages where that is not the path from the folder, and
+    /// what it will hold, or holds.
+    pub files: Vec<(&'t str, Option<&'t str>, &'t str)>,
+}
+
+impl DatasetFiles for Draft<'_> {
+    fn read(&self, path: &str) -> Result<String, FileProblem> {
+        self.file(path).map(|(_, text)| text.into()).ok_or(FileProblem::Missing)
+    }
+
+    fn label(&self, path: &str) -> String {
+        let label = self.file(path).and_then(|(label, _)| label);
+        label.map_or_else(|| self.folder.join(path).display().to_string(), Into::into)
+    }
+}
+
+impl Draft<'_> {
+    fn file(&self, path: &str) -> Option<(Option<&str>, &str)> {
+        self.files.iter().find(|file| file.0 == path).map(|&(_, label, text)| (label, text))
+    }
+
+    /// Reads the dataset with all its runs.
+    ///
+    /// # Errors
+    ///
+    /// The first mistake, with file and line.
+    pub fn read(&self) -> Result<(DatasetHead, Vec<Run>), Failure> {
+        let head = DatasetHead::open(self)?;
+        let runs = (0..head.manifest.runs.len()).map(|index| head.read_run(self, index));
+        let runs = runs.collect::<Result<_, _>>()?;
+        Ok((head, runs))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_named_from_the_folder_whether_it_is_there_or_not() {
+        let site = tempfile::tempdir().unwrap();
+        let at = |name: &str| site.path().join(name);
+        std::fs::create_dir_all(at("raw/day")).unwrap();
+        std::fs::write(at("raw/day/1.csv"), "").unwrap();
+        let named = |folder: &str| from_folder(&at(folder), &[at("raw/day/1.csv")]).unwrap();
+        assert_eq!(named("raw"), ["day/1.csv"]);
+        assert_eq!(named("raw/day"), ["1.csv"]);
+        assert_eq!(named("new/train"), ["../../raw/day/1.csv"]);
+        std::os::unix::fs::symlink(at("raw"), at("link")).unwrap();
+        assert_eq!(named("link"), ["day/1.csv"]);
+        let twice = [at("raw/day/1.csv"), at("link/day/./1.csv")];
+        assert!(from_folder(&at("raw"), &twice).is_err());
+    }
+}
