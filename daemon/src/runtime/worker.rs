@@ -29,9 +29,9 @@ pub struct WorkerPlan {
     pub host: Host,
     /// Start of the daemon.
     pub epoch: u64,
-    /// See [`crate::config::DaemonConfig::spin_us`].
+    /// See [`crate::config::ProcessConfig::spin_us`].
     pub spin_us: u64,
-    /// See [`crate::config::DaemonConfig::heartbeat_ms`].
+    /// See [`crate::config::ProcessConfig::heartbeat_ms`].
     pub heartbeat_ms: u64,
     /// The thread's pipelines by train.
     pub channels: Vec<ChannelPlan>,

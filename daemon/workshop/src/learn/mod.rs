@@ -14,7 +14,7 @@
 //! - [`conclusion`]: what of it goes into the store
 //! - [`learner`]: a round
 //! - [`mod@watch`]: when there is one
-//! - [`page`]: the history as a page, with the errors that the daemon's trials measured ([`page::errors_by_day`])
+//! - [`page`]: the history as a page, with the errors that the daemon's trials measured
 
 pub mod conclusion;
 mod error;
