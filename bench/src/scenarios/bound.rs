@@ -5,6 +5,7 @@
 //! mass, the wind of the day, and gusts and the map's error at every knot. What measured speeds say of them follows
 //! from how the true motion would differ.
 
+use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
@@ -30,8 +31,6 @@ const EXACT: f64 = 1e-18;
 /// Standard deviation of a load that is drawn evenly from 24 % of the declared mass.
 const DRAWN_LOAD_STD: f64 = 0.24 / 3.464;
 
-/// Speed in m/s from which speeds count: sensors miss slower wheels, and bearings and holding brakes stick.
-const SPEED_MIN_MPS: f64 = 0.5;
 /// Standard deviation in m/s of the speed at which a run begins to count.
 const START_STD_MPS: f64 = 1.0;
 
@@ -61,6 +60,8 @@ pub struct Bound {
     /// Where the speeds at which runs begin to count stand among the unknowns, and that of the next run.
     starts_from: usize,
     start: usize,
+    /// Speed in m/s from which speeds count, as for the estimator.
+    speed_min_mps: f64,
     block_s: f64,
     last: Option<Moment>,
 }
@@ -117,6 +118,7 @@ impl Bound {
             knots_from,
             starts_from,
             start: starts_from,
+            speed_min_mps: TrainKalmanSettings::default().speed_min_mps,
             block_s: 0.0,
             last: None,
         }
@@ -131,7 +133,8 @@ impl Bound {
             self.load =
                 (self.load + usize::from(may_change(&world.scenario))).min(self.brakes_from - 1);
         }
-        let counts = |at: &Moment| !at.is_standing && at.speed_mps >= SPEED_MIN_MPS;
+        let least_mps = self.speed_min_mps;
+        let counts = |at: &Moment| !at.is_standing && at.speed_mps >= least_mps;
         let Some(last) = last.filter(|last| counts(last) && counts(truth)) else {
             return self.begin();
         };
