@@ -14,13 +14,15 @@
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
 //! - [`driven`]: the train itself, force in and speed out, by the law that `explain` predicts with
 //! - [`advice`]: what to drive next, so that the estimates become sharper
-//! - [`statistics`]: the middle of values, their root mean square, their span
+//! - [`statistics`]: the middle of values, their root mean square, their span, lists in order
+//! - [`parallel`]: work on all threads
 
 pub mod advice;
 pub mod driven;
 pub mod explain;
 pub mod identify;
 pub mod import;
+pub mod parallel;
 pub mod statistics;
 pub mod stops;
 pub mod survey;

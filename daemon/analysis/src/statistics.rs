@@ -1,4 +1,5 @@
-//! The middle of values and what lies below others, their root mean square and their span.
+//! The middle of values and what lies below others, their root mean square and their span; lists in the order of a
+//! number.
 
 /// The middle of some values, the upper one of two; `None` of none.
 pub fn middle(values: &mut [f64]) -> Option<f64> {
@@ -34,4 +35,23 @@ pub fn rms(values: &[f64]) -> f64 {
 pub fn span(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let ends = values.map(|value| [value; 2]);
     ends.reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
+}
+
+/// Sorts a list by a number, the greatest first; what has the same number keeps its order.
+pub fn greatest_first<T>(list: &mut Vec<T>, number: impl Fn(&T) -> f64) {
+    least_first(list, |it| -number(it));
+}
+
+/// Sorts a list by a number, the least first; what has the same number keeps its order.
+pub fn least_first<T>(list: &mut Vec<T>, number: impl Fn(&T) -> f64) {
+    let order = order(&list.iter().map(number).collect::<Vec<f64>>());
+    let mut items: Vec<Option<T>> = std::mem::take(list).into_iter().map(Some).collect();
+    list.extend(order.into_iter().filter_map(|index| items[index].take()));
+}
+
+/// The places of numbers from the least to the greatest.
+fn order(numbers: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..numbers.len()).collect();
+    order.sort_by(|&one, &other| numbers[one].total_cmp(&numbers[other]));
+    order
 }

@@ -7,6 +7,7 @@ use super::answer::RunnerUp;
 use super::effects::UNKNOWN;
 use super::evidence::{EQUAL, SCORE_MIN};
 use super::selection::{Outcome, Refusal, Search, Trial, is_certain_beside, penalty};
+use crate::statistics::least_first;
 
 /// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error, and has this
 /// share of the least score.
@@ -135,7 +136,7 @@ pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
         })
         .filter(|other| found != Some(form(other.formula.clone())))
         .collect();
-    others.sort_by(|one, other| one.evidence_less.total_cmp(&other.evidence_less));
+    least_first(&mut others, |it| it.evidence_less);
     others.truncate(SHOWN);
     others
 }

@@ -11,12 +11,12 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::evidence::{
     Adjoint, Bin, Fit, FitProblem, RUNS_A_TASK, RunData, SampleForces, coarse_step,
 };
 use super::hypothesis::{Hypothesis, On, Past};
+use crate::parallel;
 
 /// Inner products of a whitened regressor.
 #[derive(Clone, Debug)]
@@ -128,9 +128,10 @@ impl<'a> Scan<'a> {
         step: usize,
         of_run: impl Fn(usize, &RunData) -> Tuple + Sync,
     ) -> Tuple {
-        let each = self.problem.runs.par_iter().enumerate().step_by(step);
-        let each = each.with_min_len(RUNS_A_TASK).map(|(index, run)| of_run(index, run));
-        let each: Vec<Tuple> = each.collect();
+        let runs = &self.problem.runs;
+        let each = parallel::in_tasks(runs.len().div_ceil(step), RUNS_A_TASK, |k| {
+            of_run(k * step, &runs[k * step])
+        });
         let mut sum = Tuple::zero(self.fit.theta.len());
         each.iter().for_each(|own| sum.add(own));
         sum

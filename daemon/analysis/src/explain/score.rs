@@ -1,7 +1,6 @@
 //! Open-loop prediction: the judge of a finished model.
 
 use dynocar_model::simulate::{Prediction, Restart, SpeedError};
-use rayon::prelude::*;
 
 use super::bootstrap::intervals_95;
 use super::evidence::{Fit, FitProblem, RunData, RunFactors, UpdatedForces};
@@ -9,6 +8,7 @@ use super::selection::without_each_run;
 use super::stop_to_stop::Judged;
 use super::stop_to_stop::stop_runs;
 use super::stop_to_stop::{self, StopToStop};
+use crate::parallel;
 
 /// Errors of the model without and with the effects.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -128,20 +128,18 @@ fn open_loop_mps(problem: &FitProblem, fit: &Fit) -> [[f64; 3]; 2] {
     let fitted = vec![fit.theta.clone(); problem.runs.len()];
     [fitted, without_each_run(problem, fit)].map(|theta| {
         let restarts = [Restart::FullRun, Restart::WINDOW_60];
-        let each = problem.runs.par_iter().zip(&theta).enumerate();
-        let each: Vec<[SpeedError; 3]> = each
-            .map(|(index, (run, theta))| {
-                let none = RunFactors::zeros();
-                let [full, window] = errors_at(fit, theta, (run, &none), restarts);
-                let on_day = || {
-                    let own = fit.own_factors(index);
-                    let [error] = errors_at(fit, theta, (run, own), [Restart::FullRun]);
-                    error
-                };
-                let is_beside = fit.is_beside_loads_and_winds();
-                [full, window, if is_beside { on_day() } else { full }]
-            })
-            .collect();
+        let each = parallel::of_each_number(problem.runs.len(), |index| {
+            let (run, theta) = (&problem.runs[index], &theta[index]);
+            let none = RunFactors::zeros();
+            let [full, window] = errors_at(fit, theta, (run, &none), restarts);
+            let on_day = || {
+                let own = fit.own_factors(index);
+                let [error] = errors_at(fit, theta, (run, own), [Restart::FullRun]);
+                error
+            };
+            let is_beside = fit.is_beside_loads_and_winds();
+            [full, window, if is_beside { on_day() } else { full }]
+        });
         [0, 1, 2].map(|restart| {
             let errors = each.iter().map(|of_run| of_run[restart]);
             errors.sum::<SpeedError>().rmse_mps().unwrap_or(0.0)

@@ -24,6 +24,7 @@ use super::selection::{
 };
 use super::unexplained::Unexplained;
 use crate::dataset::DatasetDiagnostic;
+use crate::statistics::greatest_first;
 
 /// Moving time in s of the fit runs below which nothing is said.
 const MOVING_MIN_S: f64 = 180.0;
@@ -184,7 +185,7 @@ fn effect_answers(
             (decrease, answer)
         })
         .collect();
-    answers.sort_by(|one, other| other.0.total_cmp(&one.0));
+    greatest_first(&mut answers, |it| it.0);
     answers.into_iter().map(|(_, answer)| answer).collect()
 }
 

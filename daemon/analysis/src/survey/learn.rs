@@ -1,13 +1,12 @@
 //! From passes with a chainage to a profile: how smooth it is; what the friction brake does, from what the balance lacks
 //! under its pressure.
 
-use rayon::prelude::*;
-
 use super::balance::Observation;
 use super::banded::NotPositive;
 use super::chainage::Estimate;
 use super::profile::{Evidence, Profile};
 use super::recording::RawRecording;
+use crate::parallel;
 use crate::statistics::{middle, share_of};
 
 /// Variances per m of the gradient's random walk that are tried: from a main line to a street.
@@ -104,11 +103,11 @@ fn smoothest(evidence: &Evidence) -> Result<f64, NotPositive> {
         Ok(residuals.map(|(_, residual_n)| (residual_n / scale_n).powi(2).min(25.0)).sum())
     };
     let folds = WALKS_PER_M.len() * FOLDS as usize;
-    let costs = (0..folds).into_par_iter().map(|k| {
+    let costs = parallel::of_each_number(folds, |k| {
         let fold = k % FOLDS as usize;
         cost(WALKS_PER_M[k / FOLDS as usize], fold as u32)
     });
-    let costs = costs.collect::<Result<Vec<f64>, NotPositive>>()?;
+    let costs = costs.into_iter().collect::<Result<Vec<f64>, NotPositive>>()?;
     let by_walk = costs.chunks(FOLDS as usize).map(|folds| folds.iter().sum::<f64>());
     let best = by_walk.zip(WALKS_PER_M).min_by(|one, other| one.0.total_cmp(&other.0));
     Ok(best.map_or(WALKS_PER_M[0], |(_, walk_per_m)| walk_per_m))
@@ -119,12 +118,13 @@ fn left_out(evidence: &Evidence, walk_per_m: f64) -> Result<Vec<f64>, NotPositiv
     let passes = evidence.courses.len();
     let mut sums = vec![(0.0, 0usize); passes];
     if can_leave_out(evidence) {
-        let profiles = (0..FOLDS).into_par_iter().map(|fold| {
-            let is_out = |it: &Observation| group(evidence, it, true) == fold;
+        let profiles = parallel::of_each_number(FOLDS as usize, |fold| {
+            let is_out = |it: &Observation| group(evidence, it, true) == fold as u32;
             let has_some = evidence.observations.iter().any(is_out);
             has_some.then(|| evidence.fit(walk_per_m, &|it| !is_out(it), false)).transpose()
         });
-        let profiles = profiles.collect::<Result<Vec<Option<Profile>>, NotPositive>>()?;
+        let profiles =
+            profiles.into_iter().collect::<Result<Vec<Option<Profile>>, NotPositive>>()?;
         for (fold, profile) in profiles.iter().enumerate() {
             let Some(profile) = profile else { continue };
             let is_out = |it: &Observation| group(evidence, it, true) == fold as u32;

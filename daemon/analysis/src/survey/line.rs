@@ -1,7 +1,5 @@
 //! The line that is driven repeatedly, and which parts are passes of it.
 
-use rayon::prelude::*;
-
 use super::alignment::Alignment;
 use super::both_directions::{Compared, compare};
 use super::centring::{Pass, align};
@@ -10,6 +8,7 @@ use super::recording::Recording;
 use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M};
 use super::silence::{TracePoint, filled, trace};
 use super::tracking::follow;
+use crate::parallel;
 
 /// Parts that are tried as the line, and parts that each is compared with, at most.
 const TRIED_MAX: usize = 12;
@@ -230,7 +229,7 @@ fn along(
 ) -> Vec<(RecordingPart, Pass)> {
     let pass =
         |part: &RecordingPart| Some((*part, pass_along(alignment, direction, part, recordings)?));
-    recording_parts.par_iter().filter_map(pass).collect()
+    parallel::of_each(recording_parts, pass).into_iter().flatten().collect()
 }
 
 fn pass_along(

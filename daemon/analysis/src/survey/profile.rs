@@ -5,13 +5,12 @@
 //! forces are estimated jointly with them. The heights make a banded system, the few common unknowns
 //! its border; the mass of each pass is fitted in turns, so that work grows linearly with passes.
 
-use rayon::prelude::*;
-
 use super::balance::Observation;
 use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
 use super::layout::{Course, HEIGHT_STEP_M, Layout};
 use super::normal::Normal;
+use crate::parallel;
 use crate::statistics::middle;
 
 /// Standard deviation in m of a row of GNSS altitude: far more than it errs, since its errors
@@ -172,7 +171,8 @@ impl Evidence {
             normal
         };
         // Added up in order: the same on any number of threads.
-        let chunks: Vec<Normal> = self.observations.par_chunks(CHUNK).map(of_chunk).collect();
+        let chunks: Vec<&[Observation]> = self.observations.chunks(CHUNK).collect();
+        let chunks = parallel::of_each(&chunks, |observations| of_chunk(observations));
         chunks.into_iter().for_each(|chunk| normal.add(chunk));
         let mut sizes_n = std::mem::take(&mut normal.sizes_n);
         let step = normal.solve()?;
@@ -245,8 +245,10 @@ impl Evidence {
             }
             Some((pass, top / bottom))
         };
-        let by_pass = self.observations.par_chunk_by(|one, next| one.pass == next.pass);
-        let masses: Vec<(usize, f64)> = by_pass.filter_map(of_pass).collect();
+        let by_pass = self.observations.chunk_by(|one, next| one.pass == next.pass);
+        let by_pass: Vec<&[Observation]> = by_pass.collect();
+        let masses = parallel::of_each(&by_pass, |observations| of_pass(observations));
+        let masses: Vec<(usize, f64)> = masses.into_iter().flatten().collect();
         // What all passes share is the vehicle's, and moves there at once.
         let mean = masses.iter().map(|it| it.1).sum::<f64>() / masses.len().max(1) as f64;
         state.pass_mass.fill(-mean);

@@ -4,6 +4,7 @@ use dynocar_model::terms::wheel::STILL_MPS;
 use serde::Serialize;
 
 use super::recording::RawRecording;
+use crate::statistics::least_first;
 
 /// A shorter stand in s without open doors is no stop.
 const STAND_MIN_S: f64 = 8.0;
@@ -63,7 +64,7 @@ pub fn stops(direction: i8, passes: &[Vec<f64>]) -> Vec<Stop> {
         .enumerate()
         .flat_map(|(pass, stands)| stands.iter().map(move |stand| (*stand, pass)))
         .collect();
-    all.sort_by(|one, other| one.0.total_cmp(&other.0));
+    least_first(&mut all, |it| it.0);
     let mut stops = Vec::new();
     for cluster in all.chunk_by(|one, other| other.0 - one.0 < SAME_STOP_M) {
         let mut standing: Vec<usize> = cluster.iter().map(|stand| stand.1).collect();

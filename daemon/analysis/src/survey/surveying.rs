@@ -1,7 +1,5 @@
 //! The survey as a whole.
 
-use rayon::prelude::*;
-
 use super::alignment::{FoundCurve, curves, turning_rad};
 use super::balance::{Observation, observations};
 use super::banded::NotPositive;
@@ -17,6 +15,7 @@ use super::recording::{RawRecording, Recording, plane_of};
 use super::recording_parts::{RecordingPart, recording_parts};
 use super::stops::{Stop, stands, stops};
 use super::trips::{NotUsed, Trip, not_used, trips};
+use crate::parallel;
 use crate::statistics::rms;
 
 /// Lateral uncertainty in m of an alignment: what the wheels roll differs from it by so much times the
@@ -117,20 +116,19 @@ pub fn survey(
         Some(known) => known.plane,
         None => plane_of(raws).ok_or(SurveyError::NoPositions)?,
     };
-    let recordings: Vec<Recording> =
-        raws.par_iter().map(|raw| Recording::of(raw, &plane)).collect();
-    let cut: Vec<RecordingPart> = recordings
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(number, recording)| recording_parts(number, recording))
-        .collect();
+    let recordings =
+        parallel::of_each_number(raws.len(), |number| Recording::of(&raws[number], &plane));
+    let cut = parallel::of_each_number(recordings.len(), |number| {
+        recording_parts(number, &recordings[number])
+    });
+    let cut: Vec<RecordingPart> = cut.into_iter().flatten().collect();
     let mut alignments = match known {
         Some(known) => known.alignments.clone(),
         None => find(&cut, &recordings)
             .ok_or(SurveyError::NoLine { what: "no two passes follow the same way" })?,
     };
-    let passes: Vec<_> =
-        cut.par_iter().filter_map(|part| pass_of(&alignments, part, &recordings)).collect();
+    let passes = parallel::of_each(&cut, |part| pass_of(&alignments, part, &recordings));
+    let passes: Vec<_> = passes.into_iter().flatten().collect();
     let (trips, wheels) = trips(&passes, &alignments, &recordings);
     if trips.is_empty() {
         return Err(SurveyError::NoLine { what: "no recording runs along it" });
@@ -229,8 +227,9 @@ fn profile(
             };
             seen.into_iter().filter_map(on_line).collect::<Vec<Observation>>()
         };
-        let passes = fit.par_iter().enumerate().filter(|(pass, _)| of(*pass));
-        passes.flat_map_iter(of_pass).collect::<Vec<Observation>>()
+        let passes: Vec<_> = fit.iter().enumerate().filter(|(pass, _)| of(*pass)).collect();
+        let observations = parallel::of_each(&passes, |pass| of_pass(*pass));
+        observations.into_iter().flatten().collect::<Vec<Observation>>()
     };
     let of_few = |block_s: f64| observe(block_s, &|pass| is_one_of_few(pass, fit.len()));
     let block_s = shortest_block_s(&mut evidence, of_few)?;

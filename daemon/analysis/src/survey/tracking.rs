@@ -4,6 +4,7 @@ use super::alignment::{Alignment, Beside};
 use super::geodesy::distance_squared;
 use super::recording::{Fix, Recording};
 use super::recording_parts::SAME_ALIGNMENT_M;
+use crate::statistics::least_first;
 
 /// Window in m around the expected chainage in which a fix is placed.
 const WINDOW_M: f64 = 60.0;
@@ -156,7 +157,7 @@ fn offsets(
             x * along[0] + y * along[1] > 0.6
         })
         .collect();
-    near.sort_by(|one, other| one.1.total_cmp(&other.1));
+    least_first(&mut near, |it| it.1);
     let mut offsets: Vec<f64> = Vec::new();
     for (node, _) in near {
         let offset = node as f64 * alignment.step_m() - recording.travelled_m[fix.row];

@@ -1,6 +1,5 @@
 //! One-way trips along the line, and what of the recordings is none.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::centring::Pass;
@@ -8,6 +7,7 @@ use super::chainage::{Chained, Estimate, WheelsAndLag, chain};
 use super::line::Alignments;
 use super::recording::Recording;
 use super::tracking::follow;
+use crate::parallel;
 
 /// A trip reaches beyond its first and last fix by so many m and s: it stands there.
 const REACH: (f64, f64) = (30.0, 60.0);
@@ -61,17 +61,14 @@ pub fn trips(
     alignments: &Alignments,
     recordings: &[Recording],
 ) -> (Vec<Trip>, WheelsAndLag) {
-    let placed: Vec<_> = passes
-        .par_iter()
-        .map(|pass| {
-            let recording = &recordings[pass.recording];
-            let alignment = alignments.of(pass.direction)?;
-            let placed = follow(recording, pass.rows.clone(), alignment);
-            let rows = with_stands(recording, pass.rows.clone());
-            let alone = chain(recording, rows.clone(), &placed, WheelsAndLag::UNKNOWN)?;
-            Some((rows, placed, alone.learned))
-        })
-        .collect();
+    let placed = parallel::of_each(passes, |pass| {
+        let recording = &recordings[pass.recording];
+        let alignment = alignments.of(pass.direction)?;
+        let placed = follow(recording, pass.rows.clone(), alignment);
+        let rows = with_stands(recording, pass.rows.clone());
+        let alone = chain(recording, rows.clone(), &placed, WheelsAndLag::UNKNOWN)?;
+        Some((rows, placed, alone.learned))
+    });
     let is_fit = |pass: &Pass| recordings[pass.recording].raw.is_fit;
     let has_fit = passes.iter().any(is_fit);
     let learned: Vec<WheelsAndLag> = passes
@@ -81,8 +78,8 @@ pub fn trips(
         .filter_map(|(_, placed)| placed.as_ref().map(|it| it.2))
         .collect();
     let together = WheelsAndLag::together(&learned, SCALE_SPREAD).unwrap_or(WheelsAndLag::UNKNOWN);
-    let of_pass = |(pass, placed): (&Pass, Option<(_, Vec<_>, _)>)| {
-        let (rows, placed, _) = placed?;
+    let of_pass = |index: usize, placed: Option<(_, Vec<_>, _)>| {
+        let (pass, (rows, placed, _)) = (&passes[index], placed?);
         let recording = &recordings[pass.recording];
         let is_fit = recording.raw.is_fit;
         // Another day's wheels may be worn or new.
@@ -94,7 +91,8 @@ pub fn trips(
         let along = chain(recording, rows, &placed, WheelsAndLag { scale, lag_s })?;
         Some(Trip { recording: pass.recording, is_fit, direction: pass.direction, along })
     };
-    let mut trips: Vec<Trip> = passes.par_iter().zip(placed).filter_map(of_pass).collect();
+    let trips = parallel::of_each_owned(placed, of_pass);
+    let mut trips: Vec<Trip> = trips.into_iter().flatten().collect();
     trips.sort_by_key(|trip| (trip.recording, trip.along.first_row));
     for index in 1..trips.len() {
         let end = trips[index - 1].rows().end;

@@ -6,12 +6,13 @@ use std::sync::Arc;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::adhesion;
 use dynocar_shared::vocabulary::EffectKind;
-use rayon::prelude::*;
 
 use super::{Candidate, Hypothesis, Nature, On, Proposal, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Found, Inside, Site, best_of_runs, find};
 use crate::explain::scan::{Scan, Tuple};
+use crate::parallel;
+use crate::statistics::greatest_first;
 
 /// Caps that a search starts from, as share of the strongest braking seen.
 const CAP_SHARES: [f64; 4] = [0.3, 0.5, 0.65, 0.8];
@@ -60,14 +61,13 @@ pub fn propose(scan: &Scan) -> Proposal {
         };
         places(scan, &shape, Form::Cap, cap)
     };
-    let of_caps: Vec<_> = CAP_SHARES.par_iter().map(of_cap).collect();
-    candidates.extend(of_caps.into_iter().flatten());
+    candidates.extend(parallel::of_each(&CAP_SHARES, of_cap).into_iter().flatten());
     let shape = |run: &RunData, i: usize| {
         let sample = &run.samples()[i];
         sample.brake_force_n.unwrap_or(0.0) / sample.inertial_mass_kg
     };
     candidates.extend(places(scan, &shape, Form::Ratio, 0.0));
-    candidates.sort_by(|one, other| other.0.total_cmp(&one.0));
+    greatest_first(&mut candidates, |it| it.0);
     let best_cap = candidates.iter().position(|(_, form, _)| *form == Form::Cap);
     let best_ratio = candidates.iter().position(|(_, form, _)| *form == Form::Ratio);
     let mut chosen: Vec<usize> = [Some(0), best_cap, best_ratio].into_iter().flatten().collect();

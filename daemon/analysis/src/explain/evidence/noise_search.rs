@@ -1,10 +1,10 @@
 //! The likeliest noise of what a model leaves.
 
-use rayon::prelude::*;
-
 use super::noise::Noise;
 use super::run_data::RunData;
 use super::whitener::Whitener;
+use crate::parallel;
+use crate::statistics::least_first;
 
 /// What is tried for the noise at changes of the control force, in s.
 const JUMPS_S: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0];
@@ -42,9 +42,9 @@ impl Noise {
 
 /// The cost of the differences under a noise, of one run in `step`.
 fn cost_of((runs, residuals): (&[RunData], &[Vec<f64>]), step: usize, noise: Noise) -> f64 {
-    let each = runs.par_iter().zip(residuals).step_by(step).with_min_len(RUNS_A_TASK);
-    let costs: Vec<f64> =
-        each.map(|(run, residual)| Whitener::cost(run, noise, residual)).collect();
+    let costs = parallel::in_tasks(runs.len().div_ceil(step), RUNS_A_TASK, |k| {
+        Whitener::cost(&runs[k * step], noise, &residuals[k * step])
+    });
     costs.iter().sum()
 }
 
@@ -76,7 +76,7 @@ fn nelder_mead((start, around): ([f64; 4], f64), cost: &impl Fn([f64; 4]) -> f64
         std::array::from_fn(|i| centre[i] + by * (worst[i] - centre[i]))
     };
     for _ in 0..STEPS {
-        simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
+        least_first(&mut simplex, |it| it.1);
         if simplex[4].1 - simplex[0].1 < 0.05 {
             break;
         }
@@ -106,6 +106,6 @@ fn nelder_mead((start, around): ([f64; 4], f64), cost: &impl Fn([f64; 4]) -> f64
             }
         }
     }
-    simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
+    least_first(&mut simplex, |it| it.1);
     simplex[0].0
 }

@@ -1,14 +1,14 @@
 //! Where along the line, and in which runs, a force of a given shape acts.
 
 use dynocar_model::track::Track;
-use rayon::prelude::*;
 
 use super::runs::{Found, best_runs};
 use super::site::Inside;
 use crate::explain::evidence::{Bin, RunData};
 use crate::explain::gradient_prior::SURVEYED;
 use crate::explain::scan::{Scan, Tuple};
-use crate::statistics::span;
+use crate::parallel;
+use crate::statistics::{least_first, span};
 
 /// Shortest interval in m that is looked for.
 const SHORTEST_M: f64 = 150.0;
@@ -116,8 +116,8 @@ fn cells(places: &Places, [low, high]: [f64; 2]) -> Vec<Cell> {
         }
         length_m *= 1.6;
     }
-    let cell = |interval_m| Cell { interval_m, runs: places.tuples(interval_m) };
-    intervals_m.into_par_iter().map(cell).collect()
+    let cell = |&interval_m: &[f64; 2]| Cell { interval_m, runs: places.tuples(interval_m) };
+    parallel::of_each(&intervals_m, cell)
 }
 
 /// Finds the intervals and runs in which a common positive factor on a shape explains most.
@@ -130,8 +130,9 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<Found> {
     let cells = cells(&places, span);
     let interval_cost = 2.0 * (cells.len().max(2) as f64).ln();
     let runs_min = PLACE_RUNS_MIN.min(scan.problem.runs.len());
-    let by_runs: Vec<_> =
-        cells.par_iter().map(|cell| (cell, best_runs(scan, &cell.runs, runs_min))).collect();
+    let by_runs = parallel::of_each_number(cells.len(), |number| {
+        (&cells[number], best_runs(scan, &cells[number].runs, runs_min))
+    });
     let best = by_runs
         .into_iter()
         .max_by(|one, other| (one.1.1 - one.1.3).total_cmp(&(other.1.1 - other.1.3)))?;
@@ -162,7 +163,7 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<Found> {
             (0..found.intervals_m.len()).for_each(|index| places.polish(&mut found, index));
         }
     }
-    found.intervals_m.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    least_first(&mut found.intervals_m, |it| it[0]);
     found.map_error = places.map_error(&found);
     Some(found)
 }
@@ -239,16 +240,17 @@ impl Places<'_, '_> {
         sum
     }
 
-    fn with_another<'c>(&self, cells: &'c [Cell], found: &Found) -> Option<Found> {
+    fn with_another(&self, cells: &[Cell], found: &Found) -> Option<Found> {
         let base = self.over(&found.intervals_m, &found.runs);
-        let gain = |cell: &'c Cell| {
-            let mut sum = self.summed(&cell.runs, &found.runs);
-            sum.add(&base);
-            (cell, self.scan.gain(&sum).0)
-        };
-        let free = cells.par_iter().filter(|cell| apart(cell.interval_m, &found.intervals_m));
-        let gains: Vec<(&Cell, f64)> = free.map(gain).collect();
-        let most = gains.into_iter().max_by(|one, other| one.1.total_cmp(&other.1));
+        let gains = parallel::of_each(cells, |cell| {
+            apart(cell.interval_m, &found.intervals_m).then(|| {
+                let mut sum = self.summed(&cell.runs, &found.runs);
+                sum.add(&base);
+                self.scan.gain(&sum).0
+            })
+        });
+        let gains = cells.iter().zip(gains).filter_map(|(cell, gain)| Some((cell, gain?)));
+        let most = gains.max_by(|one, other| one.1.total_cmp(&other.1));
         let (cell, gain) = most?;
         let mut grown = found.clone();
         grown.intervals_m.push(cell.interval_m);
@@ -281,8 +283,8 @@ impl Places<'_, '_> {
             ];
             let possible = |it: &[f64; 2]| it[1] - it[0] >= 100.0 && apart(*it, &others);
             let tries: Vec<[f64; 2]> = tries.into_iter().filter(possible).collect();
-            let tried = tries.into_par_iter().with_min_len(tries_a_task);
-            let values: Vec<_> = tried.map(|interval| (interval, value(interval))).collect();
+            let values =
+                parallel::in_tasks(tries.len(), tries_a_task, |k| (tries[k], value(tries[k])));
             let better = values.into_iter().max_by(|one, other| one.1.0.total_cmp(&other.1.0));
             match better {
                 Some(better) if better.1.0 > best.1.0 => best = better,

@@ -3,6 +3,7 @@
 use super::site::{Intervals, Site};
 use crate::explain::evidence::EQUAL;
 use crate::explain::scan::{Scan, Tuple};
+use crate::statistics::greatest_first;
 
 /// A set of intervals and runs with what a common factor on the shape there explains.
 #[derive(Clone, Debug)]
@@ -50,7 +51,7 @@ pub(super) fn best_runs(
             (index, gain, estimate)
         })
         .collect();
-    order.sort_by(|one, other| other.1.total_cmp(&one.1));
+    greatest_first(&mut order, |it| it.1);
     let passing = order.len();
     let mut best = (None, 0.0, 0.0, 0.0);
     if passing < runs_min {

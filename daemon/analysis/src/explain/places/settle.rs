@@ -11,6 +11,7 @@ use super::site::{Axis, End, Reach, Site};
 use crate::explain::answer::{PlaceUncertainty, WindowUncertainty};
 use crate::explain::evidence::{Fit, FitProblem, UpdatedModel};
 use crate::explain::hypothesis::SharedHypothesis;
+use crate::statistics::least_first;
 
 /// A cost above the least by this is out of the question.
 const FAR: f64 = 14.0;
@@ -84,13 +85,13 @@ fn belief(end: &End, cost: &mut dyn FnMut(f64) -> Option<f64>) -> Option<Belief>
                     points.extend(cost(at).filter(|_| until != end.at).map(|cost| (at, cost)));
                 }
             }
-            points.sort_by(|one, other| one.0.total_cmp(&other.0));
+            least_first(&mut points, |it| it.0);
             Some(continuous(&points))
         }
         Reach::OneOf(values) => {
             let others = values.iter().filter(|&&value| value != end.at);
             points.extend(others.filter_map(|&at| Some((at, cost(at)?))));
-            points.sort_by(|one, other| one.0.total_cmp(&other.0));
+            least_first(&mut points, |it| it.0);
             Some(discrete(&points))
         }
     }

@@ -7,6 +7,7 @@ use crate::explain::Explanation;
 use crate::explain::evidence::SCORE_MIN;
 use crate::explain::score::reduction;
 use crate::explain::selection::Trial;
+use crate::statistics::greatest_first;
 
 /// A kind of the library.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,11 +60,8 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
             row
         })
         .collect();
-    rows.sort_by(|one, other| {
-        let key = |row: &CandidateRow| (row.is_found, row.alone.unwrap_or(f64::NEG_INFINITY));
-        let (one, other) = (key(one), key(other));
-        other.0.cmp(&one.0).then(other.1.total_cmp(&one.1))
-    });
+    greatest_first(&mut rows, |row| row.alone.unwrap_or(f64::NEG_INFINITY));
+    greatest_first(&mut rows, |row| f64::from(row.is_found));
     let not_testable = outcome.not_testable.iter().filter(|(kind, _)| of(first, *kind).is_none());
     rows.extend(not_testable.map(|(kind, why)| CandidateRow {
         kind: kind.name(),

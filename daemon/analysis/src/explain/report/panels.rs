@@ -12,6 +12,7 @@ use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow};
 use crate::explain::evidence::RunData;
 use crate::explain::selection::Deviations;
+use crate::statistics::{greatest_first, least_first};
 
 /// Panels at most, beside those of single runs.
 const PANELS_MAX: usize = 8;
@@ -201,7 +202,7 @@ pub fn panels(dataset: &Dataset, explanation: &Explanation, windows: &[Window]) 
             unevenness(panel)
         }
     };
-    list.sort_by(|one, other| rank(other).total_cmp(&rank(one)));
+    greatest_first(&mut list, rank);
     list.truncate(PANELS_MAX);
     let in_windows = (0..runs.len())
         .filter(|&index| zones.windows.iter().any(|window| window.run == runs[index].file))
@@ -255,7 +256,7 @@ pub(super) fn bins<'w>(
         .filter_map(|window| Some((covariate.value(window, &runs[window.run])?, window)))
         .filter(|(value, _)| value.is_finite())
         .collect();
-    known.sort_by(|one, other| one.0.total_cmp(&other.0));
+    least_first(&mut known, |it| it.0);
     let (Some(first), Some(last)) = (known.first(), known.last()) else { return Vec::new() };
     let range = last.0 - first.0;
     if !(range > 1e-9 * last.0.abs().max(first.0.abs())) {

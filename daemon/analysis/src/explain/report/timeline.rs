@@ -12,6 +12,7 @@ use crate::explain::Explanation;
 use crate::explain::answer::Verdict;
 use crate::explain::evidence::{Fit, RunData};
 use crate::explain::score::{predicted, run_error};
+use crate::statistics::greatest_first;
 
 /// An explanation in time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -205,7 +206,7 @@ pub fn traces(explanation: &Explanation) -> Vec<Trace> {
             (error.rmse_mps().unwrap_or(0.0), run)
         })
         .collect();
-    ranked.sort_by(|one, other| other.0.total_cmp(&one.0));
+    greatest_first(&mut ranked, |it| it.0);
     ranked.iter().take(TRACES_MAX).map(|(_, run)| trace(explanation, run, &zones)).collect()
 }
 

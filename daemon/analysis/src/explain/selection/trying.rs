@@ -1,7 +1,6 @@
 //! What is tried in a round: every kind beside the model, fitted, and the best once more under their own noise.
 
 use dynocar_shared::vocabulary::EffectKind;
-use rayon::prelude::*;
 
 use super::outcome::Trial;
 use super::price::{discounted, penalty};
@@ -11,6 +10,8 @@ use crate::explain::effects::{Candidate, Effect, LIBRARY, UNKNOWN};
 use crate::explain::evidence::{Fit, Noise};
 use crate::explain::scan::Scan;
 use crate::explain::score::FitErrors;
+use crate::parallel;
+use crate::statistics::greatest_first;
 
 /// Kinds that get a noise of their own and a second localisation in each round.
 const FINALISTS: usize = 5;
@@ -75,14 +76,11 @@ impl Search<'_> {
         let steps = Steps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
         let share = if asked.rivals_of.is_some() { RIVAL_SHARE } else { FINALIST_SHARE };
         let mut trials = self.try_all(base, &scan, &steps, not_testable, asked);
-        let by_advantage = |one: &Trial, other: &Trial| other.bic_gain.total_cmp(&one.bic_gain);
         let before = FitErrors::of(self.problem, base);
         let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
         let measure = |trials: &mut [(Trial, &Effect)], is_asked: fn(f64) -> bool| {
-            trials
-                .par_iter_mut()
-                .filter(|(trial, _)| is_asked(trial.bic_gain))
-                .for_each(|(trial, _)| trial.reduction = reduction(&trial.fit));
+            let asked = trials.iter_mut().filter(|(trial, _)| is_asked(trial.bic_gain));
+            parallel::of_each_owned(asked, |_, (trial, _)| trial.reduction = reduction(&trial.fit));
         };
         measure(&mut trials, |gain| gain > 0.0);
         if !trials.iter().any(|(trial, _)| trial.reduction > FINALIST_ERROR_REDUCTION) {
@@ -90,30 +88,23 @@ impl Search<'_> {
         }
         // What takes nothing from the error comes last, and is no measure for the others.
         let helps = |trial: &Trial| trial.reduction > FINALIST_ERROR_REDUCTION;
-        let key = |trial: &Trial| (helps(trial), trial.bic_gain);
-        trials.sort_by(|(one, _), (other, _)| {
-            let (one, other) = (key(one), key(other));
-            other.0.cmp(&one.0).then(other.1.total_cmp(&one.1))
-        });
+        greatest_first(&mut trials, |(trial, _)| trial.bic_gain);
+        greatest_first(&mut trials, |(trial, _)| f64::from(helps(trial)));
         let greatest = trials.first().map_or(0.0, |(trial, _)| trial.bic_gain);
         let least = FINALIST_MIN.max(share * greatest);
         let is_long = base.observations() > MANY_OBSERVATIONS;
-        let mut finished: Vec<Trial> = trials
-            .into_par_iter()
-            .enumerate()
-            .map(|(rank, (trial, effect))| {
-                let is_finalist = rank < FINALISTS
-                    && trial.bic_gain > least
-                    && (helps(&trial) || !is_long)
-                    && may_be_evident(&trial);
-                if !is_finalist {
-                    return trial;
-                }
-                let trial = steps.done_with(effect, || self.finalist(base, trial, effect));
-                Trial { reduction: reduction(&trial.fit), ..trial }
-            })
-            .collect();
-        finished.sort_by(by_advantage);
+        let mut finished = parallel::of_each_owned(trials, |rank, (trial, effect)| {
+            let is_finalist = rank < FINALISTS
+                && trial.bic_gain > least
+                && (helps(&trial) || !is_long)
+                && may_be_evident(&trial);
+            if !is_finalist {
+                return trial;
+            }
+            let trial = steps.done_with(effect, || self.finalist(base, trial, effect));
+            Trial { reduction: reduction(&trial.fit), ..trial }
+        });
+        greatest_first(&mut finished, |it| it.bic_gain);
         finished
     }
 
@@ -144,8 +135,7 @@ impl Search<'_> {
         own.into_iter().for_each(|own| take(&mut trials, try_kind(own, 0.0)));
         let gains = trials.iter().map(|(own, _)| RIVAL_SHARE * own.bic_gain);
         let least = gains.fold(0.0, f64::max);
-        let tried: Vec<Tried> =
-            library.into_par_iter().map(|effect| try_kind(effect, least)).collect();
+        let tried = parallel::of_each(&library, |effect| try_kind(effect, least));
         tried.into_iter().for_each(|tried| take(&mut trials, tried));
         let mut has_forms = false;
         for effect in outside {
@@ -179,10 +169,8 @@ impl Search<'_> {
         onto: &Fit,
         candidates: Vec<Candidate>,
     ) -> Option<Trial> {
-        let attempts: Vec<Trial> = candidates
-            .into_par_iter()
-            .map(|candidate| self.attempt(base, onto, candidate))
-            .collect();
+        let attempt = |_, candidate| self.attempt(base, onto, candidate);
+        let attempts = parallel::of_each_owned(candidates, attempt);
         attempts.into_iter().max_by(|one, other| one.bic_gain.total_cmp(&other.bic_gain))
     }
 
@@ -222,9 +210,9 @@ impl Search<'_> {
                 look(own).map_or((None, false), |(trial, many)| (Some(trial), many))
             };
             let noises = if attempt == 0 && many { own.stiffer() } else { Vec::new() };
-            let stiff: Vec<_> = noises.into_par_iter().filter_map(look).collect();
+            let stiff = parallel::of_each(&noises, |noise| look(*noise));
             let mut is_better = false;
-            for again in again.into_iter().chain(stiff.into_iter().map(|it| it.0)) {
+            for again in again.into_iter().chain(stiff.into_iter().flatten().map(|it| it.0)) {
                 if again.bic_gain > best.bic_gain + 1.0 {
                     best = again;
                     is_better = true;

@@ -7,13 +7,13 @@ mod parts;
 use std::sync::Arc;
 
 use dynocar_model::terms::masses::LEAST_SHARE;
-use rayon::prelude::*;
 
 use super::{Candidate, Proposal};
 use crate::explain::evidence::{EQUAL, RunData};
 use crate::explain::hypothesis::SharedHypothesis;
 use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
+use crate::parallel;
 use masses::Masses;
 use parts::{Along, Part, STATION_M, STOP_MIN_S, stations, stops};
 
@@ -163,12 +163,11 @@ fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
         let Some(next) = Scan::new(scan.problem, scan.holdout, scan.train, scan.track, &fit) else {
             break;
         };
-        let free = parts
-            .par_iter()
-            .filter(|(part, _)| masses.parts().iter().all(|own| own.is_apart(part)));
-        let fresh: Vec<(Part, Tuple)> =
-            free.map(|(part, _)| (part.clone(), part_tuple(&next, part))).collect();
-        match best(&next, &mut fresh.into_iter()) {
+        let fresh = parallel::of_each(&parts, |(part, _)| {
+            let is_free = masses.parts().iter().all(|own| own.is_apart(part));
+            is_free.then(|| (part.clone(), part_tuple(&next, part)))
+        });
+        match best(&next, &mut fresh.into_iter().flatten()) {
             Some((gain, estimate, part))
                 if gain > part_cost + EQUAL && estimate.abs() > LEAST_SHARE =>
             {

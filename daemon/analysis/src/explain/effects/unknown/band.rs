@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_shared::vocabulary::EffectKind;
-use rayon::prelude::*;
 
 use super::band_axis::{AXES, BandAxis};
 use crate::explain::answer::{CovariateRange, Location};
@@ -14,7 +13,8 @@ use crate::explain::effects::{Candidate, Handling, Hypothesis, Nature, On, Share
 use crate::explain::evidence::{Bin, OUTSIDE_COST, RunData, SampleForces};
 use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
 use crate::explain::scan::{Scan, Tuple};
-use crate::statistics::span;
+use crate::parallel;
+use crate::statistics::{greatest_first, span};
 
 /// Cells into which the range of a covariate is cut.
 const CELLS: usize = 20;
@@ -37,9 +37,9 @@ struct Band {
 /// The ranges in which an extra force explains most, one of each covariate, with what it explains;
 /// the best first.
 pub fn bands(scan: &Scan) -> Vec<(f64, Candidate)> {
-    let mut bands: Vec<(f64, Candidate)> =
-        AXES.par_iter().filter_map(|&axis| best_band(scan, axis)).collect();
-    bands.sort_by(|one, other| other.0.total_cmp(&one.0));
+    let bands = parallel::of_each(&AXES, |&axis| best_band(scan, axis));
+    let mut bands: Vec<(f64, Candidate)> = bands.into_iter().flatten().collect();
+    greatest_first(&mut bands, |it| it.0);
     bands
 }
 

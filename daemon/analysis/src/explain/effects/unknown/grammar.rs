@@ -6,13 +6,13 @@
 
 use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
 
-use rayon::prelude::*;
-
 use super::form::{FormForce, choice_cost};
 use super::known::Known;
 use super::shape::{Ground, Tried};
 use crate::explain::effects::Candidate;
 use crate::explain::scan::Scan;
+use crate::parallel;
+use crate::statistics::greatest_first;
 
 /// Speed forms that products are tried with, beside its first and second power.
 const BEST_FOR_PRODUCTS: usize = 3;
@@ -41,14 +41,12 @@ pub fn forms(scan: &Scan) -> Vec<Candidate> {
     }
     let mut structures = alike(one_of_each_structure(all), REFINED_ALIKE);
     structures.truncate(REFINED);
-    let mut best: Vec<Tried> = structures
-        .into_par_iter()
-        .flat_map_iter(|one| {
-            let refined = ground.refined(one);
-            let whole = with_whole_exponent(&ground, &refined);
-            std::iter::once(refined).chain(whole)
-        })
-        .collect();
+    let best = parallel::of_each_owned(structures, |_, one| {
+        let refined = ground.refined(one);
+        let whole = with_whole_exponent(&ground, &refined);
+        [Some(refined), whole]
+    });
+    let mut best: Vec<Tried> = best.into_iter().flatten().flatten().collect();
     sort(&mut best);
     let candidate = |one: Tried| {
         let range = |factor: &Factor| {
@@ -66,22 +64,20 @@ pub fn forms(scan: &Scan) -> Vec<Candidate> {
 fn products(ground: &Ground, first: Vec<Factor>, second: Vec<Factor>) -> Vec<Tried> {
     type AtBins = (Factor, Vec<Vec<f64>>);
     let at_bins = |factors: Vec<Factor>| -> Vec<AtBins> {
-        factors.into_par_iter().map(|factor| (factor, ground.values(&factor))).collect()
+        parallel::of_each_owned(factors, |_, factor| (factor, ground.values(&factor)))
     };
     let (first, second) = (at_bins(first), at_bins(second));
-    let product = |((one, by_one), (other, by_other)): (&AtBins, &AtBins)| {
+    parallel::of_each_number(first.len() * second.len(), |pair| {
+        let (one, by_one) = &first[pair / second.len()];
+        let (other, by_other) = &second[pair % second.len()];
         ground.tried_at(vec![*one, *other], &[by_one, by_other], false)
-    };
-    let pairs: Vec<_> =
-        first.iter().flat_map(|one| second.iter().map(move |it| (one, it))).collect();
-    pairs.into_par_iter().map(product).collect()
+    })
 }
 
 /// Every form of one covariate, and the products; the best first.
 fn all_tried(ground: &Ground) -> Vec<Tried> {
     let alone: Vec<Factor> = ground.known.iter().flat_map(Known::alone).collect();
-    let mut all: Vec<Tried> =
-        alone.into_par_iter().map(|factor| ground.tried(vec![factor], false)).collect();
+    let mut all = parallel::of_each(&alone, |factor| ground.tried(vec![*factor], false));
     sort(&mut all);
     let Some(speed) = ground.covariate(Covariate::Speed) else { return all };
     let of_speed = all.iter().filter(|it| it.factors[0].of == Covariate::Speed);
@@ -133,6 +129,6 @@ fn with_whole_exponent(ground: &Ground, one: &Tried) -> Option<Tried> {
     whole.into_iter().max_by(|one, other| one.gain.total_cmp(&other.gain))
 }
 
-fn sort(tried: &mut [Tried]) {
-    tried.sort_by(|one, other| other.worth.total_cmp(&one.worth));
+fn sort(tried: &mut Vec<Tried>) {
+    greatest_first(tried, |it| it.worth);
 }

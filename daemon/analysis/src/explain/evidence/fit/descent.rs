@@ -1,7 +1,6 @@
 //! The search of the fit, and one step of it.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::{Noise, RunScatter};
@@ -12,6 +11,7 @@ use super::memory::RunMemory;
 use super::plan::Plan;
 use super::{Fit, FitProblem};
 use crate::explain::hypothesis::SharedHypothesis;
+use crate::parallel;
 
 /// Gauss-Newton steps at most.
 const STEPS_MAX: usize = 8;
@@ -183,16 +183,13 @@ impl FitProblem {
     }
 
     fn filters(&self, noise: Noise) -> SharedFilters {
-        self.runs
-            .par_iter()
-            .zip(&self.scatter_columns)
-            .map(|(run, columns)| {
-                let whitener = Whitener::new(run, noise);
-                let scatter = ScatterFilter::new(columns, &whitener, noise.scatter);
-                RunFilters { whitener, scatter }
-            })
-            .collect::<Vec<_>>()
-            .into()
+        let filters = parallel::of_each_number(self.runs.len(), |index| {
+            let whitener = Whitener::new(&self.runs[index], noise);
+            let scatter =
+                ScatterFilter::new(&self.scatter_columns[index], &whitener, noise.scatter);
+            RunFilters { whitener, scatter }
+        });
+        filters.into()
     }
 
     /// A step of Levenberg and Marquardt within the bounds, damped until the cost falls; `None`

@@ -5,17 +5,16 @@ use std::sync::{Arc, OnceLock};
 
 use dynocar_core::filter::lanes::dot;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::super::model::UpdatedModel;
 use super::super::noise::Noise;
-use super::super::run_data::RunData;
 use super::super::run_scatter::WeightedFilter;
 use super::super::run_scatter::{RunFilters, SharedFilters, Whitened};
 use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::{At, Plan};
 use super::{Column, Fit, FitProblem, RunNormal};
+use crate::parallel;
 
 /// What a model leaves of one run at given parameters.
 pub(super) struct Left {
@@ -38,12 +37,10 @@ impl FitProblem {
         filters: &[RunFilters],
         memories: &mut [RunMemory],
     ) -> Vec<Left> {
-        let runs = self.runs.par_iter().zip(&self.declared_responses).zip(filters);
-        runs.zip(memories)
-            .map(|(((run, declared), filters), memory)| {
-                Left::of(At { plan, run, declared, theta }, filters, memory)
-            })
-            .collect()
+        parallel::of_each_owned(memories, |index, memory| {
+            let (run, declared) = (&self.runs[index], &self.declared_responses[index]);
+            Left::of(At { plan, run, declared, theta }, &filters[index], memory)
+        })
     }
 
     /// The cost of what is left, with the prior.
@@ -80,14 +77,11 @@ impl FitProblem {
             theta,
         };
         let theta = &fit.theta[..];
-        let runs = self.runs.par_iter().zip(&self.declared_responses).zip(&filters[..]);
-        let runs = runs.zip(memories);
-        let linearised: Vec<(RunNormal, Vec<Column>)> = runs
-            .zip(&left)
-            .map(|((((run, declared), filters), memory), left)| {
-                left.normal(model, At { plan, run, declared, theta }, filters, memory)
-            })
-            .collect();
+        let linearised = parallel::of_each_owned(memories, |index, memory| {
+            let (run, declared) = (&self.runs[index], &self.declared_responses[index]);
+            let at = At { plan, run, declared, theta };
+            left[index].normal(model, at, &filters[index], memory)
+        });
         for ((normal, free), left) in linearised.into_iter().zip(left) {
             let Whitened { innovations, filter, factors, cost: run_cost } = left.whitened;
             cost += run_cost;
@@ -110,13 +104,11 @@ impl FitProblem {
         theta.resize(theta.len() + plan.ranges[last].len(), plan.model.effects[last].none());
         let (prior_information, prior_score, _) = self.prior(plan.model, &theta);
         let steps = difference_steps(plan.model, &theta);
-        let runs = self.runs.par_iter().zip(&self.declared_responses).zip(memories).enumerate();
-        let bordered: Vec<(RunNormal, Vec<Column>)> = runs
-            .map(|(index, ((run, declared), memory))| {
-                let at = At { plan, run, declared, theta: &theta };
-                fit.bordered_run(index, memory.columns_of_last(at, &steps))
-            })
-            .collect();
+        let bordered = parallel::of_each_owned(memories, |index, memory| {
+            let (run, declared) = (&self.runs[index], &self.declared_responses[index]);
+            let at = At { plan, run, declared, theta: &theta };
+            fit.bordered_run(index, memory.columns_of_last(at, &steps))
+        });
         let (runs, columns) = bordered.into_iter().unzip();
         let model = plan.model.clone();
         let mut grown = Fit {
@@ -147,11 +139,10 @@ impl FitProblem {
     pub fn cost_nearby(&self, fit: &Fit, model: &UpdatedModel, run: Option<&str>) -> Option<f64> {
         let theta = &fit.theta;
         let (mut information, mut score, mut cost) = self.prior(model, theta);
-        let moved = |(index, own): (usize, &RunData)| {
-            let may_differ = run.is_none_or(|run| run == own.file);
+        let moved = parallel::of_each_number(self.runs.len(), |index| {
+            let may_differ = run.is_none_or(|run| run == self.runs[index].file);
             may_differ.then(|| self.run_normal(index, model, theta, &fit.run_filters[index]))
-        };
-        let moved: Vec<_> = self.runs.par_iter().enumerate().map(moved).collect();
+        });
         for (moved, fitted) in moved.iter().zip(&fit.runs) {
             let normal = moved.as_ref().unwrap_or(fitted);
             information += &normal.information;

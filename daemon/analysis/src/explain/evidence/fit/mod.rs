@@ -10,7 +10,6 @@ use std::sync::{Arc, OnceLock};
 
 use dynocar_model::train::Davis;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use rayon::prelude::*;
 
 use super::integral::Response;
 use super::model::{UpdatedForces, UpdatedModel};
@@ -20,6 +19,7 @@ use super::run_data::RunData;
 use super::run_scatter::SharedFilters;
 use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns};
 use super::whitener::Whitener;
+use crate::parallel;
 use crate::statistics::median;
 use memory::RunMemory;
 
@@ -178,7 +178,7 @@ impl FitProblem {
             runs.iter().flat_map(|run| run.speed_late_s.iter().copied()).collect();
         let speed_late_s = pooled_s(&parts);
         let scatter_columns = runs.iter().map(|run| scatter_columns(run, declared)).collect();
-        let declared_responses = runs.par_iter().map(declared_response).collect();
+        let declared_responses = parallel::of_each(&runs, declared_response);
         FitProblem {
             runs,
             declared,

@@ -1,0 +1,56 @@
+//! Work on all threads that the caller gives: what is made of each item, in the order of the items, the same on any
+//! number of threads (decision 0018).
+//!
+//! The library that shares work is compiled once here, for a call through a pointer, not anew for each place of use.
+
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+
+/// What is made of each number below a count.
+pub fn of_each_number<R: Send>(count: usize, make: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    in_tasks(count, 1, make)
+}
+
+/// What is made of each number below a count, `at_least` of them in one task, since each alone is less work than
+/// handing it to a thread.
+pub fn in_tasks<R: Send>(
+    count: usize,
+    at_least: usize,
+    make: impl Fn(usize) -> R + Sync,
+) -> Vec<R> {
+    let places: Vec<Mutex<Option<R>>> = (0..count).map(|_| Mutex::new(None)).collect();
+    share_out(count, at_least, &|number| put(&places[number], make(number)));
+    places
+        .into_iter()
+        .filter_map(|it| it.into_inner().unwrap_or_else(PoisonError::into_inner))
+        .collect()
+}
+
+/// What is made of each item of a list.
+pub fn of_each<T: Sync, R: Send>(items: &[T], make: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    of_each_number(items.len(), |number| make(&items[number]))
+}
+
+/// What is made of each item, which is used up, and its number.
+pub fn of_each_owned<T: Send, R: Send>(
+    items: impl IntoIterator<Item = T>,
+    make: impl Fn(usize, T) -> R + Sync,
+) -> Vec<R> {
+    let items: Vec<Mutex<Option<T>>> = items.into_iter().map(|it| Mutex::new(Some(it))).collect();
+    let made =
+        of_each_number(items.len(), |number| taken(&items[number]).map(|item| make(number, item)));
+    made.into_iter().flatten().collect()
+}
+
+fn share_out(count: usize, at_least: usize, work: &(dyn Fn(usize) + Sync)) {
+    (0..count).into_par_iter().with_min_len(at_least).for_each(work);
+}
+
+fn put<R>(place: &Mutex<Option<R>>, made: R) {
+    *place.lock().unwrap_or_else(PoisonError::into_inner) = Some(made);
+}
+
+fn taken<T>(place: &Mutex<Option<T>>) -> Option<T> {
+    place.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
