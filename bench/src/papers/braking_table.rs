@@ -63,13 +63,13 @@ impl Table {
         let mut rows = Vec::new();
         rows.extend(self.pair(
             "the present",
-            (Some(em_end), Some(ekf), present, at_present),
+            (Some(&em_end), Some(&ekf), &present, at_present),
             &bound(&self.braking, knowledge, 0),
             seeds,
         ));
         rows.extend(self.pair(
             "5 s back (EM: middle of the window)",
-            (Some(em_middle), None, back, at_back),
+            (Some(&em_middle), None, &back, at_back),
             &bound(&self.braking, knowledge, LAG_STEPS),
             seeds,
         ));
@@ -92,7 +92,7 @@ impl Table {
         let bounds = bound(&self.braking, Knowledge::Law(scale_std), 0);
         self.pair(
             "the present, the law known but for its scale",
-            (None, None, score, score.nees_freedom()),
+            (None, None, &score, score.nees_freedom()),
             &bounds,
             seeds,
         )
@@ -102,7 +102,7 @@ impl Table {
     fn pair(
         &self,
         what: &str,
-        (em, ekf, ours, freedom): (Option<Score>, Option<Score>, Score, f64),
+        (em, ekf, ours, freedom): (Option<&Score>, Option<&Score>, &Score, f64),
         bounds: &[BoundAt],
         seeds: Seeds,
     ) -> Vec<Row> {
@@ -117,9 +117,9 @@ impl Table {
                 ..row(&format!("mean relative error, {what}"), "%")
             },
             Row {
-                paper_method: em.map(|score| score.rmse),
-                baseline: ekf.map(|score| score.rmse),
-                ours: Some(ours.rmse),
+                paper_method: em.map(|score| score.rmse()),
+                baseline: ekf.map(|score| score.rmse()),
+                ours: Some(ours.rmse()),
                 bound: Some(deviation(bounds)),
                 ..row(&format!("root mean square error, {what}"), "1")
             },
@@ -152,7 +152,6 @@ pub fn drawn_rows(
         let score = drawn_score(sought, lag_s, lag_steps, seeds);
         let quantity = format!("{name}, root mean square error, {what}");
         Row {
-            ours: Some(score.rmse),
             bound: Some(deviation(&bound(&braking, knowledge, lag_steps))),
             ..score.row(
                 score.nees_freedom(),

@@ -24,7 +24,7 @@ use self::scenario::{
 use super::row::{Row, Seeds};
 use super::score::{Score, w0_errors};
 use crate::rig::pipelines::default_pipeline;
-use crate::statistics::{mean, root_mean_square};
+use crate::statistics::mean;
 
 const PAPER: &str = "Liu 2018";
 
@@ -64,20 +64,16 @@ fn accuracy(condition: Condition, seeds: Seeds) -> Vec<Row> {
         ours.take_bound(&bound, &speeds);
         online.take_bound(&bound, &speeds);
     }
-    let row = |quantity: &str, method: Option<f64>, score: &Score| {
+    let row = |quantity: &str, paper: &[f64], score: &Score| {
         let quantity = format!("w0 over 40-72 km/h, {quantity}, {}", condition.name);
-        Row {
-            paper_method: method,
-            baseline: Some(root_mean_square(&of_methods[0])),
-            ..score.row(Row::new(PAPER, "Table 1, section 4.2", quantity, "N/kN", seeds))
-        }
+        let mut score = score.clone();
+        (score.paper, score.baseline) = (paper.to_vec(), of_methods[0].clone());
+        score.row(Row::new(PAPER, "Table 1, section 4.2", quantity, "N/kN", seeds))
     };
-    let mut rows: Vec<Row> = METHODS
-        .iter()
-        .zip(&of_methods)
-        .map(|(method, errors)| row(method.name, Some(root_mean_square(errors)), &ours))
-        .collect();
-    rows.push(row("online: resistance_kalman", None, &online));
+    let methods = METHODS.iter().zip(&of_methods);
+    let mut rows: Vec<Row> =
+        methods.map(|(method, errors)| row(method.name, errors, &ours)).collect();
+    rows.push(row("online: resistance_kalman", &[], &online));
     rows
 }
 

@@ -5,7 +5,8 @@ mod braking;
 mod braking_score;
 mod braking_table;
 mod jin;
-mod literal_em;
+#[cfg(test)]
+mod literal_em_tests;
 mod liu;
 mod promise;
 mod row;
