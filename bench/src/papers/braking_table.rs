@@ -67,12 +67,13 @@ impl Table {
             &bound(&self.braking, knowledge, 0),
             seeds,
         ));
-        rows.extend(self.pair(
-            "5 s back (EM: middle of the window)",
+        let back = self.pair(
+            "5 s back",
             (Some(&em_middle), None, &back, at_back),
             &bound(&self.braking, knowledge, LAG_STEPS),
             seeds,
-        ));
+        );
+        rows.extend(back.into_iter().map(|row| row.noted("EM: middle of the window")));
         rows.push(Row {
             paper_method: Some(exact_middle.relative_percent),
             ..self.row("EM with exact E-step, middle of the window", "%", seeds)

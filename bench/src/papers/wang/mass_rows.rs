@@ -99,8 +99,8 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 
 /// A row without figures.
 fn row(quantity: &str, seeds: Seeds) -> Row {
-    let methods = "paper's method: force on differentiated speed; baseline: the reverse";
-    Row::new(WANG, "Table 3", format!("{quantity} ({methods})"), "%", seeds)
+    let note = "paper's method: force on differentiated speed; baseline: the reverse";
+    Row::new(WANG, "Table 3", quantity, "%", seeds).noted(note)
 }
 
 /// The whole chain: resistances from one crossing, then the mass with them.
@@ -194,14 +194,14 @@ fn step_row(shuttle: &Shuttle, seeds: Seeds) -> Row {
     }
     // A way that does not settle in every run has no settling time.
     let time_s = |times: &[f64]| (times.len() == seeds.count).then(|| mean(times));
-    let quantity = "12 % more mass after a stop: time under force until the error stays below 1 % \
-                    (paper's method: force on differentiated speed, nothing where it never does; \
-                    baseline: the reverse)";
+    let quantity = "12 % more mass after a stop: time under force until the error stays below 1 %";
+    let note = "paper's method: force on differentiated speed, nothing where it never does; \
+                baseline: the reverse";
     Row {
         paper_method: time_s(&paper),
         baseline: time_s(&reverse),
         ours: time_s(&ours),
-        ..Row::new(WANG, "Figure 9", quantity, "s", seeds)
+        ..Row::new(WANG, "Figure 9", quantity, "s", seeds).noted(note)
     }
 }
 
