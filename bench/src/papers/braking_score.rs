@@ -303,8 +303,9 @@ mod tests {
     fn one_curve_of_many_runs_leaves_the_freedom_of_one_curve() {
         // NEES of half the runs one deviation above 1, of the others below it.
         let score = |variance: f64, runs: usize, length: usize| {
-            let error =
-                |run: usize| (1.0 + if run % 2 == 0 { 1.0 } else { -1.0 } * variance.sqrt()).sqrt();
+            let error = |run: usize| {
+                (1.0 + if run.is_multiple_of(2) { 1.0 } else { -1.0 } * variance.sqrt()).sqrt()
+            };
             let scored = |run| Scored { truth: 1.0, error: error(run), std: 1.0 };
             let runs: Vec<Vec<Scored>> = (0..runs).map(|run| vec![scored(run); length]).collect();
             Score::of(runs.iter())
