@@ -3,21 +3,23 @@
 //! One process stands for all controllers: it publishes every train's samples at their appointed
 //! times and polls the trains in turn, on a core of its own.
 //!
+//! - [`plan`]: so many trains with some pipelines
 //! - [`search`]: the highest rate without loss; growth with trains and pipelines
 //! - [`report`]: the result
 
+pub mod plan;
 pub mod report;
 pub mod search;
 
 use clap::Args;
 use dynocar::config::IdleStrategy;
-use dynocar_shared::PipelineKind;
 use serde_json::json;
 
+use self::plan::Load;
 use crate::open_loop::traffic::TrafficPlan;
-use crate::open_loop::trial::{Answerer, Extent, Setting, Trial, run};
+use crate::open_loop::trial::Extent;
 use crate::output::{Failure, OutputArguments, expect, named, table};
-use crate::rig::cores::{CoreArguments, Cores, in_thread};
+use crate::rig::cores::{CoreArguments, Cores};
 use crate::rig::pipelines;
 
 /// Synthetic trains against one daemon: what is used, refused and lost, and how late.
@@ -70,30 +72,6 @@ const IDLE: [(&str, IdleStrategy); 3] = [
 const JITTER: f64 = 0.1;
 /// Each trial of a search or of the growth lasts at most so long, in s.
 const TRIAL_SECONDS: f64 = 3.0;
-
-/// So many trains with some pipelines.
-#[derive(Clone, Debug)]
-pub struct Load {
-    /// The pipelines of the daemon.
-    pub pipelines: Vec<PipelineKind>,
-    /// What its threads do while no sample comes.
-    pub idle: IdleStrategy,
-    /// What is put on it.
-    pub extent: Extent,
-}
-
-impl Load {
-    /// Puts it on a daemon.
-    ///
-    /// # Errors
-    ///
-    /// When a process or channel fails.
-    pub fn run(&self) -> Result<Trial, Failure> {
-        let answerer = Answerer::Daemon(self.pipelines.clone(), None);
-        let setting = Setting { answerer, idle: self.idle, companions: &[], candidates: 0 };
-        in_thread(|| run(&setting, &self.extent))
-    }
-}
 
 impl LoadArguments {
     /// Puts the load on and measures.

@@ -3,7 +3,7 @@
 use dynocar_shared::PipelineKind;
 use serde_json::{Value, json};
 
-use super::Load;
+use super::plan::Load;
 use crate::open_loop::controller::Outcome;
 use crate::open_loop::trial::Trial;
 use crate::output::{Record, table};

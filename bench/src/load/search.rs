@@ -3,7 +3,8 @@
 use dynocar::output::report_line;
 use serde::Serialize;
 
-use super::{Load, report};
+use super::plan::Load;
+use super::report;
 use crate::output::{Failure, Record};
 
 /// Controllers that are later than this have themselves reached their limit, in ns.
