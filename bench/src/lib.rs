@@ -6,7 +6,8 @@
 //! - `explain`: the search for undeclared effects on simulated datasets
 //! - `latency`: sample → snapshot through real processes, compared with the floor and alternatives
 //! - `load`: many trains against one daemon
-//! - `rig`: what the two share
+//! - `open_loop`: what the two measure by
+//! - `rig`: processes, cores, pipelines and histograms
 //! - `monitor`: what the residual monitor suspects on simulated driving, how soon and how wrongly
 //! - `papers`: accuracy of every estimator over seeded runs, compared with the statistical bound
 //! - [`scenarios`](mod@scenarios): resistance and mass in a user's day
@@ -24,6 +25,7 @@ mod explain;
 mod latency;
 mod load;
 mod monitor;
+mod open_loop;
 pub mod output;
 mod papers;
 mod parallel;

@@ -1,5 +1,6 @@
 //! A train and its driver from stop to stop, and what each leg was worth.
 
+use dynocar_core::filter::FittedLine;
 use dynocar_model::simulate::STANDING_MPS;
 use dynocar_model::train::Davis;
 use dynocar_shared::stopping::RailAdhesion;
@@ -230,13 +231,14 @@ impl Journey {
 /// Work in J that a second more of running time saves around a time in s: the slope of a straight line
 /// through some plans.
 fn saved_w(planner: &Planner<'_>, due_s: f64) -> f64 {
-    let plans = [1.0, 1.01, 1.02, 1.03, 1.04].map(|late| planner.plan((0.0, 0.0), late * due_s));
-    let count = plans.len() as f64;
-    let mean_s = plans.iter().map(|plan| plan.time_s).sum::<f64>() / count;
-    let spread: f64 = plans.iter().map(|plan| (plan.time_s - mean_s).powi(2)).sum();
-    let saved: f64 = plans.iter().map(|plan| (mean_s - plan.time_s) * plan.energy_j).sum();
+    let mut line = FittedLine::default();
+    for late in [1.0, 1.01, 1.02, 1.03, 1.04] {
+        let plan = planner.plan((0.0, 0.0), late * due_s);
+        line.push(plan.time_s - due_s, plan.energy_j);
+    }
     // A train that is late at its best saves nothing.
-    if spread.sqrt() < 0.01 * due_s { 0.0 } else { (saved / spread).max(0.0) }
+    let slope_w = line.slope().filter(|_| line.spread().sqrt() >= 0.01 * due_s);
+    slope_w.map_or(0.0, |slope_w| (-slope_w).max(0.0))
 }
 
 #[cfg(test)]

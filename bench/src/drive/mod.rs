@@ -47,15 +47,8 @@ use crate::scenarios::world::Traffic;
 /// Exit status 1 where the driver with Dynocar is worse than with declared parameters.
 #[derive(Debug, Args)]
 pub struct DriveArguments {
-    /// Trains for each scenario, each with a seed of its own
-    #[arg(long, default_value_t = 20)]
-    trains: usize,
-    /// Stops of each train
-    #[arg(long, default_value_t = 10)]
-    stops: usize,
-    /// The first seed
-    #[arg(long, default_value_t = 1)]
-    first_seed: u64,
+    #[command(flatten)]
+    extent: Extent,
     /// Only scenarios whose name contains this, as metro or 'wet rail'
     #[arg(long, value_name = "TEXT", default_value = "")]
     scenario: String,
@@ -94,16 +87,16 @@ impl DriveArguments {
     ///
     /// When the command line is wrong, a process fails, or the driver with Dynocar is worse.
     pub fn run(&self) -> Result<(), Failure> {
+        let extent = self.extent;
         let all = services(self.cycle_ms);
         let chosen = containing("--scenario", &self.scenario, all, Service::name)?;
-        expect(self.trains > 0 && self.stops > 0, || {
+        expect(extent.trains > 0 && extent.stops > 0, || {
             "--trains and --stops: expected more than 0".into()
         })?;
         let cycle_ms = self.cycle_ms.unwrap_or(50);
         expect((10..=200).contains(&cycle_ms), || {
             format!("--cycle-ms {cycle_ms}: expected 10 to 200")
         })?;
-        let extent = Extent { trains: self.trains, stops: self.stops, first_seed: self.first_seed };
         let scored = parallel::over(&chosen, self.threads, |service| measure(*service, extent));
         let scored = scored.into_iter().collect::<Result<Vec<Scored>, _>>()?;
         if let Some(file) = &self.picture {

@@ -1,5 +1,6 @@
 //! All trains of a service with one of the three kinds of parameters.
 
+use clap::Args;
 use dynocar_shared::TrainSample;
 
 use super::answers::{self, ASKED, Memory};
@@ -31,13 +32,16 @@ impl Informant {
 }
 
 /// Which trains drive how far.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Args)]
 pub struct Extent {
-    /// Trains, each with a seed of its own.
+    /// Trains for each scenario, each with a seed of its own
+    #[arg(long, default_value_t = 20)]
     pub trains: usize,
-    /// Stops of each.
+    /// Stops of each train
+    #[arg(long, default_value_t = 10)]
     pub stops: usize,
-    /// The first seed.
+    /// The first seed
+    #[arg(long, default_value_t = 1)]
     pub first_seed: u64,
 }
 

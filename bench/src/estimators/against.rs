@@ -73,7 +73,7 @@ fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, Failure> {
     let answer: Value =
         serde_json::from_slice(&output.stdout).map_err(|error| failed(error.to_string()))?;
     let cases = answer["cases"].as_array().ok_or_else(|| failed("none came".into()))?;
-    let time = |it: &Value| Some((it["name"].as_str()?.to_owned(), it["ns_per_update"].as_f64()?));
+    let time = |it: &Value| Some((it["case"].as_str()?.to_owned(), it["ns"].as_f64()?));
     cases
         .iter()
         .map(time)

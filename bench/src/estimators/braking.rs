@@ -5,13 +5,13 @@ use std::rc::Rc;
 
 use dynocar_core::pipeline::braking::engine::{Engine, Observation};
 use dynocar_core::pipeline::braking::law::Law;
-use dynocar_core::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
+use dynocar_core::pipeline::braking::motion::{MotionNoise, StepInputs, Walk};
 use dynocar_core::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
 use dynocar_estimators::xie::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
 use dynocar_shared::Uncertain;
 
 use super::measure::Case;
-use crate::chance::Chance;
+use crate::papers::braking::{Moment, XIE_TABLE_2};
 
 /// Samples of a window.
 const SAMPLES: usize = 40;
@@ -21,8 +21,6 @@ const WINDOWS: u64 = 8;
 const STEPS: usize = 199;
 /// Samples that the smoothed estimate lies back.
 const LAG: usize = 25;
-const TRUTH: f64 = 0.08;
-const FIRST_MPS: f64 = 80.0;
 /// Noise of motion and measurement (Xie 2019), as variances.
 const NOISE: MotionNoise = MotionNoise {
     distance_m2_per_s: 0.0167,
@@ -43,26 +41,15 @@ const INPUTS: StepInputs = StepInputs {
     basic_mps2: [0.0077, 2.3e-4, 1.46e-5],
 };
 
-/// Observations of a braking with a constant coefficient.
+/// The first observations of a braking on a wet rail.
 fn braking(samples: usize, seed: u64) -> Vec<Observation> {
-    let mut random = Chance::new(seed);
-    let (mut distance_m, mut speed_mps) = (0.0, FIRST_MPS);
-    let distance_std = (NOISE.distance_m2_per_s * INPUTS.step_s).sqrt();
-    let speed_std = (NOISE.speed_m2_per_s3 * INPUTS.step_s).sqrt();
-    (0..samples)
-        .map(|_| {
-            let observation = Observation {
-                distance_m: distance_m + 0.1 * random.normal(),
-                speed_mps,
-                is_speed_valid: false,
-                demand: INPUTS.demand,
-            };
-            let moved = motion::advance(&INPUTS, &Law::Constant, speed_mps, TRUTH);
-            distance_m += moved.travelled_m + distance_std * random.normal();
-            speed_mps = moved.speed_mps + speed_std * random.normal();
-            observation
-        })
-        .collect()
+    let observation = |it: &Moment| Observation {
+        distance_m: it.measured_m,
+        speed_mps: it.speed_mps,
+        is_speed_valid: false,
+        demand: INPUTS.demand,
+    };
+    XIE_TABLE_2.simulate(seed)[..samples].iter().map(observation).collect()
 }
 
 /// An engine over some brakings, each from a fresh start and of so many updates.

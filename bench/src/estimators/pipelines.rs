@@ -13,10 +13,11 @@ use dynocar_estimators::wang::inertia::Inertia;
 use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_estimators::wang::motion::Motion;
 use dynocar_model::track::Track;
-use dynocar_model::train::{BrakeGear, TrainModel};
+use dynocar_model::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 
 use super::measure::Case;
+use crate::papers::braking;
 use crate::rig::pipelines::{default_pipeline, resolving};
 
 /// The files of the dataset that is measured on.
@@ -44,16 +45,7 @@ impl DemoRun {
         let head = DatasetHead::open(FILES)?;
         let run = head.read_run(FILES, 0)?;
         let mut train = (*head.train).clone();
-        train.brake_gear = BrakeGear {
-            cylinder_diameter_mm: Some(254.0),
-            disc_radius_mm: Some(240.0),
-            wheel_radius_mm: Some(460.0),
-            efficiency: Some(0.9),
-            ratio: Some(2.55),
-            friction: Some(0.35),
-            pads: Some(48.0),
-            friction_brake: None,
-        };
+        train.brake_gear = braking::train().brake_gear;
         Ok(Rc::new(DemoRun { train: Arc::new(train), track: head.track, samples: run.samples }))
     }
 

@@ -3,7 +3,6 @@
 use dynocar_model::terms::delay;
 use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::disturbances::Disturbances;
-use dynocar_tests::simulator::run_file::run_file;
 use dynocar_tests::simulator::run_maker::RunPlan;
 use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
@@ -28,52 +27,35 @@ impl ParameterGrade {
     }
 }
 
-/// Parameters that have a single true number; the size of an effect is its distance from none.
+/// Every number of an effect that the answer has by the same name; the size of an effect is its distance from none.
 pub fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<ParameterGrade> {
     let declared = simulated.declared_train();
-    let number = |name: &str| own["parameters"][name].as_f64();
-    let deviation = |name: &str| own["std"][name].as_f64();
-    let one = |name: &str, truth: f64, none: f64| {
+    let mut truths = effect.parameters(0.0);
+    match effect {
+        // Nobody knows which numbers of a form are those of a law outside the library.
+        Effect::Unlisted(_) => return Vec::new(),
+        Effect::GradientError { profile } => return gradient_errors(profile, own, simulated),
+        Effect::Wind { .. } => truths["wind_plus_mps"] = wind_of_the_days(simulated).into(),
+        _ => {}
+    }
+    let one = |name: &str, truth: f64| {
+        let none = match name {
+            "c_factor" | "speed_scale" | "gain" => 1.0,
+            "k_n_per_kn_m" => declared.curve_constant_n_per_kn_m,
+            "rotating_mass_factor" => declared.rotating_mass_factor,
+            _ => 0.0,
+        };
         (truth != none).then_some(())?;
-        let (value, deviation) = (number(name)?, deviation(name)?);
+        let (value, deviation) = (own["parameters"][name].as_f64()?, own["std"][name].as_f64()?);
         let error = (value - truth) / (truth - none);
         Some(ParameterGrade { name: name.into(), error, z: (value - truth) / deviation })
     };
-    let list = match effect {
-        Effect::TunnelDrag { c_factor } => vec![one("c_factor", *c_factor, 1.0)],
-        Effect::CurveResistance { k_n_per_kn_m } => {
-            vec![one("k_n_per_kn_m", *k_n_per_kn_m, declared.curve_constant_n_per_kn_m)]
-        }
-        Effect::Wind { .. } => vec![one("wind_plus_mps", wind_of_the_days(simulated), 0.0)],
-        Effect::DraggingBrake { force_n, .. } => vec![one("force_n", *force_n, 0.0)],
-        Effect::WheelDiameter { speed_scale } => vec![one("speed_scale", *speed_scale, 1.0)],
-        Effect::GradientShift { shift_m } => vec![one("shift_m", *shift_m, 0.0)],
-        Effect::GradientError { profile } => gradient_errors(profile, own, simulated),
-        Effect::TractionGain { gain } => vec![one("gain", *gain, 1.0)],
-        Effect::ActuatorDelay { delay_s, lag_s } | Effect::SpeedDelay { delay_s, lag_s } => {
-            let together_s = *delay_s + *lag_s;
-            vec![
-                one(delay::TOGETHER, together_s, 0.0),
-                one("delay_s", *delay_s, 0.0),
-                one("lag_s", *lag_s, 0.0),
-            ]
-        }
-        Effect::RotatingMass { rotating_mass_factor } => {
-            vec![one("rotating_mass_factor", *rotating_mass_factor, declared.rotating_mass_factor)]
-        }
-        Effect::BearingTemperature { delta_a_n_per_kn, tau_s } => {
-            vec![one("delta_a_n_per_kn", *delta_a_n_per_kn, 0.0), one("tau_s", *tau_s, 0.0)]
-        }
-        Effect::AmbientTemperature { w0_per_k, .. } => vec![one("w0_per_k", *w0_per_k, 0.0)],
-        Effect::LocalResistance { extra_n_per_kn, .. } => {
-            vec![one("extra_n_per_kn", *extra_n_per_kn, 0.0)]
-        }
-        Effect::LowAdhesion { adhesion, .. } => vec![one("adhesion", *adhesion, 0.0)],
-        Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) | Effect::Unlisted(_) => {
-            mass_factors(effect, own, simulated)
-        }
-    };
-    list.into_iter().flatten().collect()
+    let number = |name: &str| truths[name].as_f64();
+    let together_s = number("delay_s").zip(number("lag_s")).map(|(delay_s, lag_s)| delay_s + lag_s);
+    let together = together_s.and_then(|truth_s| one(delay::TOGETHER, truth_s));
+    let named = truths.as_object().into_iter().flatten();
+    let singly = named.filter_map(|(name, truth)| one(name, truth.as_f64()?));
+    together.into_iter().chain(singly).chain(mass_factors(&truths, own, simulated)).collect()
 }
 
 /// The error of the gradient at every node that was found, over the root mean square of the effect. All that
@@ -82,7 +64,7 @@ fn gradient_errors(
     profile: &[(f64, f64)],
     own: &Value,
     simulated: &SimulatedDataset,
-) -> Vec<Option<ParameterGrade>> {
+) -> Vec<ParameterGrade> {
     let Some(map) = simulated.track().gradient() else { return Vec::new() };
     let truth = disturbances(simulated, &simulated.runs[0].plan).gradient;
     let squares: f64 = profile.iter().map(|(_, permille)| permille * permille).sum();
@@ -94,7 +76,7 @@ fn gradient_errors(
     found
         .iter()
         .zip(deviations)
-        .map(|(node, deviation)| {
+        .filter_map(|(node, deviation)| {
             let (at_m, apart_m) = (node[0].as_f64()?, apart_m?);
             let lacking = truth.mean_around(at_m, apart_m) - map.mean_around(at_m, apart_m);
             let away = node[1].as_f64()? - lacking;
@@ -118,54 +100,41 @@ fn wind_of_the_days(simulated: &SimulatedDataset) -> f64 {
 }
 
 /// True over declared mass of a run, the effects aside: how it was loaded that day.
-fn load_of_the_day(simulated: &SimulatedDataset, run: usize) -> f64 {
-    let Some(run) = simulated.runs.iter().find(|it| it.plan.number == run) else { return 1.0 };
+fn load_of_the_day(simulated: &SimulatedDataset, file: &str) -> f64 {
+    let Some(run) = simulated.runs.iter().find(|it| it.plan.file() == file) else { return 1.0 };
     let loads = disturbances(simulated, &run.plan).loads;
     loads.iter().map(|(_, load)| load).sum::<f64>() / loads.len() as f64
 }
 
+/// Lists of masses: their name, the names of both ends, and what entries that can be compared have in common.
+const MASS_LISTS: [[&str; 4]; 2] =
+    [["sections", "from_m", "to_m", "direction"], ["windows", "t_start_s", "t_end_s", "run"]];
+
 /// Every true factor against the factor found where it holds longest, if that is in most of its place: next to
 /// a place without a factor of its own lies another one's.
-fn mass_factors(
-    effect: &Effect,
-    own: &Value,
-    simulated: &SimulatedDataset,
-) -> Vec<Option<ParameterGrade>> {
-    let graded = |list: &str,
-                  keys: [&str; 2],
-                  [from, to]: [f64; 2],
-                  truth: f64,
-                  is_like: &dyn Fn(&Value) -> bool| {
-        let overlap = |entry: &Value| {
-            let [low, high] = keys.map(|key| entry[key].as_f64().unwrap_or(0.0));
-            if is_like(entry) { (high.min(to) - low.max(from)).max(0.0) } else { 0.0 }
+fn mass_factors(truths: &Value, own: &Value, simulated: &SimulatedDataset) -> Vec<ParameterGrade> {
+    let of = |it: &Value, key: &str| it[key].as_f64().unwrap_or(0.0);
+    let graded = |[list, from, to, common]: [&str; 4], it: &Value| {
+        let is_like = |entry: &Value| {
+            let [one, other] = [&entry[common], &it[common]];
+            one.as_f64() == other.as_f64() && one.as_str() == other.as_str()
+        };
+        let overlap = |entry: &Value| match is_like(entry) {
+            true => (of(entry, to).min(of(it, to)) - of(entry, from).max(of(it, from))).max(0.0),
+            false => 0.0,
         };
         let found = own["parameters"][list].as_array()?.iter().enumerate();
         let (at, best) = found.max_by(|one, other| overlap(one.1).total_cmp(&overlap(other.1)))?;
-        (overlap(best) > 0.5 * (to - from)).then_some(())?;
+        (overlap(best) > 0.5 * (of(it, to) - of(it, from))).then_some(())?;
+        let load = it["run"].as_str().map_or(1.0, |file| load_of_the_day(simulated, file));
+        let truth = of(it, "mass_factor") * load;
         let (value, deviation) = (best["mass_factor"].as_f64()?, own["std"][list][at].as_f64()?);
         let error = (value - truth) / (truth - 1.0);
         Some(ParameterGrade { name: "mass_factor".into(), error, z: (value - truth) / deviation })
     };
-    match effect {
-        Effect::MassChangeSections(sections) => sections
-            .iter()
-            .map(|it| {
-                let is_like = |entry: &Value| entry["direction"].as_f64() == Some(it.direction);
-                let range_m = [it.from_m, it.to_m];
-                graded("sections", ["from_m", "to_m"], range_m, it.mass_factor, &is_like)
-            })
-            .collect(),
-        Effect::MassChangeWindows(windows) => windows
-            .iter()
-            .map(|(it, factor)| {
-                let file = run_file(it.run);
-                let is_like = |entry: &Value| entry["run"] == file.as_str();
-                let truth = factor * load_of_the_day(simulated, it.run);
-                let range_s = [it.start_s, it.end_s];
-                graded("windows", ["t_start_s", "t_end_s"], range_s, truth, &is_like)
-            })
-            .collect(),
-        _ => Vec::new(),
-    }
+    let of_list = |keys: [&'static str; 4]| {
+        let truths = truths[keys[0]].as_array().into_iter().flatten();
+        truths.filter_map(move |it| graded(keys, it))
+    };
+    MASS_LISTS.into_iter().flat_map(of_list).collect()
 }

@@ -1,7 +1,6 @@
 //! The place of an answer against the truth.
 
-use dynocar_tests::simulator::run_file::run_file;
-use dynocar_tests::simulator::{Effect, SimulatedDataset};
+use dynocar_tests::simulator::{Effect, SimulatedDataset, SimulatedRun};
 use serde_json::Value;
 
 fn pairs(value: &Value) -> Vec<[f64; 2]> {
@@ -9,35 +8,24 @@ fn pairs(value: &Value) -> Vec<[f64; 2]> {
     list.filter_map(|pair| Some([pair[0].as_f64()?, pair[1].as_f64()?])).collect()
 }
 
+/// The windows of a place on one axis for all runs, each far from the next.
+fn windows(place: &Value, simulated: &SimulatedDataset) -> Vec<[f64; 2]> {
+    let window = |it: &Value| {
+        let is_own = |run: &SimulatedRun| !run.plan.is_holdout && it["run"] == run.plan.file();
+        let from_s = 1e5 * simulated.runs.iter().position(is_own)? as f64;
+        Some([from_s + it["t_start_s"].as_f64()?, from_s + it["t_end_s"].as_f64()?])
+    };
+    place["windows"].as_array().into_iter().flatten().filter_map(window).collect()
+}
+
 /// Intersection over union of the true and the found place, where the effect has one.
 pub fn place_iou(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Option<f64> {
-    match effect {
-        Effect::LocalResistance { intervals_m, .. } | Effect::LowAdhesion { intervals_m, .. }
-            if !intervals_m.is_empty() =>
-        {
-            let truth: Vec<[f64; 2]> = intervals_m.iter().map(|&(from, to)| [from, to]).collect();
-            Some(iou(&truth, &pairs(&own["where"]["intervals_m"])))
-        }
-        Effect::DraggingBrake { windows, .. } => {
-            let (mut truth, mut found) = (Vec::new(), Vec::new());
-            for (number, run) in simulated.runs.iter().enumerate() {
-                if run.plan.is_holdout {
-                    continue;
-                }
-                // One axis for all runs, each far from the next.
-                let on_axis = |ends_s: [f64; 2]| ends_s.map(|it| 1e5 * number as f64 + it);
-                let of_run = windows.iter().filter(|window| window.run == number);
-                truth.extend(of_run.map(|it| on_axis([it.start_s, it.end_s])));
-                let listed = own["where"]["windows"].as_array().into_iter().flatten();
-                let of_run = listed.filter(|window| window["run"] == run.plan.file());
-                let ends_s =
-                    |it: &Value| Some([it["t_start_s"].as_f64()?, it["t_end_s"].as_f64()?]);
-                found.extend(of_run.filter_map(ends_s).map(on_axis));
-            }
-            Some(iou(&truth, &found))
-        }
-        _ => None,
+    let (truth, found) = (effect.place(0.0), &own["where"]);
+    if truth["windows"].is_array() {
+        return Some(iou(&windows(&truth, simulated), &windows(found, simulated)));
     }
+    let truth = truth["intervals_m"].as_array().map(|_| pairs(&truth["intervals_m"]))?;
+    Some(iou(&truth, &pairs(&found["intervals_m"])))
 }
 
 /// Intersection over union of two sets of disjoint intervals.
@@ -60,32 +48,27 @@ pub fn ends_within(effect: &Effect, own: &Value) -> Vec<bool> {
         let [low, high] = [interval[0].as_f64(), interval[1].as_f64()];
         low.zip(high).is_some_and(|(low, high)| low <= truth && truth <= high)
     };
-    match effect {
-        Effect::LocalResistance { intervals_m, .. } | Effect::LowAdhesion { intervals_m, .. } => {
-            let found = pairs(&own["where"]["intervals_m"]);
-            let intervals = known["intervals_m"].as_array().into_iter().flatten();
-            let mut held = Vec::new();
-            for ([from, to], interval) in found.into_iter().zip(intervals) {
-                let overlap = |true_m: &&(f64, f64)| true_m.1.min(to) - true_m.0.max(from);
-                let nearest = intervals_m
-                    .iter()
-                    .max_by(|one, other| overlap(one).total_cmp(&overlap(other)))
-                    .filter(|nearest| overlap(nearest) > 0.0);
-                if let Some(&(low, high)) = nearest {
-                    held.extend([holds(&interval[0], low), holds(&interval[1], high)]);
-                }
-            }
-            held
+    let truth = effect.place(0.0);
+    let intervals_m = pairs(&truth["intervals_m"]);
+    let listed = |list: &str| known[list].as_array().into_iter().flatten();
+    let mut held = Vec::new();
+    for ([from, to], interval) in
+        pairs(&own["where"]["intervals_m"]).into_iter().zip(listed("intervals_m"))
+    {
+        let overlap = |[low, high]: &[f64; 2]| high.min(to) - low.max(from);
+        let nearest = intervals_m
+            .iter()
+            .max_by(|one, other| overlap(one).total_cmp(&overlap(other)))
+            .filter(|nearest| overlap(nearest) > 0.0);
+        if let Some(&[low, high]) = nearest {
+            held.extend([holds(&interval[0], low), holds(&interval[1], high)]);
         }
-        Effect::DraggingBrake { windows, .. } => {
-            let intervals = known["windows"].as_array().into_iter().flatten();
-            intervals
-                .filter_map(|found| {
-                    let own = windows.iter().find(|window| found["run"] == run_file(window.run))?;
-                    Some(holds(&found["t_start_s"], own.start_s))
-                })
-                .collect()
-        }
-        _ => Vec::new(),
     }
+    for found in listed("windows") {
+        let mut truths = truth["windows"].as_array().into_iter().flatten();
+        let start_s =
+            truths.find(|it| it["run"] == found["run"]).and_then(|it| it["t_start_s"].as_f64());
+        held.extend(start_s.map(|start_s| holds(&found["t_start_s"], start_s)));
+    }
+    held
 }

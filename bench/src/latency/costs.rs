@@ -1,8 +1,5 @@
-//! What one poll and one publish cost the controller, on its own core, and what a daemon takes while no sample comes.
+//! What one poll and one publish cost the controller, on its own core.
 
-use std::time::{Duration, Instant};
-
-use dynocar::config::IdleStrategy;
 use dynocar_client::channel::{Receiver, Sender, Transport};
 use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
@@ -10,10 +7,7 @@ use dynocar_tests::process::Site;
 use serde::Serialize;
 
 use crate::output::Failure;
-use crate::rig::cores::Cores;
-use crate::rig::pipelines;
-use crate::rig::site::{DaemonPlan, ThreadPlan, require, site, stop};
-use crate::rig::usage;
+use crate::rig::site::site;
 use crate::statistics::median;
 
 const TRAIN: TrainId = TrainId(1);
@@ -128,48 +122,4 @@ fn of_batch(mut call: impl FnMut()) -> f64 {
         call();
     }
     (monotonic_now_ns() - before_ns) as f64 / CALLS as f64
-}
-
-/// How long the daemon may take to start and fall asleep.
-const SETTLE: Duration = Duration::from_millis(500);
-
-/// Processor time without samples.
-#[derive(Clone, Debug, Serialize)]
-pub struct AtRest {
-    /// The idle strategy.
-    pub idle: String,
-    /// Processor time over wall time, in %; 100 is one core.
-    pub cpu_percent: f64,
-    /// Resident memory in bytes.
-    pub rss_bytes: u64,
-}
-
-/// Lets a daemon with every fast pipeline rest for so many seconds.
-///
-/// # Errors
-///
-/// When it ends before its time.
-pub fn at_rest(idle: IdleStrategy, cores: Cores, seconds: f64) -> Result<AtRest, Failure> {
-    let site = site();
-    let thread = ThreadPlan {
-        name: "fast",
-        core: Some(cores.server),
-        idle,
-        priority: cores.priority,
-        pipelines: pipelines::fast(),
-    };
-    let plan = DaemonPlan { trains: 1, threads: vec![thread], ..DaemonPlan::default() };
-    let mut daemon = plan.start(&site)?;
-    std::thread::sleep(SETTLE);
-    let usage = || usage::of_process(daemon.id()).unwrap_or_default();
-    let (before, start) = (usage(), Instant::now());
-    std::thread::sleep(Duration::from_secs_f64(seconds));
-    let (after, elapsed_s) = (usage(), start.elapsed().as_secs_f64());
-    require(&mut daemon)?;
-    stop(daemon)?;
-    Ok(AtRest {
-        idle: idle.to_string(),
-        cpu_percent: 100.0 * (after.cpu_s - before.cpu_s) / elapsed_s,
-        rss_bytes: after.rss_bytes,
-    })
 }

@@ -6,25 +6,13 @@
 //! the median of the rounds is reported.
 //!
 //! - [`case`]: what is measured together with what, and beside which readers of the same channels
-//! - [`schedule`]: the open-loop measurement of one slice
-//! - [`link`]: the controller's end of each transport
-//! - [`server`]: the answering processes
-//! - [`sockets`], [`plain`]: what they need
-//! - `zeromq`: both ends of ZeroMQ, with the feature of that name
-//! - [`costs`]: one poll, one publish, a daemon at rest
+//! - [`costs`]: one poll and one publish
 //! - [`report`], [`plot`]: the result
 
 pub mod case;
 pub mod costs;
-pub mod link;
-pub mod plain;
 pub mod plot;
 pub mod report;
-pub mod schedule;
-pub mod server;
-pub mod sockets;
-#[cfg(feature = "zeromq")]
-pub mod zeromq;
 
 use std::path::PathBuf;
 
@@ -32,9 +20,11 @@ use clap::Args;
 use dynocar::config::IdleStrategy;
 use dynocar::output::report_line;
 
+use self::case::Case;
 use self::report::Measured;
-use self::schedule::Schedule;
 use crate::chance::Chance;
+use crate::open_loop::traffic::TrafficPlan;
+use crate::open_loop::trial::{Extent, run};
 use crate::output::{Failure, OutputArguments, expect};
 use crate::rig::cores::{CoreArguments, Cores, bind, in_thread, prioritise};
 
@@ -96,10 +86,13 @@ impl LatencyArguments {
     fn measure(&self) -> Result<Measured, Failure> {
         let choose = |quick: f64, usual: f64| if self.quick { quick } else { usual };
         let cores = Cores::choose(&self.place);
-        let schedule = Schedule {
-            rate_hz: self.rate,
+        let extent = Extent {
+            trains: 1,
+            traffic: TrafficPlan { rate_hz: self.rate, jitter: 0.0, burst: 1, bad_share: 0.0 },
             warm_up_s: choose(0.6, 0.8),
-            measure_s: self.seconds.unwrap_or(choose(0.2, 2.0)),
+            seconds: self.seconds.unwrap_or(choose(0.2, 2.0)),
+            cores,
+            seed: self.place.seed,
         };
         let mut cases = case::cases(self.quick);
         if self.readers {
@@ -121,13 +114,18 @@ impl LatencyArguments {
         for round in 1..=rounds {
             report_line(&format!("round {round} of {rounds}"));
             for index in random.order(cases.len()) {
-                let outcome = in_thread(|| case::measure(&cases[index].0, cores, &schedule))?;
-                cases[index].1.push(outcome);
+                let trial = in_thread(|| run(&cases[index].0.setting, &extent))?;
+                cases[index].1.push(trial);
             }
         }
-        let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event]
-            .map(|idle| costs::at_rest(idle, cores, choose(0.5, 5.0)));
-        let at_rest = at_rest.into_iter().collect::<Result<_, _>>()?;
-        Ok(Measured { cases, costs, at_rest, schedule, cores })
+        let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event].map(|idle| {
+            // Many seconds pass before the first sample of such a rate.
+            let traffic = TrafficPlan { rate_hz: 1e-3, ..extent.traffic };
+            let resting = Extent { traffic, seconds: choose(0.5, 5.0), ..extent };
+            let trial = in_thread(|| run(&Case::all_fast(idle).setting, &resting))?;
+            Ok((idle.to_string(), trial.cpu_percent))
+        });
+        let at_rest = at_rest.into_iter().collect::<Result<_, Failure>>()?;
+        Ok(Measured { cases, costs, at_rest, extent })
     }
 }

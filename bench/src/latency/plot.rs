@@ -6,9 +6,10 @@ use dynocar::output::write_file;
 use hdrhistogram::Histogram;
 use plotters::prelude::*;
 
-use super::case::{Answerer, Case};
+use super::case::Case;
 use super::report::{Measured, pooled};
-use super::sockets::COMPARED;
+use crate::open_loop::sockets::COMPARED;
+use crate::open_loop::trial::Answerer;
 use crate::output::{Failure, during};
 
 const SIZE: (u32, u32) = (1_000, 640);
@@ -31,7 +32,7 @@ pub fn draw(measured: &Measured, file: &Path) -> Result<(), Failure> {
 fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Failure> {
     let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
-    let caption = format!("Sample → snapshot polled at {} Hz", measured.schedule.rate_hz);
+    let caption = format!("Sample → snapshot polled at {} Hz", measured.extent.traffic.rate_hz);
     let mut chart = ChartBuilder::on(&area)
         .caption(caption, ("sans-serif", 22))
         .margin(12)
@@ -49,10 +50,10 @@ fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Failure> {
     let shown = measured.cases.iter().filter(|(case, _)| is_shown(case));
     for (index, (case, outcomes)) in shown.enumerate() {
         let color = Palette99::pick(index).to_rgba();
-        let label = format!("{} ({})", case.name, case.idle);
+        let label = case.label();
         chart
             .draw_series(LineSeries::new(
-                points(&pooled(outcomes, |slice| &slice.from_appointed)),
+                points(&pooled(outcomes, |outcome| &outcome.from_appointed)),
                 color.stroke_width(2),
             ))?
             .label(label)
@@ -71,8 +72,8 @@ fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Failure> {
 
 /// The other pipelines alone lie so near to each other that lines would hide lines.
 fn is_shown(case: &Case) -> bool {
-    match &case.answerer {
-        Answerer::Daemon { polled, .. } => *polled == COMPARED,
+    match &case.setting.answerer {
+        Answerer::Daemon(_, polled) => *polled == Some(COMPARED),
         _ => true,
     }
 }

@@ -3,25 +3,24 @@
 //! One process stands for all controllers: it publishes every train's samples at their appointed
 //! times and polls the trains in turn, on a core of its own.
 //!
-//! - [`traffic`]: when a train's samples leave, and which are bad
-//! - [`trial`]: so many trains at one rate against one daemon
+//! - [`plan`]: so many trains with some pipelines
 //! - [`search`]: the highest rate without loss; growth with trains and pipelines
 //! - [`report`]: the result
 
+pub mod plan;
 pub mod report;
 pub mod search;
-pub mod traffic;
-pub mod trial;
 
 use clap::Args;
 use dynocar::config::IdleStrategy;
 use serde_json::json;
 
+use self::plan::Load;
+use crate::open_loop::traffic::TrafficPlan;
+use crate::open_loop::trial::Extent;
 use crate::output::{Failure, OutputArguments, expect, named, table};
-use crate::rig::cores::{CoreArguments, Cores, HostGaps, in_thread};
+use crate::rig::cores::{CoreArguments, Cores};
 use crate::rig::pipelines;
-use traffic::TrafficPlan;
-use trial::TrialPlan;
 
 /// Synthetic trains against one daemon: what is used, refused and lost, and how late.
 #[derive(Debug, Args)]
@@ -44,9 +43,6 @@ pub struct LoadArguments {
     /// What the daemon's threads do while no sample comes: busy, adaptive (look for a while, then sleep) or event
     #[arg(long, value_name = "STRATEGY", default_value = "adaptive")]
     idle: String,
-    /// Greatest delay of a sample, as a share of the period
-    #[arg(long, default_value_t = 0.1, value_name = "SHARE")]
-    jitter: f64,
     /// Samples that leave at once
     #[arg(long, default_value_t = 1, value_name = "N")]
     burst: u64,
@@ -72,8 +68,8 @@ const IDLE: [(&str, IdleStrategy); 3] = [
     ("event", IdleStrategy::Event),
 ];
 
-/// For so long at most the host is watched before and after a load, in s.
-const HOST_SECONDS: f64 = 3.0;
+/// Greatest delay of a sample, as a share of the period.
+const JITTER: f64 = 0.1;
 /// Each trial of a search or of the growth lasts at most so long, in s.
 const TRIAL_SECONDS: f64 = 3.0;
 
@@ -85,20 +81,14 @@ impl LoadArguments {
     /// When the command line is wrong, or a process or channel fails; never because of a time or a
     /// loss.
     pub fn run(&self) -> Result<(), Failure> {
-        let plan = self.plan()?;
-        let mut host = HostGaps::default();
-        let watched_s = HOST_SECONDS.min(plan.seconds);
-        host.watch(plan.cores, watched_s);
-        let trial = in_thread(|| trial::run(&plan))?;
-        host.watch(plan.cores, watched_s);
-        let (mut all, mut text) = report::of(&plan, &trial, &host);
-        let short = TrialPlan { seconds: plan.seconds.min(TRIAL_SECONDS), ..plan };
+        let load = self.load()?;
+        let (mut all, mut text) = report::of(&load, &load.run()?);
+        let seconds = load.extent.seconds.min(TRIAL_SECONDS);
+        let short = Load { extent: Extent { seconds, ..load.extent }, ..load };
         if self.search {
             let found = search::highest_rate(&short)?;
-            let limit =
-                if found.limited_by_publishers { "the publishers'" } else { "the daemon's" };
             text += &format!(
-                "highest rate without loss: {:.0} Hz a train, {:.0} samples/s; the limit is {limit}\n",
+                "highest rate without loss: {:.0} Hz a train, {:.0} samples/s\n",
                 found.rate_hz, found.samples_per_s
             );
             all["search"] = json!(found);
@@ -111,32 +101,33 @@ impl LoadArguments {
         self.output.give(&all, || text)
     }
 
-    fn plan(&self) -> Result<TrialPlan, Failure> {
-        let LoadArguments { trains, rate, burst, .. } = *self;
+    fn load(&self) -> Result<Load, Failure> {
+        let LoadArguments { trains, rate, burst, bad, .. } = *self;
         let seconds = self.duration.unwrap_or(if self.quick { 1.0 } else { 10.0 });
         expect((1..=256).contains(&trains), || format!("--trains {trains}: expected 1 to 256"))?;
         expect((0.1..=1e6).contains(&rate), || {
             format!("--rate {rate}: expected 0.1 to 1000000 Hz")
         })?;
-        for (name, share) in [("--jitter", self.jitter), ("--bad", self.bad)] {
-            expect((0.0..=1.0).contains(&share), || {
-                format!("{name} {share}: expected a share from 0 to 1")
-            })?;
-        }
+        expect((0.0..=1.0).contains(&bad), || {
+            format!("--bad {bad}: expected a share from 0 to 1")
+        })?;
         expect((1..=1_000).contains(&burst), || {
             format!("--burst {burst}: expected 1 to 1000 samples")
         })?;
         expect(seconds > 0.0 && seconds <= 86_400.0, || {
             format!("--duration {seconds}: expected up to 86400 s")
         })?;
-        Ok(TrialPlan {
-            trains,
-            traffic: TrafficPlan { rate_hz: rate, jitter: self.jitter, burst, bad_share: self.bad },
-            seconds,
+        Ok(Load {
             pipelines: pipelines::by_names(&self.pipelines)?,
             idle: named("--idle", &self.idle, &IDLE)?,
-            cores: Cores::choose(&self.place),
-            seed: self.place.seed,
+            extent: Extent {
+                trains,
+                traffic: TrafficPlan { rate_hz: rate, jitter: JITTER, burst, bad_share: bad },
+                warm_up_s: 0.6,
+                seconds,
+                cores: Cores::choose(&self.place),
+                seed: self.place.seed,
+            },
         })
     }
 }

@@ -84,14 +84,12 @@ fn record(scenario: Scenario, all: &[Watched]) -> Record {
     Record::default()
         .with("kind", scenario.name())
         .with("right", format!("{}/{}", count(&is_right), watched.len()))
-        .with("alone", count(&|it| it.led_after_s.is_some()))
         .with("wrong", count(&|it| !is_right(it) && !is_silent(it)))
         .with("missed", count(&|it| !is_right(it) && is_silent(it)))
         .number("after s", median(after_s), 0)
         .number("90 % s", nine_of_ten, 0)
         .number("hours", hours(|it| it.driven_s), 1)
         .number("wrong h", hours(|it| it.wrong_s), 2)
-        .number("stale h", hours(|it| it.stale_s), 2)
         .with("others that led", counts(&others))
 }
 

@@ -27,16 +27,12 @@ pub struct Watched {
     /// Time in s from the first moment at which the effect acted until it was named, alone or
     /// among alternatives.
     pub named_after_s: Option<f64>,
-    /// The same, until it led.
-    pub led_after_s: Option<f64>,
     /// True when the effect ever acted.
     pub has_acted: bool,
     /// Suspicions in the order in which they were raised: the leading kind, and the time driven.
     pub raised: Vec<(EffectKind, f64)>,
     /// Time in s during which a suspicion stood that did not hold the effect.
     pub wrong_s: f64,
-    /// Time in s during which the effect was named in runs in which it did not act.
-    pub stale_s: f64,
     /// The leading kind at the end.
     pub last: Option<EffectKind>,
 }
@@ -45,7 +41,6 @@ pub struct Watched {
 struct Said {
     leading: Option<EffectKind>,
     holds_truth: bool,
-    is_ambiguous: bool,
 }
 
 impl Said {
@@ -54,7 +49,7 @@ impl Said {
         let leading = Some(leading).filter(|&kind| kind != EffectKind::None);
         let others = snapshot.suspected_alternatives;
         let is_named = |kind: &EffectKind| leading == Some(*kind) || others & kind.bit() != 0;
-        Said { leading, holds_truth: truth.iter().any(is_named), is_ambiguous: others != 0 }
+        Said { leading, holds_truth: truth.iter().any(is_named) }
     }
 }
 
@@ -73,7 +68,6 @@ pub fn watch(data: &SimulatedDataset) -> Watched {
     let mut acted_at_s = None;
     let mut sequence = 0;
     for run in &data.runs {
-        let acts_in_run = run.states.iter().any(|state| acts(data, run, state));
         let mut last_ns = None;
         for sample in &run.samples {
             sequence += 1;
@@ -84,7 +78,7 @@ pub fn watch(data: &SimulatedDataset) -> Watched {
             if acted_at_s.is_none() && acts_at(data, run, sample) {
                 acted_at_s = Some(watched.driven_s);
             }
-            watched.note(&said, step_s, acted_at_s, acts_in_run);
+            watched.note(&said, step_s, acted_at_s);
         }
     }
     watched.has_acted = acted_at_s.is_some();
@@ -118,18 +112,14 @@ impl Watched {
         self.last = said.leading;
     }
 
-    fn note(&mut self, said: &Said, step_s: f64, acted_at_s: Option<f64>, acts_in_run: bool) {
+    fn note(&mut self, said: &Said, step_s: f64, acted_at_s: Option<f64>) {
         if said.leading.is_none() {
             return;
         }
-        let if_true = |is_true: bool| if is_true { step_s } else { 0.0 };
-        self.wrong_s += if_true(!said.holds_truth);
-        self.stale_s += if_true(said.holds_truth && !acts_in_run);
-        let Some(acted_at_s) = acted_at_s.filter(|_| said.holds_truth) else { return };
-        let after_s = self.driven_s - acted_at_s;
-        self.named_after_s.get_or_insert(after_s);
-        if !said.is_ambiguous {
-            self.led_after_s.get_or_insert(after_s);
+        if !said.holds_truth {
+            self.wrong_s += step_s;
+        } else if let Some(acted_at_s) = acted_at_s {
+            self.named_after_s.get_or_insert(self.driven_s - acted_at_s);
         }
     }
 }

@@ -11,14 +11,15 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::xie::EmSettings;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::{HALF_95, Parameter, ParameterSnapshot};
+use dynocar_shared::{Parameter, ParameterSnapshot};
 
 use super::braking::{
     Braking, Moment, PRESSURE_PA, SPEED_NOISE_MPS, STEP_S, ShareStep, WINDOW, disc_friction, train,
 };
 use super::row::{Row, Seeds};
+use super::score;
 use crate::parallel;
-use crate::statistics::{mean, share};
+use crate::statistics::{mean, root_mean_square};
 
 /// Lag in s of our smoother.
 pub const LAG_S: f64 = 5.0;
@@ -99,29 +100,31 @@ pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<
 }
 
 /// Errors of one estimator over all runs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Score {
+    errors: score::Score,
     /// Mean of |error| / truth in %.
     pub relative_percent: f64,
-    /// Root mean square error.
-    pub rmse: f64,
-    /// Share of 95 % intervals that hold the truth.
-    pub coverage: f64,
-    /// Mean of (error / claimed standard deviation)².
-    pub nees: f64,
-    /// Variance of a run's own mean of it over the runs.
-    pub nees_run_variance: f64,
-    /// Runs behind it.
-    pub runs: usize,
-    /// Errors in a run, on average.
-    pub errors_per_run: f64,
+    /// Mean of (error / claimed standard deviation)² of each run.
+    nees_of_runs: Vec<f64>,
 }
 
 impl Score {
-    /// Degrees of freedom of a chi-square that scatters as `nees` does: the errors of one run
+    /// Root mean square error.
+    pub fn rmse(&self) -> f64 {
+        root_mean_square(&self.errors.errors)
+    }
+
+    fn nees_run_variance(&self) -> f64 {
+        let centre = mean(&self.nees_of_runs);
+        mean(self.nees_of_runs.iter().map(|nees| (nees - centre).powi(2)))
+    }
+
+    /// Degrees of freedom of a chi-square that scatters as the mean NEES does: the errors of one run
     /// are not independent of each other.
     pub fn nees_freedom(&self) -> f64 {
-        2.0 * self.nees * self.nees * self.runs as f64 / self.nees_run_variance
+        let (nees, runs) = (self.errors.nees(), self.nees_of_runs.len() as f64);
+        2.0 * nees * nees * runs / self.nees_run_variance()
     }
 
     /// The same where all runs share one curve of the coefficient, given the score of runs that
@@ -131,38 +134,29 @@ impl Score {
     /// of them, however many runs are made of it. The runs' scatter shows the noise alone, that
     /// of drawn runs noise and curve, which falls with the length of a run.
     pub fn nees_freedom_of_one_curve(&self, drawn: &Score) -> f64 {
-        let both = drawn.nees_run_variance * drawn.errors_per_run / self.errors_per_run;
-        let curve = (both - self.nees_run_variance).max(0.0);
-        2.0 / (curve + self.nees_run_variance / self.runs as f64)
+        let runs = |it: &Score| it.nees_of_runs.len() as f64;
+        let length = |it: &Score| it.errors.errors.len() as f64 / runs(it).max(1.0);
+        let own = self.nees_run_variance();
+        let both = drawn.nees_run_variance() * length(drawn) / length(self);
+        2.0 / ((both - own).max(0.0) + own / runs(self))
     }
 
     /// A row with coverage and consistency, of so many degrees of freedom.
     pub fn row(&self, freedom: f64, row: Row) -> Row {
-        let (coverage, nees) = (Some(self.coverage), Some(self.nees));
-        Row { coverage, nees, nees_freedom: Some(freedom), ..row }
+        Row { nees_freedom: Some(freedom), ..self.errors.row(row) }
     }
 
     /// The errors of runs, pooled.
-    pub fn of(runs: &[Vec<Scored>]) -> Self {
-        let all = || runs.iter().flatten();
-        let errors = all().count() as f64;
-        let runs = runs.iter().filter(|run| !run.is_empty());
-        let nees_of_runs: Vec<f64> = runs.map(|run| mean(run.iter().map(nees))).collect();
-        let centre = mean(&nees_of_runs);
-        Score {
-            relative_percent: mean(all().map(|it| 100.0 * (it.error / it.truth).abs())),
-            rmse: mean(all().map(|it| it.error * it.error)).sqrt(),
-            coverage: share(all().map(|it| it.error.abs() <= HALF_95 * it.std)),
-            nees: mean(all().map(nees)),
-            nees_run_variance: mean(nees_of_runs.iter().map(|nees| (nees - centre).powi(2))),
-            runs: nees_of_runs.len(),
-            errors_per_run: errors / nees_of_runs.len().max(1) as f64,
+    pub fn of<'a>(runs: impl Iterator<Item = &'a Vec<Scored>>) -> Self {
+        let (mut errors, mut relative, mut nees_of_runs) =
+            (score::Score::default(), Vec::new(), Vec::new());
+        for run in runs.filter(|run| !run.is_empty()) {
+            nees_of_runs.push(mean(run.iter().map(|it| (it.error / it.std).powi(2))));
+            relative.extend(run.iter().map(|it| 100.0 * (it.error / it.truth).abs()));
+            run.iter().for_each(|it| errors.take(it.error, it.std));
         }
+        Score { errors, relative_percent: mean(&relative), nees_of_runs }
     }
-}
-
-fn nees(scored: &Scored) -> f64 {
-    (scored.error / scored.std).powi(2)
 }
 
 /// Scores an estimator over runs, once for each lag.
@@ -173,9 +167,7 @@ pub fn score<const LAGS: usize>(
     settings: impl Fn(u64) -> EstimatorSettings + Sync,
 ) -> [Score; LAGS] {
     let runs = over_seeds(seeds, |seed| run(&settings(seed), &braking.simulate(seed), lags_steps));
-    std::array::from_fn(|lag| {
-        Score::of(&runs.iter().map(|run| run[lag].clone()).collect::<Vec<_>>())
-    })
+    std::array::from_fn(|lag| Score::of(runs.iter().map(|run| &run[lag])))
 }
 
 /// Settings of the scenario: only positions are measured, and every estimate counts.
@@ -299,31 +291,31 @@ mod tests {
     fn a_score_of_exact_gaussian_errors_is_consistent() {
         // Errors of +- one standard deviation: NEES 1, all covered, 1 % of the truth.
         let scored = |sign: f64| Scored { truth: 2.0, error: 0.02 * sign, std: 0.02 };
-        let score = Score::of(&[vec![scored(1.0), scored(-1.0)], vec![scored(1.0)]]);
+        let runs = [vec![scored(1.0), scored(-1.0)], vec![scored(1.0)]];
+        let score = Score::of(runs.iter());
         assert!((score.relative_percent - 1.0).abs() < 1e-12);
-        assert!((score.rmse - 0.02).abs() < 1e-15);
-        assert!((score.nees - 1.0).abs() < 1e-12);
-        assert_eq!((score.coverage, score.nees_run_variance), (1.0, 0.0));
-        assert_eq!((score.runs, score.errors_per_run), (2, 1.5));
+        assert!((score.rmse() - 0.02).abs() < 1e-15);
+        assert!((score.errors.nees() - 1.0).abs() < 1e-12);
+        assert_eq!((score.nees_run_variance(), score.nees_of_runs.len()), (0.0, 2));
     }
 
     #[test]
     fn one_curve_of_many_runs_leaves_the_freedom_of_one_curve() {
-        let score = |nees_run_variance, runs, errors_per_run| Score {
-            relative_percent: 1.0,
-            rmse: 1.0,
-            coverage: 0.95,
-            nees: 1.0,
-            nees_run_variance,
-            runs,
-            errors_per_run,
+        // NEES of half the runs one deviation above 1, of the others below it.
+        let score = |variance: f64, runs: usize, length: usize| {
+            let error = |run: usize| {
+                (1.0 + if run.is_multiple_of(2) { 1.0 } else { -1.0 } * variance.sqrt()).sqrt()
+            };
+            let scored = |run| Scored { truth: 1.0, error: error(run), std: 1.0 };
+            let runs: Vec<Vec<Scored>> = (0..runs).map(|run| vec![scored(run); length]).collect();
+            Score::of(runs.iter())
         };
-        let drawn = score(0.6, 200, 100.0);
+        let drawn = score(0.6, 200, 100);
         // Twice as long a run halves the variance of 0.6; 0.1 of it is noise.
-        let freedom = score(0.1, 1000, 200.0).nees_freedom_of_one_curve(&drawn);
-        assert!((freedom - 2.0 / 0.2001).abs() < 1e-9, "{freedom}");
+        let freedom = score(0.1, 1000, 200).nees_freedom_of_one_curve(&drawn);
+        assert!((freedom - 2.0 / 0.2001).abs() < 1e-6, "{freedom}");
         // Without a part of the curve it is the noise over all runs.
-        let freedom = score(0.4, 1000, 200.0).nees_freedom_of_one_curve(&drawn);
-        assert!((freedom - 5000.0).abs() < 1e-9, "{freedom}");
+        let freedom = score(0.4, 1000, 200).nees_freedom_of_one_curve(&drawn);
+        assert!((freedom - 5000.0).abs() < 1e-6, "{freedom}");
     }
 }

@@ -63,16 +63,17 @@ impl Table {
         let mut rows = Vec::new();
         rows.extend(self.pair(
             "the present",
-            (Some(em_end), Some(ekf), present, at_present),
+            (Some(&em_end), Some(&ekf), &present, at_present),
             &bound(&self.braking, knowledge, 0),
             seeds,
         ));
-        rows.extend(self.pair(
-            "5 s back (EM: middle of the window)",
-            (Some(em_middle), None, back, at_back),
+        let back = self.pair(
+            "5 s back",
+            (Some(&em_middle), None, &back, at_back),
             &bound(&self.braking, knowledge, LAG_STEPS),
             seeds,
-        ));
+        );
+        rows.extend(back.into_iter().map(|row| row.noted("EM: middle of the window")));
         rows.push(Row {
             paper_method: Some(exact_middle.relative_percent),
             ..self.row("EM with exact E-step, middle of the window", "%", seeds)
@@ -92,7 +93,7 @@ impl Table {
         let bounds = bound(&self.braking, Knowledge::Law(scale_std), 0);
         self.pair(
             "the present, the law known but for its scale",
-            (None, None, score, score.nees_freedom()),
+            (None, None, &score, score.nees_freedom()),
             &bounds,
             seeds,
         )
@@ -102,7 +103,7 @@ impl Table {
     fn pair(
         &self,
         what: &str,
-        (em, ekf, ours, freedom): (Option<Score>, Option<Score>, Score, f64),
+        (em, ekf, ours, freedom): (Option<&Score>, Option<&Score>, &Score, f64),
         bounds: &[BoundAt],
         seeds: Seeds,
     ) -> Vec<Row> {
@@ -117,9 +118,9 @@ impl Table {
                 ..row(&format!("mean relative error, {what}"), "%")
             },
             Row {
-                paper_method: em.map(|score| score.rmse),
-                baseline: ekf.map(|score| score.rmse),
-                ours: Some(ours.rmse),
+                paper_method: em.map(|score| score.rmse()),
+                baseline: ekf.map(|score| score.rmse()),
+                ours: Some(ours.rmse()),
                 bound: Some(deviation(bounds)),
                 ..row(&format!("root mean square error, {what}"), "1")
             },
@@ -152,7 +153,6 @@ pub fn drawn_rows(
         let score = drawn_score(sought, lag_s, lag_steps, seeds);
         let quantity = format!("{name}, root mean square error, {what}");
         Row {
-            ours: Some(score.rmse),
             bound: Some(deviation(&bound(&braking, knowledge, lag_steps))),
             ..score.row(
                 score.nees_freedom(),

@@ -1,11 +1,12 @@
 //! Accuracy over seeded runs: the papers' figures, their methods and ours compared with the bound.
 
 mod bound;
-mod braking;
+pub mod braking;
 mod braking_score;
 mod braking_table;
 mod jin;
-mod literal_em;
+#[cfg(test)]
+mod literal_em_tests;
 mod liu;
 mod promise;
 mod row;
@@ -96,20 +97,10 @@ impl PapersArguments {
     }
 }
 
-/// Where a note begins in a quantity.
-const NOTES: [&str; 6] =
-    [" (paper's method:", "; paper's method:", " (baseline:", "; baseline:", " (EM:", "; EM:"];
-
-/// A row for people and for a file of CSV. What stands behind a quantity, from `paper's method:` or `baseline:` on,
-/// is a note.
+/// A row for people and for a file of CSV.
 fn record(row: &Row, verdict: &Verdict) -> Record {
-    let (quantity, mut notes) = match NOTES.iter().filter_map(|it| row.quantity.find(it)).min() {
-        Some(at) => {
-            let note = row.quantity[at..].trim_start_matches([' ', '(', ';']);
-            (&row.quantity[..at], vec![note.trim_end_matches(')').to_owned()])
-        }
-        None => (&row.quantity[..], Vec::new()),
-    };
+    let mut notes: Vec<String> =
+        Some(row.note.clone()).filter(|it| !it.is_empty()).into_iter().collect();
     if !verdict.broken.is_empty() {
         notes.push(format!("BROKEN: {}", verdict.broken.join(", ")));
     } else if let Some(reason) = verdict.may_be_wider.filter(|_| !verdict.promised.is_empty()) {
@@ -120,7 +111,7 @@ fn record(row: &Row, verdict: &Verdict) -> Record {
     Record::default()
         .with("paper", row.paper)
         .with("table", row.table)
-        .with("quantity", quantity)
+        .with("quantity", &row.quantity)
         .with("unit", row.unit)
         .shown("published", figure(row.published), row.published)
         .shown("papers_method", figure(row.paper_method), row.paper_method)
@@ -171,7 +162,7 @@ mod tests {
 
     #[test]
     fn figures_stand_apart_from_notes() {
-        let row = Row { quantity: "mass, 3 km (paper's method: by hand)".into(), ..row() };
+        let row = Row { quantity: "mass, 3 km".into(), ..row() }.noted("paper's method: by hand");
         let record = record(&row, &Verdict::of(&row));
         let of = |name: &str| record.cell(name).unwrap();
         assert_eq!((of("quantity"), of("note")), ("mass, 3 km", "paper's method: by hand"));

@@ -18,6 +18,8 @@ pub struct Row {
     pub table: &'static str,
     /// What is measured, in words.
     pub quantity: String,
+    /// What has to be known of it besides.
+    pub note: String,
     /// Unit of the figures.
     pub unit: &'static str,
     /// The paper's own figure.
@@ -51,6 +53,12 @@ impl Row {
     ) -> Self {
         let (quantity, seeds) = (quantity.into(), seeds.count);
         Row { paper, table, quantity, unit, seeds, ..Row::default() }
+    }
+
+    /// With a note.
+    #[must_use]
+    pub fn noted(self, note: impl Into<String>) -> Self {
+        Row { note: note.into(), ..self }
     }
 }
 

@@ -7,11 +7,15 @@ use nalgebra::{Matrix3, Vector3};
 use super::row::Row;
 use crate::statistics::{mean, root_mean_square, share};
 
-/// Errors, coverage and consistency of one method.
+/// Errors, coverage and consistency of our method beside the errors of others on the same runs.
 #[derive(Clone, Debug, Default)]
 pub struct Score {
     /// Estimate minus truth.
     pub errors: Vec<f64>,
+    /// The same of the paper's method.
+    pub paper: Vec<f64>,
+    /// The same of the paper's baseline.
+    pub baseline: Vec<f64>,
     covered: Vec<bool>,
     /// Normalised estimation error squared, per degree of freedom.
     nees: Vec<f64>,
@@ -53,14 +57,34 @@ impl Score {
         self.bounds.extend(speeds_mps.iter().map(|&speed_mps| w0_std(covariance, speed_mps)));
     }
 
-    /// A row with our figures: those of this score.
+    /// Mean normalised estimation error squared, per degree of freedom.
+    pub fn nees(&self) -> f64 {
+        mean(&self.nees)
+    }
+
+    /// A row of root mean square errors, with coverage and consistency of ours; the row's own figures stay where there is
+    /// none.
     pub fn row(&self, row: Row) -> Row {
+        let rms = |of: &[f64]| (!of.is_empty()).then(|| root_mean_square(of));
+        let is_judged = !self.covered.is_empty();
         Row {
-            ours: Some(root_mean_square(&self.errors)),
-            bound: (!self.bounds.is_empty()).then(|| root_mean_square(&self.bounds)),
-            coverage: Some(share(self.covered.iter().copied())),
-            nees: Some(mean(&self.nees)),
-            nees_freedom: Some(self.freedom),
+            paper_method: rms(&self.paper).or(row.paper_method),
+            baseline: rms(&self.baseline).or(row.baseline),
+            ours: rms(&self.errors),
+            bound: rms(&self.bounds).or(row.bound),
+            coverage: is_judged.then(|| share(self.covered.iter().copied())),
+            nees: is_judged.then(|| self.nees()),
+            nees_freedom: is_judged.then_some(self.freedom),
+            ..row
+        }
+    }
+
+    /// A row of mean errors with their sign; intervals say nothing of a bias.
+    pub fn bias(&self, row: Row) -> Row {
+        Row {
+            paper_method: Some(mean(&self.paper)),
+            baseline: Some(mean(&self.baseline)),
+            ours: Some(mean(&self.errors)),
             ..row
         }
     }

@@ -10,7 +10,6 @@ use dynocar_shared::{EffortPoint, RailAdhesion, RailCondition, Stop, Uncertain};
 use super::braking::{PRESSURE_PA, STEP_S, XIE_TABLE_2, XIE_TABLE_3, train};
 use super::braking_score::{MIDDLE_STEPS, em, over_seeds, score};
 use super::braking_table::{Table, drawn_rows};
-use super::literal_em::finite_changes;
 use super::row::{Row, Seeds};
 use crate::statistics::{KMH, mean};
 
@@ -61,11 +60,6 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
         });
         Row { paper_method: Some(score.relative_percent), ..table.row(what, "%", seeds) }
     };
-    let widths = over_seeds(seeds, |seed| {
-        let moments = table.braking.simulate(seed);
-        finite_changes(&moments, table.initial(seed), seed).map(|(low, high)| 0.5 * (high - low))
-    });
-    let widths: Vec<f64> = widths.into_iter().flatten().collect();
     let frozen = over_seeds(seeds, |seed| {
         // With the printed density the gradient is zero: the initial value is the estimate.
         let moments = table.braking.simulate(seed);
@@ -75,14 +69,6 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
     vec![
         capped(Some(0.05), "mean relative error, printed cap min(F, B), from 0.05"),
         capped(Some(0.12), "mean relative error, printed cap min(F, B), from 0.12"),
-        Row {
-            paper_method: Some(mean(&widths)),
-            ..table.row(
-                "change that leaves Q finite, printed uniform density",
-                "1",
-                Seeds::from_zero(widths.len()),
-            )
-        },
         Row {
             paper_method: Some(mean(&frozen)),
             ..table.row("mean relative error, printed uniform density", "%", seeds)

@@ -2,84 +2,46 @@
 
 use std::path::{Path, PathBuf};
 
-use super::cores::Cores;
-
-/// Processor time and memory of a process at one moment.
+/// What the kernel says so far.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ProcessUsage {
-    /// Processor time of all living threads, in s.
+pub struct Usage {
+    /// Processor time of all living threads of the process, in s.
     pub cpu_s: f64,
-    /// Resident memory in bytes.
+    /// Its resident memory in bytes.
     pub rss_bytes: u64,
+    /// For how long, in s, the calling thread and the named one were ready but had no processor.
+    pub waits_s: [f64; 2],
+    /// How often the named thread was made to wait for another.
+    pub preempted: u64,
 }
 
-/// A process's usage; `None` when it is gone.
-pub fn of_process(process_id: u32) -> Option<ProcessUsage> {
+/// The usage of a process, of which one thread is named; zeros where it, or such a thread, is not there.
+pub fn of(process_id: u32, thread: &str) -> Usage {
     let folder = format!("/proc/{process_id}");
-    let tasks = std::fs::read_dir(format!("{folder}/task")).ok()?;
-    let cpu_ns: u64 = tasks.flatten().filter_map(|task| schedule_figure(&task.path(), 0)).sum();
-    let pages = std::fs::read_to_string(format!("{folder}/statm")).ok()?;
-    let pages: u64 = pages.split(' ').nth(1)?.parse().ok()?;
-    Some(ProcessUsage {
-        cpu_s: cpu_ns as f64 * 1e-9,
-        rss_bytes: pages * rustix::param::page_size() as u64,
-    })
+    let tasks = std::fs::read_dir(format!("{folder}/task")).into_iter().flatten().flatten();
+    let tasks: Vec<PathBuf> = tasks.map(|task| task.path()).collect();
+    let text = |path: PathBuf| std::fs::read_to_string(path).unwrap_or_default();
+    let named = tasks.iter().find(|task| text(task.join("comm")).trim_end() == thread);
+    let pages = text(PathBuf::from(folder).join("statm"));
+    let status = named.map_or_else(String::new, |task| text(task.join("status")));
+    let preempted = status.lines().find_map(|it| it.strip_prefix("nonvoluntary_ctxt_switches:"));
+    let wait_s = |task: &Path| 1e-9 * schedule_ns(task, 1);
+    Usage {
+        cpu_s: tasks.iter().map(|task| 1e-9 * schedule_ns(task, 0)).sum(),
+        rss_bytes: number(pages.split(' ').nth(1)) * rustix::param::page_size() as u64,
+        waits_s: [wait_s(Path::new("/proc/thread-self")), named.map_or(0.0, |task| wait_s(task))],
+        preempted: number(preempted),
+    }
+}
+
+fn number(text: Option<&str>) -> u64 {
+    text.and_then(|it| it.trim().parse().ok()).unwrap_or(0)
 }
 
 /// A figure of `/proc/…/schedstat`: time on a processor, or ready and waiting for one, in ns.
-fn schedule_figure(task: &Path, index: usize) -> Option<u64> {
-    std::fs::read_to_string(task.join("schedstat")).ok()?.split(' ').nth(index)?.parse().ok()
-}
-
-/// For how long a task was ready but had no processor, in s; 0 when there is none.
-fn wait_s(task: Option<&Path>) -> f64 {
-    task.and_then(|task| schedule_figure(task, 1)).unwrap_or(0) as f64 * 1e-9
-}
-
-/// For how long the machine beneath kept a core from its kernel, in s, as far as it says so.
-fn stolen_s(core: usize) -> f64 {
-    let stat = std::fs::read_to_string("/proc/stat").unwrap_or_default();
-    let name = format!("cpu{core} ");
-    let line = stat.lines().find_map(|line| line.strip_prefix(&name));
-    let ticks: Option<u64> = line.and_then(|line| line.split(' ').nth(7)?.parse().ok());
-    ticks.unwrap_or(0) as f64 / rustix::param::clock_ticks_per_second() as f64
-}
-
-/// For how long so far, in s, the calling thread and a process's thread of this name were ready but had no
-/// processor, and the machine beneath took their cores away.
-pub fn waits_s(process_id: u32, name: &str, cores: Cores) -> [f64; 3] {
-    let thread = task_named(process_id, name);
-    [
-        wait_s(Some(Path::new("/proc/thread-self"))),
-        wait_s(thread.as_deref()),
-        stolen_s(cores.controller) + stolen_s(cores.server),
-    ]
-}
-
-/// Page faults of a process's thread of this name since it began, how often it waited of its own accord, and how
-/// often it was made to wait for another; `None` when there is none.
-pub fn of_thread(process_id: u32, name: &str) -> Option<[u64; 3]> {
-    let task = task_named(process_id, name)?;
-    let stat = std::fs::read_to_string(task.join("stat")).ok()?;
-    let status = std::fs::read_to_string(task.join("status")).ok()?;
-    let line = |key: &str| {
-        status.lines().find_map(|line| line.strip_prefix(key)?.trim().parse::<u64>().ok())
-    };
-    let faults = stat_field(&stat, 10)? + stat_field(&stat, 12)?;
-    Some([faults, line("voluntary_ctxt_switches:")?, line("nonvoluntary_ctxt_switches:")?])
-}
-
-fn task_named(process_id: u32, name: &str) -> Option<PathBuf> {
-    let tasks = std::fs::read_dir(format!("/proc/{process_id}/task")).ok()?;
-    tasks.flatten().map(|task| task.path()).find(|task| {
-        std::fs::read_to_string(task.join("comm")).is_ok_and(|own| own.trim_end() == name)
-    })
-}
-
-/// A field of `/proc/…/stat` by its number in proc(5); the name in field 2 may hold spaces.
-fn stat_field(stat: &str, number: usize) -> Option<u64> {
-    let after_name = &stat[stat.rfind(')')? + 2..];
-    after_name.split(' ').nth(number - 3)?.parse().ok()
+fn schedule_ns(task: &Path, index: usize) -> f64 {
+    let text = std::fs::read_to_string(task.join("schedstat")).unwrap_or_default();
+    number(text.split(' ').nth(index)) as f64
 }
 
 #[cfg(test)]
@@ -89,37 +51,32 @@ mod tests {
     #[test]
     fn this_process_has_memory_and_its_threads_are_found_by_name() {
         let id = std::process::id();
-        let usage = of_process(id).unwrap();
+        let usage = of(id, "nobody");
         assert!(usage.rss_bytes > 100_000 && usage.cpu_s > 0.0);
-        let usage = std::thread::Builder::new()
-            .name("a name".into())
-            .spawn(move || {
-                // Beyond 32 MiB glibc never takes memory that was given back before.
-                std::hint::black_box(vec![1_u8; 40 << 20]);
-                of_thread(id, "a name")
+        assert_eq!((usage.waits_s[1], usage.preempted), (0.0, 0));
+        let switches = std::thread::Builder::new().name("a name".into()).spawn(move || {
+            // Two threads that never rest on two cores beside others are made to wait.
+            let start = std::time::Instant::now();
+            while of(id, "a name").preempted == 0 && start.elapsed().as_secs() < 20 {}
+            of(id, "a name").preempted
+        });
+        let more = (0..4).map(|_| {
+            std::thread::spawn(|| {
+                let start = std::time::Instant::now();
+                while start.elapsed().as_millis() < 300 {
+                    std::hint::spin_loop();
+                }
             })
-            .unwrap()
-            .join()
-            .unwrap();
-        assert!(usage.is_some_and(|usage| usage[0] > 0));
-        assert_eq!(of_thread(id, "nobody"), None);
+        });
+        more.collect::<Vec<_>>().into_iter().for_each(|it| it.join().unwrap());
+        assert!(switches.unwrap().join().unwrap() > 0);
     }
 
     #[test]
-    fn waits_and_stolen_time_are_read_and_never_fall() {
-        let cores = Cores { controller: 0, server: usize::MAX, priority: None };
-        let before = waits_s(std::process::id(), "nobody", cores);
+    fn waits_never_fall() {
+        let before = of(std::process::id(), "nobody");
         std::thread::yield_now();
-        let after = waits_s(std::process::id(), "nobody", cores);
-        assert!(after[0] >= before[0] && after[2] >= before[2]);
+        assert!(of(std::process::id(), "nobody").waits_s[0] >= before.waits_s[0]);
         assert!(Path::new("/proc/thread-self/schedstat").exists());
-        assert_eq!((after[1], stolen_s(usize::MAX)), (0.0, 0.0));
-    }
-
-    #[test]
-    fn a_name_with_spaces_and_brackets_does_not_shift_the_fields() {
-        let stat = "7 (a) b) S 1 2 3 4 5 6 77 8 99 10 11 12";
-        assert_eq!(stat_field(stat, 10), Some(77));
-        assert_eq!(stat_field(stat, 12), Some(99));
     }
 }

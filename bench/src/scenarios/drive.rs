@@ -51,15 +51,11 @@ pub struct Drive {
     habits: Habits,
     phase: Phase,
     next_stop: usize,
-    direction: f64,
-    place_m: f64,
-    speed_mps: f64,
-    mass_kg: f64,
+    now: Moment,
     weighed_kg: f64,
     target_mps: f64,
-    /// Acceleration in m/s² that the force gives, as commanded and as it acts.
+    /// Acceleration in m/s² that the force gives, as commanded.
     commanded_mps2: f64,
-    acting_mps2: f64,
     /// As reported, and what is reported and acts later.
     reported_mps2: f64,
     on_its_way: VecDeque<f64>,
@@ -67,38 +63,39 @@ pub struct Drive {
     acts_at: u32,
     /// Exerted brake force over what the brake is taken to exert, on this leg.
     brake_scale: f64,
-    /// Gusts in m/s at the knots before and behind, how many knots there were, and the share on the leg.
+    /// Gusts in m/s at the knots before and behind.
     gusts_mps: [f64; 2],
-    gust: (usize, f64),
-    cycle: u64,
 }
 
 impl Drive {
     /// Begins at the first stop.
     pub fn new(mut world: World) -> Self {
-        let habits = world.scenario.traffic.habits();
         let acts_at = world.random.within(0..STEPS);
-        let place_m = world.stops_m[0];
         let mass_kg = world.truth.mass_kg;
         let mut drive = Drive {
-            habits,
+            habits: world.scenario.traffic.habits(),
             phase: Phase::Standing { left_s: 10.0 },
             next_stop: 1,
-            direction: 1.0,
-            place_m,
-            speed_mps: 0.0,
-            mass_kg,
+            now: Moment {
+                sample: TrainSample::empty(TrainId(1)),
+                mass_kg,
+                w0_n_per_kn: 0.0,
+                speed_mps: 0.0,
+                is_standing: true,
+                push_mps2: 0.0,
+                place_m: world.stops_m[0],
+                direction: 1.0,
+                headwind_mps: 0.0,
+                gust: (0, 0.0),
+            },
             weighed_kg: mass_kg,
             target_mps: 0.0,
             commanded_mps2: 0.0,
-            acting_mps2: 0.0,
             reported_mps2: 0.0,
             on_its_way: VecDeque::new(),
             acts_at,
             brake_scale: 1.0,
             gusts_mps: [0.0; 2],
-            gust: (0, 0.0),
-            cycle: 0,
             world,
         };
         drive.gusts_mps = [drive.next_gust_mps(), drive.next_gust_mps()];
@@ -112,8 +109,8 @@ impl Drive {
     }
 
     fn headwind_mps(&self) -> f64 {
-        let ([from, to], (_, share)) = (self.gusts_mps, self.gust);
-        from + share * (to - from) - self.direction * self.world.wind_mps
+        let ([from, to], (_, share)) = (self.gusts_mps, self.now.gust);
+        from + share * (to - from) - self.now.direction * self.world.wind_mps
     }
 
     fn next_gust_mps(&mut self) -> f64 {
@@ -122,9 +119,9 @@ impl Drive {
 
     /// The gusts of a cycle later.
     fn blow(&mut self, cycle_s: f64) {
-        self.gust.1 += cycle_s / GUST_S;
-        if self.gust.1 >= 1.0 {
-            self.gust = (self.gust.0 + 1, self.gust.1 - 1.0);
+        self.now.gust.1 += cycle_s / GUST_S;
+        if self.now.gust.1 >= 1.0 {
+            self.now.gust = (self.now.gust.0 + 1, self.now.gust.1 - 1.0);
             self.gusts_mps = [self.gusts_mps[1], self.next_gust_mps()];
         }
     }
@@ -132,17 +129,12 @@ impl Drive {
     fn weigh(&mut self) {
         let World { scenario, random, .. } = &mut self.world;
         self.weighed_kg = match scenario.load {
-            LoadSource::Exact | LoadSource::Unknown => self.mass_kg,
+            LoadSource::Exact | LoadSource::Unknown => self.now.mass_kg,
+            // One weighing, wrong the same way for the whole drive.
             LoadSource::Weighed(permille) => {
-                let sign = random.sign();
-                // One weighing, wrong the same way for the whole drive.
-                if self.cycle == 0 {
-                    self.mass_kg * (1.0 + sign * 1e-3 * f64::from(permille))
-                } else {
-                    self.weighed_kg
-                }
+                self.now.mass_kg * (1.0 + random.sign() * 1e-3 * f64::from(permille))
             }
-            LoadSource::Changing => self.mass_kg * (1.0 + WEIGHING_STD * random.normal()),
+            LoadSource::Changing => self.now.mass_kg * (1.0 + WEIGHING_STD * random.normal()),
         };
     }
 
@@ -165,11 +157,11 @@ impl Drive {
             while self.on_its_way.len() > late + 1 {
                 self.on_its_way.pop_front();
             }
-            let before_mps2 = std::mem::replace(&mut self.acting_mps2, self.on_its_way[0]);
-            self.step(step_s, 0.5 * (before_mps2 + self.acting_mps2));
+            let before_mps2 = std::mem::replace(&mut self.now.push_mps2, self.on_its_way[0]);
+            self.step(step_s, 0.5 * (before_mps2 + self.now.push_mps2));
         }
-        self.cycle += 1;
-        self.moment()
+        self.measure();
+        self.now
     }
 
     fn step(&mut self, step_s: f64, push_mps2: f64) {
@@ -177,7 +169,7 @@ impl Drive {
             return;
         }
         let truth = &self.world.truth;
-        let gradient = self.direction * self.world.gradient_permille(self.place_m)[1];
+        let gradient = self.now.direction * self.world.gradient_permille(self.now.place_m)[1];
         let gain = 9.806_65e-3 / (1.0 + truth.rotating_mass_factor);
         let Davis { a, b, c } = truth.resistance;
         let headwind_mps = self.headwind_mps();
@@ -185,10 +177,10 @@ impl Drive {
             let air_mps = speed_mps + headwind_mps;
             push_mps2 - gain * (gradient + a + b * speed_mps + c * air_mps * air_mps.abs())
         };
-        let middle = self.speed_mps + 0.5 * step_s * acceleration(self.speed_mps);
-        let next = (self.speed_mps + step_s * acceleration(middle)).max(0.0);
-        self.place_m += self.direction * 0.5 * step_s * (self.speed_mps + next);
-        self.speed_mps = next;
+        let middle = self.now.speed_mps + 0.5 * step_s * acceleration(self.now.speed_mps);
+        let next = (self.now.speed_mps + step_s * acceleration(middle)).max(0.0);
+        self.now.place_m += self.now.direction * 0.5 * step_s * (self.now.speed_mps + next);
+        self.now.speed_mps = next;
     }
 
     /// What the driver wants.
@@ -203,8 +195,9 @@ impl Drive {
 
     fn decide(&mut self, cycle_s: f64) {
         let (most, brake) = self.habits.acceleration_mps2;
-        let to_stop_m = self.direction * (self.world.stops_m[self.next_stop] - self.place_m);
-        let needed = self.speed_mps * self.speed_mps / (2.0 * to_stop_m.max(0.5));
+        let to_stop_m =
+            self.now.direction * (self.world.stops_m[self.next_stop] - self.now.place_m);
+        let needed = self.now.speed_mps * self.now.speed_mps / (2.0 * to_stop_m.max(0.5));
         if needed >= brake && !matches!(self.phase, Phase::Standing { .. }) {
             self.phase = Phase::Braking;
         }
@@ -218,10 +211,10 @@ impl Drive {
             }
             Phase::Driving => {
                 let power_mps = 0.4 * self.habits.top_mps;
-                let limit = most * (power_mps / self.speed_mps.max(power_mps));
-                let wanted = 0.3 * (self.target_mps - self.speed_mps) + 0.03;
+                let limit = most * (power_mps / self.now.speed_mps.max(power_mps));
+                let wanted = 0.3 * (self.target_mps - self.now.speed_mps) + 0.03;
                 self.commanded_mps2 = wanted.clamp(-0.3 * brake, limit);
-                let is_there = self.speed_mps > self.target_mps - 0.3;
+                let is_there = self.now.speed_mps > self.target_mps - 0.3;
                 if is_there && self.world.random.uniform() < cycle_s / 60.0 {
                     let left_s = 15.0 + 60.0 * self.world.random.uniform();
                     self.phase = Phase::Coasting { left_s };
@@ -230,15 +223,15 @@ impl Drive {
             Phase::Coasting { left_s } => {
                 *left_s -= cycle_s;
                 self.commanded_mps2 = 0.0;
-                let is_slow = self.speed_mps < 0.75 * self.target_mps;
-                let is_fast = self.speed_mps > 1.04 * self.target_mps;
+                let is_slow = self.now.speed_mps < 0.75 * self.target_mps;
+                let is_fast = self.now.speed_mps > 1.04 * self.target_mps;
                 if *left_s <= 0.0 || is_slow || is_fast {
                     self.phase = Phase::Driving;
                 }
             }
             Phase::Braking => {
                 self.commanded_mps2 = -needed.min(1.3 * brake);
-                if self.speed_mps < 0.1 || to_stop_m < 0.3 {
+                if self.now.speed_mps < 0.1 || to_stop_m < 0.3 {
                     self.arrive();
                 }
             }
@@ -254,54 +247,45 @@ impl Drive {
     }
 
     fn arrive(&mut self) {
-        self.speed_mps = 0.0;
+        self.now.speed_mps = 0.0;
         self.phase = Phase::Standing { left_s: self.habits.standing_s };
-        (self.next_stop, self.direction) = self.world.after_stop(self.next_stop, self.direction);
+        (self.next_stop, self.now.direction) =
+            self.world.after_stop(self.next_stop, self.now.direction);
         if self.world.scenario.load == LoadSource::Changing {
             let share = 0.24 * (self.world.random.uniform() - 0.5);
-            self.mass_kg = self.world.declared.mass_kg * (1.0 + share);
+            self.now.mass_kg = self.world.declared.mass_kg * (1.0 + share);
             self.weigh();
         }
     }
 
-    fn moment(&mut self) -> Moment {
-        let World { scenario, truth, force_scale, speed_scale, .. } = &self.world;
-        let (scenario, force_scale, speed_scale) = (*scenario, *force_scale, *speed_scale);
-        let inertial_kg = self.mass_kg * (1.0 + truth.rotating_mass_factor);
-        let w0_n_per_kn = truth.resistance.w0_n_per_kn(self.speed_mps);
-        let force_n = self.reported_mps2 * inertial_kg;
-        let random = &mut self.world.random;
+    /// What the controller measures and writes.
+    fn measure(&mut self) {
+        let headwind_mps = self.headwind_mps();
+        let World { scenario, truth, force_scale, speed_scale, random, .. } = &mut self.world;
+        let now = &mut self.now;
+        now.headwind_mps = headwind_mps;
+        now.is_standing = matches!(self.phase, Phase::Standing { .. });
+        now.w0_n_per_kn = truth.resistance.w0_n_per_kn(now.speed_mps);
+        let force_n = self.reported_mps2 * (now.mass_kg * (1.0 + truth.rotating_mass_factor));
         let noise_mps = scenario.speed_noise_mps * random.normal();
-        let place_m = self.place_m + scenario.position_noise_m * random.normal();
-        let measured_mps = match self.speed_mps > 0.0 {
-            true => (speed_scale * self.speed_mps + noise_mps).max(0.0),
+        let place_m = now.place_m + scenario.position_noise_m * random.normal();
+        let measured_mps = match now.speed_mps > 0.0 {
+            true => (*speed_scale * now.speed_mps + noise_mps).max(0.0),
             false => 0.0,
         };
         let braked = force_scale[1] / self.brake_scale;
+        let sample = &mut now.sample;
+        sample.sequence += 1;
         let cycle_ns = 1_000_000_000 / i64::from(scenario.rate_hz);
-        let mut sample = TrainSample::empty(TrainId(1));
-        sample.sequence = self.cycle;
-        sample.time_ns = 1_000_000_000 + cycle_ns * self.cycle as i64;
-        sample.direction = if self.direction > 0.0 { 1 } else { -1 };
+        sample.time_ns = 1_000_000_000 + cycle_ns * sample.sequence as i64;
+        sample.direction = if now.direction > 0.0 { 1 } else { -1 };
         sample.set(SampleField::Speed, measured_mps);
         sample.set(SampleField::Position, place_m);
         sample.set(SampleField::TractionForce, force_scale[0] * force_n.max(0.0));
         sample.set(SampleField::BrakeForce, braked * (-force_n).max(0.0));
-        sample.set(SampleField::Gradient, self.world.gradient_permille(place_m)[0]);
         if scenario.load != LoadSource::Unknown {
             sample.set(SampleField::Mass, self.weighed_kg);
         }
-        Moment {
-            sample,
-            mass_kg: self.mass_kg,
-            w0_n_per_kn,
-            speed_mps: self.speed_mps,
-            is_standing: matches!(self.phase, Phase::Standing { .. }),
-            push_mps2: self.acting_mps2,
-            place_m: self.place_m,
-            direction: self.direction,
-            headwind_mps: self.headwind_mps(),
-            gust: self.gust,
-        }
+        sample.set(SampleField::Gradient, self.world.gradient_permille(place_m)[0]);
     }
 }

@@ -4,8 +4,8 @@ use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
 use dynocar_model::terms::wind;
 use dynocar_tests::simulator::Deviations;
 
-/// Standard deviations of the ordinary mistakes, all at once.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Standard deviations of the ordinary mistakes, all at once; none by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mistakes {
     /// Of a, b, c as a share of what is declared.
     pub coefficient_share: f64,
@@ -42,20 +42,6 @@ impl Mistakes {
         rotating_mass: 0.002,
         wind_mps: Deviations::ROUGH.day_wind_mps,
         gust_mps: Deviations::ROUGH.gust_mps,
-    };
-
-    /// None at all.
-    pub const NONE: Mistakes = Mistakes {
-        coefficient_share: 0.0,
-        force_share: 0.0,
-        brake_share: 0.0,
-        stop_to_stop_share: 0.0,
-        delay_s: 0.0,
-        mean_delay_s: 0.0,
-        wheel_share: 0.0,
-        rotating_mass: 0.0,
-        wind_mps: 0.0,
-        gust_mps: 0.0,
     };
 
     /// Those that the estimator's default settings reckon with.

@@ -129,7 +129,7 @@ fn measure(
 /// One drive.
 fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
     let cycle_s = 1.0 / f64::from(world.scenario.rate_hz);
-    let mut bound = (world.scenario.speed_noise_mps > 0.0).then(|| Bound::new(&world, hours));
+    let mut bound = (world.scenario.speed_noise_mps > 0.0).then(Bound::default);
     let mut next_s = COMPARED_FIRST_S;
     let mut drive = Drive::new(world);
     let mut scores = QUANTITIES.map(|_| Score::default());
@@ -148,7 +148,8 @@ fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
         }
         if time_s >= next_s {
             next_s = COMPARED_GROWTH * time_s;
-            let Some(least) = bound.as_ref().and_then(Bound::covariance) else { continue };
+            let least = bound.as_mut().and_then(|it| it.covariance(drive.world()));
+            let Some(least) = least else { continue };
             for ((score, answer), quantity) in scores.iter_mut().zip(answers).zip(QUANTITIES) {
                 if let Some(answer) = answer {
                     score.compare(answer.error, least_deviation(&least, quantity, &moment));

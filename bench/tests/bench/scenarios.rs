@@ -75,7 +75,7 @@ fn a_strong_wind_on_a_train_of_more_air_resistance_than_declared_stays_in_the_in
 fn each_snapshot(mut look: impl FnMut(f64, &ParameterSnapshot)) {
     let mut scenario = named(&["EMU, load exact"])[0].1;
     scenario.position_noise_m = 0.5;
-    let world = World::draw(scenario, Mistakes::NONE, 77);
+    let world = World::draw(scenario, Mistakes::default(), 77);
     let train = Arc::new(world.declared.clone());
     let kinds = [
         PipelineKind::TrainKalman,

@@ -25,27 +25,18 @@ pub const CROSSING: usize = 28_000;
 
 const NAMES: [&str; 3] = ["basic resistance z1", "curve resistance z2", "tunnel resistance z3"];
 
-/// Errors of one section over all seeds.
-#[derive(Clone, Debug, Default)]
-struct Errors {
-    staged: Vec<f64>,
-    ours: Score,
-}
-
 /// The rows for resistance.
 pub fn rows(seeds: Seeds) -> Vec<Row> {
     let shuttle = Shuttle::new(false);
     let ride = shuttle.crossing(CROSSING, &mut calm);
     let speeds = Section::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
     let information = Information::of(&shuttle, &ride);
-    let errors = run(&shuttle, &ride, &speeds, seeds);
-    let mut rows: Vec<Row> = Section::ALL
-        .iter()
-        .map(|&section| {
-            let i = section as usize;
-            let quantity = format!("{}: one crossing of 28,000 samples", NAMES[i]);
-            let bound = information.resistance_std(i, &speeds[i]);
-            error_row(quantity, &errors[i], Some(bound), seeds)
+    let scores = run(&shuttle, &ride, &speeds, seeds);
+    let mut rows: Vec<Row> = (0..3)
+        .map(|i| {
+            let bound = Some(information.resistance_std(i, &speeds[i]));
+            let what = format!("{}: one crossing of 28,000 samples", NAMES[i]);
+            Row { bound, ..scores[i].row(row(&what, seeds)) }
         })
         .collect();
     let empirical = Davis { a: 2.7551, b: 0.014 * 3.6, c: 0.00075 * 12.96 };
@@ -63,29 +54,26 @@ fn curve_in_tunnel_row(seeds: Seeds) -> Row {
     let speeds = Section::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
     let curve = Section::Curve as usize;
     let bound = Information::of(&shuttle, &ride).resistance_std(curve, &speeds[curve]);
-    let errors = run(&shuttle, &ride, &speeds, seeds);
-    let quantity = format!("{}: with two curves inside tunnels", NAMES[curve]);
-    error_row(quantity, &errors[curve], Some(bound), seeds)
+    let score = &run(&shuttle, &ride, &speeds, seeds)[curve];
+    let what = format!("{}: with two curves inside tunnels", NAMES[curve]);
+    Row { bound: Some(bound), ..score.row(row(&what, seeds)) }
 }
 
-fn error_row(quantity: String, errors: &Errors, bound: Option<f64>, seeds: Seeds) -> Row {
-    let quantity = format!(
-        "{quantity}, error over the speeds driven there (paper's method: staged descent, \
-         features normalised; baseline: Table 1's empirical values)"
-    );
-    Row {
-        paper_method: Some(root_mean_square(&errors.staged)),
-        bound,
-        ..errors.ours.row(Row::new(WANG, "Table 2", quantity, "N/kN", seeds))
-    }
+/// A row without figures.
+fn row(what: &str, seeds: Seeds) -> Row {
+    let quantity = format!("{what}, error over the speeds driven there");
+    Row::new(WANG, "Table 2", quantity, "N/kN", seeds).noted(
+        "paper's method: staged descent, features normalised; baseline: Table 1's empirical values",
+    )
 }
 
-fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds) -> [Errors; 3] {
+fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds) -> [Score; 3] {
     let truths = &shuttle.truth;
-    let mut errors: [Errors; 3] = Default::default();
+    let mut scores: [Score; 3] = Default::default();
     for seed in seeds.range() {
         let samples = measure(shuttle, ride, &mut Chance::new(seed));
-        let mut staged = staged_descent(shuttle);
+        let settings = StagedDescentSettings::default();
+        let mut staged = StagedDescent::new(settings, &shuttle.train).expect("default settings");
         let mut joint = joint_least_squares(shuttle);
         for sample in &samples {
             staged.update(sample);
@@ -96,11 +84,11 @@ fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds
         for section in Section::ALL {
             let i = section as usize;
             let covariance = joint.resistance_covariance(section).expect("a sound regression");
-            errors[i].staged.extend(w0_errors(&theirs[i], &truths[i], &speeds[i]));
-            errors[i].ours.take_resistance((&ours[i], &covariance), &truths[i], &speeds[i]);
+            scores[i].paper.extend(w0_errors(&theirs[i], &truths[i], &speeds[i]));
+            scores[i].take_resistance((&ours[i], &covariance), &truths[i], &speeds[i]);
         }
     }
-    errors
+    scores
 }
 
 /// Our estimator with its default settings: the mass is not known to it.
@@ -136,10 +124,6 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [Row; 2] {
             mean(&moved),
         ),
     ]
-}
-
-fn staged_descent(shuttle: &Shuttle) -> StagedDescent {
-    StagedDescent::new(StagedDescentSettings::default(), &shuttle.train).expect("default settings")
 }
 
 fn polynomials(resistance: &LineResistance) -> [Davis; 3] {

@@ -205,13 +205,8 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
         paper_method: Some(of(&windows)),
         ours: Some(of(&filter)),
         bound: Some(least),
-        ..Row::new(
-            XIA,
-            "Table 4",
-            format!("{quantity} (paper's method: {paper_lines} lines)"),
-            unit,
-            seeds,
-        )
+        ..Row::new(XIA, "Table 4", quantity, unit, seeds)
+            .noted(format!("paper's method: {paper_lines} lines"))
     };
     let settled = "w0 at the driven speed, noisy sections, settled";
     let least = root_mean_square(&bound.deviations);

@@ -2,8 +2,8 @@
 
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
+use super::motion::Motion;
 use crate::chance::Chance;
-use crate::rig::motion::Motion;
 
 /// The traffic of every train.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,41 +26,43 @@ pub struct Traffic {
     random: Chance,
     start_ns: i64,
     number: u64,
-    next_ns: i64,
+    count: u64,
+    next: (TrainSample, i64),
 }
 
 impl Traffic {
-    /// Traffic from a time on; trains start evenly spread over the first period.
-    pub fn new(plan: TrafficPlan, train: TrainId, spread: f64, start_ns: i64, seed: u64) -> Self {
-        let start_ns = start_ns + (spread * 1e9 / plan.rate_hz) as i64;
+    /// A train of which no sample leaves before [`Traffic::begin`].
+    pub fn new(plan: TrafficPlan, train: TrainId, start_ns: i64, seed: u64) -> Self {
         let random = Chance::new(seed ^ train.0.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mut traffic = Traffic {
-            plan,
-            motion: Motion::of(train, start_ns),
-            random,
-            start_ns,
-            number: 0,
-            next_ns: start_ns,
-        };
-        traffic.appoint();
-        traffic
+        let mut motion = Motion::of(train, start_ns);
+        let next = (motion.sample(start_ns), start_ns);
+        Traffic { plan, motion, random, start_ns, number: 0, count: 0, next }
     }
 
-    /// When the next sample is to leave, in ns.
-    pub fn next_ns(&self) -> i64 {
-        self.next_ns
+    /// So many samples from a time on.
+    pub fn begin(&mut self, start_ns: i64, count: u64) {
+        (self.start_ns, self.number, self.count, self.next.1) = (start_ns, 0, count, start_ns);
+        self.appoint();
+    }
+
+    /// When the next sample is to leave, in ns, if there is one more.
+    pub fn next_ns(&self) -> Option<i64> {
+        (self.number < self.count).then_some(self.next.1)
     }
 
     /// The next sample, with the time it was to leave.
     pub fn take(&mut self) -> (TrainSample, i64) {
-        let mut sample = self.motion.sample(self.measured_ns(self.number));
-        if self.plan.bad_share > 0.0 && self.random.uniform() < self.plan.bad_share {
-            spoil(&mut sample, self.random.within(0..KINDS_OF_BAD));
-        }
-        let appointed_ns = self.next_ns;
+        let taken = self.next;
         self.number += 1;
-        self.appoint();
-        (sample, appointed_ns)
+        if self.number < self.count {
+            self.appoint();
+        }
+        taken
+    }
+
+    /// What would be measured at a time in ns.
+    pub fn sample(&mut self, time_ns: i64) -> TrainSample {
+        self.motion.sample(time_ns)
     }
 
     fn measured_ns(&self, number: u64) -> i64 {
@@ -76,7 +78,11 @@ impl Traffic {
             _ => 0.0,
         };
         let appointed_ns = self.measured_ns(last_of_burst) + jitter_ns as i64;
-        self.next_ns = appointed_ns.max(self.next_ns);
+        let mut sample = self.motion.sample(self.measured_ns(self.number));
+        if self.plan.bad_share > 0.0 && self.random.uniform() < self.plan.bad_share {
+            spoil(&mut sample, self.random.within(0..KINDS_OF_BAD));
+        }
+        self.next = (sample, appointed_ns.max(self.next.1));
     }
 }
 
@@ -105,9 +111,10 @@ mod tests {
 
     #[test]
     fn samples_leave_in_order_in_bursts_and_at_the_mean_rate() {
-        let mut traffic = Traffic::new(plan(), TRAIN, 0.0, 0, 1);
+        let mut traffic = Traffic::new(plan(), TRAIN, 0, 1);
+        traffic.begin(0, 8_000);
         let times: Vec<i64> = (0..8_000).map(|_| traffic.take().1).collect();
-        assert!(times.is_sorted());
+        assert!(times.is_sorted() && traffic.next_ns().is_none());
         assert!(times.chunks(8).all(|burst| burst.iter().all(|&time| time == burst[0])));
         let seconds = times[times.len() - 1] as f64 * 1e-9;
         assert!((seconds - 8.0).abs() < 0.01, "{seconds}");
@@ -115,7 +122,8 @@ mod tests {
 
     #[test]
     fn the_bad_share_is_refused_and_nothing_else() {
-        let mut traffic = Traffic::new(plan(), TRAIN, 0.0, 1_000_000_000, 1);
+        let mut traffic = Traffic::new(plan(), TRAIN, 1_000_000_000, 1);
+        traffic.begin(1_000_000_000, 20_000);
         let mut validator = Validator::new(TRAIN, 200e3, ValidationLimits::for_train(200e3));
         let mut refused = 0.0;
         for number in 1..=20_000 {

@@ -15,7 +15,7 @@ use dynocar_core::pipeline::braking::motion::{self, StepInputs};
 use dynocar_model::train::TrainModel;
 
 use super::braking::{
-    Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, WINDOW, train,
+    Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, WINDOW, XIE_TABLE_2, train,
 };
 
 /// Particles of the papers.
@@ -97,11 +97,7 @@ impl ParticleModel<2> for UniformWindow<'_> {
 
 /// The changes of the adhesion, from lowest to highest, under which Q of the first window stays
 /// finite.
-///
-/// # Errors
-///
-/// When no particle explains a measurement.
-pub fn finite_changes(
+fn finite_changes(
     moments: &[Moment],
     adhesion: f64,
     seed: u64,
@@ -127,19 +123,13 @@ pub fn finite_changes(
     Ok(model.allowed.get())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::papers::braking::XIE_TABLE_2;
-
-    #[test]
-    fn q_is_finite_only_next_to_the_present_value() {
-        for seed in 0..5 {
-            let moments = XIE_TABLE_2.simulate(seed);
-            // Even from the true value of the window's middle.
-            let (low, high) = finite_changes(&moments, moments[20].truth, seed).unwrap();
-            assert!(low <= 0.0 && high >= 0.0, "{low} to {high}");
-            assert!(high - low < 5e-4, "{low} to {high}");
-        }
+#[test]
+fn q_is_finite_only_next_to_the_present_value() {
+    for seed in 0..5 {
+        let moments = XIE_TABLE_2.simulate(seed);
+        // Even from the true value of the window's middle.
+        let (low, high) = finite_changes(&moments, moments[20].truth, seed).unwrap();
+        assert!(low <= 0.0 && high >= 0.0, "{low} to {high}");
+        assert!(high - low < 5e-4, "{low} to {high}");
     }
 }

@@ -1,0 +1,221 @@
+//! A train's controller in the open loop: sends what is due, and counts the answers.
+
+use std::time::{Duration, Instant};
+
+use dynocar_client::monotonic_now_ns;
+use dynocar_shared::TrainSample;
+use dynocar_tests::process::Process;
+use hdrhistogram::Histogram;
+
+use super::traffic::Traffic;
+use super::wire::Wire;
+use crate::output::Failure;
+use crate::rig::quantiles::{histogram, record};
+use crate::rig::site::require;
+
+/// Samples in flight that are distinguished; at 10 kHz more than a second.
+const IN_FLIGHT: usize = 1 << 14;
+/// How long a peer may take to answer its first sample.
+const READY_WITHIN: Duration = Duration::from_secs(20);
+/// Time in ns between the samples that are sent until a peer answers.
+const READY_EVERY_NS: i64 = 5_000_000;
+/// How long in s after the last sample slow pipelines may go on without anything new.
+const SETTLED_AFTER: Duration = Duration::from_secs(1);
+
+/// What became of the samples of one pipeline, over all trains.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Samples sent.
+    pub offered: u64,
+    /// Samples that entered the estimate.
+    pub used: u64,
+    /// Samples refused.
+    pub rejected: u64,
+    /// From the appointed time of a sample to the poll that brought a snapshot behind which it
+    /// stands. A controller or daemon that was held up pays for every sample it kept waiting.
+    pub from_appointed: Histogram<u64>,
+    /// From the moment before publishing: what a closed loop would measure.
+    pub from_publish: Histogram<u64>,
+}
+
+impl Outcome {
+    /// Of nothing yet.
+    pub fn empty() -> Self {
+        let (from_appointed, from_publish) = (histogram(), histogram());
+        Outcome { offered: 0, used: 0, rejected: 0, from_appointed, from_publish }
+    }
+
+    /// Samples of which the pipeline gave no account: lost, and too late to be noticed as lost.
+    pub fn missing(&self) -> u64 {
+        self.offered.saturating_sub(self.used + self.rejected)
+    }
+}
+
+/// How far a pipeline has come: its newest sample, those that it used and those that it refused.
+#[derive(Clone, Copy, Debug, Default)]
+struct Answer {
+    newest: u64,
+    used: u64,
+    rejected: u64,
+}
+
+/// A controller that numbers its samples.
+pub struct Controller {
+    wire: Box<dyn Wire>,
+    traffic: Traffic,
+    /// Appointed and actual time in ns of the samples in flight, by number.
+    in_flight: Box<[(i64, i64)]>,
+    sent: u64,
+    /// By pipeline: now, and when counting began.
+    answers: Vec<[Answer; 2]>,
+    sent_before: u64,
+}
+
+impl Controller {
+    /// A controller that has sent nothing, and hears so many pipelines.
+    pub fn new(wire: Box<dyn Wire>, traffic: Traffic, pipelines: usize) -> Self {
+        let in_flight = vec![(0, 0); IN_FLIGHT].into();
+        let answers = vec![[Answer::default(); 2]; pipelines];
+        Controller { wire, traffic, in_flight, sent: 0, answers, sent_before: 0 }
+    }
+
+    /// Sends until every pipeline answers: a peer may still be starting.
+    ///
+    /// # Errors
+    ///
+    /// When one stays silent, or the peer has ended.
+    pub fn await_ready(&mut self, peer: &mut Process) -> Result<(), Failure> {
+        let mut uncounted: Vec<Outcome> = self.answers.iter().map(|_| Outcome::empty()).collect();
+        let (start, mut next_ns) = (Instant::now(), 0);
+        while self.answers.iter().any(|[now, _]| now.newest == 0) {
+            if start.elapsed() > READY_WITHIN {
+                return Err(format!("no peer answers within {READY_WITHIN:?}").into());
+            }
+            let now_ns = monotonic_now_ns();
+            if now_ns >= next_ns {
+                require(peer)?;
+                let sample = self.traffic.sample(now_ns);
+                self.publish(sample, now_ns)?;
+                next_ns = now_ns + READY_EVERY_NS;
+            }
+            self.poll(&mut uncounted)?;
+            std::thread::yield_now();
+        }
+        Ok(())
+    }
+
+    /// So many samples leave from a time in ns on; what came of earlier ones does not count.
+    pub fn begin(&mut self, start_ns: i64, count: u64) {
+        self.traffic.begin(start_ns, count);
+        self.sent_before = self.sent;
+        for [now, before] in &mut self.answers {
+            now.newest = self.sent;
+            *before = *now;
+        }
+    }
+
+    /// Adds what became of the samples since counting began.
+    pub fn account(&self, outcomes: &mut [Outcome]) {
+        for ([now, before], outcome) in self.answers.iter().zip(outcomes) {
+            outcome.offered += self.sent - self.sent_before;
+            outcome.used += now.used - before.used;
+            outcome.rejected += now.rejected - before.rejected;
+        }
+    }
+
+    /// Gives how late in ns a sample left.
+    fn publish(&mut self, mut sample: TrainSample, appointed_ns: i64) -> Result<i64, Failure> {
+        let left_ns = monotonic_now_ns();
+        (sample.sequence, sample.published_ns) = (self.sent + 1, left_ns);
+        self.wire.send(&mut sample)?;
+        self.sent += 1;
+        self.in_flight[self.sent as usize % IN_FLIGHT] = (appointed_ns, left_ns);
+        Ok(left_ns - appointed_ns)
+    }
+
+    /// Publishes what is due; gives how late the latest was, in ns.
+    fn publish_due(&mut self, now_ns: i64) -> Result<i64, Failure> {
+        let mut lag_ns = 0;
+        while self.traffic.next_ns().is_some_and(|next_ns| next_ns <= now_ns) {
+            let (sample, appointed_ns) = self.traffic.take();
+            lag_ns = lag_ns.max(self.publish(sample, appointed_ns)?);
+        }
+        Ok(lag_ns)
+    }
+
+    fn is_answered(&self) -> bool {
+        self.answers.iter().all(|[now, _]| now.newest >= self.sent)
+    }
+
+    /// Takes what has come, unless nothing can; true where it brought anything new. An answer to a sample answers those
+    /// before it too, for a snapshot stands on all of them.
+    fn poll(&mut self, outcomes: &mut [Outcome]) -> Result<bool, Failure> {
+        if !self.wire.carries_others() && self.is_answered() {
+            std::hint::spin_loop();
+            return Ok(false);
+        }
+        let Controller { wire, in_flight, answers, sent, .. } = self;
+        let mut has_news = false;
+        wire.receive(&mut |snapshot| {
+            let index = if answers.len() == 1 { 0 } else { snapshot.pipeline_index as usize };
+            let pair = answers.get_mut(index).zip(outcomes.get_mut(index));
+            let newest = snapshot.sample_sequence.min(*sent);
+            let Some(([answer, _], outcome)) = pair.filter(|(it, _)| newest > it[0].newest) else {
+                return;
+            };
+            let now_ns = monotonic_now_ns();
+            for sequence in
+                newest.saturating_sub(IN_FLIGHT as u64 - 1).max(answer.newest + 1)..=newest
+            {
+                let (appointed_ns, left_ns) = in_flight[sequence as usize % IN_FLIGHT];
+                record(&mut outcome.from_appointed, now_ns - appointed_ns);
+                record(&mut outcome.from_publish, now_ns - left_ns);
+            }
+            let (used, rejected) = (snapshot.samples_used, snapshot.samples_rejected);
+            *answer = Answer { newest, used, rejected };
+            has_news = true;
+        })?;
+        Ok(has_news)
+    }
+}
+
+/// Publishes what is due and polls the trains in turn until a time in ns; gives how late the latest sample left, in ns.
+///
+/// # Errors
+///
+/// When a transport fails.
+pub fn drive(
+    trains: &mut [Controller],
+    outcomes: &mut [Outcome],
+    until_ns: i64,
+) -> Result<i64, Failure> {
+    let (mut lag_ns, mut turn) = (0, 0);
+    loop {
+        let now_ns = monotonic_now_ns();
+        for train in trains.iter_mut() {
+            lag_ns = lag_ns.max(train.publish_due(now_ns)?);
+        }
+        if now_ns >= until_ns {
+            return Ok(lag_ns);
+        }
+        turn = (turn + 1) % trains.len();
+        trains[turn].poll(outcomes)?;
+    }
+}
+
+/// Polls until every pipeline has come to its train's last sample, or nothing new comes.
+///
+/// # Errors
+///
+/// When a transport fails.
+pub fn settle(trains: &mut [Controller], outcomes: &mut [Outcome]) -> Result<(), Failure> {
+    let mut last_news = Instant::now();
+    while !trains.iter().all(Controller::is_answered) && last_news.elapsed() < SETTLED_AFTER {
+        for train in trains.iter_mut() {
+            if train.poll(outcomes)? {
+                last_news = Instant::now();
+            }
+        }
+    }
+    Ok(())
+}

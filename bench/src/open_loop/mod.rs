@@ -1,0 +1,21 @@
+//! The open loop that latency and load measure by: samples leave at their appointed times, whatever has come back,
+//! through real processes on cores of their own.
+//!
+//! - [`motion`], [`traffic`]: a train's samples, when they leave, and which are bad
+//! - [`wire`]: the controller's end of each transport
+//! - [`controller`]: sends what is due, and counts the answers
+//! - [`trial`]: who answers, how many trains there are, and what came of it
+//! - [`server`]: the answering processes
+//! - [`sockets`], [`plain`]: what they need
+//! - `zeromq`: ZeroMQ, with the feature of that name
+
+pub mod controller;
+pub mod motion;
+pub mod plain;
+pub mod server;
+pub mod sockets;
+pub mod traffic;
+pub mod trial;
+pub mod wire;
+#[cfg(feature = "zeromq")]
+pub mod zeromq;

@@ -1,0 +1,163 @@
+//! The alternatives: the same estimator behind sockets, whose messages are the bytes of samples and snapshots.
+
+use std::io::ErrorKind;
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use dynocar::dataset::load_train;
+use dynocar_client::channel::Payload;
+use dynocar_client::monotonic_now_ns;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+
+use super::wire::Wire;
+use crate::output::{Failure, during};
+use crate::rig::pipelines::default_pipeline;
+
+/// The train of every latency case.
+pub const TRAIN: TrainId = TrainId(1);
+/// The pipeline that is compared with the floor and the alternatives.
+pub const COMPARED: PipelineKind = PipelineKind::RegularisedRls;
+/// How long a blocking receive waits before anything else is looked at again.
+pub(super) const BLOCK: Duration = Duration::from_millis(1);
+
+/// Which end of a socket.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Sends samples.
+    Controller,
+    /// Answers them.
+    Server,
+}
+
+/// An end of a socket that carries whole messages.
+pub trait Socket {
+    /// Sends a message to whoever reads: what nobody takes is lost.
+    ///
+    /// # Errors
+    ///
+    /// When the socket fails for good.
+    fn send(&mut self, bytes: &[u8]) -> Result<(), Failure>;
+
+    /// The length of a message that has come.
+    ///
+    /// # Errors
+    ///
+    /// When the socket fails for good.
+    fn receive(&mut self, bytes: &mut [u8]) -> Result<Option<usize>, Failure>;
+}
+
+impl<S: Socket> Wire for S {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
+        Socket::send(self, as_bytes(sample))
+    }
+
+    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure> {
+        take::<ParameterSnapshot>(self)?.iter().for_each(hear);
+        Ok(())
+    }
+}
+
+/// Answers samples until killed, with the estimator and the train's file as the daemon has them.
+///
+/// # Errors
+///
+/// When the socket fails for good, or the train's file is wrong.
+pub fn serve(folder: &Path, mut socket: impl Socket) -> Result<(), Failure> {
+    let train = Arc::new(load_train(&folder.join("train.toml"))?);
+    let mut pipeline = default_pipeline(COMPARED, TRAIN, &train, None);
+    loop {
+        let Some(sample) = take::<TrainSample>(&mut socket)? else {
+            std::hint::spin_loop();
+            continue;
+        };
+        pipeline.process(&sample);
+        let snapshot = pipeline.snapshot_mut();
+        snapshot.published_ns = monotonic_now_ns();
+        Socket::send(&mut socket, as_bytes(snapshot))?;
+    }
+}
+
+/// The payload of a message that has come, if it is as long as one.
+fn take<T: Payload>(socket: &mut impl Socket) -> Result<Option<T>, Failure> {
+    // No payload is longer.
+    let mut bytes = [0; size_of::<ParameterSnapshot>()];
+    let count = Socket::receive(socket, &mut bytes[..size_of::<T>()])?;
+    Ok(count.and_then(|count| from_bytes(&bytes[..count])))
+}
+
+/// The bytes of a payload.
+fn as_bytes<T: Payload>(payload: &T) -> &[u8] {
+    // SAFETY: a payload is a `repr(C)` struct of plain numbers without padding (checked when it
+    // is compiled), so that every one of its bytes is initialised.
+    unsafe { std::slice::from_raw_parts(std::ptr::from_ref(payload).cast(), size_of::<T>()) }
+}
+
+/// A payload from its bytes; `None` when they are too few or too many.
+fn from_bytes<T: Payload>(bytes: &[u8]) -> Option<T> {
+    if bytes.len() != size_of::<T>() {
+        return None;
+    }
+    // SAFETY: the length is right, every pattern of bytes is a value of a struct of plain
+    // numbers, and the read does not ask for alignment.
+    Some(unsafe { std::ptr::read_unaligned(bytes.as_ptr().cast()) })
+}
+
+/// Unix datagram sockets, as a user would write them.
+pub struct Datagrams {
+    socket: UnixDatagram,
+    peer: PathBuf,
+}
+
+impl Datagrams {
+    /// Binds an end in a site's folder; `blocks` waits in the kernel for messages.
+    ///
+    /// # Errors
+    ///
+    /// When the system refuses it.
+    pub fn open(folder: &Path, end: End, blocks: bool) -> Result<Self, Failure> {
+        let mut names = ["controller.socket", "server.socket"].map(|name| folder.join(name));
+        if end == End::Server {
+            names.reverse();
+        }
+        let [own, peer] = names;
+        let socket = UnixDatagram::bind(own).map_err(during("bind"))?;
+        socket.set_nonblocking(!blocks)?;
+        socket.set_read_timeout(blocks.then_some(BLOCK))?;
+        Ok(Datagrams { socket, peer })
+    }
+}
+
+impl Socket for Datagrams {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        // Full, or the peer does not listen yet: lost.
+        unless_passing(self.socket.send_to(bytes, &self.peer)).map(|_| ())
+    }
+
+    fn receive(&mut self, bytes: &mut [u8]) -> Result<Option<usize>, Failure> {
+        unless_passing(self.socket.recv(bytes))
+    }
+}
+
+/// What a call gave, but for what a receiver or sender has to live with.
+fn unless_passing(result: std::io::Result<usize>) -> Result<Option<usize>, Failure> {
+    use ErrorKind::{ConnectionRefused, Interrupted, NotFound, TimedOut, WouldBlock};
+    match result.map_err(|error| (error.kind(), error)) {
+        Ok(count) => Ok(Some(count)),
+        Err((WouldBlock | TimedOut | NotFound | ConnectionRefused | Interrupted, _)) => Ok(None),
+        Err((_, error)) => Err(during("a datagram")(error)),
+    }
+}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynocar_shared::{SampleField, TrainId, TrainSample};
+
+    #[test]
+    fn a_sample_survives_its_bytes() {
+        let sample = TrainSample::empty(TrainId(7)).with(SampleField::Speed, 21.5);
+        assert_eq!(from_bytes::<TrainSample>(as_bytes(&sample)), Some(sample));
+        assert_eq!(from_bytes::<TrainSample>(&as_bytes(&sample)[1..]), None);
+    }
+}

@@ -1,0 +1,113 @@
+//! The controller's end of each transport.
+
+use dynocar_client::channel::{Receiver, Sender, Transport};
+use dynocar_client::{SamplePublisher, SnapshotReader};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+use dynocar_tests::process::Site;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::prelude::ipc;
+
+use super::plain::{self, refused};
+use crate::output::Failure;
+
+/// A transport that carries samples there and answers back.
+pub trait Wire {
+    /// Sends a sample, which has a number; one that a full queue refuses is lost.
+    ///
+    /// # Errors
+    ///
+    /// When the transport fails for good.
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure>;
+
+    /// Takes what has come; each answer is heard.
+    ///
+    /// # Errors
+    ///
+    /// When the transport fails for good.
+    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure>;
+
+    /// True where other pipelines' snapshots come, too, which a controller's next poll would find in its way.
+    fn carries_others(&self) -> bool {
+        false
+    }
+}
+
+/// What a controller links: Dynocar's client library.
+pub struct Client {
+    publisher: SamplePublisher,
+    reader: SnapshotReader,
+    polled: Option<PipelineKind>,
+}
+
+impl Client {
+    /// Opens publisher and reader; the answers of one pipeline are heard, or of all.
+    ///
+    /// # Errors
+    ///
+    /// When a channel cannot be opened.
+    pub fn open(
+        site: &Site,
+        train: TrainId,
+        polled: Option<PipelineKind>,
+    ) -> Result<Self, Failure> {
+        let publisher = SamplePublisher::open(&site.host(), train)?;
+        Ok(Client { publisher, reader: SnapshotReader::open(&site.host(), train)?, polled })
+    }
+}
+
+impl Wire for Client {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
+        // It numbers by itself.
+        Ok(self.publisher.publish(sample).map(|_| ())?)
+    }
+
+    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure> {
+        if self.reader.poll() > 0 {
+            match self.polled {
+                Some(kind) => self.reader.latest(kind, 0).iter().for_each(|it| hear(it.snapshot)),
+                None => self.reader.readings(0).for_each(|it| hear(it.snapshot)),
+            }
+        }
+        Ok(())
+    }
+
+    fn carries_others(&self) -> bool {
+        true
+    }
+}
+
+/// The plain transport with a notification for every sample: the floor of the event strategy.
+pub struct Notifying {
+    sender: Sender<TrainSample>,
+    receiver: Receiver<ParameterSnapshot>,
+    notifier: Notifier<ipc::Service>,
+}
+
+impl Notifying {
+    /// Opens the ports.
+    ///
+    /// # Errors
+    ///
+    /// When the transport refuses one.
+    pub fn open(site: &Site, train: TrainId) -> Result<Self, Failure> {
+        let transport = Transport::open(&site.host(), "dynocar-bench")?;
+        let service = plain::service(&site.host(), site.path())?;
+        Ok(Notifying {
+            sender: transport.sender(train)?,
+            receiver: transport.receiver(train)?,
+            notifier: service.notifier_builder().create().map_err(refused("notifier"))?,
+        })
+    }
+}
+
+impl Wire for Notifying {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
+        self.sender.send(sample)?;
+        self.notifier.notify().map(|_| ()).map_err(refused("notification"))
+    }
+
+    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure> {
+        self.receiver.receive().iter().for_each(hear);
+        Ok(())
+    }
+}
