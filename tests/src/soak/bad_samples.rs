@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use dynocar_analysis::identify::default_estimators;
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::Davis;
 use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainSample};
 
+use crate::estimators::frugal_estimators;
 use crate::sensor_failures::{SensorFailure, Spoiled};
 use crate::simulator::sensors::SIMULATED_TRAIN;
 use crate::simulator::{
@@ -133,7 +133,7 @@ impl Scene {
             None => Spoiled { samples: self.samples.clone(), dropped: 0 },
         };
         let mut all = Vec::new();
-        for settings in default_estimators() {
+        for settings in frugal_estimators() {
             let kind = settings.kind().to_string();
             if !is_wanted(&kind) {
                 continue;
