@@ -98,8 +98,8 @@ impl LatencyArguments {
         let cores = Cores::choose(&self.place);
         let schedule = Schedule {
             rate_hz: self.rate,
-            warm_up_s: choose(0.6, 0.8),
-            measure_s: self.seconds.unwrap_or(choose(0.2, 2.0)),
+            warm_up_s: choose(0.1, 0.8),
+            measure_s: self.seconds.unwrap_or(choose(0.1, 2.0)),
         };
         let mut cases = case::cases(self.quick);
         if self.readers {
@@ -126,7 +126,7 @@ impl LatencyArguments {
             }
         }
         let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event]
-            .map(|idle| costs::at_rest(idle, cores, choose(0.5, 5.0)));
+            .map(|idle| costs::at_rest(idle, cores, choose(0.3, 5.0)));
         let at_rest = at_rest.into_iter().collect::<Result<_, _>>()?;
         Ok(Measured { cases, costs, at_rest, schedule, cores })
     }
