@@ -19,10 +19,15 @@ use dynocar_tests::power_cut::{Left, LossyDisk, Neglect, NotedDisk};
 
 const HOUR: Duration = Duration::from_secs(3600);
 /// Samples that are recorded, and after how many of them they are handed to the system.
-const SAMPLES: u64 = 240;
-const FLUSH: u64 = 40;
+const SAMPLES: u64 = 120;
+const FLUSH: u64 = 20;
 /// The sample after which a suspicion rises.
-const SUSPICION: u64 = 150;
+const SUSPICION: u64 = 75;
+
+/// A folder in memory: what a disk does is played, and no real one is waited for.
+fn place() -> tempfile::TempDir {
+    tempfile::tempdir_in("/dev/shm").unwrap()
+}
 
 fn sample(sequence: u64) -> TrainSample {
     TrainSample { sequence, ..TrainSample::empty(TrainId(1)) }
@@ -49,7 +54,7 @@ struct Run {
 
 impl Run {
     fn on(neglect: Neglect) -> Run {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = place();
         let notes = LossyDisk::new(neglect);
         let disk = Arc::new(NotedDisk { notes: notes.clone() });
         let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
@@ -111,12 +116,13 @@ impl Run {
                 let left: Left =
                     left.into_iter().map(|(name, it)| (self.inside(&name), it)).collect();
                 let is_new_place = names.insert(left.keys().cloned().collect::<Vec<_>>());
-                if seen.contains(&(left.clone(), promise.lasting, promise.oldest)) {
+                let case = (left, promise.lasting, promise.oldest);
+                if seen.contains(&case) {
                     continue;
                 }
-                let checked = check(&left, &promise, &mut known)
-                    .and_then(|()| if is_new_place { go_on(&left) } else { Ok(()) });
-                seen.insert((left, promise.lasting, promise.oldest));
+                let checked = check(&case.0, &promise, &mut known)
+                    .and_then(|()| if is_new_place { go_on(&case.0) } else { Ok(()) });
+                seen.insert(case);
                 if let Err(problem) = checked {
                     return (seen.len(), Some(format!("after {count} steps: {problem}")));
                 }
@@ -175,7 +181,7 @@ fn sequences(files: Vec<&Vec<u8>>, known: &mut Known) -> Vec<u64> {
 }
 
 fn recovered(contents: &[Vec<u8>]) -> Vec<u64> {
-    let place = tempfile::tempdir().unwrap();
+    let place = place();
     let (path, names) = (place.path().join("whole.mcap"), 0..contents.len());
     let files: Vec<PathBuf> = names.map(|it| place.path().join(format!("{it:03}.mcap"))).collect();
     for (path, content) in files.iter().zip(contents) {
@@ -206,7 +212,7 @@ fn is_whole(sequences: &[u64], oldest: u64, lasting: u64) -> Result<(), String> 
 
 /// The next flight recorder takes whatever is there.
 fn go_on(left: &Left) -> Result<(), String> {
-    let place = tempfile::tempdir().unwrap();
+    let place = place();
     let ring = place.path();
     for (name, content) in left {
         std::fs::create_dir_all(ring.join(name).parent().unwrap()).unwrap();
@@ -244,7 +250,7 @@ fn a_disk_that_keeps_bytes_or_names_of_recordings_back_is_noticed() {
 
 /// Cuts the power after every step of a file being made whole; gives the first disk that was not as promised.
 fn cut_recovery(neglect: Neglect) -> Option<String> {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = place();
     let (from, to) = (folder.path().join("run.mcap"), folder.path().join("whole.mcap"));
     let mut files = Files::begin(Arc::new(Disk), &from, Rotation::default(), None, None).unwrap();
     for sequence in 1..=200 {
