@@ -344,7 +344,12 @@ fn a_force_that_acts_somewhat_later_than_stamped_bends_no_resistance() {
     let folder = tempfile::tempdir().unwrap();
     // The simulator holds each force for 0.05 s: on average it acts 0.025 s after its stamp.
     let ideal = SimulatorSettings::ideal(SEED, EffectRequest::none());
-    let settings = SimulatorSettings { train_type: Some(TrainType::Regional), ..ideal };
+    let settings = SimulatorSettings {
+        train_type: Some(TrainType::Regional),
+        runs: 4,
+        holdout_runs: 1,
+        ..ideal
+    };
     let simulated = simulate(&settings);
     let answer = explained(&simulated, folder.path()).answer;
     assert_eq!(answer.verdict, Verdict::None, "{}", answer.statement);
