@@ -58,7 +58,7 @@ impl Cast {
     /// A daemon on two threads, with more lines in `[models]`.
     fn daemon(&self, lines: &str) -> Process {
         let text = format!(
-            "[metrics]\nlisten = \"127.0.0.1:0\"\n\
+            "[daemon]\nidle = \"event\"\n[metrics]\nlisten = \"127.0.0.1:0\"\n\
              [models]\ndirectory = \"models\"\ninterval_s = 1\n{lines}\n\
              [[trains]]\nid = 1\nfile = \"train.toml\"\ntrack = \"track.toml\"\n\
              [[threads]]\nname = \"one\"\n[[threads]]\nname = \"two\"\n\
@@ -160,75 +160,84 @@ fn an_adopted_model_goes_to_work_at_standstill_without_a_lost_sample_and_so_does
     stop(daemon);
 }
 
+/// Drives until a rule has decided between what is declared and another model.
+fn decided_by_rule(declared: &str, rival: &str, adopted_by_hand: bool) {
+    let cast = Cast::new(declared);
+    let daemon = cast.daemon("adopt = \"when_better\"\ntrips_between_mistakes = 20");
+    let rival = cast.put(declared, rival);
+    daemon.await_error("on trial");
+    if adopted_by_hand {
+        cast.decide(Choice::Adopt(rival));
+        cast.snapshots_of(rival);
+    }
+    let wanted = if adopted_by_hand { None } else { Some(rival) };
+    let is_done = || cast.models().in_force().unwrap() == wanted;
+    for _ in 0..8 {
+        if is_done() {
+            break;
+        }
+        cast.drive();
+    }
+    await_true(is_done, || format!("a decision: {}", daemon.errors()));
+    let declared = ModelText { train: cast.train.clone(), track: Some(cast.track.clone()) }.hash();
+    cast.snapshots_of(wanted.unwrap_or(declared));
+    let decisions = cast.models().decisions().unwrap();
+    let (_, last) = decisions.last().unwrap();
+    assert_eq!(last.by, "rule");
+    assert!(last.reason.contains("open loop over 60 s"), "{}", last.reason);
+    let log = stop(daemon);
+    assert!(log.contains("decided by rule"), "{log}");
+    // What was measured is there for the next daemon.
+    let record = record::Trials::read(cast.models().folder());
+    let error = |model| record.of(model).and_then(|it| it.error_mps).unwrap();
+    let (better, worse) = if adopted_by_hand { (declared, rival) } else { (rival, declared) };
+    assert!(error(better) < 0.5 * error(worse), "{} {}", error(better), error(worse));
+}
+
 #[test]
 fn a_rule_adopts_the_better_model_and_takes_back_the_worse_one() {
-    for (declared, rival, adopted_by_hand) in [(WRONG, RIGHT, false), (RIGHT, WRONG, true)] {
-        let cast = Cast::new(declared);
-        let daemon = cast.daemon("adopt = \"when_better\"\ntrips_between_mistakes = 20");
-        let rival = cast.put(declared, rival);
-        daemon.await_error("on trial");
-        if adopted_by_hand {
-            cast.decide(Choice::Adopt(rival));
-            cast.snapshots_of(rival);
+    // Side by side: a replay mostly waits.
+    std::thread::scope(|scope| {
+        scope.spawn(|| decided_by_rule(WRONG, RIGHT, false));
+        scope.spawn(|| decided_by_rule(RIGHT, WRONG, true));
+    });
+}
+
+/// Drives under a rule that does not adopt, until it says so.
+fn not_adopted(rule: &str, expected: &str) {
+    let cast = Cast::new(WRONG);
+    let daemon = cast.daemon(&format!("trips_between_mistakes = 20\n{rule}"));
+    let better = cast.put(WRONG, RIGHT);
+    daemon.await_error("on trial");
+    for _ in 0..8 {
+        cast.drive();
+        if daemon.errors().contains(expected) {
+            break;
         }
-        let wanted = if adopted_by_hand { None } else { Some(rival) };
-        let is_done = || cast.models().in_force().unwrap() == wanted;
-        for _ in 0..8 {
-            if is_done() {
-                break;
-            }
-            cast.drive();
-        }
-        await_true(is_done, || format!("a decision: {}", daemon.errors()));
-        let declared =
-            ModelText { train: cast.train.clone(), track: Some(cast.track.clone()) }.hash();
-        cast.snapshots_of(wanted.unwrap_or(declared));
-        let decisions = cast.models().decisions().unwrap();
-        let (_, last) = decisions.last().unwrap();
-        assert_eq!(last.by, "rule");
-        assert!(last.reason.contains("open loop over 60 s"), "{}", last.reason);
-        let log = stop(daemon);
-        assert!(log.contains("decided by rule"), "{log}");
-        // What was measured is there for the next daemon.
-        let record = record::Trials::read(cast.models().folder());
-        let error = |model| record.of(model).and_then(|it| it.error_mps).unwrap();
-        let (better, worse) = if adopted_by_hand { (declared, rival) } else { (rival, declared) };
-        assert!(error(better) < 0.5 * error(worse), "{} {}", error(better), error(worse));
     }
+    daemon.await_error(expected);
+    assert!(daemon.errors().contains(&better.to_string()));
+    assert_eq!(cast.models().in_force().unwrap(), None);
+    if rule.contains("bounds") {
+        // Nor by a person.
+        cast.decide(Choice::Adopt(better));
+        daemon.await_error("what was decided is not done");
+        stop(daemon);
+        let daemon = cast.daemon(&format!("trips_between_mistakes = 20\n{rule}"));
+        daemon.await_error("the declared model stays in force");
+        stop(daemon);
+        return;
+    }
+    stop(daemon);
 }
 
 #[test]
 fn a_model_out_of_bounds_is_not_adopted_by_the_rule_and_nothing_is_by_asking() {
-    let rules = [
-        ("adopt = \"when_better\"\nbounds = { \"resistance.a\" = [3, 6] }", "out of bounds"),
-        ("adopt = \"ask\"", "dynocar models adopt"),
-    ];
-    for (rule, expected) in rules {
-        let cast = Cast::new(WRONG);
-        let daemon = cast.daemon(&format!("trips_between_mistakes = 20\n{rule}"));
-        let better = cast.put(WRONG, RIGHT);
-        daemon.await_error("on trial");
-        for _ in 0..8 {
-            cast.drive();
-            if daemon.errors().contains(expected) {
-                break;
-            }
-        }
-        daemon.await_error(expected);
-        assert!(daemon.errors().contains(&better.to_string()));
-        assert_eq!(cast.models().in_force().unwrap(), None);
-        if rule.contains("bounds") {
-            // Nor by a person.
-            cast.decide(Choice::Adopt(better));
-            daemon.await_error("what was decided is not done");
-            stop(daemon);
-            let daemon = cast.daemon(&format!("trips_between_mistakes = 20\n{rule}"));
-            daemon.await_error("the declared model stays in force");
-            stop(daemon);
-            continue;
-        }
-        stop(daemon);
-    }
+    let bounded = "adopt = \"when_better\"\nbounds = { \"resistance.a\" = [3, 6] }";
+    std::thread::scope(|scope| {
+        scope.spawn(|| not_adopted(bounded, "out of bounds"));
+        scope.spawn(|| not_adopted("adopt = \"ask\"", "dynocar models adopt"));
+    });
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::sync::Mutex;
 
+use dynocar_tests::estimators::frugal_estimators;
 use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
 use dynocar_tests::soak::bad_samples::{Scene, Tally};
@@ -11,7 +12,8 @@ const BY_SINGLE_FORCES: [&str; 3] = ["trajectory_kalman", "trajectory_newton", "
 
 #[test]
 fn bad_samples_are_refused_or_survived_counted_and_never_trusted() {
-    let scenes = [Scene::new(1, TrainType::Freight), Scene::new(2, TrainType::Regional)];
+    let scenes = [(1, TrainType::Freight), (2, TrainType::Regional)]
+        .map(|(seed, train_type)| Scene::new(seed, train_type).before(frugal_estimators()));
     let cases: Vec<(usize, SensorFailure, f64)> = (0..scenes.len())
         .flat_map(|scene| {
             // Half of all samples in the first scene, one of three smaller rates in the second.

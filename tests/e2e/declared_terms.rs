@@ -7,11 +7,11 @@ mod terms;
 
 use std::sync::Arc;
 
-use dynocar_analysis::identify::default_estimators;
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainSample};
+use dynocar_tests::estimators::frugal_estimators;
 
 use drive::Drive;
 use terms::{Declaration, GRADIENT, TRACK, TRAIN, World, declarations};
@@ -91,7 +91,7 @@ fn a_declared_truth_leaves_every_estimate_where_it_was() {
     let base = World::of(TRAIN, TRACK);
     let survey = World::of(TRAIN, &format!("{TRACK}{GRADIENT}")).track;
     let drive = Drive::new(&base.train, &survey, terms::PRESSURE_PA_PER_N);
-    let estimators = default_estimators();
+    let estimators = frugal_estimators();
     let before: Vec<ParameterSnapshot> =
         estimators.iter().map(|it| last_snapshot(it, &base, &drive.samples)).collect();
     for snapshot in &before {

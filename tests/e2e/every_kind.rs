@@ -1,19 +1,13 @@
 //! Every kind of effect, simulated alone, is found by its name.
 
 use dynocar_analysis::explain::answer::Verdict;
-use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
-use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 
-/// The first seed of the matrix of effects.
-const SEED: u64 = 9001;
+use crate::explained::explained;
 
 /// Explains a dataset with one effect of a kind.
 fn is_found(kind: EffectKind) {
-    let request = EffectRequest::Kinds(vec![kind]);
-    let dataset = read_files(&dataset_files(&simulate(&SimulatorSettings::new(SEED, request))));
-    let answer = explain(&dataset, &|_, _| {}).expect("usable runs").answer;
+    let answer = &explained(kind).explanation.answer;
     let verdict = if kind == EffectKind::Unknown { Verdict::Unknown } else { Verdict::Effect };
     assert_eq!(answer.verdict, verdict, "{kind}: {}", answer.statement);
     let found: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();

@@ -13,7 +13,7 @@ fn a_wrong_gradient_is_found_with_its_profile_and_ambiguous_where_all_runs_go_on
     let simulated = simulate(&SimulatorSettings {
         train_type: Some(TrainType::Regional),
         // Enough of them in either direction alone.
-        runs: 20,
+        runs: 16,
         holdout_runs: 4,
         ..SimulatorSettings::new(9001, EffectRequest::Kinds(vec![EffectKind::GradientError]))
     });

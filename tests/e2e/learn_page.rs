@@ -140,8 +140,9 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
     let site = Site::new();
     let (page, hashes) = history(&site);
     let [declared, adopted, rejected, candidate] = hashes.map(|hash| hash.to_string());
+    let mut browser = Browser::start(1280, false);
     for width_px in [1280, 390] {
-        let mut browser = Browser::start(width_px, width_px == 390);
+        browser.show(width_px, width_px == 390);
         let address = format!("file://{}", page.display());
         browser.open(&address);
         let seen = browser.value(LOOK);

@@ -37,6 +37,7 @@ mod two_programs;
 mod declared_terms;
 mod every_kind;
 mod explain;
+mod explained;
 mod forms;
 mod gradient_error;
 mod late_speed;

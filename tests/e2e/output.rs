@@ -95,7 +95,7 @@ fn what_people_read_on_standard_error_survives_its_loss() {
     }
     let site = Site::new();
     let stock = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/import/rolling_stock.yaml");
-    for (number, lost) in [Stdio::null(), closed_pipe(), full_disk()].into_iter().enumerate() {
+    for (number, lost) in [closed_pipe(), full_disk()].into_iter().enumerate() {
         let out = format!("imported{number}");
         let import = (DYNOCAR, &["import", stock, "--train", "ore", "--out", &out][..]);
         let mut import = command(&site, import);
@@ -103,7 +103,7 @@ fn what_people_read_on_standard_error_survives_its_loss() {
         assert_eq!(status.unwrap().code(), Some(0), "import {number}");
         assert!(site.path().join(out).join("train.toml").is_file());
     }
-    for (number, lost) in [Stdio::null(), closed_pipe(), full_disk()].into_iter().enumerate() {
+    for (number, lost) in [closed_pipe(), full_disk()].into_iter().enumerate() {
         let out = format!("dynocar{number}.fmu");
         let mut fmu = command(&site, (DYNOCAR, &["fmu", "-o", &out][..]));
         let status = fmu.current_dir(site.path()).stdout(Stdio::null()).stderr(lost).status();

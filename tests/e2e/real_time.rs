@@ -58,14 +58,20 @@ impl Controller {
             sample.time_ns = monotonic_now_ns();
             let sequence = self.publisher.publish(&mut sample).unwrap();
             let reader = &mut self.reader;
-            await_true(
-                || {
-                    reader.poll();
-                    let all = reader.readings(0).count() == 3;
-                    all && reader.readings(0).all(|it| it.snapshot.sample_sequence >= sequence)
-                },
-                || format!("an answer; standard error:\n{}", daemon.errors()),
-            );
+            let mut is_answered = || {
+                reader.poll();
+                let all = reader.readings(0).count() == 3;
+                all && reader.readings(0).all(|it| it.snapshot.sample_sequence >= sequence)
+            };
+            // An answer comes in some µs: the measured thread is busy all the while.
+            if (0..20).any(|_| {
+                std::thread::sleep(Duration::from_micros(50));
+                is_answered()
+            }) {
+                continue;
+            }
+            let errors = || format!("an answer; standard error:\n{}", daemon.errors());
+            await_true(is_answered, errors);
         }
     }
 }

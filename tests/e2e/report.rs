@@ -1,16 +1,18 @@
 //! The report of `dynocar explain` in a real browser, at the widths of a desktop and a phone. What a
 //! pointer does to its plots is in `report_pointer.rs`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
+use std::sync::LazyLock;
 
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::browser::Browser;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
-use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use dynocar_tests::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, simulate};
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
+/// A train whose runs are explained in a second.
+const SEED: u64 = 23;
 const DESKTOP_PX: u32 = 1280;
 const PHONE_PX: u32 = 390;
 
@@ -50,25 +52,33 @@ const LOOK: &str = r#"(() => {
     };
 })()"#;
 
-struct Report {
-    page: PathBuf,
-    _folder: TempDir,
+/// A page, and the dataset that it was made of.
+pub struct Report {
+    pub page: String,
+    pub simulated: SimulatedDataset,
 }
 
-fn explain(dataset: &Path, page: &Path) -> Output {
+/// A report of an effect, made once for all tests that look at it.
+pub static OF_A_TUNNEL: LazyLock<Report> = LazyLock::new(|| report(&[EffectKind::TunnelDrag]));
+
+/// Runs the command in a dataset's folder: nothing that it writes depends on where that lies.
+fn explain(folder: &Path, page: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dynocar-under-test"))
-        .arg("explain")
-        .arg(dataset)
-        .arg("--report")
-        .arg(page)
+        .current_dir(folder)
+        .args(["explain", ".", "--report", page])
         .output()
         .expect("the program to start")
 }
 
 fn report(kinds: &[EffectKind]) -> Report {
+    let simulated = simulate(&SimulatorSettings::new(SEED, EffectRequest::Kinds(kinds.to_vec())));
+    Report { page: page_of(&simulated), simulated }
+}
+
+/// The page that the command makes of a dataset.
+pub fn page_of(simulated: &SimulatedDataset) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let simulated = simulate(&SimulatorSettings::new(31, EffectRequest::Kinds(kinds.to_vec())));
-    write_dataset(&simulated, folder.path()).unwrap();
+    write_dataset(simulated, folder.path()).unwrap();
     let manifest = folder.path().join("dataset.toml");
     let text = std::fs::read_to_string(&manifest).unwrap();
     let named: Vec<String> = text
@@ -79,20 +89,28 @@ fn report(kinds: &[EffectKind]) -> Report {
         })
         .collect();
     std::fs::write(&manifest, named.join("\n")).unwrap();
-    let page = folder.path().join("report.html");
-    let output = explain(folder.path(), &page);
+    let output = explain(folder.path(), "report.html");
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");
     // Standard error is no terminal here: no bar.
     assert_eq!(errors.lines().count(), 1, "{errors}");
     assert!(errors.starts_with("report: "), "{errors}");
-    Report { page, _folder: folder }
+    std::fs::read_to_string(folder.path().join("report.html")).unwrap()
 }
 
-fn look(report: &Report, width_px: u32, is_dark: bool) -> Value {
-    let mut browser = Browser::start(width_px, is_dark);
-    let address = format!("file://{}", report.page.display());
+/// Opens a page; gives its address.
+pub fn open(browser: &mut Browser, page: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("report.html");
+    std::fs::write(&file, page).unwrap();
+    let address = format!("file://{}", file.display());
     browser.open(&address);
+    address
+}
+
+fn look(browser: &mut Browser, report: &Report, width_px: u32, is_dark: bool) -> Value {
+    browser.show(width_px, is_dark);
+    let address = open(browser, &report.page);
     let seen = browser.value(LOOK);
     let conduct = browser.conduct();
     assert_eq!(conduct.console_errors, [] as [String; 0]);
@@ -122,9 +140,9 @@ const SECTIONS: [&str; 7] = [
 
 #[test]
 fn a_report_of_an_effect_renders_on_desktop_and_phone() {
-    let report = report(&[EffectKind::TunnelDrag]);
+    let mut browser = Browser::start(DESKTOP_PX, false);
     for width_px in [DESKTOP_PX, PHONE_PX] {
-        let seen = look(&report, width_px, false);
+        let seen = look(&mut browser, &OF_A_TUNNEL, width_px, false);
         let sentence = seen["sentence"].as_str().unwrap();
         for words in ["tunnel drag", " km ", "95 % interval", "N/(m/s)²", "falls from"] {
             assert!(sentence.contains(words), "{words}: {sentence}");
@@ -153,7 +171,9 @@ fn a_report_of_an_effect_renders_on_desktop_and_phone() {
 #[test]
 fn a_report_of_nothing_follows_the_dark_scheme() {
     let report = report(&[]);
-    let (light, dark) = (look(&report, DESKTOP_PX, false), look(&report, DESKTOP_PX, true));
+    let mut browser = Browser::start(DESKTOP_PX, false);
+    let [light, dark] =
+        [false, true].map(|is_dark| look(&mut browser, &report, DESKTOP_PX, is_dark));
     assert_eq!(light["sections"][0], "Verdict: Nothing undeclared");
     assert!(light["sentence"].as_str().unwrap().contains("Nothing undeclared acts"));
     assert!(light["plots"].as_u64().unwrap() >= 2 + 1 + 4, "{light:#}");
@@ -182,9 +202,9 @@ fn a_faulty_page_is_seen_to_be_faulty() {
 #[test]
 fn a_report_that_cannot_be_written_is_named() {
     let folder = tempfile::tempdir().unwrap();
-    let simulated = simulate(&SimulatorSettings::new(31, EffectRequest::none()));
+    let simulated = simulate(&SimulatorSettings::new(SEED, EffectRequest::none()));
     write_dataset(&simulated, folder.path()).unwrap();
-    let output = explain(folder.path(), &folder.path().join("no/such/folder/report.html"));
+    let output = explain(folder.path(), "no/such/folder/report.html");
     assert_eq!(output.status.code(), Some(1));
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(errors.contains("report.html: cannot be written"), "{errors}");

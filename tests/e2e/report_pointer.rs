@@ -1,16 +1,11 @@
 //! The plots of a report under a mouse and a keyboard, in a real browser; and the same page without
 //! scripts.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
-
 use dynocar_shared::TrainSample;
-use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::browser::Browser;
-use dynocar_tests::simulator::dataset_writer::write_dataset;
-use dynocar_tests::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, simulate};
 use serde_json::{Value, json};
-use tempfile::TempDir;
+
+use crate::report::{OF_A_TUNNEL, open, page_of};
 
 /// Brings a plot into the window: its box there, its numbers below the axis with their places, and
 /// what a reader sees beside it. `FIGURE` is replaced by a selector.
@@ -39,37 +34,10 @@ const LOOK: &str = r#"(() => {
 
 const TRACE: &str = "#error figure.trace";
 
-struct Report {
-    page: PathBuf,
-    folder: TempDir,
-    simulated: SimulatedDataset,
-}
-
-fn explain(dataset: &Path, page: &Path) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_dynocar-under-test"))
-        .arg("explain")
-        .arg(dataset)
-        .arg("--report")
-        .arg(page)
-        .output()
-        .expect("the program to start");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    std::fs::read_to_string(page).unwrap()
-}
-
-fn report() -> Report {
-    let folder = tempfile::tempdir().unwrap();
-    let settings = SimulatorSettings::new(31, EffectRequest::Kinds(vec![EffectKind::TunnelDrag]));
-    let simulated = simulate(&settings);
-    write_dataset(&simulated, folder.path()).unwrap();
-    let page = folder.path().join("report.html");
-    explain(folder.path(), &page);
-    Report { page, folder, simulated }
-}
-
-fn opened(report: &Report) -> Browser {
+/// A browser that shows the report.
+fn opened() -> Browser {
     let mut browser = Browser::start(1280, false);
-    browser.open(&format!("file://{}", report.page.display()));
+    open(&mut browser, &OF_A_TUNNEL.page);
     browser
 }
 
@@ -112,13 +80,12 @@ fn read(seen: &Value, name: &str) -> f64 {
 
 #[test]
 fn a_pointer_reads_what_was_recorded_and_a_drag_narrows_the_axis() {
-    let report = report();
-    let mut browser = opened(&report);
+    let mut browser = opened();
     let title =
         browser.value("document.querySelector('#error figure.trace figcaption').textContent");
     let file =
         title.as_str().unwrap().split([' ', ',']).find(|word| word.ends_with(".csv")).unwrap();
-    let run = report.simulated.runs.iter().find(|run| run.plan.file() == file).unwrap();
+    let run = OF_A_TUNNEL.simulated.runs.iter().find(|run| run.plan.file() == file).unwrap();
     let time_s = |sample: &TrainSample| 1e-9 * sample.time_ns as f64;
     let seen = look(&mut browser, TRACE);
     assert_eq!(seen["reading"], json!([]), "nothing is shown before a pointer comes");
@@ -172,8 +139,7 @@ fn a_pointer_reads_what_was_recorded_and_a_drag_narrows_the_axis() {
 
 #[test]
 fn keys_read_every_run_as_the_table_says_it() {
-    let report = report();
-    let mut browser = opened(&report);
+    let mut browser = opened();
     let table = browser.value(
         "[...document.querySelectorAll('#error details tbody tr')].map(row => [...row.children].map(cell => cell.textContent))",
     );
@@ -202,23 +168,24 @@ fn keys_read_every_run_as_the_table_says_it() {
 #[test]
 fn without_scripts_the_same_pictures_stand_and_no_address_is_named() {
     const PICTURES: &str = "[...document.querySelectorAll('svg.plot')].map(svg => [svg.innerHTML, svg.getBoundingClientRect().width])";
-    let report = report();
-    let with_scripts = opened(&report).value(PICTURES);
-    let mut browser = Browser::start(1280, false);
+    let mut browser = opened();
+    let with_scripts = browser.value(PICTURES);
     browser.forbid_scripts();
-    browser.open(&format!("file://{}", report.page.display()));
+    open(&mut browser, &OF_A_TUNNEL.page);
     assert_eq!(browser.value("document.querySelectorAll('.hint, output, button').length"), 0);
     assert_eq!(browser.value(PICTURES), with_scripts);
-    let text = std::fs::read_to_string(&report.page).unwrap();
+    let text = &OF_A_TUNNEL.page;
+    // The dataset is named as if it were a picture.
+    let text_beside_name = text.replace("&lt;img src=x", "");
     for foreign in ["://", " src=", "@import", "url(\"", "fetch", "XMLHttp", "WebSocket"] {
-        assert!(!text.contains(foreign), "{foreign}");
+        assert!(!text_beside_name.contains(foreign), "{foreign}");
     }
     // The same command makes the same page, but for the day.
-    let again = explain(report.folder.path(), &report.page);
+    let again = page_of(&OF_A_TUNNEL.simulated);
     let without_day = |text: &str| {
         let (_, rest) = text.split_once("<footer>").unwrap();
         let day = rest.split_once(" on ").unwrap().1.split_once(". ").unwrap().0.to_string();
         text.replace(&day, "")
     };
-    assert!(without_day(&text) == without_day(&again), "the pages differ");
+    assert!(without_day(text) == without_day(&again), "the pages differ");
 }

@@ -18,7 +18,7 @@ const ERROR_MAX: f64 = 0.005;
 
 #[test]
 fn a_locomotive_that_leaps_ahead_of_its_wagons_does_not_pull_harder() {
-    let seeds = 99_001..99_007;
+    let seeds = 99_001..99_005;
     let count = seeds.clone().count() as f64;
     let squares: f64 = seeds
         .map(|seed| {

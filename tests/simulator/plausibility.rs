@@ -5,10 +5,11 @@ use std::path::Path;
 use std::process::Command;
 
 use dynocar::dataset;
-use dynocar_analysis::identify::{default_estimators, identify, published_samples};
+use dynocar_analysis::identify::{identify, published_samples};
 use dynocar_core::plausibility::Severity;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, Status, TrainId};
+use dynocar_tests::estimators::frugal_estimators;
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{
     Defects, Effect, EffectRequest, SimulatorSettings, TrainType, simulate,
@@ -236,7 +237,7 @@ fn no_pipeline_trusts_samples_that_cannot_be_true() {
         write(&files, Some(fault), folder.path());
         let dataset = dataset::load(folder.path()).unwrap();
         let samples = published_samples(&dataset, TrainId(1));
-        for settings in default_estimators() {
+        for settings in frugal_estimators() {
             let kind = settings.kind();
             let snapshot = identify(&dataset, &samples, &settings).unwrap();
             if reason == Reason::ImplausiblePressure && snapshot.reason() != Some(reason) {

@@ -16,7 +16,7 @@ use dynocar_workshop::survey::survey_folder;
 /// Samples of a piece of a run, at 5 Hz.
 const PIECE: usize = 600;
 /// Lines.
-const SEEDS: std::ops::Range<u64> = 31..35;
+const SEEDS: std::ops::Range<u64> = 31..34;
 
 /// Estimators of masses.
 const KINDS: [PipelineKind; 2] = [PipelineKind::MassKalman, PipelineKind::JointLeastSquares];

@@ -125,6 +125,15 @@ impl Browser {
         for domain in ["Page", "Runtime", "Log", "Network"] {
             self.call(&format!("{domain}.enable"), json!({}));
         }
+        self.show(width_px, is_dark);
+    }
+
+    /// Gives the window another width in px, and pages the one or the other scheme of colours.
+    ///
+    /// # Panics
+    ///
+    /// When the browser is gone.
+    pub fn show(&mut self, width_px: u32, is_dark: bool) {
         let metrics = json!({
             "width": width_px, "height": 900, "deviceScaleFactor": 1, "mobile": width_px < 600
         });

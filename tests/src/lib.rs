@@ -4,6 +4,7 @@
 //!
 //! - [`browser`]: a headless browser that says what a page did
 //! - [`documents`]: the pages, their links and the commands that they show
+//! - [`estimators`]: every estimator, at less than the usual cost
 //! - [`fuzz`]: mutations of a corpus thrown at everything that reads foreign bytes
 //! - [`golden`]: what every estimator makes of the recorded runs, bit for bit
 //! - [`power_cut`]: a disk that loses what was not brought to it
@@ -15,6 +16,7 @@
 
 pub mod browser;
 pub mod documents;
+pub mod estimators;
 pub mod fuzz;
 pub mod golden;
 pub mod power_cut;

@@ -89,8 +89,8 @@ impl LatencyArguments {
         let extent = Extent {
             trains: 1,
             traffic: TrafficPlan { rate_hz: self.rate, jitter: 0.0, burst: 1, bad_share: 0.0 },
-            warm_up_s: choose(0.6, 0.8),
-            seconds: self.seconds.unwrap_or(choose(0.2, 2.0)),
+            warm_up_s: choose(0.1, 0.8),
+            seconds: self.seconds.unwrap_or(choose(0.1, 2.0)),
             cores,
             seed: self.place.seed,
         };
@@ -121,7 +121,7 @@ impl LatencyArguments {
         let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event].map(|idle| {
             // Many seconds pass before the first sample of such a rate.
             let traffic = TrafficPlan { rate_hz: 1e-3, ..extent.traffic };
-            let resting = Extent { traffic, seconds: choose(0.5, 5.0), ..extent };
+            let resting = Extent { traffic, seconds: choose(0.3, 5.0), ..extent };
             let trial = in_thread(|| run(&Case::all_fast(idle).setting, &resting))?;
             Ok((idle.to_string(), trial.cpu_percent))
         });

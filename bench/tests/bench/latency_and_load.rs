@@ -59,8 +59,20 @@ fn latency_measures_floor_daemon_and_alternatives_in_one_run() {
 #[test]
 fn load_accounts_for_every_sample_of_every_pipeline() {
     let answer = answer(&[
-        "load", "--quick", "--trains", "3", "--rate", "200", "--burst", "4", "--bad", "0.1",
-        "--json", "-",
+        "load",
+        "--quick",
+        "--trains",
+        "3",
+        "--rate",
+        "200",
+        "--burst",
+        "4",
+        "--bad",
+        "0.1",
+        "--duration",
+        "0.4",
+        "--json",
+        "-",
     ]);
     assert_eq!((number(&answer, "trains"), number(&answer, "rate_hz")), (3.0, 200.0));
     let pipelines = answer["pipelines"].as_array().expect("pipelines");

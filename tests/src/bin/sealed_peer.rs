@@ -12,7 +12,7 @@ use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 /// The ports connect with the first messages, and a new controller wakes every thread that it
 /// knows nothing of for half a second.
-const WARM_UP: Duration = Duration::from_millis(1_200);
+const WARM_UP: Duration = Duration::from_millis(700);
 const CALLS: u64 = 20_000;
 const NEWS: u64 = 50;
 

@@ -81,6 +81,7 @@ pub struct Watched {
 pub struct Scene {
     data: SimulatedDataset,
     samples: Vec<TrainSample>,
+    estimators: Vec<EstimatorSettings>,
 }
 
 impl Scene {
@@ -101,7 +102,12 @@ impl Scene {
                 samples.push(TrainSample { sequence, run, ..*sample });
             }
         }
-        Scene { data, samples }
+        Scene { data, samples, estimators: default_estimators() }
+    }
+
+    /// The same before other estimators than those by default.
+    pub fn before(self, estimators: Vec<EstimatorSettings>) -> Self {
+        Scene { estimators, ..self }
     }
 
     /// Runs every estimator over the samples under a failure; gives those that were misled at the
@@ -133,7 +139,7 @@ impl Scene {
             None => Spoiled { samples: self.samples.clone(), dropped: 0 },
         };
         let mut all = Vec::new();
-        for settings in default_estimators() {
+        for settings in &self.estimators {
             let kind = settings.kind().to_string();
             if !is_wanted(&kind) {
                 continue;
@@ -141,7 +147,7 @@ impl Scene {
             let case = format!("{failure:?} at {rate}, seed {seed}, {kind}");
             let mut watched = Watched { kind, tally: Tally::default(), misled_at_end: None };
             let misled = |what| Misled { failure, rate, kind: watched.kind.clone(), what };
-            let last = self.feed(&settings, &spoiled, failure, &case, |run, it| {
+            let last = self.feed(settings, &spoiled, failure, &case, |run, it| {
                 // Before a train departs, the mass of the run before may stand.
                 let wrong = self.misled(it, run).and_then(|_| self.misled(it, run.max(2) - 1));
                 watched.tally.add(it, wrong.is_some());

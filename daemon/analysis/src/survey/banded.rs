@@ -55,23 +55,28 @@ impl Banded {
     ///
     /// When the matrix is not positive definite.
     pub fn factor(mut self) -> Result<Factor, NotPositive> {
-        let stride = self.width + 1;
-        for i in 0..self.size {
-            let first = i.saturating_sub(self.width);
-            for j in first..=i {
-                let from = first.max(j.saturating_sub(self.width));
-                // Both rows lie in memory from the diagonal to the left.
-                let (row_i, row_j) = (i * stride + i, j * stride + j);
-                let mut sum = self.below[row_i - j];
-                for k in from..j {
-                    sum -= self.below[row_i - k] * self.below[row_j - k];
-                }
-                if j < i {
-                    self.below[row_i - j] = sum / self.below[j * stride];
-                } else if sum > 0.0 {
-                    self.below[i * stride] = sum.sqrt();
-                } else {
-                    return Err(NotPositive { row: i, pivot: sum });
+        let (width, stride) = (self.width, self.width + 1);
+        // Of a column what lies below the diagonal, the lowest first: as rows lie in memory.
+        let mut column = vec![0.0; width];
+        for k in 0..self.size {
+            let pivot = self.below[k * stride];
+            if !(pivot > 0.0) {
+                return Err(NotPositive { row: k, pivot });
+            }
+            let root = pivot.sqrt();
+            self.below[k * stride] = root;
+            let last = (k + width).min(self.size - 1);
+            for i in k + 1..=last {
+                let entry = &mut self.below[i * stride + i - k];
+                *entry /= root;
+                column[width - (i - k)] = *entry;
+            }
+            // Columns to the right lose the products one by one: nothing waits for a sum.
+            for i in k + 1..=last {
+                let own = column[width - (i - k)];
+                let row = &mut self.below[i * stride..i * stride + i - k];
+                for (entry, other) in row.iter_mut().zip(&column[width - (i - k)..]) {
+                    *entry -= own * other;
                 }
             }
         }

@@ -74,10 +74,14 @@ impl StepProfile {
         let span_m = starts_m[starts_m.len() - 1] - starts_m[0];
         let bucket_count = 4 * entries.len();
         let buckets_per_m = if span_m > 0.0 { bucket_count as f64 / span_m } else { 0.0 };
+        let mut entry = 0;
         let buckets = (0..bucket_count)
             .map(|bucket| {
                 let chainage_m = starts_m[0] + bucket as f64 / buckets_per_m.max(f64::MIN_POSITIVE);
-                starts_m.partition_point(|&start| start <= chainage_m).saturating_sub(1) as u32
+                while starts_m.get(entry + 1).is_some_and(|&start| start <= chainage_m) {
+                    entry += 1;
+                }
+                entry as u32
             })
             .collect();
         Ok(StepProfile { starts_m, values, cumulative, buckets, buckets_per_m })

@@ -16,7 +16,9 @@ pub const DAVIS: Davis = Davis { a: 1.53, b: 0.0, c: 0.0111 };
 /// Rotating mass over mass.
 const ROTATING: f64 = 0.05;
 /// Tick of the simulation in s.
-const TICK_S: f64 = 1e-3;
+const TICK_S: f64 = 1e-3 * TICK_MS as f64;
+/// The same in ms: a divisor of every step between samples.
+const TICK_MS: u32 = 2;
 /// Brake-cylinder pressure in Pa over the brake force in N.
 const PA_PER_N: f64 = 2.0;
 const GRAVITY: f64 = 9.81;
@@ -210,8 +212,8 @@ impl Drive {
         let mut noise = ChaCha8Rng::seed_from_u64(self.seed ^ 0x5eed);
         let mut all = Vec::new();
         let ramp_n = 150_000.0 * TICK_S;
-        for tick in 0..420_000_u32 {
-            let is_sampled = tick.is_multiple_of(self.step_ms);
+        for now_ms in (0..420_000_u32).step_by(TICK_MS as usize) {
+            let is_sampled = now_ms.is_multiple_of(self.step_ms);
             let before = simulation.force_n;
             match self.forces {
                 Forces::Jumping => simulation.force_n = simulation.control(),
@@ -223,7 +225,7 @@ impl Drive {
                 }
             }
             if is_sampled {
-                all.push((self.measure(&simulation, tick, &mut noise), simulation.phase));
+                all.push((self.measure(&simulation, now_ms, &mut noise), simulation.phase));
             }
             if self.forces == Forces::Past && is_sampled {
                 simulation.force_n = simulation.control();
@@ -240,9 +242,9 @@ impl Drive {
         all
     }
 
-    fn measure(&self, simulation: &Simulation, tick: u32, noise: &mut ChaCha8Rng) -> TrainSample {
+    fn measure(&self, simulation: &Simulation, now_ms: u32, noise: &mut ChaCha8Rng) -> TrainSample {
         let mut sample = TrainSample::empty(TrainId(1));
-        sample.time_ns = 1_000_000_000 + i64::from(tick) * 1_000_000;
+        sample.time_ns = 1_000_000_000 + i64::from(now_ms) * 1_000_000;
         sample.direction = 1;
         sample.run = 1;
         let true_mps = simulation.speed_mps;

@@ -3,9 +3,9 @@
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainId};
+use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainId, TrainSample};
 
-use super::drive::{DAVIS, Drive, FRICTION, MASS_KG, Phase, train};
+use super::drive::{DAVIS, FRICTION, MASS_KG, Phase, train};
 
 /// Standard deviations within which a trusted value must lie, unless it is this close as a share.
 const STDS_MAX: f64 = 4.0;
@@ -48,14 +48,14 @@ fn misled(snapshot: &ParameterSnapshot, carried: f64) -> Option<String> {
     })
 }
 
-/// Runs an estimator of given settings over a drive.
-pub fn run(settings: &EstimatorSettings, drive: &Drive) -> Found {
+/// Runs an estimator of given settings over a drive's samples.
+pub fn run(settings: &EstimatorSettings, samples: &[(TrainSample, Phase)]) -> Found {
     let train = train();
     let estimator = settings.build(&train).expect("default settings");
     let mut pipeline = Pipeline::new(TrainId(1), 0, train, None, estimator);
     let mut found = Found::default();
     let mut carried = 0.0;
-    for (index, (sample, phase)) in drive.samples().iter().enumerate() {
+    for (index, (sample, phase)) in samples.iter().enumerate() {
         if *phase == Phase::Braking {
             carried = sample.brake_force_n / (STANDARD_GRAVITY_MPS2 * MASS_KG);
         }
