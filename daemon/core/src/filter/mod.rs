@@ -17,7 +17,6 @@
 //! - [`bank`]: hypotheses side by side, weighed by evidence; [`mixture`]: beliefs mixed by weight
 //! - [`lanes`]: sums and powers over slices
 
-pub mod adjoint;
 pub mod bank;
 mod bounded;
 pub mod drifting_level;
@@ -29,7 +28,6 @@ pub mod levenberg_marquardt;
 mod line;
 mod median;
 mod mils;
-pub mod mixture;
 pub mod particle;
 pub mod random;
 mod rank_one;

@@ -12,9 +12,7 @@
 pub mod balance;
 pub mod diagnosis;
 pub mod input_fault;
-pub mod pressure;
 pub mod watch;
-pub mod words;
 
 use std::sync::Arc;
 

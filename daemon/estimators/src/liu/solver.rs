@@ -1,12 +1,10 @@
 //! The recursions of Liu 2018 behind one face.
 
 use dynocar_core::filter::{Forgetting, Mils, NotPositiveDefinite, Penalty, Rls};
-use dynocar_core::pipeline::momentum::settings::DataSettings;
-use dynocar_core::pipeline::momentum::{PARAMETERS, UNKNOWNS};
+use dynocar_core::pipeline::momentum::{DataSettings, PARAMETERS, UNKNOWNS};
 
 use crate::resistance::noise_bank::NoiseBank;
-use crate::resistance::noise_model::WhiteRow;
-use crate::resistance::regression::{Solution, Unknowns};
+use crate::resistance::regression::{Solution, Unknowns, WhiteRow};
 use crate::resistance::settings::{INNOVATION_LENGTH_MAX, MilsSettings, RlsSettings};
 
 /// One of the paper's algorithms.
@@ -119,7 +117,7 @@ impl Solver {
     /// The solution so far; `None` while there is none.
     pub fn solution(&self, bank: &NoiseBank) -> Option<Solution> {
         let (estimate, covariance) = match self {
-            Solver::Batch => return bank.mixture(),
+            Solver::Batch => return bank.mixture,
             Solver::Rls(rls) => (*rls.estimate(), *rls.covariance()),
             Solver::Mils(recursion) | Solver::VMils { recursion, .. } => {
                 (*recursion.estimate(), recursion.covariance())

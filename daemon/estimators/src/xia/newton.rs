@@ -3,7 +3,7 @@
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
 use dynocar_core::pipeline::judge::InputHealth;
 use dynocar_core::pipeline::motion::SpeedRange;
-use dynocar_core::pipeline::output::write_parameters;
+use dynocar_core::pipeline::output::{DAVIS, write_parameters};
 use dynocar_core::pipeline::sample_gate::{Gated, SampleGate};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, Outcome};
@@ -12,17 +12,16 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Matrix3, Vector3};
 
-use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSettings};
+use super::newton_settings::{FitMethod, TrajectoryNewtonSettings};
 use super::window::Window;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::xia::trajectory::fit::{FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
-use crate::xia::trajectory::index::DAVIS;
-use crate::xia::trajectory::long_run::LongRunVariance;
-use crate::xia::trajectory::motion::{Motion, MotionTracker};
-use crate::xia::trajectory::quality::Estimate;
+use crate::xia::trajectory::motion::{Motion, MotionTracker, UnexplainedForce};
+use crate::xia::trajectory::quality::{Estimate, LongRunVariance};
 use crate::xia::trajectory::step::StepRule;
-use crate::xia::trajectory::unexplained::UnexplainedForce;
 
+/// Speed noise before the first window, in m/s.
+const SPEED_NOISE_FIRST_MPS: f64 = 0.1;
 /// Windows that the learned speed noise looks back over.
 const NOISE_WINDOWS: f64 = 50.0;
 /// Innovations that the published statistics look back over.
@@ -38,7 +37,10 @@ const LONG_RUN_BLOCKS: f64 = 60.0;
 /// Fits Davis coefficients to the newest window each time a step is completed.
 #[derive(Clone, Debug)]
 pub struct TrajectoryNewton {
-    settings: CheckedSettings,
+    settings: TrajectoryNewtonSettings,
+    prior_std: Vector3<f64>,
+    /// Root of the density of the disturbance in m/s² √s.
+    disturbance_mps2: f64,
     newton: NewtonSettings,
     fit: FitSettings,
     speed_noise_mps: f64,
@@ -74,8 +76,8 @@ impl TrajectoryNewton {
         settings: &TrajectoryNewtonSettings,
         train: &TrainModel,
     ) -> Result<Self, SettingError> {
-        let settings = settings.checked(train)?;
-        let CheckedSettings { bounds, prior, window: capacity, .. } = settings;
+        let (bounds, prior) = settings.checked(train)?;
+        let capacity = settings.window as usize;
         let rule = match settings.method {
             FitMethod::LevenbergMarquardt => StepRule::Time,
             FitMethod::WolfeNewton => StepRule::Distance,
@@ -93,7 +95,7 @@ impl TrajectoryNewton {
                 decrease_tolerance: 1e-4,
                 ..FitSettings::new(rule)
             },
-            speed_noise_mps: settings.speed_noise_mps,
+            speed_noise_mps: settings.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS),
             source: RestartSource::new(settings.seed),
             gate: SampleGate::default(),
             tracker: MotionTracker::default(),
@@ -111,7 +113,9 @@ impl TrajectoryNewton {
             is_consistent: true,
             health: InputHealth::default(),
             fault: None,
-            settings,
+            prior_std: prior.std,
+            disturbance_mps2: settings.disturbance_mps2(train),
+            settings: *settings,
         })
     }
 
@@ -119,8 +123,8 @@ impl TrajectoryNewton {
     fn take_window(&mut self) -> Outcome {
         self.judge_prediction();
         let needed = match self.settings.method {
-            FitMethod::LevenbergMarquardt => self.settings.window / 2,
-            FitMethod::WolfeNewton => self.settings.window,
+            FitMethod::LevenbergMarquardt => self.settings.window as usize / 2,
+            FitMethod::WolfeNewton => self.settings.window as usize,
         };
         if self.window.count() < needed {
             return Outcome::Used;
@@ -128,7 +132,7 @@ impl TrajectoryNewton {
         self.fit.speed_noise_mps = Some(self.speed_noise_mps);
         let fitted = match self.settings.method {
             FitMethod::LevenbergMarquardt => {
-                let density = self.settings.disturbance_mps2.powi(2) + self.window.missed_density();
+                let density = self.disturbance_mps2.powi(2) + self.window.missed_density();
                 self.fit.disturbance_ratio = density / self.speed_noise_mps.powi(2);
                 let start = (self.windows > 0).then_some(self.davis);
                 self.fitter.fit(&[self.window.segment()], start.as_ref(), &self.fit)
@@ -185,9 +189,9 @@ impl TrajectoryNewton {
         let variance = self.speed_noise_mps * self.speed_noise_mps;
         let limit = variance * (1.0 + EXCESS_MAX * (2.0 / fit.samples as f64).sqrt());
         // The noise before the first window is a guess.
-        let is_first = self.settings.learns_noise && self.windows == 1;
+        let is_first = self.settings.speed_noise_mps.is_none() && self.windows == 1;
         self.is_consistent = is_first || (shown <= limit && fit.outliers == 0);
-        if self.settings.learns_noise {
+        if self.settings.speed_noise_mps.is_none() {
             let gain = 1.0 / (self.windows as f64).min(NOISE_WINDOWS);
             // What is wrong with one window is hardly noise of the next.
             let believed = if is_first { shown } else { shown.min(limit) };
@@ -212,8 +216,8 @@ impl TrajectoryNewton {
         };
         // The end of a line through n points has about 4 / n of a point's variance.
         let spread = 1.0 + 4.0 / segment.steps.len() as f64 + end_variance;
-        let variance = spread * self.speed_noise_mps.powi(2)
-            + self.settings.disturbance_mps2.powi(2) * duration_s;
+        let variance =
+            spread * self.speed_noise_mps.powi(2) + self.disturbance_mps2.powi(2) * duration_s;
         let normalised = (measured_mps - advance.speed_mps) / variance.sqrt();
         self.innovations.push(normalised);
         self.long_run.push(normalised, duration_s);
@@ -285,7 +289,7 @@ impl Estimator for TrajectoryNewton {
         let estimate = Estimate {
             davis: self.davis,
             covariance,
-            prior_std: self.settings.prior.std,
+            prior_std: self.prior_std,
             speeds: self.speeds,
             innovations: &self.innovations,
             inflation,

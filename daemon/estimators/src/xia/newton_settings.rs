@@ -11,9 +11,6 @@ use serde::Deserialize;
 use crate::xia::trajectory::fit::DavisPrior;
 use crate::xia::trajectory::quality::prior_std;
 
-/// Speed noise before the first window, in m/s.
-const SPEED_NOISE_FIRST_MPS: f64 = 0.1;
-
 /// How a window is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -55,12 +52,15 @@ settings! {
 }
 
 impl TrajectoryNewtonSettings {
-    /// The settings for a train, in the estimator's units.
+    /// Bounds and prior for a train.
     ///
     /// # Errors
     ///
     /// When a setting lies outside its range.
-    pub(crate) fn checked(&self, train: &TrainModel) -> Result<CheckedSettings, SettingError> {
+    pub(crate) fn checked(
+        &self,
+        train: &TrainModel,
+    ) -> Result<(ParameterBox<3>, DavisPrior), SettingError> {
         self.check_ranges()?;
         let davis = train.resistance;
         let std = prior_std(train, self.prior_relative_std);
@@ -74,38 +74,16 @@ impl TrajectoryNewtonSettings {
             let is_allowed = low.is_finite() && high.is_finite() && low < high;
             require(is_allowed, "high", high, "finite numbers above those of `low`")?;
         }
-        Ok(CheckedSettings {
-            method: self.method,
-            window: self.window as usize,
-            interval_m: self.interval_m,
-            bounds,
-            prior: DavisPrior { davis, std },
-            speed_noise_mps: self.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS),
-            learns_noise: self.speed_noise_mps.is_none(),
-            disturbance_mps2: match self.method {
-                FitMethod::LevenbergMarquardt => {
-                    self.disturbance_n_per_kn_sqrt_s * mps2_per_n_per_kn(train.rotating_mass_factor)
-                }
-                FitMethod::WolfeNewton => 0.0,
-            },
-            mean_square_max: self.mean_square_max,
-            seed: self.seed,
-        })
+        Ok((bounds, DavisPrior { davis, std }))
     }
-}
 
-/// Settings within their ranges, in the estimator's units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct CheckedSettings {
-    pub method: FitMethod,
-    pub window: usize,
-    pub interval_m: f64,
-    pub bounds: ParameterBox<3>,
-    pub prior: DavisPrior,
-    pub speed_noise_mps: f64,
-    pub learns_noise: bool,
-    /// Root of the disturbance's density in m/s² √s.
-    pub disturbance_mps2: f64,
-    pub mean_square_max: f64,
-    pub seed: u64,
+    /// Root of the density of the disturbance in m/s² √s.
+    pub(crate) fn disturbance_mps2(&self, train: &TrainModel) -> f64 {
+        match self.method {
+            FitMethod::LevenbergMarquardt => {
+                self.disturbance_n_per_kn_sqrt_s * mps2_per_n_per_kn(train.rotating_mass_factor)
+            }
+            FitMethod::WolfeNewton => 0.0,
+        }
+    }
 }

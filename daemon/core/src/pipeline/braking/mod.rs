@@ -15,11 +15,9 @@
 
 pub mod engine;
 pub mod estimator;
-pub mod gear;
 pub mod intake;
 pub mod law;
 pub mod law_bank;
 pub mod motion;
-pub mod report;
 pub mod settings;
 pub mod tracker;

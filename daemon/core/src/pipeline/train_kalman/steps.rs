@@ -3,11 +3,11 @@
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::wind;
 
+use super::TrainKalmanSettings;
 use super::acting_forces::ActingForces;
+use super::learned::Resistance;
 use super::motion_filter::{Step, wind_over};
-use super::prior::Resistance;
-use super::settings::TrainKalmanSettings;
-use crate::pipeline::momentum::sample::UnitSample;
+use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
