@@ -5,7 +5,6 @@
 //! are not `Send`: open them in the thread that uses them.
 
 mod count;
-mod held;
 mod ports;
 mod service;
 mod transport;

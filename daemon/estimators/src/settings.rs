@@ -23,7 +23,7 @@ use crate::wang::{
     StagedDescentSettings,
 };
 use crate::xia::newton::TrajectoryNewton;
-use crate::xia::newton_settings::TrajectoryNewtonSettings;
+use crate::xia::newton::TrajectoryNewtonSettings;
 use crate::xia::trajectory::kalman::TrajectoryKalmanSettings;
 use crate::xie::EmSettings;
 

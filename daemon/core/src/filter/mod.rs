@@ -46,7 +46,7 @@ pub use information::SquareRootInformation;
 pub use line::FittedLine;
 pub use median::RunningMedian;
 pub use mils::{Mils, Penalty};
-pub use rls::{Forgetting, Rls};
+pub use rls::Rls;
 pub use whitening::{Propagation, Sighting, UnitRow, Whitener};
 
 /// A belief or a measurement is not sound: a matrix that should be positive definite is not.

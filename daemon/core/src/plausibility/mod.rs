@@ -27,7 +27,6 @@ use watch::Watch;
 /// Judges the samples of one train as they come.
 #[derive(Clone, Debug)]
 pub struct Plausibility {
-    train: Arc<TrainModel>,
     watch: Watch,
     detected: DetectedFaults,
 }
@@ -35,7 +34,7 @@ pub struct Plausibility {
 impl Plausibility {
     /// Nothing seen yet of a train.
     pub fn new(train: Arc<TrainModel>) -> Self {
-        Plausibility { watch: Watch::new(&train), train, detected: DetectedFaults::default() }
+        Plausibility { watch: Watch::new(train), detected: DetectedFaults::default() }
     }
 
     /// Takes in a sample with what validation said of it, and the gradient in ‰ along the travel.
@@ -65,7 +64,7 @@ impl Plausibility {
             ) => false,
             Err(_) => return,
         };
-        if self.watch.take(&self.train, sample, is_valid, gradient_permille) {
+        if self.watch.take(sample, is_valid, gradient_permille) {
             self.detected = diagnosis::diagnose(&self.watch.figures());
         }
     }

@@ -2,6 +2,8 @@
 //!
 //! Whether the brake-cylinder pressure has the size that brakes work with.
 
+use std::sync::Arc;
+
 use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainSample};
@@ -70,8 +72,7 @@ struct Distances {
 /// Follows the samples of one train; of fixed size.
 #[derive(Clone, Debug)]
 pub struct Watch {
-    nominal_mass_kg: f64,
-    rotating_mass_factor: f64,
+    train: Arc<TrainModel>,
     last: Option<TrainSample>,
     usual_step_s: f64,
     gradient_permille: f64,
@@ -87,10 +88,9 @@ pub struct Watch {
 
 impl Watch {
     /// A watch over the samples of a train as it is declared.
-    pub fn new(train: &TrainModel) -> Self {
+    pub fn new(train: Arc<TrainModel>) -> Self {
         Watch {
-            nominal_mass_kg: train.mass_kg,
-            rotating_mass_factor: train.rotating_mass_factor,
+            train,
             last: None,
             usual_step_s: 0.0,
             gradient_permille: 0.0,
@@ -116,7 +116,6 @@ impl Watch {
     /// Bounded work, no allocation.
     pub fn take(
         &mut self,
-        train: &TrainModel,
         sample: &TrainSample,
         is_valid: bool,
         gradient_permille: Option<f64>,
@@ -145,7 +144,7 @@ impl Watch {
             self.window.refused_s += step_s;
         }
         let is_compared = self.compare_distances(&last, sample, step_s);
-        self.extend_window(train, &last, sample, step_s) || is_compared
+        self.extend_window(&last, sample, step_s) || is_compared
     }
 
     /// What the samples so far say.
@@ -189,13 +188,7 @@ impl Watch {
         true
     }
 
-    fn extend_window(
-        &mut self,
-        train: &TrainModel,
-        last: &TrainSample,
-        now: &TrainSample,
-        step_s: f64,
-    ) -> bool {
+    fn extend_window(&mut self, last: &TrainSample, now: &TrainSample, step_s: f64) -> bool {
         let (Some(before), Some(after)) = (forces_n(last), forces_n(now)) else {
             self.window = Window::default();
             return false;
@@ -205,7 +198,7 @@ impl Watch {
             self.window = Window::default();
             return false;
         }
-        let mass_kg = now.get(SampleField::Mass).unwrap_or(self.nominal_mass_kg);
+        let mass_kg = now.get(SampleField::Mass).unwrap_or(self.train.mass_kg);
         let window = &mut self.window;
         if window.elapsed_s == 0.0 {
             window.start_mps = last.speed_mps;
@@ -224,14 +217,16 @@ impl Watch {
         if window.refused_s > 0.0 && window.refused_s < REFUSED_SHARE_MIN * window.elapsed_s {
             return false;
         }
-        self.close(train, window, now.speed_mps, mass_kg);
+        self.close(window, now.speed_mps, mass_kg);
         true
     }
 
-    fn close(&mut self, train: &TrainModel, window: Window, end_mps: f64, mass_kg: f64) {
+    fn close(&mut self, window: Window, end_mps: f64, mass_kg: f64) {
         let per_s = 1.0 / window.elapsed_s;
         let mean = WindowMean {
-            inertia_mps2: (1.0 + self.rotating_mass_factor) * (end_mps - window.start_mps) * per_s,
+            inertia_mps2: (1.0 + self.train.rotating_mass_factor)
+                * (end_mps - window.start_mps)
+                * per_s,
             traction_mps2: window.traction_mps * per_s,
             brake_mps2: window.brake_mps * per_s,
             gradient_mps2: window.gradient_mps * per_s,
@@ -239,8 +234,9 @@ impl Watch {
         };
         self.balance.push(&mean);
         self.masses += 1.0;
-        self.mass_ratio = mass_kg / self.nominal_mass_kg;
-        let curves = [(&train.traction, mean.traction_mps2), (&train.brake, mean.brake_mps2)];
+        self.mass_ratio = mass_kg / self.train.mass_kg;
+        let curves =
+            [(&self.train.traction, mean.traction_mps2), (&self.train.brake, mean.brake_mps2)];
         for (share, (curve, force_mps2)) in self.effort_shares.iter_mut().zip(curves) {
             *share -= EFFORT_FADE * *share;
             if let Some(curve) = curve {

@@ -76,10 +76,11 @@ pub fn regularised(
     settings: &MilsSettings,
 ) -> Result<ResistanceLeastSquares, SettingError> {
     settings.check_ranges()?;
+    let innovations = settings.innovation_length as usize;
     let solver = match kind {
-        PipelineKind::RegularisedRls => Solver::mils(settings, 1),
-        PipelineKind::VMils => Solver::v_mils(settings),
-        _ => Solver::mils(settings, settings.innovation_length as usize),
+        PipelineKind::RegularisedRls => Solver::mils(settings, 1, None),
+        PipelineKind::VMils => Solver::mils(settings, innovations, Some(settings.bad_beyond)),
+        _ => Solver::mils(settings, innovations, None),
     };
     Ok(ResistanceLeastSquares::new(kind, train, settings.data, solver, settings.lambda, 1.0))
 }

@@ -64,16 +64,6 @@ impl Collected {
         Collected { last: first, step_s: 0.0, skipped_s: 0.0, gain: 0.0, demand: 0.0, tied: 0.0 }
     }
 
-    /// Lets time pass at a sample that lacks something.
-    fn skip(&mut self, step_s: f64) {
-        self.skipped_s += step_s;
-    }
-
-    /// Time in s since the step began.
-    fn span_s(&self) -> f64 {
-        self.step_s + self.skipped_s
-    }
-
     fn add(&mut self, known: Known, step_s: f64) {
         let step_s = self.skipped_s + step_s;
         self.skipped_s = 0.0;
@@ -132,7 +122,8 @@ impl BrakingIntake {
     pub fn take(&mut self, sample: &ResolvedSample) -> Intake {
         let gap_max_s = self.settings.gap_max_s;
         self.braking = self.braking.filter(|braking| {
-            let collected_s = braking.collected.span_s() + sample.step_s;
+            let Collected { step_s, skipped_s, .. } = braking.collected;
+            let collected_s = step_s + skipped_s + sample.step_s;
             braking.segment == sample.segment && collected_s <= gap_max_s
         });
         let known = match self.known(sample) {
@@ -143,7 +134,7 @@ impl BrakingIntake {
             }
             Err(reason) => {
                 if let Some(braking) = &mut self.braking {
-                    braking.collected.skip(sample.step_s);
+                    braking.collected.skipped_s += sample.step_s;
                 }
                 return Intake::Missing(reason);
             }

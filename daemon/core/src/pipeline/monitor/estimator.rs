@@ -39,13 +39,6 @@ const CUT: f64 = 3.0;
 const WHEEL_STDS: f64 = 3.5;
 /// Samples over which the time between samples is averaged.
 const PERIOD_SAMPLES: f64 = 100.0;
-/// The force that the model does not explain.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Unexplained {
-    n_per_kn: f64,
-    std_n_per_kn: f64,
-}
-
 /// Watches the residual between model and measurement.
 #[derive(Clone, Debug)]
 pub struct ResidualMonitor {
@@ -79,7 +72,8 @@ pub struct ResidualMonitor {
     known: Davis,
     /// Where and with which momentum the newest block ended.
     last_block: Option<(Option<f64>, f64)>,
-    unexplained: Unexplained,
+    /// The force that nothing explains in N/kN, and its standard deviation.
+    unexplained: (f64, f64),
     weight_kn: f64,
     speeds: SpeedRange,
     resets: u64,
@@ -122,10 +116,7 @@ impl ResidualMonitor {
             model: Parameters::zeros(),
             known: declared,
             last_block: None,
-            unexplained: Unexplained {
-                n_per_kn: 0.0,
-                std_n_per_kn: settings.davis_std_share * declared.w0_n_per_kn(20.0),
-            },
+            unexplained: (0.0, settings.davis_std_share * declared.w0_n_per_kn(20.0)),
             weight_kn: TrainModel::weight_kn(train.mass_kg),
             speeds: SpeedRange::default(),
             resets: 0,
@@ -289,7 +280,7 @@ impl ResidualMonitor {
             weights[parameter] += units[parameter];
         }
         let total = self.verdict.scale * (variance + believed.variance_of(&weights));
-        self.unexplained = Unexplained { n_per_kn: value, std_n_per_kn: total.max(0.0).sqrt() };
+        self.unexplained = (value, total.max(0.0).sqrt());
     }
 
     fn note_since(&mut self) {
@@ -361,8 +352,8 @@ impl Estimator for ResidualMonitor {
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
-        let force_n = self.unexplained.n_per_kn * self.weight_kn;
-        let std_n = self.unexplained.std_n_per_kn * self.weight_kn;
+        let force_n = self.unexplained.0 * self.weight_kn;
+        let std_n = self.unexplained.1 * self.weight_kn;
         let (values, covariance) = (Vector1::new(force_n), Vector1::new(std_n * std_n));
         write_parameters(snapshot, [Parameter::UnexplainedForce], &values, &covariance);
         let named = self.verdict.naming.named();

@@ -13,7 +13,7 @@ use super::bank::Measured;
 use super::braking_watch::BrakingWatch;
 use super::learned::{JumpShare, Learned, Resistance};
 use super::load::{Change, LoadWatch};
-use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, Step, wind_over};
+use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
 use super::report::{Report, Systematic};
 use super::steps::Steps;
 use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
@@ -114,15 +114,10 @@ impl TrainKalman {
         Outcome::Used
     }
 
-    /// The step to a sample, with what is learned beside the state.
-    fn step(&mut self, from: &UnitSample, to: &UnitSample, sample: &ResolvedSample) -> Step {
-        let delay_s = self.learned.bank.likeliest().belief.mean[FORCE_DELAY];
-        let step = self.steps.to((from, to), sample, delay_s, &self.first);
-        Step { jump_share: self.learned.jumps.share, ..step }
-    }
-
     fn advance(&mut self, from: UnitSample, now: UnitSample, sample: &ResolvedSample) -> Outcome {
-        let step = self.step(&from, &now, sample);
+        let learned =
+            (self.learned.bank.likeliest().belief.mean[FORCE_DELAY], self.learned.jumps.share);
+        let step = self.steps.to((&from, &now), sample, learned, &self.first);
         if self.braking.begins(now.brake) {
             self.before_braking = self.learned.clone();
         }

@@ -5,9 +5,8 @@
 use dynocar_model::track::gradient_error_kept;
 use nalgebra::{SMatrix, SVector};
 
-use super::acting_forces::Acting;
 use crate::filter::Gaussian;
-use crate::pipeline::momentum::{UnitSample, regressors};
+use crate::pipeline::momentum::regressors;
 use crate::pipeline::motion::jump_variance;
 
 /// Index of the speed in m/s.
@@ -90,34 +89,6 @@ pub struct Step {
     pub wind: (f64, f64),
     /// Variance that comes to the scale of the brake force, and its greatest.
     pub brake_variance: (f64, f64),
-}
-
-impl Step {
-    /// Between two samples of one segment; what is learned on the way is the caller's to fill in.
-    pub fn between(from: &UnitSample, to: &UnitSample, acting: &Acting) -> Self {
-        let duration_s = to.seconds_since(from);
-        let half_s = 0.5 * duration_s;
-        Step {
-            duration_s,
-            travelled_m: half_s * (from.speed_mps + to.speed_mps),
-            inertia: to.inertia,
-            delay_s: acting.delay_s,
-            traction: acting.impulses[0],
-            brake: acting.impulses[1],
-            known: half_s * (from.known + to.known),
-            traction_change: acting.changes[0],
-            brake_change: acting.changes[1],
-            impulse_variance: 0.0,
-            jump_share: 1.0,
-            force_rate: 0.0,
-            map_std_permille: 0.0,
-            drift_variance: 0.0,
-            by_wind: 0.0,
-            by_wind_square: 0.0,
-            wind: (1.0, 0.0),
-            brake_variance: (0.0, 0.0),
-        }
-    }
 }
 
 /// The filter under one behaviour of the disturbance.

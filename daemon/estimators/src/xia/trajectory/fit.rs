@@ -79,7 +79,6 @@ impl TrajectoryFitter {
                     noise_mps,
                     prior.as_ref(),
                     &settings.bounds,
-                    &Vector3::from(SCALES),
                     &settings.bounds.clamp(&from),
                 )
                 .ok_or(FitError::NotFinite { segment: 0 })?
@@ -141,7 +140,6 @@ pub fn integral_start(
     speed_noise_mps: f64,
     prior: Option<&TriangularSystem<3>>,
     bounds: &ParameterBox<3>,
-    scales: &Vector3<f64>,
     from: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
     let mut joint = TriangularAccumulator::<4>::default();
@@ -158,7 +156,7 @@ pub fn integral_start(
         }
     }
     let settings = SolverSettings {
-        scales: *scales,
+        scales: Vector3::from(SCALES),
         iterations_max: 4,
         decrease_tolerance: 1e-6,
         relative_tolerance: 1e-12,
@@ -327,8 +325,7 @@ mod integral_start_tests {
 
     fn start(segments: &[MotionSegment<'_>], rule: StepRule) -> Vector3<f64> {
         let bounds = ParameterBox { low: Vector3::repeat(-10.0), high: Vector3::repeat(10.0) };
-        let scales = Vector3::new(1.0, 0.02, 0.001);
-        integral_start(segments, rule, 0.1, None, &bounds, &scales, &scales).unwrap()
+        integral_start(segments, rule, 0.1, None, &bounds, &Vector3::from(SCALES)).unwrap()
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::motion::tests::sample;
 use super::test_runs::{METRO, metro, normal, random};
 use crate::EstimatorSettings;
 use crate::xia::newton::TrajectoryNewton;
-use crate::xia::newton_settings::{FitMethod, TrajectoryNewtonSettings};
+use crate::xia::newton::{FitMethod, TrajectoryNewtonSettings};
 
 /// The metro as declared: a fifth off in every coefficient.
 fn train() -> Arc<TrainModel> {
