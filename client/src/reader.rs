@@ -1,6 +1,4 @@
-//! The end a controller polls snapshots from.
-//!
-//! Which pipeline answers which quantity, as the daemon says in its snapshots.
+//! The end a controller polls snapshots from, and which pipeline answers which quantity, as they say.
 
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::snapshot::PARAMETERS_MAX;

@@ -1,6 +1,5 @@
-//! Sending and receiving ends, the transport's ports behind trait objects.
-//!
-//! The two ends of each payload, written for each one, so that they are compiled in this crate.
+//! Sending and receiving ends, the transport's ports behind trait objects; written for each payload, so that they
+//! are compiled in this crate.
 
 use std::fmt::Debug;
 use std::sync::Arc;

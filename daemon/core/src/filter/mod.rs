@@ -11,10 +11,10 @@
 //! - `rls`, `mils`, `bounded`: least squares, recursive, with bounds
 //! - `whitening`, `line`, `median`: from raw rows to independent, clean ones
 //! - [`levenberg_marquardt`]: small nonlinear least squares in a box
-//! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass
-//! - [`adjoint`]: fixed-interval smoothing without an inverse (Bryson and Frazier)
+//! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass or by one
+//!   without an inverse (Bryson and Frazier)
 //! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
-//! - [`bank`]: hypotheses side by side, weighed by evidence; [`mixture`]: beliefs mixed by weight
+//! - [`bank`]: hypotheses side by side, weighed by evidence, and beliefs mixed by weight
 //! - [`lanes`]: sums and powers over slices
 
 pub mod bank;

@@ -8,8 +8,6 @@
 //! unless the samples are so far apart that it took longer than is bridged; motion then begins anew.
 //! Where too many readings stand alone, some of them agree by chance, and nothing is taken until
 //! the forces are steady again.
-//!
-//! How an estimator takes what its gate lets pass.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Reason, RejectionReason};

@@ -1,6 +1,5 @@
-//! What may have gone wrong with a quantity, by what factor, and which unit would explain it.
-//!
-//! A detected fault in a sentence.
+//! What may have gone wrong with a quantity, by what factor, and which unit would explain it, in a
+//! sentence.
 
 use std::fmt;
 

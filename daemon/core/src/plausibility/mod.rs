@@ -5,9 +5,9 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration) and [`pressure`]
+//! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration)
 //! - [`diagnosis`]: which input fault makes all figures come out as they did
-//! - [`input_fault`]: the input faults, their names and severity; [`words`]: a detected fault in a sentence
+//! - [`input_fault`]: the input faults, their names, severity and words
 
 pub mod balance;
 pub mod diagnosis;

@@ -1,6 +1,4 @@
 //! Sample by sample: from a stream of samples to what they say of units, signs and swaps.
-//!
-//! Whether the brake-cylinder pressure has the size that brakes work with.
 
 use std::sync::Arc;
 

@@ -9,6 +9,7 @@ use crate::resistance::settings::{INNOVATION_LENGTH_MAX, MilsSettings, RlsSettin
 
 /// One of the paper's algorithms.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "one stands in each pipeline, where it stays")]
 pub enum Solver {
     /// All rows at once: the mixture of the noise bank itself.
     Batch,

@@ -1,7 +1,5 @@
-//! The observations of the linear regression of [`dynocar_core::pipeline::momentum`], and what they say of
-//! the motion now.
-//!
-//! One model of the rows' noise, with the least squares that follow from it.
+//! The observations of the linear regression of [`dynocar_core::pipeline::momentum`], and one model
+//! of their noise, with the least squares that follow from it.
 
 use dynocar_core::filter::{Propagation, Sighting, SquareRootInformation, Whitener};
 use dynocar_core::pipeline::momentum::{

@@ -12,8 +12,6 @@
 //! Wang 2022 fits eq. (11)-(18) to a differentiated speed, whose noise at 5 Hz is five hundred
 //! times the acceleration that 0.02 N/kN makes. The integrals hold the same equation with the
 //! noise of the speed itself: white, and once per sample.
-//!
-//! A regression under one assumption on the unexplained acceleration.
 
 use dynocar_core::filter::DriftingLevel;
 use dynocar_core::filter::drifting_level::{DriftStep, LEVEL, PARAMETERS};

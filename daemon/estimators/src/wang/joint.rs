@@ -1,6 +1,4 @@
 //! Resistance and mass together, by least squares on integrals of motion.
-//!
-//! Settings of [`super::JointLeastSquares`].
 
 use std::sync::Arc;
 

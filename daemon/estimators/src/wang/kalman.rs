@@ -1,6 +1,4 @@
 //! Mass by Kalman filters [v, 1/m, bias].
-//!
-//! When a force has acted for long enough to estimate the mass.
 
 use std::sync::Arc;
 

@@ -1,6 +1,4 @@
-//! Basic, curve and tunnel resistance as functions of speed.
-//!
-//! Speed polynomials in normalised coordinates.
+//! Basic, curve and tunnel resistance as functions of speed, and the polynomials that they are learned in.
 
 use dynocar_model::train::{Davis, TrainModel};
 use nalgebra::{Matrix3, Vector3};

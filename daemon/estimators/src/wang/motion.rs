@@ -1,8 +1,5 @@
-//! What the estimators of mass take from a sample.
-//!
-//! What forces do to a train of a reference mass.
-//!
-//! Which of the three resistances a piece of motion informs on.
+//! What the estimators of mass take from a sample, what its forces do to a train of a reference mass, and which of
+//! the three resistances a piece of motion informs on.
 
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::motion::BRIDGED_MAX_S;

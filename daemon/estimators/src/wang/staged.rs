@@ -1,6 +1,4 @@
 //! Staged learning of resistance and then mass, as Wang 2022.
-//!
-//! Settings of [`super::StagedDescent`].
 
 use std::sync::Arc;
 

@@ -1,6 +1,4 @@
 //! `trajectory_newton`: a trajectory fit over a sliding window, the online scheme of Xia 2023.
-//!
-//! Settings of `trajectory_newton`.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
 use dynocar_core::pipeline::judge::InputHealth;

@@ -1,6 +1,5 @@
-//! The E-step: what the states of a window look like under a value of the coefficient.
-//!
-//! The window with a value of the coefficient, and what it gives the M-step.
+//! The E-step: what the states of a window look like under a value of the coefficient, and what it
+//! gives the M-step.
 
 use std::f64::consts::LOG2_E;
 
@@ -267,7 +266,7 @@ pub struct WindowModel<'a> {
     pub noise: &'a MotionNoise,
     /// The coefficient over the demand.
     pub share: f64,
-    /// See [`super::EmModel::has_printed_cap`].
+    /// See [`super::EmSettings::has_printed_cap`].
     pub has_printed_cap: bool,
 }
 

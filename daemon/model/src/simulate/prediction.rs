@@ -1,8 +1,4 @@
-//! The open-loop simulation of a recorded run.
-//!
-//! When a train departs.
-//!
-//! The error of a predicted speed.
+//! The open-loop simulation of a recorded run, and the error of the predicted speed.
 
 use std::ops::Range;
 

@@ -1,6 +1,4 @@
-//! A recorded run, made ready to be simulated.
-//!
-//! What accelerates a train at a sample of a recorded run.
+//! A recorded run, made ready to be simulated, and what accelerates a train at its samples.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 

@@ -1,8 +1,5 @@
-//! Where a number of a term stands in the files, and what may stand there.
-//!
-//! A number of a term that is estimated.
-//!
-//! How a term is looked for while the train runs.
+//! What every term says of itself: where its numbers stand in the files and what may stand there, what of it is
+//! estimated, and how it is looked for while the train runs.
 
 use dynocar_shared::vocabulary::EffectKind;
 

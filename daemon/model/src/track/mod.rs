@@ -3,8 +3,6 @@
 //! Every property acts along the train's length. Each is kept as a step profile with its
 //! cumulative sum, so that the mean over a train costs two look-ups whatever the number of
 //! entries.
-//!
-//! What stands in the lists of a line.
 
 mod profile;
 

@@ -3,12 +3,12 @@
 //!
 //! # Layout
 //!
-//! - [`gear`], [`law`], [`motion`]: the braking train
+//! - [`law`], [`motion`]: the braking train
 //! - [`intake`]: from the train's samples to observations and steps of a braking
 //! - [`engine`]: what the estimators have in common
 //! - [`tracker`]: the papers' extended Kalman filter, and our fixed-lag smoother
 //! - [`law_bank`]: known laws, scaled and weighed by evidence
-//! - [`report`], [`estimator`]: from an engine to a snapshot
+//! - [`estimator`]: from an engine to a snapshot
 //! - [`settings`]: the pipelines by name
 //!
 //! The papers' sliding-window expectation maximisation is an engine of its own, in `dynocar_estimators`.

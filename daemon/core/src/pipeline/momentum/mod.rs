@@ -5,16 +5,10 @@
 //! whose printed factor 100 lacks rotating mass and rounds 1000/g). It is linear in Davis a, b
 //! and c whatever window it is integrated over.
 //!
-//! - [`sample`]: forces per weight; spikes refused, noise of the speed learned
+//! - [`UnitSample`], [`SpeedWatch`]: forces per weight; spikes refused, noise of the speed learned
 //! - [`blocks`]: samples to blocks, the impulse between them, and what each unknown takes off it
-//! - [`error`]: what a small unknown force leaves of one block's momentum in the next
-//! - [`settings`]: how samples become such data
-//!
-//! The error of momentum rows: what a small unknown force leaves of one block's momentum in the next.
-//!
-//! How samples become regression data.
-//!
-//! What the regression takes from a sample.
+//! - [`Disturbance`]: what a small unknown force leaves of one block's momentum in the next
+//! - [`DataSettings`]: how samples become such data
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::Davis;

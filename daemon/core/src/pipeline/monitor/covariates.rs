@@ -1,6 +1,5 @@
-//! What one unit of each column would retard the train at a sample, and its impulse by blocks.
-//!
-//! What was left unexplained at each place of the line in earlier passes.
+//! What one unit of each column would retard the train at a sample, and its impulse by blocks; what
+//! was left unexplained at each place of the line in earlier passes is one of them.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::SuspectInput;

@@ -6,8 +6,6 @@
 //! give the parameter `s / (S + 1/sigma²)` and twice the log-likelihood ratio
 //! `s² / (S + 1/sigma²)`; `ln(1 + S sigma²)` is what the freedom of its size costs, so that the
 //! difference is twice the logarithm of the Bayes factor.
-//!
-//! What is declared, and how far from it everything usually is.
 
 use dynocar_model::train::TrainModel;
 use nalgebra::{SMatrix, SVector};

@@ -9,17 +9,13 @@
 //!
 //! # Layout, in the order a sample takes
 //!
-//! - `settings`: thresholds and noise
-//! - `suspects`: the effects that are looked for; `usual`: how far off everything may be
-//! - `covariates`, `place_memory`, `pressure`, `wheel_scale`: what a sample says of each of them
+//! - `suspects`: the effects that are looked for, and since when a brake may drag
+//! - `covariates`, `pressure`, `wheel_scale`: what a sample says of each of them
 //! - `rows`: blocks to independent rows of unit variance
-//! - `onsets`: since when a brake may drag
-//! - `information`: the likelihood ratios
+//! - `information`: how far off everything may be, and the likelihood ratios
 //! - `verdict`: what speaks for each of them
 //! - `naming`: who is suspected, what is hardly distinguishable from it, and when it has ended
 //! - `estimator`: the pipeline around all of it
-//!
-//! Settings of the residual monitor.
 
 use dynocar_model::terms::{bearings, curve, masses};
 

@@ -4,8 +4,6 @@
 //! load, the wind of the day, the curve constant, how cold bearings are. Of these an unusual value is an
 //! effect. All other suspects have a column each in addition to it; the wheels' diameter shows by positions,
 //! without any force.
-//!
-//! Since when a brake may drag: onsets side by side, dense lately and sparse long ago.
 
 use dynocar_model::terms::speed_band::BANDS;
 use dynocar_model::terms::{SUSPECTS as TERMS, Suspect, USUAL, brake, traction};

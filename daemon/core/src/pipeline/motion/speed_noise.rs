@@ -1,6 +1,4 @@
-//! The noise of a measured speed, learned from the speeds themselves.
-//!
-//! The steps that a speed is reported in.
+//! The noise of a measured speed, learned from the speeds themselves, and the steps that it is reported in.
 
 /// Degrees of freedom that a guess counts for.
 const GUESS_FREEDOM: f64 = 2.0;

@@ -1,8 +1,5 @@
-//! All that samples teach, and a braking that cannot be explained must not.
-//!
-//! How much of what forces may bring between two samples they do bring.
-//!
-//! What is believed before the first sample.
+//! What is believed before the first sample, and all that samples teach and a braking that cannot be explained
+//! must not.
 
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};

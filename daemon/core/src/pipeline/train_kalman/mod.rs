@@ -9,8 +9,6 @@
 //! in N per kN of weight: traction and braking determine u, coasting and cruising a, b, c, gradients
 //! both. Whoever takes the mass for exact puts its error into the resistance, and the other way round;
 //! here each is known as well as the other allows, and their covariance says how they depend.
-//!
-//! Settings of [`super::TrainKalman`].
 
 use dynocar_model::terms::{adhesion, delay, masses, traction};
 

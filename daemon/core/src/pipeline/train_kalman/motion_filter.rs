@@ -1,6 +1,5 @@
-//! A Kalman filter of speed, disturbance, load and resistance over the steps between samples.
-//!
-//! How a force that no model knows may behave in time.
+//! A Kalman filter of speed, disturbance, load and resistance over the steps between samples, and
+//! how a force that no model knows may behave in time.
 
 use dynocar_model::track::gradient_error_kept;
 use nalgebra::{SMatrix, SVector};

@@ -1,6 +1,5 @@
-//! What the estimate is worth, and how it stands in a snapshot.
-//!
-//! What no amount of samples of one train on one line makes better known.
+//! What the estimate is worth, with what no amount of samples of one train on one line makes better known, and
+//! how it stands in a snapshot.
 
 use dynocar_model::track::GRADIENT_ERROR_FREE_M;
 use dynocar_shared::{ParameterSnapshot, Quantity};

@@ -1,6 +1,5 @@
-//! From resolved samples to steps that can be integrated.
-//!
-//! The force that the estimated model leaves unexplained, lately.
+//! From resolved samples to steps that can be integrated, and the force that the estimated model leaves
+//! unexplained, lately.
 
 use dynocar_core::pipeline::motion::MOVING_MPS;
 use dynocar_model::force::ResolvedSample;

@@ -1,6 +1,5 @@
-//! The search behind a trajectory fit: coefficients and noise in turn.
-//!
-//! What a trajectory fit is asked for, and what it answers.
+//! The search behind a trajectory fit: coefficients and noise in turn, with what it is asked for and what
+//! it answers.
 
 use dynocar_core::filter::levenberg_marquardt::{
     LeastSquares, ParameterBox, Solution, SolverSettings, Stop, minimise,

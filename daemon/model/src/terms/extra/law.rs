@@ -1,6 +1,4 @@
-//! A force and what it depends on.
-//!
-//! What a force may depend on.
+//! A force, what it depends on, and what it may depend on.
 
 use super::form::Form;
 use crate::named;
