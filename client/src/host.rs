@@ -4,8 +4,8 @@
 //! `iceoryx2-<version>/` belongs to the transport. Two roots never meet, not even in the names
 //! of their shared-memory segments, so that tests and separate installations stay apart.
 
-use std::fs::{DirBuilder, Permissions};
-use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
+use std::fs::{DirBuilder, File, OpenOptions, Permissions};
+use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use dynocar_shared::services::{ROOT_VARIABLE, SEGMENT_PREFIX, TRANSPORT_VERSION};
@@ -112,6 +112,12 @@ impl Host {
             EXPIRED_CONNECTIONS;
         Ok(config)
     }
+}
+
+/// Opens a file of this user alone for reading and writing, and makes it when it is not there.
+pub(crate) fn open_private(path: &Path) -> std::io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(true).truncate(false).mode(0o600).open(path)
 }
 
 /// Makes a directory for this user only; an existing one must belong to this user.

@@ -35,12 +35,10 @@
 //! - [`peer`]: who serves and who drives a train, and whether we understand each other
 //! - [`channel`]: the shared-memory ports, also used by the daemon
 //! - [`publisher`], [`reader`]: the two ends a controller holds
-//! - [`answers`]: which pipeline answers which quantity
 //! - [`clock`]: the host's monotonic clock
 //! - [`ffi`]: the same for C and C++
 
 mod announcement;
-pub mod answers;
 pub mod channel;
 pub mod clock;
 pub mod error;
@@ -51,10 +49,9 @@ pub mod publisher;
 pub mod reader;
 
 pub use announcement::{Announcement, Role};
-pub use answers::NoAnswer;
 pub use clock::monotonic_now_ns;
 pub use error::{ChannelError, SendRefused};
 pub use host::Host;
 pub use peer::Peer;
 pub use publisher::SamplePublisher;
-pub use reader::{Reading, SnapshotReader};
+pub use reader::{NoAnswer, Reading, SnapshotReader};

@@ -5,9 +5,8 @@
 //! outside the transport and state schema, layouts and transport version: a peer that shares no
 //! memory format with us can still be named in words.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io::{Read, Seek, Write};
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -15,7 +14,7 @@ use dynocar_shared::TrainId;
 
 use crate::announcement::{Announcement, Role};
 use crate::error::ChannelError;
-use crate::host::Host;
+use crate::host::{Host, open_private};
 
 /// What is known of the other side.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -109,14 +108,7 @@ impl RoleLock {
     /// [`ChannelError::Occupied`] names the holder.
     pub fn claim(host: &Host, train: TrainId, role: Role) -> Result<Self, ChannelError> {
         let path = announcement_path(host, train, role);
-        let mut file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .mode(0o600)
-            .open(&path)
-            .map_err(unusable(&path, "opening"))?;
+        let mut file = open_private(&path).map_err(unusable(&path, "opening"))?;
         let mut tries = 0;
         while let Err(error) = file.try_lock() {
             tries += 1;

@@ -45,7 +45,7 @@ const CALLS: [(&str, &str); 17] = [
 ];
 /// Whole files whose sentences are messages: of impossible data and declarations, of stops.
 const SENTENCES: [&str; 3] = [
-    "daemon/core/src/plausibility/words.rs",
+    "daemon/core/src/plausibility/input_fault.rs",
     "daemon/dataset/src/declared.rs",
     "shared/src/stopping.rs",
 ];

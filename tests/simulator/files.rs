@@ -1,6 +1,6 @@
 //! The simulator's files: reproducible, complete, silent about the truth.
 
-use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::Validator;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{SampleField, TrainSample};
 use dynocar_tests::simulator::dataset_writer::{dataset_files, write_dataset, write_truth};
@@ -188,8 +188,7 @@ fn defects_come_as_often_as_asked_and_validation_sees_them() {
     let (mut rejected, mut missing_cells) = (0, 0);
     for run in &poor.runs {
         let mass_kg = poor.declared_train().mass_kg;
-        let limits = ValidationLimits::for_train(mass_kg);
-        let mut validator = Validator::new(SIMULATED_TRAIN, mass_kg, limits);
+        let mut validator = Validator::new(SIMULATED_TRAIN, mass_kg);
         for sample in &run.samples {
             rejected += usize::from(validator.check(sample).is_err());
             missing_cells += usize::from(sample.get(SampleField::Position).is_none());

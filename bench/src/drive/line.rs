@@ -1,6 +1,6 @@
 //! What the world of ordinary mistakes does not have: brakes, rails, wind, tunnels, curves and loads.
 
-use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_core::pipeline::braking::intake::DeclaredGear;
 use dynocar_model::train::{BrakeGear, EffortCurve, TrainModel};
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{RailCondition, Uncertain};

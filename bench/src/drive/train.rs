@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_core::pipeline::braking::intake::DeclaredGear;
 use dynocar_model::simulate::motion::{Motion, advance};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;

@@ -6,8 +6,9 @@ use std::rc::Rc;
 use dynocar_core::pipeline::braking::engine::{Engine, Observation};
 use dynocar_core::pipeline::braking::law::Law;
 use dynocar_core::pipeline::braking::motion::{MotionNoise, StepInputs, Walk};
-use dynocar_core::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
-use dynocar_estimators::xie::{EmModel, EmWindow, KalmanExpectation, ParticleExpectation};
+use dynocar_core::pipeline::braking::settings::BrakingSettings;
+use dynocar_core::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};
+use dynocar_estimators::xie::{EmSettings, EmWindow, KalmanExpectation, ParticleExpectation};
 use dynocar_shared::Uncertain;
 
 use super::measure::Case;
@@ -74,9 +75,9 @@ fn case(
 }
 
 fn tracker(walk: Walk, lag: usize) -> Tracker {
-    let scale = PriorScale::OfLaw(Uncertain::new(INITIAL, 0.05));
-    let prior = Prior { speed_std_mps: FIRST_SPEED_STD_MPS, scale };
-    let model = TrackerModel { law: Law::Constant, noise: NOISE, walk, prior };
+    let prior = PriorScale::OfLaw(Uncertain::new(INITIAL, 0.05));
+    let first_speed_std_mps = FIRST_SPEED_STD_MPS;
+    let model = TrackerModel { law: Law::Constant, noise: NOISE, walk, first_speed_std_mps, prior };
     Tracker::new(model, lag as f64 * INPUTS.step_s, lag, false)
 }
 
@@ -84,18 +85,18 @@ fn tracker(walk: Walk, lag: usize) -> Tracker {
 pub fn cases() -> Vec<Case> {
     let windows: Rc<[_]> = (1..=WINDOWS).map(|seed| braking(SAMPLES, seed)).collect();
     let long: Rc<[_]> = [braking(STEPS + 1, 99)].into();
-    let model = || EmModel {
-        noise: NOISE,
-        window_steps: SAMPLES,
-        slide_steps: 5,
-        iterations: 50,
+    let settings = EmSettings {
+        braking: BrakingSettings {
+            first_speed_std_mps: FIRST_SPEED_STD_MPS,
+            ..BrakingSettings::default()
+        },
+        window: SAMPLES,
         tolerance: 0.0,
         initial: Some(INITIAL),
-        initial_speed_std_mps: FIRST_SPEED_STD_MPS,
-        has_printed_cap: false,
+        ..EmSettings::default()
     };
-    let particles = EmWindow::new(model(), ParticleExpectation::new(20, SAMPLES, 11));
-    let exact = EmWindow::new(model(), KalmanExpectation::new(SAMPLES));
+    let particles = EmWindow::new(settings, NOISE, ParticleExpectation::new(20, SAMPLES, 11));
+    let exact = EmWindow::new(settings, NOISE, KalmanExpectation::new(SAMPLES));
     let smoother = tracker(Walk::Drift { std_per_s: 0.005, time_s: 20.0 }, LAG);
     let filter = tracker(Walk::Scale(1e-6), 0);
     vec![

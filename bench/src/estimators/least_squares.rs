@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use dynocar_core::filter::{Forgetting, Mils, Penalty, Rls};
+use dynocar_core::filter::{Mils, Penalty, Rls};
 use nalgebra::Vector3;
 
 use super::measure::Case;
@@ -39,8 +39,8 @@ pub fn cases() -> Vec<Case> {
         Case::new(name, ROWS, move || run(&rows))
     };
     vec![
-        of("rls", |rows| rls(rows, Forgetting::None)).aim(60.0),
-        of("rls, directional forgetting", |rows| rls(rows, Forgetting::Directional(FORGETTING))),
+        of("rls", |rows| rls(rows, 1.0)).aim(60.0),
+        of("rls, directional forgetting", |rows| rls(rows, FORGETTING)),
         of("regularised rls", |rows| {
             let length = ROWS as u32;
             let lambda = Vector3::repeat(PENALTY * f64::from(length));
@@ -50,12 +50,12 @@ pub fn cases() -> Vec<Case> {
     ]
 }
 
-fn rls(rows: &[Row], forgetting: Forgetting) -> Vector3<f64> {
+fn rls(rows: &[Row], forgetting: f64) -> Vector3<f64> {
     let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(START_VARIANCE), forgetting);
     for (features, observed) in rows {
         rls.update(features, *observed).expect("sound rows");
     }
-    *rls.estimate()
+    rls.belief.mean
 }
 
 fn mils<const L: usize>(rows: &[Row], penalty: Penalty<3>) -> Vector3<f64> {

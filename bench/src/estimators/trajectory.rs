@@ -2,13 +2,12 @@
 
 use std::rc::Rc;
 
-use dynocar_estimators::xia::trajectory::bank::{JumpBank, JumpModel};
 use dynocar_estimators::xia::trajectory::fit::{
     DavisPrior, FitSettings, MotionSegment, TrajectoryFitter,
 };
 use dynocar_estimators::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
 use dynocar_estimators::xia::trajectory::noise::{LearnedNoise, NoiseModel};
-use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings};
+use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings, StepDoubt};
 use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
@@ -25,7 +24,6 @@ const FIRST_MPS: f64 = 25.0;
 const HYPOTHESES: usize = 8;
 const DECLARED: Davis = Davis { a: 1.0, b: 0.02, c: 0.0012 };
 const DAVIS_STD: Vector3<f64> = Vector3::new(0.8, 0.03, 0.001);
-const JUMPS: JumpModel = JumpModel { evidence: 16.0, std: DAVIS_STD, spacing_s: 1.0 };
 /// No measurement is taken for an outlier.
 const NO_OUTLIERS: OutlierModel = OutlierModel { share: 0.0, density: 0.5 };
 
@@ -108,30 +106,35 @@ fn step_of_one((steps, speeds_mps): &Run) -> Vector3<f64> {
     filter.davis_covariance().diagonal()
 }
 
-fn step_of_bank((steps, speeds_mps): &Run) -> Vector3<f64> {
-    let model = noise(false);
-    let mut bank = JumpBank::new(first_hypothesis(&model), HYPOTHESES, JUMPS, model, NO_OUTLIERS);
-    for (step, &speed_mps) in steps.iter().zip(&speeds_mps[1..]) {
-        bank.advance(StepRule::Time, step, STEP_S, speed_mps);
-    }
-    bank.likeliest().davis_covariance().diagonal()
-}
-
-/// As the pipeline runs it, with outliers judged.
-fn step_as_run((steps, speeds_mps): &Run) -> Vector3<f64> {
+/// As the pipeline runs it, with what is published after each step or without.
+fn step_of_filter(
+    (steps, speeds_mps): &Run,
+    learns_noise: bool,
+    is_published: bool,
+) -> Vector3<f64> {
     let mut filter = OnlineFilter::new(OnlineSettings {
         davis: DECLARED,
         davis_std: DAVIS_STD,
-        jumps: JUMPS,
+        jump_evidence: 16.0,
         hypotheses: HYPOTHESES,
-        noise: noise(true),
+        noise: noise(learns_noise),
     });
     filter.begin(FIRST_MPS);
     for (step, &speed_mps) in steps.iter().zip(&speeds_mps[1..]) {
-        filter.advance(StepRule::Time, step, STEP_S, speed_mps);
-        std::hint::black_box(filter.davis());
+        filter.advance((StepRule::Time, step), STEP_S, speed_mps, &StepDoubt::default());
+        if is_published {
+            std::hint::black_box(filter.davis());
+        }
     }
     filter.davis().1.diagonal()
+}
+
+fn step_of_bank(run: &Run) -> Vector3<f64> {
+    step_of_filter(run, false, false)
+}
+
+fn step_as_run(run: &Run) -> Vector3<f64> {
+    step_of_filter(run, true, true)
 }
 
 /// Windows of a fitted run, and the samples by which each has moved on from the one before.

@@ -75,13 +75,13 @@ impl Motion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_model::validation::{ValidationLimits, Validator};
+    use dynocar_model::validation::Validator;
 
     #[test]
     fn every_sample_of_the_motion_is_valid() {
         let train = TrainId(3);
         let mut motion = Motion::of(train, 7);
-        let mut validator = Validator::new(train, MASS_KG, ValidationLimits::for_train(MASS_KG));
+        let mut validator = Validator::new(train, MASS_KG);
         for number in 1..=200_000_u64 {
             let mut sample = motion.sample(number as i64 * 1_000_000);
             (sample.sequence, sample.run) = (number, 1);

@@ -101,7 +101,7 @@ fn spoil(sample: &mut TrainSample, kind: u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_model::validation::{ValidationLimits, Validator};
+    use dynocar_model::validation::Validator;
 
     const TRAIN: TrainId = TrainId(2);
 
@@ -124,7 +124,7 @@ mod tests {
     fn the_bad_share_is_refused_and_nothing_else() {
         let mut traffic = Traffic::new(plan(), TRAIN, 1_000_000_000, 1);
         traffic.begin(1_000_000_000, 20_000);
-        let mut validator = Validator::new(TRAIN, 200e3, ValidationLimits::for_train(200e3));
+        let mut validator = Validator::new(TRAIN, 200e3);
         let mut refused = 0.0;
         for number in 1..=20_000 {
             let (mut sample, _) = traffic.take();

@@ -8,7 +8,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::Validator;
 use dynocar_shared::{PipelineKind, TrainId, TrainSample};
 
 use crate::output::{Failure, named};
@@ -35,8 +35,7 @@ pub fn resolving(
     train: &Arc<TrainModel>,
     track: Option<Arc<Track>>,
 ) -> impl FnMut(&TrainSample) -> Option<ResolvedSample> {
-    let limits = ValidationLimits::for_train(train.mass_kg);
-    let mut validator = Validator::new(id, train.mass_kg, limits);
+    let mut validator = Validator::new(id, train.mass_kg);
     let mut resolver = ForceResolver::new(Arc::clone(train), track);
     move |sample| Some(resolver.resolve(&validator.check(sample).ok()?))
 }

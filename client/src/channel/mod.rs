@@ -5,8 +5,6 @@
 //! are not `Send`: open them in the thread that uses them.
 
 mod count;
-mod ends;
-mod held;
 mod ports;
 mod service;
 mod transport;
@@ -15,8 +13,7 @@ mod wake;
 mod wire;
 
 pub use count::SampleCount;
-pub use ends::Ends;
-pub use ports::{Receiver, Sender};
+pub use ports::{Ends, Receiver, Sender};
 pub use transport::Transport;
 pub use wake::{Sleeper, Waker};
 pub use wire::{Payload, Wire};

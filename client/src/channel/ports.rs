@@ -1,9 +1,10 @@
-//! Sending and receiving ends, the transport's ports behind trait objects.
+//! Sending and receiving ends, the transport's ports behind trait objects; written for each payload, so that they
+//! are compiled in this crate.
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use dynocar_shared::TrainId;
+use dynocar_shared::{ParameterSnapshot, SleeperState, TrainId, TrainSample};
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::port::update_connections::UpdateConnections;
@@ -137,3 +138,39 @@ impl<T: Payload> Receiver<T> {
         self.port.next()
     }
 }
+
+/// A payload whose channel has ends.
+pub trait Ends: Payload {
+    /// Opens a sending end.
+    ///
+    /// # Errors
+    ///
+    /// When the channel is of another layout or the shared memory cannot be used.
+    fn sender(entrance: &Entrance, train: TrainId) -> Result<Sender<Self>, ChannelError>;
+
+    /// Opens a receiving end.
+    ///
+    /// # Errors
+    ///
+    /// When the channel is of another layout or the shared memory cannot be used.
+    fn receiver(entrance: &Entrance, train: TrainId) -> Result<Receiver<Self>, ChannelError>;
+}
+
+macro_rules! ends {
+    ($($payload:ty),*) => {$(
+        impl Ends for $payload {
+            fn sender(entrance: &Entrance, train: TrainId) -> Result<Sender<Self>, ChannelError> {
+                open_sender(entrance, train)
+            }
+
+            fn receiver(
+                entrance: &Entrance,
+                train: TrainId,
+            ) -> Result<Receiver<Self>, ChannelError> {
+                open_receiver(entrance, train)
+            }
+        }
+    )*};
+}
+
+ends!(TrainSample, ParameterSnapshot, SleeperState);

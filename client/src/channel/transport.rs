@@ -7,10 +7,9 @@ use iceoryx2::prelude::{
     Node, NodeBuilder, NodeName, SignalHandlingMode, ipc, set_log_level_from_env_or,
 };
 
-use super::ends::Ends;
-use super::held::Held;
-use super::ports::{Receiver, Sender};
+use super::ports::{Ends, Receiver, Sender};
 use super::service::Entrance;
+use super::service::Held;
 use super::users::Users;
 use crate::error::ChannelError;
 use crate::host::Host;

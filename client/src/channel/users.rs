@@ -6,14 +6,14 @@
 //! alone, and nobody can come in until the lock is let go.
 
 use std::fs::{File, OpenOptions, Permissions, TryLockError};
-use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rustix::fs::FallocateFlags;
 
 use crate::error::ChannelError;
-use crate::host::Host;
+use crate::host::{Host, open_private};
 
 /// Where the system keeps shared memory by name.
 pub const SHARED_MEMORY: &str = "/dev/shm";
@@ -46,14 +46,7 @@ impl Users {
             let path = path.clone();
             move |source| ChannelError::Directory { path, action, source }
         };
-        let lock = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .mode(0o600)
-            .open(&path)
-            .map_err(failed("opening"))?;
+        let lock = open_private(&path).map_err(failed("opening"))?;
         for _ in 0..TRIES {
             match lock.try_lock_shared() {
                 Ok(()) => return Ok(Users { lock, segment_prefix: host.segment_prefix() }),

@@ -17,7 +17,7 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::{CallbackProgression, ServiceName, ipc};
 use iceoryx2::service::port_factory::event::PortFactory;
 
-use super::held::Held;
+use super::service::Held;
 use super::{Receiver, Sender, Transport};
 use crate::clock::monotonic_now_ns;
 use crate::error::ChannelError;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::braking::gear::DeclaredGear;
+use dynocar_core::pipeline::braking::intake::DeclaredGear;
 use dynocar_core::pipeline::quantities::candidates;
 use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_estimators::EstimatorSettings;

@@ -44,7 +44,7 @@ pub(super) fn diagnostics(
     detected: &DetectedFaults,
 ) -> Vec<Diagnostic> {
     let fault = |it: DetectedFault| Diagnostic::of_fault(it, read_as(context.manifest, it.fault));
-    let mut diagnostics: Vec<Diagnostic> = detected.iter().map(fault).collect();
+    let mut diagnostics: Vec<Diagnostic> = detected.iter().copied().map(fault).collect();
     of_time(quality, &mut diagnostics);
     of_content(context, run, quality, &mut diagnostics);
     diagnostics.extend(stands_still(run));

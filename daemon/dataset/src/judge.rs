@@ -2,7 +2,7 @@
 
 use dynocar_core::plausibility::{DetectedFaults, Plausibility};
 use dynocar_model::force::ForceResolver;
-use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::Validator;
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};
 
 use super::resolved::{Context, DATASET_TRAIN};
@@ -23,9 +23,8 @@ impl Judge {
     /// Nothing seen yet of a run.
     pub fn new(context: Context, is_position_recorded: bool) -> Self {
         let nominal_mass_kg = context.train.mass_kg;
-        let limits = ValidationLimits::for_train(nominal_mass_kg);
         Judge {
-            validator: Validator::new(DATASET_TRAIN, nominal_mass_kg, limits),
+            validator: Validator::new(DATASET_TRAIN, nominal_mass_kg),
             resolver: ForceResolver::new(context.train.clone(), context.track.cloned()),
             plausibility: Plausibility::new(context.train.clone()),
             is_position_recorded,

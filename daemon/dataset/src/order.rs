@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-/// A step ahead in time of more than this many s is a clock set, not a gap in the rows; the
-/// same bound as in [`dynocar_model::validation::ValidationLimits`].
-const CLOCK_JUMP_S: f64 = 86_400.0;
+/// A step ahead in time of more than this many s is a clock set, not a gap in the rows; as in
+/// validation.
+const CLOCK_JUMP_S: f64 = dynocar_model::validation::JUMP_MAX_S;
 /// A step longer than this many medians is a gap.
 const GAP_STEPS: f64 = 1.5;
 /// In rows without a regular step, a step longer than this many medians is a gap.

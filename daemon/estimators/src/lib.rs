@@ -17,7 +17,6 @@
 //!
 //! As the core, this library knows no channel, clock, file, thread or logger.
 
-mod answers;
 pub mod liu;
 pub mod resistance;
 mod settings;

@@ -5,12 +5,15 @@
 use std::sync::Arc;
 
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
-use dynocar_core::pipeline::braking::settings::{EkfSettings, LawSettings, SmootherSettings};
+use dynocar_core::pipeline::braking::settings::{
+    BrakeFactor, EkfSettings, LawSettings, SmootherSettings,
+};
 use dynocar_core::pipeline::monitor::{MonitorSettings, ResidualMonitor};
+use dynocar_core::pipeline::quantities::candidates;
 use dynocar_core::pipeline::train_kalman::{TrainKalman, TrainKalmanSettings};
 use dynocar_core::pipeline::{Echo, Estimator, SettingError};
 use dynocar_model::train::TrainModel;
-use dynocar_shared::PipelineKind;
+use dynocar_shared::{PipelineKind, Quantity};
 use serde::Deserialize;
 
 use crate::resistance;
@@ -20,7 +23,7 @@ use crate::wang::{
     StagedDescentSettings,
 };
 use crate::xia::newton::TrajectoryNewton;
-use crate::xia::newton_settings::TrajectoryNewtonSettings;
+use crate::xia::newton::TrajectoryNewtonSettings;
 use crate::xia::trajectory::kalman::TrajectoryKalmanSettings;
 use crate::xie::EmSettings;
 
@@ -97,11 +100,14 @@ estimator_kinds! {
     /// Recursive least squares with directional forgetting.
     Rls(RlsSettings) = Rls, |s, t| boxed(resistance::rls(t, s));
     /// Regularised recursive least squares.
-    RegularisedRls(MilsSettings) = RegularisedRls, |s, t| boxed(resistance::regularised_rls(t, s));
+    RegularisedRls(MilsSettings) = RegularisedRls,
+        |s, t| boxed(resistance::regularised(PipelineKind::RegularisedRls, t, s));
     /// Regularised multi-innovation least squares.
-    Mils(MilsSettings) = Mils, |s, t| boxed(resistance::mils(t, s));
+    Mils(MilsSettings) = Mils,
+        |s, t| boxed(resistance::regularised(PipelineKind::Mils, t, s));
     /// Interval-varying, regularised multi-innovation least squares.
-    VMils(MilsSettings) = VMils, |s, t| boxed(resistance::v_mils(t, s));
+    VMils(MilsSettings) = VMils,
+        |s, t| boxed(resistance::regularised(PipelineKind::VMils, t, s));
     /// Robust Kalman filter of resistance jointly with a disturbance.
     ResistanceKalman(KalmanSettings) = ResistanceKalman, |s, t| boxed(resistance::kalman(t, s));
     /// Trajectory fit over a sliding window.
@@ -141,4 +147,52 @@ estimator_kinds! {
     /// Disc friction or braking ratio by fixed-lag smoothing.
     BrakeSmoother(SmootherSettings) = BrakeSmoother,
         |s, t| s.build(PipelineKind::BrakeSmoother, s.reports.quantity(), t);
+}
+
+impl EstimatorSettings {
+    /// True when the estimator, so set, gives what a controller asks for.
+    pub fn answers(&self, quantity: Quantity) -> bool {
+        let reports = match self {
+            EstimatorSettings::BrakeSmoother(settings) => Some(settings.reports),
+            EstimatorSettings::BrakeEkf(settings) => Some(settings.reports),
+            EstimatorSettings::BrakeEm(settings) => Some(settings.reports),
+            _ => None,
+        };
+        candidates(quantity).contains(&self.kind())
+            && match quantity {
+                Quantity::BrakeFriction => reports == Some(BrakeFactor::Friction),
+                Quantity::BrakingRatio => reports == Some(BrakeFactor::Ratio),
+                _ => true,
+            }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers come from the estimator alone, so that a kind which never writes a quantity's
+    /// parameters cannot answer it.
+    #[test]
+    fn every_kind_but_monitor_and_echo_answers_something() {
+        for &kind in PipelineKind::ALL {
+            let settings = EstimatorSettings::default_of(kind).expect("every kind can be built");
+            let answers = Quantity::ALL.iter().filter(|&&it| settings.answers(it)).count();
+            let is_silent = matches!(kind, PipelineKind::ResidualMonitor | PipelineKind::Echo);
+            assert_eq!(answers == 0, is_silent, "{kind}");
+        }
+    }
+
+    #[test]
+    fn a_brake_pipeline_answers_for_the_factor_that_it_reports() {
+        let set = |reports| {
+            let table = format!("kind = \"brake_smoother\"\nreports = \"{reports}\"");
+            toml::from_str::<EstimatorSettings>(&table).unwrap()
+        };
+        let answered = |settings: EstimatorSettings| {
+            Quantity::ALL.iter().copied().filter(|&it| settings.answers(it)).collect::<Vec<_>>()
+        };
+        assert_eq!(answered(set("friction")), [Quantity::BrakeFriction]);
+        assert_eq!(answered(set("ratio")), [Quantity::BrakingRatio]);
+    }
 }

@@ -7,12 +7,12 @@ use std::sync::Arc;
 
 use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::simulate::{
-    BridgeLimits, ForceModel, Prediction, QuadraticForces, Recording, Restart, STANDING_MPS,
-    SpeedError, declared_polynomial,
+    ForceModel, Prediction, QuadraticForces, Recording, Restart, STANDING_MPS, SpeedError,
+    declared_polynomial,
 };
 use dynocar_model::terms::delay::DelayLine;
 use dynocar_model::terms::{gradient, traction};
-use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::Validator;
 
 use super::disturbances::{DisturbanceInput, Disturbances};
 use super::sensors::SIMULATED_TRAIN;
@@ -77,8 +77,7 @@ fn error(recording: &Recording, model: &impl ForceModel, restart: Restart) -> Sp
 /// When no sample is usable.
 pub fn record(dataset: &SimulatedDataset, run: &SimulatedRun) -> Recording {
     let train = Arc::new(dataset.train.declared.clone());
-    let limits = ValidationLimits::for_train(train.mass_kg);
-    let mut validator = Validator::new(SIMULATED_TRAIN, train.mass_kg, limits);
+    let mut validator = Validator::new(SIMULATED_TRAIN, train.mass_kg);
     let mut resolver = ForceResolver::new(train, Some(Arc::new(dataset.line.track.clone())));
     let resolved: Vec<ResolvedSample> = run
         .samples
@@ -86,7 +85,7 @@ pub fn record(dataset: &SimulatedDataset, run: &SimulatedRun) -> Recording {
         .filter_map(|sample| validator.check(sample).ok())
         .map(|valid| resolver.resolve(&valid))
         .collect();
-    Recording::new(resolved, BridgeLimits::default()).expect("a simulated run has forces")
+    Recording::new(resolved).expect("a simulated run has forces")
 }
 
 /// The true model of one run.

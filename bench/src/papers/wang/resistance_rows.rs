@@ -4,7 +4,7 @@
 use dynocar_core::pipeline::Estimator;
 use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_estimators::wang::motion::Motion;
-use dynocar_estimators::wang::section::Section;
+use dynocar_estimators::wang::motion::Section;
 use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_estimators::wang::{StagedDescent, StagedDescentSettings};
 use dynocar_model::force::ResolvedSample;

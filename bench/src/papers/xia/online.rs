@@ -5,10 +5,9 @@
 //! most. The error with noise is taken from km 64 on, but for the 8 km after the switch at km 82.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-use dynocar_estimators::xia::trajectory::bank::JumpModel;
 use dynocar_estimators::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
 use dynocar_estimators::xia::trajectory::noise::{LearnedNoise, NoiseModel};
-use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings};
+use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings, StepDoubt};
 use dynocar_estimators::xia::trajectory::step::StepRule;
 use dynocar_estimators::xia::wolfe_newton::{NewtonSettings, RestartSource, wolfe_newton};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
@@ -55,7 +54,7 @@ fn settings(davis: Davis, std: Vector3<f64>) -> OnlineSettings {
     OnlineSettings {
         davis,
         davis_std: std,
-        jumps: JumpModel { evidence: 16.0, std, spacing_s: 1.0 },
+        jump_evidence: 16.0,
         hypotheses: 8,
         noise: NoiseModel {
             speed_noise_mps: 0.2,
@@ -79,7 +78,9 @@ fn ours(run: &Run, speeds_mps: &[f64], settings: OnlineSettings) -> Estimates {
     let steps = run.steps.iter().zip(speeds_mps).zip(&speeds_mps[1..]);
     steps
         .map(|((step, &before_mps), &speed_mps)| {
-            filter.advance(StepRule::Distance, step, step.size / before_mps, speed_mps);
+            let duration_s = step.size / before_mps;
+            let none = StepDoubt::default();
+            filter.advance((StepRule::Distance, step), duration_s, speed_mps, &none);
             filter.davis()
         })
         .collect()

@@ -1,6 +1,6 @@
 //! The driven train compared with the open-loop prediction, and where no recording goes.
 
-use dynocar_model::simulate::{BridgeLimits, Prediction, Recording, Restart};
+use dynocar_model::simulate::{Prediction, Recording, Restart};
 use dynocar_model::track::{Curve, Track};
 use dynocar_model::train::Davis;
 
@@ -61,7 +61,7 @@ fn a_train_driven_along_a_recording_goes_to_the_bit_as_is_predicted() {
     let resolved: Vec<_> = (0..700)
         .map(|k| forces.resolve(&ValidSample { sample: &at(k), step_s: 0.2, segment: 1 }))
         .collect();
-    let recording = Recording::new(resolved, BridgeLimits::default()).unwrap();
+    let recording = Recording::new(resolved).unwrap();
     let law = |k: usize, speed_mps: f64| {
         let forces = SampleForces::declared(&recording.samples()[k], train.rotating_mass_factor);
         let [p0, p1, p2] = forces.polynomial(train.resistance, speed_mps);

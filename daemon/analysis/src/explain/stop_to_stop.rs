@@ -181,14 +181,14 @@ impl From<&StopToStop> for Judged {
 #[cfg(test)]
 mod tests {
     use dynocar_model::force::ResolvedSample;
-    use dynocar_model::simulate::{BridgeLimits, Prediction, QuadraticForces, Restart, SpeedError};
+    use dynocar_model::simulate::{Prediction, QuadraticForces, Restart, SpeedError};
     use dynocar_model::train::Davis;
 
     use super::*;
     use crate::explain::evidence::coasting;
 
     fn recorded(samples: Vec<ResolvedSample>) -> Recording {
-        Recording::new(samples, BridgeLimits::default()).unwrap()
+        Recording::new(samples).unwrap()
     }
 
     fn predict(recording: &Recording, restart: Restart) -> Prediction {

@@ -4,83 +4,36 @@
 //! of whoever keeps the bank; what each weighs, which is the likeliest and what they say together is reported
 //! here (multiple models: Bar-Shalom, Li, Kirubarajan 2001, section 11.6).
 
-use std::marker::PhantomData;
-
 use arrayvec::ArrayVec;
+use nalgebra::{SMatrix, SVector};
 
-/// How evidence is counted.
-pub trait Evidence {
-    /// Weight of the likeliest, once a bank has settled.
-    const LIKELIEST: f64;
-    /// Weight of what cannot be.
-    const NONE: f64;
-    /// A weight against the greatest one.
-    fn against(weight: f64, greatest: f64) -> f64;
-    /// The probability that a weight stands for, up to a factor that all share.
-    fn probability(weight: f64) -> f64;
-}
-
-/// Likelihoods that multiply: the cheapest where they come as densities that cannot vanish.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Odds;
-
-impl Evidence for Odds {
-    const LIKELIEST: f64 = 1.0;
-    const NONE: f64 = 0.0;
-
-    #[inline(always)]
-    fn against(weight: f64, greatest: f64) -> f64 {
-        weight / greatest
-    }
-
-    #[inline(always)]
-    fn probability(weight: f64) -> f64 {
-        weight
-    }
-}
-
-/// Logarithms of likelihoods, which add up, of any size.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nats;
-
-impl Evidence for Nats {
-    const LIKELIEST: f64 = 0.0;
-    const NONE: f64 = f64::NEG_INFINITY;
-
-    #[inline(always)]
-    fn against(weight: f64, greatest: f64) -> f64 {
-        weight - greatest
-    }
-
-    #[inline(always)]
-    fn probability(weight: f64) -> f64 {
-        weight.exp()
-    }
-}
+use super::Gaussian;
 
 /// At most `MAX` hypotheses with the evidence for each, in the order in which they joined.
 ///
-/// Whoever moves and measures the hypotheses adds to their weights, and lets the bank settle.
+/// Whoever moves and measures the hypotheses adds to their weights, and lets the bank settle. A weight
+/// is the logarithm of a likelihood, of any size, or odds, the cheapest where likelihoods come as
+/// densities that cannot vanish.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bank<H, E, const MAX: usize> {
+pub struct Bank<H, const MAX: usize> {
     hypotheses: ArrayVec<H, MAX>,
-    /// Of places without a hypothesis, [`Evidence::NONE`].
+    /// Of places without a hypothesis, negative infinity.
     weights: [f64; MAX],
     likeliest: usize,
-    evidence: PhantomData<E>,
 }
 
-impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
-    /// Hypotheses of equal weight, the first believed until evidence comes.
+impl<H, const MAX: usize> Bank<H, MAX> {
+    /// Hypotheses of one weight, 0 for a logarithm and 1 for odds, the first believed until evidence
+    /// comes.
     ///
     /// # Panics
     ///
     /// When there are more than `MAX`.
-    pub fn even(hypotheses: impl IntoIterator<Item = H>) -> Self {
+    pub fn even(hypotheses: impl IntoIterator<Item = H>, weight: f64) -> Self {
         let hypotheses: ArrayVec<_, MAX> = hypotheses.into_iter().collect();
-        let mut weights = [E::NONE; MAX];
-        weights[..hypotheses.len()].fill(E::LIKELIEST);
-        Bank { hypotheses, weights, likeliest: 0, evidence: PhantomData }
+        let mut weights = [f64::NEG_INFINITY; MAX];
+        weights[..hypotheses.len()].fill(weight);
+        Bank { hypotheses, weights, likeliest: 0 }
     }
 
     /// The hypotheses.
@@ -128,8 +81,8 @@ impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
         self.likeliest = index;
     }
 
-    /// Finds the likeliest, gives it the weight [`Evidence::LIKELIEST`] and the others theirs in
-    /// proportion; among equals the likeliest stays. False when a weight is not a number.
+    /// Finds the likeliest, gives it the logarithm 0 and the others theirs in proportion; among equals
+    /// the likeliest stays. False when a weight is not a number.
     ///
     /// # Real-time
     ///
@@ -138,17 +91,25 @@ impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
     pub fn settle(&mut self) -> bool {
         self.find_likeliest();
         let greatest = self.weights[self.likeliest];
-        self.weights.iter_mut().for_each(|weight| *weight = E::against(*weight, greatest));
+        self.weights.iter_mut().for_each(|weight| *weight -= greatest);
         !self.weights.iter().any(|weight| weight.is_nan())
     }
 
-    /// Probability of each hypothesis that counts; 0 of the others.
+    /// The same for odds: the likeliest has 1, the others theirs in proportion.
+    #[inline]
+    pub fn settle_odds(&mut self) {
+        self.find_likeliest();
+        let greatest = self.weights[self.likeliest];
+        self.weights.iter_mut().for_each(|weight| *weight /= greatest);
+    }
+
+    /// Probability of each hypothesis that counts, by its logarithm; 0 of the others.
     #[inline]
     pub fn shares(&self, counts: impl Fn(&H) -> bool) -> [f64; MAX] {
         let mut shares = [0.0; MAX];
         let mut sum = 0.0;
         for (index, _) in self.hypotheses.iter().enumerate().filter(|(_, it)| counts(it)) {
-            shares[index] = E::probability(self.weights[index]);
+            shares[index] = self.weights[index].exp();
             sum += shares[index];
         }
         if sum > 0.0 {
@@ -192,7 +153,7 @@ impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
     fn drop(&mut self, index: usize) {
         self.hypotheses.remove(index);
         self.weights.copy_within(index + 1.., index);
-        self.weights[MAX - 1] = E::NONE;
+        self.weights[MAX - 1] = f64::NEG_INFINITY;
         self.find_likeliest();
     }
 
@@ -205,13 +166,49 @@ impl<H, E: Evidence, const MAX: usize> Bank<H, E, MAX> {
     }
 }
 
+/// Beliefs mixed by weight: their common mean, and a covariance that holds the spread between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mixture<const N: usize> {
+    /// Sum of the weights.
+    pub weight: f64,
+    /// Mean and covariance of all; zero while nothing has been mixed in.
+    pub belief: Gaussian<N>,
+}
+
+impl<const N: usize> Default for Mixture<N> {
+    fn default() -> Self {
+        let belief = Gaussian { mean: SVector::zeros(), covariance: SMatrix::zeros() };
+        Mixture { weight: 0.0, belief }
+    }
+}
+
+impl<const N: usize> Mixture<N> {
+    /// Mixes a belief in.
+    ///
+    /// # Real-time
+    ///
+    /// Work in proportion to N², no allocation.
+    pub fn add(&mut self, weight: f64, mean: &SVector<f64, N>, covariance: &SMatrix<f64, N, N>) {
+        self.weight += weight;
+        if !(weight > 0.0) {
+            return;
+        }
+        let share = weight / self.weight;
+        let apart = mean - self.belief.mean;
+        self.belief.mean += apart * share;
+        self.belief.covariance *= 1.0 - share;
+        self.belief.covariance +=
+            covariance * share + apart * apart.transpose() * (share * (1.0 - share));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn shares_follow_logarithms_of_any_size() {
-        let mut bank = Bank::<_, Nats, 3>::even(["a", "b", "none"]);
+        let mut bank = Bank::<_, 3>::even(["a", "b", "none"], 0.0);
         bank.weights = [-1e4, -1e4 + 2.0_f64.ln(), f64::NEG_INFINITY];
         assert!(bank.settle());
         assert_eq!((*bank.likeliest(), bank.weights()[1]), ("b", 0.0));
@@ -222,32 +219,29 @@ mod tests {
 
     #[test]
     fn the_likeliest_stays_among_equals() {
-        let mut bank = Bank::<_, Odds, 3>::even([0, 1, 2]);
+        let mut bank = Bank::<_, 3>::even([0, 1, 2], 1.0);
         bank.believe(2);
         bank.weights[0] = 0.3;
-        assert!(bank.settle());
+        bank.settle_odds();
         assert_eq!(*bank.likeliest(), 2);
         bank.weights[2] = 0.5;
-        assert!(bank.settle());
+        bank.settle_odds();
         assert_eq!(*bank.likeliest(), 1);
     }
 
     #[test]
     fn a_weight_that_is_no_number_is_reported() {
-        let mut bank = Bank::<_, Nats, 2>::even([0, 1]);
+        let mut bank = Bank::<_, 2>::even([0, 1], 0.0);
         bank.weights[1] = f64::NAN;
         assert!(!bank.settle());
-        let mut nothing = Bank::<_, Odds, 2>::even([0]);
-        nothing.weights[0] = 0.0;
-        assert!(!nothing.settle());
     }
 
     #[test]
     fn hypotheses_join_unite_and_go() {
-        let mut bank = Bank::<_, Odds, 3>::even([10]);
+        let mut bank = Bank::<_, 3>::even([10], 1.0);
         bank.join(20, 3.0);
         bank.join(30, 2.0);
-        assert!(bank.settle());
+        bank.settle_odds();
         assert_eq!(*bank.likeliest(), 20);
         bank.unite(0, (15, 0.1));
         assert_eq!((bank.hypotheses(), *bank.likeliest()), ([15, 30].as_slice(), 30));
@@ -256,5 +250,31 @@ mod tests {
         bank.weights[0] = f64::NAN;
         bank.drop_up_to(0.0);
         assert!(bank.hypotheses().is_empty());
+    }
+}
+
+#[cfg(test)]
+mod mixture_tests {
+    use nalgebra::{Matrix2, Vector2};
+
+    use super::*;
+
+    #[test]
+    fn a_mixture_has_the_moments_of_the_sum_of_densities() {
+        let parts = [
+            (0.5, Vector2::new(1.0, -2.0), Matrix2::new(1.0, 0.2, 0.2, 0.5)),
+            (0.0, Vector2::new(9.0, 9.0), Matrix2::identity()),
+            (1.5, Vector2::new(0.0, 3.0), Matrix2::new(2.0, -0.3, -0.3, 0.1)),
+            (1.0, Vector2::new(-1.0, 0.5), Matrix2::identity()),
+        ];
+        let mut mixture = Mixture::default();
+        parts.iter().for_each(|(weight, mean, own)| mixture.add(*weight, mean, own));
+        let mean: Vector2<f64> = parts.iter().map(|(weight, mean, _)| mean * (weight / 3.0)).sum();
+        let second: Matrix2<f64> =
+            parts.iter().map(|(weight, m, own)| (own + m * m.transpose()) * (weight / 3.0)).sum();
+        let covariance = second - mean * mean.transpose();
+        assert_eq!(mixture.weight, 3.0);
+        assert!((mixture.belief.mean - mean).norm() < 1e-14);
+        assert!((mixture.belief.covariance - covariance).norm() < 1e-13);
     }
 }

@@ -11,13 +11,12 @@
 //! - `rls`, `mils`, `bounded`: least squares, recursive, with bounds
 //! - `whitening`, `line`, `median`: from raw rows to independent, clean ones
 //! - [`levenberg_marquardt`]: small nonlinear least squares in a box
-//! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass
-//! - [`adjoint`]: fixed-interval smoothing without an inverse (Bryson and Frazier)
+//! - [`fixed_lag`]: what later measurements say of an earlier state, without a backward pass or by one
+//!   without an inverse (Bryson and Frazier)
 //! - [`particle`], [`random`]: particle filter, marginal particle smoother and their seeded generator
-//! - [`bank`]: hypotheses side by side, weighed by evidence; [`mixture`]: beliefs mixed by weight
+//! - [`bank`]: hypotheses side by side, weighed by evidence, and beliefs mixed by weight
 //! - [`lanes`]: sums and powers over slices
 
-pub mod adjoint;
 pub mod bank;
 mod bounded;
 pub mod drifting_level;
@@ -29,7 +28,6 @@ pub mod levenberg_marquardt;
 mod line;
 mod median;
 mod mils;
-pub mod mixture;
 pub mod particle;
 pub mod random;
 mod rank_one;
@@ -48,7 +46,7 @@ pub use information::SquareRootInformation;
 pub use line::FittedLine;
 pub use median::RunningMedian;
 pub use mils::{Mils, Penalty};
-pub use rls::{Forgetting, Rls};
+pub use rls::Rls;
 pub use whitening::{Propagation, Sighting, UnitRow, Whitener};
 
 /// A belief or a measurement is not sound: a matrix that should be positive definite is not.

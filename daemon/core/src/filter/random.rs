@@ -7,17 +7,20 @@ pub struct Random {
     ziggurat: Ziggurat,
 }
 
+/// The next number of the generator SplitMix64, whose state is a counter.
+pub fn split_mix(counter: &mut u64) -> u64 {
+    *counter = counter.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut mixed = *counter;
+    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    mixed ^ (mixed >> 31)
+}
+
 impl Random {
     /// A generator for a seed; equal seeds give equal sequences.
     pub fn new(seed: u64) -> Self {
         let mut counter = seed;
-        let state = std::array::from_fn(|_| {
-            counter = counter.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut mixed = counter;
-            mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            mixed ^ (mixed >> 31)
-        });
+        let state = std::array::from_fn(|_| split_mix(&mut counter));
         Random { state, ziggurat: Ziggurat::new() }
     }
 

@@ -4,16 +4,6 @@ use nalgebra::{SMatrix, SVector};
 
 use super::{Gaussian, Innovation, NotPositiveDefinite};
 
-/// How old rows lose weight.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Forgetting {
-    /// All rows count alike.
-    None,
-    /// Only what the newest row adds anew is forgotten (Cao and Schwartz 2000): the estimate
-    /// keeps what it knows in unexcited directions.
-    Directional(f64),
-}
-
 /// Recursive least squares (Liu 2018, eq. 9-11).
 ///
 /// Joseph's form is taken where subtraction would cost digits, as from a wide prior.
@@ -21,35 +11,19 @@ pub enum Forgetting {
 /// The covariance is in units of the error's variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rls<const N: usize> {
-    belief: Gaussian<N>,
-    forgetting: Forgetting,
+    /// The estimate with its covariance.
+    pub belief: Gaussian<N>,
+    /// 1 when all rows count alike. Below it only what the newest row adds anew is forgotten (Cao and
+    /// Schwartz 2000): the estimate keeps what it knows in unexcited directions.
+    forgetting: f64,
 }
 
 impl<const N: usize> Rls<N> {
     /// Starts at `estimate` with independent errors of these variances; p0 for all of them in
     /// Liu 2018.
-    pub fn new(
-        estimate: SVector<f64, N>,
-        variances: &SVector<f64, N>,
-        forgetting: Forgetting,
-    ) -> Self {
+    pub fn new(estimate: SVector<f64, N>, variances: &SVector<f64, N>, forgetting: f64) -> Self {
         let covariance = SMatrix::from_diagonal(variances);
         Rls { belief: Gaussian { mean: estimate, covariance }, forgetting }
-    }
-
-    /// The estimate.
-    pub fn estimate(&self) -> &SVector<f64, N> {
-        &self.belief.mean
-    }
-
-    /// The estimate's covariance, in units of the error's variance.
-    pub fn covariance(&self) -> &SMatrix<f64, N, N> {
-        &self.belief.covariance
-    }
-
-    /// Goes on from another estimate and covariance.
-    pub fn restart(&mut self, estimate: SVector<f64, N>, covariance: SMatrix<f64, N, N>) {
-        self.belief = Gaussian { mean: estimate, covariance };
     }
 
     /// Takes in a row `observed = features . theta + error`.
@@ -67,9 +41,8 @@ impl<const N: usize> Rls<N> {
         features: &SVector<f64, N>,
         observed: f64,
     ) -> Result<Innovation, NotPositiveDefinite> {
-        match self.forgetting {
-            Forgetting::None => {}
-            Forgetting::Directional(factor) => self.forget_along(features, factor)?,
+        if self.forgetting != 1.0 {
+            self.forget_along(features, self.forgetting)?;
         }
         self.belief.measure_along(features, observed, 1.0)
     }
@@ -155,36 +128,37 @@ mod tests {
 
     /// Plain exponential forgetting, which winds up.
     fn forget(rls: &mut Rls<3>, factor: f64) {
-        rls.restart(*rls.estimate(), rls.covariance() / factor);
+        rls.belief.covariance /= factor;
     }
 
     #[test]
     fn the_recursion_equals_its_batch_twin_with_and_without_forgetting() {
         for factor in [1.0, 0.95] {
             let rows = rows(60);
-            let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), Forgetting::None);
+            let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), 1.0);
             for (features, observed) in &rows {
                 forget(&mut rls, factor);
                 rls.update(features, *observed).unwrap();
             }
             let (estimate, covariance) = twin(&rows, 1e4, factor);
-            assert!((rls.estimate() - estimate).norm() < 1e-7);
-            assert!((rls.covariance() - covariance).norm() < 1e-7 * covariance.norm().max(1.0));
+            assert!((rls.belief.mean - estimate).norm() < 1e-7);
+            assert!(
+                (rls.belief.covariance - covariance).norm() < 1e-7 * covariance.norm().max(1.0)
+            );
         }
     }
 
     #[test]
     fn directional_forgetting_keeps_what_the_data_no_longer_excite() {
-        let mut directional =
-            Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), Forgetting::Directional(0.9));
-        let mut exponential = Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), Forgetting::None);
+        let mut directional = Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), 0.9);
+        let mut exponential = Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), 1.0);
         for (features, observed) in rows(100) {
             directional.update(&features, observed).unwrap();
             forget(&mut exponential, 0.9);
             exponential.update(&features, observed).unwrap();
         }
         let across = Vector3::new(1.0, -2.0, 1.0).normalize();
-        let spread = |rls: &Rls<3>| (across.transpose() * rls.covariance() * across)[0];
+        let spread = |rls: &Rls<3>| (across.transpose() * rls.belief.covariance * across)[0];
         let before = spread(&directional);
         let cruise = Vector3::new(1.0, 1.0, 1.0);
         for _ in 0..150 {
@@ -194,14 +168,13 @@ mod tests {
         }
         assert!(spread(&directional) < 1.5 * before, "across the cruise nothing is forgotten");
         assert!(spread(&exponential) > 1e5 * before, "plain forgetting winds up");
-        assert!((directional.estimate().dot(&cruise) - 1.7).abs() < 1e-6, "along it all is new");
+        assert!((directional.belief.mean.dot(&cruise) - 1.7).abs() < 1e-6, "along it all is new");
     }
 
     #[test]
     fn directional_forgetting_is_its_formula_with_an_inverse() {
         let factor = 0.98;
-        let mut rls =
-            Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), Forgetting::Directional(factor));
+        let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(1e4), factor);
         let (mut theta, mut p) = (Vector3::zeros(), Matrix3::identity() * 1e4);
         for (features, observed) in rows(200) {
             rls.update(&features, observed).unwrap();
@@ -211,8 +184,8 @@ mod tests {
             theta += gain * (observed - features.dot(&theta));
             p = (Matrix3::identity() - gain * features.transpose()) * p;
         }
-        assert!((rls.estimate() - theta).norm() < 1e-6 * theta.norm());
-        assert!((rls.covariance() - p).norm() < 1e-6 * p.norm());
+        assert!((rls.belief.mean - theta).norm() < 1e-6 * theta.norm());
+        assert!((rls.belief.covariance - p).norm() < 1e-6 * p.norm());
     }
 
     #[test]
@@ -228,17 +201,16 @@ mod tests {
 
     #[test]
     fn the_covariance_stays_positive_over_a_million_updates_of_one_direction() {
-        let mut rls =
-            Rls::new(Vector3::zeros(), &Vector3::repeat(1e6), Forgetting::Directional(0.999));
+        let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(1e6), 0.999);
         for _ in 0..1_000_000 {
             rls.update(&Vector3::new(1.0, 0.999, 0.998), 2.0).unwrap();
         }
-        assert!(rls.covariance().cholesky().is_some());
+        assert!(rls.belief.covariance.cholesky().is_some());
     }
 
     #[test]
     fn a_row_of_nan_is_refused_and_leaves_the_estimate() {
-        let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(1.0), Forgetting::None);
+        let mut rls = Rls::new(Vector3::zeros(), &Vector3::repeat(1.0), 1.0);
         let before = rls;
         assert!(rls.update(&Vector3::repeat(f64::NAN), 1.0).is_err());
         assert!(rls.update(&Vector3::repeat(1.0), f64::NAN).is_err());

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, SVector, Vector2};
 
-use super::adjoint::ForwardStep;
+use super::fixed_lag::ForwardStep;
 use super::gaussian::Gaussian;
 use super::random::Random;
 

@@ -45,24 +45,16 @@ pub struct UnitRow<const C: usize> {
 /// `y = phi . theta + error` with independent errors of unit variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Whitener<const S: usize, const C: usize> {
-    state: SMatrix<f64, S, C>,
-    covariance: SMatrix<f64, S, S>,
+    /// The states by column.
+    pub state: SMatrix<f64, S, C>,
+    /// The states' covariance, for known parameters.
+    pub covariance: SMatrix<f64, S, S>,
 }
 
 impl<const S: usize, const C: usize> Whitener<S, C> {
     /// Starts at known states with their covariance.
     pub fn new(state: SMatrix<f64, S, C>, covariance: SMatrix<f64, S, S>) -> Self {
         Whitener { state, covariance }
-    }
-
-    /// The states by column.
-    pub fn state(&self) -> &SMatrix<f64, S, C> {
-        &self.state
-    }
-
-    /// The states' covariance, for known parameters.
-    pub fn covariance(&self) -> &SMatrix<f64, S, S> {
-        &self.covariance
     }
 
     /// Moves the states to the next row.

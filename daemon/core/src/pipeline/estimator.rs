@@ -1,7 +1,7 @@
-//! The interface of every estimator.
+//! The interface of every estimator, and one that estimates nothing.
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason, Status};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 
 use super::KeptEstimate;
 
@@ -50,5 +50,24 @@ pub trait Estimator: Send {
     /// it has no use for one. The status stays unestimated until samples confirm it.
     fn warm_start(&mut self, _kept: &KeptEstimate) -> bool {
         false
+    }
+}
+
+/// Counts the samples and leaves the snapshot without parameters.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Echo;
+
+impl Estimator for Echo {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::Echo
+    }
+
+    fn update(&mut self, _sample: &ResolvedSample) -> Outcome {
+        Outcome::Used
+    }
+
+    fn write(&self, snapshot: &mut ParameterSnapshot) {
+        snapshot.status = Status::Unestimated as u32;
+        snapshot.reason = Reason::None as u32;
     }
 }

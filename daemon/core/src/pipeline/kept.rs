@@ -3,7 +3,7 @@
 //! A stored estimate comes back as a prior, never as an estimate: a pipeline that starts from it
 //! reports `unestimated` with the stored values until its own samples have confirmed them.
 
-use dynocar_shared::snapshot::{COVARIANCE_ENTRIES, PARAMETERS_MAX, packed_index};
+use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
 use dynocar_shared::{Parameter, ParameterSnapshot, Status};
 use nalgebra::{Cholesky, DMatrix, SMatrix, SVector};
 
@@ -11,12 +11,11 @@ use super::judge::{are_alike, are_too_large};
 use super::output::contract_unit;
 
 /// A validated estimate with its covariance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct KeptEstimate {
-    count: usize,
-    parameters: [Parameter; PARAMETERS_MAX],
-    values: [f64; PARAMETERS_MAX],
-    covariance: [f64; COVARIANCE_ENTRIES],
+    parameters: Vec<Parameter>,
+    values: Vec<f64>,
+    covariance: Vec<f64>,
 }
 
 /// Why an estimate is not worth keeping, or a kept one not worth taking up.
@@ -62,15 +61,11 @@ impl KeptEstimate {
         {
             return Err(NotKept::Parameters);
         }
-        let mut kept = KeptEstimate {
-            count,
-            parameters: [parameters[0]; PARAMETERS_MAX],
-            values: [0.0; PARAMETERS_MAX],
-            covariance: [0.0; COVARIANCE_ENTRIES],
+        let kept = KeptEstimate {
+            parameters: parameters.to_vec(),
+            values: values.to_vec(),
+            covariance: covariance.to_vec(),
         };
-        kept.parameters[..count].copy_from_slice(parameters);
-        kept.values[..count].copy_from_slice(values);
-        kept.covariance[..entries].copy_from_slice(covariance);
         if kept.is_sound() { Ok(kept) } else { Err(NotKept::NotSound) }
     }
 
@@ -102,17 +97,17 @@ impl KeptEstimate {
 
     /// The parameters.
     pub fn parameters(&self) -> &[Parameter] {
-        &self.parameters[..self.count]
+        &self.parameters
     }
 
     /// Their values, each in its unit.
     pub fn values(&self) -> &[f64] {
-        &self.values[..self.count]
+        &self.values
     }
 
     /// Their covariance, lower triangle packed by rows.
     pub fn covariance(&self) -> &[f64] {
-        &self.covariance[..self.count * (self.count + 1) / 2]
+        &self.covariance
     }
 
     /// What the estimate is worth after a time in s without a sample: every variance grows by
@@ -120,13 +115,14 @@ impl KeptEstimate {
     ///
     /// Resistance follows the weather within hours; the mass is another one after the next stop.
     #[must_use]
-    pub fn after(mut self, elapsed_s: f64) -> Self {
-        for i in 0..self.count {
+    pub fn after(&self, elapsed_s: f64) -> Self {
+        let mut aged = self.clone();
+        for i in 0..self.parameters.len() {
             let (share, time_s) = wander(self.parameters[i]);
             let grown = 1.0 - (-2.0 * elapsed_s.max(0.0) / time_s).exp();
-            self.covariance[packed_index(i, i)] += (share * self.values[i]).powi(2) * grown;
+            aged.covariance[packed_index(i, i)] += (share * self.values[i]).powi(2) * grown;
         }
-        self
+        aged
     }
 
     /// Mean and covariance of these parameters, the mass in kg; `None` unless all of them were kept.
@@ -148,7 +144,8 @@ impl KeptEstimate {
 
     fn is_sound(&self) -> bool {
         let entry = |i, j| self.covariance[packed_index(i, j)];
-        let matrix = DMatrix::from_fn(self.count, self.count, entry);
+        let count = self.parameters.len();
+        let matrix = DMatrix::from_fn(count, count, entry);
         let is_finite = self.values().iter().chain(self.covariance()).all(|it| it.is_finite());
         is_finite && Cholesky::new(matrix).is_some()
     }

@@ -4,7 +4,6 @@
 //! from the channel, `dynocar identify` from a file, and both get the same bits.
 
 pub mod braking;
-mod echo;
 mod estimator;
 pub mod judge;
 mod kept;
@@ -18,8 +17,7 @@ pub mod settings;
 pub mod train_kalman;
 mod usable;
 
-pub use echo::Echo;
-pub use estimator::{Estimator, Outcome};
+pub use estimator::{Echo, Estimator, Outcome};
 pub use judge::InnovationMonitor;
 pub use kept::{KeptEstimate, NotKept};
 pub use settings::SettingError;
@@ -29,7 +27,7 @@ use std::sync::Arc;
 use dynocar_model::force::ForceResolver;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::Validator;
 use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status, TrainId, TrainSample};
 
 use self::usable::Usable;
@@ -66,7 +64,6 @@ impl Pipeline {
         track: Option<Arc<Track>>,
         estimator: Box<dyn Estimator>,
     ) -> Self {
-        let limits = ValidationLimits::for_train(train.mass_kg);
         let mut snapshot = ParameterSnapshot::empty();
         snapshot.train_id = train_id.0;
         snapshot.pipeline_index = index;
@@ -74,7 +71,7 @@ impl Pipeline {
         estimator.write(&mut snapshot);
         let answerable = quantities::answerable(estimator.kind());
         Pipeline {
-            validator: Validator::new(train_id, train.mass_kg, limits),
+            validator: Validator::new(train_id, train.mass_kg),
             plausibility: Plausibility::new(Arc::clone(&train)),
             resolver: ForceResolver::new(train, track),
             estimator,
@@ -198,7 +195,8 @@ impl Pipeline {
     /// What cannot be true of the samples lately and spoils the estimate.
     pub fn implausible(&self) -> Option<DetectedFault> {
         let kind = self.estimator.kind();
-        self.plausibility.detected().iter().find(|detected| detected.fault.concerns(kind))
+        let mut detected = self.plausibility.detected().iter();
+        detected.find(|detected| detected.fault.concerns(kind)).copied()
     }
 
     /// The snapshot after the last sample.

@@ -1,7 +1,7 @@
 //! Writing an estimate into a snapshot.
 
 use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
-use dynocar_shared::{Parameter, ParameterSnapshot, Reason, Status};
+use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, Reason, Status};
 use nalgebra::{SMatrix, SVector};
 
 use super::InnovationMonitor;
@@ -46,4 +46,26 @@ pub fn write_innovations(snapshot: &mut ParameterSnapshot, monitor: &InnovationM
     snapshot.innovation_normalised = monitor.last();
     snapshot.innovation_mean_square = monitor.mean_square();
     snapshot.innovation_correlation = monitor.correlation();
+}
+
+/// The Davis coefficients, in their order.
+pub const DAVIS: [Parameter; 3] = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
+/// The Davis coefficients and the mass, in their order.
+pub const DAVIS_AND_MASS: [Parameter; 4] =
+    [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass];
+/// What brings data for each of them.
+const MANOEUVRES: [Manoeuvre; 4] =
+    [Manoeuvre::CoastSlow, Manoeuvre::VarySpeed, Manoeuvre::CoastFast, Manoeuvre::Accelerate];
+
+/// Bits of those of [`DAVIS_AND_MASS`] that the data determine, and of the manoeuvres that bring data
+/// for the others.
+pub fn excitation<const N: usize>(is_known: [bool; N]) -> (u32, u32) {
+    let mut bits = (0, 0);
+    for (i, (is_known, manoeuvre)) in is_known.into_iter().zip(MANOEUVRES).enumerate() {
+        match is_known {
+            true => bits.0 |= 1 << i,
+            false => bits.1 |= manoeuvre.bit(),
+        }
+    }
+    bits
 }

@@ -9,14 +9,11 @@
 //! Where too many readings stand alone, some of them agree by chance, and nothing is taken until
 //! the forces are steady again.
 
-mod gated;
-
-pub use gated::Gated;
-
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Reason, RejectionReason};
 
 use super::motion::{BRIDGED_MAX_S, MOVING_MPS};
+use crate::pipeline::Outcome;
 
 /// So many samples away from the old level make a new one.
 const AGREEING: usize = 3;
@@ -303,3 +300,37 @@ impl SampleGate {
 
 #[cfg(test)]
 mod tests;
+
+/// An estimator whose samples pass a gate.
+pub trait Gated {
+    /// The gate.
+    fn gate(&mut self) -> &mut SampleGate;
+
+    /// Takes a sample that has passed.
+    fn take(&mut self, sample: &ResolvedSample) -> Outcome;
+
+    /// Leaves a sample out; the next one begins anew.
+    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason);
+
+    /// Judges a sample and takes what the verdict sets free.
+    ///
+    /// # Real-time
+    ///
+    /// The work of as many samples as can be held, no allocation.
+    fn pass(&mut self, sample: &ResolvedSample) -> Outcome {
+        match self.gate().judge(sample) {
+            Verdict::Take => self.take(sample),
+            Verdict::Wait => Outcome::Used,
+            Verdict::Release(count) => {
+                (0..count).fold(Outcome::Used, |last, index| match self.gate().released(index) {
+                    Some(released) => self.take(&released),
+                    None => last,
+                })
+            }
+            Verdict::Refuse(reason) => {
+                self.leave_out(sample, reason);
+                Outcome::Rejected(reason)
+            }
+        }
+    }
+}

@@ -36,31 +36,16 @@ pub struct WindowMean {
     pub speed_mps: f64,
 }
 
-/// By how much the acceleration exceeds what a reported quantity would give; 1 in right units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slope {
-    /// The factor.
-    pub factor: f64,
-    /// Its standard deviation.
-    pub std: f64,
-}
-
-impl Slope {
-    /// True when it is surely not 0.
-    fn is_known(&self) -> bool {
-        self.factor.abs() > KNOWN_DEVIATIONS * self.std
-    }
-}
-
-/// The factors of traction, brake and gradient, where the motion determines them.
+/// By how much the acceleration exceeds what the reported traction, brake and gradient would give,
+/// where the motion determines it; 1 in right units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
     /// Of the traction force.
-    pub traction: Option<Slope>,
+    pub traction: Option<f64>,
     /// Of the brake force.
-    pub brake: Option<Slope>,
+    pub brake: Option<f64>,
     /// Of the gradient.
-    pub gradient: Option<Slope>,
+    pub gradient: Option<f64>,
 }
 
 /// Sums over the windows lately.
@@ -134,12 +119,10 @@ impl Balance {
         let variance = left / (self.windows - COLUMNS as f64).max(1.0);
         let slope = |column: usize| {
             let own_share = 1.0 / inverse[(column, column)];
-            let slope = Slope {
-                factor: solution[column] / scale[column],
-                std: (variance * inverse[(column, column)]).sqrt() / scale[column],
-            };
+            let factor = solution[column] / scale[column];
+            let std = (variance * inverse[(column, column)]).sqrt() / scale[column];
             let is_there = self.gram[(column, column)] > 0.0 && own_share > OWN_SHARE_MIN;
-            (is_there && slope.is_known()).then_some(slope)
+            (is_there && factor.abs() > KNOWN_DEVIATIONS * std).then_some(factor)
         };
         Slopes { traction: slope(0), brake: slope(1), gradient: slope(2) }
     }

@@ -9,7 +9,8 @@
 //! | position | 1 | f | not known |
 //! | traction and brake exchanged | -1 | 1 | 1 |
 
-use super::balance::Slope;
+use arrayvec::ArrayVec;
+
 use super::input_fault::{DetectedFault, InputFault};
 use super::watch::Figures;
 
@@ -35,24 +36,13 @@ const ORDINARY_PRESSURE_PA: f64 = 1e5;
 /// Detected faults at most.
 const DETECTED_MAX: usize = 4;
 
-/// What was found, the most fundamental first.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DetectedFaults {
-    list: [Option<DetectedFault>; DETECTED_MAX],
+fn add(found: &mut DetectedFaults, fault: InputFault, factor: f64) {
+    // Of more than there is room for, the first are the most fundamental.
+    let _ = found.try_push(DetectedFault { fault, factor });
 }
 
-impl DetectedFaults {
-    fn add(&mut self, fault: InputFault, factor: f64) {
-        if let Some(place) = self.list.iter_mut().find(|place| place.is_none()) {
-            *place = Some(DetectedFault { fault, factor });
-        }
-    }
-
-    /// All of them.
-    pub fn iter(&self) -> impl Iterator<Item = DetectedFault> {
-        self.list.into_iter().flatten()
-    }
-}
+/// What is surely wrong with the input, the most fundamental first.
+pub type DetectedFaults = ArrayVec<DetectedFault, DETECTED_MAX>;
 
 /// Judges figures.
 ///
@@ -70,11 +60,11 @@ pub fn diagnose(figures: &Figures) -> DetectedFaults {
         _ => (1.0, 1.0),
     };
     if let Some(DetectedFault { fault, factor }) = kinematic {
-        found.add(fault, factor);
+        add(&mut found, fault, factor);
     }
     let mut forces_by = forces_by;
     if let Some(ratio) = figures.mass_ratio.filter(|&ratio| is_outside(ratio, MASS_RATIOS)) {
-        found.add(InputFault::MassScale, ratio);
+        add(&mut found, InputFault::MassScale, ratio);
         forces_by *= ratio;
     }
     of_forces(figures, forces_by, kinematic.is_some(), &mut found);
@@ -84,7 +74,7 @@ pub fn diagnose(figures: &Figures) -> DetectedFaults {
     if let Some(pressure_pa) = figures.braking_pressure_pa
         && pressure_pa < BRAKING_PRESSURE_MIN_PA
     {
-        found.add(InputFault::PressureScale, pressure_factor(pressure_pa));
+        add(&mut found, InputFault::PressureScale, pressure_factor(pressure_pa));
     }
     found
 }
@@ -131,13 +121,13 @@ fn kinematic(figures: &Figures) -> Option<DetectedFault> {
 fn common_factor(figures: &Figures) -> Option<f64> {
     match (figures.slopes.traction, figures.slopes.brake) {
         (Some(one), Some(other)) => {
-            let ratio = one.factor / other.factor;
+            let ratio = one / other;
             (1.0 / SAME_FACTOR..SAME_FACTOR).contains(&ratio).then(|| {
                 // The geometric mean, with their sign.
-                one.factor.signum() * (one.factor * other.factor).sqrt()
+                one.signum() * (one * other).sqrt()
             })
         }
-        (one, other) => one.or(other).map(|slope| slope.factor),
+        (one, other) => one.or(other),
     }
 }
 
@@ -145,20 +135,20 @@ fn of_forces(figures: &Figures, by: f64, is_kinematic: bool, found: &mut Detecte
     let slopes = figures.slopes;
     if let Some(common) = common_factor(figures).map(|factor| factor / by) {
         if common < -FORCE_FACTORS.0 {
-            found.add(InputFault::ForcesSwapped, common);
+            add(found, InputFault::ForcesSwapped, common);
         } else if is_outside(common, FORCE_FACTORS) {
             let (fault, factor) = blamed(figures, common, is_kinematic);
-            found.add(fault, factor);
+            add(found, fault, factor);
         }
         return;
     }
     let of_one =
         [(InputFault::TractionScale, slopes.traction), (InputFault::BrakeScale, slopes.brake)];
     for (fault, slope) in of_one {
-        let Some(Slope { factor, .. }) = slope else { continue };
+        let Some(factor) = slope else { continue };
         let factor = factor / by;
         if is_outside(factor, FORCE_FACTORS) {
-            found.add(fault, 1.0 / factor);
+            add(found, fault, 1.0 / factor);
         }
     }
 }
@@ -181,10 +171,10 @@ fn blamed(figures: &Figures, common: f64, is_kinematic: bool) -> (InputFault, f6
 
 fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
     let Some(slope) = figures.slopes.gradient else { return };
-    let factor = slope.factor / by;
+    let factor = slope / by;
     if factor < 0.0 {
         if !is_outside(-factor, DISTANCE_RATIOS) {
-            found.add(InputFault::GradientSign, factor);
+            add(found, InputFault::GradientSign, factor);
         }
         return;
     }
@@ -192,7 +182,7 @@ fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
     let is_credible =
         if factor > 1.0 { rms < GRADIENT_RMS_PERMILLE.0 } else { rms > GRADIENT_RMS_PERMILLE.1 };
     if is_credible && InputFault::GradientScale.misfit(1.0 / factor).is_some() {
-        found.add(InputFault::GradientScale, 1.0 / factor);
+        add(found, InputFault::GradientScale, 1.0 / factor);
     }
 }
 

@@ -5,16 +5,14 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration) and [`pressure`]
+//! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration)
 //! - [`diagnosis`]: which input fault makes all figures come out as they did
-//! - [`input_fault`]: the input faults, their names and severity; [`words`]: a detected fault in a sentence
+//! - [`input_fault`]: the input faults, their names, severity and words
 
 pub mod balance;
 pub mod diagnosis;
 pub mod input_fault;
-pub mod pressure;
 pub mod watch;
-pub mod words;
 
 use std::sync::Arc;
 
@@ -29,7 +27,6 @@ use watch::Watch;
 /// Judges the samples of one train as they come.
 #[derive(Clone, Debug)]
 pub struct Plausibility {
-    train: Arc<TrainModel>,
     watch: Watch,
     detected: DetectedFaults,
 }
@@ -37,7 +34,7 @@ pub struct Plausibility {
 impl Plausibility {
     /// Nothing seen yet of a train.
     pub fn new(train: Arc<TrainModel>) -> Self {
-        Plausibility { watch: Watch::new(&train), train, detected: DetectedFaults::default() }
+        Plausibility { watch: Watch::new(train), detected: DetectedFaults::default() }
     }
 
     /// Takes in a sample with what validation said of it, and the gradient in ‰ along the travel.
@@ -67,7 +64,7 @@ impl Plausibility {
             ) => false,
             Err(_) => return,
         };
-        if self.watch.take(&self.train, sample, is_valid, gradient_permille) {
+        if self.watch.take(sample, is_valid, gradient_permille) {
             self.detected = diagnosis::diagnose(&self.watch.figures());
         }
     }

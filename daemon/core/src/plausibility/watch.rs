@@ -1,11 +1,12 @@
 //! Sample by sample: from a stream of samples to what they say of units, signs and swaps.
 
+use std::sync::Arc;
+
 use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::balance::{Balance, Slopes, WindowMean};
-use super::pressure::PressureContrast;
 use crate::filter::RunningMedian;
 
 /// Time in s over which accelerations are averaged; one step where the steps are longer.
@@ -69,8 +70,7 @@ struct Distances {
 /// Follows the samples of one train; of fixed size.
 #[derive(Clone, Debug)]
 pub struct Watch {
-    nominal_mass_kg: f64,
-    rotating_mass_factor: f64,
+    train: Arc<TrainModel>,
     last: Option<TrainSample>,
     usual_step_s: f64,
     gradient_permille: f64,
@@ -86,10 +86,9 @@ pub struct Watch {
 
 impl Watch {
     /// A watch over the samples of a train as it is declared.
-    pub fn new(train: &TrainModel) -> Self {
+    pub fn new(train: Arc<TrainModel>) -> Self {
         Watch {
-            nominal_mass_kg: train.mass_kg,
-            rotating_mass_factor: train.rotating_mass_factor,
+            train,
             last: None,
             usual_step_s: 0.0,
             gradient_permille: 0.0,
@@ -115,7 +114,6 @@ impl Watch {
     /// Bounded work, no allocation.
     pub fn take(
         &mut self,
-        train: &TrainModel,
         sample: &TrainSample,
         is_valid: bool,
         gradient_permille: Option<f64>,
@@ -144,7 +142,7 @@ impl Watch {
             self.window.refused_s += step_s;
         }
         let is_compared = self.compare_distances(&last, sample, step_s);
-        self.extend_window(train, &last, sample, step_s) || is_compared
+        self.extend_window(&last, sample, step_s) || is_compared
     }
 
     /// What the samples so far say.
@@ -188,13 +186,7 @@ impl Watch {
         true
     }
 
-    fn extend_window(
-        &mut self,
-        train: &TrainModel,
-        last: &TrainSample,
-        now: &TrainSample,
-        step_s: f64,
-    ) -> bool {
+    fn extend_window(&mut self, last: &TrainSample, now: &TrainSample, step_s: f64) -> bool {
         let (Some(before), Some(after)) = (forces_n(last), forces_n(now)) else {
             self.window = Window::default();
             return false;
@@ -204,7 +196,7 @@ impl Watch {
             self.window = Window::default();
             return false;
         }
-        let mass_kg = now.get(SampleField::Mass).unwrap_or(self.nominal_mass_kg);
+        let mass_kg = now.get(SampleField::Mass).unwrap_or(self.train.mass_kg);
         let window = &mut self.window;
         if window.elapsed_s == 0.0 {
             window.start_mps = last.speed_mps;
@@ -223,14 +215,16 @@ impl Watch {
         if window.refused_s > 0.0 && window.refused_s < REFUSED_SHARE_MIN * window.elapsed_s {
             return false;
         }
-        self.close(train, window, now.speed_mps, mass_kg);
+        self.close(window, now.speed_mps, mass_kg);
         true
     }
 
-    fn close(&mut self, train: &TrainModel, window: Window, end_mps: f64, mass_kg: f64) {
+    fn close(&mut self, window: Window, end_mps: f64, mass_kg: f64) {
         let per_s = 1.0 / window.elapsed_s;
         let mean = WindowMean {
-            inertia_mps2: (1.0 + self.rotating_mass_factor) * (end_mps - window.start_mps) * per_s,
+            inertia_mps2: (1.0 + self.train.rotating_mass_factor)
+                * (end_mps - window.start_mps)
+                * per_s,
             traction_mps2: window.traction_mps * per_s,
             brake_mps2: window.brake_mps * per_s,
             gradient_mps2: window.gradient_mps * per_s,
@@ -238,8 +232,9 @@ impl Watch {
         };
         self.balance.push(&mean);
         self.masses += 1.0;
-        self.mass_ratio = mass_kg / self.nominal_mass_kg;
-        let curves = [(&train.traction, mean.traction_mps2), (&train.brake, mean.brake_mps2)];
+        self.mass_ratio = mass_kg / self.train.mass_kg;
+        let curves =
+            [(&self.train.traction, mean.traction_mps2), (&self.train.brake, mean.brake_mps2)];
         for (share, (curve, force_mps2)) in self.effort_shares.iter_mut().zip(curves) {
             *share -= EFFORT_FADE * *share;
             if let Some(curve) = curve {
@@ -259,5 +254,56 @@ fn forces_n(sample: &TrainSample) -> Option<(f64, f64)> {
         (Some(traction), None) if traction > 0.0 => Some((traction, 0.0)),
         (None, Some(brake)) if brake > 0.0 => Some((0.0, brake)),
         _ => None,
+    }
+}
+
+/// Braking time in s that is enough to judge.
+const BRAKING_MIN_S: f64 = 20.0;
+/// Times of which the means forget, in s.
+const MEMORY_S: f64 = 2000.0;
+/// The pressure follows the brake when it is so many times as high while braking.
+const CONTRAST_MIN: f64 = 3.0;
+
+/// Mean pressure with and without brake force.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PressureContrast {
+    braking: Mean,
+    released: Mean,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Mean {
+    time_s: f64,
+    integral_pa_s: f64,
+}
+
+impl Mean {
+    fn take(&mut self, value: f64, step_s: f64) {
+        let keep = 1.0 / (1.0 + step_s / MEMORY_S);
+        self.time_s = self.time_s * keep + step_s;
+        self.integral_pa_s = self.integral_pa_s * keep + value * step_s;
+    }
+
+    fn value(&self) -> f64 {
+        self.integral_pa_s / self.time_s
+    }
+}
+
+impl PressureContrast {
+    /// Takes in a sample and the time since the one before it.
+    pub fn take(&mut self, sample: &TrainSample, step_s: f64) {
+        let pressure = sample.get(SampleField::BrakeCylinderPressure);
+        let (Some(pressure), Some(brake)) = (pressure, sample.get(SampleField::BrakeForce)) else {
+            return;
+        };
+        let mean = if brake > 0.0 { &mut self.braking } else { &mut self.released };
+        mean.take(pressure.abs(), step_s);
+    }
+
+    /// The mean pressure in Pa while braking, when it surely follows the brake.
+    pub fn braking_pa(&self) -> Option<f64> {
+        let is_enough = self.braking.time_s.min(self.released.time_s) >= BRAKING_MIN_S;
+        let follows = is_enough && self.braking.value() > CONTRAST_MIN * self.released.value();
+        follows.then(|| self.braking.value())
     }
 }

@@ -3,9 +3,7 @@
 use std::sync::Arc;
 
 use dynocar_model::force::{ForceResolver, ResolvedSample};
-use dynocar_model::simulate::{
-    BridgeLimits, Prediction, QuadraticForces, Recording, Restart, SpeedError,
-};
+use dynocar_model::simulate::{Prediction, QuadraticForces, Recording, Restart, SpeedError};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_model::validation::ValidSample;
@@ -59,7 +57,7 @@ impl OpenLoop {
     /// Ends the window: what the model leaves of it, nothing where nothing can be simulated.
     pub fn close(&mut self) -> WindowError {
         let samples = std::mem::replace(&mut self.samples, Vec::with_capacity(SAMPLES_MAX));
-        let Ok(recording) = Recording::new(samples, BridgeLimits::default()) else {
+        let Ok(recording) = Recording::new(samples) else {
             return WindowError::default();
         };
         let forces = QuadraticForces::declared(&recording, self.train.resistance);

@@ -1,7 +1,7 @@
 //! The model in force and its rivals on the same samples.
 
 use dynocar_model::simulate::{Restart, SpeedError};
-use dynocar_model::validation::{ValidSample, ValidationLimits, Validator};
+use dynocar_model::validation::{ValidSample, Validator};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::{Evidence, score};
@@ -112,7 +112,7 @@ pub struct Trials {
 impl Trials {
     /// Of a train of a nominal mass in kg.
     pub fn new(train: TrainId, mass_kg: f64, in_force: Rival, rivals: Vec<Rival>) -> Self {
-        let validator = Validator::new(train, mass_kg, ValidationLimits::for_train(mass_kg));
+        let validator = Validator::new(train, mass_kg);
         let mut trials =
             Trials { validator, in_force, rivals, window: None, run: None, moved_s: 0.0 };
         trials.begin_trip();

@@ -8,11 +8,10 @@
 //! does. Spikes are refused before they reach a segment.
 
 use dynocar_core::filter::FittedLine;
-use dynocar_core::pipeline::momentum::sample::{
-    SpeedWatch, UnitSample, resistance_integral, trapezoids,
+use dynocar_core::pipeline::momentum::{
+    Columns, DataSettings, PARAMETERS, SPEED_SCALE_MPS, SpeedWatch, UnitSample,
+    resistance_integral, trapezoids,
 };
-use dynocar_core::pipeline::momentum::settings::DataSettings;
-use dynocar_core::pipeline::momentum::{Columns, PARAMETERS, SPEED_SCALE_MPS};
 use dynocar_core::pipeline::motion::SpeedNoise;
 use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;

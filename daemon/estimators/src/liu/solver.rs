@@ -1,29 +1,27 @@
 //! The recursions of Liu 2018 behind one face.
 
-use dynocar_core::filter::{Forgetting, Mils, NotPositiveDefinite, Penalty, Rls};
-use dynocar_core::pipeline::momentum::settings::DataSettings;
-use dynocar_core::pipeline::momentum::{PARAMETERS, UNKNOWNS};
+use dynocar_core::filter::{Gaussian, Mils, NotPositiveDefinite, Penalty, Rls};
+use dynocar_core::pipeline::momentum::{DataSettings, PARAMETERS, UNKNOWNS};
 
 use crate::resistance::noise_bank::NoiseBank;
-use crate::resistance::noise_model::WhiteRow;
-use crate::resistance::regression::{Solution, Unknowns};
+use crate::resistance::regression::{Solution, Unknowns, WhiteRow};
 use crate::resistance::settings::{INNOVATION_LENGTH_MAX, MilsSettings, RlsSettings};
 
 /// One of the paper's algorithms.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "one stands in each pipeline, where it stays")]
 pub enum Solver {
     /// All rows at once: the mixture of the noise bank itself.
     Batch,
     /// Recursive least squares.
     Rls(Rls<UNKNOWNS>),
-    /// Multi-innovation, of length 1 for regularised RLS.
-    Mils(Mils<UNKNOWNS, INNOVATION_LENGTH_MAX>),
-    /// Multi-innovation that skips bad data.
-    VMils {
+    /// Multi-innovation least squares; with regularised RLS as its length of 1.
+    Mils {
         /// The recursion.
         recursion: Mils<UNKNOWNS, INNOVATION_LENGTH_MAX>,
-        /// Robust standard deviations beyond which a row is bad.
-        bad_beyond: f64,
+        /// Where the interval varies with bad rows, the robust standard deviations beyond which a row
+        /// is one.
+        bad_beyond: Option<f64>,
     },
 }
 
@@ -54,29 +52,25 @@ pub fn bank_penalty(data: &DataSettings, lambda: f64) -> Unknowns {
 impl Solver {
     /// Recursive least squares (eq. 9-11).
     pub fn rls(settings: &RlsSettings) -> Self {
-        let forgetting = match settings.forgetting {
-            1.0 => Forgetting::None,
-            factor => Forgetting::Directional(factor),
-        };
         let variances = start(&settings.data, settings.start_variance, 1.0);
-        Solver::Rls(Rls::new(Unknowns::zeros(), &variances, forgetting))
+        Solver::Rls(Rls::new(Unknowns::zeros(), &variances, settings.forgetting))
     }
 
-    /// Regularised multi-innovation least squares of a length; 1 is regularised RLS (eq. 12-16).
-    pub fn mils(settings: &MilsSettings, length: usize) -> Self {
-        Solver::Mils(recursion(settings, length))
-    }
-
-    /// Interval-varying multi-innovation least squares.
-    pub fn v_mils(settings: &MilsSettings) -> Self {
-        let recursion = recursion(settings, settings.innovation_length as usize);
-        Solver::VMils { recursion, bad_beyond: settings.bad_beyond }
+    /// Regularised multi-innovation least squares of a length, 1 for regularised RLS (eq. 12-16); with
+    /// an interval that varies where bad rows are left out.
+    pub fn mils(settings: &MilsSettings, length: usize, bad_beyond: Option<f64>) -> Self {
+        let lambda = Unknowns::from_fn(|i, _| if i < PARAMETERS { settings.lambda } else { 0.0 });
+        let penalty =
+            Penalty { lambda, length: settings.length, is_printed: settings.printed_penalty };
+        let variances = start(&settings.data, settings.start_variance, length as f64);
+        let recursion = Mils::new(Unknowns::zeros(), &variances, length, penalty);
+        Solver::Mils { recursion, bad_beyond }
     }
 
     /// Robust standard deviations beyond which a row must not be used.
     pub fn bad_beyond(&self, otherwise: f64) -> f64 {
         match self {
-            Solver::VMils { bad_beyond, .. } => *bad_beyond,
+            Solver::Mils { bad_beyond: Some(bad_beyond), .. } => *bad_beyond,
             _ => otherwise,
         }
     }
@@ -90,7 +84,7 @@ impl Solver {
         match self {
             Solver::Batch => Ok(()),
             Solver::Rls(rls) => rls.update(&row.features, row.observed).map(drop),
-            Solver::Mils(recursion) | Solver::VMils { recursion, .. } => {
+            Solver::Mils { recursion, .. } => {
                 recursion.update(&row.features, row.observed).map(drop)
             }
         }
@@ -102,16 +96,14 @@ impl Solver {
         let Some(Solution { estimate, covariance }) = bank.likeliest_solution() else { return };
         match self {
             Solver::Batch => {}
-            Solver::Rls(rls) => rls.restart(estimate, covariance),
-            Solver::Mils(recursion) | Solver::VMils { recursion, .. } => {
-                recursion.restart(estimate, covariance)
-            }
+            Solver::Rls(rls) => rls.belief = Gaussian { mean: estimate, covariance },
+            Solver::Mils { recursion, .. } => recursion.restart(estimate, covariance),
         }
     }
 
     /// Goes on after a row that was refused: a stack of innovations must not hold it.
     pub fn skip(&mut self) {
-        if let Solver::VMils { recursion, .. } = self {
+        if let Solver::Mils { recursion, bad_beyond: Some(_) } = self {
             recursion.forget_rows();
         }
     }
@@ -119,19 +111,10 @@ impl Solver {
     /// The solution so far; `None` while there is none.
     pub fn solution(&self, bank: &NoiseBank) -> Option<Solution> {
         let (estimate, covariance) = match self {
-            Solver::Batch => return bank.mixture(),
-            Solver::Rls(rls) => (*rls.estimate(), *rls.covariance()),
-            Solver::Mils(recursion) | Solver::VMils { recursion, .. } => {
-                (*recursion.estimate(), recursion.covariance())
-            }
+            Solver::Batch => return bank.mixture,
+            Solver::Rls(rls) => (rls.belief.mean, rls.belief.covariance),
+            Solver::Mils { recursion, .. } => (*recursion.estimate(), recursion.covariance()),
         };
         bank.widened(&Solution { estimate, covariance })
     }
-}
-
-fn recursion(settings: &MilsSettings, length: usize) -> Mils<UNKNOWNS, INNOVATION_LENGTH_MAX> {
-    let lambda = Unknowns::from_fn(|i, _| if i < PARAMETERS { settings.lambda } else { 0.0 });
-    let penalty = Penalty { lambda, length: settings.length, is_printed: settings.printed_penalty };
-    let variances = start(&settings.data, settings.start_variance, length as f64);
-    Mils::new(Unknowns::zeros(), &variances, length, penalty)
 }

@@ -6,10 +6,9 @@
 //! the data are it takes from a least-squares estimator that runs in parallel.
 
 use dynocar_core::filter::Gaussian;
-use dynocar_core::pipeline::momentum::error::Disturbance;
-use dynocar_core::pipeline::momentum::sample::UnitSample;
 use dynocar_core::pipeline::momentum::{
-    BRAKE_SCALE, FORCE_DELAY, PARAMETERS, TRACTION_SCALE, UNKNOWNS, regressors,
+    BRAKE_SCALE, Disturbance, FORCE_DELAY, PARAMETERS, TRACTION_SCALE, UNKNOWNS, UnitSample,
+    regressors,
 };
 use dynocar_core::pipeline::motion::jump_variance;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
@@ -71,7 +70,7 @@ impl ResistanceKalman {
         settings: KalmanSettings,
         least_squares: ResistanceLeastSquares,
     ) -> Self {
-        let declared = least_squares.declared();
+        let declared = &least_squares.declared;
         ResistanceKalman {
             settings,
             mean_weight: mean_student_weight(settings.student_freedom),
@@ -84,7 +83,7 @@ impl ResistanceKalman {
             moved_mps: 0.0,
             consecutive_outliers: 0,
             monitor: InnovationMonitor::new(MONITOR_SAMPLES),
-            report: *least_squares.report(),
+            report: least_squares.report,
             resets: 0,
             least_squares,
         }
@@ -203,7 +202,7 @@ impl ResistanceKalman {
             self.least_squares.bank.likeliest_solution().filter(|_| self.least_squares.is_warm());
         let disturbance = *self.filter.mean.fixed_rows::<1>(DISTURBANCE).as_scalar();
         let variance = self.filter.covariance[(DISTURBANCE, DISTURBANCE)];
-        self.filter = filter_at(known.as_ref().unwrap_or(self.least_squares.declared()));
+        self.filter = filter_at(known.as_ref().unwrap_or(&self.least_squares.declared));
         self.filter.replace(DISTURBANCE, disturbance, variance);
         self.start(now);
         self.resets += 1;
@@ -302,7 +301,7 @@ impl ResistanceKalman {
 
     /// Starts anew after a numerical failure.
     fn reset(&mut self) {
-        self.filter = filter_at(self.least_squares.declared());
+        self.filter = filter_at(&self.least_squares.declared);
         self.last = None;
         self.resets += 1;
     }
@@ -393,8 +392,8 @@ impl Estimator for ResistanceKalman {
 
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
         let is_taken = self.least_squares.warm_start(kept);
-        self.filter = filter_at(self.least_squares.declared());
-        self.report = *self.least_squares.report();
+        self.filter = filter_at(&self.least_squares.declared);
+        self.report = self.least_squares.report;
         is_taken
     }
 }

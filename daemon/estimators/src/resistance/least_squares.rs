@@ -2,25 +2,20 @@
 
 use dynocar_core::filter::RunningMedian;
 use dynocar_core::pipeline::judge::missing;
-use dynocar_core::pipeline::momentum::sample::UnitSample;
-use dynocar_core::pipeline::momentum::settings::DataSettings;
-use dynocar_core::pipeline::momentum::{PARAMETERS, scaled, unscaling};
-use dynocar_core::pipeline::output::{write_innovations, write_parameters, write_status};
+use dynocar_core::pipeline::momentum::{DataSettings, PARAMETERS, UnitSample, scaled, unscaling};
+use dynocar_core::pipeline::output::{DAVIS, write_innovations, write_parameters, write_status};
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
 use super::noise_bank::NoiseBank;
-use super::noise_model::WhiteRow;
-use super::regression::{Motion, Observation, Solution, Unknowns};
+use super::regression::{Motion, Observation, Solution, Unknowns, WhiteRow};
 use super::report::{DrivenSpeeds, Evidence, Report};
 use super::source::RowSource;
 use crate::liu::solver::{Solver, bank_penalty};
 
-/// What this pipeline estimates.
-const DAVIS: [Parameter; PARAMETERS] = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
 /// Rows that the innovation statistics look back over.
 const MONITOR_ROWS: u32 = 60;
 /// Rows whose median gives the robust scale of the innovations.
@@ -47,14 +42,16 @@ pub struct ResistanceLeastSquares {
     pub(super) bank: NoiseBank,
     fresh: Solver,
     solver: Solver,
-    declared: Solution,
+    /// The declared resistance as a start.
+    pub(super) declared: Solution,
     solution: Option<Solution>,
     known: Davis,
     monitor: InnovationMonitor,
     deviations: RunningMedian<SCALE_ROWS>,
     refused_share: f64,
     speeds: DrivenSpeeds,
-    report: Report,
+    /// The report on its own solution.
+    pub(super) report: Report,
     obstacle: Option<Reason>,
     refused_in_a_row: u32,
     /// How far the disturbance has been let go by the newest sample.
@@ -179,16 +176,6 @@ impl ResistanceLeastSquares {
     pub(super) fn motion(&self) -> Option<Motion> {
         let since = self.source.since_block()?;
         Some(self.bank.likeliest_motion(&since))
-    }
-
-    /// The declared resistance as a start.
-    pub(super) fn declared(&self) -> &Solution {
-        &self.declared
-    }
-
-    /// The report on its own solution.
-    pub(super) fn report(&self) -> &Report {
-        &self.report
     }
 
     /// True when the newest row was refused.

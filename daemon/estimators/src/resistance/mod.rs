@@ -13,7 +13,6 @@
 mod kalman;
 mod least_squares;
 pub(crate) mod noise_bank;
-pub(crate) mod noise_model;
 pub(crate) mod regression;
 mod report;
 pub mod settings;
@@ -65,41 +64,25 @@ pub fn rls(
     Ok(ResistanceLeastSquares::new(PipelineKind::Rls, train, data, solver, lambda, forgetting))
 }
 
-/// Regularised recursive least squares (eq. 12-16).
+/// Regularised least squares of a kind: recursive (eq. 12-16), multi-innovation, or interval-varying
+/// multi-innovation.
 ///
 /// # Errors
 ///
 /// When a setting lies outside its range.
-pub fn regularised_rls(
+pub fn regularised(
+    kind: PipelineKind,
     train: &TrainModel,
     settings: &MilsSettings,
 ) -> Result<ResistanceLeastSquares, SettingError> {
-    regularised(PipelineKind::RegularisedRls, train, settings, Solver::mils(settings, 1))
-}
-
-/// Regularised multi-innovation least squares.
-///
-/// # Errors
-///
-/// When a setting lies outside its range.
-pub fn mils(
-    train: &TrainModel,
-    settings: &MilsSettings,
-) -> Result<ResistanceLeastSquares, SettingError> {
-    let solver = Solver::mils(settings, settings.innovation_length as usize);
-    regularised(PipelineKind::Mils, train, settings, solver)
-}
-
-/// Interval-varying, regularised multi-innovation least squares.
-///
-/// # Errors
-///
-/// When a setting lies outside its range.
-pub fn v_mils(
-    train: &TrainModel,
-    settings: &MilsSettings,
-) -> Result<ResistanceLeastSquares, SettingError> {
-    regularised(PipelineKind::VMils, train, settings, Solver::v_mils(settings))
+    settings.check_ranges()?;
+    let innovations = settings.innovation_length as usize;
+    let solver = match kind {
+        PipelineKind::RegularisedRls => Solver::mils(settings, 1, None),
+        PipelineKind::VMils => Solver::mils(settings, innovations, Some(settings.bad_beyond)),
+        _ => Solver::mils(settings, innovations, None),
+    };
+    Ok(ResistanceLeastSquares::new(kind, train, settings.data, solver, settings.lambda, 1.0))
 }
 
 /// A robust Kalman filter with a disturbance state.
@@ -114,14 +97,4 @@ pub fn kalman(
     settings.check_ranges()?;
     let least_squares = ls(train, &LsSettings { data: settings.data, ..LsSettings::default() })?;
     Ok(ResistanceKalman::new(train, *settings, least_squares))
-}
-
-fn regularised(
-    kind: PipelineKind,
-    train: &TrainModel,
-    settings: &MilsSettings,
-    solver: Solver,
-) -> Result<ResistanceLeastSquares, SettingError> {
-    settings.check_ranges()?;
-    Ok(ResistanceLeastSquares::new(kind, train, settings.data, solver, settings.lambda, 1.0))
 }

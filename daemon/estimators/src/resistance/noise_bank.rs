@@ -6,13 +6,12 @@
 //! are mixed by their likelihood.
 
 use dynocar_core::filter::Gaussian;
-use dynocar_core::filter::bank::{Bank, Nats};
-use dynocar_core::filter::mixture::Mixture;
-use dynocar_core::pipeline::momentum::error::Disturbance;
-use dynocar_core::pipeline::momentum::{PARAMETERS, SinceBlock};
+use dynocar_core::filter::bank::{Bank, Mixture};
+use dynocar_core::pipeline::momentum::{Disturbance, PARAMETERS, SinceBlock, gap_s};
 
-use super::noise_model::{NoiseModel, PRIOR_ROWS, WhiteRow};
-use super::regression::{Motion, Observation, Solution, Unknowns};
+use super::regression::{
+    Motion, NoiseModel, Observation, PRIOR_ROWS, Solution, Unknowns, WhiteRow,
+};
 
 /// Standard deviations of the disturbance in N/kN: from nothing to as large as resistance itself.
 const STDS_N_PER_KN: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
@@ -53,7 +52,7 @@ pub struct LikeliestNoise {
 /// Noise models side by side; the first has no disturbance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseBank {
-    models: Bank<NoiseModel, Nats, MODELS>,
+    models: Bank<NoiseModel, MODELS>,
     /// Their probabilities.
     shares: [f64; MODELS],
     /// Solutions of those that matter, after the newest row.
@@ -62,7 +61,8 @@ pub struct NoiseBank {
     forgetting: f64,
     rows_since_renewal: u32,
     last_time_ns: Option<i64>,
-    mixture: Option<Solution>,
+    /// The mixture of all models; `None` while the rows do not determine the parameters.
+    pub mixture: Option<Solution>,
 }
 
 impl NoiseBank {
@@ -76,7 +76,7 @@ impl NoiseBank {
             },
         };
         let of_index = |index| NoiseModel::new(disturbance(index), penalty);
-        let mut models = Bank::even((0..MODELS).map(of_index));
+        let mut models = Bank::even((0..MODELS).map(of_index), 0.0);
         models.believe(LIKELIEST_AT_FIRST);
         NoiseBank {
             models,
@@ -93,7 +93,7 @@ impl NoiseBank {
     /// Adds what is known of the unknowns from elsewhere to every model, a row of unit variance.
     pub fn know(&mut self, features: &Unknowns, observed: f64) {
         for model in self.models.hypotheses_mut() {
-            model.know(features, observed);
+            model.information.add_knowledge(features, observed);
         }
         self.solutions = [None; MODELS];
     }
@@ -110,12 +110,7 @@ impl NoiseBank {
     ///
     /// Bounded work, no allocation.
     pub fn predict(&mut self, observation: &Observation) -> Option<WhiteRow> {
-        let time_ns = observation.time_ns();
-        let gap_s = self
-            .last_time_ns
-            .replace(time_ns)
-            .map(|last_ns| time_ns.saturating_sub(last_ns) as f64 * 1e-9)
-            .filter(|&gap_s| gap_s > 0.0);
+        let gap_s = gap_s(&mut self.last_time_ns, observation.time_ns());
         for model in self.models.hypotheses_mut() {
             match observation.is_first() {
                 true => model.restart(observation, gap_s),
@@ -188,7 +183,7 @@ impl NoiseBank {
     pub fn likeliest_noise(&self) -> LikeliestNoise {
         let model = self.models.likeliest();
         let scale = model.scale();
-        let Disturbance { std_n_per_kn, time_s } = *model.disturbance();
+        let Disturbance { std_n_per_kn, time_s } = model.disturbance;
         let disturbance = Disturbance { std_n_per_kn: std_n_per_kn * scale.sqrt(), time_s };
         LikeliestNoise { index: self.models.likeliest_index(), disturbance, scale }
     }
@@ -196,11 +191,6 @@ impl NoiseBank {
     /// The disturbance now, in N/kN for given unknowns, with its standard deviation.
     pub fn disturbance(&self, unknowns: &Unknowns) -> (f64, f64) {
         self.models.likeliest().disturbance_now(unknowns)
-    }
-
-    /// The mixture of all models; `None` while the rows do not determine the parameters.
-    pub fn mixture(&self) -> Option<Solution> {
-        self.mixture
     }
 
     /// A solution from the likeliest model's rows, its covariance of a, b, c widened as the
@@ -235,7 +225,7 @@ impl NoiseBank {
         let weighty = self.models.hypotheses().iter().zip(self.shares);
         let variance: f64 = weighty
             .filter(|(_, share)| *share > WEIGHT_MIN)
-            .map(|(model, share)| share * model.scale() * model.disturbance().std_n_per_kn.powi(2))
+            .map(|(model, share)| share * model.scale() * model.disturbance.std_n_per_kn.powi(2))
             .sum();
         let gain = self.models.likeliest().log_likelihood() - self.undisturbed().log_likelihood();
         Disturbed { std_n_per_kn: variance.sqrt(), evidence: 2.0 * gain }
@@ -281,7 +271,7 @@ impl NoiseBank {
             self.rows_since_renewal = 0;
             let weights = self.penalty * (1.0 - self.forgetting.powi(RENEWAL_ROWS as i32));
             for model in self.models.hypotheses_mut() {
-                model.add_penalty(&weights);
+                model.information.add_penalty(&weights);
             }
         }
     }
@@ -362,7 +352,7 @@ mod tests {
         let bank = after(&blocks(800, none, 0.4));
         assert!(bank.disturbed().evidence < 4.0);
         assert!(bank.disturbed().std_n_per_kn < 0.05);
-        let mixture = bank.mixture().unwrap();
+        let mixture = bank.mixture.unwrap();
         let truth = [2.0, 0.5, 1.0];
         for (i, value) in truth.iter().enumerate() {
             let std = mixture.covariance[(i, i)].sqrt();
@@ -386,7 +376,7 @@ mod tests {
                 _ => drop(bank.accept(block)),
             }
         }
-        let mixture = bank.mixture().unwrap();
+        let mixture = bank.mixture.unwrap();
         assert!((mixture.estimate[0] - 2.0).abs() < 4.0 * mixture.covariance[(0, 0)].sqrt());
         assert_eq!(bank.count(), 297.0);
     }

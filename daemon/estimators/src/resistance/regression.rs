@@ -1,11 +1,11 @@
-//! The observations of the linear regression of [`dynocar_core::pipeline::momentum`], and what they say of
-//! the motion now.
+//! The observations of the linear regression of [`dynocar_core::pipeline::momentum`], and one model
+//! of their noise, with the least squares that follow from it.
 
-use dynocar_core::filter::{Propagation, Sighting, Whitener};
-use dynocar_core::pipeline::momentum::error::{
-    DISTURBANCE, Disturbance, MOMENTUM, STATES, momentum_seen,
+use dynocar_core::filter::{Propagation, Sighting, SquareRootInformation, Whitener};
+use dynocar_core::pipeline::momentum::{
+    COLUMNS, Columns, DISTURBANCE, Disturbance, MOMENTUM, MomentumBlock, STATES, SinceBlock,
+    UNKNOWNS, momentum_seen,
 };
-use dynocar_core::pipeline::momentum::{COLUMNS, Columns, MomentumBlock, SinceBlock, UNKNOWNS};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// Values of the unknowns.
@@ -128,43 +128,137 @@ impl Observation {
     }
 }
 
-/// Lets the disturbance have jumped, by so much in N/kN.
-pub fn loosen_disturbance(whitener: &mut RowWhitener, std_n_per_kn: f64) {
-    whitener.loosen(DISTURBANCE, std_n_per_kn * std_n_per_kn);
+/// Rows for which the noise model as declared counts against the rows seen.
+pub const PRIOR_ROWS: f64 = 3.0;
+/// Coefficients that take up freedom; the other unknowns have priors.
+const FREE: f64 = 3.0;
+
+/// A row with an error of unit variance, as far as the noise is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WhiteRow {
+    /// Regressors.
+    pub features: Unknowns,
+    /// What they should add up to.
+    pub observed: f64,
 }
 
-/// The motion now, from the errors' states in the middle of the newest block; `scale` is the
-/// variance of the rows.
-pub fn motion_of(
-    whitener: &RowWhitener,
-    since: &SinceBlock,
-    disturbance: &Disturbance,
-    scale: f64,
-) -> Motion {
-    let duration_s = since.impulse[1];
-    let mut to_now = Matrix2::identity();
-    to_now[(MOMENTUM, DISTURBANCE)] = -duration_s;
-    let mut columns = to_now * whitener.state();
-    for (column, impulse) in since.impulse.iter().enumerate() {
-        columns[(MOMENTUM, column)] += impulse;
-    }
-    // A random walk of the disturbance, integrated twice.
-    let walk = 2.0 * disturbance.std_n_per_kn.powi(2) / disturbance.time_s;
-    let mut covariance = to_now * whitener.covariance() * to_now.transpose();
-    covariance[(MOMENTUM, MOMENTUM)] += walk * duration_s.powi(3) / 3.0;
-    covariance[(DISTURBANCE, DISTURBANCE)] += walk * duration_s;
-    let to_speed = Matrix2::new(1.0 / since.inertia, 0.0, 0.0, 1.0);
-    let columns = to_speed * columns;
-    Motion {
-        at_zero: columns.column(0).into_owned(),
-        gain: -columns.fixed_columns::<UNKNOWNS>(1),
-        covariance: to_speed * covariance * to_speed * scale,
-    }
+/// White noise as the observations declare it and one slow disturbance, both up to a common
+/// scale; the generalised least squares of the rows and their restricted likelihood (Patterson
+/// and Thompson 1971).
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoiseModel {
+    /// The disturbance, before the scale.
+    pub disturbance: Disturbance,
+    whitener: RowWhitener,
+    /// The information on the unknowns.
+    pub information: SquareRootInformation<UNKNOWNS>,
+    log_variances: f64,
 }
 
-/// The disturbance in N/kN for given parameters, with its variance in units of the errors'.
-pub fn disturbance_of(whitener: &RowWhitener, unknowns: &Unknowns) -> (f64, f64) {
-    let columns = whitener.state().row(DISTURBANCE);
-    let taken: f64 = (0..UNKNOWNS).map(|i| columns[i + 1] * unknowns[i]).sum();
-    (columns[0] - taken, whitener.covariance()[(DISTURBANCE, DISTURBANCE)])
+impl NoiseModel {
+    /// A model without rows, with the penalty `sum of weight * unknown^2`.
+    pub fn new(disturbance: Disturbance, penalty: &Unknowns) -> Self {
+        NoiseModel {
+            disturbance,
+            whitener: RowWhitener::new(nalgebra::zero(), nalgebra::zero()),
+            information: SquareRootInformation::new(penalty, &Unknowns::zeros()),
+            log_variances: 0.0,
+        }
+    }
+
+    /// Rows taken in, the forgotten ones in part.
+    pub fn count(&self) -> f64 {
+        self.information.count()
+    }
+
+    /// Moves to the next observation of a chain.
+    pub fn propagate(&mut self, observation: &Observation) {
+        self.whitener.propagate(&observation.propagation(&self.disturbance));
+    }
+
+    /// Moves to the first observation of a chain, so long after the last; unknown when `None`.
+    pub fn restart(&mut self, observation: &Observation, gap_s: Option<f64>) {
+        self.whitener.propagate(&observation.restart(&self.disturbance, gap_s));
+    }
+
+    /// Lets the disturbance have jumped, by so much in N/kN.
+    pub fn loosen(&mut self, std_n_per_kn: f64) {
+        let root = self.scale().sqrt();
+        self.whitener.loosen(DISTURBANCE, (std_n_per_kn / root).powi(2));
+    }
+
+    /// The row of an observation that the model has moved to; `None` when its variance is not
+    /// sound.
+    pub fn row(&self, observation: &Observation) -> Option<WhiteRow> {
+        let row = self.whitener.row(&observation.sighting())?;
+        let columns = row.columns / self.scale().sqrt();
+        let features = columns.fixed_rows::<UNKNOWNS>(1).into_owned();
+        Some(WhiteRow { features, observed: columns[0] })
+    }
+
+    /// Takes in what is seen of an observation that the model has moved to.
+    pub fn accept(&mut self, seen: &Sighting<STATES, COLUMNS>, forgetting: f64) {
+        let Ok(row) = self.whitener.take(seen) else { return };
+        self.information.forget(forgetting);
+        self.log_variances = forgetting * self.log_variances + row.variance.ln();
+        let features = row.columns.fixed_rows::<UNKNOWNS>(1).into_owned();
+        self.information.update(&features, row.columns[0]);
+    }
+
+    /// Degrees of freedom of the residuals; negative while rows are too few.
+    pub fn freedom(&self) -> f64 {
+        self.count() - FREE
+    }
+
+    /// Residual variance of rows of unit variance, the model itself counting for some.
+    pub fn scale(&self) -> f64 {
+        let freedom = self.freedom().max(0.0);
+        (self.information.residual_sum() + PRIOR_ROWS) / (freedom + PRIOR_ROWS)
+    }
+
+    /// Restricted log-likelihood with the scale profiled out, up to a constant that models of
+    /// the same rows share.
+    pub fn log_likelihood(&self) -> f64 {
+        -0.5 * (self.freedom() + PRIOR_ROWS) * self.scale().ln()
+            - 0.5 * self.log_variances
+            - 0.5 * self.information.log_determinant()
+    }
+
+    /// Generalised least squares with its covariance; `None` while undetermined.
+    pub fn solution(&self) -> Option<Solution> {
+        let estimate = self.information.solve().ok()?;
+        let covariance = self.information.covariance().ok()? * self.scale();
+        Some(Solution { estimate, covariance })
+    }
+
+    /// Speed and disturbance now, so long after the newest block.
+    pub fn motion(&self, since: &SinceBlock) -> Motion {
+        let duration_s = since.impulse[1];
+        let mut to_now = Matrix2::identity();
+        to_now[(MOMENTUM, DISTURBANCE)] = -duration_s;
+        let mut columns = to_now * self.whitener.state;
+        for (column, impulse) in since.impulse.iter().enumerate() {
+            columns[(MOMENTUM, column)] += impulse;
+        }
+        // A random walk of the disturbance, integrated twice.
+        let walk = 2.0 * self.disturbance.std_n_per_kn.powi(2) / self.disturbance.time_s;
+        let mut covariance = to_now * self.whitener.covariance * to_now.transpose();
+        covariance[(MOMENTUM, MOMENTUM)] += walk * duration_s.powi(3) / 3.0;
+        covariance[(DISTURBANCE, DISTURBANCE)] += walk * duration_s;
+        let to_speed = Matrix2::new(1.0 / since.inertia, 0.0, 0.0, 1.0);
+        let columns = to_speed * columns;
+        Motion {
+            at_zero: columns.column(0).into_owned(),
+            gain: -columns.fixed_columns::<UNKNOWNS>(1),
+            covariance: to_speed * covariance * to_speed * self.scale(),
+        }
+    }
+
+    /// The disturbance now in N/kN for given unknowns, with its standard deviation.
+    pub fn disturbance_now(&self, unknowns: &Unknowns) -> (f64, f64) {
+        let columns = self.whitener.state.row(DISTURBANCE);
+        let taken: f64 = (0..UNKNOWNS).map(|i| columns[i + 1] * unknowns[i]).sum();
+        let variance = self.whitener.covariance[(DISTURBANCE, DISTURBANCE)];
+        (columns[0] - taken, (variance * self.scale()).max(0.0).sqrt())
+    }
 }

@@ -5,6 +5,7 @@ use dynocar_core::pipeline::InnovationMonitor;
 use dynocar_core::pipeline::judge::Case;
 use dynocar_core::pipeline::momentum::{PARAMETERS, SPEED_SCALE_MPS, regressors, unscaling};
 use dynocar_core::pipeline::motion::SpeedRange;
+use dynocar_core::pipeline::output::excitation;
 use dynocar_model::train::Davis;
 use dynocar_shared::{Manoeuvre, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
@@ -131,7 +132,7 @@ impl Report {
         let excited = excited(&covariance, at(speeds.max_mps()).0, speeds.max_mps());
         let case = case(evidence, at(speeds.mean_mps()), excited, bounded.at_bound != 0);
         let (status, reason) = case.verdict();
-        let missing_manoeuvres = missing_manoeuvres(excited);
+        let (excited, missing_manoeuvres) = excitation(excited);
         Some(Report { status, reason, estimate, covariance, excited, missing_manoeuvres })
     }
 
@@ -143,7 +144,12 @@ impl Report {
 }
 
 /// All that the judge asks for, by w0 at the mean speed with its standard deviation.
-fn case(evidence: &Evidence, (w0, w0_std): (f64, f64), excited: u32, is_at_bound: bool) -> Case {
+fn case(
+    evidence: &Evidence,
+    (w0, w0_std): (f64, f64),
+    excited: [bool; PARAMETERS],
+    is_at_bound: bool,
+) -> Case {
     let Evidence { disturbed, innovations, .. } = evidence;
     let now = evidence.disturbance_n_per_kn.abs();
     let has_structure = disturbed.std_n_per_kn > DISTURBANCE_SHARE_MAX * w0
@@ -161,7 +167,7 @@ fn case(evidence: &Evidence, (w0, w0_std): (f64, f64), excited: u32, is_at_bound
         contradiction: has_structure
             .then_some(Reason::InnovationsNotWhite)
             .or(is_too_large.then_some(Reason::InnovationsTooLarge)),
-        caveat: if excited != (1 << PARAMETERS) - 1 {
+        caveat: if excited.contains(&false) {
             Reason::WeakExcitation
         } else if is_at_bound {
             Reason::AtBound
@@ -171,17 +177,10 @@ fn case(evidence: &Evidence, (w0, w0_std): (f64, f64), excited: u32, is_at_bound
     }
 }
 
-/// Coefficients whose own part of w0 at the highest speed is known to a share of w0 there.
-fn excited(covariance: &Matrix3<f64>, w0: f64, speed_mps: f64) -> u32 {
+/// Which coefficients contribute an error that is small against w0 at the highest driven speed.
+fn excited(covariance: &Matrix3<f64>, w0: f64, speed_mps: f64) -> [bool; PARAMETERS] {
     let powers = regressors(speed_mps.max(0.25 * SPEED_SCALE_MPS));
-    (0..PARAMETERS)
-        .filter(|&i| covariance[(i, i)].sqrt() * powers[i] < EXCITED_SHARE * w0)
-        .fold(0, |bits, i| bits | 1 << i)
-}
-
-fn missing_manoeuvres(excited: u32) -> u32 {
-    let wanted = [Manoeuvre::CoastSlow, Manoeuvre::VarySpeed, Manoeuvre::CoastFast];
-    (0..PARAMETERS).filter(|i| excited & (1 << i) == 0).fold(0, |bits, i| bits | wanted[i].bit())
+    std::array::from_fn(|i| covariance[(i, i)].sqrt() * powers[i] < EXCITED_SHARE * w0)
 }
 
 #[cfg(test)]

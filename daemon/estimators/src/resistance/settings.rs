@@ -1,6 +1,6 @@
 //! Settings of the least-squares resistance pipelines.
 
-use dynocar_core::pipeline::momentum::settings::DataSettings;
+use dynocar_core::pipeline::momentum::DataSettings;
 use dynocar_core::settings;
 
 settings! {

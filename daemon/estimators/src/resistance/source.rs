@@ -1,9 +1,7 @@
 //! Where the observations of the regression come from.
 
-use dynocar_core::pipeline::momentum::SinceBlock;
 use dynocar_core::pipeline::momentum::blocks::MomentumBlocks;
-use dynocar_core::pipeline::momentum::sample::UnitSample;
-use dynocar_core::pipeline::momentum::settings::{DataSettings, DataSource};
+use dynocar_core::pipeline::momentum::{DataSettings, DataSource, SinceBlock, UnitSample};
 use dynocar_core::pipeline::motion::SpeedNoise;
 use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;

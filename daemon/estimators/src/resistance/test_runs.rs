@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dynocar_core::pipeline::Pipeline;
-use dynocar_core::pipeline::momentum::sample::UnitSample;
+use dynocar_core::pipeline::momentum::UnitSample;
 use dynocar_model::track::Track;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};

@@ -5,16 +5,14 @@
 //! trusting in wind or too timid in calm. Each filter therefore assumes one behaviour, and the
 //! evidence of the innovations weighs them.
 
-use dynocar_core::filter::bank::{Bank, Nats};
-use dynocar_core::filter::mixture::Mixture;
+use dynocar_core::filter::bank::{Bank, Mixture};
 use dynocar_core::filter::{Gaussian, NotPositiveDefinite};
 use dynocar_core::pipeline::motion::{OutlierRow, Trust};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::bias_model::{BiasModel, MapError};
-use super::inertia::Inertia;
 use super::line_resistance::LineResistance;
-use super::motion::Motion;
+use super::motion::{Inertia, Motion};
 
 /// Index of the speed in m/s in a filter's state.
 pub const SPEED: usize = 0;
@@ -75,7 +73,7 @@ struct Behaviour {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BiasBank {
     dynamics: Dynamics,
-    behaviours: Bank<Behaviour, Nats, MODELS>,
+    behaviours: Bank<Behaviour, MODELS>,
     forgetting: f64,
     /// Step in s that the behaviours know what is kept over.
     kept_step_s: f64,
@@ -100,7 +98,7 @@ impl BiasBank {
             keep: 1.0,
         });
         let forgetting = 1.0 - 1.0 / memory;
-        BiasBank { dynamics, behaviours: Bank::even(behaviours), forgetting, kept_step_s: 0.0 }
+        BiasBank { dynamics, behaviours: Bank::even(behaviours, 0.0), forgetting, kept_step_s: 0.0 }
     }
 
     /// Starts anew at a measured speed; mass and bias stay as they are.
@@ -182,16 +180,7 @@ impl BiasBank {
         let mut judged = [Trust::of(0.0); MODELS];
         for (judged, (behaviour, weight)) in judged.iter_mut().zip(self.behaviours.weighed_mut()) {
             let Behaviour { filter, outliers, .. } = behaviour;
-            let innovation = filter.innovation(SPEED, speed_mps, noise_variance)?;
-            let trust = Trust::of(innovation.normalised());
-            let is_believed = outliers.push(trust.is_outlier());
-            if trust.is_full() {
-                filter.take(SPEED, &innovation, noise_variance);
-            } else if !trust.is_outlier() {
-                filter.measure(SPEED, speed_mps, noise_variance / trust.weight)?;
-            } else if is_believed {
-                filter.replace(SPEED, speed_mps, noise_variance);
-            }
+            let (innovation, trust) = outliers.correct(filter, SPEED, speed_mps, noise_variance)?;
             *judged = trust;
             let evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
             *weight = self.forgetting * *weight + evidence;

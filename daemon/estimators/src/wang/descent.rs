@@ -11,7 +11,8 @@ pub struct MeanSquare<const N: usize> {
     gram: SMatrix<f64, N, N>,
     moment: SVector<f64, N>,
     squares: f64,
-    count: f64,
+    /// Number of samples.
+    pub count: f64,
 }
 
 impl<const N: usize> Default for MeanSquare<N> {
@@ -27,11 +28,6 @@ impl<const N: usize> MeanSquare<N> {
         self.moment += features * target;
         self.squares += target * target;
         self.count += 1.0;
-    }
-
-    /// Number of samples.
-    pub fn count(&self) -> f64 {
-        self.count
     }
 
     /// The mean square at some coefficients; 0 without samples.

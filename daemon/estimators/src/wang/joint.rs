@@ -2,26 +2,26 @@
 
 use std::sync::Arc;
 
-use dynocar_core::filter::bank::{Bank, Nats};
+use dynocar_core::filter::bank::Bank;
 use dynocar_core::filter::drifting_level::BIAS;
 use dynocar_core::pipeline::judge::{InputHealth, LackOfFit};
 use dynocar_core::pipeline::motion::{
-    OutlierRow, SpeedNoise, SpeedRange, StopWatch, Trust, kink_variance,
+    MOVING_MPS, OutlierRow, SpeedNoise, SpeedRange, StopWatch, Trust, kink_variance,
 };
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, Outcome};
+use dynocar_core::settings;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
-use super::bias_model::MapError;
-use super::hypothesis::{Hypothesis, Step};
-use super::integrals::{INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS};
-use super::joint_settings::{JOINT_MODELS, JointLeastSquaresSettings};
-use super::line_resistance::LineResistance;
-use super::motion::Motion;
-use super::section::Section;
+use super::bias_model::{BiasModel, MapError};
+use super::integrals::{
+    Hypothesis, INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, Step, UNKNOWNS,
+};
+use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
+use super::motion::{Motion, Section};
 
 /// Updates between two looks at the slope of the resistance.
 const REFRESH_EVERY: u32 = 50;
@@ -35,8 +35,8 @@ const REFRESH_EVERY: u32 = 50;
 pub struct JointLeastSquares {
     pub(super) settings: JointLeastSquaresSettings,
     pub(super) regressors: Regressors,
-    initial: Bank<Hypothesis, Nats, JOINT_MODELS>,
-    pub(super) bank: Bank<Hypothesis, Nats, JOINT_MODELS>,
+    initial: Bank<Hypothesis, JOINT_MODELS>,
+    pub(super) bank: Bank<Hypothesis, JOINT_MODELS>,
     stops: StopWatch,
     last: Option<(Motion, Integrals)>,
     integrals: Integrals,
@@ -77,7 +77,7 @@ impl JointLeastSquares {
         let mut std = Row::repeat(settings.resistance_std_n_per_kn);
         std[INVERSE_MASS] = 0.01 * settings.mass_std_percent;
         let models = settings.bias_models();
-        let initial = Bank::even(models.map(|model| Hypothesis::new(model, &mean, &std)));
+        let initial = Bank::even(models.map(|model| Hypothesis::new(model, &mean, &std)), 0.0);
         Ok(JointLeastSquares {
             settings,
             regressors,
@@ -103,7 +103,7 @@ impl JointLeastSquares {
     }
     /// z1, z2 and z3, the latter two beyond what is declared; `None` when the regression is not sound.
     pub fn resistance(&self) -> Option<LineResistance> {
-        let solution = self.bank.likeliest().regression().solve()?;
+        let solution = self.bank.likeliest().regression.solve()?;
         let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(&solution, section));
         Some(LineResistance {
             basic,
@@ -123,7 +123,7 @@ impl JointLeastSquares {
 
     /// Mass in kg and its standard deviation; `None` when the regression is not sound.
     pub fn mass_kg(&self) -> Option<(f64, f64)> {
-        let inverse = self.bank.likeliest().regression().solve()?[INVERSE_MASS];
+        let inverse = self.bank.likeliest().regression.solve()?[INVERSE_MASS];
         let std = self.covariance_root()?.row(INVERSE_MASS).norm();
         let mass_kg = self.regressors.inertia.reference_mass_kg / inverse;
         Some((mass_kg, mass_kg / inverse * std))
@@ -140,7 +140,7 @@ impl JointLeastSquares {
     }
 
     pub(super) fn covariance_root(&self) -> Option<SMatrix<f64, UNKNOWNS, UNKNOWNS>> {
-        self.bank.likeliest().regression().covariance_root()
+        self.bank.likeliest().regression.covariance_root()
     }
 
     /// Covariance of some unknowns from the square root of the whole.
@@ -162,7 +162,7 @@ impl JointLeastSquares {
             if is_opened && map.std_mps2 > 0.0 {
                 hypothesis.begin_on_map(&map, motion.speed_mps);
             }
-            hypothesis.free_level();
+            hypothesis.regression.free_level();
             *weight += hypothesis.absorb(&row, value, 1.0 / self.noise.variance());
         }
         self.monitor.break_here();
@@ -255,8 +255,7 @@ impl JointLeastSquares {
     /// Looks at the force that the bias has to take up.
     fn look(&mut self) {
         let best = self.bank.likeliest();
-        let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
-        else {
+        let (Some(solution), Some(root)) = (best.regression.solve(), self.covariance_root()) else {
             return;
         };
         let per_bias = best.shape(self.speed_mps) / self.regressors.inertia.mps2_per_n_per_kn();
@@ -306,5 +305,54 @@ impl Estimator for JointLeastSquares {
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         self.write_snapshot(snapshot);
+    }
+}
+
+/// Number of behaviours of the unexplained acceleration.
+pub const JOINT_MODELS: usize = 6;
+
+settings! {
+    /// Settings of [`super::JointLeastSquares`].
+    #[derive(Copy)]
+    JointLeastSquaresSettings {
+        /// Standard deviation of the declared mass in %.
+        mass_std_percent: f64 = 20.0 => (0.0001 to 50);
+        /// Standard deviation in % of a change of mass at a stop; 0 when it never changes.
+        mass_change_std_percent: f64 = 10.0 => (0 to 50);
+        /// Shortest stop in s at which the mass may change.
+        stop_min_s: f64 = 5.0 => (0 to 3600);
+        /// Standard deviation in N/kN of the declared resistances.
+        resistance_std_n_per_kn: f64 = 5.0 => (0.001 to 100);
+        /// Standard deviation of the measured speed in m/s to start with; it is learned.
+        speed_noise_mps: f64 = 0.02 => (0.001 to 1);
+        /// Standard deviation in m/s² of an acceleration that no parameter explains.
+        bias_std_mps2: f64 = 0.01 => (0.0001 to 0.5);
+        /// Lowest speed in m/s that is used.
+        speed_min_mps: f64 = MOVING_MPS => (0.3 to 20);
+        /// Radius in m that the curve resistance refers to.
+        reference_radius_m: f64 = DEFAULT_REFERENCE_RADIUS_M => (50 to 10000);
+        /// Standard deviation of the mass in % up to which it may be used.
+        usable_std_percent: f64 = 2.0 => (0.01 to 50);
+        /// Standard deviation in N/kN of the basic resistance up to which it may be used.
+        usable_std_n_per_kn: f64 = 0.3 => (0.001 to 10);
+    }
+}
+
+impl JointLeastSquaresSettings {
+    /// The behaviours of the unexplained acceleration: none; slow in proportion to speed; small
+    /// and large, each slow and gusty. A constant is z1's to explain, so that 'none' stays far
+    /// below what a leg measures of an acceleration, 1e-5 m/s²: otherwise every leg would have a
+    /// constant of its own, and what the legs show together would count as less than it is.
+    pub fn bias_models(&self) -> [BiasModel; JOINT_MODELS] {
+        let model =
+            |share: f64, time_s, grows| BiasModel::new(share * self.bias_std_mps2, time_s, grows);
+        [
+            model(1e-4, f64::INFINITY, false),
+            model(1.0, 60.0, true),
+            model(0.3, 60.0, false),
+            model(0.3, 10.0, false),
+            model(1.0, 60.0, false),
+            model(1.0, 10.0, false),
+        ]
     }
 }

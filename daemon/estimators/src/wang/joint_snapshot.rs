@@ -2,13 +2,15 @@
 
 use dynocar_core::filter::drifting_level::BIAS;
 use dynocar_core::pipeline::judge::Case;
-use dynocar_core::pipeline::output::{write_innovations, write_parameters, write_status};
-use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, Reason, Status};
+use dynocar_core::pipeline::output::{
+    DAVIS_AND_MASS, excitation, write_innovations, write_parameters, write_status,
+};
+use dynocar_shared::{ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 
 use super::integrals::{INVERSE_MASS, POLYNOMIALS, Row, UNKNOWNS};
 use super::joint::JointLeastSquares;
-use super::section::Section;
+use super::motion::Section;
 
 /// Used samples below which nothing is said.
 const SAMPLES_MIN: u64 = 50;
@@ -21,8 +23,7 @@ impl JointLeastSquares {
         snapshot.generation = self.generation;
         write_innovations(snapshot, &self.monitor);
         let best = self.bank.likeliest();
-        let (Some(solution), Some(root)) = (best.regression().solve(), self.covariance_root())
-        else {
+        let (Some(solution), Some(root)) = (best.regression.solve(), self.covariance_root()) else {
             snapshot.parameter_count = 0;
             write_status(snapshot, (Status::Invalid, Reason::NumericalFailure));
             return;
@@ -31,18 +32,8 @@ impl JointLeastSquares {
         let is_mass_known = mass_std <= 0.01 * self.settings.usable_std_percent;
         let usable = self.settings.usable_std_n_per_kn;
         let known = self.resistance_stds(&root).map(|std| std <= usable);
-        let manoeuvres = [
-            (known[0], Manoeuvre::CoastSlow),
-            (known[1], Manoeuvre::VarySpeed),
-            (known[2], Manoeuvre::CoastFast),
-            (is_mass_known, Manoeuvre::Accelerate),
-        ];
-        snapshot.excited = 0;
-        snapshot.missing_manoeuvres = 0;
-        for (i, (is_known, manoeuvre)) in manoeuvres.into_iter().enumerate() {
-            snapshot.excited |= u32::from(is_known) << i;
-            snapshot.missing_manoeuvres |= if is_known { 0 } else { manoeuvre.bit() };
-        }
+        (snapshot.excited, snapshot.missing_manoeuvres) =
+            excitation([known[0], known[1], known[2], is_mass_known]);
         write_status(snapshot, self.case(is_mass_known, known[1]).verdict());
         let inertia = &self.regressors.inertia;
         let mass_kg = inertia.reference_mass_kg / solution[INVERSE_MASS];
@@ -87,7 +78,7 @@ impl JointLeastSquares {
         to_units[(3, 3)] = -mass_kg / inverse;
         write_parameters(
             snapshot,
-            [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass],
+            DAVIS_AND_MASS,
             &Vector4::new(davis.a, davis.b, davis.c, mass_kg),
             &(to_units * own * to_units.transpose()),
         );
@@ -100,7 +91,7 @@ impl JointLeastSquares {
         let own = self.covariance(root, [first, first + 1, first + 2]);
         JUDGED_AT.map(|share| {
             let phi: Vector3<f64> =
-                self.regressors.basis.at(share * self.regressors.basis.scale_mps());
+                self.regressors.basis.at(share * self.regressors.basis.scale_mps);
             phi.dot(&(own * phi)).max(0.0).sqrt()
         })
     }

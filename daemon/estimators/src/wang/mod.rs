@@ -4,31 +4,22 @@
 //! - `descent`, `staged`: the paper's stages, by normalised gradient descent on sums over all samples
 //! - [`JointLeastSquares`]: all of it together, on [`integrals`] of motion
 //! - [`MassKalman`]: the mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
-//! - [`motion`], [`inertia`], [`section`], [`line_resistance`], [`speed_basis`], [`bias_model`]: what a sample gives,
+//! - [`motion`], [`line_resistance`], [`bias_model`]: what a sample gives,
 //!   and the parts of the model
 
 pub mod bias_bank;
 pub mod bias_model;
 mod descent;
-mod hypothesis;
-pub mod inertia;
 pub mod integrals;
 mod joint;
-mod joint_settings;
 mod joint_snapshot;
 mod kalman;
 mod kalman_settings;
 pub mod line_resistance;
 pub mod motion;
-pub mod section;
-mod settling;
-pub mod speed_basis;
 mod staged;
-mod staged_settings;
 
-pub use joint::JointLeastSquares;
-pub use joint_settings::JointLeastSquaresSettings;
+pub use joint::{JointLeastSquares, JointLeastSquaresSettings};
 pub use kalman::MassKalman;
 pub use kalman_settings::MassKalmanSettings;
-pub use staged::StagedDescent;
-pub use staged_settings::{MassRegression, StagedDescentSettings};
+pub use staged::{MassRegression, StagedDescent, StagedDescentSettings};

@@ -7,7 +7,6 @@
 
 pub mod deviation;
 pub mod newton;
-pub mod newton_settings;
 pub mod trajectory;
 pub mod window;
 pub mod wolfe_newton;

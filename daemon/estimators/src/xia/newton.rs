@@ -3,26 +3,29 @@
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
 use dynocar_core::pipeline::judge::InputHealth;
 use dynocar_core::pipeline::motion::SpeedRange;
-use dynocar_core::pipeline::output::write_parameters;
+use dynocar_core::pipeline::output::{DAVIS, write_parameters};
 use dynocar_core::pipeline::sample_gate::{Gated, SampleGate};
-use dynocar_core::pipeline::settings::SettingError;
+use dynocar_core::pipeline::settings::{SettingError, require};
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, Outcome};
+use dynocar_core::settings;
 use dynocar_model::force::ResolvedSample;
+use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
 
-use super::newton_settings::{CheckedSettings, FitMethod, TrajectoryNewtonSettings};
 use super::window::Window;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
-use crate::xia::trajectory::fit::{FitError, FitSettings, TrajectoryFit, TrajectoryFitter};
-use crate::xia::trajectory::index::DAVIS;
-use crate::xia::trajectory::long_run::LongRunVariance;
-use crate::xia::trajectory::motion::{Motion, MotionTracker};
-use crate::xia::trajectory::quality::Estimate;
+use crate::xia::trajectory::fit::{
+    DavisPrior, FitError, FitSettings, TrajectoryFit, TrajectoryFitter,
+};
+use crate::xia::trajectory::motion::{Motion, MotionTracker, UnexplainedForce};
+use crate::xia::trajectory::quality::{Estimate, LongRunVariance, prior_std};
 use crate::xia::trajectory::step::StepRule;
-use crate::xia::trajectory::unexplained::UnexplainedForce;
 
+/// Speed noise before the first window, in m/s.
+const SPEED_NOISE_FIRST_MPS: f64 = 0.1;
 /// Windows that the learned speed noise looks back over.
 const NOISE_WINDOWS: f64 = 50.0;
 /// Innovations that the published statistics look back over.
@@ -38,7 +41,10 @@ const LONG_RUN_BLOCKS: f64 = 60.0;
 /// Fits Davis coefficients to the newest window each time a step is completed.
 #[derive(Clone, Debug)]
 pub struct TrajectoryNewton {
-    settings: CheckedSettings,
+    settings: TrajectoryNewtonSettings,
+    prior_std: Vector3<f64>,
+    /// Root of the density of the disturbance in m/s² √s.
+    disturbance_mps2: f64,
     newton: NewtonSettings,
     fit: FitSettings,
     speed_noise_mps: f64,
@@ -74,8 +80,8 @@ impl TrajectoryNewton {
         settings: &TrajectoryNewtonSettings,
         train: &TrainModel,
     ) -> Result<Self, SettingError> {
-        let settings = settings.checked(train)?;
-        let CheckedSettings { bounds, prior, window: capacity, .. } = settings;
+        let (bounds, prior) = settings.checked(train)?;
+        let capacity = settings.window as usize;
         let rule = match settings.method {
             FitMethod::LevenbergMarquardt => StepRule::Time,
             FitMethod::WolfeNewton => StepRule::Distance,
@@ -93,7 +99,7 @@ impl TrajectoryNewton {
                 decrease_tolerance: 1e-4,
                 ..FitSettings::new(rule)
             },
-            speed_noise_mps: settings.speed_noise_mps,
+            speed_noise_mps: settings.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS),
             source: RestartSource::new(settings.seed),
             gate: SampleGate::default(),
             tracker: MotionTracker::default(),
@@ -111,7 +117,9 @@ impl TrajectoryNewton {
             is_consistent: true,
             health: InputHealth::default(),
             fault: None,
-            settings,
+            prior_std: prior.std,
+            disturbance_mps2: settings.disturbance_mps2(train),
+            settings: *settings,
         })
     }
 
@@ -119,8 +127,8 @@ impl TrajectoryNewton {
     fn take_window(&mut self) -> Outcome {
         self.judge_prediction();
         let needed = match self.settings.method {
-            FitMethod::LevenbergMarquardt => self.settings.window / 2,
-            FitMethod::WolfeNewton => self.settings.window,
+            FitMethod::LevenbergMarquardt => self.settings.window as usize / 2,
+            FitMethod::WolfeNewton => self.settings.window as usize,
         };
         if self.window.count() < needed {
             return Outcome::Used;
@@ -128,7 +136,7 @@ impl TrajectoryNewton {
         self.fit.speed_noise_mps = Some(self.speed_noise_mps);
         let fitted = match self.settings.method {
             FitMethod::LevenbergMarquardt => {
-                let density = self.settings.disturbance_mps2.powi(2) + self.window.missed_density();
+                let density = self.disturbance_mps2.powi(2) + self.window.missed_density();
                 self.fit.disturbance_ratio = density / self.speed_noise_mps.powi(2);
                 let start = (self.windows > 0).then_some(self.davis);
                 self.fitter.fit(&[self.window.segment()], start.as_ref(), &self.fit)
@@ -185,9 +193,9 @@ impl TrajectoryNewton {
         let variance = self.speed_noise_mps * self.speed_noise_mps;
         let limit = variance * (1.0 + EXCESS_MAX * (2.0 / fit.samples as f64).sqrt());
         // The noise before the first window is a guess.
-        let is_first = self.settings.learns_noise && self.windows == 1;
+        let is_first = self.settings.speed_noise_mps.is_none() && self.windows == 1;
         self.is_consistent = is_first || (shown <= limit && fit.outliers == 0);
-        if self.settings.learns_noise {
+        if self.settings.speed_noise_mps.is_none() {
             let gain = 1.0 / (self.windows as f64).min(NOISE_WINDOWS);
             // What is wrong with one window is hardly noise of the next.
             let believed = if is_first { shown } else { shown.min(limit) };
@@ -212,8 +220,8 @@ impl TrajectoryNewton {
         };
         // The end of a line through n points has about 4 / n of a point's variance.
         let spread = 1.0 + 4.0 / segment.steps.len() as f64 + end_variance;
-        let variance = spread * self.speed_noise_mps.powi(2)
-            + self.settings.disturbance_mps2.powi(2) * duration_s;
+        let variance =
+            spread * self.speed_noise_mps.powi(2) + self.disturbance_mps2.powi(2) * duration_s;
         let normalised = (measured_mps - advance.speed_mps) / variance.sqrt();
         self.innovations.push(normalised);
         self.long_run.push(normalised, duration_s);
@@ -285,7 +293,7 @@ impl Estimator for TrajectoryNewton {
         let estimate = Estimate {
             davis: self.davis,
             covariance,
-            prior_std: self.settings.prior.std,
+            prior_std: self.prior_std,
             speeds: self.speeds,
             innovations: &self.innovations,
             inflation,
@@ -297,5 +305,82 @@ impl Estimator for TrajectoryNewton {
         };
         estimate.write(snapshot);
         self.unexplained.write(snapshot, self.speed_noise_mps.powi(2));
+    }
+}
+
+/// How a window is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FitMethod {
+    /// Box-constrained least squares with free initial speed and a prior; steps in time.
+    LevenbergMarquardt,
+    /// Algorithm 1 of the paper: Newton, Wolfe steps, restarts; steps by eq. 7.
+    WolfeNewton,
+}
+
+settings! {
+    /// Settings of `trajectory_newton`.
+    #[derive(Copy)]
+    TrajectoryNewtonSettings {
+        /// How a window is fitted.
+        method: FitMethod = FitMethod::LevenbergMarquardt;
+        /// Steps of a window, the data capacity I of the paper.
+        window: u32 = 20 => (5 to 5000 "steps");
+        /// Distance in m between points.
+        interval_m: f64 = 100.0 => (1 to 10000 "m");
+        /// Standard deviations of the declared coefficients, as a share of each; they bind what a
+        /// window does not determine.
+        prior_relative_std: f64 = 0.5 => (above 0);
+        /// Standard deviation of the measured speed in m/s; learned from the residuals when absent.
+        speed_noise_mps: Option<f64> = None => (above 0);
+        /// Root of the density of disturbing forces in N/kN √s, for `levenberg_marquardt`; 0 fits
+        /// the whole trajectory as the paper does.
+        disturbance_n_per_kn_sqrt_s: f64 = 0.2 => (0 or more);
+        /// Lowest a, b, c; 0 when absent. Table 2 of the paper has 0.4, 0, 0.
+        low: Option<[f64; 3]> = None;
+        /// Highest a, b, c; five prior standard deviations above the declared when absent. Table 2
+        /// of the paper has 3, 0.2, 0.01.
+        high: Option<[f64; 3]> = None;
+        /// ε1 of eq. 25 in (m/s)², for `wolfe_newton`.
+        mean_square_max: f64 = 0.05 => (above 0);
+        /// Seed of the restarts, for `wolfe_newton`.
+        seed: u64 = 1;
+    }
+}
+
+impl TrajectoryNewtonSettings {
+    /// Bounds and prior for a train.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub(crate) fn checked(
+        &self,
+        train: &TrainModel,
+    ) -> Result<(ParameterBox<3>, DavisPrior), SettingError> {
+        self.check_ranges()?;
+        let davis = train.resistance;
+        let std = prior_std(train, self.prior_relative_std);
+        let mean = Vector3::new(davis.a, davis.b, davis.c);
+        let bounds = ParameterBox {
+            low: self.low.map_or(Vector3::zeros(), Vector3::from),
+            high: self.high.map_or(mean + std * 5.0, Vector3::from),
+        };
+        for i in 0..3 {
+            let (low, high) = (bounds.low[i], bounds.high[i]);
+            let is_allowed = low.is_finite() && high.is_finite() && low < high;
+            require(is_allowed, "high", high, "finite numbers above those of `low`")?;
+        }
+        Ok((bounds, DavisPrior { davis, std }))
+    }
+
+    /// Root of the density of the disturbance in m/s² √s.
+    pub(crate) fn disturbance_mps2(&self, train: &TrainModel) -> f64 {
+        match self.method {
+            FitMethod::LevenbergMarquardt => {
+                self.disturbance_n_per_kn_sqrt_s * mps2_per_n_per_kn(train.rotating_mass_factor)
+            }
+            FitMethod::WolfeNewton => 0.0,
+        }
     }
 }

@@ -13,6 +13,7 @@
 //! - when the iterations run out, the best parameters seen are the answer.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
+use dynocar_core::filter::random::split_mix;
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
@@ -95,11 +96,7 @@ impl RestartSource {
 
     /// Uniform in [0, 1).
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((bits ^ (bits >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (split_mix(&mut self.0) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// Parameters uniform in the box, further than `distance` from `from` in each component

@@ -7,21 +7,19 @@
 //!   is an interval of about 1e-5 around the old value: the M-step never moves. The Gaussian
 //!   makes the M-step, eq. (29)-(33), a weighted least-squares problem with a closed form.
 //! - The motion is that of [`dynocar_core::pipeline::braking::motion`], without the cap min(F(mu), B), unless
-//!   [`EmModel::has_printed_cap`] asks for it.
+//!   [`EmSettings::has_printed_cap`] asks for it.
 //! - An estimate belongs to the middle of its window; attributed to the end, as printed, it
 //!   lags behind a changing coefficient by half a window.
 //! - The first state of a window, whose density I_1 needs and the papers do not give, is the
 //!   filter's prediction from the window before.
 
 mod expectation;
-mod settings;
 mod sliding;
-mod window;
 
-pub use expectation::{Expectation, KalmanExpectation, ParticleExpectation};
-pub use settings::{EStep, EmSettings};
-pub use sliding::{EmModel, EmWindow};
-pub use window::{Statistics, Window, WindowModel};
+pub use expectation::{
+    Expectation, KalmanExpectation, ParticleExpectation, Statistics, Window, WindowModel,
+};
+pub use sliding::{EStep, EmSettings, EmWindow};
 
 #[cfg(test)]
 mod tests;

@@ -1,41 +1,106 @@
-//! The window as it slides, and its iterations.
+//! The settings of sliding-window EM, the window as it slides, and its iterations.
 
 use dynocar_core::filter::Gaussian;
-use dynocar_core::pipeline::braking::engine::{Engine, EngineError, Estimate, Observation, Step};
+use dynocar_core::pipeline::Estimator;
+use dynocar_core::pipeline::braking::engine::{Engine, Estimate, Observation, Step};
+use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::law::Law;
-use dynocar_core::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
-use dynocar_core::pipeline::braking::tracker::{Prior, PriorScale, TrackerModel, measure};
-use dynocar_shared::Uncertain;
+use dynocar_core::pipeline::braking::motion::{MotionNoise, SCALE, StepInputs, Walk};
+use dynocar_core::pipeline::braking::settings::{BrakeFactor, BrakingSettings};
+use dynocar_core::pipeline::braking::tracker::{PriorScale, TrackerModel, measure};
+use dynocar_core::pipeline::settings::{SettingError, require};
+use dynocar_core::settings;
+use dynocar_model::train::TrainModel;
+use dynocar_shared::{PipelineKind, Uncertain};
 use nalgebra::{SMatrix, SVector};
+use serde::Deserialize;
 
-use super::expectation::Expectation;
-use super::window::{Entry, MoveNoise, Window, WindowModel};
+use super::expectation::{
+    Entry, Expectation, KalmanExpectation, MoveNoise, ParticleExpectation, Window, WindowModel,
+};
 
-/// What does not change from window to window.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EmModel {
-    /// Noise of motion and measurement; speeds are not used.
-    pub noise: MotionNoise,
-    /// Observations in a window (S).
-    pub window_steps: usize,
-    /// Observations by which the window slides (L), at most `window_steps`.
-    pub slide_steps: usize,
-    /// Most iterations in a window.
-    pub iterations: usize,
-    /// Iterations end when the coefficient changes by less, as a share of the demand.
-    pub tolerance: f64,
-    /// The coefficient before the first window; `None` for the demand.
-    pub initial: Option<f64>,
-    /// Standard deviation in m/s of the speed before the first window.
-    pub initial_speed_std_mps: f64,
-    /// True for the printed model, in which the coefficient acts only up to the demand.
-    pub has_printed_cap: bool,
+/// How the expectation of the EM is taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EStep {
+    /// Particle filter and smoother, as in the papers.
+    #[default]
+    Particle,
+    /// Kalman filter and Rauch-Tung-Striebel smoother: exact for the Gaussian model.
+    Kalman,
+}
+
+settings! {
+    /// Settings of sliding-window EM.
+    #[derive(Copy)]
+    EmSettings {
+        /// Motion, measurement and braking; speeds are used only to start with.
+        braking: BrakingSettings = BrakingSettings::default();
+        /// Particles, of the particle E-step.
+        particles: usize = 20 => (2 or more);
+        /// Most iterations in a window.
+        iterations: usize = 50 => (1 or more);
+        /// Observations in a window (S).
+        window: usize = 40 => (3 or more);
+        /// Observations by which the window slides (L).
+        slide: usize = 5;
+        /// Iterations end when the coefficient changes by less, as a share of the demand.
+        tolerance: f64 = 1e-7 => (0 or more);
+        /// The coefficient before the first window; when absent the declared one, and for adhesion
+        /// what the brake would need.
+        initial: Option<f64> = None => (0 or more);
+        /// Seed of the particles.
+        seed: u64 = 1;
+        /// How the expectation is taken.
+        e_step: EStep = EStep::Particle;
+        /// True for the papers' cap on the coefficient, under which values above the demand stick.
+        has_printed_cap: bool = false;
+        /// What a brake pipeline reports; no meaning for adhesion.
+        reports: BrakeFactor = BrakeFactor::Friction;
+    }
+}
+
+impl EmSettings {
+    fn check(&self) -> Result<(), SettingError> {
+        self.braking.check()?;
+        self.check_ranges()?;
+        let slides = self.slide >= 1 && self.slide < self.window;
+        require(slides, "slide", self.slide as f64, "at least 1 and below window")
+    }
+
+    /// Builds an estimator of a kind.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(
+        &self,
+        kind: PipelineKind,
+        quantity: BrakingCoefficient,
+        train: &TrainModel,
+    ) -> Result<Box<dyn Estimator>, SettingError> {
+        self.check()?;
+        let noise = MotionNoise { measured_speed_m2_per_s2: None, ..self.braking.noise() };
+        Ok(match self.e_step {
+            EStep::Particle => {
+                let particles = ParticleExpectation::new(self.particles, self.window, self.seed);
+                let window = EmWindow::new(*self, noise, particles);
+                self.braking.estimator(kind, quantity, train, window)
+            }
+            EStep::Kalman => {
+                let window = EmWindow::new(*self, noise, KalmanExpectation::new(self.window));
+                self.braking.estimator(kind, quantity, train, window)
+            }
+        })
+    }
 }
 
 /// Sliding-window EM with an interchangeable E-step.
 #[derive(Clone, Debug)]
 pub struct EmWindow<E> {
-    model: EmModel,
+    settings: EmSettings,
+    /// Noise of motion and measurement; speeds are not used.
+    noise: MotionNoise,
     expectation: E,
     window: Window,
     share: f64,
@@ -43,36 +108,33 @@ pub struct EmWindow<E> {
 }
 
 impl<E: Expectation> EmWindow<E> {
-    /// An estimator with an E-step made for windows of `model.window_steps`.
-    pub fn new(model: EmModel, expectation: E) -> Self {
+    /// An estimator with an E-step made for windows of `settings.window`.
+    pub fn new(settings: EmSettings, noise: MotionNoise, expectation: E) -> Self {
         let first = Gaussian { mean: SVector::zeros(), covariance: SMatrix::zeros() };
-        let entries = Vec::with_capacity(model.window_steps);
         EmWindow {
-            model,
+            settings,
+            noise,
             expectation,
-            window: Window { entries, first },
+            window: Window { entries: Vec::with_capacity(settings.window), first },
             share: 1.0,
             estimate: None,
         }
     }
 
     /// Runs the iterations of a full window.
-    fn maximise(&mut self) -> Result<(), EngineError> {
+    fn maximise(&mut self) -> Option<()> {
         // The iterates of the second half scatter by the particles' randomness, and go on moving
         // where they have not converged: both are part of the error.
         let (mut scatter, mut scatter_count, mut halfway) = (0.0, 0.0, self.share);
-        for iteration in 0..self.model.iterations {
-            let statistics = {
-                let model = WindowModel {
-                    window: &self.window,
-                    noise: &self.model.noise,
-                    share: self.share,
-                    has_printed_cap: self.model.has_printed_cap,
-                };
-                self.expectation.expect(&model)?
-            };
-            let change = statistics.newton_step();
-            if 2 * iteration >= self.model.iterations {
+        for iteration in 0..self.settings.iterations {
+            let change = self.expectation.expect(&WindowModel {
+                window: &self.window,
+                noise: &self.noise,
+                share: self.share,
+                has_printed_cap: self.settings.has_printed_cap,
+            })?;
+            let change = change.newton_step();
+            if 2 * iteration >= self.settings.iterations {
                 scatter += change * change;
                 scatter_count += 1.0;
             } else {
@@ -80,9 +142,9 @@ impl<E: Expectation> EmWindow<E> {
             }
             self.share += change;
             if !self.share.is_finite() {
-                return Err(EngineError::NotFinite { value: self.share });
+                return None;
             }
-            if change.abs() <= self.model.tolerance {
+            if change.abs() <= self.settings.tolerance {
                 break;
             }
         }
@@ -99,18 +161,19 @@ impl<E: Expectation> EmWindow<E> {
             demand,
             brake_limited: None,
         });
-        Ok(())
+        Some(())
     }
 
     /// Variance of the share given the window alone, by a Kalman filter in which it is
     /// constant and unknown beforehand.
-    fn information_variance(&self) -> Result<f64, EngineError> {
+    fn information_variance(&self) -> Option<f64> {
         let scale = Uncertain::new(self.share, 10.0);
         let model = TrackerModel {
             law: Law::Demand,
-            noise: MotionNoise { measured_speed_m2_per_s2: None, ..self.model.noise },
+            noise: MotionNoise { measured_speed_m2_per_s2: None, ..self.noise },
             walk: Walk::Scale(0.0),
-            prior: Prior { speed_std_mps: 1.0, scale: PriorScale::OfLaw(scale) },
+            first_speed_std_mps: 1.0,
+            prior: PriorScale::OfLaw(scale),
         };
         let first = &self.window.first;
         let mut state = Gaussian::independent(
@@ -122,15 +185,15 @@ impl<E: Expectation> EmWindow<E> {
             if step > 0 {
                 model.advance(&entry.inputs, &mut state);
             }
-            measure(&model, &mut state, &entry.observed)?;
+            measure(&model, &mut state, &entry.observed).ok()?;
         }
-        Ok(state.covariance[(motion::State::Scale as usize, motion::State::Scale as usize)])
+        Some(state.covariance[(SCALE, SCALE)])
     }
 
     /// Moves the window on, with the filter's prediction as belief about its new first state.
     fn slide(&mut self) {
-        let by = self.model.slide_steps;
-        let noise = &self.model.noise;
+        let by = self.settings.slide;
+        let noise = &self.noise;
         if let Some(mut first) = self.expectation.predicted(by) {
             // A handful of particles may collapse; one step's noise is the least uncertainty.
             let step_s = self.window.entries[by.min(self.window.entries.len() - 1)].inputs.step_s;
@@ -145,11 +208,11 @@ impl<E: Expectation> EmWindow<E> {
 impl<E: Expectation> Engine for EmWindow<E> {
     fn start(&mut self, first: &Observation) {
         self.window.entries.clear();
-        self.share = self.model.initial.map_or(1.0, |initial| initial / first.demand);
+        self.share = self.settings.initial.map_or(1.0, |initial| initial / first.demand);
         self.estimate = None;
         let std = SVector::from([
-            self.model.noise.measured_distance_m2.sqrt(),
-            self.model.initial_speed_std_mps,
+            self.noise.measured_distance_m2.sqrt(),
+            self.settings.braking.first_speed_std_mps,
         ]);
         self.window.first =
             Gaussian::independent(SVector::from([first.distance_m, first.speed_mps]), std);
@@ -160,27 +223,27 @@ impl<E: Expectation> Engine for EmWindow<E> {
             tied_mps2: 0.0,
             basic_mps2: [0.0; 3],
         };
-        let noise = MoveNoise::over(&self.model.noise, inputs.step_s);
+        let noise = MoveNoise::over(&self.noise, inputs.step_s);
         self.window.entries.push(Entry { inputs, observed: *first, noise });
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Result<Step, EngineError> {
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<Step> {
         if self.window.entries.is_empty() {
             self.start(observed);
-            return Ok(Step::Restarted);
+            return Some(Step::Restarted);
         }
-        let noise = MoveNoise::over(&self.model.noise, inputs.step_s);
+        let noise = MoveNoise::over(&self.noise, inputs.step_s);
         self.window.entries.push(Entry { inputs: *inputs, observed: *observed, noise });
-        if self.window.entries.len() < self.model.window_steps {
-            return Ok(Step::Collected);
+        if self.window.entries.len() < self.settings.window {
+            return Some(Step::Collected);
         }
         self.maximise()?;
         self.slide();
-        Ok(Step::Updated { normalised_innovation: None })
+        Some(Step::Updated { normalised_innovation: None })
     }
 
     fn set_distance_variance(&mut self, variance_m2: f64) {
-        self.model.noise.measured_distance_m2 = variance_m2;
+        self.noise.measured_distance_m2 = variance_m2;
     }
 
     fn estimate(&self) -> Option<Estimate> {

@@ -86,102 +86,45 @@ pub unsafe extern "C" fn fmi2FreeInstance(component: Component) {
     unsafe { take_back(component) }
 }
 
-/// Accepted without effect: errors are always logged, and there is nothing else to log.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetDebugLogging(
-    component: Component,
-    _logging_on: Boolean,
-    _count: usize,
-    _categories: *const Text,
-) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { call(component, |_| Ok(())) }
+/// Exports the functions that a simulator calls with an instance, but for those of values.
+macro_rules! calls {
+    ($( $(#[$meta:meta])* $name:ident($($argument:ident: $type:ty),*), $work:expr; )*) => { $(
+        $(#[$meta])*
+        ///
+        /// # Safety
+        ///
+        /// See [the module](super#safety).
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(component: Component $(, $argument: $type)*) -> Status {
+            // SAFETY: promised by the caller.
+            unsafe { call(component, $work) }
+        }
+    )* };
 }
 
-/// Takes note of when an experiment begins; tolerance and stop matter to no model.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetupExperiment(
-    component: Component,
-    _tolerance_defined: Boolean,
-    _tolerance: f64,
-    start_time_s: f64,
-    _stop_time_defined: Boolean,
-    _stop_time_s: f64,
-) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { call(component, |model| model.set_up_experiment(start_time_s)) }
-}
-
-/// Reads the files of train and line.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2EnterInitializationMode(component: Component) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { call(component, Model::enter_initialization) }
-}
-
-/// Ends the initialization.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2ExitInitializationMode(component: Component) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { call(component, Model::exit_initialization) }
-}
-
-/// Takes the inputs as they are at the beginning of the step.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DoStep(
-    component: Component,
-    time_s: f64,
-    step_s: f64,
-    _no_set_state_prior: Boolean,
-) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { call(component, |model| model.step(time_s, step_s)) }
-}
-
-/// Ends the simulation.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Terminate(component: Component) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { call(component, Model::terminate) }
-}
-
-/// Forgets everything since the instance was made.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Reset(component: Component) -> Status {
-    let reset = |model: &mut Model| {
+calls! {
+    /// Accepted without effect: errors are always logged, and there is nothing else to log.
+    fmi2SetDebugLogging(_logging_on: Boolean, _count: usize, _categories: *const Text), |_| Ok(());
+    /// Takes note of when an experiment begins; tolerance and stop matter to no model.
+    fmi2SetupExperiment(
+        _tolerance_defined: Boolean, _tolerance: f64, start_time_s: f64,
+        _stop_time_defined: Boolean, _stop_time_s: f64
+    ), |model| model.set_up_experiment(start_time_s);
+    /// Reads the files of train and line.
+    fmi2EnterInitializationMode(), Model::enter_initialization;
+    /// Ends the initialization.
+    fmi2ExitInitializationMode(), Model::exit_initialization;
+    /// Takes the inputs as they are at the beginning of the step.
+    fmi2DoStep(
+        time_s: f64, step_s: f64, _no_set_state_prior: Boolean
+    ), |model| model.step(time_s, step_s);
+    /// Ends the simulation.
+    fmi2Terminate(), Model::terminate;
+    /// Forgets everything since the instance was made.
+    fmi2Reset(), |model| {
         model.reset();
         Ok(())
     };
-    // SAFETY: promised by the caller.
-    unsafe { call(component, reset) }
 }
 
 macro_rules! unsupported {

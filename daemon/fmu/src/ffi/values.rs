@@ -63,86 +63,50 @@ fn require<T>(array: *const T, count: usize, name: &'static str) -> Result<(), M
     if count > 0 && array.is_null() { Err(ModelError::Null(name)) } else { Ok(()) }
 }
 
-/// Gets numbers.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetReal(
-    component: Component,
-    references: *const u32,
-    count: usize,
-    values: *mut f64,
-) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { get(component, (references, count), values, Model::real) }
+/// Exports the functions that get or set a row of variables of one type.
+macro_rules! rows {
+    ($( $(#[$meta:meta])* $name:ident: $way:ident $array:ty, $one:expr; )*) => { $(
+        $(#[$meta])*
+        ///
+        /// # Safety
+        ///
+        /// See [the module](super#safety).
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(
+            component: Component,
+            references: *const u32,
+            count: usize,
+            values: $array,
+        ) -> Status {
+            // SAFETY: promised by the caller.
+            unsafe { $way(component, (references, count), values, $one) }
+        }
+    )* };
 }
 
-/// Gets whole numbers and members of enumerations.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetInteger(
-    component: Component,
-    references: *const u32,
-    count: usize,
-    values: *mut c_int,
-) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { get(component, (references, count), values, Model::integer) }
+rows! {
+    /// Gets numbers.
+    fmi2GetReal: get *mut f64, Model::real;
+    /// Gets whole numbers and members of enumerations.
+    fmi2GetInteger: get *mut c_int, Model::integer;
+    /// Gets truth values.
+    fmi2GetBoolean: get *mut Boolean, |model, reference| Ok(model.boolean(reference)?.into());
+    /// Gets texts, which are good until they are set, reset or freed.
+    fmi2GetString: get *mut Text, |model, reference| Ok(model.string(reference)?.as_ptr());
+    /// Sets measured inputs.
+    fmi2SetReal: set *const f64, Model::set_real;
+    /// Sets the run and the direction.
+    fmi2SetInteger: set *const c_int, Model::set_integer;
+    /// Sets truth values.
+    fmi2SetBoolean: set *const Boolean, |model, reference, value| model.set_boolean(reference, value != 0);
+    /// Sets the paths of files.
+    fmi2SetString: set *const Text, set_text;
 }
 
-/// Gets truth values.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBoolean(
-    component: Component,
-    references: *const u32,
-    count: usize,
-    values: *mut Boolean,
-) -> Status {
-    let one = |model: &Model, reference: u32| Ok(Boolean::from(model.boolean(reference)?));
-    // SAFETY: promised by the caller.
-    unsafe { get(component, (references, count), values, one) }
-}
-
-/// Gets texts, which are good until they are set, reset or freed.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetString(
-    component: Component,
-    references: *const u32,
-    count: usize,
-    values: *mut Text,
-) -> Status {
-    let one = |model: &Model, reference: u32| Ok(model.string(reference)?.as_ptr());
-    // SAFETY: promised by the caller.
-    unsafe { get(component, (references, count), values, one) }
-}
-
-/// Sets measured inputs.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetReal(
-    component: Component,
-    references: *const u32,
-    count: usize,
-    values: *const f64,
-) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { set(component, (references, count), values, Model::set_real) }
+fn set_text(model: &mut Model, reference: u32, value: Text) -> Result<(), ModelError> {
+    // SAFETY: a text of the caller's array, or NULL.
+    let value = unsafe { text(value) };
+    model.set_string(reference, value.ok_or(ModelError::Null("a text"))?)
 }
 
 /// Sets the slopes of inputs during the next step, where the model takes them.
@@ -173,60 +137,4 @@ pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
     };
     // SAFETY: promised by the caller.
     unsafe { call(component, all) }
-}
-
-/// Sets the run and the direction.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetInteger(
-    component: Component,
-    references: *const u32,
-    count: usize,
-    values: *const c_int,
-) -> Status {
-    // SAFETY: promised by the caller.
-    unsafe { set(component, (references, count), values, Model::set_integer) }
-}
-
-/// Sets truth values.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetBoolean(
-    component: Component,
-    references: *const u32,
-    count: usize,
-    values: *const Boolean,
-) -> Status {
-    let one = |model: &mut Model, reference: u32, value: Boolean| {
-        model.set_boolean(reference, value != 0)
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(component, (references, count), values, one) }
-}
-
-/// Sets the paths of files.
-///
-/// # Safety
-///
-/// See [the module](super#safety).
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetString(
-    component: Component,
-    references: *const u32,
-    count: usize,
-    values: *const Text,
-) -> Status {
-    let one = |model: &mut Model, reference: u32, value: Text| {
-        // SAFETY: promised by the caller.
-        let value = unsafe { text(value) };
-        model.set_string(reference, value.ok_or(ModelError::Null("a text"))?)
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(component, (references, count), values, one) }
 }

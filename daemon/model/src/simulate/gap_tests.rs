@@ -133,11 +133,11 @@ fn a_stop_on_a_falling_gradient_is_held_without_a_reported_brake() {
 #[test]
 fn a_run_without_forces_or_order_is_refused() {
     let bare = ResolvedSample { brake_force_n: None, ..coasting_sample(0.0) };
-    let refused = Recording::new(vec![bare], BridgeLimits::default());
+    let refused = Recording::new(vec![bare]);
     assert_eq!(refused, Err(SimulateError::NoForces { samples: 1 }));
     let backwards = vec![coasting_sample(1.0), coasting_sample(0.5)];
     assert!(matches!(
-        Recording::new(backwards, BridgeLimits::default()),
+        Recording::new(backwards),
         Err(SimulateError::TimeNotIncreasing { index: 1, .. })
     ));
 }

@@ -27,17 +27,14 @@
 
 #[cfg(test)]
 mod analytic_tests;
-mod departure;
-mod force_model;
 #[cfg(test)]
 mod gap_tests;
-mod metric;
 pub mod motion;
 mod prediction;
 mod recording;
 
-pub use departure::{STANDING_MPS, departs};
-pub use force_model::{ForceModel, Polynomial, QuadraticForces, declared_polynomial};
-pub use metric::{MOVING_SPEED_MPS, SpeedError};
-pub use prediction::{Prediction, Restart};
-pub use recording::{BridgeLimits, Recording, SimulateError, is_pulled};
+pub use prediction::{MOVING_SPEED_MPS, Prediction, Restart, STANDING_MPS, SpeedError, departs};
+pub use recording::{
+    ForceModel, Polynomial, QuadraticForces, Recording, SimulateError, declared_polynomial,
+    is_pulled,
+};

@@ -1,10 +1,12 @@
-//! The open-loop simulation of a recorded run.
+//! The open-loop simulation of a recorded run, and the error of the predicted speed.
 
-use super::departure::departs;
-use super::force_model::ForceModel;
+use std::ops::Range;
+
 use super::motion::{SPEED_MAX_MPS, STEP_MAX_S, speed_after};
-use super::recording::{Recording, SampleRole};
+use super::recording::{ForceModel, Recording, SampleRole};
 use crate::force::ResolvedSample;
+
+pub use crate::terms::wheel::STANDING_MPS;
 
 /// How long the simulation runs before it takes up a measured speed again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -160,4 +162,76 @@ fn start_speed(recording: &Recording, model: &impl ForceModel, index: usize) -> 
     let median_mps = starts[count / 2];
     let is_outlier = count >= 3 && (measured_mps - median_mps).abs() > START_TOLERANCE_MPS;
     if is_outlier { median_mps.clamp(0.0, SPEED_MAX_MPS) } else { measured_mps }
+}
+
+/// True for the last sample of a stand: a train departs after it.
+#[inline]
+pub fn departs(samples: &[ResolvedSample], index: usize) -> bool {
+    let stands = |at: usize| samples.get(at).is_some_and(|it| it.speed_mps <= STANDING_MPS);
+    stands(index) && index + 1 < samples.len() && !stands(index + 1)
+}
+
+/// Samples at or below this measured speed in m/s do not count.
+pub const MOVING_SPEED_MPS: f64 = 0.5;
+
+/// Sum of squared differences between predicted and measured speed over moving samples; pooled
+/// over runs by addition.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SpeedError {
+    /// Sum of squares in (m/s)².
+    pub sum_of_squares: f64,
+    /// Moving samples.
+    pub count: usize,
+}
+
+impl SpeedError {
+    /// The error of a prediction over the run's moving, simulated samples.
+    ///
+    /// # Panics
+    ///
+    /// When the prediction belongs to another run.
+    pub fn of(recording: &Recording, prediction: &Prediction) -> Self {
+        SpeedError::within(recording, prediction, 0..recording.samples().len())
+    }
+
+    /// The same over some samples of the run.
+    ///
+    /// # Panics
+    ///
+    /// When the prediction belongs to another run, or the run has not these samples.
+    pub fn within(recording: &Recording, prediction: &Prediction, samples: Range<usize>) -> Self {
+        assert_eq!(recording.samples().len(), prediction.speed_mps().len());
+        let mut error = SpeedError::default();
+        for i in samples {
+            let measured_mps = recording.speed_mps()[i];
+            if measured_mps > MOVING_SPEED_MPS && recording.is_simulated(i) {
+                let difference = prediction.speed_mps()[i] - measured_mps;
+                error.sum_of_squares += difference * difference;
+                error.count += 1;
+            }
+        }
+        error
+    }
+
+    /// Root mean square in m/s; `None` without moving samples.
+    pub fn rmse_mps(&self) -> Option<f64> {
+        (self.count > 0).then(|| (self.sum_of_squares / self.count as f64).sqrt())
+    }
+}
+
+impl core::ops::Add for SpeedError {
+    type Output = SpeedError;
+
+    fn add(self, other: SpeedError) -> SpeedError {
+        SpeedError {
+            sum_of_squares: self.sum_of_squares + other.sum_of_squares,
+            count: self.count + other.count,
+        }
+    }
+}
+
+impl core::iter::Sum for SpeedError {
+    fn sum<I: Iterator<Item = SpeedError>>(errors: I) -> SpeedError {
+        errors.fold(SpeedError::default(), |sum, error| sum + error)
+    }
 }

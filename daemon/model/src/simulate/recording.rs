@@ -1,23 +1,15 @@
-//! A recorded run, made ready to be simulated.
+//! A recorded run, made ready to be simulated, and what accelerates a train at its samples.
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use crate::force::ResolvedSample;
+use crate::force::balance::ActingForces;
+use crate::train::Davis;
 
-/// How long a gap in a recording may be and still be bridged.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BridgeLimits {
-    /// Longest time in s over which missing forces or gradients are interpolated.
-    pub force_gap_max_s: f64,
-    /// Longest time in s between two rows; beyond it the run is restarted.
-    pub row_gap_max_s: f64,
-}
-
-impl Default for BridgeLimits {
-    fn default() -> Self {
-        BridgeLimits { force_gap_max_s: 2.0, row_gap_max_s: 10.0 }
-    }
-}
+/// Gaps in s up to which a missing force is bridged by a straight line.
+const FORCE_GAP_MAX_S: f64 = 2.0;
+/// Gaps in s between rows up to which the simulation runs on.
+const ROW_GAP_MAX_S: f64 = 10.0;
 
 /// Why a run cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -85,10 +77,7 @@ impl Recording {
     /// # Errors
     ///
     /// When times do not grow or no sample has forces.
-    pub fn new(
-        mut samples: Vec<ResolvedSample>,
-        limits: BridgeLimits,
-    ) -> Result<Self, SimulateError> {
+    pub fn new(mut samples: Vec<ResolvedSample>) -> Result<Self, SimulateError> {
         for (i, pair) in samples.windows(2).enumerate() {
             let (before_ns, time_ns) = (pair[0].time_ns, pair[1].time_ns);
             if time_ns <= before_ns {
@@ -101,13 +90,15 @@ impl Recording {
             .map(|sample| sample.time_ns.saturating_sub(first_ns) as f64 * 1e-9)
             .collect();
         let knows_gradient = samples.iter().any(|sample| sample.gradient_permille.is_some());
-        let force_gap_max_s = limits.force_gap_max_s;
-        let bridged = bridge(&mut samples, &time_s, force_gap_max_s, |s| &mut s.traction_force_n)
-            .max(bridge(&mut samples, &time_s, force_gap_max_s, |s| &mut s.brake_force_n));
+        let bridged = bridge(&mut samples, &time_s, |s| &mut s.traction_force_n).max(bridge(
+            &mut samples,
+            &time_s,
+            |s| &mut s.brake_force_n,
+        ));
         // A profile along the line has no short gaps in time: hold it to the ends of the run.
-        bridge(&mut samples, &time_s, force_gap_max_s, |s| &mut s.gradient_permille);
+        bridge(&mut samples, &time_s, |s| &mut s.gradient_permille);
         hold_ends(&mut samples);
-        let roles = roles(&samples, &time_s, knows_gradient, limits.row_gap_max_s);
+        let roles = roles(&samples, &time_s, knows_gradient);
         if !roles.contains(&SampleRole::Starts) {
             return Err(SimulateError::NoForces { samples: samples.len() });
         }
@@ -168,11 +159,10 @@ impl Recording {
     }
 }
 
-/// Interpolates a quantity over gaps of at most `gap_max_s`; returns the number of samples filled.
+/// Interpolates a quantity over gaps of at most [`FORCE_GAP_MAX_S`]; returns the number of samples filled.
 fn bridge(
     samples: &mut [ResolvedSample],
     time_s: &[f64],
-    gap_max_s: f64,
     field: fn(&mut ResolvedSample) -> &mut Option<f64>,
 ) -> usize {
     let mut filled = 0;
@@ -180,7 +170,7 @@ fn bridge(
     for i in 0..samples.len() {
         let Some(value) = *field(&mut samples[i]) else { continue };
         if let Some((from, from_value)) = known
-            && time_s[i] - time_s[from] <= gap_max_s
+            && time_s[i] - time_s[from] <= FORCE_GAP_MAX_S
         {
             for k in from + 1..i {
                 let share = (time_s[k] - time_s[from]) / (time_s[i] - time_s[from]);
@@ -205,19 +195,14 @@ fn hold_ends(samples: &mut [ResolvedSample]) {
     }
 }
 
-fn roles(
-    samples: &[ResolvedSample],
-    time_s: &[f64],
-    knows_gradient: bool,
-    row_gap_max_s: f64,
-) -> Vec<SampleRole> {
+fn roles(samples: &[ResolvedSample], time_s: &[f64], knows_gradient: bool) -> Vec<SampleRole> {
     let mut roles = Vec::with_capacity(samples.len());
     for (i, sample) in samples.iter().enumerate() {
         let is_known = sample.control_force_n().is_some()
             && (!knows_gradient || sample.gradient_permille.is_some());
         let follows = i > 0
             && roles[i - 1] != SampleRole::Unknown
-            && time_s[i] - time_s[i - 1] <= row_gap_max_s;
+            && time_s[i] - time_s[i - 1] <= ROW_GAP_MAX_S;
         roles.push(match (is_known, follows) {
             (false, _) => SampleRole::Unknown,
             (true, false) => SampleRole::Starts,
@@ -238,6 +223,91 @@ pub fn is_pulled(sample: &ResolvedSample) -> bool {
     !(traction_n < REST_TRACTION_MPS2 * sample.weight_kn * 1000.0 / STANDARD_GRAVITY_MPS2)
 }
 
+/// The acceleration of a train at each sample of a recorded run, for any speed.
+///
+/// The simulated speed is not the measured one, so a model answers for any speed; everything
+/// else (place, forces, weather) is the sample's. Between samples the answers are interpolated.
+pub trait ForceModel {
+    /// dv/dt in m/s² at the sample of this index if the train went at `speed_mps` there.
+    fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64;
+
+    /// Measured speed over true speed; differs from 1 where the wheel diameter is not the
+    /// declared one.
+    fn speed_scale(&self) -> f64 {
+        1.0
+    }
+}
+
+/// A closure (index, speed in m/s) to dv/dt in m/s².
+impl<F: Fn(usize, f64) -> f64> ForceModel for F {
+    fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
+        self(index, speed_mps)
+    }
+}
+
+/// Acceleration in m/s² at one sample as a polynomial of the speed in m/s: p0 + p1 v + p2 v².
+pub type Polynomial = [f64; 3];
+
+/// A force model that is a quadratic polynomial of the speed at every sample.
+///
+/// The declared model is of this form, and so are tunnel and curve resistance, wind, dragging
+/// brakes, another mass, gain or delay of the forces: an effect adds its three numbers per sample
+/// once, and the simulation costs the same with ten effects as with none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct QuadraticForces {
+    polynomials: Vec<Polynomial>,
+    speed_scale: f64,
+}
+
+impl QuadraticForces {
+    /// The declared model over a run with the given Davis coefficients.
+    pub fn declared(recording: &Recording, resistance: Davis) -> Self {
+        let mut forces = QuadraticForces::default();
+        let polynomial = |sample| declared_polynomial(sample, resistance);
+        forces.restart(1.0);
+        forces.extend(recording.samples().iter().map(polynomial));
+        forces
+    }
+
+    /// Becomes the model of no sample yet, and of a measured over true speed; keeps its memory, so that an
+    /// optimiser allocates only once.
+    pub fn restart(&mut self, speed_scale: f64) {
+        self.speed_scale = speed_scale;
+        self.polynomials.clear();
+    }
+
+    /// Goes on with these polynomials, one for each sample.
+    pub fn extend(&mut self, polynomials: impl Iterator<Item = Polynomial>) {
+        self.polynomials.extend(polynomials);
+    }
+}
+
+impl ForceModel for QuadraticForces {
+    #[inline]
+    fn acceleration_mps2(&self, index: usize, speed_mps: f64) -> f64 {
+        let [p0, p1, p2] = self.polynomials[index];
+        p0 + speed_mps * (p1 + speed_mps * p2)
+    }
+
+    fn speed_scale(&self) -> f64 {
+        self.speed_scale
+    }
+}
+
+/// The declared model at a sample. A gradient that is not known counts as level track;
+/// [`Recording::knows_gradient`] says.
+pub fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
+    let Davis { a, b, c } = resistance;
+    let acting = ActingForces {
+        mass_kg: sample.mass_kg,
+        rotating_mass_factor: sample.rotating_mass_factor(),
+        force_n: sample.control_force_n().unwrap_or(0.0),
+        gradient_permille: sample.gradient_permille.unwrap_or(0.0),
+        resistance_n_per_kn: [sample.extra_n_per_kn + a, b, c],
+    };
+    acting.acceleration_mps2()
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -248,6 +318,6 @@ pub(super) mod tests {
     }
 
     pub(in crate::simulate) fn recorded(samples: Vec<ResolvedSample>) -> Recording {
-        Recording::new(samples, BridgeLimits::default()).unwrap()
+        Recording::new(samples).unwrap()
     }
 }

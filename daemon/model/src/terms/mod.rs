@@ -16,22 +16,18 @@ pub mod extra;
 pub mod gradient;
 mod key;
 pub mod masses;
-mod parameter;
 pub mod place;
 mod resistance;
 pub mod rotating;
 pub mod speed_band;
 pub mod speed_delay;
-mod suspect;
 pub mod traction;
 pub mod tunnel;
 pub mod wheel;
 pub mod wind;
 
-pub use key::{Entry, Joined, Key};
-pub use parameter::Parameter;
+pub use key::{Entry, Joined, Key, Least, Parameter, Suspect, SuspectInput};
 pub use resistance::Resistance;
-pub use suspect::{Least, Suspect, SuspectInput};
 
 /// Every number of a term that stands in `[corrections]` of `train.toml`.
 pub const CORRECTIONS: [&Key; 13] = [

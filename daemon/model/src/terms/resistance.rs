@@ -2,120 +2,66 @@
 
 use crate::train::Davis;
 
-/// What resists at one sample, but for the Davis coefficients: each term writes its own part.
-///
-/// ```text
-/// w(v) = factor (a + b v + c v²) + c (c_share v² + outside ((v + u)|v + u| - v²)) + dc v²
-///        + curve + tunnel + place + bearing
-/// ```
-///
-/// in N/kN, with the headwind u on the part of the train outside tunnels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Resistance {
+/// Lists the parts once, each with its value in the basic resistance alone.
+macro_rules! parts {
+    ($( $(#[doc = $doc:literal])* $part:ident = $basic:literal; )*) => {
+        /// What resists at one sample, but for the Davis coefficients: each term writes its own part.
+        ///
+        /// ```text
+        /// w(v) = factor (a + b v + c v²) + c (c_share v² + outside ((v + u)|v + u| - v²)) + dc v²
+        ///        + curve + tunnel + place + bearing
+        /// ```
+        ///
+        /// in N/kN, with the headwind u on the part of the train outside tunnels.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Resistance { $( $(#[doc = $doc])* pub $part: f64 ),* }
+
+        impl Resistance {
+            /// The basic resistance alone.
+            pub const BASIC: Resistance = Resistance { $( $part: $basic ),* };
+            /// Number of its parts.
+            pub const PARTS: usize = [$( stringify!($part) ),*].len();
+
+            /// Its parts, in the order of the fields.
+            pub fn parts(&self) -> [f64; Self::PARTS] {
+                [$( self.$part ),*]
+            }
+
+            /// The resistance of these [`parts`](Self::parts).
+            pub fn of_parts([$( $part ),*]: [f64; Self::PARTS]) -> Self {
+                Resistance { $( $part ),* }
+            }
+        }
+    };
+}
+
+parts! {
     /// Of curves, in N/kN.
-    pub curve_n_per_kn: f64,
+    curve_n_per_kn = 0.0;
     /// Of tunnels by their length, in N/kN.
-    pub tunnel_n_per_kn: f64,
+    tunnel_n_per_kn = 0.0;
     /// Of places, in N/kN.
-    pub place_n_per_kn: f64,
+    place_n_per_kn = 0.0;
     /// Of cold bearings, in N/kN.
-    pub bearing_n_per_kn: f64,
+    bearing_n_per_kn = 0.0;
     /// Of everything in no library, in N/kN: at standstill, with a slope over the speed in N/kN per
     /// m/s that holds near the sample's.
-    pub other_n_per_kn: f64,
+    other_n_per_kn = 0.0;
     /// That slope.
-    pub other_per_mps: f64,
+    other_per_mps = 0.0;
     /// Factor on the basic resistance.
-    pub factor: f64,
+    factor = 1.0;
     /// What tunnels add to c, as share of it.
-    pub c_share: f64,
+    c_share = 0.0;
     /// What tunnels add to c, in N/kN per (m/s)².
-    pub dc: f64,
+    dc = 0.0;
     /// Headwind in m/s.
-    pub headwind_mps: f64,
+    headwind_mps = 0.0;
     /// Share of the train that feels it.
-    pub outside: f64,
+    outside = 1.0;
 }
 
 impl Resistance {
-    /// The basic resistance alone.
-    pub const BASIC: Resistance = Resistance {
-        curve_n_per_kn: 0.0,
-        tunnel_n_per_kn: 0.0,
-        place_n_per_kn: 0.0,
-        bearing_n_per_kn: 0.0,
-        other_n_per_kn: 0.0,
-        other_per_mps: 0.0,
-        factor: 1.0,
-        c_share: 0.0,
-        dc: 0.0,
-        headwind_mps: 0.0,
-        outside: 1.0,
-    };
-
-    /// Number of its parts.
-    pub const PARTS: usize = 11;
-
-    /// Its parts, in the order of the fields.
-    pub fn parts(&self) -> [f64; Self::PARTS] {
-        let Resistance {
-            curve_n_per_kn,
-            tunnel_n_per_kn,
-            place_n_per_kn,
-            bearing_n_per_kn,
-            other_n_per_kn,
-            other_per_mps,
-            factor,
-            c_share,
-            dc,
-            headwind_mps,
-            outside,
-        } = *self;
-        [
-            curve_n_per_kn,
-            tunnel_n_per_kn,
-            place_n_per_kn,
-            bearing_n_per_kn,
-            other_n_per_kn,
-            other_per_mps,
-            factor,
-            c_share,
-            dc,
-            headwind_mps,
-            outside,
-        ]
-    }
-
-    /// The resistance of these [`parts`](Self::parts).
-    pub fn of_parts(parts: [f64; Self::PARTS]) -> Self {
-        let [
-            curve_n_per_kn,
-            tunnel_n_per_kn,
-            place_n_per_kn,
-            bearing_n_per_kn,
-            other_n_per_kn,
-            other_per_mps,
-            factor,
-            c_share,
-            dc,
-            headwind_mps,
-            outside,
-        ] = parts;
-        Resistance {
-            curve_n_per_kn,
-            tunnel_n_per_kn,
-            place_n_per_kn,
-            bearing_n_per_kn,
-            other_n_per_kn,
-            other_per_mps,
-            factor,
-            c_share,
-            dc,
-            headwind_mps,
-            outside,
-        }
-    }
-
     /// What is there at standstill, in N/kN.
     #[inline]
     fn constant_n_per_kn(&self) -> f64 {

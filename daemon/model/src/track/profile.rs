@@ -141,6 +141,17 @@ impl StepProfile {
     }
 }
 
+/// The value at a place on the straight lines between points (place, value) in order, and that of the
+/// nearest end beyond; 0 without points.
+pub fn along_line(points: &[(f64, f64)], at: f64) -> f64 {
+    let after = points.partition_point(|point| point.0 <= at);
+    match (after.checked_sub(1).map(|before| points[before]), points.get(after)) {
+        (Some((from, low)), Some(&(to, high))) => low + (high - low) * (at - from) / (to - from),
+        (Some((_, value)), None) | (None, Some(&(_, value))) => value,
+        (None, None) => 0.0,
+    }
+}
+
 /// A function of the chainage that is linear between its entries and holds beyond them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearProfile {
@@ -161,14 +172,7 @@ impl LinearProfile {
     /// The value at a chainage in m.
     #[inline]
     pub fn at(&self, chainage_m: f64) -> f64 {
-        let after = self.entries.partition_point(|&(m, _)| m <= chainage_m);
-        match (after.checked_sub(1).map(|before| self.entries[before]), self.entries.get(after)) {
-            (Some((m, from)), Some(&(to_m, to))) => {
-                from + (to - from) * (chainage_m - m) / (to_m - m)
-            }
-            (Some((_, value)), None) | (None, Some(&(_, value))) => value,
-            (None, None) => 0.0,
-        }
+        along_line(&self.entries, chainage_m)
     }
 
     /// The entries.

@@ -8,6 +8,7 @@ pub use drive::Drive;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use crate::terms::extra::Extra;
+use crate::track::along_line;
 
 /// Davis coefficients of the unit basic resistance w0(v) = a + b v + c v² in N/kN, v in m/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,12 +46,7 @@ impl EffortCurve {
 
     /// Force in N at a speed in m/s.
     pub fn force_n(&self, speed_mps: f64) -> f64 {
-        let after = self.points.partition_point(|&(v, _)| v <= speed_mps);
-        match (after.checked_sub(1).map(|i| self.points[i]), self.points.get(after)) {
-            (Some((v0, f0)), Some(&(v1, f1))) => f0 + (f1 - f0) * (speed_mps - v0) / (v1 - v0),
-            (Some((_, force)), None) | (None, Some(&(_, force))) => force,
-            (None, None) => 0.0,
-        }
+        along_line(&self.points, speed_mps)
     }
 
     /// The points (speed in m/s, force in N).

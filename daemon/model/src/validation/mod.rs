@@ -9,45 +9,24 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{RejectionReason, SampleField, TrainId, TrainSample};
 
-/// Bounds beyond which a sample cannot be true.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ValidationLimits {
-    /// Highest speed in m/s.
-    pub speed_max_mps: f64,
-    /// Greatest |dv/dt| in m/s².
-    pub acceleration_max_mps2: f64,
-    /// Change of speed in m/s that is let pass whatever the time step: quantum and noise.
-    pub speed_tolerance_mps: f64,
-    /// Difference in m between position and integrated speed that is let pass: balises.
-    pub position_tolerance_m: f64,
-    /// Greatest force in N per N of train weight.
-    pub force_max_per_weight: f64,
-    /// Lowest and highest mass in kg.
-    pub mass_kg: (f64, f64),
-    /// A longer step in s ends a motion segment.
-    pub gap_max_s: f64,
-    /// A longer step ahead in s is not believed within a run.
-    pub jump_max_s: f64,
-    /// After so many refusals in a row that agree with each other, the past is given up.
-    pub refusals_before_restart: u32,
-}
-
-impl ValidationLimits {
-    /// Limits for a train of a nominal mass in kg.
-    pub fn for_train(mass_kg: f64) -> Self {
-        ValidationLimits {
-            speed_max_mps: 170.0,
-            acceleration_max_mps2: 4.0,
-            speed_tolerance_mps: 1.0,
-            position_tolerance_m: 60.0,
-            force_max_per_weight: 0.6,
-            mass_kg: (0.2 * mass_kg, 5.0 * mass_kg),
-            gap_max_s: 2.5,
-            jump_max_s: 86_400.0,
-            refusals_before_restart: 5,
-        }
-    }
-}
+/// Highest speed in m/s.
+const SPEED_MAX_MPS: f64 = 170.0;
+/// Greatest |dv/dt| in m/s².
+const ACCELERATION_MAX_MPS2: f64 = 4.0;
+/// Change of speed in m/s that is let pass whatever the time step: quantum and noise.
+const SPEED_TOLERANCE_MPS: f64 = 1.0;
+/// Difference in m between position and integrated speed that is let pass: balises.
+const POSITION_TOLERANCE_M: f64 = 60.0;
+/// Greatest force in N per N of train weight.
+const FORCE_MAX_PER_WEIGHT: f64 = 0.6;
+/// Lowest and highest mass over the nominal one.
+const MASS_SHARES: (f64, f64) = (0.2, 5.0);
+/// A longer step in s ends a motion segment.
+pub const GAP_MAX_S: f64 = 2.5;
+/// A longer step ahead in s is not believed within a run.
+pub const JUMP_MAX_S: f64 = 86_400.0;
+/// After so many refusals in a row that agree with each other, the past is given up.
+const REFUSALS_BEFORE_RESTART: u32 = 5;
 
 /// A sample that passed, with what its predecessors say about it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +63,6 @@ struct Gap {
 #[derive(Clone, Debug)]
 pub struct Validator {
     train: TrainId,
-    limits: ValidationLimits,
     nominal_mass_kg: f64,
     last: Option<TrainSample>,
     /// The run of the newest sample.
@@ -100,10 +78,9 @@ pub struct Validator {
 
 impl Validator {
     /// A validator for one train of a nominal mass in kg.
-    pub fn new(train: TrainId, nominal_mass_kg: f64, limits: ValidationLimits) -> Self {
+    pub fn new(train: TrainId, nominal_mass_kg: f64) -> Self {
         Validator {
             train,
-            limits,
             nominal_mass_kg,
             last: None,
             run: None,
@@ -131,7 +108,6 @@ impl Validator {
     /// where the other stopped, by its own limits, and begins a new motion segment.
     pub fn exchange(&mut self, other: &mut Validator) {
         std::mem::swap(self, other);
-        std::mem::swap(&mut self.limits, &mut other.limits);
         std::mem::swap(&mut self.nominal_mass_kg, &mut other.nominal_mass_kg);
         let segment = self.segment.max(other.segment);
         for it in [self, other] {
@@ -215,12 +191,11 @@ impl Validator {
         self.gap = Some(gap);
         // The sample with the wrong number arrived as well.
         let arrived = 1 + u64::from(gap.refused);
-        (gap.refused > self.limits.refusals_before_restart)
+        (gap.refused > REFUSALS_BEFORE_RESTART)
             .then(|| gap.lost_before + (sample.sequence - gap.before).saturating_sub(arrived))
     }
 
     fn check_values(&self, sample: &TrainSample) -> Result<(), RejectionReason> {
-        let limits = &self.limits;
         if sample.direction != 1 && sample.direction != -1 {
             return Err(RejectionReason::BadDirection);
         }
@@ -230,14 +205,16 @@ impl Validator {
             }
         }
         let speed_mps = sample.get(SampleField::Speed).ok_or(RejectionReason::Missing)?;
-        if !(0.0..=limits.speed_max_mps).contains(&speed_mps) {
+        if !(0.0..=SPEED_MAX_MPS).contains(&speed_mps) {
             return Err(RejectionReason::SpeedOutOfRange);
         }
         let mass_kg = sample.get(SampleField::Mass).unwrap_or(self.nominal_mass_kg);
-        if !(limits.mass_kg.0..=limits.mass_kg.1).contains(&mass_kg) {
+        let (low_kg, high_kg) =
+            (MASS_SHARES.0 * self.nominal_mass_kg, MASS_SHARES.1 * self.nominal_mass_kg);
+        if !(low_kg..=high_kg).contains(&mass_kg) {
             return Err(RejectionReason::MassOutOfRange);
         }
-        let force_max_n = limits.force_max_per_weight * mass_kg * STANDARD_GRAVITY_MPS2;
+        let force_max_n = FORCE_MAX_PER_WEIGHT * mass_kg * STANDARD_GRAVITY_MPS2;
         for field in [SampleField::TractionForce, SampleField::BrakeForce] {
             if sample.get(field).is_some_and(|force| !(0.0..=force_max_n).contains(&force)) {
                 return Err(RejectionReason::ForceOutOfRange);
@@ -260,10 +237,10 @@ impl Validator {
             return Err(RejectionReason::TimeNotIncreasing);
         }
         let step_s = step_s(last, sample);
-        if step_s > self.limits.jump_max_s {
+        if step_s > JUMP_MAX_S {
             return Err(RejectionReason::TimeJump);
         }
-        if step_s > self.limits.gap_max_s || sample.direction != last.direction {
+        if step_s > GAP_MAX_S || sample.direction != last.direction {
             return Ok(None);
         }
         self.check_continuity(last, sample, step_s)?;
@@ -276,9 +253,8 @@ impl Validator {
         sample: &TrainSample,
         step_s: f64,
     ) -> Result<(), RejectionReason> {
-        let limits = &self.limits;
         let speed_change = (sample.speed_mps - last.speed_mps).abs();
-        if speed_change > limits.speed_tolerance_mps + limits.acceleration_max_mps2 * step_s {
+        if speed_change > SPEED_TOLERANCE_MPS + ACCELERATION_MAX_MPS2 * step_s {
             return Err(RejectionReason::SpeedJump);
         }
         if let (Some(from_m), Some(to_m)) =
@@ -286,7 +262,7 @@ impl Validator {
         {
             let travelled_m = 0.5 * (last.speed_mps + sample.speed_mps) * step_s;
             let expected_m = from_m + f64::from(sample.direction) * travelled_m;
-            if (to_m - expected_m).abs() > limits.position_tolerance_m {
+            if (to_m - expected_m).abs() > POSITION_TOLERANCE_M {
                 return Err(RejectionReason::PositionJump);
             }
         }
@@ -298,13 +274,13 @@ impl Validator {
         let continues = self.last_refused.as_ref().is_some_and(|before| {
             let step_s = step_s(before, sample);
             step_s > 0.0
-                && step_s <= self.limits.gap_max_s
+                && step_s <= GAP_MAX_S
                 && sample.direction == before.direction
                 && self.check_continuity(before, sample, step_s).is_ok()
         });
         self.refusals_in_a_row = if continues { self.refusals_in_a_row + 1 } else { 1 };
         self.last_refused = Some(*sample);
-        self.refusals_in_a_row > self.limits.refusals_before_restart
+        self.refusals_in_a_row > REFUSALS_BEFORE_RESTART
     }
 
     fn accept<'a>(&mut self, sample: &'a TrainSample, step_s: Option<f64>) -> ValidSample<'a> {

@@ -5,7 +5,7 @@ use super::*;
 const TRAIN: TrainId = TrainId(3);
 
 fn validator() -> Validator {
-    Validator::new(TRAIN, 100_000.0, ValidationLimits::for_train(100_000.0))
+    Validator::new(TRAIN, 100_000.0)
 }
 
 /// A train at a steady 20 m/s, five samples a second.

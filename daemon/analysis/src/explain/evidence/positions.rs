@@ -146,7 +146,6 @@ pub(super) fn pooled_s(parts: &[f64]) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use dynocar_model::force::ResolvedSample;
-    use dynocar_model::simulate::BridgeLimits;
 
     use super::super::coasting;
     use super::*;
@@ -169,7 +168,7 @@ mod tests {
                 ..coasting()
             }
         };
-        Recording::new((0..2500).map(sample).collect(), BridgeLimits::default()).unwrap()
+        Recording::new((0..2500).map(sample).collect()).unwrap()
     }
 
     #[test]
@@ -202,7 +201,7 @@ mod tests {
                 ..coasting()
             }
         };
-        Recording::new((0..620).map(sample).collect(), BridgeLimits::default()).unwrap()
+        Recording::new((0..620).map(sample).collect()).unwrap()
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! A run made ready for fitting: resolved, cleaned and binned.
 
 use dynocar_model::force::{ForceResolver, ResolvedSample};
-use dynocar_model::simulate::{BridgeLimits, Recording, SimulateError};
+use dynocar_model::simulate::{Recording, SimulateError};
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::train::TrainModel;
-use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::Validator;
 use dynocar_shared::TrainSample;
 
 use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};
@@ -136,8 +136,7 @@ impl RunData {
 /// The first run without usable samples.
 pub fn prepare(dataset: &Dataset) -> Result<Vec<RunData>, RunDataError> {
     let train = &dataset.train;
-    let limits = ValidationLimits::for_train(train.mass_kg);
-    let mut validator = Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg, limits);
+    let mut validator = Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg);
     let mut resolver = ForceResolver::new(train.clone(), dataset.track.clone());
     let mut resolve =
         |sample: &TrainSample| validator.check(sample).ok().map(|valid| resolver.resolve(&valid));
@@ -157,7 +156,7 @@ fn prepare_run(
     let time_s: Vec<f64> =
         samples.iter().map(|sample| (sample.time_ns - first_ns) as f64 * 1e-9).collect();
     let replaced = cleaning::clean(&mut samples, bins::sampling_period_s(&time_s));
-    let recording = Recording::new(samples, BridgeLimits::default())
+    let recording = Recording::new(samples)
         .map_err(|source| RunDataError::Simulate { file: run.file.clone(), source })?;
     let declared = DeclaredForces::of(recording.samples(), train.rotating_mass_factor);
     let smooth_mps = smoothed(&recording);

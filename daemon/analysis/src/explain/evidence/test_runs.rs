@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_model::validation::{ValidationLimits, Validator};
+use dynocar_model::validation::Validator;
 use dynocar_shared::{SampleField, TrainSample};
 
 use crate::dataset::DATASET_TRAIN;
@@ -22,8 +22,7 @@ pub fn coasting() -> ResolvedSample {
     ] {
         sample.set(field, value);
     }
-    let limits = ValidationLimits::for_train(train.mass_kg);
-    let mut validator = Validator::new(DATASET_TRAIN, train.mass_kg, limits);
+    let mut validator = Validator::new(DATASET_TRAIN, train.mass_kg);
     let valid = validator.check(&sample).expect("a sound sample");
     ForceResolver::new(Arc::new(train), None).resolve(&valid)
 }

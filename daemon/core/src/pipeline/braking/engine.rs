@@ -1,26 +1,85 @@
 //! What the estimators of a braking coefficient have in common.
 
+use dynocar_model::terms::adhesion;
 use dynocar_shared::Uncertain;
 
-use super::motion::StepInputs;
-use crate::filter::NotPositiveDefinite;
-use crate::filter::particle::ParticleError;
+use super::motion::{MotionNoise, StepInputs};
+use crate::pipeline::motion::MOVING_MPS;
+use crate::pipeline::settings::{SettingError, require};
+use crate::settings;
 
-/// Why an engine failed; it has to be started anew.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum EngineError {
-    /// A Kalman filter failed.
-    #[error(transparent)]
-    Filter(#[from] NotPositiveDefinite),
-    /// A particle filter failed.
-    #[error(transparent)]
-    Particle(#[from] ParticleError),
-    /// The estimate is not finite.
-    #[error("expected a finite estimate, got {value}")]
-    NotFinite {
-        /// The estimate.
-        value: f64,
-    },
+settings! {
+    /// What every braking pipeline knows beforehand of motion, measurement and braking.
+    ///
+    /// The defaults of the noise are those of the papers' simulation: a position measured within
+    /// 0.1 m, and process noise uniform within 0.1 m and 0.1 km/h over steps of 0.2 s.
+    #[derive(Copy)]
+    BrakingSettings {
+        /// Shortest time in s between two observations.
+        interval_s: f64 = 0.2 => (above 0);
+        /// A longer time in s between two observations ends the braking.
+        gap_max_s: f64 = 2.0;
+        /// Standard deviation of a measured position in m; a greater one is learned.
+        position_std_m: f64 = 0.1 => (above 0);
+        /// Standard deviation of a measured speed in m/s.
+        speed_std_mps: f64 = 0.1 => (above 0);
+        /// False when only the first speed of a braking is used, as in the papers.
+        uses_speed: bool = true;
+        /// Standard deviation in m that the position gains in 1 s about the model.
+        position_walk_m: f64 = walk_per_sqrt_s(0.1) => (above 0);
+        /// Standard deviation in m/s that the speed gains in 1 s about the model.
+        speed_walk_mps: f64 = walk_per_sqrt_s(0.1 / 3.6) => (above 0);
+        /// Standard deviation in m/s of the first speed of a braking.
+        first_speed_std_mps: f64 = 0.2 => (above 0);
+        /// Least brake force per weight that counts as braking.
+        braking_min_per_weight: f64 = 0.01 => (above 0);
+        /// Slowest speed in m/s at which the model is trusted.
+        speed_min_mps: f64 = MOVING_MPS => (0 or more);
+        /// True when the position does not come from the braked wheels, so that it holds while they
+        /// slide.
+        position_is_wheel_independent: bool = false;
+        /// Standard deviation over value of the declared brake force.
+        demand_relative_std: f64 = adhesion::DECLARED_BRAKE_STD => (above 0);
+        /// Greatest standard deviation over value of an estimate that counts.
+        relative_std_max: f64 = 0.15 => (above 0);
+        /// Age in s at which an estimate is stale.
+        stale_after_s: f64 = 300.0 => (above 0);
+    }
+}
+
+/// Standard deviation that comes in 1 s from steps of 0.2 s, uniform within a half width, each of
+/// variance w²/3.
+fn walk_per_sqrt_s(half_width: f64) -> f64 {
+    (half_width * half_width / 3.0 / 0.2).sqrt()
+}
+
+impl BrakingSettings {
+    /// Refuses settings outside their ranges.
+    ///
+    /// # Errors
+    ///
+    /// Names key, value and range.
+    pub fn check(&self) -> Result<(), SettingError> {
+        self.check_ranges()?;
+        let is_longer = self.gap_max_s >= self.interval_s && self.gap_max_s.is_finite();
+        require(is_longer, "gap_max_s", self.gap_max_s, "at least interval_s")
+    }
+
+    /// The noise of motion and measurement.
+    pub fn noise(&self) -> MotionNoise {
+        MotionNoise {
+            distance_m2_per_s: self.position_walk_m.powi(2),
+            speed_m2_per_s3: self.speed_walk_mps.powi(2),
+            measured_distance_m2: self.position_std_m.powi(2),
+            measured_speed_m2_per_s2: self.uses_speed.then_some(self.speed_std_mps.powi(2)),
+        }
+    }
+
+    /// True when an estimate is precise enough to be used.
+    pub fn counts(&self, estimate: &Estimate) -> bool {
+        let coefficient = estimate.coefficient;
+        coefficient.std <= self.relative_std_max * coefficient.value.abs()
+    }
 }
 
 /// What is measured at one moment of braking.
@@ -72,16 +131,13 @@ pub trait Engine: Send {
     /// Forgets the past and starts from a first observation.
     fn start(&mut self, first: &Observation);
 
-    /// Takes the observation at the end of a step into account.
-    ///
-    /// # Errors
-    ///
-    /// When a factorisation fails or no particle is left.
+    /// Takes the observation at the end of a step into account. None when a factorisation fails, no
+    /// particle is left or the estimate is not finite: the engine has to be started anew.
     ///
     /// # Real-time
     ///
     /// Allocates nothing.
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Result<Step, EngineError>;
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<Step>;
 
     /// Takes the variance of a measured distance in m² for another one from the next step on.
     fn set_distance_variance(&mut self, variance_m2: f64);

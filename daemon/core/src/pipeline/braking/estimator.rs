@@ -1,14 +1,18 @@
-//! The estimator behind every braking pipeline: intake, engine, report.
+//! The estimator behind every braking pipeline: intake, engine, and what of an estimate may be said.
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
+use dynocar_model::train::TrainModel;
+use dynocar_shared::{
+    Manoeuvre, Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status,
+};
+use nalgebra::{Matrix1, Matrix2, SVector};
 
-use super::engine::{Engine, Estimate, Observation, Step};
+use super::engine::{BrakingSettings, Engine, Estimate, Observation, Step};
 use super::intake::{BrakingCoefficient, BrakingIntake, Intake};
 use super::motion::StepInputs;
-use super::report::{self, Circumstances, ReportSettings};
+use crate::pipeline::judge::Case;
 use crate::pipeline::motion::{PositionNoise, SpeedRange};
-use crate::pipeline::output::write_innovations;
+use crate::pipeline::output::{write_innovations, write_parameters, write_status};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
 /// Memory of the innovation statistics, in innovations.
@@ -21,9 +25,7 @@ pub struct BrakingEstimator<E> {
     quantity: BrakingCoefficient,
     intake: BrakingIntake,
     engine: E,
-    report: ReportSettings,
-    /// Age in s at which an estimate is stale.
-    stale_after_s: f64,
+    settings: BrakingSettings,
     innovations: InnovationMonitor,
     reason: Reason,
     /// The last estimate that counts, else the last of all.
@@ -34,28 +36,29 @@ pub struct BrakingEstimator<E> {
     now_ns: i64,
     resets: u64,
     speeds: SpeedRange,
-    /// Variance in m² of a position as declared, and what the positions show.
-    declared_position_m2: f64,
+    /// What the positions show of their noise.
     positions: PositionNoise,
 }
 
-impl<E: Engine> BrakingEstimator<E> {
-    /// An estimator of one quantity.
-    pub fn new(
+/// Standard deviations by which the achieved brake force must lie below the demanded one before
+/// the rail counts as the smaller one.
+const RAIL_LIMIT_SIGMAS: f64 = 2.0;
+
+impl BrakingSettings {
+    /// The estimator of a kind around an engine.
+    pub fn estimator<E: Engine + 'static>(
+        &self,
         kind: PipelineKind,
         quantity: BrakingCoefficient,
-        intake: BrakingIntake,
+        train: &TrainModel,
         engine: E,
-        report: ReportSettings,
-        (stale_after_s, position_std_m): (f64, f64),
-    ) -> Self {
-        BrakingEstimator {
+    ) -> Box<dyn Estimator> {
+        Box::new(BrakingEstimator {
             kind,
             quantity,
-            intake,
+            intake: BrakingIntake::new(quantity, *self, train),
             engine,
-            report,
-            stale_after_s,
+            settings: *self,
             innovations: InnovationMonitor::new(INNOVATION_MEMORY),
             reason: Reason::TooFewSamples,
             held: None,
@@ -64,29 +67,30 @@ impl<E: Engine> BrakingEstimator<E> {
             now_ns: 0,
             resets: 0,
             speeds: SpeedRange::default(),
-            declared_position_m2: position_std_m * position_std_m,
             positions: PositionNoise::default(),
-        }
+        })
     }
+}
 
+impl<E: Engine> BrakingEstimator<E> {
     fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Outcome {
         match self.engine.step(inputs, observed) {
-            Ok(Step::Collected) => Outcome::Used,
-            Ok(Step::Updated { normalised_innovation }) => {
+            Some(Step::Collected) => Outcome::Used,
+            Some(Step::Updated { normalised_innovation }) => {
                 if let Some(normalised) = normalised_innovation {
                     self.innovations.push(normalised);
                 }
                 self.hold(observed.speed_mps);
                 Outcome::Updated
             }
-            Ok(Step::Outlier) => Outcome::Rejected(RejectionReason::Outlier),
-            Ok(Step::Restarted) => {
+            Some(Step::Outlier) => Outcome::Rejected(RejectionReason::Outlier),
+            Some(Step::Restarted) => {
                 self.resets += 1;
                 self.is_current = false;
                 self.innovations.break_here();
                 Outcome::Used
             }
-            Err(_) => {
+            None => {
                 // The reset is not hidden: the reason stays until the next update, and the
                 // generation counts it.
                 self.resets += 1;
@@ -103,8 +107,8 @@ impl<E: Engine> BrakingEstimator<E> {
     /// not yet.
     fn hold(&mut self, speed_mps: f64) {
         let Some(estimate) = self.engine.estimate() else { return };
-        let counts = self.report.counts(&estimate);
-        let held_counts = self.held.is_some_and(|held| self.report.counts(&held));
+        let counts = self.settings.counts(&estimate);
+        let held_counts = self.held.is_some_and(|held| self.settings.counts(&held));
         if counts || self.is_current || !held_counts {
             if !self.is_current {
                 self.speeds = SpeedRange::default();
@@ -119,7 +123,75 @@ impl<E: Engine> BrakingEstimator<E> {
 
     fn is_stale(&self) -> bool {
         let age_s = self.now_ns.saturating_sub(self.updated_ns) as f64 * 1e-9;
-        !self.is_current || age_s > self.stale_after_s
+        !self.is_current || age_s > self.settings.stale_after_s
+    }
+
+    /// True when the rail carries less than the brake would need, so that the coefficient is that
+    /// of the rail and not only a lower bound of it.
+    fn is_rail_limited(&self, estimate: &Estimate) -> bool {
+        if let Some(probability) = estimate.brake_limited {
+            return probability <= 0.5;
+        }
+        let demand_std = self.settings.demand_relative_std * estimate.demand;
+        let std = estimate.coefficient.std.hypot(demand_std);
+        estimate.coefficient.value < estimate.demand - RAIL_LIMIT_SIGMAS * std
+    }
+
+    fn write_estimate(
+        &self,
+        estimate: &Estimate,
+        is_stale: bool,
+        snapshot: &mut ParameterSnapshot,
+    ) {
+        let is_adhesion = self.quantity == BrakingCoefficient::Adhesion;
+        let is_number = !is_adhesion || self.is_rail_limited(estimate);
+        let parameter = match self.quantity {
+            BrakingCoefficient::Adhesion if is_number => Parameter::Adhesion,
+            BrakingCoefficient::Adhesion => Parameter::AdhesionLowerBound,
+            BrakingCoefficient::Friction => Parameter::DiscFriction,
+            BrakingCoefficient::Ratio => Parameter::BrakingRatio,
+        };
+        let Estimate { coefficient, scale, covariance, .. } = *estimate;
+        let variance = coefficient.std * coefficient.std;
+        if self.kind == PipelineKind::AdhesionLaw && is_number {
+            write_parameters(
+                snapshot,
+                [parameter, Parameter::AdhesionLawScale],
+                &SVector::from([coefficient.value, scale.value]),
+                &Matrix2::new(variance, covariance, covariance, scale.std * scale.std),
+            );
+        } else {
+            let value = SVector::from([coefficient.value]);
+            write_parameters(snapshot, [parameter], &value, &Matrix1::new(variance));
+        }
+        write_status(snapshot, self.case(estimate, is_stale, is_number).verdict());
+    }
+
+    fn case(&self, estimate: &Estimate, is_stale: bool, is_number: bool) -> Case {
+        let counts = self.settings.counts(estimate);
+        let is_impossible = counts && estimate.coefficient.value <= 0.0;
+        let is_too_large = self.innovations.are_too_large();
+        // The event that would say more has not come: nothing is wrong, and nothing may be used yet.
+        let awaited = [(is_stale, Reason::EstimateStale), (!is_number, Reason::OnlyLowerBound)];
+        let awaited = awaited.into_iter().find(|(is_so, _)| counts && !is_too_large && *is_so);
+        let fault = match is_impossible {
+            true => Some((Status::Invalid, Reason::AtBound)),
+            false => awaited.map(|(_, reason)| (Status::Unestimated, reason)),
+        };
+        Case {
+            fault,
+            input: None,
+            is_ready: counts,
+            is_known: true,
+            lacking: Status::Unestimated,
+            contradiction: is_too_large.then_some(Reason::InnovationsTooLarge),
+            // Only friction times ratio acts on the train, and the other factor is held as declared:
+            // who reckons with both has the force that acts.
+            caveat: match self.quantity {
+                BrakingCoefficient::Adhesion => Reason::None,
+                BrakingCoefficient::Friction | BrakingCoefficient::Ratio => Reason::NotIdentifiable,
+            },
+        }
     }
 }
 
@@ -131,7 +203,7 @@ impl<E: Engine> Estimator for BrakingEstimator<E> {
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         self.now_ns = sample.time_ns;
         self.positions.see(sample);
-        let position_m2 = self.positions.variance_m2(self.declared_position_m2);
+        let position_m2 = self.positions.variance_m2(self.settings.position_std_m.powi(2));
         self.engine.set_distance_variance(position_m2);
         match self.intake.take(sample) {
             Intake::NotBraking | Intake::Collected => Outcome::Used,
@@ -156,16 +228,18 @@ impl<E: Engine> Estimator for BrakingEstimator<E> {
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
-        let circumstances = Circumstances {
-            reason: self.reason,
-            is_stale: self.is_stale(),
-            are_innovations_too_large: self.innovations.are_too_large(),
-        };
-        report::write(snapshot, self.quantity, &self.report, self.held.as_ref(), &circumstances);
+        let is_stale = self.is_stale();
+        match &self.held {
+            Some(estimate) => self.write_estimate(estimate, is_stale, snapshot),
+            None => {
+                snapshot.parameter_count = 0;
+                write_status(snapshot, (Status::Unestimated, self.reason));
+            }
+        }
         write_innovations(snapshot, &self.innovations);
         snapshot.generation = self.resets;
         snapshot.excited = (1u32 << snapshot.parameter_count) - 1;
-        let is_missing = self.held.is_none() || circumstances.is_stale;
+        let is_missing = self.held.is_none() || is_stale;
         snapshot.missing_manoeuvres = if is_missing { Manoeuvre::Brake.bit() } else { 0 };
         self.speeds.write(snapshot);
     }

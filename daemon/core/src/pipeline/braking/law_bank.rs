@@ -8,17 +8,12 @@
 use dynocar_shared::Uncertain;
 use nalgebra::Vector1;
 
-use super::engine::{Engine, EngineError, Estimate, Observation, Step};
+use super::engine::{Engine, Estimate, Observation, Step};
 use super::law::Law;
-use super::motion::{STATES, State, StepInputs};
+use super::motion::{DRIFT, SCALE, SPEED, STATES, StepInputs};
 use super::tracker::{TrackerModel, measure};
 use crate::filter::Gaussian;
-use crate::filter::bank::{Bank, Nats};
-use crate::filter::mixture::Mixture;
-
-const SPEED: usize = State::Speed as usize;
-const SCALE: usize = State::Scale as usize;
-const DRIFT: usize = State::Drift as usize;
+use crate::filter::bank::{Bank, Mixture};
 
 /// Share of the probability at which one law stands alone; else the laws are mixed, and their
 /// spread is part of the error.
@@ -40,7 +35,7 @@ struct Hypothesis {
 /// Laws weighed by evidence.
 #[derive(Clone, Debug)]
 pub struct LawBank {
-    laws: Bank<Hypothesis, Nats, LAWS>,
+    laws: Bank<Hypothesis, LAWS>,
     /// Their probabilities.
     shares: [f64; LAWS],
     /// Rate in 1/s at which one hypothesis gives way to another.
@@ -54,7 +49,7 @@ impl LawBank {
     pub fn new(models: [TrackerModel; LAWS], change_rate_per_s: f64) -> Self {
         let empty = Mixture::<STATES>::default().belief;
         let hypothesis = |model| Hypothesis { model, state: empty, mixed: empty, normalised: 0.0 };
-        let laws = Bank::even(models.map(hypothesis));
+        let laws = Bank::even(models.map(hypothesis), 0.0);
         let shares = [0.0; LAWS];
         LawBank { laws, shares, change_rate_per_s, demand: 0.0, is_started: false }
     }
@@ -117,27 +112,27 @@ impl Engine for LawBank {
         self.is_started = true;
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Result<Step, EngineError> {
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<Step> {
         if !self.is_started {
             self.start(observed);
-            return Ok(Step::Restarted);
+            return Some(Step::Restarted);
         }
         let priors = self.mix(inputs.step_s);
         for ((law, weight), prior) in self.laws.weighed_mut().zip(priors) {
             let Hypothesis { model, state, mixed, normalised } = law;
             let mut next = *mixed;
             model.advance(inputs, &mut next);
-            let (log_likelihood, innovation) = measure(model, &mut next, observed)?;
+            let (log_likelihood, innovation) = measure(model, &mut next, observed).ok()?;
             (*state, *normalised) = (next, innovation);
             *weight = prior + log_likelihood;
         }
         self.demand = observed.demand;
         if !self.laws.settle() {
-            return Err(EngineError::NotFinite { value: f64::NAN });
+            return None;
         }
         self.shares = self.laws.shares(|_| true);
         let normalised = self.laws.likeliest().normalised;
-        Ok(Step::Updated { normalised_innovation: Some(normalised) })
+        Some(Step::Updated { normalised_innovation: Some(normalised) })
     }
 
     fn set_distance_variance(&mut self, variance_m2: f64) {

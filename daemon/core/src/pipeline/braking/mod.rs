@@ -3,23 +3,21 @@
 //!
 //! # Layout
 //!
-//! - [`gear`], [`law`], [`motion`]: the braking train
+//! - [`law`], [`motion`]: the braking train
 //! - [`intake`]: from the train's samples to observations and steps of a braking
 //! - [`engine`]: what the estimators have in common
 //! - [`tracker`]: the papers' extended Kalman filter, and our fixed-lag smoother
 //! - [`law_bank`]: known laws, scaled and weighed by evidence
-//! - [`report`], [`estimator`]: from an engine to a snapshot
+//! - [`estimator`]: from an engine to a snapshot
 //! - [`settings`]: the pipelines by name
 //!
 //! The papers' sliding-window expectation maximisation is an engine of its own, in `dynocar_estimators`.
 
 pub mod engine;
 pub mod estimator;
-pub mod gear;
 pub mod intake;
 pub mod law;
 pub mod law_bank;
 pub mod motion;
-pub mod report;
 pub mod settings;
 pub mod tracker;

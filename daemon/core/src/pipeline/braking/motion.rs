@@ -14,20 +14,14 @@ use nalgebra::{SMatrix, SVector};
 
 use super::law::Law;
 
-/// Components of the state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(usize)]
-pub enum State {
-    /// Distance in m since the brakes came on.
-    Distance = 0,
-    /// Speed in m/s.
-    Speed = 1,
-    /// Scale of the law, dimensionless.
-    Scale = 2,
-    /// Drift of the scale in 1/s.
-    Drift = 3,
-}
-
+/// Place in the state of the distance in m since the brakes came on.
+pub const DISTANCE: usize = 0;
+/// Place in the state of the speed in m/s.
+pub const SPEED: usize = 1;
+/// Place in the state of the scale of the law, dimensionless.
+pub const SCALE: usize = 2;
+/// Place in the state of the drift of the scale in 1/s.
+pub const DRIFT: usize = 3;
 /// Number of components of the state.
 pub const STATES: usize = 4;
 
@@ -150,10 +144,6 @@ pub fn predict(
     walk: Walk,
     mean: &SVector<f64, STATES>,
 ) -> (SVector<f64, STATES>, SMatrix<f64, STATES, STATES>) {
-    const DISTANCE: usize = State::Distance as usize;
-    const SPEED: usize = State::Speed as usize;
-    const SCALE: usize = State::Scale as usize;
-    const DRIFT: usize = State::Drift as usize;
     let step_s = inputs.step_s;
     let moved = advance(inputs, law, mean[SPEED], mean[SCALE]);
     let mut after = *mean;
@@ -180,10 +170,6 @@ pub fn move_covariance(
     covariance: &SMatrix<f64, STATES, STATES>,
     added: &SMatrix<f64, STATES, STATES>,
 ) -> SMatrix<f64, STATES, STATES> {
-    const DISTANCE: usize = State::Distance as usize;
-    const SPEED: usize = State::Speed as usize;
-    const SCALE: usize = State::Scale as usize;
-    const DRIFT: usize = State::Drift as usize;
     let times_jacobian = |matrix: SMatrix<f64, STATES, STATES>| {
         let (distance, speed) = (matrix.column(DISTANCE), matrix.column(SPEED));
         let (scale, drift) = (matrix.column(SCALE), matrix.column(DRIFT));
@@ -205,11 +191,9 @@ pub fn move_covariance(
 
 /// Covariance that a step adds.
 pub fn process_noise(noise: &MotionNoise, walk: Walk, step_s: f64) -> SMatrix<f64, STATES, STATES> {
-    const SCALE: usize = State::Scale as usize;
-    const DRIFT: usize = State::Drift as usize;
     let mut added = SMatrix::<f64, STATES, STATES>::zeros();
-    added[(State::Distance as usize, State::Distance as usize)] = noise.distance_m2_per_s * step_s;
-    added[(State::Speed as usize, State::Speed as usize)] = noise.speed_m2_per_s3 * step_s;
+    added[(DISTANCE, DISTANCE)] = noise.distance_m2_per_s * step_s;
+    added[(SPEED, SPEED)] = noise.speed_m2_per_s3 * step_s;
     match walk {
         Walk::Scale(rate) => added[(SCALE, SCALE)] = rate * step_s,
         Walk::Drift { std_per_s, time_s } => {

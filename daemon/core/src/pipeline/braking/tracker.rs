@@ -6,25 +6,12 @@
 use dynocar_shared::Uncertain;
 use nalgebra::{SMatrix, SVector};
 
-use super::engine::{Engine, EngineError, Estimate, Observation, Step};
+use super::engine::{BrakingSettings, Engine, Estimate, Observation, Step};
 use super::law::Law;
-use super::motion::{self, MotionNoise, STATES, State, StepInputs, Walk};
+use super::motion::{self, DISTANCE, MotionNoise, SCALE, SPEED, STATES, StepInputs, Walk};
 use crate::filter::fixed_lag::FixedLagSmoother;
 use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::pipeline::motion::OutlierRow;
-
-const DISTANCE: usize = State::Distance as usize;
-const SPEED: usize = State::Speed as usize;
-const SCALE: usize = State::Scale as usize;
-
-/// What is believed before the first observation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Prior {
-    /// Standard deviation of the first speed in m/s.
-    pub speed_std_mps: f64,
-    /// The scale.
-    pub scale: PriorScale,
-}
 
 /// What is believed of the scale beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,14 +31,22 @@ pub struct TrackerModel {
     pub noise: MotionNoise,
     /// How the scale wanders.
     pub walk: Walk,
-    /// Belief before the first observation.
-    pub prior: Prior,
+    /// Standard deviation of the first speed in m/s.
+    pub first_speed_std_mps: f64,
+    /// Belief about the scale before the first observation.
+    pub prior: PriorScale,
 }
 
 impl TrackerModel {
+    /// The model of a law with the noise of the settings.
+    pub fn new(settings: &BrakingSettings, law: Law, walk: Walk, prior: PriorScale) -> Self {
+        let first_speed_std_mps = settings.first_speed_std_mps;
+        TrackerModel { law, noise: settings.noise(), walk, first_speed_std_mps, prior }
+    }
+
     /// The belief about the scale beforehand, at a speed in m/s and a demand.
     pub fn prior_scale(&self, speed_mps: f64, demand: f64) -> Uncertain {
-        match self.prior.scale {
+        match self.prior {
             PriorScale::OfLaw(scale) => scale,
             PriorScale::OfCoefficient(coefficient) => {
                 let (shape, _) = self.law.at(speed_mps, demand);
@@ -62,13 +57,12 @@ impl TrackerModel {
 
     /// The belief after a first observation.
     pub fn initial(&self, first: &Observation) -> Gaussian<STATES> {
-        let prior = &self.prior;
         let scale = self.prior_scale(first.speed_mps, first.demand);
         Gaussian::independent(
             SVector::from([first.distance_m, first.speed_mps, scale.value, 0.0]),
             SVector::from([
                 self.noise.measured_distance_m2.sqrt(),
-                prior.speed_std_mps,
+                self.first_speed_std_mps,
                 scale.std,
                 self.walk.drift_std_per_s(),
             ]),
@@ -216,10 +210,10 @@ impl Engine for Tracker {
         self.restart(first);
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Result<Step, EngineError> {
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<Step> {
         let Some(state) = &mut self.state else {
             self.start(observed);
-            return Ok(Step::Restarted);
+            return Some(Step::Restarted);
         };
         self.time_s += inputs.step_s;
         let jacobian = self.model.advance(inputs, state);
@@ -233,7 +227,7 @@ impl Engine for Tracker {
         let measurements = self.model.measurements(observed).into_iter();
         for (measurement, changes) in measurements.zip(&mut self.changes) {
             let Some((component, measured, variance)) = measurement else { continue };
-            let innovation = state.innovation(component, measured, variance)?;
+            let innovation = state.innovation(component, measured, variance).ok()?;
             let normalised = innovation.normalised();
             let is_outlier = normalised.abs() > OUTLIER_GATE;
             if is_outlier && first_innovation.is_some() {
@@ -243,9 +237,9 @@ impl Engine for Tracker {
             if is_outlier {
                 if self.outliers.push(true) {
                     self.restart(observed);
-                    return Ok(Step::Restarted);
+                    return Some(Step::Restarted);
                 }
-                return Ok(Step::Outlier);
+                return Some(Step::Outlier);
             }
             let gain = state.take(component, &innovation, variance);
             if has_lag {
@@ -255,16 +249,15 @@ impl Engine for Tracker {
             first_innovation.get_or_insert(normalised);
         }
         self.outliers.push(false);
-        let value = state.mean[SCALE];
-        if !value.is_finite() {
-            return Err(EngineError::NotFinite { value });
+        if !state.mean[SCALE].is_finite() {
+            return None;
         }
         if is_change && self.detects_changes {
             self.restart(observed);
-            return Ok(Step::Restarted);
+            return Some(Step::Restarted);
         }
         self.remember(observed.demand);
-        Ok(Step::Updated { normalised_innovation: first_innovation })
+        Some(Step::Updated { normalised_innovation: first_innovation })
     }
 
     fn set_distance_variance(&mut self, variance_m2: f64) {

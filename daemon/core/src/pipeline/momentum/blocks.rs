@@ -9,9 +9,10 @@
 use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
 
-use super::sample::{SpeedWatch, UnitSample, resistance_integral, trapezoids};
-use super::settings::DataSettings;
-use super::{BRAKE_SCALE, Columns, FORCE_DELAY, MomentumBlock, SinceBlock, TRACTION_SCALE};
+use super::{
+    BRAKE_SCALE, Columns, DataSettings, FORCE_DELAY, MomentumBlock, SinceBlock, SpeedWatch,
+    TRACTION_SCALE, UnitSample, resistance_integral, trapezoids,
+};
 use crate::filter::FittedLine;
 use crate::pipeline::motion::{SpeedNoise, jump_variance};
 
@@ -206,8 +207,8 @@ impl Block {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sample::tests::{driven, unit_sample};
     use super::*;
+    use crate::pipeline::momentum::tests::{driven, unit_sample};
     use crate::pipeline::momentum::{PARAMETERS, scaled};
 
     const DAVIS: Davis = Davis { a: 1.5, b: 0.04, c: 0.003 };

@@ -1,13 +1,13 @@
-//! What one unit of each column would retard the train at a sample, and its impulse by blocks.
+//! What one unit of each column would retard the train at a sample, and its impulse by blocks; what
+//! was left unexplained at each place of the line in earlier passes is one of them.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::SuspectInput;
 use dynocar_model::train::Davis;
 use nalgebra::SVector;
 
-use super::place_memory::PlaceMemory;
 use super::suspects::{COVARIATES, covariate};
-use crate::pipeline::momentum::sample::UnitSample;
+use crate::pipeline::momentum::UnitSample;
 
 /// One value for each column that comes from samples.
 pub type Covariates = SVector<f64, COVARIATES>;
@@ -105,6 +105,121 @@ impl CovariateImpulse {
     }
 }
 
+/// Length of a cell in m.
+const CELL_M: f64 = 150.0;
+/// Cells; longer lines share them.
+const CELLS: usize = 2048;
+/// Passes in a direction that the mean looks back over.
+const PASSES_MAX: f64 = 6.0;
+
+/// A mean over passes of one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Mean {
+    n_per_kn: f64,
+    passes: f64,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Cell {
+    index: i64,
+    pass: u32,
+    /// Means over the passes before this one, towards falling and growing chainage.
+    earlier: [Mean; 2],
+    /// Direction of this pass.
+    is_growing: bool,
+    /// Mean over this pass.
+    now: f64,
+    count: f64,
+}
+
+/// What earlier passes of a place left unexplained, in N/kN; 0 where there was none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Earlier {
+    /// As a resistance: the same in both directions.
+    pub resistance: f64,
+    /// As an error of the gradient, which acts the other way in the other direction; as it acts
+    /// in the direction asked for.
+    pub uphill: f64,
+    /// Passes behind it.
+    pub passes: f64,
+}
+
+/// Unexplained force by place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaceMemory {
+    cells: Vec<Cell>,
+    pass: u32,
+}
+
+impl PlaceMemory {
+    /// An empty memory; its only allocation.
+    pub fn new() -> Self {
+        PlaceMemory { cells: vec![Cell { index: i64::MIN, ..Cell::default() }; CELLS], pass: 1 }
+    }
+
+    /// A new pass begins.
+    pub fn next_pass(&mut self) {
+        self.pass = self.pass.wrapping_add(1);
+    }
+
+    /// What the passes before this one left at a place, for travel in a direction.
+    pub fn earlier(&self, position_m: f64, direction: f64) -> Earlier {
+        let (slot, index) = slot(position_m);
+        let cell = &self.cells[slot];
+        match cell.index == index {
+            true if cell.pass == self.pass => mean_of_both(&cell.earlier, direction),
+            true => mean_of_both(&cell.with_pass_closed().earlier, direction),
+            false => Earlier::default(),
+        }
+    }
+
+    /// Takes in the unexplained force in N/kN of a block.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn push(&mut self, position_m: f64, direction: f64, n_per_kn: f64) {
+        let (slot, index) = slot(position_m);
+        let is_growing = direction > 0.0;
+        let cell = &mut self.cells[slot];
+        if cell.index != index {
+            *cell = Cell { index, pass: self.pass, is_growing, ..Cell::default() };
+        } else if cell.pass != self.pass || cell.is_growing != is_growing {
+            *cell = Cell { pass: self.pass, is_growing, ..cell.with_pass_closed() };
+        }
+        cell.count += 1.0;
+        cell.now += (n_per_kn - cell.now) / cell.count;
+    }
+}
+
+/// The means of both directions, as they act in one.
+fn mean_of_both([falling, growing]: &[Mean; 2], direction: f64) -> Earlier {
+    let passes = falling.passes + growing.passes;
+    if passes == 0.0 {
+        return Earlier::default();
+    }
+    let (down, up) = (falling.n_per_kn * falling.passes, growing.n_per_kn * growing.passes);
+    Earlier { resistance: (up + down) / passes, uphill: direction * (up - down) / passes, passes }
+}
+
+impl Cell {
+    fn with_pass_closed(&self) -> Cell {
+        if self.count == 0.0 {
+            return *self;
+        }
+        let mut closed = Cell { now: 0.0, count: 0.0, ..*self };
+        let mean = &mut closed.earlier[usize::from(self.is_growing)];
+        mean.passes = (mean.passes + 1.0).min(PASSES_MAX);
+        mean.n_per_kn += (self.now - mean.n_per_kn) / mean.passes;
+        closed
+    }
+}
+
+fn slot(position_m: f64) -> (usize, i64) {
+    let index = (position_m / CELL_M).floor() as i64;
+    (index.rem_euclid(CELLS as i64) as usize, index)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,5 +245,42 @@ mod tests {
         assert!(!clock.push(6_000_000_000));
         assert!(clock.push(1_000_000_000));
         assert!(clock.push(1_000_000_000_000));
+    }
+}
+
+#[cfg(test)]
+mod place_memory_tests {
+    use super::*;
+
+    #[test]
+    fn only_earlier_passes_are_remembered() {
+        let mut memory = PlaceMemory::new();
+        let resistance = |memory: &PlaceMemory, at_m: f64| memory.earlier(at_m, 1.0).resistance;
+        memory.push(1000.0, 1.0, 3.0);
+        assert_eq!(resistance(&memory, 1000.0), 0.0);
+        memory.next_pass();
+        assert_eq!(resistance(&memory, 1000.0), 3.0);
+        memory.push(1000.0, 1.0, 1.0);
+        assert_eq!(resistance(&memory, 1000.0), 3.0);
+        memory.next_pass();
+        assert_eq!(resistance(&memory, 1010.0), 2.0);
+        assert_eq!(resistance(&memory, 5000.0), 0.0);
+        assert_eq!(resistance(&memory, 1000.0 + CELL_M * CELLS as f64), 0.0);
+    }
+
+    #[test]
+    fn both_directions_show_a_resistance_from_a_wrong_gradient() {
+        for (back_n_per_kn, expected) in [(2.0, (2.0, 0.0)), (-2.0, (0.0, 2.0))] {
+            let mut memory = PlaceMemory::new();
+            memory.push(700.0, 1.0, 2.0);
+            memory.next_pass();
+            let one_way = memory.earlier(700.0, -1.0);
+            assert_eq!((one_way.resistance, one_way.uphill), (2.0, -2.0), "not yet distinguished");
+            memory.push(700.0, -1.0, back_n_per_kn);
+            memory.next_pass();
+            let both = memory.earlier(700.0, 1.0);
+            assert_eq!((both.resistance, both.uphill), expected);
+            assert_eq!(memory.earlier(700.0, -1.0).uphill, -expected.1);
+        }
     }
 }

@@ -6,22 +6,21 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::{Vector1, Vector3};
 
-use super::covariates::{CovariateImpulse, RunClock, covariates};
-use super::information::{BaseVector, Information};
-use super::onsets::Onsets;
-use super::place_memory::PlaceMemory;
+use super::MonitorSettings;
+use super::covariates::{CovariateImpulse, PlaceMemory, RunClock, covariates};
+use super::information::{BaseVector, Information, usual};
 use super::pressure::ReleasedPressure;
 use super::rows::{Parameters, Row, Rows, units};
-use super::settings::MonitorSettings;
-use super::suspects::{BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, SUSPECTS, suspect_of};
-use super::usual::Usual;
+use super::suspects::{
+    BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, Onsets, SUSPECTS, suspect_of,
+};
 use super::verdict::{Evidence, Verdict};
 use super::wheel_scale::WheelScale;
 use crate::pipeline::judge::Case;
 use crate::pipeline::momentum::blocks::MomentumBlocks;
-use crate::pipeline::momentum::sample::UnitSample;
 use crate::pipeline::momentum::{
-    BRAKE_SCALE, MomentumBlock, PARAMETERS as DAVIS, TRACTION_SCALE, regressors, unscaling,
+    BRAKE_SCALE, MomentumBlock, PARAMETERS as DAVIS, TRACTION_SCALE, UnitSample, regressors,
+    unscaling,
 };
 use crate::pipeline::motion::{STANDING_MPS, SpeedRange, is_same_mass};
 use crate::pipeline::output::{write_innovations, write_parameters, write_status};
@@ -40,13 +39,6 @@ const CUT: f64 = 3.0;
 const WHEEL_STDS: f64 = 3.5;
 /// Samples over which the time between samples is averaged.
 const PERIOD_SAMPLES: f64 = 100.0;
-/// The force that the model does not explain.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Unexplained {
-    n_per_kn: f64,
-    std_n_per_kn: f64,
-}
-
 /// Watches the residual between model and measurement.
 #[derive(Clone, Debug)]
 pub struct ResidualMonitor {
@@ -80,7 +72,8 @@ pub struct ResidualMonitor {
     known: Davis,
     /// Where and with which momentum the newest block ended.
     last_block: Option<(Option<f64>, f64)>,
-    unexplained: Unexplained,
+    /// The force that nothing explains in N/kN, and its standard deviation.
+    unexplained: (f64, f64),
     weight_kn: f64,
     speeds: SpeedRange,
     resets: u64,
@@ -94,8 +87,8 @@ impl ResidualMonitor {
     /// When a setting lies outside its range.
     pub fn new(settings: MonitorSettings, train: &TrainModel) -> Result<Self, SettingError> {
         settings.check_ranges()?;
-        let (declared, usual) = (train.resistance, Usual::of(&settings, train)?);
-        let Usual { declared_base, base_std } = usual;
+        let declared = train.resistance;
+        let (declared_base, base_std) = usual(&settings, train)?;
         let kept_per_row = 1.0 - settings.data.block_s / (3600.0 * settings.memory_h);
         Ok(ResidualMonitor {
             settings,
@@ -123,10 +116,7 @@ impl ResidualMonitor {
             model: Parameters::zeros(),
             known: declared,
             last_block: None,
-            unexplained: Unexplained {
-                n_per_kn: 0.0,
-                std_n_per_kn: settings.davis_std_share * declared.w0_n_per_kn(20.0),
-            },
+            unexplained: (0.0, settings.davis_std_share * declared.w0_n_per_kn(20.0)),
             weight_kn: TrainModel::weight_kn(train.mass_kg),
             speeds: SpeedRange::default(),
             resets: 0,
@@ -135,7 +125,7 @@ impl ResidualMonitor {
 
     /// A run starts: brakes are released, and whatever dragged is over.
     fn start_run(&mut self) {
-        let dragged = self.verdict.naming().onset();
+        let dragged = self.verdict.naming.onset();
         (0..ONSETS).for_each(|place| self.retire(FIRST_ONSET + place, dragged == Some(place)));
         self.onsets = Onsets::new();
         for scale in [TRACTION_SCALE, BRAKE_SCALE] {
@@ -163,7 +153,7 @@ impl ResidualMonitor {
         for place in (0..SUSPECTS).filter(|&place| BANK[place].changes_at_stops) {
             let parameter = BASE + place;
             self.verdict.hold_over_stop(parameter);
-            self.retire(parameter, self.verdict.naming().is_clearly(parameter));
+            self.retire(parameter, self.verdict.naming.is_clearly(parameter));
         }
     }
 
@@ -178,7 +168,7 @@ impl ResidualMonitor {
         let prior_std = suspect_of(parameter).prior_std;
         match self.base_std.get(parameter) {
             None => prior_std,
-            Some(&usual) if self.verdict.naming().parameter() != Some(parameter) => usual,
+            Some(&usual) if self.verdict.naming.parameter() != Some(parameter) => usual,
             Some(&usual) => usual.hypot(prior_std),
         }
     }
@@ -195,7 +185,7 @@ impl ResidualMonitor {
 
     fn take_block(&mut self, block: &MomentumBlock, sample: &ResolvedSample) -> bool {
         let impulse = self.impulse.close();
-        if let Some(place) = self.onsets.open(self.verdict.naming().onset()) {
+        if let Some(place) = self.onsets.open(self.verdict.naming.onset()) {
             self.retire(FIRST_ONSET + place, false);
         }
         self.onsets.advance();
@@ -211,7 +201,7 @@ impl ResidualMonitor {
         };
         row.observed -= row.features.fixed_rows::<BASE>(0).dot(declared);
         let innovation = row.observed - row.features.dot(model);
-        if self.information.count() >= ROWS_MIN {
+        if self.information.count >= ROWS_MIN {
             self.innovations.push(innovation);
             self.cut_innovations.push(innovation.clamp(-CUT, CUT));
         }
@@ -228,7 +218,7 @@ impl ResidualMonitor {
 
     /// Whether the cause of the suspicion has ended, by a row.
     fn watch_end(&mut self, row: &Row, innovation: f64) {
-        let Some(parameter) = self.verdict.naming().parameter() else { return };
+        let Some(parameter) = self.verdict.naming.parameter() else { return };
         let without = innovation + row.features[parameter] * self.model[parameter];
         let weight = row.weight;
         if self.verdict.has_ended(weight * innovation.powi(2), weight * without.powi(2)) {
@@ -245,7 +235,7 @@ impl ResidualMonitor {
         sample: &ResolvedSample,
     ) {
         let before = self.last_block.replace((sample.position_m, block.momentum));
-        let has_other_suspect = self.verdict.naming().is_no_place();
+        let has_other_suspect = self.verdict.naming.is_no_place();
         if block.is_first || has_other_suspect {
             return;
         }
@@ -270,7 +260,7 @@ impl ResidualMonitor {
             cut_innovations: &self.cut_innovations,
         });
         self.note_since();
-        let suspect = self.verdict.naming().parameter();
+        let suspect = self.verdict.naming.parameter();
         let suspect_given = suspect.filter(|&parameter| parameter >= BASE);
         let believed = base.believed(suspect_given.map(|it| (it, suspect_of(it).prior_std)));
         self.model = believed.values;
@@ -289,12 +279,12 @@ impl ResidualMonitor {
             value += units[parameter] * self.model[parameter];
             weights[parameter] += units[parameter];
         }
-        let total = self.verdict.scale() * (variance + believed.variance_of(&weights));
-        self.unexplained = Unexplained { n_per_kn: value, std_n_per_kn: total.max(0.0).sqrt() };
+        let total = self.verdict.scale * (variance + believed.variance_of(&weights));
+        self.unexplained = (value, total.max(0.0).sqrt());
     }
 
     fn note_since(&mut self) {
-        let effect = self.verdict.naming().named().map(|named| named.effect);
+        let effect = self.verdict.naming.named().map(|named| named.effect);
         if effect != self.suspected_since.map(|(effect, _)| effect) {
             self.suspected_since = effect.map(|effect| (effect, self.newest_ns));
         }
@@ -362,12 +352,12 @@ impl Estimator for ResidualMonitor {
     }
 
     fn write(&self, snapshot: &mut ParameterSnapshot) {
-        let force_n = self.unexplained.n_per_kn * self.weight_kn;
-        let std_n = self.unexplained.std_n_per_kn * self.weight_kn;
+        let force_n = self.unexplained.0 * self.weight_kn;
+        let std_n = self.unexplained.1 * self.weight_kn;
         let (values, covariance) = (Vector1::new(force_n), Vector1::new(std_n * std_n));
         write_parameters(snapshot, [Parameter::UnexplainedForce], &values, &covariance);
-        let named = self.verdict.naming().named();
-        let has_rows = self.information.count() >= ROWS_MIN;
+        let named = self.verdict.naming.named();
+        let has_rows = self.information.count >= ROWS_MIN;
         let case = Case {
             fault: None,
             input: None,

@@ -7,11 +7,17 @@
 //! `s² / (S + 1/sigma²)`; `ln(1 + S sigma²)` is what the freedom of its size costs, so that the
 //! difference is twice the logarithm of the Bayes factor.
 
+use dynocar_model::train::TrainModel;
 use nalgebra::{SMatrix, SVector};
 
+use super::MonitorSettings;
 use super::rows::{Parameters, Row};
-use super::suspects::{BASE, PARAMETERS};
+use super::suspects::{BASE, CURVE, DAY_WIND, LOAD, PARAMETERS, WARMING};
 use crate::filter::NotPositiveDefinite;
+use crate::pipeline::momentum::{
+    BRAKE_SCALE, DataSettings, FORCE_DELAY, SPEED_SCALE_MPS, TRACTION_SCALE, scaled,
+};
+use crate::pipeline::settings::{SettingError, require};
 
 /// One value for each parameter of the base model.
 pub type BaseVector = SVector<f64, BASE>;
@@ -26,7 +32,8 @@ pub struct Information {
     matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
     side: Parameters,
     square_sum: f64,
-    count: f64,
+    /// Rows taken in, the forgotten ones in part.
+    pub count: f64,
     base_precision: BaseVector,
 }
 
@@ -191,11 +198,6 @@ impl Information {
         self.count = kept * self.count + 1.0;
     }
 
-    /// Rows taken in, the forgotten ones in part.
-    pub fn count(&self) -> f64 {
-        self.count
-    }
-
     /// A parameter is another from now on, by a standard deviation: what the rows so far say of it
     /// is integrated over the difference.
     pub fn loosen(&mut self, parameter: usize, std: f64) {
@@ -272,6 +274,47 @@ impl Information {
         let rest = (self.square_sum - base.reduced.norm_squared() - ratio).max(0.0);
         (rest + prior_rows) / (self.count + prior_rows)
     }
+}
+
+/// Standard deviation of a curve constant of which nothing is declared, in 1000 N/kN m.
+const CURVE_STD_MIN: f64 = 0.02;
+
+/// The base model of a train before the rows: the declared a, b, c, scaled, as base parameters, and
+/// standard deviations of what each base parameter lacks.
+///
+/// # Errors
+///
+/// When the scale of the forces is given at two places.
+pub fn usual(
+    settings: &MonitorSettings,
+    train: &TrainModel,
+) -> Result<(BaseVector, BaseVector), SettingError> {
+    let force_scale_std = settings.data.force_scale_std;
+    require(
+        force_scale_std == DataSettings::default().force_scale_std,
+        "data.force_scale_std",
+        force_scale_std,
+        "no value here: force_std_percent says it",
+    )?;
+    let declared = train.resistance;
+    let coefficients = scaled(&declared);
+    let mut declared_base = BaseVector::zeros();
+    let mut base_std = BaseVector::zeros();
+    for i in 0..coefficients.len() {
+        declared_base[i] = coefficients[i];
+        let least = 0.01 * declared.w0_n_per_kn(10.0).max(0.1);
+        base_std[i] = (settings.davis_std_share * coefficients[i].abs()).max(least);
+    }
+    base_std[TRACTION_SCALE] = 0.01 * settings.force_std_percent;
+    base_std[BRAKE_SCALE] = 0.01 * settings.force_std_percent;
+    base_std[FORCE_DELAY] = settings.data.force_delay_std_s;
+    base_std[LOAD] = 0.01 * settings.mass_std_percent;
+    base_std[DAY_WIND] = settings.wind_std_mps;
+    let curve = settings.curve_constant_std * 1e-3 * train.curve_constant_n_per_kn_m;
+    base_std[CURVE] = curve.max(CURVE_STD_MIN);
+    let over_a = declared.w0_n_per_kn(SPEED_SCALE_MPS) / declared.a.max(0.1);
+    base_std[WARMING] = settings.warming_std * over_a;
+    Ok((declared_base, base_std))
 }
 
 #[cfg(test)]

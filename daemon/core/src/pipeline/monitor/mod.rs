@@ -9,29 +9,69 @@
 //!
 //! # Layout, in the order a sample takes
 //!
-//! - `settings`: thresholds and noise
-//! - `suspects`: the effects that are looked for; `usual`: how far off everything may be
-//! - `covariates`, `place_memory`, `pressure`, `wheel_scale`: what a sample says of each of them
+//! - `suspects`: the effects that are looked for, and since when a brake may drag
+//! - `covariates`, `pressure`, `wheel_scale`: what a sample says of each of them
 //! - `rows`: blocks to independent rows of unit variance
-//! - `onsets`: since when a brake may drag
-//! - `information`: the likelihood ratios
+//! - `information`: how far off everything may be, and the likelihood ratios
 //! - `verdict`: what speaks for each of them
 //! - `naming`: who is suspected, what is hardly distinguishable from it, and when it has ended
 //! - `estimator`: the pipeline around all of it
+
+use dynocar_model::terms::{bearings, curve, masses};
+
+use crate::pipeline::momentum::DataSettings;
+use crate::settings;
+
+pub use estimator::ResidualMonitor;
 
 mod covariates;
 mod estimator;
 mod information;
 mod naming;
-mod onsets;
-mod place_memory;
 mod pressure;
 mod rows;
-mod settings;
 mod suspects;
-mod usual;
 mod verdict;
 mod wheel_scale;
 
-pub use estimator::ResidualMonitor;
-pub use settings::MonitorSettings;
+settings! {
+    /// Settings of `residual_monitor`.
+    #[derive(Copy)]
+    MonitorSettings {
+        /// Evidence, less what the search costs, from which a suspect is named.
+        evidence_min: f64 = 20.0 => (1 to 1000000);
+        /// Share of the resistance below which an unexplained force is no matter.
+        share_min: f64 = 0.08 => (0 to 1);
+        /// Standard deviation of each declared Davis coefficient, as a share of it.
+        davis_std_share: f64 = 0.1 => (0.001 to 1);
+        /// Small slow forces that are no effect: standard deviation in N/kN.
+        disturbance_n_per_kn: f64 = 0.05 => (0.001 to 10 "N/kN");
+        /// The same as a share of the resistance; both count.
+        disturbance_share: f64 = 0.03 => (0 to 1);
+        /// How long such a force lasts, in s.
+        disturbance_time_s: f64 = 60.0 => (1 to 10000 "s");
+        /// Standard deviation in % of the scales of traction and brake force; it stands in the place of
+        /// `data.force_scale_std`.
+        force_std_percent: f64 = 0.6 => (0.0001 to 50 "%");
+        /// Standard deviation in % of the mass that samples or the train's file give, from run to run and
+        /// at every stop where another is given.
+        mass_std_percent: f64 = 100.0 * masses::WEIGHED_STD => (0.01 to 50 "%");
+        /// Standard deviation in m/s of the wind from run to run; gusts have half of it.
+        wind_std_mps: f64 = 1.5 => (0.01 to 20 "m/s");
+        /// Standard deviation in permille of the map's gradient, smooth over some hundred metres.
+        map_std_permille: f64 = 0.03 => (0 to 10 "permille");
+        /// Standard deviation of the declared curve constant, as a share of it.
+        curve_constant_std: f64 = curve::USUAL_STD => (0.001 to 1);
+        /// Standard deviation of what bearings that warm up add at the start of a run, as a share of the
+        /// basic resistance.
+        warming_std: f64 = bearings::USUAL_STD => (0.0001 to 1);
+        /// Standard deviation of the wheels' diameter, as a share of it.
+        wheel_std: f64 = 0.0015 => (0.0001 to 0.1);
+        /// Standard deviation by which the scales of traction and brake force differ from run to run.
+        force_run_std: f64 = 0.003 => (0.000001 to 0.5);
+        /// Time of motion in h over which evidence is forgotten.
+        memory_h: f64 = 4.0 => (0.1 to 10000 "h");
+        /// How samples become regression data; the source is always momentum.
+        data: DataSettings = DataSettings::default() => (each);
+    }
+}

@@ -2,8 +2,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::onsets::Onsets;
-use super::suspects::{CANDIDATES, FIRST_ONSET, PARAMETERS, effect_of};
+use super::suspects::{CANDIDATES, FIRST_ONSET, Onsets, PARAMETERS, effect_of};
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::FORCE_DELAY;
 

@@ -4,13 +4,13 @@ use dynocar_model::terms::wind;
 use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
 
+use super::MonitorSettings;
 use super::covariates::Covariates;
-use super::onsets::Onsets;
-use super::settings::MonitorSettings;
-use super::suspects::{COVARIATES, FIRST_ONSET, ONSETS, PARAMETERS};
+use super::suspects::{COVARIATES, FIRST_ONSET, ONSETS, Onsets, PARAMETERS};
 use crate::filter::Whitener;
-use crate::pipeline::momentum::error::{DISTURBANCE, Disturbance, STATES, momentum_seen};
-use crate::pipeline::momentum::{MomentumBlock, UNKNOWNS};
+use crate::pipeline::momentum::{
+    DISTURBANCE, Disturbance, MomentumBlock, STATES, UNKNOWNS, gap_s, momentum_seen,
+};
 
 const COLUMNS: usize = 1 + PARAMETERS;
 /// Innovations beyond so many standard deviations count for less (Huber).
@@ -80,11 +80,7 @@ impl Rows {
         units: &Parameters,
         predicted: impl Fn(&Parameters) -> f64,
     ) -> Option<Row> {
-        let gap_s = self
-            .last_time_ns
-            .replace(block.time_ns)
-            .map(|last_ns| block.time_ns.saturating_sub(last_ns) as f64 * 1e-9)
-            .filter(|&gap_s| gap_s > 0.0);
+        let gap_s = gap_s(&mut self.last_time_ns, block.time_ns);
         let small = self.small_forces(block);
         if block.is_first {
             let (momentum, variance) = (block.momentum, block.momentum_variance);
@@ -126,9 +122,9 @@ impl Rows {
 
     /// The disturbance now: known part, what each parameter takes off it, variance.
     pub fn disturbance(&self) -> (f64, Parameters, f64) {
-        let state = self.whitener.state();
+        let state = self.whitener.state;
         let taken = Parameters::from_fn(|i, _| state[(DISTURBANCE, 1 + i)]);
-        let variance = self.whitener.covariance()[(DISTURBANCE, DISTURBANCE)];
+        let variance = self.whitener.covariance[(DISTURBANCE, DISTURBANCE)];
         (state[(DISTURBANCE, 0)], taken, variance)
     }
 }

@@ -2,14 +2,13 @@
 
 use dynocar_model::terms::{Least, delay};
 
+use super::MonitorSettings;
 use super::information::{Alternative, BaseSolution, Information};
 use super::naming::{Naming, Standing};
-use super::onsets::Onsets;
 use super::rows::Parameters;
-use super::settings::MonitorSettings;
 use super::suspects::{
-    BASE, CANDIDATES, FIRST_BAND, FIRST_ONSET, PARAMETERS, SEARCHED, SUSPECTS, UNUSUAL, WHEEL,
-    suspect_of,
+    BASE, CANDIDATES, FIRST_BAND, FIRST_ONSET, Onsets, PARAMETERS, SEARCHED, SUSPECTS, UNUSUAL,
+    WHEEL, suspect_of,
 };
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::{FORCE_DELAY, UNKNOWNS};
@@ -68,8 +67,10 @@ pub struct Verdict {
     /// The same against the base model, by which candidates are compared: a scale of the forces
     /// that the base model takes up in part is there all the same.
     given_base: [f64; CANDIDATES],
-    naming: Naming,
-    scale: f64,
+    /// Who is suspected.
+    pub naming: Naming,
+    /// Variance of the rows, at least 1.
+    pub scale: f64,
     /// Blocks since the train started from a stop.
     leg_blocks: u32,
 }
@@ -90,16 +91,6 @@ impl Verdict {
             scale: 1.0,
             leg_blocks: 0,
         }
-    }
-
-    /// Who is suspected.
-    pub fn naming(&self) -> &Naming {
-        &self.naming
-    }
-
-    /// Variance of the rows, at least 1.
-    pub fn scale(&self) -> f64 {
-        self.scale
     }
 
     /// Notes how strongly one unit of each parameter acted in a block, jointly with the resistance in
@@ -207,7 +198,7 @@ impl Verdict {
         match parameter.checked_sub(FIRST_ONSET) {
             Some(index) => evidence.onsets.age(index),
             None if suspect_of(parameter).changes_at_stops => Some(self.leg_blocks),
-            None => Some(evidence.information.count() as u32),
+            None => Some(evidence.information.count as u32),
         }
     }
 

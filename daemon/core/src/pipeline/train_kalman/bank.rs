@@ -2,12 +2,11 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::behaviour::{BEHAVIOURS, behaviours};
 use super::motion_filter::{
-    DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, STATES, State, StateCovariance, Step, WIND,
+    BEHAVIOURS, DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, STATES, State, StateCovariance,
+    Step, WIND, behaviours,
 };
-use crate::filter::bank::{Bank, Nats};
-use crate::filter::mixture::Mixture;
+use crate::filter::bank::{Bank, Mixture};
 use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::pipeline::motion::{OutlierRow, Trust};
 
@@ -42,7 +41,7 @@ struct Rival {
 /// The filters with the evidence for each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionBank {
-    rivals: Bank<Rival, Nats, BEHAVIOURS>,
+    rivals: Bank<Rival, BEHAVIOURS>,
 }
 
 /// a, b, c (scaled) and the load factor, with the covariance of all; and the disturbance now.
@@ -60,12 +59,13 @@ impl MotionBank {
     /// All behaviours, each believing the same of everything but the disturbance.
     pub fn new(mean: &State, covariance: &StateCovariance) -> Self {
         let behaviours = behaviours();
-        let mut rivals = Bank::even(behaviours.map(|behaviour| {
+        let rivals = behaviours.map(|behaviour| {
             let mut belief = Gaussian { mean: *mean, covariance: *covariance };
             belief.replace(DISTURBANCE, 0.0, behaviour.std_n_per_kn.powi(2));
             let filter = MotionFilter { behaviour, belief, jump_variance: 0.0 };
             Rival { filter, outliers: OutlierRow::default() }
-        }));
+        });
+        let mut rivals = Bank::even(rivals, 0.0);
         for ((_, weight), behaviour) in rivals.weighed_mut().zip(behaviours) {
             *weight = behaviour.log_prior;
         }
@@ -125,16 +125,8 @@ impl MotionBank {
         for (index, (rival, weight)) in self.rivals.weighed_mut().enumerate() {
             let Rival { filter, outliers } = rival;
             let noise_variance = noise_variance + filter.transient_variance(step);
-            let innovation = filter.belief.innovation(SPEED, speed_mps, noise_variance)?;
-            let trust = Trust::of(innovation.normalised());
-            let is_believed = outliers.push(trust.is_outlier());
-            if trust.is_full() {
-                filter.belief.take(SPEED, &innovation, noise_variance);
-            } else if !trust.is_outlier() {
-                filter.belief.measure(SPEED, speed_mps, noise_variance / trust.weight)?;
-            } else if is_believed {
-                filter.belief.replace(SPEED, speed_mps, noise_variance);
-            }
+            let (innovation, trust) =
+                outliers.correct(&mut filter.belief, SPEED, speed_mps, noise_variance)?;
             let log_prior = filter.behaviour.log_prior;
             let evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
             // What is forgotten is the evidence, not what is known beforehand.

@@ -8,21 +8,18 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, RejectionReason, Status};
 
+use super::TrainKalmanSettings;
 use super::bank::Measured;
 use super::braking_watch::BrakingWatch;
-use super::jump_share::JumpShare;
-use super::learned::Learned;
+use super::learned::{JumpShare, Learned, Resistance};
 use super::load::{Change, LoadWatch};
-use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, Step, wind_over};
-use super::prior::Resistance;
-use super::report::Report;
-use super::settings::TrainKalmanSettings;
+use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
+use super::report::{Report, Systematic};
 use super::steps::Steps;
-use super::systematic::Systematic;
 use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
-use crate::pipeline::momentum::sample::UnitSample;
+use crate::pipeline::momentum::UnitSample;
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};
-use crate::pipeline::output::{write_innovations, write_status};
+use crate::pipeline::output::{DAVIS, write_innovations, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, KeptEstimate, Outcome};
@@ -117,15 +114,10 @@ impl TrainKalman {
         Outcome::Used
     }
 
-    /// The step to a sample, with what is learned beside the state.
-    fn step(&mut self, from: &UnitSample, to: &UnitSample, sample: &ResolvedSample) -> Step {
-        let delay_s = self.learned.bank.likeliest().belief.mean[FORCE_DELAY];
-        let step = self.steps.to((from, to), sample, delay_s, &self.first);
-        Step { jump_share: self.learned.jumps.share(), ..step }
-    }
-
     fn advance(&mut self, from: UnitSample, now: UnitSample, sample: &ResolvedSample) -> Outcome {
-        let step = self.step(&from, &now, sample);
+        let learned =
+            (self.learned.bank.likeliest().belief.mean[FORCE_DELAY], self.learned.jumps.share);
+        let step = self.steps.to((&from, &now), sample, learned, &self.first);
         if self.braking.begins(now.brake) {
             self.before_braking = self.learned.clone();
         }
@@ -233,7 +225,7 @@ impl TrainKalman {
             }),
             None => {}
         }
-        if self.load.departed() {
+        if self.load.has_departed {
             self.systematic.start();
         }
     }
@@ -313,8 +305,7 @@ impl Estimator for TrainKalman {
 
     /// Takes up the kept resistance, and the mass unless the first sample contradicts it.
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
-        let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
-        let Some((mean, covariance)) = kept.moments(davis) else { return false };
+        let Some((mean, covariance)) = kept.moments(DAVIS) else { return false };
         self.first = Resistance::kept(&mean, &covariance);
         self.learned.bank = self.first.bank(&self.settings);
         self.report = Report::new(&self.learned.bank.published(0.0, 0.0));

@@ -4,7 +4,7 @@ use dynocar_model::force::ResolvedSample;
 
 use crate::pipeline::motion::{StopWatch, is_same_mass};
 
-use super::settings::TrainKalmanSettings;
+use super::TrainKalmanSettings;
 
 /// What a sample changes in what is known of the load: the declared mass over the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +24,10 @@ pub struct LoadWatch {
     load_change_std: f64,
     /// Mass in kg that the load factor refers to, once there was a sample.
     declared_kg: Option<f64>,
-    is_weighed: bool,
-    has_departed: bool,
+    /// True when the newest samples carry a mass.
+    pub is_weighed: bool,
+    /// True when the train left a stop with the newest sample.
+    pub has_departed: bool,
     /// True when the load was weighed since the last departure.
     is_fresh: bool,
 }
@@ -43,16 +45,6 @@ impl LoadWatch {
             has_departed: false,
             is_fresh: false,
         }
-    }
-
-    /// True when the train left a stop with the newest sample.
-    pub fn departed(&self) -> bool {
-        self.has_departed
-    }
-
-    /// True when the newest samples carry a mass.
-    pub fn is_weighed(&self) -> bool {
-        self.is_weighed
     }
 
     /// Variance of the load factor by what the samples or the train's file say of it.

@@ -10,28 +10,64 @@
 //! both. Whoever takes the mass for exact puts its error into the resistance, and the other way round;
 //! here each is known as well as the other allows, and their covariance says how they depend.
 
+use dynocar_model::terms::{adhesion, delay, masses, traction};
+
+use crate::settings;
+
+pub use estimator::TrainKalman;
+pub use learned::declared_a_std;
+
 mod acting_forces;
 mod bank;
-mod behaviour;
 mod braking_watch;
 mod estimator;
-mod jump_share;
 mod learned;
 mod load;
 mod motion_filter;
-mod prior;
 mod report;
-mod settings;
 mod steps;
-mod systematic;
 #[cfg(test)]
 mod tests;
 
-pub use estimator::TrainKalman;
-pub use settings::TrainKalmanSettings;
-
-/// Standard deviation in N/kN of the declared a before any sample, by default.
-pub fn declared_a_std(train: &dynocar_model::train::TrainModel) -> f64 {
-    let relative_std = TrainKalmanSettings::default().prior_relative_std;
-    prior::Resistance::declared(&train.resistance, relative_std).a_std()
+settings! {
+    /// Settings of [`TrainKalman`].
+    #[derive(Copy)]
+    TrainKalmanSettings {
+        /// Standard deviation in % of a mass that the samples carry, as weighed; 0 where it is exact.
+        mass_std_percent: f64 = 100.0 * masses::WEIGHED_STD => (0 to 50);
+        /// Standard deviation in % of the train's declared mass where the samples carry none: from
+        /// empty to full.
+        load_std_percent: f64 = 15.0 => (0 to 50);
+        /// Standard deviation in % by which the load changes at a stop where the samples carry no mass.
+        load_change_std_percent: f64 = 10.0 => (0 to 50);
+        /// Shortest stop in s at which the load may change.
+        stop_min_s: f64 = 5.0 => (0 to 3600);
+        /// Standard deviation of each declared coefficient of resistance as a share of it.
+        prior_relative_std: f64 = 0.4 => (0.001 to 10);
+        /// Random walk of the resistance in N/kN over an hour of motion: weather, wear.
+        drift_n_per_kn_per_sqrt_h: f64 = 0.01 => (0 to 10 "N/kN");
+        /// Standard deviation of the scale of the traction force: 0.01 is 1 %.
+        force_scale_std: f64 = traction::USUAL_STD => (0.000001 to 0.5);
+        /// Standard deviation of the scale of the brake force, which with friction is what pressure and
+        /// disc should exert, rarely what they do.
+        brake_scale_std: f64 = adhesion::DECLARED_BRAKE_STD => (0.000001 to 0.5);
+        /// Random walk of that scale over a minute: friction goes with heat, moisture and wear.
+        brake_scale_per_sqrt_min: f64 = 0.015 => (0 to 0.5);
+        /// Standard deviation in m/s of the wind of the day along the line; gusts have half of it.
+        wind_std_mps: f64 = 1.5 => (0 to 20 "m/s");
+        /// Standard deviation in s of the delay of a force behind its report.
+        force_delay_std_s: f64 = delay::USUAL_STD_S => (0.000001 to 5 "s");
+        /// Standard deviation of the scale of accelerations, by wheel diameter and rotating mass,
+        /// which nothing here can find: 0.003 is 0.3 %.
+        acceleration_scale_std: f64 = 0.0025 => (0 to 0.1);
+        /// Standard deviation in ‰ of gradients along a line for which no survey states one, of
+        /// which every passage is the same.
+        gradient_std_permille: f64 = 0.1 => (0 to 10 "‰");
+        /// Standard deviation of the measured speed in m/s to start with; it is learned.
+        speed_noise_mps: f64 = 0.05 => (0.001 to 1 "m/s");
+        /// Standard deviation in m of the position against the gradient profile.
+        position_std_m: f64 = 3.0 => (0 to 1000 "m");
+        /// Lowest speed in m/s that is used: sensors miss slower wheels, and bearings stick.
+        speed_min_mps: f64 = 0.5 => (0.3 to 20 "m/s");
+    }
 }

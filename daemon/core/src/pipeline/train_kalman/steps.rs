@@ -3,11 +3,11 @@
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::wind;
 
+use super::TrainKalmanSettings;
 use super::acting_forces::ActingForces;
+use super::learned::Resistance;
 use super::motion_filter::{Step, wind_over};
-use super::prior::Resistance;
-use super::settings::TrainKalmanSettings;
-use crate::pipeline::momentum::sample::UnitSample;
+use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
 const FORCE_RATE_MEMORY_S: f64 = 0.5;
@@ -54,7 +54,7 @@ impl Steps {
         &mut self,
         (from, to): (&UnitSample, &UnitSample),
         sample: &ResolvedSample,
-        delay_s: f64,
+        (delay_s, jump_share): (f64, f64),
         air: &Resistance,
     ) -> Step {
         let settings = &self.settings;
@@ -74,7 +74,19 @@ impl Steps {
         let by_wind = air.by_wind(to.speed_mps);
         let gust_n_per_kn = by_wind * wind::GUST_SHARE * settings.wind_std_mps;
         let by_gusts = 2.0 * wind::GUST_TIME_S * gust_n_per_kn.powi(2) * duration_s;
+        let acting = self.acting.over(duration_s, delay_s);
+        let half_s = 0.5 * duration_s;
         Step {
+            duration_s,
+            travelled_m: half_s * (from.speed_mps + to.speed_mps),
+            inertia: to.inertia,
+            delay_s: acting.delay_s,
+            traction: acting.impulses[0],
+            brake: acting.impulses[1],
+            known: half_s * (from.known + to.known),
+            traction_change: acting.changes[0],
+            brake_change: acting.changes[1],
+            jump_share,
             impulse_variance: by_place + by_gusts,
             force_rate: self.force_rate,
             map_std_permille: sample.gradient_std_permille,
@@ -83,7 +95,6 @@ impl Steps {
             by_wind_square: air.by_wind_square(),
             wind: wind_over(duration_s, settings.wind_std_mps),
             brake_variance: (walk, settings.brake_scale_std.powi(2)),
-            ..Step::between(from, to, &self.acting.over(duration_s, delay_s))
         }
     }
 }
@@ -118,7 +129,9 @@ mod tests {
         let of_step = |k: i64| {
             let (from, to) = (sample(k - 1), sample(k));
             steps.see(&to);
-            steps.to((&from, &to), &ResolvedSample::coasting(), 0.0, &resistance).impulse_variance
+            steps
+                .to((&from, &to), &ResolvedSample::coasting(), (0.0, 1.0), &resistance)
+                .impulse_variance
         };
         (1..20 * rate_hz).map(of_step).sum()
     }
@@ -142,7 +155,9 @@ mod tests {
             let (from, to) = (sample(0), sample(100_000_000));
             steps.see(&from);
             steps.see(&to);
-            steps.to((&from, &to), &ResolvedSample::coasting(), 0.0, &resistance).impulse_variance
+            steps
+                .to((&from, &to), &ResolvedSample::coasting(), (0.0, 1.0), &resistance)
+                .impulse_variance
         };
         // Gusts of 1 m/s for 10 s each: 2 c v, over 0.1 s of independent ones.
         assert!((variance(0.001, 30.0) - 0.06_f64.powi(2) * 2.0 * 10.0 * 0.1).abs() < 1e-9);

@@ -1,15 +1,15 @@
 //! A Kalman filter of [a, b, c, v] under one hypothesis about the last jump of (a, b, c).
 
-use dynocar_core::filter::mixture::Mixture;
+use dynocar_core::filter::bank::Mixture;
 use dynocar_core::filter::square_root::CovarianceFactor;
 use dynocar_core::pipeline::motion::OutlierRow;
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use super::index::{A, B, C, SPEED};
 use super::noise::{LearnedNoise, NoiseModel};
 use super::step::{Step, StepRule};
 use super::unit_disturbance::UnitDisturbance;
+use super::{A, B, C, SPEED};
 
 /// How often measured speeds are wrong, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +26,7 @@ pub struct OutlierModel {
 /// triangular without a factorisation, since a step moves the speed alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hypothesis {
-    /// a, b, c and v in the order of [`super::index`].
+    /// a, b, c and v in the order of [`crate::xia::trajectory`].
     pub state: SVector<f64, 4>,
     /// Factor of their covariance.
     pub factor: CovarianceFactor<4>,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynocar_core::pipeline::judge::InputHealth;
 use dynocar_core::pipeline::motion::{Rounding, SpeedRange, jump_variance};
-use dynocar_core::pipeline::output::write_parameters;
+use dynocar_core::pipeline::output::{DAVIS, write_parameters};
 use dynocar_core::pipeline::sample_gate::{Gated, SampleGate};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
@@ -15,15 +15,12 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::Vector3;
 
-use super::bank::{JumpModel, StepDoubt};
 use super::hypothesis::Innovation;
-use super::index::DAVIS;
-use super::motion::{Motion, MotionStep, MotionTracker};
+use super::motion::{Motion, MotionStep, MotionTracker, UnexplainedForce};
 use super::noise::NoiseModel;
-use super::online::{OnlineFilter, OnlineSettings};
+use super::online::{OnlineFilter, OnlineSettings, StepDoubt};
 use super::quality::{Estimate, prior_std};
 use super::step::{Step, StepRule};
-use super::unexplained::UnexplainedForce;
 
 settings! {
     /// Settings of `trajectory_kalman`.
@@ -54,8 +51,6 @@ const SPEED_NOISE_FIRST_MPS: f64 = 0.2;
 const DISTURBANCE_RANGE: (f64, f64) = (0.01, 10.0);
 /// Disturbance before any data, in N/kN √s.
 const DISTURBANCE_FIRST: f64 = 1.0;
-/// Least time in s between two hypotheses.
-const SPACING_S: f64 = 1.0;
 
 impl TrajectoryKalmanSettings {
     /// Builds the estimator for a train.
@@ -68,11 +63,10 @@ impl TrajectoryKalmanSettings {
         let speed_noise_mps = self.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS);
         let disturbance = self.disturbance_n_per_kn_sqrt_s.unwrap_or(DISTURBANCE_FIRST);
         let gain = mps2_per_n_per_kn(train.rotating_mass_factor);
-        let davis_std = prior_std(train, self.prior_relative_std);
         Ok(TrajectoryKalman::new(OnlineSettings {
             davis: train.resistance,
-            davis_std,
-            jumps: JumpModel { evidence: self.jump_evidence, std: davis_std, spacing_s: SPACING_S },
+            davis_std: prior_std(train, self.prior_relative_std),
+            jump_evidence: self.jump_evidence,
             hypotheses: self.hypotheses as usize,
             noise: NoiseModel {
                 speed_noise_mps,
@@ -141,20 +135,20 @@ impl TrajectoryKalman {
     fn take_step(&mut self, motion: &MotionStep, sample: &ResolvedSample) -> Outcome {
         let step = Step::from(motion);
         let moved_mps = motion.distance_m / motion.duration_s - sample.speed_mps;
-        let learned = self.filter.bank().likeliest().noise.speed_variance;
-        self.filter.doubt(StepDoubt {
+        let learned = self.filter.likeliest().noise.speed_variance;
+        let doubt = StepDoubt {
             impulse_variance: jump_variance(motion.drive_change_mps2, motion.duration_s),
             rounding_variance: self.rounding.variance_of_sample(learned, 2.0 * moved_mps.abs()),
-        });
-        let absorbed =
-            self.filter.advance(StepRule::Time, &step, motion.duration_s, sample.speed_mps);
+        };
+        let step = (StepRule::Time, &step);
+        let absorbed = self.filter.advance(step, motion.duration_s, sample.speed_mps, &doubt);
         let Some(innovation) = absorbed else {
             self.fault = Some((Status::Unestimated, Reason::NumericalFailure));
             self.updates = 0;
             return Outcome::Used;
         };
         self.fault = None;
-        self.unexplained.push(motion, sample, &self.filter.bank().likeliest().davis());
+        self.unexplained.push(motion, sample, &self.filter.likeliest().davis());
         let Innovation { innovation_mps, deviation_mps, is_used, .. } = innovation;
         if !is_used {
             self.innovations.break_here();
@@ -206,7 +200,7 @@ impl Estimator for TrajectoryKalman {
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         let (davis, covariance) = self.filter.davis();
         write_parameters(snapshot, DAVIS, &Vector3::new(davis.a, davis.b, davis.c), &covariance);
-        let is_fresh = self.filter.bank().likeliest().age_s < FRESH_S;
+        let is_fresh = self.filter.likeliest().age_s < FRESH_S;
         let estimate = Estimate {
             davis,
             covariance,
@@ -221,9 +215,9 @@ impl Estimator for TrajectoryKalman {
             doubt: is_fresh.then_some(Reason::InnovationsTooLarge),
         };
         estimate.write(snapshot);
-        let speed_variance = self.filter.bank().likeliest().noise.speed_variance;
+        let speed_variance = self.filter.likeliest().noise.speed_variance;
         self.unexplained.write(snapshot, speed_variance);
-        snapshot.generation = self.filter.resets();
+        snapshot.generation = self.filter.resets;
     }
 
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {

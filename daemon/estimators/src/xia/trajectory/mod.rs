@@ -3,18 +3,14 @@
 //!
 //! - [`step`]: how a train moves over one step, with derivatives
 //! - [`motion`]: from resolved samples to steps
-//! - [`integral_start`], [`residuals`], [`fit`]: ours, offline and over windows
-//! - [`hypothesis`], [`bank`], [`noise`], [`online`]: ours, sample by sample
+//! - [`residuals`], [`fit`]: ours, offline and over windows
+//! - [`hypothesis`], [`noise`], [`online`]: ours, sample by sample
 //! - [`quality`]: what an estimate is worth
+//! - [`A`], [`B`], [`C`], [`SPEED`]: places in vectors and matrices
 
-pub mod bank;
 pub mod fit;
-mod fit_settings;
 pub mod hypothesis;
-pub mod index;
-pub mod integral_start;
 pub mod kalman;
-pub mod long_run;
 pub mod motion;
 pub mod noise;
 pub mod online;
@@ -26,5 +22,13 @@ mod search;
 pub mod step;
 #[cfg(test)]
 mod test_runs;
-pub mod unexplained;
 mod unit_disturbance;
+
+/// Davis a.
+pub const A: usize = 0;
+/// Davis b.
+pub const B: usize = 1;
+/// Davis c.
+pub const C: usize = 2;
+/// The speed, last: a step changes only the last row of a triangular factor then.
+pub const SPEED: usize = 3;

@@ -12,7 +12,7 @@ use super::motion::tests::sample;
 use super::test_runs::{METRO, metro, normal, random};
 use crate::EstimatorSettings;
 use crate::xia::newton::TrajectoryNewton;
-use crate::xia::newton_settings::{FitMethod, TrajectoryNewtonSettings};
+use crate::xia::newton::{FitMethod, TrajectoryNewtonSettings};
 
 /// The metro as declared: a fifth off in every coefficient.
 fn train() -> Arc<TrainModel> {
@@ -95,7 +95,7 @@ fn the_kalman_pipeline_follows_a_jump_that_the_window_forgets() {
     let estimate = snapshot.resistance_at(12.0).unwrap();
     let error = estimate.w0_n_per_kn - rain(1600.0).w0_n_per_kn(12.0);
     assert!(error.abs() < 0.1, "{error}");
-    let age_s = estimator.filter().bank().likeliest().age_s;
+    let age_s = estimator.filter().likeliest().age_s;
     assert!(age_s < 620.0, "the jump is dated: {age_s}");
 }
 

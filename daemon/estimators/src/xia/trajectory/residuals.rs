@@ -14,7 +14,7 @@ use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
-use super::long_run::LongRunVariance;
+use super::quality::LongRunVariance;
 use super::step::{MotionSegment, Step, StepRule};
 
 /// How residuals are weighted.

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::index::SPEED;
+use super::SPEED;
 
 /// Covariance of [a, b, c, v] from a disturbance of unit density.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

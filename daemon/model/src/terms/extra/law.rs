@@ -1,7 +1,7 @@
-//! A force and what it depends on.
+//! A force, what it depends on, and what it may depend on.
 
-use super::covariate::Covariate;
 use super::form::Form;
+use crate::named;
 
 /// A function without unit of one covariate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,5 +71,23 @@ impl Extra {
         });
         let (value, slope) = joined.unwrap_or((0.0, 0.0));
         (self.n_per_kn * value, self.n_per_kn * slope)
+    }
+}
+
+named! {
+    /// A quantity known at every sample, or at some.
+    Covariate ("in files and answers, with the unit") {
+        /// Speed in m/s.
+        Speed "speed_mps";
+        /// Chainage in m.
+        Chainage "chainage_m";
+        /// Time in s since the train was cold, as its bearings count it.
+        TimeSinceStart "time_since_start_s";
+        /// Reported traction force in N.
+        TractionForce "traction_force_n";
+        /// Reported brake force in N.
+        BrakeForce "brake_force_n";
+        /// Outside temperature in °C.
+        Temperature "ambient_temperature_degc";
     }
 }

@@ -8,13 +8,11 @@
 //! finds such a force where nothing of its library explains a residual; `[[extra]]` of
 //! `train.toml` holds it, and whoever knows a law from elsewhere may write it there.
 
-mod covariate;
 mod form;
 mod law;
 
-pub use covariate::Covariate;
 pub use form::Form;
-pub use law::{Extra, Factor};
+pub use law::{Covariate, Extra, Factor};
 
 use super::Resistance;
 

@@ -1,125 +1,22 @@
 //! Settings of the braking pipelines, and how each is built from them.
 
-mod ekf;
-mod law;
-mod smoother;
-
-pub use ekf::EkfSettings;
-pub use law::LawSettings;
-pub use smoother::{SmootherSettings, WalkSettings};
-
-use dynocar_model::terms::adhesion;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::PipelineKind;
+use dynocar_shared::{PipelineKind, RailCondition, Uncertain};
 use serde::Deserialize;
 
-use super::engine::Engine;
-use super::estimator::BrakingEstimator;
-use super::gear::DeclaredGear;
-use super::intake::{BrakingCoefficient, BrakingIntake, IntakeSettings};
-use super::motion::MotionNoise;
-use super::report::ReportSettings;
+use super::intake::{BrakingCoefficient, DeclaredGear};
+use super::law::Law;
+use super::law_bank::LawBank;
+use super::motion::Walk;
+use super::tracker::{PriorScale, Tracker, TrackerModel};
 use crate::pipeline::Estimator;
-use crate::pipeline::motion::MOVING_MPS;
-use crate::pipeline::settings::{SettingError, require};
+use crate::pipeline::settings::SettingError;
 use crate::settings;
 
-settings! {
-    /// What every braking pipeline knows beforehand of motion, measurement and braking.
-    ///
-    /// The defaults of the noise are those of the papers' simulation: a position measured within
-    /// 0.1 m, and process noise uniform within 0.1 m and 0.1 km/h over steps of 0.2 s.
-    #[derive(Copy)]
-    BrakingSettings {
-        /// Shortest time in s between two observations.
-        interval_s: f64 = 0.2 => (above 0);
-        /// A longer time in s between two observations ends the braking.
-        gap_max_s: f64 = 2.0;
-        /// Standard deviation of a measured position in m; a greater one is learned.
-        position_std_m: f64 = 0.1 => (above 0);
-        /// Standard deviation of a measured speed in m/s.
-        speed_std_mps: f64 = 0.1 => (above 0);
-        /// False when only the first speed of a braking is used, as in the papers.
-        uses_speed: bool = true;
-        /// Standard deviation in m that the position gains in 1 s about the model.
-        position_walk_m: f64 = walk_per_sqrt_s(0.1) => (above 0);
-        /// Standard deviation in m/s that the speed gains in 1 s about the model.
-        speed_walk_mps: f64 = walk_per_sqrt_s(0.1 / 3.6) => (above 0);
-        /// Standard deviation in m/s of the first speed of a braking.
-        first_speed_std_mps: f64 = 0.2 => (above 0);
-        /// Least brake force per weight that counts as braking.
-        braking_min_per_weight: f64 = 0.01 => (above 0);
-        /// Slowest speed in m/s at which the model is trusted.
-        speed_min_mps: f64 = MOVING_MPS => (0 or more);
-        /// True when the position does not come from the braked wheels, so that it holds while they
-        /// slide.
-        position_is_wheel_independent: bool = false;
-        /// Standard deviation over value of the declared brake force.
-        demand_relative_std: f64 = adhesion::DECLARED_BRAKE_STD => (above 0);
-        /// Greatest standard deviation over value of an estimate that counts.
-        relative_std_max: f64 = 0.15 => (above 0);
-        /// Age in s at which an estimate is stale.
-        stale_after_s: f64 = 300.0 => (above 0);
-    }
-}
+pub use super::engine::BrakingSettings;
+pub use smoother::{SmootherSettings, WalkSettings};
 
-/// Standard deviation that comes in 1 s from steps of 0.2 s, uniform within a half width, each of
-/// variance w²/3.
-fn walk_per_sqrt_s(half_width: f64) -> f64 {
-    (half_width * half_width / 3.0 / 0.2).sqrt()
-}
-
-impl BrakingSettings {
-    /// Refuses settings outside their ranges.
-    ///
-    /// # Errors
-    ///
-    /// Names key, value and range.
-    pub fn check(&self) -> Result<(), SettingError> {
-        self.check_ranges()?;
-        let is_longer = self.gap_max_s >= self.interval_s && self.gap_max_s.is_finite();
-        require(is_longer, "gap_max_s", self.gap_max_s, "at least interval_s")
-    }
-
-    /// The noise of motion and measurement.
-    pub fn noise(&self) -> MotionNoise {
-        MotionNoise {
-            distance_m2_per_s: self.position_walk_m.powi(2),
-            speed_m2_per_s3: self.speed_walk_mps.powi(2),
-            measured_distance_m2: self.position_std_m.powi(2),
-            measured_speed_m2_per_s2: self.uses_speed.then_some(self.speed_std_mps.powi(2)),
-        }
-    }
-
-    fn intake(&self, quantity: BrakingCoefficient, train: &TrainModel) -> BrakingIntake {
-        let settings = IntakeSettings {
-            interval_s: self.interval_s,
-            gap_max_s: self.gap_max_s,
-            braking_min_per_weight: self.braking_min_per_weight,
-            speed_min_mps: self.speed_min_mps,
-            position_is_wheel_independent: self.position_is_wheel_independent,
-        };
-        BrakingIntake::new(quantity, settings, train)
-    }
-
-    /// The estimator of a kind around an engine.
-    pub fn estimator<E: Engine + 'static>(
-        &self,
-        kind: PipelineKind,
-        quantity: BrakingCoefficient,
-        train: &TrainModel,
-        engine: E,
-    ) -> Box<dyn Estimator> {
-        let report = ReportSettings {
-            relative_std_max: self.relative_std_max,
-            demand_relative_std: self.demand_relative_std,
-            has_law_scale: kind == PipelineKind::AdhesionLaw,
-        };
-        let intake = self.intake(quantity, train);
-        let sensors = (self.stale_after_s, self.position_std_m);
-        Box::new(BrakingEstimator::new(kind, quantity, intake, engine, report, sensors))
-    }
-}
+mod smoother;
 
 /// Which factor of the brake force a brake pipeline reports; the other is held as declared, since
 /// only their product acts on the train.
@@ -153,5 +50,93 @@ fn declared(quantity: BrakingCoefficient, train: &TrainModel) -> Option<f64> {
         BrakingCoefficient::Adhesion => None,
         BrakingCoefficient::Friction => gear.map(|gear| gear.friction),
         BrakingCoefficient::Ratio => gear.map(|gear| gear.ratio),
+    }
+}
+
+settings! {
+    /// Settings of the extended Kalman filter with a random walk of the coefficient.
+    #[derive(Copy)]
+    EkfSettings {
+        /// Motion, measurement and braking.
+        braking: BrakingSettings = BrakingSettings::default();
+        /// The coefficient before the first observation; the declared one, or an adhesion of 0.1, when
+        /// absent.
+        initial: Option<f64> = None => (0 or more);
+        /// Its standard deviation over the declared value (over 0.1 for adhesion).
+        initial_relative_std: f64 = 1.0 => (above 0);
+        /// Standard deviation that it gains in 1 s, over the demand; when absent, what serves best in
+        /// the papers' scenarios.
+        relative_walk: Option<f64> = None => (above 0);
+        /// What a brake pipeline reports; no meaning for adhesion.
+        reports: BrakeFactor = BrakeFactor::Friction;
+    }
+}
+
+impl EkfSettings {
+    /// Builds an estimator of a kind.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build(
+        &self,
+        kind: PipelineKind,
+        quantity: BrakingCoefficient,
+        train: &TrainModel,
+    ) -> Result<Box<dyn Estimator>, SettingError> {
+        self.braking.check()?;
+        self.check_ranges()?;
+        let relative_walk = self.relative_walk.unwrap_or(match quantity {
+            BrakingCoefficient::Adhesion => 0.018,
+            BrakingCoefficient::Friction => 0.03,
+            BrakingCoefficient::Ratio => 0.004,
+        });
+        let reference = declared(quantity, train).unwrap_or(ADHESION_REFERENCE);
+        let initial_std = self.initial_relative_std * reference;
+        let initial = Uncertain::new(self.initial.unwrap_or(reference), initial_std);
+        let walk = Walk::Scale(relative_walk.powi(2));
+        let prior = PriorScale::OfCoefficient(initial);
+        let model = TrackerModel::new(&self.braking, Law::Demand, walk, prior);
+        Ok(self.braking.estimator(kind, quantity, train, Tracker::new(model, 0.0, 0, false)))
+    }
+}
+
+settings! {
+    /// Settings of the scale of a known adhesion law.
+    #[derive(Copy)]
+    LawSettings {
+        /// Motion, measurement and braking.
+        braking: BrakingSettings = BrakingSettings::default();
+        /// Standard deviation of the scale of a rail's law beforehand.
+        scale_std: f64 = 0.25 => (above 0);
+        /// Standard deviation that the scale gains in 1 s.
+        scale_walk: f64 = 0.0005 => (above 0);
+        /// Rate in 1/s at which the rail's condition changes.
+        change_rate_per_s: f64 = 0.0005 => (above 0);
+    }
+}
+
+impl LawSettings {
+    /// Builds `adhesion_law`.
+    ///
+    /// # Errors
+    ///
+    /// When a setting lies outside its range.
+    pub fn build_adhesion(&self, train: &TrainModel) -> Result<Box<dyn Estimator>, SettingError> {
+        self.braking.check()?;
+        self.check_ranges()?;
+        let walk = Walk::Scale(self.scale_walk.powi(2));
+        let hypothesis = |law, std| {
+            let prior = PriorScale::OfLaw(Uncertain::new(1.0, std));
+            TrackerModel::new(&self.braking, law, walk, prior)
+        };
+        let hypotheses = [
+            hypothesis(Law::Rail(RailCondition::Dry), self.scale_std),
+            hypothesis(Law::Rail(RailCondition::Wet), self.scale_std),
+            hypothesis(Law::Demand, self.braking.demand_relative_std),
+        ];
+        let bank = LawBank::new(hypotheses, self.change_rate_per_s);
+        let (kind, quantity) = (PipelineKind::AdhesionLaw, BrakingCoefficient::Adhesion);
+        Ok(self.braking.estimator(kind, quantity, train, bank))
     }
 }

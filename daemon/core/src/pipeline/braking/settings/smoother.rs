@@ -5,14 +5,13 @@ use dynocar_shared::{PipelineKind, Uncertain};
 use serde::Deserialize;
 
 use super::{BrakeFactor, BrakingSettings};
-use crate::check_setting;
 use crate::pipeline::Estimator;
 use crate::pipeline::braking::intake::BrakingCoefficient;
 use crate::pipeline::braking::law::{Law, SpeedTable};
 use crate::pipeline::braking::motion::Walk;
-use crate::pipeline::braking::tracker::{Prior, PriorScale, Tracker, TrackerModel};
+use crate::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};
 use crate::pipeline::settings::SettingError;
-use crate::settings;
+use crate::{check_setting, settings};
 
 /// How the achieved share of the declared brake force wanders.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -115,15 +114,8 @@ impl SmootherSettings {
     ) -> Result<Box<dyn Estimator>, SettingError> {
         self.braking.check()?;
         self.check_ranges()?;
-        let model = TrackerModel {
-            law: self.law(quantity)?,
-            noise: self.braking.noise(),
-            walk: self.checked_walk(quantity)?,
-            prior: Prior {
-                speed_std_mps: self.braking.first_speed_std_mps,
-                scale: PriorScale::OfLaw(SHARE_PRIOR),
-            },
-        };
+        let (law, walk) = (self.law(quantity)?, self.checked_walk(quantity)?);
+        let model = TrackerModel::new(&self.braking, law, walk, PriorScale::OfLaw(SHARE_PRIOR));
         let most_moments = (self.lag_s / (0.9 * self.braking.interval_s)).ceil() as usize;
         let tracker = Tracker::new(model, self.lag_s, most_moments, true);
         Ok(self.braking.estimator(kind, quantity, train, tracker))

@@ -48,7 +48,7 @@ impl TrainKalman {
     pub(super) fn mass_source(&self) -> MassSource {
         if self.report.load_variance() < 0.5 * self.load.prior_variance() {
             MassSource::Learned
-        } else if self.load.is_weighed() {
+        } else if self.load.is_weighed {
             MassSource::Weighed
         } else {
             MassSource::Declared
