@@ -163,7 +163,7 @@ fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
         let Some(next) = Scan::new(scan.problem, scan.holdout, scan.train, scan.track, &fit) else {
             break;
         };
-        let fresh = parallel::of_each(&parts, |(part, _)| {
+        let fresh = parallel::of_each(parts, |(part, _)| {
             let is_free = masses.parts().iter().all(|own| own.is_apart(part));
             is_free.then(|| (part.clone(), part_tuple(&next, part)))
         });
