@@ -136,9 +136,11 @@ impl Controller {
     /// Publishes what is due; gives how late the latest was, in ns.
     fn publish_due(&mut self, now_ns: i64) -> Result<i64, Failure> {
         let mut lag_ns = 0;
-        while self.traffic.next_ns().is_some_and(|next_ns| next_ns <= now_ns) {
-            let (sample, appointed_ns) = self.traffic.take();
+        while let Some(&(sample, appointed_ns)) =
+            self.traffic.upcoming().filter(|it| it.1 <= now_ns)
+        {
             lag_ns = lag_ns.max(self.publish(sample, appointed_ns)?);
+            self.traffic.prepare_next();
         }
         Ok(lag_ns)
     }

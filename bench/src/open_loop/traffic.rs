@@ -45,19 +45,17 @@ impl Traffic {
         self.appoint();
     }
 
-    /// When the next sample is to leave, in ns, if there is one more.
-    pub fn next_ns(&self) -> Option<i64> {
-        (self.number < self.count).then_some(self.next.1)
+    /// The next sample, with the time in ns at which it is to leave, if there is one more.
+    pub fn upcoming(&self) -> Option<&(TrainSample, i64)> {
+        (self.number < self.count).then_some(&self.next)
     }
 
-    /// The next sample, with the time it was to leave.
-    pub fn take(&mut self) -> (TrainSample, i64) {
-        let taken = self.next;
+    /// Prepares the sample after the next, which has left: none waits for that.
+    pub fn prepare_next(&mut self) {
         self.number += 1;
         if self.number < self.count {
             self.appoint();
         }
-        taken
     }
 
     /// What would be measured at a time in ns.
@@ -105,6 +103,12 @@ mod tests {
 
     const TRAIN: TrainId = TrainId(2);
 
+    fn take(traffic: &mut Traffic) -> (TrainSample, i64) {
+        let taken = *traffic.upcoming().expect("one more");
+        traffic.prepare_next();
+        taken
+    }
+
     fn plan() -> TrafficPlan {
         TrafficPlan { rate_hz: 1_000.0, jitter: 0.5, burst: 8, bad_share: 0.1 }
     }
@@ -113,8 +117,8 @@ mod tests {
     fn samples_leave_in_order_in_bursts_and_at_the_mean_rate() {
         let mut traffic = Traffic::new(plan(), TRAIN, 0, 1);
         traffic.begin(0, 8_000);
-        let times: Vec<i64> = (0..8_000).map(|_| traffic.take().1).collect();
-        assert!(times.is_sorted() && traffic.next_ns().is_none());
+        let times: Vec<i64> = (0..8_000).map(|_| take(&mut traffic).1).collect();
+        assert!(times.is_sorted() && traffic.upcoming().is_none());
         assert!(times.chunks(8).all(|burst| burst.iter().all(|&time| time == burst[0])));
         let seconds = times[times.len() - 1] as f64 * 1e-9;
         assert!((seconds - 8.0).abs() < 0.01, "{seconds}");
@@ -127,7 +131,7 @@ mod tests {
         let mut validator = Validator::new(TRAIN, 200e3);
         let mut refused = 0.0;
         for number in 1..=20_000 {
-            let (mut sample, _) = traffic.take();
+            let (mut sample, _) = take(&mut traffic);
             sample.sequence = number;
             refused += f64::from(u8::from(validator.check(&sample).is_err()));
         }

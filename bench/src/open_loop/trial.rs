@@ -100,7 +100,7 @@ pub struct Trial {
     pub pipelines: Vec<Outcome>,
     /// Processor time of the answering process over wall time, in %; 100 is one core.
     pub cpu_percent: f64,
-    /// Its resident memory after the first tenth, in bytes.
+    /// Its resident memory after the warm-up, in bytes.
     pub rss_start_bytes: u64,
     /// Its resident memory at the end, in bytes.
     pub rss_bytes: u64,
@@ -182,11 +182,9 @@ fn measure(
     settle(controllers, &mut uncounted)?;
     require(peer)?;
     let usage = || (usage::of(peer.id(), FAST), monotonic_now_ns());
-    let (before, _) = usage();
-    let start_ns = begin(controllers, extent.seconds);
-    let first_ns = drive(controllers, &mut counted, after(start_ns, 0.1 * extent.seconds))?;
     let (early, early_ns) = usage();
-    let then_ns = drive(controllers, &mut counted, after(start_ns, extent.seconds))?;
+    let start_ns = begin(controllers, extent.seconds);
+    let publisher_lag_ns = drive(controllers, &mut counted, after(start_ns, extent.seconds))?;
     let (late, late_ns) = usage();
     settle(controllers, &mut counted)?;
     controllers.iter().for_each(|it| it.account(&mut counted));
@@ -195,9 +193,9 @@ fn measure(
         cpu_percent: 1e11 * (late.cpu_s - early.cpu_s) / (late_ns - early_ns) as f64,
         rss_start_bytes: early.rss_bytes,
         rss_bytes: late.rss_bytes,
-        publisher_lag_ns: first_ns.max(then_ns),
-        waits_s: std::array::from_fn(|which| late.waits_s[which] - before.waits_s[which]),
-        preempted: late.preempted - before.preempted,
+        publisher_lag_ns,
+        waits_s: std::array::from_fn(|which| late.waits_s[which] - early.waits_s[which]),
+        preempted: late.preempted - early.preempted,
     })
 }
 
