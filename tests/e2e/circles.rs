@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use dynocar_tests::sources::{FOLDERS, is_of_tests, without_tests, workspace};
+use dynocar_tests::sources::{FOLDERS, is_of_tests, rust_files, without_tests, workspace};
 
 /// A module by its path from the crate's root.
 type Module = Vec<String>;
@@ -45,28 +45,24 @@ struct Package {
 }
 
 impl Package {
-    fn read(root: &Path) -> Self {
+    /// The package of a source folder: its files of Rust alone, as a style or a script may bear a module's name.
+    fn read(folder: &str) -> Self {
         let mut package = Package::default();
-        package.read_folder(root, &mut Vec::new());
-        package
-    }
-
-    fn read_folder(&mut self, folder: &Path, module: &mut Module) {
-        for entry in std::fs::read_dir(folder).expect("a source folder") {
-            let path = entry.expect("an entry").path();
-            let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
-            if path.is_dir() {
-                module.push(name);
-                self.read_folder(&path, module);
-                module.pop();
-            } else if !is_of_tests(&path) && name != "main" {
-                let mut of_file = module.clone();
-                if name != "mod" && name != "lib" {
-                    of_file.push(name);
-                }
-                self.read_file(&path, of_file);
+        let root = workspace().join(folder);
+        for path in rust_files(folder) {
+            let within = path.strip_prefix(&root).expect("a file of the folder").with_extension("");
+            let mut module: Module =
+                within.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+            let name = module.last().map_or("", String::as_str);
+            if is_of_tests(&path) || name == "main" {
+                continue;
             }
+            if ["mod", "lib"].contains(&name) {
+                module.pop();
+            }
+            package.read_file(&path, module);
         }
+        package
     }
 
     fn read_file(&mut self, path: &Path, module: Module) {
@@ -168,7 +164,7 @@ impl Package {
 #[test]
 fn imports_between_files_run_one_way() {
     for folder in FOLDERS {
-        let package = Package::read(&workspace().join(folder));
+        let package = Package::read(folder);
         assert!(package.imports.len() > 5, "the sources of {folder} were found");
         let circles = package.circles();
         assert!(circles.is_empty(), "{folder}: circles of imports: {circles:?}");

@@ -18,9 +18,8 @@ use super::error::LearnError;
 use super::learner::Learner;
 use super::memory::OpenQuestion;
 use crate::report::html::Column::{Numbers, Words};
-use crate::report::html::{
-    self, TableColumn, chance, document, escape, legend, marked_table, table,
-};
+use crate::report::html::{self, TableColumn, chance, escape, legend, marked_table, table};
+use crate::report::page::document;
 use crate::report::plots::series::{self, Day};
 use crate::report::plots::{PlotError, figure, wide_and_narrow};
 use crate::report::provenance::Provenance;

@@ -5,8 +5,7 @@ use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::report::panels::Panel;
 
 use super::Subject;
-use super::plots::speeds::Width;
-use super::plots::{Plot, PlotError, as_file, line, panel, series, speeds};
+use super::plots::{Plot, PlotError, Width, as_file, line, panel, series, speeds};
 
 /// Names and SVG of every plot of the report: the errors of the runs, the line with what was found along it, the
 /// speeds of runs, the residual against covariates.

@@ -3,11 +3,11 @@
 //!
 //! # Layout
 //!
-//! - [`mod@page`]: the page from top to bottom
+//! - [`mod@page`]: the page from top to bottom; the survey's and the learner's have its head and policy too
 //! - [`sections`]: its parts
 //! - [`plots`]: the plots, as SVG text
 //! - [`mod@images`]: the same as files of their own
-//! - [`html`]: what every page has, for the survey's and the learner's too: head, policy, tables, numbers
+//! - [`html`]: what pages are made of: tables, sections, numbers
 //! - [`provenance`]: command, versions, content hash
 //! - `style.css`: the style, for wide and narrow, light and dark, screen and paper
 //! - `plots.js`: values at the pointer and zoom

@@ -1,18 +1,44 @@
-//! The page from top to bottom.
+//! The page from top to bottom, and what every page has, for the survey's and the learner's too: head and policy.
 
 use std::fmt::Write as _;
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::answer::Verdict;
 use dynocar_analysis::explain::report::{effect, words};
 use dynocar_core::plausibility::Severity;
+use sha2::{Digest, Sha256};
 
 use super::Subject;
-use super::html::{chance, document, escape, section};
-use super::plots::PlotError;
+use super::html::{chance, escape, section};
+use super::plots::{PlotError, colour_rules};
 use super::provenance::Provenance;
 use super::sections::{Section, errors, model, quality, residual};
 use crate::run_facts::tonnes;
+
+const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("plots.js");
+
+/// A whole page; title, header and main part are HTML.
+///
+/// Its policy lets it load nothing, and run no script but ours.
+pub fn document(title: &str, header: &str, main: &str, made: &Provenance) -> String {
+    let (version, day, colours) = (made.version, &made.day, colour_rules());
+    let hash = STANDARD.encode(Sha256::digest(SCRIPT));
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta name=\"generator\" content=\"dynocar {version}\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+         style-src 'unsafe-inline'; script-src 'sha256-{hash}'\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}\n{colours}</style>\n</head>\n<body>\n\
+         <header>\n{header}</header>\n<main>\n{main}</main>\n\
+         <footer><p>Made by Dynocar {version} on {day}. The page is complete in itself: it loads \
+         nothing.</p></footer>\n<script>{SCRIPT}</script>\n</body>\n</html>\n"
+    )
+}
 
 /// The page.
 ///

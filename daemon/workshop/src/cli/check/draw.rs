@@ -5,7 +5,7 @@ use std::path::Path;
 use dynocar_analysis::explain::report::line::AlongLine;
 
 use super::Understood;
-use crate::report::plots::speeds::Width;
+use crate::report::plots::Width;
 use crate::report::plots::{as_file, effort, line};
 use dynocar::cli::Failure;
 use dynocar::output::{report_line, write_in_folder};

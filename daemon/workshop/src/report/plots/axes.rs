@@ -2,18 +2,14 @@
 
 use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
-use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::{
-    Cartesian2d, Color, DrawingArea, IntoFont, Polygon, Rectangle, Text, TextStyle,
-};
+use plotters::prelude::{Cartesian2d, Color, IntoFont, Polygon, Rectangle, Text, TextStyle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{RGBColor, ShapeStyle};
 
-use super::{AXIS, BAND, DrawError, Frame, GRID, SCALE, TEXT};
+use super::picture::{AXIS, Area, BAND, DrawError, Frame, GRID, SCALE, TEXT};
 use crate::report::html::minus;
 
-pub(super) type Area<'t> = DrawingArea<SVGBackend<'t>, Shift>;
 pub(super) type Chart<'a, 't> =
     ChartContext<'a, SVGBackend<'t>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 

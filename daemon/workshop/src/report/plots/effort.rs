@@ -6,7 +6,7 @@ use plotters::style::RGBColor;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::axes::{Axis, chart, letters, range_with_zero, stroke};
-use super::{AFTER, BEFORE, MEASURED, PlotError, SCALE, picture};
+use super::picture::{AFTER, BEFORE, MEASURED, PlotError, SCALE, picture};
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (980, 380);

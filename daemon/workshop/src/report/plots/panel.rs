@@ -8,8 +8,10 @@ use plotters::style::{Color, RGBColor};
 use super::axes::{
     Axis, Chart, band, chart, frame, padded, range_with_zero, shade, stroke, zero_line,
 };
+use super::picture::{
+    ACTING, AFTER, BEFORE, DrawError, Plot, PlotError, SCALE, before_name, picture,
+};
 use super::reading::Reading;
-use super::{ACTING, AFTER, BEFORE, DrawError, Plot, PlotError, SCALE, before_name, picture};
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (470, 290);

@@ -7,9 +7,10 @@ use plotters::element::{Circle, PathElement};
 use plotters::style::{Color, RGBColor, ShapeStyle};
 
 use super::axes::{Axis, Chart, band, chart, frame, padded, range_with_zero, stroke, zero_line};
+use super::picture::{
+    AFTER, AXIS, BEFORE, DrawError, Plot, PlotError, SCALE, Width, before_name, picture,
+};
 use super::reading::Reading;
-use super::speeds::Width;
-use super::{AFTER, AXIS, BEFORE, DrawError, Plot, PlotError, SCALE, before_name, picture};
 
 /// Nominal size in px of the errors of runs.
 const RUNS_SIZE: (u32, u32) = (470, 230);

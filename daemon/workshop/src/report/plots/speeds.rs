@@ -5,44 +5,10 @@ use plotters::element::PathElement;
 use plotters::style::RGBColor;
 
 use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, shade, stroke, zero_line};
-use super::reading::Reading;
-use super::{
-    ACTING, AFTER, BEFORE, DrawError, MEASURED, Plot, PlotError, SCALE, before_name, picture,
+use super::picture::{
+    ACTING, AFTER, BEFORE, DrawError, MEASURED, Plot, PlotError, SCALE, Width, before_name, picture,
 };
-
-/// For which page a plot is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Width {
-    /// A desktop.
-    Wide,
-    /// A phone.
-    Narrow,
-}
-
-impl Width {
-    /// Nominal size in px: width, height of the speeds, height of the errors.
-    pub(super) fn size(self) -> (u32, u32, u32) {
-        match self {
-            Width::Wide => (980, 250, 190),
-            Width::Narrow => (470, 240, 190),
-        }
-    }
-
-    /// Labels of a horizontal axis at most.
-    pub(super) fn labels(self) -> usize {
-        match self {
-            Width::Wide => 10,
-            Width::Narrow => 5,
-        }
-    }
-
-    pub(super) fn class(self) -> &'static str {
-        match self {
-            Width::Wide => "wide",
-            Width::Narrow => "narrow",
-        }
-    }
-}
+use super::reading::Reading;
 
 /// The run as SVG.
 ///

@@ -8,12 +8,12 @@ use dynocar_model::track::Track;
 use plotters::element::{PathElement, Text};
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::axes::{
-    Area, Axis, Chart, band, chart, frame, letters, padded, shade, stroke, zero_line,
-};
+use super::axes::{Axis, Chart, band, chart, frame, letters, padded, shade, stroke, zero_line};
 use super::panel::means;
-use super::speeds::Width;
-use super::{ACTING, AFTER, AXIS, DrawError, Plot, PlotError, SCALE, TUNNEL, picture};
+
+use super::picture::{
+    ACTING, AFTER, AXIS, Area, DrawError, Plot, PlotError, SCALE, TUNNEL, Width, picture,
+};
 use panels::{Content, Panel};
 
 /// Nominal width in px of the letters of a stop's name, and of the gap to the next.

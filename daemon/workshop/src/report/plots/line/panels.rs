@@ -9,8 +9,8 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use crate::report::plots::axes::{Chart, letters, range_with_zero, stroke};
 use crate::report::plots::panel::{reading, vertical_range};
+use crate::report::plots::picture::{ACTING, AFTER, DrawError};
 use crate::report::plots::reading::{Reading, thinned};
-use crate::report::plots::{ACTING, AFTER, DrawError};
 
 /// Nominal height in px of a panel, of one that shows places only, and of a row of places more.
 const HEIGHT: u32 = 190;
