@@ -45,6 +45,7 @@ pub(super) fn diagnostics(
 ) -> Vec<Diagnostic> {
     let fault = |it: DetectedFault| Diagnostic::of_fault(it, read_as(context.manifest, it.fault));
     let mut diagnostics: Vec<Diagnostic> = detected.iter().copied().map(fault).collect();
+    of_doubts(context, &mut diagnostics);
     of_time(quality, &mut diagnostics);
     of_content(context, run, quality, &mut diagnostics);
     diagnostics.extend(stands_still(run));
@@ -104,6 +105,18 @@ fn of_power(context: Context, run: &Resolved, diagnostics: &mut Vec<Diagnostic>)
         ("is_brake", is_brake.into()),
     ];
     diagnostics.push(Diagnostic::new("force_by_power", Info, text, figures));
+}
+
+/// What `init` doubted and nobody has confirmed.
+fn of_doubts(context: Context, diagnostics: &mut Vec<Diagnostic>) {
+    for mapping in context.manifest.columns.iter().filter(|mapping| mapping.is_doubtful) {
+        let (quantity, shown) = (mapping.quantity, mapping.shown());
+        let text = format!(
+            "{quantity} was DOUBTFUL when {shown} was taken for it, and nobody has confirmed it: set it \
+             right in dataset.toml or delete its doubtful = true"
+        );
+        diagnostics.push(Diagnostic::new("doubtful_input", Warning, text, [of(quantity)]));
+    }
 }
 
 fn of_time(quality: &RunQuality, diagnostics: &mut Vec<Diagnostic>) {

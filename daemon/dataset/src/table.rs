@@ -99,11 +99,16 @@ impl Table {
         let indices = find_columns(&names, "", (&TextLayout::PLAIN, mappings))
             .map_err(|words| SourcePosition::line(label, 1).problem(words))?;
         let held_by = |(at, mapping): (usize, &ColumnMapping)| {
-            let values = &mut columns[indices[at]].values;
-            // Its numbers stay where they are, unless another quantity needs them, too.
-            let is_last = !indices[at + 1..].contains(&indices[at]);
-            let values = if is_last { values.take() } else { values.clone() };
-            let (mut values, to) = (values.unwrap_or_default(), mapping.converted_to());
+            let mut taken = indices[at].iter().map(|&index| {
+                let values = &mut columns[index].values;
+                // Its numbers stay where they are, unless another quantity needs them, too.
+                let is_last = !indices[at + 1..].iter().flatten().any(|other| *other == index);
+                if is_last { values.take() } else { values.clone() }.unwrap_or_default()
+            });
+            let (mut values, to) = (taken.next().unwrap_or_default(), mapping.converted_to());
+            for part in taken {
+                values.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+            }
             for value in &mut values {
                 *value = held(mapping, to.as_ref(), *value);
             }
@@ -139,10 +144,10 @@ impl Table {
         let indices = find_columns(&names, whole, (layout, mappings)).map_err(|words| {
             SourcePosition::line(label, layout.skip_rows + row.line).problem(words)
         })?;
-        let columns = mappings.iter().zip(indices).map(|(mapping, index)| {
+        let columns = mappings.iter().zip(indices).map(|(mapping, indices)| {
             let clock = mapping.format.as_ref().map(DayClock::new);
             let converted_to = mapping.converted_to();
-            Column { mapping, index, converted_to, clock, values: Vec::new() }
+            Column { mapping, indices, converted_to, clock, values: Vec::new() }
         });
         let mut rows = Rows {
             label,
@@ -189,7 +194,8 @@ struct Rows<'m> {
 
 struct Column<'m> {
     mapping: &'m ColumnMapping,
-    index: usize,
+    /// Where its cells stand; of several, which add up.
+    indices: Vec<usize>,
     /// The quantity's unit, where the cells are in another.
     converted_to: Option<Unit>,
     /// Reads the cells that are times and no numbers.
@@ -215,7 +221,7 @@ impl Rows<'_> {
     /// Refuses a row of values in the place of that of units, which would be lost.
     fn require_units(&self, row: &Row) -> Result<(), DatasetError> {
         for column in &self.columns {
-            let cell = row.trimmed(column.index);
+            let cell = row.trimmed(column.indices[0]);
             let is_number = parse_cell(cell, self.layout.decimal).is_some_and(|it| !it.is_nan());
             // The unit "1" is one.
             if is_number && cell != b"1" {
@@ -254,25 +260,26 @@ impl Rows<'_> {
         }
         self.pending = (found < self.width).then_some(Flaw::Short);
         for column in &mut self.columns {
-            let plain = row.cells.get(column.index).and_then(|cell| cell.plain);
-            let value = match &mut column.clock {
-                None if plain.is_some() => plain,
-                None => parse_cell(row.trimmed(column.index), self.layout.decimal),
-                Some(_) if row.trimmed(column.index).is_empty() => Some(f64::NAN),
-                Some(clock) => clock.seconds(row.trimmed(column.index)),
-            };
-            column.values.push(value.map_or(f64::NAN, |value| {
-                held(column.mapping, column.converted_to.as_ref(), value)
-            }));
-            if value.is_some() {
-                continue;
+            let (mut sum, mut flaw) = (0.0, None);
+            for &index in &column.indices {
+                let plain = row.cells.get(index).and_then(|cell| cell.plain);
+                let value = match &mut column.clock {
+                    None if plain.is_some() => plain,
+                    None => parse_cell(row.trimmed(index), self.layout.decimal),
+                    Some(_) if row.trimmed(index).is_empty() => Some(f64::NAN),
+                    Some(clock) => clock.seconds(row.trimmed(index)),
+                };
+                sum += value.unwrap_or(f64::NAN);
+                flaw = flaw.or(Some(index).filter(|_| value.is_none()));
             }
-            let cell = row.trimmed(column.index);
+            column.values.push(held(column.mapping, column.converted_to.as_ref(), sum));
+            let Some(index) = flaw else { continue };
+            let cell = row.trimmed(index);
             let is_below_names = line <= self.layout.lines_above() + 1;
             let problem = not_a_value(column.mapping, cell, self.layout, is_below_names);
             let error = place().problem(problem);
             // What is left of a number where a file breaks off is such a cell.
-            let may_be_cut = column.index + 1 == found
+            let may_be_cut = index + 1 == found
                 && cell.iter().all(|letter| b"0123456789+-.,eE:T/ ".contains(letter));
             if !may_be_cut {
                 return Err(error);

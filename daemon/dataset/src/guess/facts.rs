@@ -27,6 +27,12 @@ impl Spread {
         }
     }
 
+    /// The mean; `None` without a value.
+    fn mean(&self) -> Option<f64> {
+        let count = self.values.len();
+        (count > 0).then(|| self.values.iter().sum::<f64>() / count as f64)
+    }
+
     /// The value below which this share of the values' magnitudes lies.
     fn quantile(&self, share: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
         let mut sorted: Vec<f64> = self.values.iter().map(|&value| of(value)).collect();
@@ -162,6 +168,11 @@ impl Facts {
     /// The greatest magnitude, single spikes left out; `None` without a number.
     pub fn top(&self) -> Option<f64> {
         self.values.quantile(0.99, f64::abs)
+    }
+
+    /// The mean; `None` without a number.
+    pub fn mean(&self) -> Option<f64> {
+        self.values.mean()
     }
 
     /// The middle value; `None` without a number.

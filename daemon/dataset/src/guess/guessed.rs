@@ -4,7 +4,7 @@ use dynocar_core::plausibility::InputFault;
 use dynocar_model::units::Unit;
 
 use super::facts::Facts;
-use super::name::{Name, Spelled, named_unit};
+use super::name::{Name, named_unit};
 use super::plausible::{UnitChoice, choose_unit};
 use crate::diagnostic::concerned;
 use crate::{GradientSource, Quantity, Run, TextLayout, TimeFormat};
@@ -49,6 +49,8 @@ pub struct GuessedColumn {
     pub quantity: Quantity,
     /// Its name in the header.
     pub name: Name,
+    /// Further columns, which add up with it.
+    pub parts: Vec<Name>,
     /// The unit of `cell * scale`.
     pub unit: Unit,
     /// Factor on the cell.
@@ -100,19 +102,20 @@ impl GuessedColumn {
         (name, facts): (&Name, &Facts),
         quantity: Quantity,
         reason: String,
-        (given, named): (Option<Unit>, Option<Spelled>),
+        (given, named): (Option<Unit>, Option<Unit>),
     ) -> Self {
         let unit = match given {
             Some(unit) => {
-                UnitChoice { spelled: unit.into(), reason: "the unit as given".into(), doubt: None }
+                UnitChoice { unit, scale: 1.0, reason: "the unit as given".into(), doubt: None }
             }
             None => choose_unit(quantity, facts, named),
         };
         let guessed = GuessedColumn {
             quantity,
             name: name.clone(),
-            unit: unit.spelled.unit,
-            scale: unit.spelled.scale,
+            parts: Vec::new(),
+            unit: unit.unit,
+            scale: unit.scale,
             format: None,
             reasons: vec![reason, unit.reason],
             doubts: unit.doubt.into_iter().collect(),

@@ -1,5 +1,7 @@
 //! How a file's text falls into cells: delimiter, decimal mark, the lines above the names, names and units.
-use super::name::{self, Name};
+use dynocar_model::units::is_unit;
+
+use super::name::Name;
 use crate::cell::parse_cell;
 use crate::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
 use crate::lines::{self, RowReader};
@@ -90,7 +92,7 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, DatasetError> {
     let units = units.map(|units| &rows[units]);
     let name = |(index, cell): (usize, &String)| {
         let unit = units.and_then(|row| row.cells.get(index)).map(|cell| without_brackets(cell));
-        Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && name::is_unit(unit)))
+        Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && is_unit(unit)))
     };
     let (delimiter, skip_rows) = (*delimiter, names.line - 1);
     let units_row = units.is_some();
@@ -136,7 +138,7 @@ impl Row {
     /// names of columns: t, v, F.
     fn is_of_units(&self) -> bool {
         let cells: Vec<String> = self.filled().map(without_brackets).collect();
-        let units: Vec<&String> = cells.iter().filter(|cell| name::is_unit(cell)).collect();
+        let units: Vec<&String> = cells.iter().filter(|cell| is_unit(cell)).collect();
         let is_plain = units.iter().any(|unit| unit.chars().count() > 1);
         self.is_of_words() && is_plain && 2 * units.len() >= cells.len()
     }

@@ -30,6 +30,8 @@ mod tests;
 pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, Recording, Unmapped};
 pub use name::Name;
 
+use dynocar_model::units::Unit;
+
 use super::{DatasetError, Quantity, SourcePosition};
 
 /// Guesses the description of recordings that are laid out alike, and takes what is declared for
@@ -44,6 +46,15 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
     let label = files.first().map_or("", |file| file.label);
     let mut assignment = assignment::Assignment::new(&read, given, label)?;
     assignment::settle(&mut assignment);
+    let at_names = || SourcePosition::line(label, read.layout.text.skip_rows + 1);
+    if let Some((column, quantity, reason)) = assignment.unknown_unit() {
+        let name = column.name.shown();
+        return Err(at_names().problem(format!(
+            "column '{name}' looks like {quantity}, but {reason}: say its unit: --column \
+             {quantity}=COLUMN:UNIT, or that it is something else by another name; the units: {}",
+            unit_names(quantity)
+        )));
+    }
     for quantity in [Quantity::Time, Quantity::Speed] {
         if !assignment.has(quantity) {
             let near = match assignment.near(quantity).join("; ") {
@@ -52,7 +63,7 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
             };
             let grows =
                 if quantity == Quantity::Time { " (numbers or times that grow)" } else { "" };
-            return Err(SourcePosition::line(label, read.layout.text.skip_rows + 1).problem(format!(
+            return Err(at_names().problem(format!(
                 "no column was recognised as {quantity}{near}; the columns: {}; say which it is: \
                  --column {quantity}=COLUMN:UNIT{grows}",
                 read.names()
@@ -73,4 +84,9 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
     });
     let runs = runs.collect();
     Ok(Guess { layout: read.layout.text, columns, unmapped, runs })
+}
+
+fn unit_names(quantity: Quantity) -> String {
+    let names: Vec<&str> = Unit::of(quantity.dimension()).map(|unit| unit.name()).collect();
+    names.join(", ")
 }

@@ -1,6 +1,8 @@
 //! Guesses of whole files.
 
 use super::*;
+
+mod others;
 use crate::TimeFormat;
 use Quantity::*;
 

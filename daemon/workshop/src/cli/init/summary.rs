@@ -64,7 +64,11 @@ fn recordings(described: &Described) -> String {
             scale => format!("{scale} × "),
         };
         table.push(vec![
-            format!("'{}'", column.name.shown()),
+            std::iter::once(&column.name)
+                .chain(&column.parts)
+                .map(|name| format!("'{}'", name.shown()))
+                .collect::<Vec<_>>()
+                .join(" + "),
             column.quantity.to_string(),
             match &column.format {
                 Some(format) => format.name().to_owned(),
