@@ -56,17 +56,22 @@ impl<'c> Assignment<'c> {
             assignment.take_given(it, columns).map_err(|words| place().problem(words))?;
         }
         for (index, column) in columns.columns.iter().enumerate() {
-            if column.unusable.is_some() || assignment.is_taken(index) {
+            if assignment.is_taken(index) {
                 continue;
             }
             let is_given = |quantity: &Quantity| given.iter().any(|it| it.quantity == *quantity);
             for quantity in Quantity::ALL.into_iter().filter(|it| !is_given(it)) {
-                match consider(&column.name, &column.all, quantity) {
-                    None => {}
-                    Some(Ok((score, guessed))) => {
-                        assignment.candidates.push(Candidate { column: index, score, guessed });
+                match (consider(&column.name, &column.all, quantity), &column.unusable) {
+                    (None, _) => {}
+                    (Some(_), Some(reason)) => {
+                        assignment.refused.push((index, quantity, reason.clone()));
                     }
-                    Some(Err(reason)) => assignment.refused.push((index, quantity, reason)),
+                    (Some(found), None) => match found {
+                        Ok((score, guessed)) => {
+                            assignment.candidates.push(Candidate { column: index, score, guessed });
+                        }
+                        Err(reason) => assignment.refused.push((index, quantity, reason)),
+                    },
                 }
             }
         }
@@ -84,6 +89,8 @@ impl<'c> Assignment<'c> {
         };
         let column = &self.columns[index];
         let reason = match &column.unusable {
+            // How its cells are to be read is said.
+            _ if given.format.is_some() => Ok(()),
             Some(reason) => Err(reason.clone()),
             None => can_hold(&column.all, quantity),
         };
@@ -93,7 +100,7 @@ impl<'c> Assignment<'c> {
         let unit = (given.unit, named_unit(&column.name, quantity));
         let reason = "given on the command line".into();
         let guessed = GuessedColumn::new((&column.name, &column.all), quantity, reason, unit);
-        self.taken.push((index, guessed, true));
+        self.taken.push((index, guessed.given_as(given.format.as_ref()), true));
         Ok(())
     }
 
@@ -280,6 +287,7 @@ impl<'c> Assignment<'c> {
                 format!("could be {}{by}", it.quantity)
             }
             (.., Some((_, quantity, reason))) => format!("not {quantity}: {reason}"),
+            _ if column.name.text.is_empty() => "it has no name".into(),
             _ => "its name says none of the quantities".into(),
         };
         Unmapped { name: column.name.clone(), reason }

@@ -27,6 +27,8 @@ pub struct GivenColumn {
     pub column: String,
     /// Its unit; `None` where name and values are to reveal it.
     pub unit: Option<Unit>,
+    /// How its cells are written, where they are times and that is said.
+    pub format: Option<TimeFormat>,
 }
 
 /// The description of recordings, as far as it can be guessed.
@@ -125,8 +127,18 @@ impl GuessedColumn {
         };
         match (quantity, &facts.formats()[..]) {
             (Quantity::Time, [format, others @ ..]) => guessed.written_as(format, others),
+            (Quantity::Time, []) if given.is_none() && guessed.is_unit_open => match facts.packed()
+            {
+                Some(format) => guessed.written_as(&format, &[]),
+                None => guessed,
+            },
             _ => guessed,
         }
+    }
+
+    /// The same, its cells times in the format that is given.
+    pub(super) fn given_as(self, format: Option<&TimeFormat>) -> Self {
+        format.map_or(self.clone(), |format| self.written_as(format, &[]))
     }
 
     /// The same, its cells times in a format; in others they could be, too.
@@ -134,8 +146,14 @@ impl GuessedColumn {
         self.reasons[1] = format!("its cells are times as {}", format.example());
         // A day without a leading zero is read where one stands, too.
         let plain = |format: &TimeFormat| format.name().replace('-', "");
-        let others = others.iter().filter(|other| plain(other) != plain(format));
-        let others: Vec<&str> = others.map(|it| it.name()).collect();
+        let mut known = vec![plain(format)];
+        let mut others: Vec<&str> = others.iter().map(|it| it.name()).collect();
+        others.retain(|other| {
+            let other = other.replace('-', "");
+            let is_new = !known.contains(&other);
+            known.push(other);
+            is_new
+        });
         let doubt = || format!("they could be {}, too", others.join(" or "));
         let doubts = (!others.is_empty()).then(doubt).into_iter().collect();
         let (unit, format) = (Unit::base_of(self.quantity.dimension()), Some(format.clone()));

@@ -1,8 +1,8 @@
 //! Which quantity a column's name and values speak for.
 
-use dynocar_model::units::{Unit, is_unit};
+use dynocar_model::units::{Dimension, Unit, is_unit};
 
-use super::facts::Facts;
+use super::facts::{Facts, Text};
 use super::guessed::GuessedColumn;
 use super::name::{Name, readings};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
@@ -15,6 +15,8 @@ const SAID: i32 = 100;
 const ENOUGH: i32 = 45;
 /// A name below this is a doubtful sign.
 const SURE: i32 = 65;
+/// One cell of text among more than so many numbers is a mistake in the file.
+const TEXTS_RARE: usize = 50;
 /// Terms of so many letters are found within a longer word, too.
 const WITHIN_MIN: usize = 6;
 
@@ -35,6 +37,9 @@ pub fn consider(
     facts: &Facts,
     quantity: Quantity,
 ) -> Option<Result<(i32, GuessedColumn), String>> {
+    if name.text.is_empty() && (quantity != Quantity::Time || facts.formats().is_empty()) {
+        return None;
+    }
     let by_name = match quantity {
         // What stands in brackets behind the name may be the times' form.
         Quantity::Time if !facts.formats().is_empty() => {
@@ -57,8 +62,23 @@ pub fn consider(
 ///
 /// What speaks against it.
 pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
-    if let Some(text) = &facts.text {
-        return Err(format!("it holds text in line {}: '{}'", text.line, text.cell));
+    if facts.truths > 0 && quantity.dimension() != Dimension::Count {
+        return Err("it holds words of truth".into());
+    }
+    // One bad cell among many is an error in its line, and unmaps no force.
+    let is_needed = matches!(
+        quantity,
+        Quantity::Time
+            | Quantity::Speed
+            | Quantity::TractionForce
+            | Quantity::BrakeForce
+            | Quantity::ControlForce
+            | Quantity::TractionPower
+    );
+    let is_rare = facts.texts * TEXTS_RARE < facts.numbers;
+    if let Some(text) = facts.text.as_ref().filter(|_| !(is_needed && is_rare)) {
+        let Text { file, line, cell } = text;
+        return Err(format!("it holds text in {file}line {line}: '{cell}'"));
     }
     let (Some(top), min, max) = (facts.top(), facts.min, facts.max) else {
         return Err("it holds no value".into());

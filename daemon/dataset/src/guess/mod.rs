@@ -8,6 +8,7 @@
 //! # Layout, in the order of the work
 //!
 //! - `layout`, `columns`, `facts`: delimiter, decimal mark, names and units; what the values are like
+//! - `marks`: which marks stand in numbers
 //! - `name`, `vocabulary`: a name in words, units as people write them, what recorders
 //!   call the quantities
 //! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
@@ -19,6 +20,7 @@ mod columns;
 mod facts;
 pub mod guessed;
 mod layout;
+mod marks;
 mod matching;
 mod name;
 mod plausible;
@@ -61,8 +63,11 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
                 none if none.is_empty() => none,
                 near => format!(" ({near})"),
             };
-            let grows =
-                if quantity == Quantity::Time { " (numbers or times that grow)" } else { "" };
+            let grows = if quantity == Quantity::Time {
+                " or time=COLUMN:FORMAT, as %d.%m.%Y %H:%M:%S"
+            } else {
+                ""
+            };
             return Err(at_names().problem(format!(
                 "no column was recognised as {quantity}{near}; the columns: {}; say which it is: \
                  --column {quantity}=COLUMN:UNIT{grows}",

@@ -99,7 +99,7 @@ fn decimal_commas_without_quotes_are_distinguished_from_delimiters() {
 fn a_file_that_breaks_off_in_its_last_line_loses_that_line_only() {
     for end in ["2", "2,", "2,-", "2,1e"] {
         let table = table("", &format!("t,v,x\n0,1,5\n1,1,5\n{end}")).unwrap();
-        let lines = LineCounts { rows: 2, short: 0, truncated: true };
+        let lines = LineCounts { rows: 2, truncated: true, ..LineCounts::default() };
         assert_eq!(table.lines, lines, "{end:?}");
         assert_eq!(table.column(Quantity::Time).unwrap(), [0.0, 1.0]);
     }
@@ -108,7 +108,7 @@ fn a_file_that_breaks_off_in_its_last_line_loses_that_line_only() {
 #[test]
 fn a_short_row_elsewhere_has_missing_cells() {
     let table = table("", "t,v\n0,1\n1\n2,1\n").unwrap();
-    assert_eq!(table.lines, LineCounts { rows: 3, short: 1, truncated: false });
+    assert_eq!(table.lines, LineCounts { rows: 3, short: 1, ..LineCounts::default() });
     assert!(table.column(Quantity::Speed).unwrap()[1].is_nan());
 }
 

@@ -79,6 +79,9 @@ fn layout_text(layout: &TextLayout) -> String {
     let delimiter = char::from(layout.delimiter).to_string();
     text += &format!("delimiter = {}\n", quoted(&delimiter));
     text += &format!("decimal = {}\n", quoted(&char::from(layout.decimal).to_string()));
+    if let Some(mark) = layout.thousands {
+        text += &format!("thousands = {}\n", quoted(&mark.to_string()));
+    }
     if layout.skip_rows > 0 {
         text += &format!("skip_rows = {:<19}# lines above the names\n", layout.skip_rows);
     }
