@@ -60,6 +60,21 @@ pub struct ColumnMapping {
 }
 
 impl ColumnMapping {
+    /// A column of times in s, which takes columns of numbers, too.
+    pub fn of_time(column: &str) -> Self {
+        ColumnMapping {
+            quantity: Quantity::Time,
+            column: column.into(),
+            parts: Vec::new(),
+            is_doubtful: false,
+            unit: Quantity::Time.unit(),
+            format: None,
+            scale: 1.0,
+            offset: 0.0,
+            place: SourcePosition::whole(column),
+        }
+    }
+
     /// The names of its columns.
     pub fn names(&self) -> impl Iterator<Item = &String> {
         std::iter::once(&self.column).chain(&self.parts)

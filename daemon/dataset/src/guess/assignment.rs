@@ -9,6 +9,8 @@ use super::matching::{UNKNOWN_UNIT, can_hold, consider};
 use super::name::named_unit;
 use crate::{DatasetError, Quantity, SourcePosition};
 
+/// Logarithm of the ratio of a position's span and the integrated speed that gaps and wear explain.
+const SPAN_MISFIT: f64 = 0.2;
 /// A column whose name says less than another's by no more than this could be it as well.
 const NEAR: i32 = 25;
 
@@ -201,6 +203,50 @@ impl<'c> Assignment<'c> {
     /// What the values are like of the column that is taken for a quantity.
     pub fn facts(&self, quantity: Quantity) -> Option<&'c Facts> {
         self.taken_for(quantity).map(|(index, ..)| &self.columns[*index].all)
+    }
+
+    /// Takes the column for the position that spans what the speed says, where another does not and more speaks for
+    /// its name.
+    pub fn weigh_positions(&mut self) {
+        let Some((at, taken, false)) = self
+            .taken_for(Quantity::Position)
+            .map(|(at, guessed, given)| (*at, guessed.clone(), *given))
+        else {
+            return;
+        };
+        let Some((time_at, time, _)) = self.taken_for(Quantity::Time) else { return };
+        let Some((speed_at, speed, _)) = self.taken_for(Quantity::Speed) else { return };
+        let facts = |column: usize| &self.columns[column].facts;
+        let base =
+            |guessed: &GuessedColumn, value: f64| guessed.unit.to_base(value * guessed.scale);
+        // Times that are no numbers are in s already.
+        let driven_m: f64 = facts(*time_at)
+            .iter()
+            .zip(facts(*speed_at))
+            .filter_map(|(times, speeds)| {
+                Some(base(time, times.span()?) * base(speed, speeds.mean()?))
+            })
+            .sum();
+        let misfit = |column: usize, guessed: &GuessedColumn| {
+            let spans = facts(column).iter().filter_map(Facts::span);
+            (spans.map(|span| base(guessed, span)).sum::<f64>() / driven_m).ln().abs()
+        };
+        let own = misfit(at, &taken);
+        let others = self
+            .candidates
+            .iter()
+            .filter(|it| it.guessed.quantity == Quantity::Position && !self.is_taken(it.column));
+        let best = others
+            .map(|it| (misfit(it.column, &it.guessed), it))
+            .filter(|(misfit, _)| *misfit < SPAN_MISFIT && own > 2.0 * SPAN_MISFIT)
+            .min_by(|one, other| one.0.total_cmp(&other.0));
+        let Some((_, best)) = best else { return };
+        let (column, mut guessed) = (best.column, best.guessed.clone());
+        guessed
+            .reasons
+            .push(format!("it spans what the speed says, which '{}' does not", self.shown(at)));
+        self.taken.retain(|(_, guessed, _)| guessed.quantity != Quantity::Position);
+        self.taken.push((column, guessed, false));
     }
 
     /// Takes a quantity's column for another quantity instead, with a doubt; what was declared stays.

@@ -48,6 +48,7 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
     let label = files.first().map_or("", |file| file.label);
     let mut assignment = assignment::Assignment::new(&read, given, label)?;
     assignment::settle(&mut assignment);
+    assignment.weigh_positions();
     let at_names = || SourcePosition::line(label, read.layout.text.skip_rows + 1);
     if let Some((column, quantity, reason)) = assignment.unknown_unit() {
         let name = column.name.shown();

@@ -8,6 +8,8 @@ use crate::Quantity;
 
 /// Values so many times beyond the usual ones are none of a quantity in a unit.
 const FAR: f64 = 20.0;
+/// Some 3000 years in s.
+const TIME_MAX_S: f64 = 1e11;
 /// The factor of recorders that write counts of a thousandth.
 const RAW_COUNT: f64 = 1e-3;
 
@@ -56,7 +58,7 @@ pub fn choose_unit(quantity: Quantity, facts: &Facts, named: Option<Unit>) -> Un
     match (named, shown) {
         (Some(unit), None) => said(unit),
         (Some(unit), Some((usual, figure))) => judge(unit, usual, figure),
-        (None, Some((usual, figure))) => by_values(quantity, usual, figure),
+        (None, Some((usual, figure))) => by_values(quantity, usual, figure, facts.max),
         (None, None) => {
             let unit = quantity.unit();
             let counts = unit.name() == "1";
@@ -87,8 +89,15 @@ fn judge(unit: Unit, usual: &Usual, (figure, words): (f64, String)) -> UnitChoic
 }
 
 /// The likeliest unit where the name gives none.
-fn by_values(quantity: Quantity, usual: &Usual, (figure, words): (f64, String)) -> UnitChoice {
+fn by_values(
+    quantity: Quantity,
+    usual: &Usual,
+    (figure, words): (f64, String),
+    max: f64,
+) -> UnitChoice {
     let units = usual.units.iter().filter_map(|name| Unit::find(quantity.dimension(), name));
+    // No clock counts longer than from the year 0.
+    let units = units.filter(|it| quantity != Quantity::Time || it.to_base(max) < TIME_MAX_S);
     let mut fits: Vec<(f64, Unit)> =
         units.map(|unit| (usual.distance(unit.to_base(figure)), unit)).collect();
     // Stable: of units that fit alike, the likelier comes first.

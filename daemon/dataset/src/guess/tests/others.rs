@@ -129,3 +129,113 @@ fn an_unknown_unit_is_an_error_that_names_it() {
     assert!(guess_of(&["traction force [kN] (front)"], |time| vec![time]).is_ok());
     assert!(guess_of(&["Zugkraft [Lok 1]"], |time| vec![time]).is_ok());
 }
+
+#[test]
+fn the_position_is_that_which_the_speed_spans_and_its_direction_that_of_most_steps() {
+    let text = |rows: &dyn Fn(f64) -> (f64, f64)| {
+        let row = |second: u32| {
+            let (one, other) = rows(f64::from(second));
+            format!("{second},20,{one},{other}\n")
+        };
+        let rows: String = (0..300).map(row).collect();
+        format!("time [s],speed [m/s],distance [m],odometer [m]\n{rows}")
+    };
+    let guess = guessed(&text(&|time| (1.5 * time, 20.0 * time)));
+    assert_eq!(guess.column(Position).unwrap().name.text, "odometer [m]");
+    let guess = guessed(&text(&|time| (20.0 * time, 1e6 * time)));
+    assert_eq!(guess.column(Position).unwrap().name.text, "distance [m]");
+    let falling = |time: f64| if time < 60.0 { 0.0 } else { 40_000.0 - 20.0 * time };
+    let guess = guessed(&text(&|time| (falling(time), falling(time))));
+    assert_eq!(guess.runs[0].direction, -1);
+}
+
+/// What the practice file of [`file`] is guessed to be with another first column, and the samples that it gives.
+fn times_of(cells: impl Fn(f64) -> String) -> (Guess, Vec<i64>) {
+    let rows = (0..900).map(|row| {
+        let time = 0.2 * f64::from(row);
+        format!("{};{:.3};{}\n", cells(time), 0.05 * time, 300.0 - time)
+    });
+    let text = format!("Timestamp;speed [m/s];traction force [kN]\n{}", rows.collect::<String>());
+    let guess = guess(&[Recording { label: "a.csv", text: &text }], &[]).unwrap();
+    let time = guess.column(Time).unwrap();
+    let how = match &time.format {
+        Some(format) => format!("format='{}'", format.name()),
+        None => format!("unit='{}',scale={:?}", time.unit.name(), time.scale),
+    };
+    let manifest = format!(
+        "[dataset]\nname='x'\ndelimiter=';'\n[train]\nfile='t'\n[columns]\ntime={{column='Timestamp',{how}}}\n\
+         speed={{column='speed [m/s]',unit='m/s'}}\n[[runs]]\nfile='a.csv'\n"
+    );
+    let train =
+        "[train]\nmass_t=100\nlength_m=50\nrotating_mass_factor=0\n[resistance]\na=1\nb=0\nc=0\n";
+    let files = [("dataset.toml", &manifest[..]), ("t", train), ("a.csv", &text)];
+    let dataset = crate::Dataset::load(&files[..]).unwrap();
+    let first_ns = dataset.runs[0].samples[0].time_ns;
+    (guess, dataset.runs[0].samples.iter().map(|it| it.time_ns - first_ns).collect())
+}
+
+#[test]
+fn times_are_read_as_they_were_recorded() {
+    let clock = |time: f64, from_s: f64| {
+        let ms = ((from_s + time) * 1000.0).round() as u64;
+        (ms / 3_600_000, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000)
+    };
+    let with = |form: fn((u64, u64, u64, u64)) -> String, from_s: f64| {
+        move |time: f64| form(clock(time, from_s))
+    };
+    let cases: [(&str, Box<dyn Fn(f64) -> String>); 11] = [
+        (
+            "AM",
+            Box::new(with(
+                |(h, m, s, ms)| format!("3/18/2026 {h}:{m:02}:{s:02}.{ms:03} AM"),
+                26_000.0,
+            )),
+        ),
+        ("ms", Box::new(with(|(h, m, s, ms)| format!("{h:02}:{m:02}:{s:02}:{ms:03}"), 26_000.0))),
+        ("mm:ss", Box::new(with(|(_, m, s, ms)| format!("{m:02}:{s:02}.{}", ms / 100), 3500.0))),
+        (
+            "UTC",
+            Box::new(with(
+                |(h, m, s, ms)| format!("2026-03-18 {h:02}:{m:02}:{s:02}.{ms:03} UTC"),
+                26_000.0,
+            )),
+        ),
+        (
+            "+0100",
+            Box::new(with(
+                |(h, m, s, ms)| format!("2026-03-18 {h:02}:{m:02}:{s:02}.{ms:03} +0100"),
+                26_000.0,
+            )),
+        ),
+        (
+            "days",
+            Box::new(with(|(h, m, s, ms)| format!("0 days {h:02}:{m:02}:{s:02}.{ms:03}000"), 10.0)),
+        ),
+        (
+            "packed",
+            Box::new(with(|(h, m, s, ms)| format!("{h:02}{m:02}{s:02}.{:02}", ms / 10), 34_400.0)),
+        ),
+        (
+            "stamp",
+            Box::new(with(|(h, m, s, ms)| format!("20260318{h:02}{m:02}{s:02}.{ms:03}"), 26_000.0)),
+        ),
+        ("Excel", Box::new(|time| format!("{:.9}", 46_099.301 + time / 86_400.0))),
+        (
+            "ticks",
+            Box::new(|time| {
+                format!("{}", 638_000_000_000_000_000_u64 + (time * 1e7).round() as u64)
+            }),
+        ),
+        ("whole", Box::new(with(|(h, m, s, _)| format!("{h:02}:{m:02}:{s:02}"), 26_000.0))),
+    ];
+    for (name, cells) in cases {
+        let (guess, times_ns) = times_of(cells);
+        let time = guess.column(Time).unwrap();
+        let worst = times_ns
+            .iter()
+            .enumerate()
+            .map(|(row, ns)| (ns - 200_000_000 * row as i64).abs())
+            .max();
+        assert!(worst.unwrap() < 200_000, "{name}: {worst:?} {time:?} {:?}", &times_ns[..12]);
+    }
+}

@@ -7,9 +7,11 @@ use clap::Args;
 use dialoguer::Input;
 use dynocar::cli::Failure;
 use dynocar::output::require_new;
+use dynocar_analysis::dataset::encoding::by_name;
 use dynocar_analysis::dataset::guess::GivenColumn;
 use dynocar_analysis::dataset::{Quantity, TimeFormat};
 use dynocar_model::units::Unit;
+use encoding_rs::Encoding;
 
 use super::summary::DAEMON_FILE;
 use crate::cli::train_text::{QUESTIONS, TrainArguments};
@@ -30,6 +32,9 @@ pub struct InitArguments {
     /// Recorded runs of the train, laid out alike; of several the last one is held out
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub csv: Vec<PathBuf>,
+    /// Which letters the files' bytes are, as windows-1251 or gbk [default: UTF-8, else guessed]
+    #[arg(long, value_name = "NAME", requires = "csv", value_parser = encoding)]
+    pub encoding: Option<&'static Encoding>,
     /// Say what a column holds, as speed=v_ist:km/h or time=Zeit:%d.%m.%Y %H:%M:%S; may be given several times
     #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = given_column)]
     pub column: Vec<GivenColumn>,
@@ -47,6 +52,12 @@ impl InitArguments {
 /// True where nobody can be asked.
 fn nobody_is_there() -> bool {
     !(stdin().is_terminal() && stderr().is_terminal())
+}
+
+/// An encoding by one of its names.
+fn encoding(name: &str) -> Result<&'static Encoding, String> {
+    let expected = "expected a name of the WHATWG's, as windows-1251, gbk, shift_jis or ibm866";
+    by_name(name).ok_or_else(|| expected.into())
 }
 
 /// What somebody says of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
