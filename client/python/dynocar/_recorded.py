@@ -10,7 +10,6 @@ import html
 import json
 import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterable
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from ._errors import WorkError
+from ._kept import Kept
 from ._records import Record, _restored
 
 PathLike = str | os.PathLike[str]
@@ -236,56 +235,6 @@ class GrownFiles(NamedTuple):
     not_expressed: list[str]
 
 
-class _Kept:
-    """What is asked of an explanation in another process."""
-
-    def __init__(self, answers: dict[str, Any], grown: dict[str, str] | Exception) -> None:
-        self._answers = answers
-        self._grown = grown
-
-    @classmethod
-    def of(cls, native: _native.Explained | _Kept) -> _Kept:
-        if isinstance(native, _Kept):
-            return native
-        names = ("json", "text", "page", "plots", "predictions")
-        answers = {name: getattr(native, name)() for name in names}
-        grown: dict[str, str] | Exception
-        try:
-            with tempfile.TemporaryDirectory() as folder:
-                files, answers["not_expressed"] = native.write_grown(folder)
-                grown = {Path(file).name: Path(file).read_text() for file in files}
-        except Exception as error:
-            grown = error
-        return cls(answers, grown)
-
-    def json(self) -> str:
-        return str(self._answers["json"])
-
-    def text(self) -> str:
-        return str(self._answers["text"])
-
-    def page(self) -> str:
-        return str(self._answers["page"])
-
-    def plots(self) -> list[tuple[str, str]]:
-        return list(self._answers["plots"])
-
-    def predictions(self) -> list[tuple[str, _native.Table]]:
-        return list(self._answers["predictions"])
-
-    def write_grown(self, folder: PathLike) -> tuple[list[Path], list[str]]:
-        if isinstance(self._grown, Exception):
-            raise self._grown
-        place = Path(folder)
-        place.mkdir(parents=True, exist_ok=True)
-        taken = [place / name for name in self._grown if (place / name).exists()]
-        if taken:
-            raise WorkError(f"{taken[0]}: exists already")
-        for name, text in self._grown.items():
-            (place / name).write_text(text)
-        return [place / name for name in self._grown], self._answers["not_expressed"]
-
-
 class Explanation(_Answer):
     """Which effect explains what the declared model leaves. A notebook shows it with the plots."""
 
@@ -312,7 +261,7 @@ class Explanation(_Answer):
     considered: list[Record]
     identifiability: list[Record]  # kind, parameter, std at no effect, told, alike
 
-    def __init__(self, native: _native.Explained | _Kept) -> None:
+    def __init__(self, native: _native.Explained | Kept) -> None:
         super().__init__(json.loads(native.json()), native.text())
         self.__dict__["_native"] = native
 
@@ -337,7 +286,7 @@ class Explanation(_Answer):
     def __reduce__(self) -> tuple[Any, ...]:
         # What another process may ask for is made now: the runs stay here.
         state = {key: value for key, value in self.__dict__.items() if key != "_native"}
-        state["_native"] = _Kept.of(self._native)
+        state["_native"] = Kept.of(self._native)
         return (_restored, (type(self), state))
 
     def _repr_html_(self) -> str:

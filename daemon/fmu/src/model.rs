@@ -145,8 +145,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// In the wrong order, for times that are no numbers, for a point other than the end of the step before, and for a
-    /// step that the train cannot take.
+    /// In the wrong order, for a point other than the end of the step before, and for a step that the train cannot take.
     ///
     /// # Real-time
     ///
@@ -160,8 +159,7 @@ impl Model {
             return Err(ModelError::BadValue { name, value: step_s, expected });
         }
         // A new trip may have a clock of its own.
-        let is_new_run = self.inputs.sample.run != self.run_before;
-        if let Some(next_s) = self.next_s.filter(|_| !is_new_run)
+        if let Some(next_s) = self.next_s.filter(|_| self.inputs.sample.run == self.run_before)
             && (time_s - next_s).abs() > POINT_TOLERANCE * time_s.abs().max(step_s).max(1.0)
         {
             return Err(ModelError::OffPoint { time_s, next_s });
@@ -254,7 +252,6 @@ impl Model {
         Ok(match (self.got(reference, Kind::Boolean)?.meaning, &self.behind) {
             (Meaning::Begins(_), _) => self.beginning.is_held_at_rest,
             (Meaning::Estimate(of, _), Behind::Estimators(it)) => it.is_usable(of),
-            (Meaning::Estimate(..), _) => false,
             _ => self.inputs.sample.flags & FLAG_WHEEL_SLIDE != 0,
         })
     }

@@ -197,3 +197,30 @@ fn times_of_loggers_are_read_and_bad_ones_named() {
          format = \"clock\" in place of unit"
     );
 }
+
+#[test]
+fn words_for_missing_numbers_marks_of_thousands_and_footers_are_read() {
+    let missing =
+        ["n/a", "#N/A", "NULL", "None", "<NA>", "1.#QNAN", "-", "#DIV/0!", "null", "NaN", "#NV"];
+    for word in missing {
+        assert_eq!(speeds("", &format!("t,v\n0,1\n1,{word}\n2,3\n")), [Some(1.0), None, Some(3.0)]);
+    }
+    for (dataset, cell) in [
+        ("delimiter = \";\"\ndecimal = \",\"\nthousands = \".\"", "1.755,5"),
+        ("delimiter = \";\"\nthousands = \",\"", "1,755.5"),
+        ("delimiter = \";\"\nthousands = \"'\"", "1'755.5"),
+        ("delimiter = \";\"\ndecimal = \",\"\nthousands = \" \"", "1 755,5"),
+    ] {
+        assert_eq!(speeds(dataset, &format!("t;v\n0;{cell}\n")), [Some(1755.5)], "{cell}");
+    }
+    let wrong = table("delimiter = \";\"\nthousands = \",\"", "t;v\n0;1,75\n").unwrap_err();
+    assert!(wrong.contains("expected a number"), "{wrong}");
+    let hint = table("delimiter = \";\"", "t;v\n0;1\n1;1'755.5\n").unwrap_err();
+    assert!(hint.contains("set thousands = \"'\""), "{hint}");
+    for footer in ["End of file\n", "t,v\n2,2\n", "\0\0\0\0", "\x1a", "-- end, of\n"] {
+        let read = speeds("", &format!("t,v\n0,1\n1,2\n{footer}"));
+        assert_eq!(read[..2], [Some(1.0), Some(2.0)], "{footer:?}");
+    }
+    let text = table("", "t,v\n0,1\nabc,2\n2,3\n").unwrap_err();
+    assert!(text.contains("a.csv:3: column 't'") && text.contains("'abc'"), "{text}");
+}
