@@ -31,7 +31,24 @@ fn other_format(head: &[u8], encoding: &'static Encoding) -> Option<&'static str
     if [UTF_16LE, UTF_16BE].contains(&encoding) {
         return None;
     }
-    let begins: [(&[u8], &'static str); 5] = [
+    let begins: [(&[u8], &'static str); 16] = [
+        (b"PAR1", "a Parquet file: give it a name that ends with .parquet"),
+        (
+            b"\x89MCAP0",
+            "an MCAP recording: dynocar check reads it as it is, under a name that ends with .mcap",
+        ),
+        (b"MDF     ", "an MF4 or MDF file: export it, as asammdf does with export(\"csv\")"),
+        (b"TDSm", "a TDMS file: export it, as npTDMS does with as_dataframe().to_csv()"),
+        (b"\x89HDF\r\n", "an HDF5 or MATLAB 7.3 file: export its columns as CSV or Parquet"),
+        (b"MATLAB 5.0", "a MATLAB file: export its columns, as writetable does"),
+        (
+            b"LOGG",
+            "a BLF file of CAN frames: decode it to signals first, as asammdf does with a DBC file",
+        ),
+        (b"SQLite format 3", "an SQLite database: export the table as CSV"),
+        (b"#ROSBAG", "a ROS bag: export its topics as CSV"),
+        (b"ARROW1", "an Arrow or Feather file: write it as Parquet"),
+        (b"\x28\xb5\x2f\xfd", "a zstd file: unpack it first"),
         (&[0x1f, 0x8b], "a gzip file: unpack it first"),
         (b"PK\x03\x04", "a zip file or a workbook: unpack it, or save the sheet as CSV"),
         (b"\xd0\xcf\x11\xe0", "a workbook: save the sheet as CSV"),

@@ -44,7 +44,9 @@ pub fn columns_of(file: &Path, mappings: &[ColumnMapping]) -> Result<Vec<RunColu
     let mut command = call(PARQUET);
     command.arg("columns").arg(file);
     for it in mappings {
-        command.arg("--column").arg(&it.column).arg(it.unit.name());
+        for name in it.names() {
+            command.arg("--column").arg(name).arg(it.unit.name());
+        }
     }
     let columns = taken_of(PARQUET, &mut command, |it| columns_stream::read(it));
     columns.map_err(CallFailure::words)?.ok_or_else(|| format!("{PARQUET}: hands over no columns"))

@@ -92,7 +92,7 @@ fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
 }
 
 /// Sets the inputs of one row and steps.
-fn take_row(fmu: &Fmu, header: &[&str], row: &str) {
+fn take_row(fmu: &Fmu, header: &[&str], (row, next): (&str, Option<&&str>)) {
     let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
     for (name, &cell) in header.iter().zip(&cells).skip(1) {
         let reference = reference(name);
@@ -103,7 +103,9 @@ fn take_row(fmu: &Fmu, header: &[&str], row: &str) {
         };
         assert_eq!(went, Status::Ok, "{name} = {cell}: {}", fmu.said());
     }
-    assert_eq!(fmu.step(cells[0]), Status::Ok, "{}", fmu.said());
+    let time_s = |row: &str| row.split(',').next().unwrap().parse::<f64>().unwrap();
+    let step_s = next.map_or(0.1, |next| time_s(next) - cells[0]);
+    assert_eq!(fmu.step_for(cells[0], step_s), Status::Ok, "{}", fmu.said());
 }
 
 #[test]
@@ -124,8 +126,9 @@ fn every_output_has_the_bits_of_identify_at_every_moment_looked_at() {
         assert!(text.starts_with(dynocar_workshop::fmu::INPUTS_MARK));
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-        for row in lines {
-            take_row(&fmu, &header, row);
+        let rows: Vec<&str> = lines.collect();
+        for (index, row) in rows.iter().enumerate() {
+            take_row(&fmu, &header, (row, rows.get(index + 1)));
             count += 1;
             if [1, 300, 2_000, 4_900, 11_111].contains(&count) {
                 assert_as_identified(&fmu, &dataset, count);
@@ -158,7 +161,10 @@ fn the_fmu_holds_what_the_standard_asks_for_and_is_the_same_twice() {
     assert!(bytes("a.fmu") == bytes("b.fmu"), "nothing in it depends on the hour");
     let folder = unpacked(&site, "a.fmu");
     let description = read_to_string(folder.join("modelDescription.xml")).unwrap();
-    assert_eq!(description, dynocar_fmu::model_description(&ESTIMATORS));
+    assert_eq!(
+        description,
+        dynocar_fmu::model_description(&ESTIMATORS, dynocar_fmu::STEP_DEFAULT_S)
+    );
     let platform = if cfg!(target_arch = "x86_64") { "linux64" } else { "aarch64-linux" };
     let library = read(folder.join(format!("binaries/{platform}/dynocar.so"))).unwrap();
     assert!(library.starts_with(b"\x7fELF"));
@@ -219,7 +225,12 @@ fn an_instance_that_was_refused_something_goes_on_and_begins_anew() {
     let (speed, rejected) = (reference("speed_mps"), reference("mass.rejected"));
     for (value, count) in [(f64::NAN, 1), (f64::INFINITY, 2), (1e30, 3)] {
         assert_eq!(fmu.set_real(speed, value), Status::Ok);
-        assert_eq!(fmu.step(f64::from(count)), Status::Ok, "{}", fmu.said());
+        let time_s = f64::from(count - 1);
+        assert_eq!(fmu.step_for(time_s, 1.0), Status::Ok, "{}", fmu.said());
+        for elsewhere_s in [time_s, time_s - 5.0, time_s + 1000.0] {
+            assert_eq!(fmu.step_for(elsewhere_s, 1.0), Status::Error, "{elsewhere_s}");
+            assert!(fmu.said().contains("the end of the step before"), "{}", fmu.said());
+        }
         assert_eq!(fmu.integer(rejected), Some(count), "after a speed of {value}");
     }
     let a = fmu.real(reference("resistance.a"));

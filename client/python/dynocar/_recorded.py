@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from ._records import Record
+from ._kept import Kept
+from ._records import Record, _restored
 
 PathLike = str | os.PathLike[str]
 # Given the share done, 0 to 1, and what is being done.
@@ -40,6 +41,9 @@ class Table:
         # NumPy's own types do not know its array interface.
         columns: list[tuple[str, Any]] = list(self._native.columns())
         return {name: np.asarray(column) for name, column in columns}
+
+    def __reduce__(self) -> tuple[type[Table], tuple[_native.Table]]:
+        return (Table, (self._native,))
 
     def __len__(self) -> int:
         return len(self._native)
@@ -257,7 +261,7 @@ class Explanation(_Answer):
     considered: list[Record]
     identifiability: list[Record]  # kind, parameter, std at no effect, told, alike
 
-    def __init__(self, native: _native.Explained) -> None:
+    def __init__(self, native: _native.Explained | Kept) -> None:
         super().__init__(json.loads(native.json()), native.text())
         self.__dict__["_native"] = native
 
@@ -278,6 +282,12 @@ class Explanation(_Answer):
     def write_grown(self, folder: PathLike) -> GrownFiles:
         """Writes the model with the effects as ``train.toml`` and ``track.toml``."""
         return GrownFiles(*self._native.write_grown(folder))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # What another process may ask for is made now: the runs stay here.
+        state = {key: value for key, value in self.__dict__.items() if key != "_native"}
+        state["_native"] = Kept.of(self._native)
+        return (_restored, (type(self), state))
 
     def _repr_html_(self) -> str:
         plots = "".join(plot.svg for plot in self.plots)

@@ -23,6 +23,9 @@ class Record:
         made = {key: _made(self._kinds.get(key, Record), value) for key, value in fields.items()}
         self.__dict__["_fields"] = made
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_restored, (type(self), self.__dict__))
+
     def __getattr__(self, name: str) -> Any:
         fields = self.__dict__.get("_fields", {})
         if name in fields:
@@ -61,6 +64,12 @@ class Record:
     def to_dict(self) -> dict[str, Any]:
         """Plain dictionaries, lists, numbers and texts."""
         return {key: _plain(value) for key, value in self._fields.items()}
+
+
+def _restored(kind: type[Record], state: dict[str, Any]) -> Record:
+    record = kind.__new__(kind)
+    record.__dict__.update(state)
+    return record
 
 
 def _made(kind: type[Record], value: Any) -> Any:

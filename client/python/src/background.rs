@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 /// How often signals are looked for.
@@ -25,14 +26,18 @@ pub(crate) fn in_background<T: Send + 'static>(
     let is_given_up = Arc::new(AtomicBool::new(false));
     let (sender, mut steps) = channel();
     let is_unwanted = Arc::clone(&is_given_up);
+    // Threads of this call: those of an earlier one are not there in a forked child.
+    let threads = rayon::ThreadPoolBuilder::new().build();
+    let threads = threads.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
     let worker = std::thread::spawn(move || {
-        work(&move |share: f64, what: &str| {
+        let progress = move |share: f64, what: &str| {
             if is_unwanted.load(Ordering::Relaxed) {
                 resume_unwind(Box::new("given up"));
             }
             // Fails only when the work was given up this moment.
             let _ = sender.send((share, what.replace('_', " ")));
-        })
+        };
+        threads.install(|| work(&progress))
     });
     loop {
         let (step, back) = py.detach(move || (steps.recv_timeout(SIGNALS_EVERY), steps));

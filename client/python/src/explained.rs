@@ -72,8 +72,8 @@ impl Explained {
     /// Speeds that the updated model predicts, by run.
     fn predictions(&self) -> PyResult<Vec<(String, Table)>> {
         let table = |run: &PredictedRun| -> PyResult<(String, Table)> {
-            let columns =
-                vec![("time_s", run.time_s.clone()), ("speed_mps", run.speed_mps.clone())];
+            let columns = [("time_s", &run.time_s), ("speed_mps", &run.speed_mps)];
+            let columns = columns.map(|(name, values)| (name.to_owned(), values.clone())).to_vec();
             Ok((run.file.clone(), Table::of(columns)?))
         };
         self.explanation.predictions.iter().map(table).collect()

@@ -9,13 +9,15 @@ use dynocar_analysis::dataset::{EXTRAS, Quantity, Run};
 use dynocar_shared::SampleField;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyType};
 
 /// Name of the column that distinguishes the runs of a dataset.
 const RUN: &str = "run";
 
 /// Named columns of one length, NaN where a value is missing.
-pub(crate) type Columns = Vec<(&'static str, Vec<f64>)>;
+pub(crate) type Columns = Vec<(String, Vec<f64>)>;
+/// A batch for a pickle: the run's number, and the bytes of its columns.
+type Kept<B> = (Option<u32>, Vec<(String, B)>);
 
 /// A column of numbers, which NumPy takes by `numpy.asarray`.
 #[pyclass(frozen, module = "dynocar._native")]
@@ -42,6 +44,38 @@ pub(crate) struct Table(Vec<RecordBatch>);
 
 #[pymethods]
 impl Table {
+    /// The table that a pickle has kept.
+    #[new]
+    fn kept(batches: Vec<Kept<Vec<u8>>>) -> PyResult<Self> {
+        let numbers = |bytes: &[u8]| {
+            let (numbers, _) = bytes.as_chunks();
+            numbers.iter().map(|it| f64::from_ne_bytes(*it)).collect()
+        };
+        let batches = batches.into_iter().map(|(run, columns)| {
+            batch(run, columns.into_iter().map(|(name, bytes)| (name, numbers(&bytes))).collect())
+        });
+        Ok(Table(batches.collect::<PyResult<_>>()?))
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> (Bound<'py, PyType>, (Vec<Kept<Bound<'py, PyBytes>>>,)) {
+        let py = slf.py();
+        let kept = |batch: &RecordBatch| {
+            let named = || batch.schema_ref().fields().iter().zip(batch.columns());
+            let run = named().find_map(|(_, array)| {
+                array.as_any().downcast_ref::<UInt32Array>()?.values().first().copied()
+            });
+            let columns = named().filter_map(|(field, array)| {
+                let numbers = array.as_any().downcast_ref::<Float64Array>()?.values();
+                let bytes: Vec<u8> = numbers.iter().flat_map(|it| it.to_ne_bytes()).collect();
+                Some((field.name().clone(), PyBytes::new(py, &bytes)))
+            });
+            (run, columns.collect())
+        };
+        (slf.get_type(), (slf.get().0.iter().map(kept).collect(),))
+    }
+
     /// The columns of numbers of the first batch, with their names.
     fn columns(&self) -> Vec<(String, Column)> {
         let Some(batch) = self.0.first() else { return Vec::new() };
@@ -107,7 +141,7 @@ const SAMPLES_AT_ONCE: usize = 512;
 
 /// What a run holds: its times, these quantities of its samples, and of those beyond them.
 fn quantities(run: &Run, fields: &[SampleField], known: &[(Quantity, &'static str)]) -> Columns {
-    let column = |name| (name, Vec::with_capacity(run.samples.len()));
+    let column = |name: &str| (name.to_owned(), Vec::with_capacity(run.samples.len()));
     let mut times = column("time_s");
     let mut columns: Columns = fields.iter().map(|field| column(field.name())).collect();
     for samples in run.samples.chunks(SAMPLES_AT_ONCE) {
@@ -121,7 +155,7 @@ fn quantities(run: &Run, fields: &[SampleField], known: &[(Quantity, &'static st
         let known =
             run.extra(*quantity).into_iter().flatten().map(|value| value.unwrap_or(f64::NAN));
         let whole = known.chain(std::iter::repeat(f64::NAN)).take(run.samples.len());
-        columns.push((*name, whole.collect()));
+        columns.push(((*name).to_owned(), whole.collect()));
     }
     columns
 }
@@ -129,7 +163,8 @@ fn quantities(run: &Run, fields: &[SampleField], known: &[(Quantity, &'static st
 /// Columns in Arrow's form: what is missing is null there, and NaN in the memory that NumPy sees.
 fn batch(run: Option<u32>, columns: Columns) -> PyResult<RecordBatch> {
     let rows = columns.first().map_or(0, |(_, values)| values.len());
-    let number = run.map(|run| (RUN, Arc::new(UInt32Array::from(vec![run; rows])) as ArrayRef));
+    let number =
+        run.map(|run| (RUN.to_owned(), Arc::new(UInt32Array::from(vec![run; rows])) as ArrayRef));
     let numbers = columns.into_iter().map(|(name, values)| {
         let is_known = |row: usize| !values[row].is_nan();
         let known = BooleanBuffer::collect_bool(values.len(), is_known);

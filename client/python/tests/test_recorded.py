@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import multiprocessing
 import os
 import pickle
 import signal
@@ -314,3 +315,28 @@ def read_some(terminal: int) -> bytes:
         return os.read(terminal, 4096)
     except OSError:  # the other side is closed
         return b""
+
+
+def test_results_go_to_other_processes_and_back(recordings: Path, tmp_path: Path) -> None:
+    dataset = pickle.loads(pickle.dumps(dynocar.read_dataset(recordings)))
+    again = dynocar.read_dataset(recordings)
+    for name, column in again.runs[0].columns.items():
+        np.testing.assert_array_equal(dataset.runs[0].columns[name], column)
+    assert pyarrow.table(dataset).equals(pyarrow.table(again))
+    explanation = dynocar.explain(recordings)
+    carried = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(explanation))))
+    assert carried == explanation and str(carried) == str(explanation)
+    assert carried.report() == explanation.report() and carried.plots == explanation.plots
+    assert list(carried.predictions) == list(explanation.predictions)
+    grown = [it.write_grown(tmp_path / name) for it, name in ((explanation, "a"), (carried, "b"))]
+    texts = [[Path(file).read_text() for file in files.files] for files in grown]
+    assert texts[0] == texts[1]
+
+
+def test_a_forked_child_answers_as_its_parent(recordings: Path) -> None:
+    here = [str(dynocar.check(recordings)), str(dynocar.identify(recordings))]
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        check = pool.map_async(dynocar.check, [recordings] * 4)
+        identify = pool.apply_async(dynocar.identify, (recordings,))
+        assert {str(it) for it in check.get(120)} == {here[0]}
+        assert str(identify.get(120)) == here[1]

@@ -9,15 +9,45 @@ const HALF_WINDOW_M: f64 = 150.0;
 /// A fit over fewer m than this says nothing.
 const SPAN_MIN_M: f64 = 100.0;
 
-/// Gradient in ‰ at every row, climbing positive as the chainage grows, `NaN` where unknown:
-/// the slope of the straight line fitted by least squares to the altitudes around the place.
+/// A train whose altitude was recorded.
+pub(super) struct Recorded<'t> {
+    /// Chainage of its centre in m, row by row.
+    pub centre_m: &'t [f64],
+    /// Chainage in m of the point whose altitude is recorded.
+    pub point_m: &'t [f64],
+    /// Altitude in m of that point.
+    pub altitude_m: &'t [f64],
+    /// Length in m.
+    pub length_m: f64,
+}
+
+/// Gradient in ‰ under a train at every row, climbing positive as the chainage grows, `NaN` where unknown: the mean
+/// over its length of the slope of the straight line fitted by least squares to the altitudes around each place.
 ///
-/// Positions and altitudes are in m, `NaN` where missing.
-pub(super) fn gradient_permille(position_m: &[f64], altitude_m: &[f64]) -> Vec<f64> {
-    let cells = cells(position_m, altitude_m);
+/// Positions and altitudes are `NaN` where missing.
+pub(super) fn gradient_permille(of: &Recorded) -> Vec<f64> {
+    let cells = cells(of.point_m, of.altitude_m);
     let slopes = slopes(&cells);
-    let at = |position: f64| Some(1000.0 * slopes[nearest(&cells, position)?]);
-    position_m.iter().map(|&position| at(position).unwrap_or(f64::NAN)).collect()
+    // Sums of the known slopes, and their number, before each cell.
+    let mut sums = vec![(0.0, 0.0)];
+    for slope in &slopes {
+        let (sum, count) = sums[sums.len() - 1];
+        let is_known = !slope.is_nan();
+        sums.push(if is_known { (sum + slope, count + 1.0) } else { (sum, count) });
+    }
+    let under = |centre_m: f64| {
+        let half_m = 0.5 * of.length_m;
+        let before = |at_m: f64| cells.partition_point(|cell| cell.position_m < at_m);
+        let (from, to) = (before(centre_m - half_m), before(centre_m + half_m));
+        // A train no longer than a cell or two is a point.
+        if half_m <= CELL_M || to < from + 2 {
+            return nearest(&cells, centre_m).map(|cell| slopes[cell]);
+        }
+        let (sum, count) = (sums[to].0 - sums[from].0, sums[to].1 - sums[from].1);
+        (count > 0.0).then(|| sum / count)
+    };
+    let rows = of.centre_m.iter();
+    rows.map(|&centre_m| 1000.0 * under(centre_m).unwrap_or(f64::NAN)).collect()
 }
 
 /// The cell nearest to a place, when it lies within the window.
@@ -98,6 +128,39 @@ fn slope(cells: &[Cell]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of a train taken as a point.
+    fn gradient_permille(position_m: &[f64], altitude_m: &[f64]) -> Vec<f64> {
+        let point =
+            Recorded { centre_m: position_m, point_m: position_m, altitude_m, length_m: 1.0 };
+        super::gradient_permille(&point)
+    }
+
+    #[test]
+    fn the_gradient_is_the_mean_under_the_train_wherever_the_altitude_is_recorded() {
+        let (hill_m, length_m) = (493.0, 700.0);
+        let truth = |s: f64| 12.0 * (s / hill_m).sin();
+        for direction in [1.0, -1.0] {
+            let head: Vec<f64> = (0..9000).map(|i| 10_000.0 + direction * f64::from(i)).collect();
+            let altitude: Vec<f64> =
+                head.iter().map(|s| 400.0 - 12e-3 * hill_m * (s / hill_m).cos()).collect();
+            let centre: Vec<f64> = head.iter().map(|s| s - 0.5 * direction * length_m).collect();
+            let found = super::gradient_permille(&Recorded {
+                centre_m: &centre,
+                point_m: &head,
+                altitude_m: &altitude,
+                length_m,
+            });
+            // The mean of a sine over a train.
+            let shrunk = (0.5 * length_m / hill_m).sin() / (0.5 * length_m / hill_m);
+            let errors: Vec<f64> = found[1000..8000]
+                .iter()
+                .zip(&centre[1000..])
+                .map(|(slope, s)| slope - shrunk * truth(*s))
+                .collect();
+            assert!(root_mean_square(&errors) < 0.2, "{}", root_mean_square(&errors));
+        }
+    }
 
     fn root_mean_square(errors: &[f64]) -> f64 {
         (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()

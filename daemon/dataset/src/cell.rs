@@ -7,19 +7,83 @@ use dynocar_model::units::Unit;
 use super::clock::TimeFormat;
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
-use super::text_layout::TextLayout;
+use super::text_layout::{THOUSANDS, TextLayout};
 
-/// The number in a trimmed cell, `NaN` for an empty one; `None` when it is something else.
-pub fn parse_cell(cell: &[u8], decimal: u8) -> Option<f64> {
+/// What programs write for a missing number, in small letters.
+const MISSING: &str = "n/a na #n/a #na <na> nan null (null) none nil nat - -- --- . ? * missing #n/v #nv #null! #value! \
+                       #wert! #num! #zahl! #div/0! #ref! #bezug! #name? 1.#qnan -1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf \
+                       1.#snan bad invalid no_data nodata undefined undef";
+
+/// Marks of a number: before its fraction, and between groups of three digits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Marks {
+    /// Before the fraction.
+    pub decimal: u8,
+    /// Between groups of three digits; `None` where nothing is.
+    pub thousands: Option<char>,
+}
+
+impl Marks {
+    /// A point and nothing, or a comma and nothing.
+    pub const fn plain(decimal: u8) -> Self {
+        Marks { decimal, thousands: None }
+    }
+}
+
+/// The number in a trimmed cell, `NaN` for an empty one and a word for what is missing; `None` when it is something
+/// else.
+pub fn parse_cell(cell: &[u8], marks: Marks) -> Option<f64> {
     if cell.is_empty() {
         return Some(f64::NAN);
     }
     let text = std::str::from_utf8(cell).ok()?;
-    if decimal == b',' {
+    let number = match marks.thousands.filter(|mark| text.contains(*mark)) {
+        Some(mark) => decimal(&ungrouped(text, mark, char::from(marks.decimal))?, marks.decimal),
+        None => decimal(text, marks.decimal),
+    };
+    number.or_else(|| is_missing(text).then_some(f64::NAN))
+}
+
+fn decimal(text: &str, mark: u8) -> Option<f64> {
+    if mark == b',' {
         // A point would be a mark of thousands here, or a mistake: neither is a number.
         return if text.contains('.') { None } else { text.replace(',', ".").parse().ok() };
     }
     text.parse().ok()
+}
+
+/// A number without the marks between its groups of three digits; `None` where they stand elsewhere.
+pub fn ungrouped(text: &str, mark: char, decimal: char) -> Option<String> {
+    let (whole, fraction) = text.split_once(decimal).map_or((text, None), |(a, b)| (a, Some(b)));
+    let is_digits = |it: &str| it.bytes().all(|byte| byte.is_ascii_digit());
+    let unsigned = whole.trim_start_matches(['+', '-']);
+    let mut groups = unsigned.split(mark);
+    let first = groups.next()?;
+    let is_first = (1..=3).contains(&first.len()) && is_digits(first);
+    let is_grouped = is_first && groups.all(|group| group.len() == 3 && is_digits(group));
+    let rest = fraction.map_or(String::new(), |it| format!("{decimal}{it}"));
+    is_grouped.then(|| whole.replace(mark, "") + &rest)
+}
+
+fn is_missing(text: &str) -> bool {
+    let folded = text.to_lowercase().replace(' ', "_");
+    MISSING.split(' ').any(|word| word == folded)
+}
+
+/// 1 for a word that says yes, 0 for one that says no.
+pub fn truth(cell: &[u8]) -> Option<f64> {
+    let word = std::str::from_utf8(cell).ok()?.to_lowercase();
+    match &word[..] {
+        "true" | "yes" | "on" | "ja" | "wahr" | "oui" | "vrai" | "si" | "ein" => Some(1.0),
+        "false" | "no" | "off" | "nein" | "falsch" | "non" | "faux" | "aus" => Some(0.0),
+        _ => None,
+    }
+}
+
+/// True for a cell that begins as no number does: a word.
+pub fn is_word(cell: &[u8]) -> bool {
+    let begins = |byte: &u8| byte.is_ascii_digit() || b"+-.,".contains(byte);
+    cell.first().is_some_and(|byte| !begins(byte))
 }
 
 /// A greater number in SI units is none of a railway's; its square or sum might be infinite.
@@ -55,9 +119,11 @@ pub fn not_a_value(
         format!("; for such times set format = \"{}\"{instead}", format.name())
     } else if mapping.format.is_none()
         && layout.decimal == b'.'
-        && parse_cell(&with_point, b'.').is_some()
+        && parse_cell(&with_point, Marks::plain(b'.')).is_some()
     {
         "; for decimal commas set decimal = \",\" in [dataset]".into()
+    } else if let Some(mark) = grouping(cell, layout) {
+        format!("; for marks of thousands set thousands = {mark:?} in [dataset]")
     } else if is_below_names && !layout.units_row {
         "; for a line of units below the names set units_row = true in [dataset]".into()
     } else {
@@ -73,6 +139,15 @@ pub fn not_a_value(
             format.name()
         ),
     }
+}
+
+/// The mark that would make a number of a cell, were it between groups of three digits.
+fn grouping(cell: &[u8], layout: &TextLayout) -> Option<String> {
+    let with = |thousands| Marks { thousands: Some(thousands), ..layout.marks() };
+    let mark = THOUSANDS.into_iter().filter(|mark| *mark != char::from(layout.decimal));
+    mark.map(|mark| (mark, with(mark)))
+        .find(|(_, marks)| parse_cell(cell, *marks).is_some())
+        .map(|(mark, _)| mark.to_string())
 }
 
 /// Bytes as text, whatever they are.

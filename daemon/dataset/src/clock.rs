@@ -3,6 +3,8 @@
 //! A run's times count from the midnight before its first row, so that they stay small numbers; the
 //! day itself is kept beside them. Local time without a zone counts as UTC.
 
+use std::borrow::Cow;
+
 use time::format_description::{self, OwnedFormatItem};
 use time::parsing::Parsed;
 use time::{Date, Time};
@@ -18,12 +20,14 @@ pub enum TimeFormat {
     Iso,
     /// `07:13:20.2`, which begins anew at midnight.
     Clock,
+    /// `0 days 07:13:20.2`, or `31:13:20.2`: the time since a start.
+    Elapsed,
     /// As `strftime` writes it: `%d.%m.%Y %H:%M:%S`.
     Pattern(String),
 }
 
 /// The formats that are looked for in cells that nobody described, the likeliest first.
-const PATTERNS: [&str; 9] = [
+const PATTERNS: [&str; 20] = [
     "%d.%m.%Y %H:%M:%S",
     "%-d.%-m.%Y %-H:%M:%S",
     "%d/%m/%Y %H:%M:%S",
@@ -32,8 +36,22 @@ const PATTERNS: [&str; 9] = [
     "%d-%m-%Y %H:%M:%S",
     "%d.%m.%y %H:%M:%S",
     "%m/%d/%Y %I:%M:%S %p",
+    "%-m/%-d/%Y %-I:%M:%S %p",
+    "%-m/%-d/%Y %-H:%M:%S",
+    "%-I:%M:%S %p",
     "%Y%m%d %H:%M:%S",
+    "%Y%m%dT%H%M%S",
+    "%d-%b-%Y %H:%M:%S",
+    "%d %b %Y %H:%M:%S",
+    "%b %d, %Y %-I:%M:%S %p",
+    "%b %d %Y %H:%M:%S",
+    "%d-%b-%y %H:%M:%S",
+    "%a %b %d %H:%M:%S %Y",
+    "%M:%S",
 ];
+/// Times packed into one number.
+const PACKED_CLOCK: &str = "%H%M%S";
+const PACKED_DATE: &str = "%Y%m%d%H%M%S";
 
 impl TimeFormat {
     /// The format of this name, or of this pattern; `None` where it is none, or leaves hours or part
@@ -42,11 +60,13 @@ impl TimeFormat {
         match name {
             "iso" => return Some(TimeFormat::Iso),
             "clock" => return Some(TimeFormat::Clock),
+            "elapsed" => return Some(TimeFormat::Elapsed),
             _ => {}
         }
         let date = [DAY, MONTH, YEAR].map(|marks| has(name, marks));
         let is_whole = date.iter().all(|it| *it) || date.iter().all(|it| !*it);
-        let is_sound = is_whole && has(name, HOUR) && compiled(name).is_some();
+        let has_clock = has(name, HOUR) || (!date[0] && has(name, MINUTE) && has(name, SECOND));
+        let is_sound = is_whole && has_clock && compiled(without_half(name)).is_some();
         is_sound.then(|| TimeFormat::Pattern(name.into()))
     }
 
@@ -55,6 +75,7 @@ impl TimeFormat {
         match self {
             TimeFormat::Iso => "iso",
             TimeFormat::Clock => "clock",
+            TimeFormat::Elapsed => "elapsed",
             TimeFormat::Pattern(pattern) => pattern,
         }
     }
@@ -63,7 +84,7 @@ impl TimeFormat {
     pub fn has_date(&self) -> bool {
         match self {
             TimeFormat::Iso => true,
-            TimeFormat::Clock => false,
+            TimeFormat::Clock | TimeFormat::Elapsed => false,
             TimeFormat::Pattern(pattern) => has(pattern, YEAR),
         }
     }
@@ -73,6 +94,7 @@ impl TimeFormat {
         match self {
             TimeFormat::Iso => "2026-03-18T07:13:20.2",
             TimeFormat::Clock => "07:13:20.2",
+            TimeFormat::Elapsed => "0 days 07:13:20.2",
             TimeFormat::Pattern(pattern) => pattern,
         }
     }
@@ -80,10 +102,57 @@ impl TimeFormat {
     /// The formats in which a cell is a time, the likeliest first.
     pub(super) fn of_cell(cell: &[u8]) -> Vec<TimeFormat> {
         let patterns = PATTERNS.into_iter().map(|pattern| TimeFormat::Pattern(pattern.into()));
-        let all = [TimeFormat::Iso, TimeFormat::Clock].into_iter().chain(patterns);
+        let all = [TimeFormat::Iso, TimeFormat::Clock, TimeFormat::Elapsed];
+        let all = all.into_iter().chain(patterns);
         // No number is a time, and most cells are numbers.
-        let may_be = cell.contains(&b':');
-        all.filter(|it| may_be && DayClock::new(it).seconds(cell).is_some()).collect()
+        let may_be = cell.contains(&b':') || cell.get(8) == Some(&b'T');
+        let is_it = |it: &TimeFormat| match it {
+            // Hours and minutes look like minutes and seconds.
+            TimeFormat::Pattern(pattern) if !has(pattern, HOUR) && !cell.contains(&b'.') => false,
+            // Within a day it is a clock's.
+            TimeFormat::Elapsed if DayClock::new(&TimeFormat::Clock).seconds(cell).is_some() => {
+                false
+            }
+            _ => DayClock::new(it).seconds(cell).is_some(),
+        };
+        all.filter(|it| may_be && is_it(it)).collect()
+    }
+}
+
+/// Whether numbers are times that are packed: hours, minutes and seconds as digits, with or without a date before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Packed {
+    is_clock: bool,
+    is_date: bool,
+    last: f64,
+    /// How often the seconds began anew.
+    minutes: usize,
+}
+
+impl Packed {
+    /// Nothing seen yet.
+    pub const NEW: Packed = Packed { is_clock: true, is_date: true, last: f64::NAN, minutes: 0 };
+
+    /// Takes in a number.
+    pub fn push(&mut self, number: f64) {
+        let clock = number.rem_euclid(1e6);
+        let part = |below: f64, over: f64| (clock / over).floor().rem_euclid(100.0) < below;
+        let is_clock = part(24.0, 1e4) && part(60.0, 100.0) && part(60.0, 1.0);
+        self.is_clock &= is_clock && (0.0..240_000.0).contains(&number);
+        self.is_date &= is_clock && (19_700_101e6..21_000_101e6).contains(&number);
+        // From 59 to 0 a packed time leaps by 40 at least, and a count of seconds does not.
+        self.minutes += usize::from(number - self.last >= 40.0 && number % 100.0 < 30.0);
+        self.last = number;
+    }
+
+    /// The format; `None` for numbers that are none, or that do not show it.
+    pub fn format(&self) -> Option<TimeFormat> {
+        let pattern = match self {
+            Packed { is_date: true, last, .. } if !last.is_nan() => PACKED_DATE,
+            Packed { is_clock: true, minutes: 2.., .. } => PACKED_CLOCK,
+            _ => return None,
+        };
+        Some(TimeFormat::Pattern(pattern.into()))
     }
 }
 
@@ -92,6 +161,15 @@ const DAY: &[char] = &['d', 'e', 'F', 'D'];
 const MONTH: &[char] = &['m', 'b', 'B', 'F', 'D'];
 const YEAR: &[char] = &['Y', 'y', 'F', 'D'];
 const HOUR: &[char] = &['H', 'I', 'k', 'l', 'T', 'R', 'r'];
+const MINUTE: &[char] = &['M'];
+const SECOND: &[char] = &['S'];
+/// The end of a pattern that says which half of the day it is.
+const HALF: &str = "%p";
+
+/// A pattern without its half of the day, before which a fraction may stand.
+fn without_half(pattern: &str) -> &str {
+    pattern.strip_suffix(HALF).map_or(pattern, str::trim_end)
+}
 
 fn has(pattern: &str, marks: &[char]) -> bool {
     pattern.split('%').skip(1).any(|part| part.trim_start_matches('-').starts_with(marks))
@@ -115,8 +193,8 @@ impl DayClock {
     pub fn new(format: &TimeFormat) -> Self {
         let patterns: &[&str] = match format {
             TimeFormat::Iso => &["%Y-%m-%d", "%H:%M:%S"],
-            TimeFormat::Clock => &["%-H:%M:%S"],
-            TimeFormat::Pattern(pattern) => &[pattern],
+            TimeFormat::Clock | TimeFormat::Elapsed => &["%-H:%M:%S"],
+            TimeFormat::Pattern(pattern) => &[without_half(pattern)],
         };
         let items = patterns.iter().filter_map(|pattern| compiled(pattern)).collect();
         DayClock { format: format.clone(), items, first_day: None, last_s: None }
@@ -142,10 +220,15 @@ impl DayClock {
                 let first = *self.first_day.get_or_insert(day);
                 (day - first) as f64 * DAY_S + of_day_s
             }
-            // The day in which it is nearest to the row before.
+            None if self.format == TimeFormat::Elapsed => of_day_s,
+            // The day, or the hour, in which it is nearest to the row before.
             None => {
                 let last_s = self.last_s.unwrap_or(of_day_s);
-                of_day_s + DAY_S * ((last_s - of_day_s) / DAY_S).round()
+                let turn_s = match &self.format {
+                    TimeFormat::Pattern(pattern) if !has(pattern, HOUR) => 3600.0,
+                    _ => DAY_S,
+                };
+                of_day_s + turn_s * ((last_s - of_day_s) / turn_s).round()
             }
         };
         self.last_s = Some(time_s);
@@ -154,8 +237,27 @@ impl DayClock {
 
     /// The day, where the cell holds it, and the second of it, in UTC.
     fn read(&self, cell: &[u8]) -> Option<(Option<i64>, f64)> {
+        if self.format == TimeFormat::Elapsed {
+            return Some((None, elapsed_s(cell)?));
+        }
         let mut parsed = Parsed::new();
-        let mut rest = cell;
+        let (mut padded, mut half) = (Cow::Borrowed(cell), None);
+        if let TimeFormat::Pattern(pattern) = &self.format {
+            if pattern.ends_with(HALF) {
+                let (clock, is_afternoon) = split_half(cell)?;
+                (padded, half) = (clock.into(), Some(is_afternoon));
+            }
+            if pattern == PACKED_CLOCK {
+                padded = with_zeros(cell)?.into();
+            }
+            if !has(pattern, HOUR) {
+                parsed.set_hour_24(0)?;
+            }
+        }
+        if let Some(is_afternoon) = half {
+            parsed.set_hour_12_is_pm(is_afternoon)?;
+        }
+        let mut rest = &padded[..];
         for (index, item) in self.items.iter().enumerate() {
             if index > 0 {
                 rest = rest.strip_prefix(b"T").or(rest.strip_prefix(b" "))?;
@@ -194,9 +296,48 @@ fn with_century(mut parsed: Parsed) -> Parsed {
     parsed
 }
 
-/// A fraction of a second behind a point or a comma, 0 without, and what follows.
+/// Seconds of a time since a start: days in words, hours of any number, minutes and seconds.
+fn elapsed_s(cell: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(cell).ok()?;
+    let (sign, text) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest));
+    let (days, clock) = match text.split_once(" day") {
+        Some((days, clock)) => {
+            (days.parse::<f64>().ok()?, clock.trim_start_matches(['s', ',', ' ']))
+        }
+        None => (0.0, text),
+    };
+    let mut parts = clock.trim_start_matches('+').split(':');
+    let mut part = || parts.next()?.parse::<f64>().ok().filter(|it| *it >= 0.0);
+    let (hours, minutes, seconds) = (part()?, part()?, part()?);
+    let is_clock = parts.next().is_none() && minutes < 60.0 && seconds < 60.0 && hours < 1e6;
+    is_clock.then(|| sign * days * DAY_S + sign * (hours * 3600.0 + minutes * 60.0 + seconds))
+}
+
+/// A cell without its half of the day, and whether that is the second one.
+fn split_half(cell: &[u8]) -> Option<(&[u8], bool)> {
+    let folded: Vec<u8> = cell.to_ascii_lowercase();
+    let halves: [(&[u8], bool); 4] =
+        [(b"am", false), (b"pm", true), (b"a.m.", false), (b"p.m.", true)];
+    halves.into_iter().find_map(|(word, is_afternoon)| {
+        let clock = folded.strip_suffix(word)?;
+        Some((cell[..clock.len()].trim_ascii_end(), is_afternoon))
+    })
+}
+
+/// Packed hours, minutes and seconds with the zeros that a number loses before them.
+fn with_zeros(cell: &[u8]) -> Option<Vec<u8>> {
+    let digits = cell.iter().take_while(|it| it.is_ascii_digit()).count();
+    let zeros = 6_usize.checked_sub(digits).filter(|_| digits > 0)?;
+    Some([&b"000000"[..zeros], cell].concat())
+}
+
+/// A fraction of a second behind a point, a comma, or a colon before thousandths, or as further digits; 0 without; and
+/// what follows.
 fn fraction(text: &[u8]) -> Option<(f64, &[u8])> {
-    let Some(digits) = text.strip_prefix(b".").or(text.strip_prefix(b",")) else {
+    let thousandths = text.strip_prefix(b":").filter(|it| it.len() >= 3);
+    let more = Some(text).filter(|it| it.first().is_some_and(u8::is_ascii_digit));
+    let marked = text.strip_prefix(b".").or(text.strip_prefix(b","));
+    let Some(digits) = marked.or(thousandths).or(more) else {
         return Some((0.0, text));
     };
     let count = digits.iter().take_while(|it| it.is_ascii_digit()).count();
@@ -205,10 +346,12 @@ fn fraction(text: &[u8]) -> Option<(f64, &[u8])> {
     Some((value / 10_f64.powi(count as i32), rest))
 }
 
-/// A zone's offset in s: none, `Z`, or as `+01:00`.
+/// A zone's offset in s: none, `Z`, `UTC`, or as `+01:00`, `+0100`, with or without a space before.
 fn zone_s(text: &[u8]) -> Option<f64> {
-    let (sign, digits) = match text {
-        b"" | b"Z" => return Some(0.0),
+    let (sign, digits) = match text.trim_ascii_start() {
+        b"" | b"Z" | b"UTC" | b"GMT" => return Some(0.0),
+        b"CET" | b"MEZ" | b"BST" => return Some(3600.0),
+        b"CEST" | b"MESZ" => return Some(7200.0),
         [b'+', digits @ ..] => (1.0, digits),
         [b'-', digits @ ..] => (-1.0, digits),
         _ => return None,
@@ -243,78 +386,4 @@ pub(super) fn unix_s(at: &toml::value::Datetime) -> Option<i64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(format: &str, cells: &[&str]) -> (Option<i64>, Vec<Option<f64>>) {
-        let mut clock = DayClock::new(&TimeFormat::from_name(format).expect("a format"));
-        let seconds = cells.iter().map(|cell| clock.seconds(cell.as_bytes())).collect();
-        (clock.first_day(), seconds)
-    }
-
-    #[test]
-    fn dates_count_from_the_midnight_before_the_first_row() {
-        let cells = ["2026-03-18T07:13:20.25", "2026-03-18 07:13:21,5", "2026-03-19T00:00:01"];
-        let (day, seconds) = read("iso", &cells);
-        assert_eq!(day, Some(20_530));
-        assert_eq!(seconds, [Some(26_000.25), Some(26_001.5), Some(86_401.0)]);
-        let (day, seconds) = read("iso", &["2026-03-18T00:30:00+01:00", "2026-03-17T23:30:01Z"]);
-        assert_eq!((day, seconds), (Some(20_529), vec![Some(84_600.0), Some(84_601.0)]));
-        let (day, seconds) = read("%d.%m.%Y %H:%M:%S", &["18.03.2026 07:13:20,25"]);
-        assert_eq!((day, seconds), (Some(20_530), vec![Some(26_000.25)]));
-        let (day, seconds) = read("%m/%d/%Y %I:%M:%S %p", &["03/18/2026 07:13:20 PM"]);
-        assert_eq!((day, seconds), (Some(20_530), vec![Some(69_200.0)]));
-        assert_eq!(read("%d.%m.%y %H:%M:%S", &["18.03.26 07:13:20"]).0, Some(20_530));
-    }
-
-    #[test]
-    fn clock_times_pass_midnight_and_rows_out_of_order_do_not() {
-        let cells = ["23:59:59.5", "0:00:00,5", "23:59:59.9", "", "00:00:01"];
-        let expected = [Some(86_399.5), Some(86_400.5), Some(86_399.9), None, Some(86_401.0)];
-        assert_eq!(read("clock", &cells), (None, expected.to_vec()));
-    }
-
-    #[test]
-    fn what_is_no_time_is_none() {
-        for cell in
-            ["", "x", "2026-03-18", "2026-02-30T00:00:00", "2026-03-18T25:00:00", "07:13:20"]
-        {
-            assert_eq!(read("iso", &[cell]).1, [None], "{cell}");
-        }
-        for cell in ["24:00:00", "07:60:00", "07:13:20.2x", "07:13:20.", "7", "07:13:20+1"] {
-            assert_eq!(read("clock", &[cell]).1, [None], "{cell}");
-        }
-        for name in ["", "utc", "%H:%M:%Q", "%d.%m. %H:%M:%S", "%d.%m.%Y", "%"] {
-            assert_eq!(TimeFormat::from_name(name), None, "{name}");
-        }
-    }
-
-    #[test]
-    fn a_format_is_recognised_by_its_cells() {
-        let first = |cell: &str| {
-            TimeFormat::of_cell(cell.as_bytes()).first().map(|it| it.name().to_owned())
-        };
-        let cases = [
-            ("2026-03-18T07:13:20.2", Some("iso")),
-            ("2026-03-18 07:13:20", Some("iso")),
-            ("7:13:20", Some("clock")),
-            ("18.03.2026 07:13:20,2", Some("%d.%m.%Y %H:%M:%S")),
-            ("8.3.2026 7:13:20", Some("%-d.%-m.%Y %-H:%M:%S")),
-            ("03/18/2026 07:13:20", Some("%m/%d/%Y %H:%M:%S")),
-            ("3.5", None),
-            ("12:5", None),
-        ];
-        for (cell, expected) in cases {
-            assert_eq!(first(cell).as_deref(), expected, "{cell}");
-        }
-    }
-
-    #[test]
-    fn a_date_of_a_file_is_a_second_since_1970() {
-        let at = |text: &str| unix_s(&text.parse().expect("a TOML date"));
-        assert_eq!(at("2026-03-18"), Some(20_530 * 86_400));
-        assert_eq!(at("2026-03-18T07:13:20"), Some(20_530 * 86_400 + 26_000));
-        assert_eq!(at("2026-03-18T07:13:20+01:00"), Some(20_530 * 86_400 + 22_400));
-        assert_eq!(at("07:13:20"), None);
-    }
-}
+mod tests;

@@ -8,6 +8,7 @@ use toml::Value;
 use super::diagnostic::{Diagnostic, read_as};
 use super::forces::{Force, ForceSource};
 use super::motion::PositionSource;
+use super::order::quantile;
 use super::quality::RunQuality;
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
@@ -45,6 +46,8 @@ pub(super) fn diagnostics(
 ) -> Vec<Diagnostic> {
     let fault = |it: DetectedFault| Diagnostic::of_fault(it, read_as(context.manifest, it.fault));
     let mut diagnostics: Vec<Diagnostic> = detected.iter().copied().map(fault).collect();
+    of_doubts(context, &mut diagnostics);
+    of_clock(run, &mut diagnostics);
     of_time(quality, &mut diagnostics);
     of_content(context, run, quality, &mut diagnostics);
     diagnostics.extend(stands_still(run));
@@ -82,9 +85,12 @@ fn of_power(context: Context, run: &Resolved, diagnostics: &mut Vec<Diagnostic>)
         && run.table.filled(Quantity::BrakeCylinderPressure).is_some();
     let is_brake = run.forces.brake.source == ForceSource::Power && !has_friction;
     let Drive { efficiency, speed_min_mps, .. } = drive;
-    let of_drive = match declared {
-        Some(_) => "",
-        None => " as usual, since no efficiency is declared",
+    let (of_drive, severity) = match declared {
+        Some(_) => ("", Info),
+        None => (
+            " as usual, since no efficiency is declared: force and mass are known to a tenth of the power",
+            Warning,
+        ),
     };
     let of_brake = match is_brake {
         true => {
@@ -103,7 +109,60 @@ fn of_power(context: Context, run: &Resolved, diagnostics: &mut Vec<Diagnostic>)
         ("speed_min_mps", speed_min_mps.into()),
         ("is_brake", is_brake.into()),
     ];
-    diagnostics.push(Diagnostic::new("force_by_power", Info, text, figures));
+    diagnostics.push(Diagnostic::new("force_by_power", severity, text, figures));
+}
+
+/// What `init` doubted and nobody has confirmed.
+fn of_doubts(context: Context, diagnostics: &mut Vec<Diagnostic>) {
+    for mapping in context.manifest.columns.iter().filter(|mapping| mapping.is_doubtful) {
+        let (quantity, shown) = (mapping.quantity, mapping.shown());
+        let text = format!(
+            "{quantity} was DOUBTFUL when {shown} was taken for it, and nobody has confirmed it: set it \
+             right in dataset.toml or delete its doubtful = true"
+        );
+        diagnostics.push(Diagnostic::new("doubtful_input", Warning, text, [of(quantity)]));
+    }
+}
+
+/// What was done to the times, and what could not be.
+fn of_clock(run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
+    let faults = &run.clock_faults;
+    for &(row, jump_s) in &faults.jumps {
+        let (line, way) = (run.table.line(row), if jump_s < 0.0 { "back" } else { "forward" });
+        let text = format!(
+            "the clock went {way} by {:.0} s in line {line} while the train went on: summer time? The rows \
+             from there are read as if it had not",
+            jump_s.abs()
+        );
+        let figures = [("line", Value::Integer(line as i64)), ("jump_s", jump_s.into())];
+        diagnostics.push(Diagnostic::new("clock_change", Warning, text, figures));
+    }
+    if let Some(rows) = faults.shared {
+        let text = format!(
+            "{rows} rows share each time: they are spread evenly over the time to the next; a clock with \
+             fractions would tell more"
+        );
+        diagnostics.push(Diagnostic::new("whole_seconds", Warning, text, [of_count(rows)]));
+    }
+    if faults.sorted {
+        let text = "the rows stood in another order than that of time: they are sorted";
+        diagnostics.push(Diagnostic::new("sorted", Info, text, []));
+    }
+    if let Some((row, back_s)) = faults.anew {
+        let line = run.table.line(row);
+        let text = format!(
+            "the time begins anew in line {line}, {back_s:.1} s back, and overlaps what stands before: the rows \
+             from there are another run or another train, and need a file of their own"
+        );
+        let figures = [("line", Value::Integer(line as i64)), ("back_s", back_s.into())];
+        diagnostics.push(Diagnostic::new("time_begins_anew", Fundamental, text, figures));
+    }
+    if run.table.lines.notes > 0 {
+        let count = run.table.lines.notes;
+        let text =
+            format!("{count} lines between or below the rows hold words alone: they are left out");
+        diagnostics.push(Diagnostic::new("notes_left_out", Info, text, [of_count(count)]));
+    }
 }
 
 fn of_time(quality: &RunQuality, diagnostics: &mut Vec<Diagnostic>) {
@@ -208,8 +267,8 @@ fn of_position(
         positions.sort_by(f64::total_cmp);
         positions[(positions.len() - 1) / 2]
     };
-    let (first, last) = (positions.clone().take(few), positions.rev().take(few));
-    let net_m = median_m(last.collect()) - median_m(first.collect());
+    let (first, last) = (positions.clone().take(few), positions.clone().rev().take(few));
+    let net_m = median_m(last.collect()) - median_m(first.collect()) - leap_m(positions);
     let direction = run.entry.direction;
     let is_reported =
         |faults: &[InputFault]| detected.iter().any(|detected| faults.contains(&detected.fault));
@@ -250,6 +309,17 @@ fn of_position(
             [("from_m", from_m.into()), ("to_m", to_m.into()), ("length_m", length_m.into())];
         diagnostics.push(Diagnostic::new("off_the_line", Warning, text, figures));
     }
+}
+
+/// The leap in m from a position that a receiver held before its first fix; 0 without one.
+fn leap_m(positions: impl Iterator<Item = f64>) -> f64 {
+    let positions: Vec<f64> = positions.collect();
+    let held = positions.iter().take_while(|it| **it == positions[0]).count();
+    let Some(&fixed_m) = positions.get(held).filter(|_| positions[0] == 0.0) else { return 0.0 };
+    let mut steps: Vec<f64> =
+        positions[held..].windows(2).map(|it| (it[1] - it[0]).abs()).collect();
+    let usual_m = quantile(&mut steps, 0.9).unwrap_or(0.0);
+    if fixed_m.abs() > DISTANCE_MIN_M + 10.0 * usual_m { fixed_m } else { 0.0 }
 }
 
 fn of_force(

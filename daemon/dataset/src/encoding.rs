@@ -8,7 +8,7 @@ use super::error::FileProblem;
 pub(super) const USUAL: [&str; 5] = ["utf-8", "windows-1252", "iso-8859-2", "utf-16le", "utf-16be"];
 
 /// The encoding of this name, as `utf-8`, `windows-1252`, `cp1252` or `latin1`.
-pub(super) fn by_name(name: &str) -> Option<&'static Encoding> {
+pub fn by_name(name: &str) -> Option<&'static Encoding> {
     Encoding::for_label_no_replacement(name.as_bytes())
 }
 

@@ -15,7 +15,7 @@ fn elsewhere(text: &str, (layout, mappings): (&TextLayout, &[ColumnMapping])) ->
         let mut row = Row::default();
         let is_read = RowReader::new(line, layout.delimiter, layout.decimal).read(&mut row);
         let cells = names_of(&row);
-        is_read && mappings.iter().all(|mapping| cells.contains(&mapping.column))
+        is_read && mappings.iter().flat_map(ColumnMapping::names).all(|name| cells.contains(name))
     };
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let found = text.lines().take(LINES_MAX).position(holds_names);
@@ -29,14 +29,13 @@ pub fn names_of(row: &Row) -> Vec<String> {
     row.cells.iter().map(|cell| lossy(&cell.text).trim().to_owned()).collect()
 }
 
-/// The index of every mapped column among the names of a text that is laid out so; or what is wrong with the names.
+/// The indices of every mapping's columns among the names of a text that is laid out so; or what is wrong with the names.
 pub fn find_columns(
     header: &[String],
     text: &str,
     (layout, mappings): (&TextLayout, &[ColumnMapping]),
-) -> Result<Vec<usize>, String> {
-    let index = |mapping: &ColumnMapping| {
-        let name = &mapping.column;
+) -> Result<Vec<Vec<usize>>, String> {
+    let index = |mapping: &ColumnMapping, name: &String| {
         let mut found = (0..header.len()).filter(|&index| header[index] == *name);
         match (found.next(), found.count()) {
             (Some(index), 0) => Ok(index),
@@ -61,5 +60,8 @@ pub fn find_columns(
             }
         }
     };
-    mappings.iter().map(index).collect()
+    let indices = |mapping: &ColumnMapping| {
+        mapping.names().map(|name| index(mapping, name)).collect::<Result<Vec<usize>, String>>()
+    };
+    mappings.iter().map(indices).collect()
 }

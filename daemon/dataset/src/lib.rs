@@ -16,6 +16,7 @@
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
 //! - `run_content`: what a run's file holds, text or columns
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
+//! - `clock_faults`: an hour of summer time, seconds without a fraction, rows in another order
 //! - `order`, `spikes`, `motion`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], `judge`, [`diagnostic`], `diagnosing`, `declared`: samples,
@@ -25,6 +26,7 @@
 mod altitude;
 mod cell;
 pub mod clock;
+mod clock_faults;
 mod corrections;
 pub mod dataset_diagnostic;
 mod declared;
@@ -60,6 +62,7 @@ mod tests;
 
 pub use clock::TimeFormat;
 pub use dataset_diagnostic::DatasetDiagnostic;
+pub use declared::unusual_resistance;
 pub use diagnostic::Diagnostic;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
@@ -81,6 +84,7 @@ use std::sync::Arc;
 
 use dynocar_shared::SampleField;
 
+use dynocar_core::plausibility::InputFault;
 use dynocar_model::track::Track;
 use dynocar_model::train::{Drive, TrainModel};
 #[cfg(feature = "parallel")]
@@ -172,15 +176,33 @@ impl Dataset {
         dataset
     }
 
+    /// True where forces come from power and nobody declares how much of it reaches the rims.
+    pub fn is_efficiency_unknown(&self) -> bool {
+        let by_power = |run: &Run| run.traction_source == ForceSource::Power;
+        self.train.drive.is_none() && self.runs.iter().any(by_power)
+    }
+
     /// Forgets the forces of all samples without traction, for a train whose friction brake is not
-    /// recorded: there the true force is unknown.
+    /// recorded: there the true force is unknown. While it pulls no brake acts, be one recorded or not, and what is
+    /// wrong with a recorded one spoils nothing.
     pub fn keep_traction_only(&mut self) {
         for sample in self.runs.iter_mut().flat_map(|run| &mut run.samples) {
             let pulls = sample.get(SampleField::TractionForce).is_some_and(|force| force > 0.0);
             let brakes = sample.get(SampleField::BrakeForce).is_some_and(|force| force > 0.0);
             if !pulls || brakes {
                 sample.valid &= !(SampleField::TractionForce.bit() | SampleField::BrakeForce.bit());
+            } else {
+                sample.set(
+                    SampleField::BrakeForce,
+                    sample.get(SampleField::BrakeForce).unwrap_or(0.0),
+                );
             }
+        }
+        for run in &mut self.runs {
+            let of_brake = |it: &Diagnostic| {
+                it.fault.is_some_and(|(detected, _)| detected.fault == InputFault::BrakeScale)
+            };
+            run.diagnostics.retain(|it| !of_brake(it));
         }
     }
 }

@@ -43,6 +43,10 @@ pub struct ColumnMapping {
     pub quantity: Quantity,
     /// Its name in the header, without surrounding spaces.
     pub column: String,
+    /// Names of further columns in the same unit, which add up with it.
+    pub parts: Vec<String>,
+    /// True where `dynocar init` doubted the mapping and nobody has confirmed it.
+    pub is_doubtful: bool,
     /// The unit of [`scaled`](Self::scaled) cells.
     pub unit: Unit,
     /// How the cells are written, where they are times and no numbers.
@@ -56,6 +60,31 @@ pub struct ColumnMapping {
 }
 
 impl ColumnMapping {
+    /// A column of times in s, which takes columns of numbers, too.
+    pub fn of_time(column: &str) -> Self {
+        ColumnMapping {
+            quantity: Quantity::Time,
+            column: column.into(),
+            parts: Vec::new(),
+            is_doubtful: false,
+            unit: Quantity::Time.unit(),
+            format: None,
+            scale: 1.0,
+            offset: 0.0,
+            place: SourcePosition::whole(column),
+        }
+    }
+
+    /// The names of its columns.
+    pub fn names(&self) -> impl Iterator<Item = &String> {
+        std::iter::once(&self.column).chain(&self.parts)
+    }
+
+    /// Its columns for people, as `'a' + 'b'`.
+    pub fn shown(&self) -> String {
+        self.names().map(|name| format!("'{name}'")).collect::<Vec<_>>().join(" + ")
+    }
+
     /// A cell's number in [`unit`](Self::unit).
     pub fn scaled(&self, cell: f64) -> f64 {
         cell * self.scale + self.offset
@@ -210,11 +239,11 @@ fn mapping(columns: &Item, quantity: Quantity) -> Result<ColumnMapping, DatasetE
     let section = columns.need_table(quantity.name())?;
     let format = match quantity {
         Quantity::Time => {
-            section.allow(&["column", "unit", "scale", "offset", "format"])?;
+            section.allow(&["column", "unit", "scale", "offset", "format", DOUBTFUL])?;
             time_format(&section)?
         }
         _ => {
-            section.allow(&["column", "unit", "scale", "offset"])?;
+            section.allow(&["column", "unit", "scale", "offset", DOUBTFUL])?;
             None
         }
     };
@@ -222,17 +251,44 @@ fn mapping(columns: &Item, quantity: Quantity) -> Result<ColumnMapping, DatasetE
         Some(_) => Unit::base_of(quantity.dimension()),
         None => unit(&section, quantity)?,
     };
-    let column = section.need_quoted("column", "the name of a column in the runs' files")?;
+    let mut names = columns_of(&section, quantity)?.into_iter();
     let scale = section.checked_under("scale", "a number other than 0", |it| it != 0.0)?;
     Ok(ColumnMapping {
         quantity,
-        column: column.trim().into(),
+        column: names.next().unwrap_or_default(),
+        parts: names.collect(),
+        is_doubtful: section.truth(DOUBTFUL)?.unwrap_or(false),
         unit,
         format,
         scale: scale.unwrap_or(1.0),
         offset: section.optional("offset", "a finite number", ..)?.unwrap_or(0.0),
         place: section.place(),
     })
+}
+
+/// The key that says of a column that nobody has confirmed what it was taken for.
+pub const DOUBTFUL: &str = "doubtful";
+
+/// The columns of a quantity: one, or several that add up.
+fn columns_of(section: &Item, quantity: Quantity) -> Result<Vec<String>, DatasetError> {
+    const KEY: &str = "column";
+    let expected = match quantity.adds_up() {
+        true => {
+            "the name of a column in the runs' files, or a list of names of columns that add up"
+        }
+        false => "the name of a column in the runs' files",
+    };
+    let item = section.need(KEY, expected)?;
+    if !(quantity.adds_up() && item.is_list()) {
+        return Ok(vec![section.need_quoted(KEY, expected)?.trim().into()]);
+    }
+    let names =
+        item.list(expected, 1)?.into_iter().map(|name| Ok(name.text(expected)?.trim().into()));
+    let names: Vec<String> = names.collect::<Result<_, DatasetError>>()?;
+    match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+        Some((_, name)) => Err(item.wrong(format!("column '{name}' is named twice"))),
+        None => Ok(names),
+    }
 }
 
 fn unit(section: &Item, quantity: Quantity) -> Result<Unit, DatasetError> {

@@ -77,6 +77,11 @@ impl Placement {
         }
     }
 
+    /// Chainage in m of the point that positions are of, by the centre's.
+    pub fn reference_m(self, centre_m: f64) -> f64 {
+        centre_m - self.to_centre_m()
+    }
+
     /// Chainage in m of the train's centre from the mapped column.
     pub fn centre_m(self, column: &[f64]) -> Vec<f64> {
         let to_centre_m = self.to_centre_m();

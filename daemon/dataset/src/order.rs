@@ -134,7 +134,7 @@ impl OrderCounts {
 /// earliest rows, since those are what a reader from the top would keep.
 ///
 /// Patience sorting (Fredman 1975) from the end, n log n; one pass when all increase.
-fn longest_increasing(values: &[f64]) -> Vec<bool> {
+pub(super) fn longest_increasing(values: &[f64]) -> Vec<bool> {
     if values.windows(2).all(|pair| pair[0] < pair[1]) {
         return vec![true; values.len()];
     }

@@ -97,6 +97,22 @@ impl Quantity {
         Self::ALL.into_iter().find(|it| it.field() == Some(field))
     }
 
+    /// True where the parts of a train have each their own, which add up to the whole train's.
+    pub fn adds_up(self) -> bool {
+        use Quantity::*;
+        matches!(
+            self,
+            TractionForce
+                | BrakeForce
+                | ControlForce
+                | TractionPower
+                | LinePower
+                | LineCurrent
+                | Passengers
+                | TrainMass
+        )
+    }
+
     /// The unit in which it is held once read: the base unit of its dimension, but ‰ for the
     /// gradient.
     pub fn unit(self) -> Unit {

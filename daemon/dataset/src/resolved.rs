@@ -8,7 +8,8 @@ use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use serde::Serialize;
 
-use super::altitude;
+use super::altitude::{self, Recorded};
+use super::clock_faults::{self, ClockFaults};
 use super::forces::Forces;
 use super::manifest::{Manifest, RunEntry};
 use super::motion::{Placement, PositionSource, Speeds};
@@ -50,6 +51,7 @@ pub(super) struct Resolved<'d> {
     pub table: Table,
     pub times_s: Vec<f64>,
     pub order: TimeOrder,
+    pub clock_faults: ClockFaults,
     pub rows_without_time: usize,
     pub speeds: Speeds,
     pub forces: Forces,
@@ -61,7 +63,8 @@ pub(super) struct Resolved<'d> {
 
 impl<'d> Resolved<'d> {
     pub fn of(context: Context<'d>, entry: &'d RunEntry, mut table: Table) -> Self {
-        let (timeless_before, rows_without_time) = drop_timeless(&mut table);
+        let (mut timeless_before, rows_without_time) = drop_timeless(&mut table);
+        let clock_faults = mend_times(&mut table, &mut timeless_before);
         table.hold_last(Quantity::Passengers);
         let column = |quantity| table.column(quantity).unwrap_or_default();
         let times_s = column(Quantity::Time).to_vec();
@@ -82,11 +85,12 @@ impl<'d> Resolved<'d> {
             }
         };
         let (gradient_permille, gradient_source) =
-            gradient(context.track.map(Arc::as_ref), &table, &position_m);
+            gradient((context.track.map(Arc::as_ref), placement), &table, &position_m);
         Resolved {
             entry,
             times_s,
             order,
+            clock_faults,
             rows_without_time,
             speeds,
             forces,
@@ -150,7 +154,10 @@ impl<'d> Resolved<'d> {
 fn drop_timeless(table: &mut Table) -> (Vec<u64>, usize) {
     let times = table.column(Quantity::Time).unwrap_or_default();
     // Nanoseconds in an i64 reach 292 years; a time beyond is no time.
-    let keep: Vec<bool> = times.iter().map(|time| time.abs() < 9.2e9).collect();
+    // Counts since the year 0 or 1 are later counted from the first row.
+    let is_far = times.iter().find(|time| !time.is_nan()).is_some_and(|time| time.abs() > 9.2e9);
+    let most_s = if is_far { 1e11 } else { 9.2e9 };
+    let keep: Vec<bool> = times.iter().map(|time| time.abs() < most_s).collect();
     let (mut before, mut dropped) = (Vec::with_capacity(keep.len()), 0);
     for &is_kept in &keep {
         if is_kept {
@@ -166,12 +173,32 @@ fn drop_timeless(table: &mut Table) -> (Vec<u64>, usize) {
     (before, total)
 }
 
+/// Sets times right, and the rows into their order; what went before a row is known of the first only then.
+fn mend_times(table: &mut Table, timeless_before: &mut [u64]) -> ClockFaults {
+    let column = |quantity| table.column(quantity).unwrap_or_default();
+    let (mut times_s, speed_mps) = (column(Quantity::Time).to_vec(), column(Quantity::Speed));
+    let is_repeated = |row: usize| {
+        let others = table.columns().filter(|(quantity, _)| *quantity != Quantity::Time);
+        let same = |one: f64, other: f64| one == other || (one.is_nan() && other.is_nan());
+        others.into_iter().all(|(_, values)| same(values[row], values[row - 1]))
+    };
+    let (faults, order) = clock_faults::mend(&mut times_s, speed_mps, is_repeated);
+    if table.column(Quantity::Time) != Some(&times_s) {
+        table.replace(Quantity::Time, times_s);
+    }
+    if let Some(order) = order {
+        table.reorder(&order);
+        timeless_before.fill(0);
+    }
+    faults
+}
+
 /// The gradient that the samples carry, and where the gradient comes from first.
 ///
 /// A mapped `gradient` goes into the samples whatever the line's file says, since it counts
 /// where the position is missing.
 fn gradient(
-    track: Option<&Track>,
+    (track, placement): (Option<&Track>, Placement),
     table: &Table,
     position_m: &[f64],
 ) -> (Option<Vec<f64>>, GradientSource) {
@@ -187,7 +214,13 @@ fn gradient(
     }
     let slope = table
         .filled(Quantity::Altitude)
-        .map(|altitude| altitude::gradient_permille(position_m, altitude))
+        .map(|altitude_m| {
+            let point_m: Vec<f64> =
+                position_m.iter().map(|it| placement.reference_m(*it)).collect();
+            let (centre_m, length_m) = (position_m, placement.train_length_m);
+            let recorded = Recorded { centre_m, point_m: &point_m, altitude_m, length_m };
+            altitude::gradient_permille(&recorded)
+        })
         .filter(|slope| slope.iter().any(|slope| !slope.is_nan()));
     match slope {
         Some(slope) => (Some(slope), GradientSource::Altitude),

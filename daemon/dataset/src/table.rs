@@ -1,8 +1,8 @@
 //! A run's CSV file as columns of numbers.
 
-use dynocar_model::units::Unit;
+use dynocar_model::units::{Dimension, Unit};
 
-use super::cell::{held, lossy, not_a_value, parse_cell};
+use super::cell::{held, is_word, lossy, not_a_value, parse_cell, truth};
 use super::clock::DayClock;
 use super::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
 use super::header::{find_columns, names_of};
@@ -32,6 +32,8 @@ pub(super) struct Table {
 pub struct LineCounts {
     /// Rows of values, without a truncated last one.
     pub rows: usize,
+    /// Lines between or below the rows that hold words alone: footers, the names again.
+    pub notes: usize,
     /// Rows with fewer cells than the header; the cells at the end count as missing.
     pub short: usize,
     /// True when the file breaks off within its last line, which is then not used.
@@ -57,6 +59,21 @@ impl Table {
     /// The mapped columns with their values.
     pub fn columns(&self) -> impl Iterator<Item = (Quantity, &[f64])> {
         self.columns.iter().map(|(quantity, values)| (*quantity, &values[..]))
+    }
+
+    /// Puts the rows into another order.
+    pub fn reorder(&mut self, order: &[usize]) {
+        for (_, values) in &mut self.columns {
+            *values = order.iter().map(|&row| values[row]).collect();
+        }
+        self.line_of_row = order.iter().map(|&row| self.line_of_row[row]).collect();
+    }
+
+    /// Replaces the values of a quantity.
+    pub fn replace(&mut self, quantity: Quantity, values: Vec<f64>) {
+        if let Some(column) = self.columns.iter_mut().find(|(other, _)| *other == quantity) {
+            column.1 = values;
+        }
     }
 
     /// Lets an empty cell of a quantity keep the last value before it.
@@ -99,11 +116,16 @@ impl Table {
         let indices = find_columns(&names, "", (&TextLayout::PLAIN, mappings))
             .map_err(|words| SourcePosition::line(label, 1).problem(words))?;
         let held_by = |(at, mapping): (usize, &ColumnMapping)| {
-            let values = &mut columns[indices[at]].values;
-            // Its numbers stay where they are, unless another quantity needs them, too.
-            let is_last = !indices[at + 1..].contains(&indices[at]);
-            let values = if is_last { values.take() } else { values.clone() };
-            let (mut values, to) = (values.unwrap_or_default(), mapping.converted_to());
+            let mut taken = indices[at].iter().map(|&index| {
+                let values = &mut columns[index].values;
+                // Its numbers stay where they are, unless another quantity needs them, too.
+                let is_last = !indices[at + 1..].iter().flatten().any(|other| *other == index);
+                if is_last { values.take() } else { values.clone() }.unwrap_or_default()
+            });
+            let (mut values, to) = (taken.next().unwrap_or_default(), mapping.converted_to());
+            for part in taken {
+                values.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+            }
             for value in &mut values {
                 *value = held(mapping, to.as_ref(), *value);
             }
@@ -139,10 +161,10 @@ impl Table {
         let indices = find_columns(&names, whole, (layout, mappings)).map_err(|words| {
             SourcePosition::line(label, layout.skip_rows + row.line).problem(words)
         })?;
-        let columns = mappings.iter().zip(indices).map(|(mapping, index)| {
+        let columns = mappings.iter().zip(indices).map(|(mapping, indices)| {
             let clock = mapping.format.as_ref().map(DayClock::new);
             let converted_to = mapping.converted_to();
-            Column { mapping, index, converted_to, clock, values: Vec::new() }
+            Column { mapping, indices, converted_to, clock, values: Vec::new() }
         });
         let mut rows = Rows {
             label,
@@ -189,7 +211,8 @@ struct Rows<'m> {
 
 struct Column<'m> {
     mapping: &'m ColumnMapping,
-    index: usize,
+    /// Where its cells stand; of several, which add up.
+    indices: Vec<usize>,
     /// The quantity's unit, where the cells are in another.
     converted_to: Option<Unit>,
     /// Reads the cells that are times and no numbers.
@@ -212,11 +235,26 @@ impl Rows<'_> {
         let _ = self.line_of_row.try_reserve(rows);
     }
 
+    /// True for a row in which words stand where values are expected and no value does: a footer, the names again,
+    /// what a power cut leaves.
+    fn is_note(&self, row: &Row) -> bool {
+        let mut cells = self.columns.iter().flat_map(|column| &column.indices);
+        let first = cells.clone().next().map_or(&b""[..], |&index| row.trimmed(index));
+        // Most rows hold a number there.
+        is_word(first)
+            && cells.all(|&index| row.trimmed(index).is_empty() || is_word(row.trimmed(index)))
+            && row.cells.iter().all(|cell| !cell.text.contains(&b'\n'))
+            && !(self.columns.iter().all(|column| {
+                let cell = row.trimmed(column.indices[0]);
+                parse_cell(cell, self.layout.marks()).is_some()
+            }))
+    }
+
     /// Refuses a row of values in the place of that of units, which would be lost.
     fn require_units(&self, row: &Row) -> Result<(), DatasetError> {
         for column in &self.columns {
-            let cell = row.trimmed(column.index);
-            let is_number = parse_cell(cell, self.layout.decimal).is_some_and(|it| !it.is_nan());
+            let cell = row.trimmed(column.indices[0]);
+            let is_number = parse_cell(cell, self.layout.marks()).is_some_and(|it| !it.is_nan());
             // The unit "1" is one.
             if is_number && cell != b"1" {
                 let place = SourcePosition::line(self.label, self.layout.skip_rows + row.line);
@@ -235,6 +273,11 @@ impl Rows<'_> {
     fn push(&mut self, row: &Row) -> Result<(), DatasetError> {
         let line = self.layout.skip_rows + row.line;
         let place = || SourcePosition::line(self.label, line);
+        if line > self.layout.lines_above() + 1 && self.is_note(row) {
+            self.lines.notes += 1;
+            self.pending = None;
+            return Ok(());
+        }
         let found = row.cells.len();
         if found < self.width && row.cells.iter().any(|cell| cell.text.contains(&b'\n')) {
             let words = "a quoted cell runs over the end of the line: is a quote unclosed?";
@@ -254,25 +297,31 @@ impl Rows<'_> {
         }
         self.pending = (found < self.width).then_some(Flaw::Short);
         for column in &mut self.columns {
-            let plain = row.cells.get(column.index).and_then(|cell| cell.plain);
-            let value = match &mut column.clock {
-                None if plain.is_some() => plain,
-                None => parse_cell(row.trimmed(column.index), self.layout.decimal),
-                Some(_) if row.trimmed(column.index).is_empty() => Some(f64::NAN),
-                Some(clock) => clock.seconds(row.trimmed(column.index)),
-            };
-            column.values.push(value.map_or(f64::NAN, |value| {
-                held(column.mapping, column.converted_to.as_ref(), value)
-            }));
-            if value.is_some() {
-                continue;
+            let (mut sum, mut flaw) = (0.0, None);
+            for &index in &column.indices {
+                let plain = row.cells.get(index).and_then(|cell| cell.plain);
+                let value = match &mut column.clock {
+                    None if plain.is_some() => plain,
+                    None => {
+                        let cell = row.trimmed(index);
+                        let is_truth = column.mapping.quantity.dimension() == Dimension::Count;
+                        let number = parse_cell(cell, self.layout.marks());
+                        number.or_else(|| truth(cell).filter(|_| is_truth))
+                    }
+                    Some(_) if row.trimmed(index).is_empty() => Some(f64::NAN),
+                    Some(clock) => clock.seconds(row.trimmed(index)),
+                };
+                sum += value.unwrap_or(f64::NAN);
+                flaw = flaw.or(Some(index).filter(|_| value.is_none()));
             }
-            let cell = row.trimmed(column.index);
+            column.values.push(held(column.mapping, column.converted_to.as_ref(), sum));
+            let Some(index) = flaw else { continue };
+            let cell = row.trimmed(index);
             let is_below_names = line <= self.layout.lines_above() + 1;
             let problem = not_a_value(column.mapping, cell, self.layout, is_below_names);
             let error = place().problem(problem);
             // What is left of a number where a file breaks off is such a cell.
-            let may_be_cut = column.index + 1 == found
+            let may_be_cut = index + 1 == found
                 && cell.iter().all(|letter| b"0123456789+-.,eE:T/ ".contains(letter));
             if !may_be_cut {
                 return Err(error);

@@ -2,12 +2,16 @@
 
 use encoding_rs::{Encoding, UTF_8};
 
+use super::cell::Marks;
 use super::document::Item;
 use super::encoding;
 use super::error::DatasetError;
 
 /// More lines above the names than any recorder writes.
 const SKIP_ROWS_MAX: f64 = 10_000.0;
+
+/// What may separate groups of three digits.
+pub const THOUSANDS: [char; 8] = ['.', ',', '\'', '’', ' ', '\u{a0}', '\u{202f}', '\u{2009}'];
 
 /// How the text of the runs' files falls into cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +22,8 @@ pub struct TextLayout {
     pub delimiter: u8,
     /// What separates a number's fraction: a point or a comma.
     pub decimal: u8,
+    /// What separates groups of three digits in numbers; `None` for nothing.
+    pub thousands: Option<char>,
     /// Lines above that with the columns' names.
     pub skip_rows: usize,
     /// True where a line of units stands below the names.
@@ -26,13 +32,15 @@ pub struct TextLayout {
 
 impl TextLayout {
     /// The keys that declare it, in `[dataset]`.
-    pub const KEYS: [&str; 5] = ["encoding", "delimiter", "decimal", "skip_rows", "units_row"];
+    pub const KEYS: [&str; 6] =
+        ["encoding", "delimiter", "decimal", "thousands", "skip_rows", "units_row"];
 
     /// CSV as programs write it: names, then rows, with commas between the cells and points in numbers.
     pub const PLAIN: TextLayout = TextLayout {
         encoding: UTF_8,
         delimiter: b',',
         decimal: b'.',
+        thousands: None,
         skip_rows: 0,
         units_row: false,
     };
@@ -67,6 +75,17 @@ impl TextLayout {
                 }
             };
         }
+        if let Some(text) = section.quoted("thousands")? {
+            let mark =
+                Some(text).filter(|it| it.chars().count() == 1).and_then(|it| it.chars().next());
+            let is_other =
+                |mark: &char| *mark != char::from(layout.decimal) && THOUSANDS.contains(mark);
+            layout.thousands = Some(mark.filter(is_other).ok_or_else(|| {
+                let allowed =
+                    "a point, a comma, an apostrophe or a space, other than the decimal mark";
+                section.key_out_of_range("thousands", &format!("{text:?}"), allowed)
+            })?);
+        }
         let is_allowed = |rows: f64| (0.0..=SKIP_ROWS_MAX).contains(&rows) && rows.fract() == 0.0;
         let rows =
             section.checked_under("skip_rows", "a number of lines, 0 to 10000", is_allowed)?;
@@ -77,6 +96,11 @@ impl TextLayout {
             return Err(section.key_out_of_range("decimal", "\".\"", allowed));
         }
         Ok(layout)
+    }
+
+    /// The marks of its numbers.
+    pub(super) fn marks(&self) -> Marks {
+        Marks { decimal: self.decimal, thousands: self.thousands }
     }
 
     /// Lines above the first row of values.

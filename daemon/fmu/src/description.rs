@@ -12,8 +12,12 @@ use super::variables::{Begins, Interface, Kind, MISSING, Meaning, Variable, Voca
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The text of `modelDescription.xml`: the same for every FMU of this model in a release.
-pub fn model_description(interface: &Interface) -> String {
+/// A step in s that suits every train, where no recording says another.
+pub const STEP_DEFAULT_S: f64 = 0.1;
+
+/// The text of `modelDescription.xml`, with the step in s that hosts take by default: the same for every FMU of this
+/// model in a release.
+pub fn model_description(interface: &Interface, step_s: f64) -> String {
     let Interface { identifier, name, about, guid, variables, takes_slopes, .. } = interface;
     let mut xml = format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -29,7 +33,9 @@ pub fn model_description(interface: &Interface) -> String {
         push_types(&mut xml);
     }
     xml += "  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n";
-    xml += "  <DefaultExperiment startTime=\"0\" stepSize=\"0.1\"/>\n  <ModelVariables>\n";
+    xml += "  <DefaultExperiment startTime=\"0\" stepSize=\"";
+    let _ = write!(xml, "{step_s}");
+    xml += "\"/>\n  <ModelVariables>\n";
     for (reference, variable) in variables.iter().enumerate() {
         push_variable(&mut xml, reference, variable, *takes_slopes);
     }
@@ -207,7 +213,7 @@ mod tests {
     #[test]
     fn the_description_has_every_variable_under_its_reference() {
         for interface in INTERFACES {
-            let xml = model_description(interface);
+            let xml = model_description(interface, STEP_DEFAULT_S);
             assert_eq!(xml.matches("<ScalarVariable ").count(), interface.variables.len());
             for (reference, Variable { name, .. }) in interface.variables.iter().enumerate() {
                 let place = format!("name=\"{name}\" valueReference=\"{reference}\" ");
@@ -220,7 +226,7 @@ mod tests {
     #[test]
     fn what_starts_with_a_value_is_what_is_set_before_the_first_step() {
         for (interface, measured) in INTERFACES.into_iter().zip([11, 7]) {
-            let xml = model_description(interface);
+            let xml = model_description(interface, STEP_DEFAULT_S);
             let starts = xml.matches(" start=\"").count();
             let is_output = |it: &&Variable| it.meaning.causality() == "output";
             let outputs = interface.variables.iter().filter(is_output).count();

@@ -48,6 +48,17 @@ pub enum ModelError {
         /// The longest in s.
         most_s: f64,
     },
+    /// A step that does not begin where the one before ended.
+    #[error(
+        "currentCommunicationPoint = {time_s} s: expected {next_s} s, the end of the step before; steps are not \
+         taken back, repeated or left out"
+    )]
+    OffPoint {
+        /// Where the step begins, in s.
+        time_s: f64,
+        /// Where it should, in s.
+        next_s: f64,
+    },
     /// The call comes at the wrong time.
     #[error("{call} is not allowed {now}")]
     WrongOrder {

@@ -3,7 +3,7 @@
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::quantities::candidates;
 use dynocar_shared::{
-    Parameter, ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainSample,
+    Parameter, ParameterSnapshot, PipelineKind, Quantity, SampleField, Status, TrainSample,
 };
 
 use crate::units::{self, Unit};
@@ -49,6 +49,7 @@ const fn reported(
 
 const STATUS: &str = "What may be done with it: 2 estimated, may be used";
 const REASON: &str = "Why the status is what it is";
+const USABLE: &str = "True while its status is estimated: it may be used";
 const REJECTED: &str = "Samples refused so far";
 const STD: &str = "Its standard deviation";
 
@@ -113,6 +114,24 @@ const VARIABLES: &[Variable] = &[
     reported("monitor.status", MONITOR, SnapshotField::Status, units::NONE, STATUS),
     reported("monitor.reason", MONITOR, SnapshotField::Reason, units::NONE, REASON),
     reported("monitor.rejected", MONITOR, SnapshotField::Rejected, units::NONE, REJECTED),
+
+    // For hosts that drop enumerations; below the others, whose references stay.
+    reported("resistance.status_number", RESISTANCE, SnapshotField::StatusNumber, units::NONE, STATUS),
+    reported("resistance.reason_number", RESISTANCE, SnapshotField::ReasonNumber, units::NONE, REASON),
+    reported("resistance.usable", RESISTANCE, SnapshotField::Usable, units::NONE, USABLE),
+    reported("mass.status_number", MASS, SnapshotField::StatusNumber, units::NONE, STATUS),
+    reported("mass.reason_number", MASS, SnapshotField::ReasonNumber, units::NONE, REASON),
+    reported("mass.usable", MASS, SnapshotField::Usable, units::NONE, USABLE),
+    reported("adhesion.status_number", ADHESION, SnapshotField::StatusNumber, units::NONE, STATUS),
+    reported("adhesion.reason_number", ADHESION, SnapshotField::ReasonNumber, units::NONE, REASON),
+    reported("adhesion.usable", ADHESION, SnapshotField::Usable, units::NONE, USABLE),
+    reported("brake_friction.status_number", BRAKE, SnapshotField::StatusNumber, units::NONE, STATUS),
+    reported("brake_friction.reason_number", BRAKE, SnapshotField::ReasonNumber, units::NONE, REASON),
+    reported("brake_friction.usable", BRAKE, SnapshotField::Usable, units::NONE, USABLE),
+    reported("monitor.status_number", MONITOR, SnapshotField::StatusNumber, units::NONE, STATUS),
+    reported("monitor.reason_number", MONITOR, SnapshotField::ReasonNumber, units::NONE, REASON),
+    reported("monitor.usable", MONITOR, SnapshotField::Usable, units::NONE, USABLE),
+    reported("monitor.suspected_effect_number", MONITOR, SnapshotField::SuspectedEffectNumber, units::NONE, "The effect that the model may lack"),
 ];
 
 /// What is declared before the files are read.
@@ -157,10 +176,7 @@ impl Estimators {
             }
             SnapshotField::UnexplainedForce => Some(snapshot.unexplained_force_n),
             SnapshotField::UnexplainedForceStd => Some(snapshot.unexplained_force_std_n),
-            SnapshotField::SuspectedEffect
-            | SnapshotField::Status
-            | SnapshotField::Reason
-            | SnapshotField::Rejected => None,
+            _ => None,
         }
     }
 
@@ -168,11 +184,18 @@ impl Estimators {
     pub fn integer(&self, of: PipelineKind, reported: SnapshotField) -> u64 {
         let snapshot = self.snapshot(of);
         match reported {
-            SnapshotField::Status => snapshot.status.into(),
-            SnapshotField::Reason => snapshot.reason.into(),
-            SnapshotField::SuspectedEffect => snapshot.suspected_effect.into(),
+            SnapshotField::Status | SnapshotField::StatusNumber => snapshot.status.into(),
+            SnapshotField::Reason | SnapshotField::ReasonNumber => snapshot.reason.into(),
+            SnapshotField::SuspectedEffect | SnapshotField::SuspectedEffectNumber => {
+                snapshot.suspected_effect.into()
+            }
             _ => snapshot.samples_rejected,
         }
+    }
+
+    /// Whether an estimate may be used.
+    pub fn is_usable(&self, of: PipelineKind) -> bool {
+        self.snapshot(of).status() == Status::Estimated
     }
 }
 
@@ -209,7 +232,9 @@ mod tests {
                 |it: &&Variable| matches!(it.meaning, Meaning::Estimate(of, _) if of == kind);
             let names: Vec<_> = VARIABLES.iter().filter(of_kind).map(|it| it.name).collect();
             for group in names.iter().map(|name| name.split('.').next().unwrap()) {
-                for reported in ["status", "reason", "rejected"] {
+                for reported in
+                    ["status", "reason", "rejected", "status_number", "reason_number", "usable"]
+                {
                     assert!(
                         names.contains(&format!("{group}.{reported}").as_str()),
                         "{kind}: {reported}"

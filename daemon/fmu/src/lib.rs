@@ -30,8 +30,8 @@ pub mod units;
 pub mod variables;
 
 pub use crate::description::INTERFACES;
-pub use description::{documentation, model_description};
+pub use description::{STEP_DEFAULT_S, documentation, model_description};
 pub use estimators::ESTIMATORS;
 pub use model::Model;
-pub use plant::PLANT;
+pub use plant::{PLANT, STEP_MAX_S};
 pub use variables::{Interface, MISSING};

@@ -15,6 +15,8 @@ use crate::plant::{
 };
 use crate::variables::{Begins, Interface, Kind, Meaning, Variable};
 
+/// By so much of the time a point may be off, as sums of steps are rounded.
+const POINT_TOLERANCE: f64 = 1e-9;
 /// Later times in s have no number of ns.
 const TIME_MAX_S: f64 = 9e9;
 
@@ -57,6 +59,9 @@ pub struct Model {
     /// How the driven train begins, and when in s.
     beginning: Beginning,
     start_s: f64,
+    /// Where the next step begins in s; before the first one of an experiment that was not set up, anywhere.
+    next_s: Option<f64>,
+    run_before: u32,
     behind: Behind,
 }
 
@@ -71,6 +76,8 @@ impl Model {
             inputs: Inputs::default(),
             beginning: BEGINNING,
             start_s: 0.0,
+            next_s: None,
+            run_before: 0,
             behind: Behind::Nothing,
         }
     }
@@ -91,6 +98,7 @@ impl Model {
     pub fn set_up_experiment(&mut self, start_s: f64) -> Result<(), ModelError> {
         self.require(&[Phase::Instantiated], "fmi2SetupExperiment")?;
         self.start_s = require_time("startTime", start_s)?;
+        self.next_s = Some(self.start_s);
         Ok(())
     }
 
@@ -137,7 +145,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// In the wrong order, for times that are no numbers, and for a step that the train cannot take.
+    /// In the wrong order, for a point other than the end of the step before, and for a step that the train cannot take.
     ///
     /// # Real-time
     ///
@@ -149,6 +157,12 @@ impl Model {
         if !(0.0..=TIME_MAX_S).contains(&step_s) {
             let expected = "a duration in s from 0 to 9e9";
             return Err(ModelError::BadValue { name, value: step_s, expected });
+        }
+        // A new trip may have a clock of its own.
+        if let Some(next_s) = self.next_s.filter(|_| self.inputs.sample.run == self.run_before)
+            && (time_s - next_s).abs() > POINT_TOLERANCE * time_s.abs().max(step_s).max(1.0)
+        {
+            return Err(ModelError::OffPoint { time_s, next_s });
         }
         match &mut self.behind {
             Behind::Nothing => {}
@@ -167,6 +181,8 @@ impl Model {
                 self.inputs.end_step();
             }
         }
+        self.next_s = Some(time_s + step_s);
+        self.run_before = self.inputs.sample.run;
         Ok(())
     }
 
@@ -233,8 +249,9 @@ impl Model {
     ///
     /// When there is none of this type, or after a fault.
     pub fn boolean(&self, reference: u32) -> Result<bool, ModelError> {
-        Ok(match self.got(reference, Kind::Boolean)?.meaning {
-            Meaning::Begins(_) => self.beginning.is_held_at_rest,
+        Ok(match (self.got(reference, Kind::Boolean)?.meaning, &self.behind) {
+            (Meaning::Begins(_), _) => self.beginning.is_held_at_rest,
+            (Meaning::Estimate(of, _), Behind::Estimators(it)) => it.is_usable(of),
             _ => self.inputs.sample.flags & FLAG_WHEEL_SLIDE != 0,
         })
     }

@@ -103,7 +103,7 @@ pub(crate) fn require_drivable(inputs: &Inputs) -> Result<(), ModelError> {
 }
 
 /// A longer step in s is refused: a simulator that skips hours has lost its way.
-pub(crate) const STEP_MAX_S: f64 = 3600.0;
+pub const STEP_MAX_S: f64 = 3600.0;
 
 /// A shorter step in s would push out of memory what a dead time still needs.
 pub(crate) fn least_step_s(train: &DrivenTrain) -> f64 {

@@ -86,6 +86,14 @@ pub enum SnapshotField {
     Status,
     /// The reason, by its number.
     Reason,
+    /// The suspected missing effect, by its number, as an integer: some hosts drop enumerations.
+    SuspectedEffectNumber,
+    /// The status likewise.
+    StatusNumber,
+    /// The reason likewise.
+    ReasonNumber,
+    /// Whether the values may be used.
+    Usable,
     /// How many samples were refused.
     Rejected,
 }
@@ -204,7 +212,11 @@ impl Meaning {
                 SnapshotField::Status => Kind::Enumeration(Vocabulary::Status),
                 SnapshotField::Reason => Kind::Enumeration(Vocabulary::Reason),
                 SnapshotField::SuspectedEffect => Kind::Enumeration(Vocabulary::Effect),
-                SnapshotField::Rejected => Kind::Integer,
+                SnapshotField::Usable => Kind::Boolean,
+                SnapshotField::Rejected
+                | SnapshotField::SuspectedEffectNumber
+                | SnapshotField::StatusNumber
+                | SnapshotField::ReasonNumber => Kind::Integer,
                 _ => Kind::Real,
             },
         }

@@ -49,6 +49,10 @@ pub struct Unit {
     shift: f64,
     multiply: f64,
     divide: f64,
+    /// Spellings besides the name, in small letters and digits, separated by spaces.
+    spellings: &'static str,
+    /// True for a unit that recorders of trains use without saying so.
+    is_usual: bool,
 }
 
 /// Newtons in a pound-force: 0.45359237 kg at 9.80665 m/s² (NIST SP 811, appendix B.8).
@@ -57,64 +61,247 @@ const POUND_FORCE_N: f64 = 4.4482216152605;
 pub const J_PER_KWH: f64 = 3.6e6;
 /// Metres per second in a mile per hour: 1609.344 m in 3600 s.
 const MILE_PER_HOUR_MPS: f64 = 0.44704;
+/// Acceleration in m/s² of a weight by its mass (NIST SP 811, appendix B.8).
+const STANDARD_GRAVITY_MPS2: f64 = 9.80665;
+/// Watts in a mechanical horsepower: 550 foot pounds-force in a second (NIST SP 811, appendix B.8).
+const HORSEPOWER_W: f64 = 550.0 * 0.3048 * POUND_FORCE_N;
 
-static UNITS: [Unit; 38] = {
+/// The units, with what files call them; of a dimension the first ones are usual.
+static UNITS: [Unit; 75] = {
     use Dimension::*;
     [
-        unit("s", Time, 1.0, 1.0),
-        unit("ms", Time, 1.0, 1e3),
-        unit("us", Time, 1.0, 1e6),
-        unit("ns", Time, 1.0, 1e9),
-        unit("min", Time, 60.0, 1.0),
-        unit("h", Time, 3600.0, 1.0),
-        unit("m", Length, 1.0, 1.0),
-        unit("km", Length, 1e3, 1.0),
-        unit("mm", Length, 1.0, 1e3),
-        unit("m/s", Speed, 1.0, 1.0),
-        unit("km/h", Speed, 1.0, 3.6),
-        unit("mph", Speed, MILE_PER_HOUR_MPS, 1.0),
-        unit("m/s2", Acceleration, 1.0, 1.0),
-        unit("N", Force, 1.0, 1.0),
-        unit("kN", Force, 1e3, 1.0),
-        unit("MN", Force, 1e6, 1.0),
-        unit("lbf", Force, POUND_FORCE_N, 1.0),
-        unit("Pa", Pressure, 1.0, 1.0),
-        unit("kPa", Pressure, 1e3, 1.0),
-        unit("bar", Pressure, 1e5, 1.0),
-        unit("kg", Mass, 1.0, 1.0),
-        unit("t", Mass, 1e3, 1.0),
-        unit("degC", Temperature, 1.0, 1.0),
-        shifted("K", -273.15, 1.0, 1.0),
-        shifted("degF", -32.0, 5.0, 9.0),
-        unit("permille", Ratio, 1.0, 1e3),
-        unit("%", Ratio, 1.0, 1e2),
-        unit("1", Ratio, 1.0, 1.0),
-        unit("deg", Angle, 1.0, 1.0),
-        unit("rad", Angle, 180.0, std::f64::consts::PI),
-        unit("1/m", Curvature, 1.0, 1.0),
-        unit("W", Power, 1.0, 1.0),
-        unit("kW", Power, 1e3, 1.0),
-        unit("V", Voltage, 1.0, 1.0),
-        unit("kV", Voltage, 1e3, 1.0),
-        unit("A", Current, 1.0, 1.0),
-        unit("kA", Current, 1e3, 1.0),
-        unit("1", Count, 1.0, 1.0),
+        unit(
+            "s",
+            Time,
+            1.0,
+            1.0,
+            "sec secs second seconds sek sekunde sekunden seconde secondes segundo segundos secondi",
+        ),
+        unit(
+            "ms",
+            Time,
+            1.0,
+            1e3,
+            "msec msecs millis millisec millisecond milliseconds millisekunde millisekunden millisecondes",
+        ),
+        unit("us", Time, 1.0, 1e6, "usec usecs micros microsecond microseconds mikrosekunden"),
+        unit("ns", Time, 1.0, 1e9, "nsec nanos nanosecond nanoseconds"),
+        unit("min", Time, 60.0, 1.0, "mins minute minutes minuten"),
+        unit("h", Time, 3600.0, 1.0, "hr hrs hour hours std stunden heures"),
+        rare("d", Time, 86_400.0, 1.0, "days datenum serial"),
+        rare("100ns", Time, 1.0, 1e7, "tick ticks filetime"),
+        unit("m", Length, 1.0, 1.0, "meter meters metre metres mtr metri metros м"),
+        unit("km", Length, 1e3, 1.0, "kilometer kilometers kilometre kilometres chilometri км"),
+        unit("mm", Length, 1.0, 1e3, "millimeter millimeters millimetre millimetres"),
+        rare("cm", Length, 1.0, 1e2, "centimeter centimeters centimetre centimetres"),
+        rare("ft", Length, 0.3048, 1.0, "feet foot"),
+        rare("yd", Length, 0.9144, 1.0, "yds yard yards"),
+        rare("mi", Length, 1609.344, 1.0, "mile miles"),
+        unit(
+            "m/s",
+            Speed,
+            1.0,
+            1.0,
+            "mps mpers ms1 mpersec msec meterpersecond meterspersecond metrepersecond metrespersecond мс",
+        ),
+        unit(
+            "km/h",
+            Speed,
+            1.0,
+            3.6,
+            "kph kmph kmperh kmh1 kmhr kmperhour kmstd kilometerperhour kilometersperhour kilometreperhour kilometresperhour кмч",
+        ),
+        unit("mph", Speed, MILE_PER_HOUR_MPS, 1.0, "miph mih mileperhour milesperhour"),
+        rare("kn", Speed, 1852.0, 3600.0, "kt kts knot knots knoten"),
+        rare("cm/s", Speed, 1.0, 1e2, "cms cmps centimeterspersecond"),
+        rare("mm/s", Speed, 1.0, 1e3, "mms mmps millimeterspersecond"),
+        rare("m/min", Speed, 1.0, 60.0, "mmin mpermin metersperminute metresperminute"),
+        rare("ft/s", Speed, 0.3048, 1.0, "fts fps ftpersec feetpersecond"),
+        unit(
+            "m/s2",
+            Acceleration,
+            1.0,
+            1.0,
+            "mps2 mss mpss mpers2 ms msec2 ms2 meterspersecondsquared metrespersecondsquared meterpersecondsquared meterspersecond2",
+        ),
+        rare("g", Acceleration, STANDARD_GRAVITY_MPS2, 1.0, "gn gee standardgravity"),
+        rare("mg", Acceleration, STANDARD_GRAVITY_MPS2, 1e3, "milligee"),
+        rare("cm/s2", Acceleration, 1.0, 1e2, "cms2 gal centimeterspersecondsquared"),
+        rare("km/h/s", Acceleration, 1.0, 3.6, "kmhs kmphps kmphs kphs"),
+        rare("mph/s", Acceleration, MILE_PER_HOUR_MPS, 1.0, "mphs mphps"),
+        rare("ft/s2", Acceleration, 0.3048, 1.0, "fts2 fps2 feetpersecondsquared"),
+        unit("N", Force, 1.0, 1.0, "newton newtons н"),
+        unit("kN", Force, 1e3, 1.0, "kilonewton kilonewtons кн"),
+        unit("MN", Force, 1e6, 1.0, "meganewton meganewtons"),
+        unit("lbf", Force, POUND_FORCE_N, 1.0, "lb lbs poundforce poundsforce poundforces"),
+        rare(
+            "klbf",
+            Force,
+            1e3 * POUND_FORCE_N,
+            1.0,
+            "kip kips klb klbs kilopoundsforce kilopoundforce",
+        ),
+        rare(
+            "kp",
+            Force,
+            STANDARD_GRAVITY_MPS2,
+            1.0,
+            "kgf kilopond kiloponds kilogramforce kilogramsforce кгс",
+        ),
+        rare(
+            "tf",
+            Force,
+            1e3 * STANDARD_GRAVITY_MPS2,
+            1.0,
+            "mp megapond tonneforce tonnesforce тс",
+        ),
+        rare("daN", Force, 10.0, 1.0, "decanewton decanewtons dekanewton"),
+        unit("Pa", Pressure, 1.0, 1.0, "pascal pascals"),
+        unit("kPa", Pressure, 1e3, 1.0, "kilopascal kilopascals"),
+        unit("bar", Pressure, 1e5, 1.0, "bars barg"),
+        rare("hPa", Pressure, 100.0, 1.0, "hectopascal hectopascals hektopascal"),
+        rare("mbar", Pressure, 100.0, 1.0, "millibar millibars"),
+        rare("MPa", Pressure, 1e6, 1.0, "megapascal megapascals nmm2"),
+        rare("psi", Pressure, 6894.757293168, 1.0, "psig lbfin2"),
+        rare("atm", Pressure, 101_325.0, 1.0, "atmosphere atmospheres"),
+        rare("kgf/cm2", Pressure, 98_066.5, 1.0, "kpcm2 kgcm2 кгссм2"),
+        unit("kg", Mass, 1.0, 1.0, "kilogram kilograms kilogramme kilogrammes kgs"),
+        unit("t", Mass, 1e3, 1.0, "to ton tons tonne tonnes tonnen megagram т"),
+        rare("lb", Mass, 0.45359237, 1.0, "lbs lbm pound pounds"),
+        rare("short ton", Mass, 907.18474, 1.0, "shorttons ustons uston"),
+        rare("long ton", Mass, 1016.0469088, 1.0, "longtons uktons"),
+        unit(
+            "degC",
+            Temperature,
+            1.0,
+            1.0,
+            "c celsius gradc grad cel degreecelsius degreescelsius gradcelsius",
+        ),
+        shifted("K", -273.15, 1.0, 1.0, "kelvin degk"),
+        shifted("degF", -32.0, 5.0, 9.0, "f fahrenheit degreesfahrenheit"),
+        unit(
+            "permille",
+            Ratio,
+            1.0,
+            1e3,
+            "promille permil mmm mperkm mkm metersperkilometer metresperkilometre",
+        ),
+        unit("%", Ratio, 1.0, 1e2, "pct percent prozent pourcent perc pc"),
+        unit("1", Ratio, 1.0, 1.0, "pu ratio mm fraction share anteil"),
+        // A slope's angle, as small as those of railways: its tangent is the angle to 0.2 %.
+        rare("deg", Ratio, std::f64::consts::PI, 180.0, "degree degrees grad degrad winkelgrad"),
+        rare("rad", Ratio, 1.0, 1.0, "radian radians"),
+        rare("mrad", Ratio, 1.0, 1e3, "milliradian milliradians"),
+        unit("deg", Angle, 1.0, 1.0, "degree degrees grad"),
+        unit("rad", Angle, 180.0, std::f64::consts::PI, "radian radians"),
+        unit("1/m", Curvature, 1.0, 1.0, "perm m1 permeter permetre"),
+        rare("1/km", Curvature, 1.0, 1e3, "perkm km1"),
+        unit("W", Power, 1.0, 1.0, "watt watts"),
+        unit("kW", Power, 1e3, 1.0, "kilowatt kilowatts"),
+        rare("MW", Power, 1e6, 1.0, "megawatt megawatts"),
+        rare("hp", Power, HORSEPOWER_W, 1.0, "bhp horsepower mechanicalhorsepower"),
+        rare(
+            "PS",
+            Power,
+            75.0 * STANDARD_GRAVITY_MPS2,
+            1.0,
+            "cv metrichorsepower pferdestaerke pferdestaerken лс",
+        ),
+        unit("V", Voltage, 1.0, 1.0, "volt volts"),
+        unit("kV", Voltage, 1e3, 1.0, "kilovolt kilovolts"),
+        unit("A", Current, 1.0, 1.0, "amp amps ampere amperes"),
+        unit("kA", Current, 1e3, 1.0, "kiloamp kiloamps kiloampere kiloamperes"),
+        unit("1", Count, 1.0, 1.0, "bool boolean flag count pax persons"),
     ]
 };
 
-/// Name, dimension, factor and divisor to the base unit.
-const fn unit(name: &'static str, dimension: Dimension, multiply: f64, divide: f64) -> Unit {
-    Unit { name, dimension, shift: 0.0, multiply, divide }
+/// Units of things that a dataset has no quantity for.
+const FOREIGN: &str = "ma mv hz khz rpm umin 1min nm knm kwh wh mwh j kj mj l lmin db ppm kva ohm gwh kvar var \
+                       pas m3 m2 m3s kgs kgh lph gpm nms radps degs rads dbm pct100 cd lx mol wm2 wb";
+
+/// Name, dimension, factor and divisor to the base unit, and spellings.
+const fn unit(
+    name: &'static str,
+    dimension: Dimension,
+    multiply: f64,
+    divide: f64,
+    spellings: &'static str,
+) -> Unit {
+    Unit { name, dimension, shift: 0.0, multiply, divide, spellings, is_usual: true }
 }
 
-const fn shifted(name: &'static str, shift: f64, multiply: f64, divide: f64) -> Unit {
-    Unit { name, dimension: Dimension::Temperature, shift, multiply, divide }
+/// A unit that is read where a file says it, and never guessed.
+const fn rare(
+    name: &'static str,
+    dimension: Dimension,
+    multiply: f64,
+    divide: f64,
+    spellings: &'static str,
+) -> Unit {
+    Unit { is_usual: false, ..unit(name, dimension, multiply, divide, spellings) }
+}
+
+const fn shifted(
+    name: &'static str,
+    shift: f64,
+    multiply: f64,
+    divide: f64,
+    spellings: &'static str,
+) -> Unit {
+    Unit { shift, ..unit(name, Dimension::Temperature, multiply, divide, spellings) }
+}
+
+/// Small letters and digits only.
+fn fold(text: &str) -> String {
+    let digits = |letter: char| match letter {
+        '¹' => '1',
+        '²' => '2',
+        '³' => '3',
+        'µ' | 'μ' => 'u',
+        letter => letter,
+    };
+    let letters = text.chars().map(digits).flat_map(char::to_lowercase);
+    letters.filter(|letter| letter.is_alphanumeric()).collect()
+}
+
+/// True for the spelling of any unit, of a dataset's or of another thing's.
+pub fn is_unit(text: &str) -> bool {
+    FOREIGN.split(' ').any(|unit| unit == fold(text))
+        || Unit::all().any(|unit| Unit::spelled(unit.dimension, text).is_some())
 }
 
 impl Unit {
     /// The unit of a dimension with this name.
     pub fn find(dimension: Dimension, name: &str) -> Option<Unit> {
         Self::of(dimension).find(|unit| unit.name == name)
+    }
+
+    /// The unit of a dimension that is spelled so. The names come first, then case distinguishes nothing (but mN is
+    /// no MN).
+    pub fn spelled(dimension: Dimension, text: &str) -> Option<Unit> {
+        let text = text.trim();
+        match (dimension, text) {
+            (Dimension::Ratio, "‰" | "0/00" | "o/oo") => {
+                return Self::find(dimension, "permille");
+            }
+            (Dimension::Ratio | Dimension::Count, "-" | "") => return Self::find(dimension, "1"),
+            (Dimension::Ratio | Dimension::Angle, "°") => return Self::find(dimension, "deg"),
+            // Nobody's train pulls with thousandths of a newton or a watt.
+            (Dimension::Force, "mN") | (Dimension::Power, "mW") => return None,
+            _ => {}
+        }
+        if let Some(exact) = Self::find(dimension, text) {
+            return Some(exact);
+        }
+        // kN are no knots: capitals distinguish units of different things.
+        let has_capital = text.chars().any(char::is_uppercase);
+        let folded = fold(text);
+        if folded.is_empty() || (has_capital && Self::all().any(|unit| unit.name == text)) {
+            return None;
+        }
+        let like = Self::of(dimension).find(|unit| fold(unit.name) == folded);
+        let by_list = |unit: &Unit| unit.spellings.split(' ').any(|spelling| spelling == folded);
+        like.or_else(|| Self::of(dimension).find(by_list))
     }
 
     /// Every unit.
@@ -127,10 +314,17 @@ impl Unit {
         Self::all().filter(move |unit| unit.dimension == dimension)
     }
 
+    /// The units of a dimension that recorders use without saying so: what an unknown factor may be.
+    pub fn usual_of(dimension: Dimension) -> impl Iterator<Item = Unit> {
+        Self::of(dimension).filter(|unit| unit.is_usual)
+    }
+
     /// The base unit of a dimension: the one without shift and scale.
     pub fn base_of(dimension: Dimension) -> Unit {
         Self::of(dimension)
-            .find(|unit| unit.shift == 0.0 && unit.multiply == 1.0 && unit.divide == 1.0)
+            .find(|unit| {
+                unit.is_usual && unit.shift == 0.0 && unit.multiply == 1.0 && unit.divide == 1.0
+            })
             .expect("every dimension has its base unit")
     }
 
@@ -166,84 +360,6 @@ impl Unit {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn base(dimension: Dimension, name: &str, value: f64) -> f64 {
-        Unit::find(dimension, name).unwrap().to_base(value)
-    }
-
-    #[test]
-    fn every_unit_converts_to_its_base() {
-        use Dimension::*;
-        let cases = [
-            (Time, "s", 7.0, 7.0),
-            (Time, "ms", 200.0, 0.2),
-            (Time, "us", 5.0, 5e-6),
-            (Time, "ns", 3.0, 3e-9),
-            (Time, "min", 2.0, 120.0),
-            (Time, "h", 0.5, 1800.0),
-            (Length, "m", 12.5, 12.5),
-            (Length, "km", 10.5788, 10578.8),
-            (Length, "mm", 12.5, 0.0125),
-            (Speed, "m/s", 3.0, 3.0),
-            (Speed, "km/h", 72.0, 20.0),
-            (Speed, "mph", 100.0, 44.704),
-            (Acceleration, "m/s2", -0.7, -0.7),
-            (Force, "N", 4.0, 4.0),
-            (Force, "kN", 35.3, 35_300.0),
-            (Force, "MN", 0.25, 250_000.0),
-            (Force, "lbf", 1.0, 4.4482216152605),
-            (Pressure, "Pa", 9.0, 9.0),
-            (Pressure, "kPa", 103.2, 103_200.0),
-            (Pressure, "bar", 1.046, 104_600.0),
-            (Mass, "kg", 70.0, 70.0),
-            (Mass, "t", 114.5, 114_500.0),
-            (Temperature, "degC", 7.9, 7.9),
-            (Temperature, "K", 273.15, 0.0),
-            (Temperature, "degF", 212.0, 100.0),
-            (Ratio, "permille", 3.0, 0.003),
-            (Ratio, "%", 93.0, 0.93),
-            (Ratio, "1", 0.4, 0.4),
-            (Angle, "deg", 47.4, 47.4),
-            (Angle, "rad", std::f64::consts::PI, 180.0),
-            (Curvature, "1/m", -0.01, -0.01),
-            (Power, "W", 5.0, 5.0),
-            (Power, "kW", 1.5, 1500.0),
-            (Voltage, "V", 750.0, 750.0),
-            (Voltage, "kV", 1.5, 1500.0),
-            (Current, "A", -40.0, -40.0),
-            (Current, "kA", 0.5, 500.0),
-            (Count, "1", 250.0, 250.0),
-        ];
-        assert_eq!(cases.len(), UNITS.len(), "one case for every unit");
-        for (dimension, name, value, expected) in cases {
-            assert_eq!(base(dimension, name, value), expected, "{value} {name}");
-        }
-    }
-
-    #[test]
-    fn conversion_there_and_back_is_the_identity() {
-        for unit in UNITS {
-            for value in [-40.0, 0.0, 0.1, 7.3, 1e4] {
-                let back = unit.from_base(unit.to_base(value));
-                assert!((back - value).abs() <= 1e-12 * (1.0 + value.abs()), "{}", unit.name);
-            }
-        }
-    }
-
-    #[test]
-    fn a_unit_belongs_to_one_dimension() {
-        assert_eq!(Unit::find(Dimension::Speed, "kN"), None);
-        let names: Vec<_> = Unit::of(Dimension::Speed).map(|unit| unit.name()).collect();
-        assert_eq!(names, ["m/s", "km/h", "mph"]);
-    }
-
-    #[test]
-    fn a_value_in_its_own_unit_stays_as_it_is() {
-        let permille = Unit::find(Dimension::Ratio, "permille").unwrap();
-        let percent = Unit::find(Dimension::Ratio, "%").unwrap();
-        assert_eq!(permille.convert(0.7, &permille), 0.7);
-        assert!((percent.convert(2.5, &permille) - 25.0).abs() < 1e-14);
-    }
-}
+mod spelling_tests;
+#[cfg(test)]
+mod tests;

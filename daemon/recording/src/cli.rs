@@ -20,6 +20,7 @@ use super::convert::{
 };
 use super::copying::recover;
 use super::error::CopyError;
+use super::joining::read_all;
 use super::page::page;
 use super::reading::Ending;
 use super::record::{KeepError, RecordError};
@@ -132,6 +133,9 @@ pub struct VerifyArguments {
     with: Option<PathBuf>,
 }
 
+/// The exit status where something of a recording is lost.
+const LOST: u8 = 3;
+
 /// The name by which messages call this program.
 fn program() -> &'static str {
     called_as(RECORDING)
@@ -162,9 +166,12 @@ pub fn main() -> ExitCode {
 
 fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
     require_new(&arguments.output)?;
+    // Those of two daemons are refused before anything is written.
+    read_all(&arguments.broken, &mut ()).map_err(Failure::from)?;
     let recovered = recover(&arguments.broken, &arguments.output)?;
     let lost: Vec<String> =
         arguments.broken.iter().zip(&recovered.endings).filter_map(lost).collect();
+    let is_whole = lost.is_empty();
     let lost =
         if lost.is_empty() { "nothing is lost: it was whole".to_owned() } else { lost.join("; ") };
     report_line(&format!(
@@ -173,7 +180,7 @@ fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
         recovered.messages,
         recovered.attachments
     ));
-    Ok(())
+    if is_whole { Ok(()) } else { Err(Failure::Verdict(LOST)) }
 }
 
 /// What a file has lost, unless it is whole.

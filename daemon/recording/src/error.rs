@@ -46,6 +46,15 @@ pub enum ReadProblem {
         /// The file's.
         found: String,
     },
+    /// Another tool has written it anew and left out which release recorded it.
+    #[error(
+        "{topic}: the channel does not say which layout its messages have, and their description is another than \
+         this release's: another tool wrote the file anew; keep the channels' metadata there"
+    )]
+    NoLayout {
+        /// The channel.
+        topic: String,
+    },
     /// A message is not what its channel says.
     #[error("{topic}, message {number}: {source}")]
     Malformed {

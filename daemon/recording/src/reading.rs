@@ -14,7 +14,7 @@ use prost::Message;
 use crate::codec::{decode_sample, decode_snapshot};
 use crate::error::{CopyError, ReadError, ReadProblem};
 use crate::event::Event;
-use crate::schema::{EVENT, SAMPLE, SNAPSHOT};
+use crate::schema::{EVENT, SAMPLE, SNAPSHOT, is_described_alike};
 
 /// How a file ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -265,12 +265,16 @@ fn require_our_layout(channel: &ChannelInfo) -> Result<(), ReadProblem> {
         Some(SNAPSHOT) => ParameterSnapshot::WIRE_NAME,
         _ => return Ok(()),
     };
-    let found = channel.metadata.get("layout").map_or("none", String::as_str);
-    if found == expected {
-        return Ok(());
+    let topic = channel.topic.clone();
+    match channel.metadata.get("layout") {
+        Some(found) if found == expected => Ok(()),
+        Some(found) => Err(ReadProblem::OtherSchema { topic, expected, found: found.clone() }),
+        // Tools that write messages anew keep what describes these, not what is said of the channel.
+        None if channel.schema.as_ref().is_some_and(|it| is_described_alike(&it.0, &it.2)) => {
+            Ok(())
+        }
+        None => Err(ReadProblem::NoLayout { topic }),
     }
-    let (topic, found) = (channel.topic.clone(), found.to_owned());
-    Err(ReadProblem::OtherSchema { topic, expected, found })
 }
 
 /// True when an attachment's record holds its two times, its two texts, its length and its checksum:

@@ -39,6 +39,23 @@ pub static SNAPSHOT_FIELDS: LazyLock<Vec<Field>> = LazyLock::new(|| snapshot_fie
 /// The messages of a recording, as the bytes that an MCAP schema holds.
 pub static DESCRIPTORS: LazyLock<Vec<u8>> = LazyLock::new(|| descriptors().encode_to_vec());
 
+/// True where other descriptors describe the fields of a message as this release's do.
+pub fn is_described_alike(message: &str, descriptors: &[u8]) -> bool {
+    let fields = |bytes: &[u8]| -> Option<Vec<(Option<String>, Option<i32>, Option<i32>)>> {
+        let files = FileDescriptorSet::decode(bytes).ok()?;
+        let (package, name) = message.rsplit_once('.')?;
+        let mut files = files.file.into_iter().filter(|it| it.package() == package);
+        let found =
+            files.find_map(|it| it.message_type.into_iter().find(|it| it.name() == name))?;
+        let mut fields: Vec<_> =
+            found.field.into_iter().map(|it| (it.name, it.number, it.r#type)).collect();
+        fields.sort();
+        Some(fields)
+    };
+    let other = fields(descriptors);
+    other.is_some() && other == fields(&DESCRIPTORS)
+}
+
 /// The protobuf number of a layout's field.
 pub fn number(field: &Field) -> u32 {
     field.index as u32 + 1

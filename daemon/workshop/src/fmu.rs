@@ -75,7 +75,7 @@ pub fn read_library(path: &Path) -> Result<Vec<u8>, FmuError> {
     if is_ours { Ok(library) } else { Err(FmuError::OtherLibrary(path.into())) }
 }
 
-/// The FMU of a model: the same bytes for the same library and files.
+/// The FMU of a model whose hosts take steps of so many s by default: the same bytes for the same library and files.
 ///
 /// # Errors
 ///
@@ -83,7 +83,7 @@ pub fn read_library(path: &Path) -> Result<Vec<u8>, FmuError> {
 pub fn archive(
     model: &Interface,
     library: &[u8],
-    files: &[(ModelFile, String)],
+    (files, step_s): (&[(ModelFile, String)], f64),
 ) -> Result<Vec<u8>, FmuError> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
@@ -93,7 +93,7 @@ pub fn archive(
         archive.start_file(name, options)?;
         Ok(archive.write_all(content)?)
     };
-    put("modelDescription.xml".into(), model_description(model).as_bytes())?;
+    put("modelDescription.xml".into(), model_description(model, step_s).as_bytes())?;
     put("documentation/index.html".into(), documentation(model).as_bytes())?;
     put(format!("binaries/{}/{}.so", platform(), model.identifier), library)?;
     for (file, text) in files {

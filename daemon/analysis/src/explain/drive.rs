@@ -119,9 +119,9 @@ impl Hypothesis for OpenDrive {
 
     fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
         let spec = &PARAMETERS[0];
-        let near = |bound: &f64| (parameters[0] - bound).abs() < spec.step;
-        let bound = [spec.lower, spec.upper].into_iter().find(near)?;
-        Some(AtBound { name: spec.name, bound })
+        // The upper bound is a drive without losses: power that is recorded at the wheels.
+        let is_low = parameters[0] - spec.lower < spec.step;
+        is_low.then_some(AtBound { name: spec.name, bound: spec.lower })
     }
 
     fn touches(&self, _parameter: usize, run: &RunData) -> bool {

@@ -6,9 +6,9 @@
 use dynocar_model::train::{Davis, TrainModel};
 
 use super::imported::{Account, ImportedTrain, Reading, force_n};
-use crate::dataset::DatasetError;
 use crate::dataset::document::{Item, above_zero};
 use crate::dataset::train_file::growing;
+use crate::dataset::{DatasetError, unusual_resistance};
 
 /// Why fields have no place, and which.
 const WITHOUT_PLACE: [(&str, &str); 9] = [
@@ -65,7 +65,7 @@ pub(super) fn train(root: &Item, reading: &Reading) -> Result<ImportedTrain, Dat
         length_m,
         cars: None,
         rotating_mass_factor: inertia.map(|inertia| inertia - 1.0),
-        resistance: Some(resistance),
+        resistance,
         traction,
         account,
     })
@@ -76,7 +76,7 @@ fn resistance(
     mass_kg: f64,
     top_mps: Option<f64>,
     account: &mut Account,
-) -> Result<Davis, DatasetError> {
+) -> Result<Option<Davis>, DatasetError> {
     let item = root.need("rolling_resistance", "Davis coefficients")?;
     let kind = item.need("type", "\"davis\"")?;
     if kind.text("\"davis\"")? != "davis" {
@@ -84,6 +84,10 @@ fn resistance(
     }
     let number = |key: &str| item.required(key, "a number from 0 to 1e7", 0.0..=1e7);
     let stated = Davis { a: number("A")?, b: number("B")?, c: number("C")? };
+    if stated == (Davis { a: 0.0, b: 0.0, c: 0.0 }) {
+        account.unknown("a, b, c", "A, B and C are 0");
+        return Ok(None);
+    }
     let weight_kn = TrainModel::weight_kn(mass_kg);
     let times =
         |factor: f64| Davis { a: factor * stated.a, b: factor * stated.b, c: factor * stated.c };
@@ -106,8 +110,10 @@ fn resistance(
     let how = format!(
         "read as N, N/(m/s), N/(m/s)² {of}: {w0:.2} N/kN at {speed_mps:.1} m/s, and {other:.1e} if not"
     );
-    account.taken("rolling_resistance", "a, b, c", how);
-    Ok(taken)
+    let unusual = unusual_resistance(&taken, top_mps.unwrap_or(SPEED_MPS));
+    let unusual = unusual.map_or(String::new(), |it| format!("; UNUSUAL: {it}"));
+    account.taken("rolling_resistance", "a, b, c", how + &unusual);
+    Ok(Some(taken))
 }
 
 /// The default curve of the mode that is wanted, or of the file's default mode.

@@ -125,8 +125,9 @@ impl InputFault {
     /// How well two units of the quantity explain a factor of reported over true: the logarithm of
     /// what is left, for the nearest two; `None` where none is near.
     pub fn misfit(self, factor: f64) -> Option<f64> {
-        let pairs = Unit::of(self.dimension())
-            .flat_map(|of| Unit::of(self.dimension()).map(move |read_as| read_as.in_terms_of(&of)));
+        let pairs = Unit::usual_of(self.dimension()).flat_map(|of| {
+            Unit::usual_of(self.dimension()).map(move |read_as| read_as.in_terms_of(&of))
+        });
         pairs
             .filter(|&pair| pair != 1.0)
             .map(|pair| (factor / pair).abs().ln().abs())
@@ -149,7 +150,7 @@ impl DetectedFault {
     /// factor.
     pub fn true_unit(&self, read_as: &Unit) -> Option<Unit> {
         let misfit = |of: &Unit| (self.factor / read_as.in_terms_of(of)).abs().ln().abs();
-        Unit::of(self.fault.dimension())
+        Unit::usual_of(self.fault.dimension())
             .filter(|of| of.name() != read_as.name() && misfit(of) < UNIT_TOLERANCE)
             .min_by(|one, other| misfit(one).total_cmp(&misfit(other)))
     }

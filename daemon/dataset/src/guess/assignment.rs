@@ -5,9 +5,14 @@ use std::cmp::Reverse;
 use super::columns::{Column, Columns};
 use super::facts::Facts;
 use super::guessed::{GivenColumn, GuessedColumn, Unmapped};
-use super::matching::{can_hold, consider};
+use super::matching::{UNKNOWN_UNIT, can_hold, consider};
 use super::name::named_unit;
 use crate::{DatasetError, Quantity, SourcePosition};
+
+/// Logarithm of the ratio of a position's span and the integrated speed that gaps and wear explain.
+const SPAN_MISFIT: f64 = 0.2;
+/// A column whose name says less than another's by no more than this could be it as well.
+const NEAR: i32 = 25;
 
 /// A column that may hold a quantity.
 #[derive(Clone)]
@@ -53,21 +58,27 @@ impl<'c> Assignment<'c> {
             assignment.take_given(it, columns).map_err(|words| place().problem(words))?;
         }
         for (index, column) in columns.columns.iter().enumerate() {
-            if column.unusable.is_some() || assignment.is_taken(index) {
+            if assignment.is_taken(index) {
                 continue;
             }
             let is_given = |quantity: &Quantity| given.iter().any(|it| it.quantity == *quantity);
             for quantity in Quantity::ALL.into_iter().filter(|it| !is_given(it)) {
-                match consider(&column.name, &column.all, quantity) {
-                    None => {}
-                    Some(Ok((score, guessed))) => {
-                        assignment.candidates.push(Candidate { column: index, score, guessed });
+                match (consider(&column.name, &column.all, quantity), &column.unusable) {
+                    (None, _) => {}
+                    (Some(_), Some(reason)) => {
+                        assignment.refused.push((index, quantity, reason.clone()));
                     }
-                    Some(Err(reason)) => assignment.refused.push((index, quantity, reason)),
+                    (Some(found), None) => match found {
+                        Ok((score, guessed)) => {
+                            assignment.candidates.push(Candidate { column: index, score, guessed });
+                        }
+                        Err(reason) => assignment.refused.push((index, quantity, reason)),
+                    },
                 }
             }
         }
         assignment.take_best();
+        assignment.weigh_others();
         Ok(assignment)
     }
 
@@ -80,6 +91,8 @@ impl<'c> Assignment<'c> {
         };
         let column = &self.columns[index];
         let reason = match &column.unusable {
+            // How its cells are to be read is said.
+            _ if given.format.is_some() => Ok(()),
             Some(reason) => Err(reason.clone()),
             None => can_hold(&column.all, quantity),
         };
@@ -89,7 +102,7 @@ impl<'c> Assignment<'c> {
         let unit = (given.unit, named_unit(&column.name, quantity));
         let reason = "given on the command line".into();
         let guessed = GuessedColumn::new((&column.name, &column.all), quantity, reason, unit);
-        self.taken.push((index, guessed, true));
+        self.taken.push((index, guessed.given_as(given.format.as_ref()), true));
         Ok(())
     }
 
@@ -102,6 +115,76 @@ impl<'c> Assignment<'c> {
                 self.taken.push((column, guessed, false));
             }
         }
+    }
+
+    /// Takes columns for parts that add up where they are alike but for what numbers them, and doubts what another
+    /// column could be as well.
+    fn weigh_others(&mut self) {
+        for place in 0..self.taken.len() {
+            let (index, guessed, is_given_here) = &self.taken[place];
+            if *is_given_here {
+                continue;
+            }
+            let (quantity, column) = (guessed.quantity, &self.columns[*index]);
+            let own_score = self.score(*index, quantity);
+            let others = self.candidates.iter().filter(|it| {
+                it.guessed.quantity == quantity && it.column != *index && !self.is_taken(it.column)
+            });
+            let is_part = |it: &&Candidate| {
+                let other = &self.columns[it.column].name;
+                quantity.adds_up()
+                    && column.name.without_number().is_some()
+                    && other.without_number() == column.name.without_number()
+                    && other.unit == column.name.unit
+            };
+            let (parts, others): (Vec<&Candidate>, Vec<&Candidate>) = others.partition(is_part);
+            let mut parts: Vec<usize> = parts.iter().map(|it| it.column).collect();
+            parts.sort_unstable();
+            let own = figures(&column.all, guessed);
+            let is_near = |it: &&&Candidate| {
+                let other = figures(&self.columns[it.column].all, &it.guessed);
+                it.score + NEAR >= own_score && !are_alike(own, other)
+            };
+            let near: Vec<String> = others
+                .iter()
+                .filter(is_near)
+                .map(|it| format!("'{}' could be it as well", self.shown(it.column)))
+                .collect();
+            let mut doubts = Vec::new();
+            if !parts.is_empty() {
+                let names: Vec<String> = std::iter::once(index)
+                    .chain(&parts)
+                    .map(|&index| format!("'{}'", self.shown(index)))
+                    .collect();
+                doubts.push(format!("{} are taken for parts that add up", names.join(", ")));
+            }
+            doubts.extend(near);
+            let parts = parts.iter().map(|&part| self.columns[part].name.clone()).collect();
+            let guessed = &mut self.taken[place].1;
+            guessed.parts = parts;
+            guessed.doubts.extend(doubts);
+        }
+    }
+
+    fn score(&self, index: usize, quantity: Quantity) -> i32 {
+        let is_it = |it: &&Candidate| it.column == index && it.guessed.quantity == quantity;
+        self.candidates.iter().find(is_it).map_or(0, |it| it.score)
+    }
+
+    /// The first column that would be a quantity that nothing is taken for, were its unit known.
+    pub fn unknown_unit(&self) -> Option<(&'c Column, Quantity, &str)> {
+        self.refused.iter().find_map(|(index, quantity, reason)| {
+            let is_it = reason.starts_with(UNKNOWN_UNIT)
+                && !self.has(*quantity)
+                && !self.is_taken(*index)
+                && self.columns[*index].all.formats().is_empty();
+            is_it.then(|| (&self.columns[*index], *quantity, reason.as_str()))
+        })
+    }
+
+    fn is_part(&self, index: usize) -> bool {
+        let name = &self.columns[index].name;
+        self.taken.iter().any(|(_, guessed, _)| guessed.parts.contains(name))
     }
 
     fn is_taken(&self, index: usize) -> bool {
@@ -120,6 +203,50 @@ impl<'c> Assignment<'c> {
     /// What the values are like of the column that is taken for a quantity.
     pub fn facts(&self, quantity: Quantity) -> Option<&'c Facts> {
         self.taken_for(quantity).map(|(index, ..)| &self.columns[*index].all)
+    }
+
+    /// Takes the column for the position that spans what the speed says, where another does not and more speaks for
+    /// its name.
+    pub fn weigh_positions(&mut self) {
+        let Some((at, taken, false)) = self
+            .taken_for(Quantity::Position)
+            .map(|(at, guessed, given)| (*at, guessed.clone(), *given))
+        else {
+            return;
+        };
+        let Some((time_at, time, _)) = self.taken_for(Quantity::Time) else { return };
+        let Some((speed_at, speed, _)) = self.taken_for(Quantity::Speed) else { return };
+        let facts = |column: usize| &self.columns[column].facts;
+        let base =
+            |guessed: &GuessedColumn, value: f64| guessed.unit.to_base(value * guessed.scale);
+        // Times that are no numbers are in s already.
+        let driven_m: f64 = facts(*time_at)
+            .iter()
+            .zip(facts(*speed_at))
+            .filter_map(|(times, speeds)| {
+                Some(base(time, times.span()?) * base(speed, speeds.mean()?))
+            })
+            .sum();
+        let misfit = |column: usize, guessed: &GuessedColumn| {
+            let spans = facts(column).iter().filter_map(Facts::span);
+            (spans.map(|span| base(guessed, span)).sum::<f64>() / driven_m).ln().abs()
+        };
+        let own = misfit(at, &taken);
+        let others = self
+            .candidates
+            .iter()
+            .filter(|it| it.guessed.quantity == Quantity::Position && !self.is_taken(it.column));
+        let best = others
+            .map(|it| (misfit(it.column, &it.guessed), it))
+            .filter(|(misfit, _)| *misfit < SPAN_MISFIT && own > 2.0 * SPAN_MISFIT)
+            .min_by(|one, other| one.0.total_cmp(&other.0));
+        let Some((_, best)) = best else { return };
+        let (column, mut guessed) = (best.column, best.guessed.clone());
+        guessed
+            .reasons
+            .push(format!("it spans what the speed says, which '{}' does not", self.shown(at)));
+        self.taken.retain(|(_, guessed, _)| guessed.quantity != Quantity::Position);
+        self.taken.push((column, guessed, false));
     }
 
     /// Takes a quantity's column for another quantity instead, with a doubt; what was declared stays.
@@ -167,7 +294,8 @@ impl<'c> Assignment<'c> {
             let more = self.not_taken(self.taken[place].0, self.taken[place].1.quantity);
             self.taken[place].1.rejected.extend(more);
         }
-        let left = (0..self.columns.len()).filter(|index| !self.is_taken(*index));
+        let left =
+            (0..self.columns.len()).filter(|index| !self.is_taken(*index) && !self.is_part(*index));
         let unmapped = left.map(|index| self.unmapped(index)).collect();
         let mut columns: Vec<_> = self.taken.into_iter().map(|(_, guessed, _)| guessed).collect();
         columns.sort_by_key(|column| column.quantity);
@@ -205,10 +333,22 @@ impl<'c> Assignment<'c> {
                 format!("could be {}{by}", it.quantity)
             }
             (.., Some((_, quantity, reason))) => format!("not {quantity}: {reason}"),
+            _ if column.name.text.is_empty() => "it has no name".into(),
             _ => "its name says none of the quantities".into(),
         };
         Unmapped { name: column.name.clone(), reason }
     }
+}
+
+/// Greatest magnitude and mean of a column's values in the base unit, as it is taken.
+fn figures(facts: &Facts, guessed: &GuessedColumn) -> [f64; 2] {
+    let figures = [facts.top(), facts.mean()];
+    figures.map(|it| guessed.unit.to_base(it.unwrap_or(f64::NAN) * guessed.scale))
+}
+
+/// True for the figures of columns that say the same, but for noise.
+fn are_alike(one: [f64; 2], other: [f64; 2]) -> bool {
+    one.iter().zip(other).all(|(one, other)| (one - other).abs() <= 0.02 * one.abs().max(1e-9))
 }
 
 /// A force with more than this share of values below zero is signed.

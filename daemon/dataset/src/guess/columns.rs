@@ -2,8 +2,10 @@
 use super::facts::Facts;
 use super::guessed::Recording;
 use super::layout::{Layout, layout};
+use super::marks::Evidence;
 use super::name::Name;
 use crate::TextLayout;
+use crate::cell::{Marks, is_word, parse_cell, truth};
 use crate::error::{DatasetError, NO_HEADER, SourcePosition};
 use crate::lines::{Row, RowReader, below};
 
@@ -44,7 +46,13 @@ impl Columns {
             return Err(SourcePosition::whole("no file").problem(NO_HEADER));
         };
         let mut first = first.clone();
-        first.text.decimal = layouts.iter().find_map(|it| it.decimal).unwrap_or(b'.');
+        let mut evidence = Evidence::default();
+        for (file, it) in files.iter().zip(&layouts) {
+            let text = below(file.label, file.text, it.text.skip_rows)?;
+            evidence.push_text(text, it.text.delimiter, it.text.lines_above() - it.text.skip_rows);
+        }
+        let marks = evidence.marks();
+        (first.text.decimal, first.text.thousands) = (marks.decimal, marks.thousands);
         for (file, other) in files.iter().zip(&layouts) {
             require_alike(file, other, (files[0].label, &first.text))?;
         }
@@ -60,18 +68,13 @@ impl Columns {
             .collect();
         let mut rows = Vec::new();
         for (file, layout) in files.iter().zip(&layouts) {
-            let (facts, count) = read_file(file, layout, first.text.decimal)?;
+            let (facts, count) = read_file(file, layout, marks)?;
             for column in &mut columns {
                 let place = layout.header.iter().position(|name| *name == column.name);
                 let of_file = place.map_or_else(Facts::new, |index| facts[index].clone());
                 column.all.merge(&of_file);
-                if column.unusable.is_none() && files.len() > 1 {
-                    column.unusable = of_file.text.as_ref().map(|text| {
-                        let (label, line, cell) = (file.label, text.line, &text.cell);
-                        format!("it holds text in {label}, line {line}: '{cell}'")
-                    });
-                }
-                column.all.text = column.all.text.take().or_else(|| of_file.text.clone());
+                let text = || of_file.text.clone().map(|it| it.of_file(file.label, files.len()));
+                column.all.text = column.all.text.take().or_else(text);
                 column.facts.push(of_file);
             }
             rows.push(count);
@@ -89,9 +92,6 @@ impl Columns {
 
 /// Why no dataset can map a column of this name.
 fn unusable(name: &Name, files: &[Recording], layouts: &[Layout]) -> Option<String> {
-    if name.text.is_empty() {
-        return Some("it has no name".into());
-    }
     files.iter().zip(layouts).find_map(|(file, layout)| {
         match layout.header.iter().filter(|other| *other == name).count() {
             0 => Some(format!("{} has no such column", file.label)),
@@ -107,12 +107,11 @@ fn require_alike(
     (label, first): (&str, &TextLayout),
 ) -> Result<(), DatasetError> {
     let mark = |mark: u8| format!("{:?}", char::from(mark).to_string());
-    let (own, own_decimal) = (&layout.text, layout.decimal.unwrap_or(first.decimal));
+    let own = &layout.text;
     let shown = |is_there: bool| String::from(if is_there { "there" } else { "not there" });
     let above = |layout: &TextLayout| layout.skip_rows.to_string();
     let all = [
         ("the delimiter", mark(own.delimiter), mark(first.delimiter)),
-        ("the decimal mark", mark(own_decimal), mark(first.decimal)),
         ("the number of lines above the names", above(own), above(first)),
         ("a line of units", shown(own.units_row), shown(first.units_row)),
     ];
@@ -128,11 +127,11 @@ fn require_alike(
 fn read_file(
     file: &Recording,
     layout: &Layout,
-    decimal: u8,
+    marks: Marks,
 ) -> Result<(Vec<Facts>, usize), DatasetError> {
     let TextLayout { skip_rows, delimiter, units_row, .. } = layout.text;
     let text = below(file.label, file.text, skip_rows)?;
-    let mut reader = RowReader::new(text, delimiter, decimal);
+    let mut reader = RowReader::new(text, delimiter, marks.decimal);
     let mut facts = vec![Facts::new(); layout.header.len()];
     let above = 1 + usize::from(units_row);
     let (mut row, mut rows) = (Row::default(), 0);
@@ -141,9 +140,17 @@ fn read_file(
         if rows <= above {
             continue;
         }
+        let mut filled =
+            row.cells.iter().map(|cell| cell.text.trim_ascii()).filter(|it| !it.is_empty());
+        // A footer, or the names again.
+        if filled
+            .all(|cell| is_word(cell) && parse_cell(cell, marks).is_none() && truth(cell).is_none())
+        {
+            continue;
+        }
         let line = row.line + skip_rows;
         for (facts, cell) in facts.iter_mut().zip(&row.cells) {
-            facts.push_cell(line, cell.text.trim_ascii(), decimal);
+            facts.push_cell(line, cell.text.trim_ascii(), marks);
         }
     }
     // Names and units are no rows of values.

@@ -1,8 +1,8 @@
 //! What the values of a column are like.
 
 use crate::TimeFormat;
-use crate::cell::parse_cell;
-use crate::clock::{DayClock, day_of_cell};
+use crate::cell::{Marks, parse_cell, truth};
+use crate::clock::{DayClock, Packed, day_of_cell};
 
 /// So many values of a column are kept, evenly spread, to find its middle and its top.
 const KEPT_MAX: usize = 4096;
@@ -27,6 +27,12 @@ impl Spread {
         }
     }
 
+    /// The mean; `None` without a value.
+    fn mean(&self) -> Option<f64> {
+        let count = self.values.len();
+        (count > 0).then(|| self.values.iter().sum::<f64>() / count as f64)
+    }
+
     /// The value below which this share of the values' magnitudes lies.
     fn quantile(&self, share: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
         let mut sorted: Vec<f64> = self.values.iter().map(|&value| of(value)).collect();
@@ -39,10 +45,19 @@ impl Spread {
 /// A cell that holds text where numbers were expected.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Text {
+    /// The file and a comma, where there are several.
+    pub file: String,
     /// Line in the file, from 1.
     pub line: usize,
     /// The cell, on one line.
     pub cell: String,
+}
+
+impl Text {
+    /// The same, with its file where there are several.
+    pub fn of_file(self, label: &str, files: usize) -> Self {
+        Text { file: (files > 1).then(|| format!("{label}, ")).unwrap_or_default(), ..self }
+    }
 }
 
 /// What was seen of a column's values, cell by cell.
@@ -52,6 +67,10 @@ pub struct Facts {
     pub numbers: usize,
     /// The first cell that is neither empty nor a number.
     pub text: Option<Text>,
+    /// Cells that are neither.
+    pub texts: usize,
+    /// Cells that say yes or no.
+    pub truths: usize,
     /// The least number.
     pub min: f64,
     /// The greatest number.
@@ -60,9 +79,10 @@ pub struct Facts {
     pub day: Option<i64>,
     /// Readers of the formats in which every cell so far is a time, the likeliest first.
     clocks: Vec<DayClock>,
-    first: f64,
+    packed: Option<Packed>,
     last: f64,
     growing: usize,
+    falling: usize,
     pairs: usize,
     values: Spread,
     steps: Spread,
@@ -72,13 +92,17 @@ impl Facts {
     /// Nothing seen yet.
     pub fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
-        Facts { min, max, first: f64::NAN, last: f64::NAN, ..Facts::default() }
+        Facts { min, max, last: f64::NAN, packed: Some(Packed::NEW), ..Facts::default() }
     }
 
     /// Takes in a trimmed cell of a line: a number, a time, or text.
-    pub fn push_cell(&mut self, line: usize, cell: &[u8], decimal: u8) {
-        match parse_cell(cell, decimal) {
+    pub fn push_cell(&mut self, line: usize, cell: &[u8], marks: Marks) {
+        match parse_cell(cell, marks) {
             Some(value) if value.is_nan() || self.clocks.is_empty() => self.push(value),
+            None if truth(cell).is_some() => {
+                self.truths += 1;
+                self.push(truth(cell).unwrap_or(f64::NAN));
+            }
             None if self.may_hold_times() => match self.time_s(cell) {
                 Some(time_s) => self.push(time_s),
                 None => self.push_text(line, &String::from_utf8_lossy(cell)),
@@ -122,10 +146,12 @@ impl Facts {
         if self.numbers > 0 {
             let step = value - self.last;
             self.growing += usize::from(step > 0.0);
+            self.falling += usize::from(step < 0.0);
             self.pairs += 1;
             self.steps.push(step.abs());
-        } else {
-            self.first = value;
+        }
+        if let Some(packed) = &mut self.packed {
+            packed.push(value);
         }
         self.last = value;
         self.numbers += 1;
@@ -138,7 +164,8 @@ impl Facts {
     fn push_text(&mut self, line: usize, cell: &str) {
         let printable = |letter: char| if letter.is_control() { ' ' } else { letter };
         let cell = || cell.chars().take(40).map(printable).collect();
-        self.text.get_or_insert_with(|| Text { line, cell: cell() });
+        self.texts += 1;
+        self.text.get_or_insert_with(|| Text { file: String::new(), line, cell: cell() });
     }
 
     /// Takes in what was seen of the same column in another file.
@@ -150,10 +177,14 @@ impl Facts {
             }
             _ => {}
         }
+        self.packed = other.packed.filter(|it| self.numbers == 0 || self.packed() == it.format());
         self.numbers += other.numbers;
+        self.texts += other.texts;
+        self.truths += other.truths;
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
         self.growing += other.growing;
+        self.falling += other.falling;
         self.pairs += other.pairs;
         other.values.values.iter().for_each(|&value| self.values.push(value));
         other.steps.values.iter().for_each(|&step| self.steps.push(step));
@@ -162,6 +193,11 @@ impl Facts {
     /// The greatest magnitude, single spikes left out; `None` without a number.
     pub fn top(&self) -> Option<f64> {
         self.values.quantile(0.99, f64::abs)
+    }
+
+    /// The mean; `None` without a number.
+    pub fn mean(&self) -> Option<f64> {
+        self.values.mean()
     }
 
     /// The middle value; `None` without a number.
@@ -179,14 +215,21 @@ impl Facts {
         (self.numbers > 0).then_some(self.max - self.min)
     }
 
-    /// True where nearly every number is greater than the one before.
+    /// True where nearly every number is greater than the one before, or as great.
     pub fn grows(&self) -> bool {
-        self.growing > 0 && self.growing * 10 >= self.pairs * 8
+        let changing = self.growing + self.falling;
+        // Several rows may share a whole second; rows in disorder fall as often as they grow.
+        self.growing > 0 && self.growing * 10 >= changing * 3 && self.growing * 50 >= self.pairs
     }
 
-    /// -1 where the last number is less than the first, else 1.
+    /// The format in which the numbers are packed times.
+    pub fn packed(&self) -> Option<TimeFormat> {
+        self.packed?.format()
+    }
+
+    /// -1 where the number falls in most steps, else 1.
     pub fn direction(&self) -> i8 {
-        if self.last < self.first { -1 } else { 1 }
+        if self.falling > self.growing { -1 } else { 1 }
     }
 
     /// The shares of the values that are above and below zero by more than noise.
@@ -245,6 +288,6 @@ mod tests {
         seen.push_text(3, "a\tb");
         seen.push_text(4, "c");
         assert_eq!((seen.top(), seen.middle(), seen.step(), seen.span()), (None, None, None, None));
-        assert_eq!(seen.text, Some(Text { line: 3, cell: "a b".into() }));
+        assert_eq!(seen.text, Some(Text { file: String::new(), line: 3, cell: "a b".into() }));
     }
 }

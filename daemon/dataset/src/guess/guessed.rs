@@ -4,7 +4,7 @@ use dynocar_core::plausibility::InputFault;
 use dynocar_model::units::Unit;
 
 use super::facts::Facts;
-use super::name::{Name, Spelled, named_unit};
+use super::name::{Name, named_unit};
 use super::plausible::{UnitChoice, choose_unit};
 use crate::diagnostic::concerned;
 use crate::{GradientSource, Quantity, Run, TextLayout, TimeFormat};
@@ -27,6 +27,8 @@ pub struct GivenColumn {
     pub column: String,
     /// Its unit; `None` where name and values are to reveal it.
     pub unit: Option<Unit>,
+    /// How its cells are written, where they are times and that is said.
+    pub format: Option<TimeFormat>,
 }
 
 /// The description of recordings, as far as it can be guessed.
@@ -49,6 +51,8 @@ pub struct GuessedColumn {
     pub quantity: Quantity,
     /// Its name in the header.
     pub name: Name,
+    /// Further columns, which add up with it.
+    pub parts: Vec<Name>,
     /// The unit of `cell * scale`.
     pub unit: Unit,
     /// Factor on the cell.
@@ -100,19 +104,20 @@ impl GuessedColumn {
         (name, facts): (&Name, &Facts),
         quantity: Quantity,
         reason: String,
-        (given, named): (Option<Unit>, Option<Spelled>),
+        (given, named): (Option<Unit>, Option<Unit>),
     ) -> Self {
         let unit = match given {
             Some(unit) => {
-                UnitChoice { spelled: unit.into(), reason: "the unit as given".into(), doubt: None }
+                UnitChoice { unit, scale: 1.0, reason: "the unit as given".into(), doubt: None }
             }
             None => choose_unit(quantity, facts, named),
         };
         let guessed = GuessedColumn {
             quantity,
             name: name.clone(),
-            unit: unit.spelled.unit,
-            scale: unit.spelled.scale,
+            parts: Vec::new(),
+            unit: unit.unit,
+            scale: unit.scale,
             format: None,
             reasons: vec![reason, unit.reason],
             doubts: unit.doubt.into_iter().collect(),
@@ -122,8 +127,18 @@ impl GuessedColumn {
         };
         match (quantity, &facts.formats()[..]) {
             (Quantity::Time, [format, others @ ..]) => guessed.written_as(format, others),
+            (Quantity::Time, []) if given.is_none() && guessed.is_unit_open => match facts.packed()
+            {
+                Some(format) => guessed.written_as(&format, &[]),
+                None => guessed,
+            },
             _ => guessed,
         }
+    }
+
+    /// The same, its cells times in the format that is given.
+    pub(super) fn given_as(self, format: Option<&TimeFormat>) -> Self {
+        format.map_or(self.clone(), |format| self.written_as(format, &[]))
     }
 
     /// The same, its cells times in a format; in others they could be, too.
@@ -131,8 +146,14 @@ impl GuessedColumn {
         self.reasons[1] = format!("its cells are times as {}", format.example());
         // A day without a leading zero is read where one stands, too.
         let plain = |format: &TimeFormat| format.name().replace('-', "");
-        let others = others.iter().filter(|other| plain(other) != plain(format));
-        let others: Vec<&str> = others.map(|it| it.name()).collect();
+        let mut known = vec![plain(format)];
+        let mut others: Vec<&str> = others.iter().map(|it| it.name()).collect();
+        others.retain(|other| {
+            let other = other.replace('-', "");
+            let is_new = !known.contains(&other);
+            known.push(other);
+            is_new
+        });
         let doubt = || format!("they could be {}, too", others.join(" or "));
         let doubts = (!others.is_empty()).then(doubt).into_iter().collect();
         let (unit, format) = (Unit::base_of(self.quantity.dimension()), Some(format.clone()));

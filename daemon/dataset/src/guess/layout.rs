@@ -1,8 +1,11 @@
 //! How a file's text falls into cells: delimiter, decimal mark, the lines above the names, names and units.
-use super::name::{self, Name};
-use crate::cell::parse_cell;
+use dynocar_model::units::is_unit;
+
+use super::name::Name;
+use crate::cell::{Marks, parse_cell, ungrouped};
 use crate::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
 use crate::lines::{self, RowReader};
+use crate::text_layout::THOUSANDS;
 use crate::{TextLayout, TimeFormat};
 
 /// What may separate cells, in the order of preference.
@@ -15,8 +18,6 @@ const ROWS_MAX: usize = 200;
 pub struct Layout {
     /// As a dataset says it.
     pub text: TextLayout,
-    /// Between a number and its fraction; `None` where no number has one.
-    pub decimal: Option<u8>,
     /// The columns' names, with the units that stand below them.
     pub header: Vec<Name>,
 }
@@ -90,13 +91,12 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, DatasetError> {
     let units = units.map(|units| &rows[units]);
     let name = |(index, cell): (usize, &String)| {
         let unit = units.and_then(|row| row.cells.get(index)).map(|cell| without_brackets(cell));
-        Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && name::is_unit(unit)))
+        Name::parse(cell).with_unit(unit.filter(|unit| !unit.is_empty() && is_unit(unit)))
     };
     let (delimiter, skip_rows) = (*delimiter, names.line - 1);
     let units_row = units.is_some();
     Ok(Layout {
         text: TextLayout { delimiter, skip_rows, units_row, ..TextLayout::PLAIN },
-        decimal: decimal(values),
         header: names.cells.iter().enumerate().map(name).collect(),
     })
 }
@@ -133,19 +133,32 @@ impl Row {
     }
 
     /// True where at least half of the cells are units and none is a value. Letters alone are as well the
-    /// names of columns: t, v, F.
-    fn is_of_units(&self) -> bool {
+    /// names of columns: t, v, F; but not where less of them stand there than above.
+    fn is_of_units(&self, names: &Row) -> bool {
         let cells: Vec<String> = self.filled().map(without_brackets).collect();
-        let units: Vec<&String> = cells.iter().filter(|cell| name::is_unit(cell)).collect();
+        let units: Vec<&String> = cells.iter().filter(|cell| is_unit(cell)).collect();
         let is_plain = units.iter().any(|unit| unit.chars().count() > 1);
+        // Names leave no cell empty, units may.
+        let is_plain = is_plain || cells.len() < names.filled().count().min(names.cells.len());
         self.is_of_words() && is_plain && 2 * units.len() >= cells.len()
     }
 }
 
 fn is_value(cell: &str) -> bool {
     let cell = cell.as_bytes();
-    parse_cell(cell, b'.').or(parse_cell(cell, b',')).is_some()
-        || !TimeFormat::of_cell(cell).is_empty()
+    let is_plain = |mark| parse_cell(cell, Marks::plain(mark)).is_some();
+    is_plain(b'.') || is_plain(b',') || is_grouped(cell) || !TimeFormat::of_cell(cell).is_empty()
+}
+
+/// True for a number with marks between its groups of three digits.
+fn is_grouped(cell: &[u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(cell) else { return false };
+    let is_it = |mark: char| {
+        let decimal = if mark == '.' { ',' } else { '.' };
+        text.contains(mark)
+            && [decimal, ','].into_iter().any(|it| ungrouped(text, mark, it).is_some())
+    };
+    THOUSANDS.into_iter().any(is_it)
 }
 
 fn without_brackets(cell: &str) -> String {
@@ -165,7 +178,7 @@ fn block(rows: &[Row]) -> Option<Block> {
     let words = (0..values).rev().find(|&index| rows[index].is_of_words())?;
     let above = words.checked_sub(1).filter(|&above| {
         let (names, units) = (&rows[above], &rows[words]);
-        units.is_of_units()
+        units.is_of_units(names)
             && names.is_of_words()
             && names.filled().count() >= units.filled().count()
     });
@@ -189,29 +202,15 @@ fn usual_width(rows: &[Row]) -> Option<usize> {
     widths.get(widths.len() / 2).copied()
 }
 
-/// The decimal mark: what stands within most of the numbers that have one.
-fn decimal(rows: &[Row]) -> Option<u8> {
-    let (mut commas, mut points) = (0, 0);
-    for cell in rows.iter().flat_map(Row::filled).map(str::as_bytes) {
-        let is_number = |mark| parse_cell(cell, mark).is_some();
-        commas += usize::from(cell.contains(&b',') && is_number(b','));
-        points += usize::from(cell.contains(&b'.') && is_number(b'.'));
-    }
-    match (commas, points) {
-        (0, 0) => None,
-        _ if commas > points => Some(b','),
-        _ => Some(b'.'),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn recognised(text: &str) -> (char, Option<char>, usize) {
-        let layout = layout("a.csv", text).unwrap();
-        let decimal = layout.decimal.map(char::from);
-        (char::from(layout.text.delimiter), decimal, layout.header.len())
+    fn recognised(text: &str) -> (char, char, usize) {
+        let file = crate::guess::Recording { label: "a.csv", text };
+        let read = crate::guess::columns::Columns::read(&[file]).unwrap().layout;
+        let TextLayout { delimiter, decimal, .. } = read.text;
+        (char::from(delimiter), char::from(decimal), read.header.len())
     }
 
     fn refusal(text: &str) -> String {
@@ -220,14 +219,14 @@ mod tests {
 
     #[test]
     fn delimiter_and_decimal_mark_are_distinguished() {
-        assert_eq!(recognised("t,v\n0,1.5\n1,2.5\n"), (',', Some('.'), 2));
-        assert_eq!(recognised("t;v\n0;1,5\n1;2,5\n"), (';', Some(','), 2));
-        assert_eq!(recognised("t;v\n0,5;1,5\n1;2,5\n"), (';', Some(','), 2));
-        assert_eq!(recognised("t\tv\tF\n0\t1\t3\n"), ('\t', None, 3));
-        assert_eq!(recognised("t|v\n0|1.5\n"), ('|', Some('.'), 2));
-        assert_eq!(recognised("t,v\n\"0,5\",\"1,5\"\n"), (',', Some(','), 2));
-        assert_eq!(recognised("\u{feff}t;v, measured\n0;1.0\n"), (';', Some('.'), 2));
-        assert_eq!(recognised("t,v,note\n0,1.5,\"a;b\"\n1,1.5,\"c;d\"\n"), (',', Some('.'), 3));
+        assert_eq!(recognised("t,v\n0,1.5\n1,2.5\n"), (',', '.', 2));
+        assert_eq!(recognised("t;v\n0;1,5\n1;2,5\n"), (';', ',', 2));
+        assert_eq!(recognised("t;v\n0,5;1,5\n1;2,5\n"), (';', ',', 2));
+        assert_eq!(recognised("t\tv\tF\n0\t1\t3\n"), ('\t', '.', 3));
+        assert_eq!(recognised("t|v\n0|1.5\n"), ('|', '.', 2));
+        assert_eq!(recognised("t,v\n\"0,5\",\"1,5\"\n"), (',', ',', 2));
+        assert_eq!(recognised("\u{feff}t;v, measured\n0;1.0\n"), (';', '.', 2));
+        assert_eq!(recognised("t,v,note\n0,1.5,\"a;b\"\n1,1.5,\"c;d\"\n"), (',', '.', 3));
     }
 
     #[test]
@@ -269,6 +268,8 @@ mod tests {
         let tabular = format!("Zug;Fahrer;Strecke\nET 1;X;Y\nt;v;F\n{rows}").replace(',', ";");
         assert_eq!(read(&tabular), (2, false, plain.clone(), none.clone()), "letters are names");
         assert_eq!(read(&padded.replace('\n', "\r\n")).0, 3, "as Windows ends lines");
+        let unfilled = format!("t,v,F\ns,,\n{rows}");
+        assert_eq!(read(&unfilled), (0, true, plain.clone(), vec![unit("s"), None, None]));
         let timed =
             "Messung vom 18.03.2026\nZeit;v;F\n;km/h;kN\n07:13:20,2;1,5;\n07:13:20,4;1,6;\n";
         let (skip_rows, units_row, names, _) = read(timed);

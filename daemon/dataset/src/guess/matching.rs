@@ -1,8 +1,10 @@
 //! Which quantity a column's name and values speak for.
 
-use super::facts::Facts;
+use dynocar_model::units::{Dimension, Unit, is_unit};
+
+use super::facts::{Facts, Text};
 use super::guessed::GuessedColumn;
-use super::name::{self, Name, Spelled, readings};
+use super::name::{Name, readings};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
 use crate::names::nearest;
@@ -13,14 +15,19 @@ const SAID: i32 = 100;
 const ENOUGH: i32 = 45;
 /// A name below this is a doubtful sign.
 const SURE: i32 = 65;
+/// One cell of text among more than so many numbers is a mistake in the file.
+const TEXTS_RARE: usize = 50;
 /// Terms of so many letters are found within a longer word, too.
 const WITHIN_MIN: usize = 6;
+
+/// How a reason begins that is an unknown unit.
+pub const UNKNOWN_UNIT: &str = "there is no unit ";
 
 /// What a name says of a quantity.
 struct Match {
     score: i32,
     reason: String,
-    unit: Option<Spelled>,
+    unit: Option<Unit>,
 }
 
 /// Whether a column may hold a quantity, and its score, the greater the likelier: `None` where nothing speaks for
@@ -30,6 +37,9 @@ pub fn consider(
     facts: &Facts,
     quantity: Quantity,
 ) -> Option<Result<(i32, GuessedColumn), String>> {
+    if name.text.is_empty() && (quantity != Quantity::Time || facts.formats().is_empty()) {
+        return None;
+    }
     let by_name = match quantity {
         // What stands in brackets behind the name may be the times' form.
         Quantity::Time if !facts.formats().is_empty() => {
@@ -52,8 +62,23 @@ pub fn consider(
 ///
 /// What speaks against it.
 pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
-    if let Some(text) = &facts.text {
-        return Err(format!("it holds text in line {}: '{}'", text.line, text.cell));
+    if facts.truths > 0 && quantity.dimension() != Dimension::Count {
+        return Err("it holds words of truth".into());
+    }
+    // One bad cell among many is an error in its line, and unmaps no force.
+    let is_needed = matches!(
+        quantity,
+        Quantity::Time
+            | Quantity::Speed
+            | Quantity::TractionForce
+            | Quantity::BrakeForce
+            | Quantity::ControlForce
+            | Quantity::TractionPower
+    );
+    let is_rare = facts.texts * TEXTS_RARE < facts.numbers;
+    if let Some(text) = facts.text.as_ref().filter(|_| !(is_needed && is_rare)) {
+        let Text { file, line, cell } = text;
+        return Err(format!("it holds text in {file}line {line}: '{cell}'"));
     }
     let (Some(top), min, max) = (facts.top(), facts.min, facts.max) else {
         return Err("it holds no value".into());
@@ -96,8 +121,12 @@ fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
         .max_by_key(|(it, _)| it.score);
     let Some((mut best, words)) = best else { return by_unit_alone(name, quantity).map(Ok) };
     if let Some(text) = &name.unit {
-        let Some(unit) = name::find(quantity.dimension(), text) else {
-            return Some(Err(format!("its unit '{text}' is none of {quantity}")));
+        let Some(unit) = Unit::spelled(quantity.dimension(), text) else {
+            let problem = match is_unit(text) {
+                true => format!("its unit '{text}' is none of {quantity}"),
+                false => format!("{UNKNOWN_UNIT}'{text}'"),
+            };
+            return Some(Err(contradiction(words, quantity).unwrap_or(problem)));
         };
         best.unit = Some(unit);
         best.score += 5;
@@ -133,7 +162,8 @@ fn by_term(words: &[String], strength: TermWeight, term: &str) -> Option<i32> {
     // What was wanted instead of measured is the same quantity, and refused as that later.
     let is_neutral = |word: &&String| {
         let words = &VOCABULARY.words;
-        let lists = [&words.neutral, &words.not_measured, &words.about];
+        let lists =
+            [&words.neutral, &words.parts, &words.vehicles, &words.not_measured, &words.about];
         lists.into_iter().flat_map(|list| listed(list)).any(|neutral| neutral == *word)
             || word.chars().all(|letter| letter.is_ascii_digit())
     };
@@ -183,7 +213,7 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
 /// A column of which only the unit speaks: of what trains record in km/h it is the speed; and T is
 /// a temperature beside the unit of one.
 fn by_unit_alone(name: &Name, quantity: Quantity) -> Option<Match> {
-    let unit = name::find(quantity.dimension(), name.unit.as_ref()?)?;
+    let unit = Unit::spelled(quantity.dimension(), name.unit.as_ref()?)?;
     let is_known = match quantity {
         Quantity::Speed => contradiction(&name.words, quantity).is_none(),
         Quantity::AmbientTemperature => name.words == ["t"],

@@ -8,6 +8,7 @@
 //! # Layout, in the order of the work
 //!
 //! - `layout`, `columns`, `facts`: delimiter, decimal mark, names and units; what the values are like
+//! - `marks`: which marks stand in numbers
 //! - `name`, `vocabulary`: a name in words, units as people write them, what recorders
 //!   call the quantities
 //! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
@@ -19,6 +20,7 @@ mod columns;
 mod facts;
 pub mod guessed;
 mod layout;
+mod marks;
 mod matching;
 mod name;
 mod plausible;
@@ -29,6 +31,8 @@ mod tests;
 
 pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, Recording, Unmapped};
 pub use name::Name;
+
+use dynocar_model::units::Unit;
 
 use super::{DatasetError, Quantity, SourcePosition};
 
@@ -44,15 +48,28 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
     let label = files.first().map_or("", |file| file.label);
     let mut assignment = assignment::Assignment::new(&read, given, label)?;
     assignment::settle(&mut assignment);
+    assignment.weigh_positions();
+    let at_names = || SourcePosition::line(label, read.layout.text.skip_rows + 1);
+    if let Some((column, quantity, reason)) = assignment.unknown_unit() {
+        let name = column.name.shown();
+        return Err(at_names().problem(format!(
+            "column '{name}' looks like {quantity}, but {reason}: say its unit: --column \
+             {quantity}=COLUMN:UNIT, or that it is something else by another name; the units: {}",
+            unit_names(quantity)
+        )));
+    }
     for quantity in [Quantity::Time, Quantity::Speed] {
         if !assignment.has(quantity) {
             let near = match assignment.near(quantity).join("; ") {
                 none if none.is_empty() => none,
                 near => format!(" ({near})"),
             };
-            let grows =
-                if quantity == Quantity::Time { " (numbers or times that grow)" } else { "" };
-            return Err(SourcePosition::line(label, read.layout.text.skip_rows + 1).problem(format!(
+            let grows = if quantity == Quantity::Time {
+                " or time=COLUMN:FORMAT, as %d.%m.%Y %H:%M:%S"
+            } else {
+                ""
+            };
+            return Err(at_names().problem(format!(
                 "no column was recognised as {quantity}{near}; the columns: {}; say which it is: \
                  --column {quantity}=COLUMN:UNIT{grows}",
                 read.names()
@@ -73,4 +90,9 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
     });
     let runs = runs.collect();
     Ok(Guess { layout: read.layout.text, columns, unmapped, runs })
+}
+
+fn unit_names(quantity: Quantity) -> String {
+    let names: Vec<&str> = Unit::of(quantity.dimension()).map(|unit| unit.name()).collect();
+    names.join(", ")
 }

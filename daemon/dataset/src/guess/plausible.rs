@@ -3,20 +3,23 @@
 use dynocar_model::units::Unit;
 
 use super::facts::Facts;
-use super::name::Spelled;
 use super::vocabulary::{Measure, Usual, usual};
 use crate::Quantity;
 
 /// Values so many times beyond the usual ones are none of a quantity in a unit.
 const FAR: f64 = 20.0;
+/// Some 3000 years in s.
+const TIME_MAX_S: f64 = 1e11;
 /// The factor of recorders that write counts of a thousandth.
 const RAW_COUNT: f64 = 1e-3;
 
 /// A unit for a column, and how sure it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnitChoice {
-    /// The unit and the factor that leads to it.
-    pub spelled: Spelled,
+    /// The unit of `cell * scale`.
+    pub unit: Unit,
+    /// Factor on the cell.
+    pub scale: f64,
     /// What speaks for it.
     pub reason: String,
     /// What makes it doubtful; `None` where the header says it and the values agree.
@@ -50,45 +53,51 @@ impl Usual {
 }
 
 /// The unit of a column: the one that its name gives, else the likeliest by its values.
-pub fn choose_unit(quantity: Quantity, facts: &Facts, named: Option<Spelled>) -> UnitChoice {
+pub fn choose_unit(quantity: Quantity, facts: &Facts, named: Option<Unit>) -> UnitChoice {
     let shown = usual(quantity).and_then(|usual| Some((usual, usual.figure(facts)?)));
     match (named, shown) {
-        (Some(spelled), None) => said(spelled),
-        (Some(spelled), Some((usual, figure))) => judge(spelled, usual, figure),
-        (None, Some((usual, figure))) => by_values(quantity, usual, figure),
+        (Some(unit), None) => said(unit),
+        (Some(unit), Some((usual, figure))) => judge(unit, usual, figure),
+        (None, Some((usual, figure))) => by_values(quantity, usual, figure, facts.max),
         (None, None) => {
             let unit = quantity.unit();
             let counts = unit.name() == "1";
             let doubt = (!counts).then(|| format!("the name gives no unit; {}", unit.name()));
-            UnitChoice { spelled: unit.into(), reason: "the unit that is usual".into(), doubt }
+            UnitChoice { unit, scale: 1.0, reason: "the unit that is usual".into(), doubt }
         }
     }
 }
 
-fn said(spelled: Spelled) -> UnitChoice {
-    UnitChoice { spelled, reason: "the unit that the name gives".into(), doubt: None }
+fn said(unit: Unit) -> UnitChoice {
+    UnitChoice { unit, scale: 1.0, reason: "the unit that the name gives".into(), doubt: None }
 }
 
 /// Whether values can be in the unit that the name gives.
-fn judge(spelled: Spelled, usual: &Usual, (figure, words): (f64, String)) -> UnitChoice {
-    let base = |scale: f64| spelled.unit.to_base(figure * spelled.scale * scale);
+fn judge(unit: Unit, usual: &Usual, (figure, words): (f64, String)) -> UnitChoice {
+    let base = |scale: f64| unit.to_base(figure * scale);
     let distance = usual.distance(base(1.0));
     if distance <= FAR.ln() {
-        return said(spelled);
+        return said(unit);
     }
-    let name = spelled.unit.name();
+    let name = unit.name();
     if distance > 100.0_f64.ln() && usual.distance(base(RAW_COUNT)) == 0.0 {
         let doubt = format!("{words} are no {name} of a train; read as thousandths of {name}");
-        let spelled = Spelled { scale: spelled.scale * RAW_COUNT, ..spelled };
-        return UnitChoice { doubt: Some(doubt), ..said(spelled) };
+        return UnitChoice { doubt: Some(doubt), scale: RAW_COUNT, ..said(unit) };
     }
     let doubt = format!("{words} are unusual in {name}, the unit that the name gives");
-    UnitChoice { doubt: Some(doubt), ..said(spelled) }
+    UnitChoice { doubt: Some(doubt), ..said(unit) }
 }
 
 /// The likeliest unit where the name gives none.
-fn by_values(quantity: Quantity, usual: &Usual, (figure, words): (f64, String)) -> UnitChoice {
+fn by_values(
+    quantity: Quantity,
+    usual: &Usual,
+    (figure, words): (f64, String),
+    max: f64,
+) -> UnitChoice {
     let units = usual.units.iter().filter_map(|name| Unit::find(quantity.dimension(), name));
+    // No clock counts longer than from the year 0.
+    let units = units.filter(|it| quantity != Quantity::Time || it.to_base(max) < TIME_MAX_S);
     let mut fits: Vec<(f64, Unit)> =
         units.map(|unit| (usual.distance(unit.to_base(figure)), unit)).collect();
     // Stable: of units that fit alike, the likelier comes first.
@@ -109,7 +118,7 @@ fn by_values(quantity: Quantity, usual: &Usual, (figure, words): (f64, String)) 
         ),
     };
     let reason = format!("{words} are usual in {name}");
-    UnitChoice { spelled: unit.into(), reason, doubt: Some(doubt) }
+    UnitChoice { unit, scale: 1.0, reason, doubt: Some(doubt) }
 }
 
 /// A number in few letters.
@@ -129,7 +138,6 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::guess::name::find;
 
     /// Values from 0 up to a top.
     fn ramp(top: f64) -> Facts {
@@ -140,7 +148,7 @@ mod tests {
 
     fn unit_of(quantity: Quantity, top: f64) -> (&'static str, Option<String>) {
         let choice = choose_unit(quantity, &ramp(top), None);
-        (choice.spelled.unit.name(), choice.doubt)
+        (choice.unit.name(), choice.doubt)
     }
 
     #[test]
@@ -182,27 +190,27 @@ mod tests {
         let time = |step: f64| {
             let mut facts = Facts::new();
             (0..500).for_each(|row| facts.push(1.7e9 + f64::from(row) * step));
-            choose_unit(Quantity::Time, &facts, None).spelled.unit.name()
+            choose_unit(Quantity::Time, &facts, None).unit.name()
         };
         assert_eq!((time(1.0), time(0.2), time(200.0), time(2e5)), ("s", "s", "ms", "us"));
         let mut kelvin = Facts::new();
         (0..50).for_each(|row| kelvin.push(280.0 + 0.1 * f64::from(row)));
         let choice = choose_unit(Quantity::AmbientTemperature, &kelvin, None);
-        assert_eq!(choice.spelled.unit.name(), "K");
+        assert_eq!(choice.unit.name(), "K");
     }
 
     #[test]
     fn a_named_unit_is_taken_and_doubted_where_no_train_has_such_values() {
         let named = |text: &str, top: f64| {
             let dimension = Quantity::BrakeCylinderPressure.dimension();
-            choose_unit(Quantity::BrakeCylinderPressure, &ramp(top), find(dimension, text))
+            choose_unit(Quantity::BrakeCylinderPressure, &ramp(top), Unit::spelled(dimension, text))
         };
         assert_eq!(named("bar", 3.8).doubt, None);
         let odd = named("bar", 380.0);
-        assert!(odd.spelled.scale == 1.0 && odd.doubt.unwrap().contains("unusual in bar"));
+        assert!(odd.scale == 1.0 && odd.doubt.unwrap().contains("unusual in bar"));
         let raw = named("bar", 3800.0);
         assert!(raw.doubt.unwrap().contains("thousandths of bar"));
-        assert_eq!(raw.spelled.scale, 1e-3);
+        assert_eq!(raw.scale, 1e-3);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! Guesses of whole files.
 
 use super::*;
+
+mod others;
 use crate::TimeFormat;
 use Quantity::*;
 
@@ -296,8 +298,12 @@ fn what_lacks_time_or_speed_is_refused_with_what_comes_near() {
 fn what_is_reported_is_taken_for_granted() {
     let text = file("A,B,v", |row| [row[0], row[2] * 3.6, 7.0].map(|it| it.to_string()).to_vec());
     let kmh = dynocar_model::units::Unit::find(Speed.dimension(), "km/h");
-    let given =
-        |quantity, column: &str, unit| GivenColumn { quantity, column: column.into(), unit };
+    let given = |quantity, column: &str, unit| GivenColumn {
+        quantity,
+        column: column.into(),
+        unit,
+        format: None,
+    };
     let files = [Recording { label: "a.csv", text: &text }];
     let all = [given(Time, "A", None), given(Speed, "B", kmh)];
     let guessed = guess(&files, &all).unwrap();

@@ -36,6 +36,10 @@ pub struct Vocabulary {
 pub struct Words {
     /// They change nothing of what a column is.
     pub neutral: String,
+    /// They number the parts of a whole.
+    pub parts: String,
+    /// The parts of a train.
+    pub vehicles: String,
     /// Of what was wanted or allowed instead of what was measured.
     pub not_measured: String,
     /// Of what is said of a measurement instead of it.
@@ -117,6 +121,16 @@ pub fn terms(quantity: Quantity) -> impl Iterator<Item = (TermWeight, &'static s
     TERMS[&quantity].iter().map(|(weight, term)| (*weight, term.as_str()))
 }
 
+/// True for a word that a name may hold besides its unit.
+pub fn is_word(word: &str) -> bool {
+    let words = &VOCABULARY.words;
+    let lists = [&words.neutral, &words.parts, &words.vehicles, &words.not_measured, &words.about];
+    let all_terms = || TERMS.values().flatten().flat_map(|(_, term)| term.split(' '));
+    lists.into_iter().flat_map(|list| listed(list)).any(|it| it == word)
+        || word.chars().all(|letter| letter.is_ascii_digit())
+        || all_terms().any(|it| it == word)
+}
+
 /// What is usual of a quantity; `None` where its values reveal no unit.
 pub fn usual(quantity: Quantity) -> Option<&'static Usual> {
     VOCABULARY.quantities.get(quantity.name())?.usual.as_ref()
@@ -132,7 +146,9 @@ mod tests {
         for quantity in Quantity::ALL {
             assert!(terms(quantity).next().is_some(), "{quantity}");
             for (_, term) in terms(quantity) {
-                let is_folded = |letter: char| letter.is_ascii_lowercase() || letter == ' ';
+                let is_folded = |letter: char| {
+                    (letter.is_alphabetic() && !letter.is_uppercase()) || letter == ' '
+                };
                 assert!(!term.is_empty() && term.chars().all(is_folded), "{quantity}: {term:?}");
                 let twin = seen.iter().find(|(other, _)| *other == term);
                 assert_eq!(twin, None, "{quantity}: {term} again");

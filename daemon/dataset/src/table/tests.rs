@@ -99,7 +99,7 @@ fn decimal_commas_without_quotes_are_distinguished_from_delimiters() {
 fn a_file_that_breaks_off_in_its_last_line_loses_that_line_only() {
     for end in ["2", "2,", "2,-", "2,1e"] {
         let table = table("", &format!("t,v,x\n0,1,5\n1,1,5\n{end}")).unwrap();
-        let lines = LineCounts { rows: 2, short: 0, truncated: true };
+        let lines = LineCounts { rows: 2, truncated: true, ..LineCounts::default() };
         assert_eq!(table.lines, lines, "{end:?}");
         assert_eq!(table.column(Quantity::Time).unwrap(), [0.0, 1.0]);
     }
@@ -108,7 +108,7 @@ fn a_file_that_breaks_off_in_its_last_line_loses_that_line_only() {
 #[test]
 fn a_short_row_elsewhere_has_missing_cells() {
     let table = table("", "t,v\n0,1\n1\n2,1\n").unwrap();
-    assert_eq!(table.lines, LineCounts { rows: 3, short: 1, truncated: false });
+    assert_eq!(table.lines, LineCounts { rows: 3, short: 1, ..LineCounts::default() });
     assert!(table.column(Quantity::Speed).unwrap()[1].is_nan());
 }
 
@@ -196,4 +196,31 @@ fn times_of_loggers_are_read_and_bad_ones_named() {
         "a.csv:2: column 't': expected a number or an empty cell, got '07:13:20.2'; for such times set \
          format = \"clock\" in place of unit"
     );
+}
+
+#[test]
+fn words_for_missing_numbers_marks_of_thousands_and_footers_are_read() {
+    let missing =
+        ["n/a", "#N/A", "NULL", "None", "<NA>", "1.#QNAN", "-", "#DIV/0!", "null", "NaN", "#NV"];
+    for word in missing {
+        assert_eq!(speeds("", &format!("t,v\n0,1\n1,{word}\n2,3\n")), [Some(1.0), None, Some(3.0)]);
+    }
+    for (dataset, cell) in [
+        ("delimiter = \";\"\ndecimal = \",\"\nthousands = \".\"", "1.755,5"),
+        ("delimiter = \";\"\nthousands = \",\"", "1,755.5"),
+        ("delimiter = \";\"\nthousands = \"'\"", "1'755.5"),
+        ("delimiter = \";\"\ndecimal = \",\"\nthousands = \" \"", "1 755,5"),
+    ] {
+        assert_eq!(speeds(dataset, &format!("t;v\n0;{cell}\n")), [Some(1755.5)], "{cell}");
+    }
+    let wrong = table("delimiter = \";\"\nthousands = \",\"", "t;v\n0;1,75\n").unwrap_err();
+    assert!(wrong.contains("expected a number"), "{wrong}");
+    let hint = table("delimiter = \";\"", "t;v\n0;1\n1;1'755.5\n").unwrap_err();
+    assert!(hint.contains("set thousands = \"'\""), "{hint}");
+    for footer in ["End of file\n", "t,v\n2,2\n", "\0\0\0\0", "\x1a", "-- end, of\n"] {
+        let read = speeds("", &format!("t,v\n0,1\n1,2\n{footer}"));
+        assert_eq!(read[..2], [Some(1.0), Some(2.0)], "{footer:?}");
+    }
+    let text = table("", "t,v\n0,1\nabc,2\n2,3\n").unwrap_err();
+    assert!(text.contains("a.csv:3: column 't'") && text.contains("'abc'"), "{text}");
 }

@@ -23,6 +23,9 @@ pub struct Drive {
 }
 
 impl Drive {
+    /// Standard deviation of an efficiency that nobody declares: from transformers and gears under a light load to
+    /// power that is recorded at the wheels.
+    pub const EFFICIENCY_STD: f64 = 0.1;
     /// Efficiencies that make sense.
     pub const EFFICIENCIES: std::ops::RangeInclusive<f64> = 0.3..=1.0;
     /// Powers in kW of what is fed in addition to the drive.

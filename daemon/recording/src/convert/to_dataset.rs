@@ -2,9 +2,10 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use dynocar::dataset;
 use dynocar::output::{OutputError, require_new, write_file};
 use dynocar::storage::{Disk, Storage, folder_of};
-use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity};
+use dynocar_analysis::dataset::{Dataset, FileEntry, MANIFEST_FILE, Quantity};
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -128,9 +129,15 @@ pub fn unpack(
             write(folder, name, content)?;
         }
         unpacked.samples = recording.samples.len();
-        return Ok(unpacked);
+        // What is wrong with it is said by whoever reads it.
+        if dataset::load(folder).map_or(true, |it| are_of(&it, &recording.samples)) {
+            return Ok(unpacked);
+        }
     }
-    let (train_text, track_text) = models(path, &recording, train, files)?;
+    let (train_text, track_text) = match read_models(folder) {
+        Some(models) if files.train.is_none() => models,
+        _ => models(path, &recording, train, files)?,
+    };
     write(folder, "train.toml", &train_text)?;
     if let Some(text) = &track_text {
         write(folder, "track.toml", text)?;
@@ -147,6 +154,26 @@ pub fn unpack(
     }
     (unpacked.runs, unpacked.samples) = (runs.len(), samples.len());
     Ok(unpacked)
+}
+
+/// True where a recording's samples are those of the dataset that is attached to it, all and no other: another tool may
+/// have cut or changed its messages.
+fn are_of(dataset: &Dataset, samples: &[TrainSample]) -> bool {
+    let attached: usize = dataset.runs.iter().map(|run| run.samples.len()).sum();
+    let published = dataset.runs.iter().flat_map(|run| &run.samples);
+    let is_same = |(one, other): (&TrainSample, &TrainSample)| {
+        let fields = |it: &TrainSample| SampleField::ALL.map(|field| it.get(field));
+        (one.time_ns, one.direction, fields(one)) == (other.time_ns, other.direction, fields(other))
+    };
+    attached == samples.len() && published.zip(samples).all(is_same)
+}
+
+/// The files of train and line of a dataset that is attached.
+fn read_models(folder: &Path) -> Option<Models> {
+    let (files, head) = dataset::open(folder).ok()?;
+    let read = |it: &FileEntry| std::fs::read(files.path_of(&it.path)).ok();
+    let track = head.manifest.track_file.as_ref().and_then(read);
+    Some((read(&head.manifest.train_file)?, track))
 }
 
 fn chosen(recording: &Recording, train: Option<u64>) -> Result<u64, NoDataset> {

@@ -6,6 +6,7 @@ mod fields;
 mod files;
 mod keeping;
 mod process;
+mod rewritten;
 mod rotation;
 mod rows;
 mod support;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use dynocar_analysis::dataset::{DatasetError, DatasetFiles};
 use dynocar_fmu::variables::ModelFile;
-use dynocar_fmu::{ESTIMATORS, PLANT};
+use dynocar_fmu::{ESTIMATORS, PLANT, STEP_DEFAULT_S, STEP_MAX_S};
 
 use crate::fmu::{FmuError, INPUTS_MARK, archive, find_library, inputs, read_library};
 use dynocar::cli::Failure;
@@ -65,13 +65,23 @@ pub fn execute(arguments: &FmuArguments) -> Result<(), Failure> {
         Some(path) => read_library(path)?,
         None => find_library(&std::env::current_exe().unwrap_or_default())?,
     };
-    let fmu = archive(model, &library, &files)?;
+    let fmu = archive(model, &library, (&files, step_s(arguments)?))?;
     if let (Some(dataset), Some(folder)) = (&arguments.dataset, &arguments.inputs) {
         write_inputs(dataset, folder)?;
     }
     write_file(&arguments.out, &fmu)?;
     report_line(&format!("FMU: {}", arguments.out.display()));
     Ok(())
+}
+
+/// The step that hosts take by default: the dataset's.
+fn step_s(arguments: &FmuArguments) -> Result<f64, Failure> {
+    let Some(dataset) = &arguments.dataset else { return Ok(STEP_DEFAULT_S) };
+    let step_s = dataset::load(dataset)?.step_s();
+    // As it was recorded, but for the last digits of a difference.
+    let step_s = (step_s * 1e6).round() / 1e6;
+    let most_s = if arguments.plant { STEP_MAX_S } else { f64::INFINITY };
+    Ok(if step_s > 0.0 && step_s <= most_s { step_s } else { STEP_DEFAULT_S })
 }
 
 impl From<FmuError> for Failure {

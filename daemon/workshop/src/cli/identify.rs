@@ -9,6 +9,7 @@ use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
 use dynocar_core::plausibility::Severity;
 use dynocar_estimators::EstimatorSettings;
+use dynocar_model::train::Drive;
 use dynocar_model::units::Unit;
 use dynocar_shared::{HALF_95, Parameter, TrainId, schema};
 use serde::Serialize;
@@ -108,13 +109,25 @@ pub fn answer(question: &Question) -> Result<IdentifyAnswer, Failure> {
         dataset.keep_traction_only();
     }
     let all: Vec<usize> = (0..dataset.runs.len()).collect();
-    let learned = learned(&dataset, &all, (&estimators, speed_unit))?;
+    let mut learned = learned(&dataset, &all, (&estimators, speed_unit))?;
     let by_run = || by_run(&dataset, (&estimators, speed_unit));
-    let runs = if question.per_run { Some(by_run()?) } else { None };
+    let mut runs = if question.per_run { Some(by_run()?) } else { None };
+    let mut diagnostics = dataset.diagnostics();
+    let of_runs = runs.iter_mut().flatten().flat_map(RunAnswer::estimators);
+    for answer in learned.iter_mut().chain(of_runs) {
+        if dataset.is_efficiency_unknown() {
+            answer.widen_mass(Drive::EFFICIENCY_STD / Drive::USUAL.efficiency);
+        }
+        if let Some(it) = diagnostics.iter().find(|it| it.severity == Severity::Fundamental) {
+            answer.refuse(it.code);
+        }
+    }
+    let declared_kg = dataset.runs.last().map_or(dataset.train.mass_kg, |run| run.mass_kg);
+    diagnostics.extend(learned.iter().find_map(|it| it.contradiction(declared_kg)));
     Ok(IdentifyAnswer {
         dataset: dataset.name.clone(),
         speed_unit,
-        diagnostics: dataset.diagnostics(),
+        diagnostics,
         estimators: learned,
         not_run: if is_chosen { Vec::new() } else { others(&estimators) },
         between_runs: runs.as_deref().map(runs::spreads),

@@ -61,7 +61,7 @@ fn describe(
     train: &mut TrainText,
     has_track: bool,
 ) -> Result<Described, Failure> {
-    let (texts, encoding) = recordings::texts(&arguments.csv)?;
+    let (texts, encoding) = recordings::texts(&arguments.csv, arguments.encoding)?;
     let files = recordings::from_folder(arguments.folder(), &arguments.csv)?;
     let recordings: Vec<Recording> =
         texts.iter().map(|(label, text)| Recording { label, text }).collect();

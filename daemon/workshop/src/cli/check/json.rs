@@ -68,6 +68,7 @@ fn of_dataset((manifest, runs): &(Manifest, Vec<Result<Run, DatasetError>>)) -> 
             quantity: mapping.quantity,
             column: &mapping.column,
             unit: mapping.unit.name(),
+            ..parts: (!mapping.parts.is_empty()).then(|| object! { parts: &mapping.parts, }),
             ..written: format.map(|format| object! { format: format, }),
             ..converted: Some(object! { scale: mapping.scale, offset: mapping.offset, }),
         }

@@ -289,7 +289,7 @@ fn columns(manifest: &Manifest) -> String {
             Some(format) => format!("as times like {}", format.example()),
             None => format!("in {}", mapping.unit.name()),
         };
-        text += &format!("  {name:width$}  '{}'{scale}{offset} {read_as}\n", mapping.column);
+        text += &format!("  {name:width$}  {}{scale}{offset} {read_as}\n", mapping.shown());
     }
     text
 }

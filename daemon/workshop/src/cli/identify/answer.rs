@@ -2,10 +2,18 @@
 
 use std::collections::BTreeMap;
 
+use dynocar_analysis::dataset::DatasetDiagnostic;
+use dynocar_core::plausibility::Severity;
 use dynocar_model::units::Unit;
-use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason};
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use serde::Serialize;
 
+/// The parameter that a force scales.
+const MASS: &str = "mass_t";
+/// Standard deviation of a load as a share of the declared mass.
+const LOAD_STD: f64 = 0.1;
+/// A mass that is further from the declared one is no load.
+const DEVIATIONS_MAX: f64 = 3.0;
 /// At so many speeds, or a few more, the resistance is shown.
 const SHOWN_MAX: f64 = 7.0;
 
@@ -72,6 +80,42 @@ impl EstimatorAnswer {
             unexplained_force_n: snapshot.unexplained_force_n,
             unexplained_force_std_n: snapshot.unexplained_force_std_n,
         }
+    }
+
+    /// Says nothing but why: the data cannot be true.
+    pub(super) fn refuse(&mut self, code: &'static str) {
+        (self.status, self.reason) = (Status::Invalid.name(), code);
+        self.values.clear();
+        self.std.clear();
+        self.resistance.clear();
+        self.resistance_shown.clear();
+    }
+
+    /// Adds what a force leaves open of the mass that is known up to this share.
+    pub(super) fn widen_mass(&mut self, share: f64) {
+        let mass_t = self.values.get(MASS).copied().unwrap_or(0.0);
+        if let Some(std) = self.std.get_mut(MASS) {
+            *std = std.hypot(share * mass_t);
+        }
+    }
+
+    /// What is to be said of an estimated mass that no load explains.
+    pub(super) fn contradiction(&self, declared_kg: f64) -> Option<DatasetDiagnostic> {
+        let (mass_t, declared_t) = (*self.values.get(MASS)?, declared_kg / 1000.0);
+        let std_t = self.std.get(MASS)?.hypot(LOAD_STD * declared_t);
+        let deviations = (mass_t - declared_t).abs() / std_t;
+        (self.is_known() && deviations > DEVIATIONS_MAX).then(|| DatasetDiagnostic {
+            code: "against_declared",
+            severity: Severity::Warning,
+            runs: Vec::new(),
+            text: format!(
+                "{} estimates {mass_t:.0} t, {deviations:.0} standard deviations from the declared \
+                 {declared_t:.0} t, while {:.1} kN stay unexplained: is a force missing, a unit wrong or \
+                 one of several columns taken for the whole?",
+                self.name,
+                self.unexplained_force_n / 1000.0
+            ),
+        })
     }
 
     /// True when the values are more than the declared ones.

@@ -46,6 +46,11 @@ pub(super) struct EstimatorSpread {
 }
 
 impl RunAnswer {
+    /// What each estimator learned from it.
+    pub(super) fn estimators(&mut self) -> &mut Vec<EstimatorAnswer> {
+        &mut self.estimators
+    }
+
     /// What was learned from a run.
     pub(super) fn of(run: &Run, estimators: Vec<EstimatorAnswer>) -> Self {
         RunAnswer {

@@ -7,9 +7,11 @@ use clap::Args;
 use dialoguer::Input;
 use dynocar::cli::Failure;
 use dynocar::output::require_new;
-use dynocar_analysis::dataset::Quantity;
+use dynocar_analysis::dataset::encoding::by_name;
 use dynocar_analysis::dataset::guess::GivenColumn;
+use dynocar_analysis::dataset::{Quantity, TimeFormat};
 use dynocar_model::units::Unit;
+use encoding_rs::Encoding;
 
 use super::summary::DAEMON_FILE;
 use crate::cli::train_text::{QUESTIONS, TrainArguments};
@@ -30,7 +32,10 @@ pub struct InitArguments {
     /// Recorded runs of the train, laid out alike; of several the last one is held out
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub csv: Vec<PathBuf>,
-    /// Say what a column holds, as speed=v_ist:km/h; may be given several times
+    /// Which letters the files' bytes are, as windows-1251 or gbk [default: UTF-8, else guessed]
+    #[arg(long, value_name = "NAME", requires = "csv", value_parser = encoding)]
+    pub encoding: Option<&'static Encoding>,
+    /// Say what a column holds, as speed=v_ist:km/h or time=Zeit:%d.%m.%Y %H:%M:%S; may be given several times
     #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = given_column)]
     pub column: Vec<GivenColumn>,
     #[command(flatten)]
@@ -49,6 +54,12 @@ fn nobody_is_there() -> bool {
     !(stdin().is_terminal() && stderr().is_terminal())
 }
 
+/// An encoding by one of its names.
+fn encoding(name: &str) -> Result<&'static Encoding, String> {
+    let expected = "expected a name of the WHATWG's, as windows-1251, gbk, shift_jis or ibm866";
+    by_name(name).ok_or_else(|| expected.into())
+}
+
 /// What somebody says of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
 fn given_column(text: &str) -> Result<GivenColumn, String> {
     let expected = "expected QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, as speed=v_ist:km/h";
@@ -56,16 +67,22 @@ fn given_column(text: &str) -> Result<GivenColumn, String> {
     let names = || Quantity::ALL.map(Quantity::name).join(", ");
     let quantity = Quantity::from_name(name.trim())
         .ok_or_else(|| format!("'{name}' is no quantity; the quantities: {}", names()))?;
-    // A name may hold colons itself: what follows the last one counts where it is a unit.
-    let unit_of = |unit: &str| Unit::find(quantity.dimension(), unit.trim());
-    let (column, unit) = match rest.rsplit_once(':') {
-        Some((column, unit)) if unit_of(unit).is_some() => (column, unit_of(unit)),
-        _ => (rest, None),
+    // A name may hold colons itself, and so may a format: what follows one counts where it is a unit or a format.
+    let said = |at: usize| {
+        let (column, said) = (rest[..at].trim().to_owned(), rest[at + 1..].trim());
+        let unit = Unit::find(quantity.dimension(), said);
+        let is_time = quantity == Quantity::Time && unit.is_none();
+        let format = TimeFormat::from_name(said).filter(|_| is_time);
+        let is_said = unit.is_some() || format.is_some();
+        is_said.then_some(GivenColumn { quantity, column, unit, format })
     };
-    if column.trim().is_empty() {
+    if let Some(given) = rest.match_indices(':').find_map(|(at, _)| said(at)) {
+        return Ok(given);
+    }
+    if rest.trim().is_empty() {
         return Err(expected.into());
     }
-    Ok(GivenColumn { quantity, column: column.trim().into(), unit })
+    Ok(GivenColumn { quantity, column: rest.trim().into(), unit: None, format: None })
 }
 
 /// The arguments with what is asked for: everything that was not said, where not even the folder was.
@@ -148,7 +165,13 @@ mod tests {
             quantity: Quantity::Speed,
             column: column.into(),
             unit,
+            format: None,
         };
+        let clock = given_column("time=Zeit: UTC:%d.%m.%Y %H:%M:%S").unwrap();
+        assert_eq!(clock.column, "Zeit: UTC");
+        assert_eq!(clock.format.unwrap().name(), "%d.%m.%Y %H:%M:%S");
+        let unnamed = given_column("time=:s").unwrap();
+        assert_eq!((&unnamed.column[..], unnamed.unit.map(|it| it.name())), ("", Some("s")));
         assert_eq!(given_column("speed=v_ist:km/h"), Ok(speed("v_ist", kmh)));
         assert_eq!(given_column("speed=v_ist"), Ok(speed("v_ist", None)));
         assert_eq!(given_column("speed=MVB:v=1:km/h"), Ok(speed("MVB:v=1", kmh)));

@@ -4,8 +4,11 @@ use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
 use dynocar::text_file::{read_beginning, read_bytes};
+use dynocar::unpacking::columns_of;
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
-use dynocar_analysis::dataset::{DatasetFiles, DatasetHead, FileProblem, Run, SourcePosition};
+use dynocar_analysis::dataset::{
+    ColumnMapping, DatasetFiles, DatasetHead, FileProblem, Run, SourcePosition,
+};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use crate::paths::{self, real};
@@ -18,8 +21,14 @@ pub type NamedText = (String, String);
 /// # Errors
 ///
 /// When one cannot be read, or is written in other letters than the others.
-pub fn texts(paths: &[PathBuf]) -> Result<(Vec<NamedText>, &'static Encoding), Failure> {
+pub fn texts(
+    paths: &[PathBuf],
+    given: Option<&'static Encoding>,
+) -> Result<(Vec<NamedText>, &'static Encoding), Failure> {
     let mut files = Vec::new();
+    if let Some(parquet) = tables(paths)? {
+        return Ok((parquet, UTF_8));
+    }
     for path in paths {
         let label = path.display().to_string();
         let unread = |problem: FileProblem| problem.of(&label);
@@ -27,7 +36,14 @@ pub fn texts(paths: &[PathBuf]) -> Result<(Vec<NamedText>, &'static Encoding), F
         let begins = guessed(&read_beginning(path, 2).map_err(unread)?);
         let is_wide = [UTF_16LE, UTF_16BE].contains(&begins);
         let bytes = read_bytes(path, if is_wide { begins } else { UTF_8 }).map_err(unread)?;
-        files.push((label, guessed(&bytes), bytes));
+        files.push((label, given.unwrap_or_else(|| guessed(&bytes)), bytes));
+    }
+    if let Some(encoding) = given {
+        let text = |(label, _, bytes): (String, _, Vec<u8>)| {
+            let text = decoded(bytes, encoding).map_err(|problem| problem.of(&label))?;
+            Ok::<NamedText, Failure>((label, text))
+        };
+        return Ok((files.into_iter().map(text).collect::<Result<_, _>>()?, encoding));
     }
     // What holds plain letters only is written in any of them.
     let is_plain = |bytes: &[u8]| bytes.is_ascii();
@@ -49,6 +65,50 @@ pub fn texts(paths: &[PathBuf]) -> Result<(Vec<NamedText>, &'static Encoding), F
         texts.push((label, text));
     }
     Ok((texts, encoding))
+}
+
+/// Parquet files as texts of their columns of numbers and times, as CSV has them; `None` for other files.
+fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
+    let is_parquet = |path: &PathBuf| path.extension().is_some_and(|it| it == "parquet");
+    match paths.iter().filter(|path| is_parquet(path)).count() {
+        0 => return Ok(None),
+        count if count == paths.len() => {}
+        _ => return Err(Failure::Input("--csv: expected files of one format".into())),
+    }
+    let table = |path: &PathBuf| {
+        let label = path.display().to_string();
+        let refused =
+            |words: String| Failure::At(SourcePosition::whole(&label), format!("{label}: {words}"));
+        let names = columns_of(path, &[]).map_err(&refused)?;
+        let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
+        for name in names.into_iter().map(|it| it.name) {
+            // A column of texts or lists is none that can be mapped.
+            let Ok(read) = numbers_of(path, &name) else { continue };
+            columns.push((name, read));
+        }
+        Ok((label, as_csv(&columns)))
+    };
+    paths.iter().map(table).collect::<Result<_, Failure>>().map(Some)
+}
+
+/// A column's numbers, times in s.
+fn numbers_of(path: &Path, name: &str) -> Result<Vec<f64>, String> {
+    let mapping = ColumnMapping::of_time(name);
+    let columns = columns_of(path, &[mapping])?;
+    columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
+}
+
+fn as_csv(columns: &[(String, Vec<f64>)]) -> String {
+    let quoted = |(name, _): &(String, Vec<f64>)| format!("\"{}\"", name.replace('"', "\"\""));
+    let mut text = columns.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n";
+    for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
+        let cell = |(_, values): &(String, Vec<f64>)| match values[row] {
+            missing if missing.is_nan() => String::new(),
+            value => value.to_string(),
+        };
+        text += &(columns.iter().map(cell).collect::<Vec<_>>().join(",") + "\n");
+    }
+    text
 }
 
 /// The paths of existing files from a folder that need not be there yet.

@@ -45,7 +45,7 @@ fn recordings(described: &Described) -> String {
     text += &format!("cells end at {delimiter}, decimals at '{}'\n", char::from(layout.decimal));
     if layout.encoding != UTF_8 {
         let name = layout.encoding.name().to_lowercase();
-        text += &format!("letters are {name}: the files are no UTF-8\n");
+        text += &format!("letters are {name}: the files are no UTF-8; --encoding says another\n");
     }
     if layout.skip_rows > 0 {
         text += &format!("the names stand in line {}\n", layout.skip_rows + 1);
@@ -64,7 +64,11 @@ fn recordings(described: &Described) -> String {
             scale => format!("{scale} × "),
         };
         table.push(vec![
-            format!("'{}'", column.name.shown()),
+            std::iter::once(&column.name)
+                .chain(&column.parts)
+                .map(|name| format!("'{}'", name.shown()))
+                .collect::<Vec<_>>()
+                .join(" + "),
             column.quantity.to_string(),
             match &column.format {
                 Some(format) => format.name().to_owned(),

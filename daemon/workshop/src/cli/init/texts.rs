@@ -4,6 +4,7 @@ use std::path::Path;
 
 use dynocar::models::Moment;
 use dynocar_analysis::dataset::guess::{Guess, GuessedColumn, GuessedRun};
+use dynocar_analysis::dataset::manifest::DOUBTFUL;
 use dynocar_analysis::dataset::{Quantity, TextLayout};
 use encoding_rs::UTF_8;
 use toml::Value;
@@ -24,7 +25,8 @@ pub fn dataset(guess: &Guess, name: &str, files: &[String], has_track: bool) -> 
         "",
         "Recorded runs of one train. Written by dynocar init: every line under [columns] is a guess \
          from header and values, with what speaks for it and what was not taken. Set right what is \
-         wrong; `dynocar check` then says what it understood.",
+         wrong, and delete `doubtful = true` where it is right: until then every answer says so. `dynocar check` \
+         says what it understood.",
     );
     let track = match has_track {
         true => "[track]\nfile = ",
@@ -77,6 +79,9 @@ fn layout_text(layout: &TextLayout) -> String {
     let delimiter = char::from(layout.delimiter).to_string();
     text += &format!("delimiter = {}\n", quoted(&delimiter));
     text += &format!("decimal = {}\n", quoted(&char::from(layout.decimal).to_string()));
+    if let Some(mark) = layout.thousands {
+        text += &format!("thousands = {}\n", quoted(&mark.to_string()));
+    }
     if layout.skip_rows > 0 {
         text += &format!("skip_rows = {:<19}# lines above the names\n", layout.skip_rows);
     }
@@ -111,12 +116,21 @@ fn column_text(column: &GuessedColumn) -> String {
         1.0 => String::new(),
         scale => format!(", scale = {}", Value::Float(scale)),
     };
-    let name = quoted(&column.name.text);
+    let names: Vec<String> =
+        std::iter::once(&column.name).chain(&column.parts).map(|name| quoted(&name.text)).collect();
+    let name = match &names[..] {
+        [name] => name.clone(),
+        names => format!("[{}]", names.join(", ")),
+    };
+    let doubtful = match column.doubts.is_empty() {
+        true => String::new(),
+        false => format!(", {DOUBTFUL} = true"),
+    };
     let read_as = match &column.format {
         Some(format) => format!("format = {}", quoted(format.name())),
         None => format!("unit = {}{scale}", quoted(column.unit.name())),
     };
-    text + &format!("{} = {{ column = {name}, {read_as} }}\n", column.quantity)
+    text + &format!("{} = {{ column = {name}, {read_as}{doubtful} }}\n", column.quantity)
 }
 
 /// A text as TOML writes it, on one line.

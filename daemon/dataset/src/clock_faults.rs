@@ -1,0 +1,234 @@
+//! What recorders and tools do to the times of whole rows: seconds without a fraction, an hour of summer time, rows in
+//! another order; and times that begin anew.
+
+use super::order::quantile;
+
+/// An hour, by which clocks are put forward and back.
+const HOUR_S: f64 = 3600.0;
+/// A train that goes on changes its speed by no more m/s over a step, besides what it accelerates.
+const SPEED_STEP_MPS: f64 = 1.0;
+/// The sharpest acceleration in m/s².
+const ACCELERATION_MPS2: f64 = 3.0;
+/// Share of rows with the time of the row before from which times have no fraction.
+const REPEATED_SHARE: f64 = 0.4;
+/// Share of rows out of order from which it is no disorder of single rows.
+const DISORDER_SHARE: f64 = 0.05;
+/// Rows in a part that was recorded as one, at least.
+const PART_ROWS: usize = 50;
+/// Epochs of times in s beyond this are none of a clock that counts from 1970.
+const FAR_S: f64 = 9.2e9;
+
+/// What was done to the times of a run, each with the row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct ClockFaults {
+    /// Where the clock was put forward or back, and by how many s.
+    pub jumps: Vec<(usize, f64)>,
+    /// Rows with one stamp, where they are spread over the time to the next.
+    pub shared: Option<usize>,
+    /// True where rows stood in another order.
+    pub sorted: bool,
+    /// Where times begin anew that overlap those before, and by how many s they fall.
+    pub anew: Option<(usize, f64)>,
+}
+
+/// Sets the times of a run right where what happened to them is plain. Gives what was done, and the order of the rows where
+/// they stood in another.
+///
+/// `is_repeated` says of a row whether it repeats the one before in all but the time.
+pub(super) fn mend(
+    times_s: &mut [f64],
+    speed_mps: &[f64],
+    is_repeated: impl Fn(usize) -> bool,
+) -> (ClockFaults, Option<Vec<usize>>) {
+    let mut faults = ClockFaults::default();
+    if let Some(first_s) = times_s.first().copied().filter(|it| it.abs() > FAR_S) {
+        // Ticks since the year 1, days since the year 0.
+        times_s.iter_mut().for_each(|time_s| *time_s -= first_s.floor());
+    }
+    if times_s.len() < 10 {
+        return (faults, None);
+    }
+    let mut steps: Vec<f64> =
+        times_s.windows(2).map(|it| it[1] - it[0]).filter(|step| *step > 0.0).collect();
+    let Some(step_s) = quantile(&mut steps, 0.5) else { return (faults, None) };
+    faults.shared = spread(times_s, step_s, is_repeated);
+    let step_s = step_s / faults.shared.unwrap_or(1) as f64;
+    faults.jumps = set_back(times_s, speed_mps, step_s);
+    let order = match faults.shared {
+        None => sorted(times_s, &mut faults),
+        Some(_) => None,
+    };
+    (faults, order)
+}
+
+/// Takes out the hours by which the clock was put forward or back while the train went on.
+fn set_back(times_s: &mut [f64], speed_mps: &[f64], step_s: f64) -> Vec<(usize, f64)> {
+    let mut jumps = Vec::new();
+    let mut shift_s = 0.0;
+    let mut before_s = times_s[0];
+    for row in 1..times_s.len() {
+        let ahead_s = times_s[row] - before_s;
+        before_s = times_s[row];
+        let hour_s = if ahead_s > 0.0 { HOUR_S } else { -HOUR_S };
+        let is_hour = (ahead_s - hour_s - step_s).abs() <= 1.5 * step_s.max(0.4);
+        let (from, to) = (speed_mps[row - 1], speed_mps[row]);
+        let goes_on = (to - from).abs() <= SPEED_STEP_MPS + ACCELERATION_MPS2 * step_s;
+        // A train that stands for an hour does so.
+        let is_moving = ahead_s < 0.0 || from.min(to) > SPEED_STEP_MPS;
+        if is_hour && goes_on && is_moving {
+            jumps.push((row, hour_s));
+            shift_s -= hour_s;
+        }
+        times_s[row] += shift_s;
+    }
+    jumps
+}
+
+/// Spreads rows that share a stamp evenly over the time to the next one; gives how many usually do.
+fn spread(times_s: &mut [f64], step_s: f64, is_repeated: impl Fn(usize) -> bool) -> Option<usize> {
+    let shared: Vec<usize> =
+        (1..times_s.len()).filter(|&row| times_s[row] == times_s[row - 1]).collect();
+    let is_disordered = times_s.windows(2).any(|it| it[1] < it[0] && it[1] > it[0] - 0.5 * HOUR_S);
+    let copies = shared.iter().filter(|&&row| is_repeated(row)).count();
+    if (shared.len() as f64) < REPEATED_SHARE * times_s.len() as f64
+        || is_disordered
+        || 2 * copies > shared.len()
+    {
+        return None;
+    }
+    let groups: Vec<usize> = times_s.chunk_by(|one, next| one == next).map(<[f64]>::len).collect();
+    let mut inner: Vec<f64> = groups.iter().map(|&rows| rows as f64).collect();
+    let usual = quantile(&mut inner, 0.5)? as usize;
+    let mut row = 0;
+    for (index, &rows) in groups.iter().enumerate() {
+        // The first second may have begun before the recording.
+        let missing = if index == 0 { usual.saturating_sub(rows) } else { 0 };
+        let share_s = step_s / rows.max(usual) as f64;
+        for (place, time_s) in times_s[row..row + rows].iter_mut().enumerate() {
+            *time_s += (missing + place) as f64 * share_s;
+        }
+        row += rows;
+    }
+    Some(usual)
+}
+
+/// The rows in the order of time, where parts that do not overlap, or single rows, stand in another.
+fn sorted(times_s: &[f64], faults: &mut ClockFaults) -> Option<Vec<usize>> {
+    let falls: Vec<usize> =
+        (1..times_s.len()).filter(|&row| times_s[row] < times_s[row - 1]).collect();
+    let first = *falls.first()?;
+    let count = times_s.len();
+    let out_of_order =
+        count - super::order::longest_increasing(times_s).iter().filter(|it| **it).count();
+    if (out_of_order as f64) < DISORDER_SHARE * count as f64 {
+        return None;
+    }
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|&one, &other| times_s[one].total_cmp(&times_s[other]));
+    let mut steps: Vec<f64> = order.windows(2).map(|it| times_s[it[1]] - times_s[it[0]]).collect();
+    let step_s = quantile(&mut steps, 0.5)?;
+    let twice = steps.iter().filter(|step| **step < 0.25 * step_s).count();
+    let is_of_parts = count / (falls.len() + 1) >= PART_ROWS;
+    let overlap = is_of_parts && {
+        // A part's rows stand together in the order of time, too.
+        let breaks = order.windows(2).filter(|it| it[1] != it[0] + 1).count();
+        breaks > 2 * falls.len() + count / 100
+    };
+    if overlap || twice as f64 > DISORDER_SHARE * count as f64 {
+        faults.anew = Some((first, times_s[first - 1] - times_s[first]));
+        return None;
+    }
+    faults.sorted = true;
+    Some(order)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mended(times_s: &[f64], speed_mps: &[f64]) -> (Vec<f64>, ClockFaults, Option<Vec<usize>>) {
+        let mut times = times_s.to_vec();
+        let (faults, order) = mend(&mut times, speed_mps, |_| false);
+        (times, faults, order)
+    }
+
+    fn grid(rows: usize) -> Vec<f64> {
+        (0..rows).map(|row| 1000.0 + 0.2 * row as f64).collect()
+    }
+
+    fn are_equal(one: &[f64], other: &[f64]) -> bool {
+        one.iter().zip(other).all(|(one, other)| (one - other).abs() < 1e-6)
+    }
+
+    #[test]
+    fn an_hour_forward_or_back_is_taken_out_where_the_train_goes_on() {
+        let times = grid(400);
+        for hour_s in [HOUR_S, -HOUR_S] {
+            let put: Vec<f64> = times
+                .iter()
+                .enumerate()
+                .map(|(row, it)| it + if row < 150 { 0.0 } else { hour_s })
+                .collect();
+            let (found, faults, order) = mended(&put, &[20.0; 400]);
+            assert_eq!((faults.jumps, order), (vec![(150, hour_s)], None));
+            assert!(are_equal(&found, &times));
+        }
+        let stood: Vec<f64> = times
+            .iter()
+            .enumerate()
+            .map(|(row, it)| it + if row < 150 { 0.0 } else { HOUR_S })
+            .collect();
+        assert_eq!(mended(&stood, &[0.0; 400]).0, stood, "a train that stands for an hour");
+    }
+
+    #[test]
+    fn rows_that_share_whole_seconds_are_spread_over_them() {
+        let times = grid(403);
+        let whole: Vec<f64> = times[2..].iter().map(|it| (it + 1e-6).floor()).collect();
+        let speeds: Vec<f64> = (0..401).map(|row| 0.1 * row as f64).collect();
+        let (found, faults, _) = mended(&whole, &speeds);
+        assert_eq!(faults.shared, Some(5));
+        assert!(are_equal(&found, &times[2..]), "{:?} {:?}", &found[..8], &times[2..8]);
+        let copied: Vec<f64> = (0..400).map(|row| f64::from(row / 2)).collect();
+        let mut times = copied.clone();
+        assert_eq!(mend(&mut times, &[1.0; 400], |row| row % 2 == 1).0.shared, None, "rows twice");
+    }
+
+    #[test]
+    fn rows_in_any_order_and_parts_in_another_are_sorted() {
+        let times = grid(500);
+        let shuffled: Vec<f64> = (0..500).map(|row| times[(row * 37) % 500]).collect();
+        let parts: Vec<f64> = [&times[300..], &times[..120], &times[120..300]].concat();
+        for disordered in [shuffled, parts] {
+            let (found, faults, order) = mended(&disordered, &[20.0; 500]);
+            assert!(faults.sorted && faults.anew.is_none(), "{faults:?}");
+            let order = order.unwrap();
+            assert!(order.windows(2).all(|it| found[it[0]] < found[it[1]]));
+        }
+        let mut swapped = times.clone();
+        swapped.swap(10, 11);
+        assert_eq!(mended(&swapped, &[20.0; 500]).2, None, "single rows are refused and counted");
+    }
+
+    #[test]
+    fn times_that_begin_anew_are_reported_where_they_do() {
+        let times = grid(300);
+        let again: Vec<f64> = [&times[..], &times[..250]].concat();
+        let beside: Vec<f64> = times
+            .iter()
+            .chain(&times[20..])
+            .enumerate()
+            .map(|(row, it)| if row < 300 { *it } else { it + 0.1 })
+            .collect();
+        for anew in [again, beside] {
+            let (_, faults, order) = mended(&anew, &vec![20.0; anew.len()]);
+            assert_eq!((faults.anew.unwrap().0, order), (300, None));
+        }
+    }
+
+    #[test]
+    fn far_epochs_are_near_ones() {
+        let ticks: Vec<f64> = (0..20).map(|row| 6.38e10 + 0.5 * f64::from(row)).collect();
+        assert_eq!(mended(&ticks, &[1.0; 20]).0[3], 1.5);
+    }
+}
