@@ -12,7 +12,9 @@ use dynocar_model::force::balance::mps2_per_n_per_kn;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::drive::Moment;
-use super::world::{KNOT_M, KNOT_OVER_MEAN, LoadSource, ROOM_KG, WEIGHING_STD, World, knot_std_permille};
+use super::world::{
+    KNOT_M, KNOT_OVER_MEAN, LoadSource, ROOM_KG, WEIGHING_STD, World, knot_std_permille,
+};
 
 /// What is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

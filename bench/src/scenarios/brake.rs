@@ -48,10 +48,8 @@ impl Brake {
     /// Rows of brakes with their names.
     pub fn rows() -> [(&'static str, Brake); 15] {
         let blended = |lag_s, strength| Brake { lag_s, strength, ..Brake::BLENDED };
-        let alone = |lag_s, strength| Brake {
-            hand_over_mps: Brake::ALONE,
-            ..blended(lag_s, strength)
-        };
+        let alone =
+            |lag_s, strength| Brake { hand_over_mps: Brake::ALONE, ..blended(lag_s, strength) };
         let told = |reported, brake: Brake| Brake { reported, ..brake };
         [
             ("blended, lag 0.1 s", blended(0.1, 1.0)),
@@ -101,9 +99,7 @@ impl Friction {
         let share = brake.friction_share(speed_mps);
         let follows = if brake.lag_s > 0.0 { (step_s / brake.lag_s).min(1.0) } else { 1.0 };
         self.by_pressure_mps2 += follows * (share * braked_mps2 - self.by_pressure_mps2);
-        told_mps2.max(0.0)
-            - (1.0 - share) * braked_mps2
-            - brake.strength * self.by_pressure_mps2
+        told_mps2.max(0.0) - (1.0 - share) * braked_mps2 - brake.strength * self.by_pressure_mps2
     }
 
     /// Pressure in the cylinders in Pa.

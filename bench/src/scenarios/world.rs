@@ -79,8 +79,8 @@ pub struct Habits {
 impl Traffic {
     /// Its habits.
     pub fn habits(self) -> Habits {
-        let habits = |stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille| {
-            Habits {
+        let habits =
+            |stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille| Habits {
                 stop_m,
                 top_mps,
                 acceleration_mps2,
@@ -88,8 +88,7 @@ impl Traffic {
                 line_m,
                 steep_permille,
                 holding_mps2: if self == Traffic::Tram { 1.2 } else { 0.3 },
-            }
-        };
+            };
         match self {
             Traffic::Metro => habits((900.0, 1700.0), 20.0, (1.0, 0.9), 30.0, 16e3, 15.0),
             Traffic::Emu => habits((5e3, 10e3), 38.0, (0.6, 0.7), 60.0, 70e3, 10.0),
@@ -111,6 +110,7 @@ impl Traffic {
         TrainModel {
             length_m,
             rotating_mass_factor: if self == Traffic::Tram { 0.10 } else { 0.06 },
+            full_mass_kg: (self == Traffic::Tram).then_some(mass_kg + ROOM_KG),
             ..TrainModel::bare("scenario", mass_kg, Davis { a, b, c })
         }
     }
