@@ -144,7 +144,9 @@ enum {
     /* A gradient that cannot be true: a wrong unit or sign */
     DYNOCAR_REASON_IMPLAUSIBLE_GRADIENT = 18,
     /* A brake-cylinder pressure that cannot be true: a wrong unit */
-    DYNOCAR_REASON_IMPLAUSIBLE_PRESSURE = 19
+    DYNOCAR_REASON_IMPLAUSIBLE_PRESSURE = 19,
+    /* The train stood so long that the load may have changed; its interval allows for that */
+    DYNOCAR_REASON_LOAD_MAY_HAVE_CHANGED = 20
 };
 
 /* The kind of estimator behind a snapshot, named as in the configuration. */

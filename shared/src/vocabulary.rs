@@ -219,6 +219,8 @@ vocabulary! {
         ImplausibleGradient = 18 "implausible_gradient",
         /// A brake-cylinder pressure that cannot be true: a wrong unit.
         ImplausiblePressure = 19 "implausible_pressure",
+        /// The train stood so long that the load may have changed; its interval allows for that.
+        LoadMayHaveChanged = 20 "load_may_have_changed",
     }
 }
 

@@ -8,6 +8,7 @@ use dynocar_shared::{RailCondition, Uncertain};
 use super::knowledge::Ability;
 use crate::chance::Chance;
 use crate::output::Record;
+use crate::scenarios::brake::Brake;
 use crate::scenarios::mistakes::Mistakes;
 use crate::scenarios::world::{LoadSource, Scenario, Traffic, World};
 
@@ -79,12 +80,14 @@ impl Service {
                 Traffic::Metro => LoadSource::Changing,
                 Traffic::Freight => LoadSource::Unknown,
                 Traffic::Emu | Traffic::HighSpeed => LoadSource::Weighed(20),
+                Traffic::Tram => LoadSource::Passengers,
             },
             jumps: false,
             rate_hz: 1000 / self.cycle_ms,
             speed_noise_mps: 0.03,
             position_noise_m: 0.05,
             map_std_permille: 0.1,
+            brake: Brake::AS_TOLD,
         }
     }
 
@@ -107,6 +110,7 @@ pub fn traffic_name(traffic: Traffic) -> &'static str {
         Traffic::Emu => "regional",
         Traffic::Freight => "freight",
         Traffic::HighSpeed => "high speed",
+        Traffic::Tram => "tram",
     }
 }
 
@@ -123,6 +127,7 @@ pub fn ability(traffic: Traffic) -> Ability {
     let points = [(0.0, inertial_kg * most)].into_iter().chain(points).collect();
     let (jerk_mps3, lag_s) = match traffic {
         Traffic::Metro => (0.8, 0.5),
+        Traffic::Tram => (1.4, 0.25),
         Traffic::Emu | Traffic::HighSpeed => (0.5, 0.6),
         Traffic::Freight => (0.1, 2.5),
     };
@@ -186,7 +191,7 @@ impl Hidden {
             false => (RailCondition::Dry, 1.0 + 0.05 * random.normal()),
         };
         let wind_std_mps = match service.traffic {
-            Traffic::Metro => 0.0,
+            Traffic::Metro | Traffic::Tram => 0.0,
             Traffic::Emu | Traffic::Freight => 3.0,
             Traffic::HighSpeed => 5.0,
         };

@@ -97,7 +97,7 @@ pub fn drive(
         .map(|seed| Driving {
             journey: Journey::new(Train::new(service, seed)),
             memory: Memory::default(),
-            scores: [Score::default(); 4],
+            scores: Default::default(),
         })
         .collect();
     let dies = service.condition.daemon_dies;

@@ -188,7 +188,7 @@ fn line(service: &Service, (informant, name): (Informant, &str), drives: &Drives
 
 /// What an answer was worth.
 fn answer(service: &Service, index: usize, driven: &[Driven], stops: usize) -> Record {
-    let scores: Vec<Score> = driven.iter().map(|it| it.scores[index]).collect();
+    let scores: Vec<Score> = driven.iter().map(|it| it.scores[index].clone()).collect();
     let all = Scores(&scores);
     let record = all
         .usable(service.record().with("quantity", ASKED[index].name()))

@@ -103,7 +103,7 @@ impl Train {
                 let sign = if self.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
                 1.0 + sign * 1e-3 * f64::from(permille)
             }
-            LoadSource::Exact | LoadSource::Unknown => 1.0,
+            LoadSource::Exact | LoadSource::Unknown | LoadSource::Passengers => 1.0,
         };
         self.weighed_kg = scale * self.mass_kg;
         self.brake_scale =

@@ -12,7 +12,9 @@ use dynocar_model::force::balance::mps2_per_n_per_kn;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::drive::Moment;
-use super::world::{KNOT_M, KNOT_OVER_MEAN, LoadSource, WEIGHING_STD, World, knot_std_permille};
+use super::world::{
+    KNOT_M, KNOT_OVER_MEAN, LoadSource, ROOM_KG, WEIGHING_STD, World, knot_std_permille,
+};
 
 /// What is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -41,6 +43,7 @@ impl Unknown {
     /// Its standard deviation beforehand.
     fn std(self, world: &World) -> f64 {
         let (declared, usual) = (world.declared.resistance, &world.mistakes);
+        let declared_kg = world.declared.mass_kg;
         match self {
             Unknown::Davis(power) => {
                 usual.coefficient_share * [declared.a, declared.b, declared.c][power]
@@ -56,6 +59,7 @@ impl Unknown {
                 LoadSource::Weighed(permille) => 1e-3 * f64::from(permille),
                 LoadSource::Unknown => DRAWN_LOAD_STD,
                 LoadSource::Changing => WEIGHING_STD,
+                LoadSource::Passengers => ROOM_KG / declared_kg / 3.464,
             },
             Unknown::Brake(_) => usual.stop_to_stop_share,
             Unknown::Gust(_) => KNOT_OVER_MEAN * usual.gust_mps,

@@ -5,12 +5,13 @@ use std::collections::VecDeque;
 use dynocar_model::train::Davis;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::world::{GUST_S, Habits, KNOT_OVER_MEAN, LoadSource, WEIGHING_STD, World};
+use super::brake::{Brake, Friction, Reported};
+use super::world::{
+    BOARDING_STD_KG, GUST_S, Habits, KNOT_OVER_MEAN, LoadSource, ROOM_KG, WEIGHING_STD, World,
+};
 
 /// Steps of the simulation per cycle of the controller.
 const STEPS: u32 = 10;
-/// Change of acceleration in m/s³ where forces do not jump.
-const JERK_MPS3: f64 = 0.6;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
@@ -56,6 +57,9 @@ pub struct Drive {
     target_mps: f64,
     /// Acceleration in m/s² that the force gives, as commanded.
     commanded_mps2: f64,
+    /// As demanded, before the limit of jerk.
+    demanded_mps2: f64,
+    friction: Friction,
     /// As reported, and what is reported and acts later.
     reported_mps2: f64,
     on_its_way: VecDeque<f64>,
@@ -91,6 +95,8 @@ impl Drive {
             weighed_kg: mass_kg,
             target_mps: 0.0,
             commanded_mps2: 0.0,
+            demanded_mps2: 0.0,
+            friction: Friction::default(),
             reported_mps2: 0.0,
             on_its_way: VecDeque::new(),
             acts_at,
@@ -129,7 +135,7 @@ impl Drive {
     fn weigh(&mut self) {
         let World { scenario, random, .. } = &mut self.world;
         self.weighed_kg = match scenario.load {
-            LoadSource::Exact | LoadSource::Unknown => self.now.mass_kg,
+            LoadSource::Exact | LoadSource::Unknown | LoadSource::Passengers => self.now.mass_kg,
             // One weighing, wrong the same way for the whole drive.
             LoadSource::Weighed(permille) => {
                 self.now.mass_kg * (1.0 + random.sign() * 1e-3 * f64::from(permille))
@@ -157,7 +163,10 @@ impl Drive {
             while self.on_its_way.len() > late + 1 {
                 self.on_its_way.pop_front();
             }
-            let before_mps2 = std::mem::replace(&mut self.now.push_mps2, self.on_its_way[0]);
+            let brake = &self.world.scenario.brake;
+            let (told_mps2, speed_mps) = (self.on_its_way[0], self.now.speed_mps);
+            let acts_mps2 = self.friction.acts_mps2(brake, told_mps2, speed_mps, step_s);
+            let before_mps2 = std::mem::replace(&mut self.now.push_mps2, acts_mps2);
             self.step(step_s, 0.5 * (before_mps2 + self.now.push_mps2));
         }
         self.measure();
@@ -187,8 +196,9 @@ impl Drive {
     fn command(&mut self, cycle_s: f64) {
         let before_mps2 = self.commanded_mps2;
         self.decide(cycle_s);
+        self.demanded_mps2 = self.commanded_mps2;
         if !self.world.scenario.jumps {
-            let most = JERK_MPS3 * cycle_s;
+            let most = self.world.scenario.brake.jerk_mps3 * cycle_s;
             self.commanded_mps2 = self.commanded_mps2.clamp(before_mps2 - most, before_mps2 + most);
         }
     }
@@ -203,9 +213,14 @@ impl Drive {
         }
         match &mut self.phase {
             Phase::Standing { left_s } => {
-                *left_s -= cycle_s;
-                self.commanded_mps2 = -0.3;
-                if *left_s <= 0.0 {
+                let before_s = std::mem::replace(left_s, *left_s - cycle_s);
+                let half_s = 0.5 * self.habits.standing_s;
+                let (is_half, is_over) = (before_s > half_s && *left_s <= half_s, *left_s <= 0.0);
+                self.commanded_mps2 = -self.habits.holding_mps2;
+                if is_half {
+                    self.board();
+                }
+                if is_over {
                     self.depart();
                 }
             }
@@ -231,7 +246,8 @@ impl Drive {
             }
             Phase::Braking => {
                 self.commanded_mps2 = -needed.min(1.3 * brake);
-                if self.now.speed_mps < 0.1 || to_stop_m < 0.3 {
+                let is_exact = self.world.scenario.brake == Brake::AS_TOLD;
+                if self.now.speed_mps < 0.1 || (is_exact && to_stop_m < 0.3) {
                     self.arrive();
                 }
             }
@@ -244,6 +260,16 @@ impl Drive {
         self.brake_scale = *brake_scale * (1.0 + mistakes.stop_to_stop_share * random.normal());
         self.commanded_mps2 = 0.0;
         self.target_mps = self.habits.top_mps * (0.75 + 0.25 * self.world.random.uniform());
+    }
+
+    /// Passengers leave and board, as far as there is room.
+    fn board(&mut self) {
+        let World { scenario, declared, random, .. } = &mut self.world;
+        if scenario.load == LoadSource::Passengers {
+            let changed_kg = self.now.mass_kg + BOARDING_STD_KG * random.normal();
+            let most_kg = declared.mass_kg + ROOM_KG;
+            self.now.mass_kg = changed_kg.clamp(declared.mass_kg, most_kg);
+        }
     }
 
     fn arrive(&mut self) {
@@ -266,7 +292,8 @@ impl Drive {
         now.headwind_mps = headwind_mps;
         now.is_standing = matches!(self.phase, Phase::Standing { .. });
         now.w0_n_per_kn = truth.resistance.w0_n_per_kn(now.speed_mps);
-        let force_n = self.reported_mps2 * (now.mass_kg * (1.0 + truth.rotating_mass_factor));
+        let inertial_kg = now.mass_kg * (1.0 + truth.rotating_mass_factor);
+        let force_n = self.reported_mps2 * inertial_kg;
         let noise_mps = scenario.speed_noise_mps * random.normal();
         let place_m = now.place_m + scenario.position_noise_m * random.normal();
         let measured_mps = match now.speed_mps > 0.0 {
@@ -282,8 +309,17 @@ impl Drive {
         sample.set(SampleField::Speed, measured_mps);
         sample.set(SampleField::Position, place_m);
         sample.set(SampleField::TractionForce, force_scale[0] * force_n.max(0.0));
-        sample.set(SampleField::BrakeForce, braked * (-force_n).max(0.0));
-        if scenario.load != LoadSource::Unknown {
+        let brake = &scenario.brake;
+        let brake_n = match brake.reported {
+            Reported::Force | Reported::Pressure => -force_n,
+            Reported::Demand => -inertial_kg * self.demanded_mps2,
+            Reported::ElectricForce => -force_n * Friction::electric_share(brake, now.speed_mps),
+        };
+        sample.set(SampleField::BrakeForce, braked * brake_n.max(0.0));
+        if brake.reported == Reported::Pressure {
+            sample.set(SampleField::BrakeCylinderPressure, self.friction.pressure_pa());
+        }
+        if !matches!(scenario.load, LoadSource::Unknown | LoadSource::Passengers) {
             sample.set(SampleField::Mass, self.weighed_kg);
         }
         sample.set(SampleField::Gradient, self.world.gradient_permille(place_m)[0]);

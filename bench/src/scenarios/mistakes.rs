@@ -1,7 +1,7 @@
 //! How wrong what is declared of a train and its day is.
 
 use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
-use dynocar_model::terms::wind;
+use dynocar_model::terms::{adhesion, wind};
 use dynocar_tests::simulator::Deviations;
 
 /// Standard deviations of the ordinary mistakes, all at once; none by default.
@@ -50,7 +50,7 @@ impl Mistakes {
         Mistakes {
             coefficient_share: settings.prior_relative_std,
             force_share: settings.force_scale_std,
-            brake_share: settings.brake_scale_std,
+            brake_share: adhesion::DECLARED_BRAKE_STD,
             delay_s: settings.force_delay_std_s,
             mean_delay_s: 0.0,
             wind_mps: settings.wind_std_mps,

@@ -3,12 +3,14 @@
 //!
 //! - [`mistakes`]: how wrong what is declared of them is
 //! - [`world`]: a train, its line and its day, drawn by those
+//! - [`brake`]: brakes that do not act as they report
 //! - [`drive`]: driving from stop to stop, and what the controller writes of it
 //! - [`bound`]: how well both can be known at best
 //! - [`score`]: what an answer was worth over a drive
 //! - [`table`]: the scenarios, all of it in numbers
 
 pub mod bound;
+pub mod brake;
 pub mod drive;
 pub mod mistakes;
 pub mod score;
@@ -39,6 +41,9 @@ pub struct ScenariosArguments {
     /// Only scenarios whose name contains this, as metro
     #[arg(long, value_name = "TEXT", default_value = "")]
     scenario: String,
+    /// Rows of brakes that do not act as they report, instead of the usual ones
+    #[arg(long)]
+    brakes: bool,
     /// How large the mistakes are: those of careful declarations, or all that default settings expect
     #[arg(long, value_enum, default_value_t = Size::Usual)]
     mistakes: Size,
@@ -78,7 +83,7 @@ impl ScenariosArguments {
     ///
     /// When the command line is wrong, or the result cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
-        let all = table::scenarios();
+        let all = if self.brakes { table::brakes() } else { table::scenarios() };
         let chosen = containing("--scenario", &self.scenario, all, |(it, _)| it.join(", "))?;
         let all: Vec<_> = PipelineKind::ALL.iter().map(|kind| (kind.name(), *kind)).collect();
         let kinds = self.pipelines.iter().map(|name| named("--pipeline", name, &all));

@@ -30,8 +30,13 @@ impl Answer {
     }
 }
 
+/// Time in s from which an answer is expected.
+const SETTLED_S: f64 = 120.0;
+/// Deviation of the mass as a share of it from which it is known.
+const KNOWN: f64 = 0.025;
+
 /// One quantity of one pipeline over one drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
     /// Cycles of the moving train.
     pub cycles: u64,
@@ -61,12 +66,21 @@ pub struct Score {
     /// The same of the least deviations there.
     pub least_square: f64,
     was_usable: bool,
+    /// Cycles after the first two minutes, and those with a usable answer.
+    pub later: [u64; 2],
+    /// Motion in s after each stop until the answer was known, and of the newest so far.
+    known_s: Vec<f64>,
+    moving_s: Option<f64>,
 }
 
 impl Score {
     /// Takes in a cycle of so many s.
     pub fn push(&mut self, time_s: f64, cycle_s: f64, answer: Option<Answer>) {
         self.cycles += 1;
+        if time_s >= SETTLED_S {
+            self.later[0] += 1;
+            self.later[1] += u64::from(answer.is_some());
+        }
         self.changes += u64::from(answer.is_some() != self.was_usable);
         self.was_usable = answer.is_some();
         let Some(Answer { error, deviation, declared_error }) = answer else {
@@ -84,6 +98,20 @@ impl Score {
         self.declared_square += declared_error * declared_error;
         self.wrong_now_s = if is_wrong { self.wrong_now_s + cycle_s } else { 0.0 };
         self.wrong_s = self.wrong_s.max(self.wrong_now_s);
+    }
+
+    /// Takes in whether the train stands: how long it moves after a stop until the answer is known.
+    pub fn follow_stops(&mut self, is_standing: bool, cycle_s: f64, answer: Option<Answer>) {
+        if is_standing {
+            let before_s = self.moving_s.replace(0.0);
+            self.known_s.extend(before_s.filter(|moving_s| *moving_s > 0.0));
+        } else if let Some(moving_s) = &mut self.moving_s {
+            *moving_s += cycle_s;
+            if answer.is_some_and(|it| it.deviation < KNOWN) {
+                self.known_s.push(*moving_s);
+                self.moving_s = None;
+            }
+        }
     }
 
     /// Takes in a usable answer's error and the least deviation, both relative to the truth.
@@ -125,6 +153,19 @@ impl Scores<'_> {
     pub fn usable(&self, record: Record) -> Record {
         let share = self.count(|it| it.usable) as f64 / self.count(|it| it.cycles).max(1) as f64;
         record.number("usable_percent", 100.0 * share, 1)
+    }
+
+    /// With the share of the time after the first two minutes.
+    pub fn usable_later(&self, record: Record) -> Record {
+        let [cycles, usable] = [0, 1].map(|i| self.0.iter().map(|it| it.later[i]).sum::<u64>());
+        record.number("usable_later_percent", 100.0 * usable as f64 / cycles.max(1) as f64, 1)
+    }
+
+    /// With the time of motion after a stop until the answer was known, for 19 stops of 20.
+    pub fn known_again(&self, record: Record) -> Record {
+        let mut all: Vec<f64> = self.0.iter().flat_map(|it| it.known_s.iter().copied()).collect();
+        all.sort_by(f64::total_cmp);
+        record.number("known_again_s", all.get(all.len() * 19 / 20).copied(), 1)
     }
 
     /// With the median time until the first use.

@@ -9,6 +9,7 @@ use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, Train
 use nalgebra::{Matrix4, Vector4};
 
 use super::bound::Bound;
+use super::brake::Brake;
 use super::drive::{Drive, Moment};
 use super::mistakes::Mistakes;
 use super::score::{Answer, COUNTS_MPS, Score, Scores};
@@ -23,7 +24,7 @@ const COMPARED_GROWTH: f64 = 1.35;
 const QUANTITIES: [Quantity; 2] = [Quantity::Resistance, Quantity::Mass];
 
 /// A scenario with the names of its traffic and of what is particular.
-pub type NamedScenario = ([&'static str; 2], Scenario);
+pub type NamedScenario = ([String; 2], Scenario);
 
 const TRAFFIC: [(&str, Traffic); 4] = [
     ("metro", Traffic::Metro),
@@ -32,13 +33,32 @@ const TRAFFIC: [(&str, Traffic); 4] = [
     ("high speed", Traffic::HighSpeed),
 ];
 
-/// All rows: for each traffic each load, and the ordinary one with everything else varied.
+/// Usual rows: for each traffic each load, and the ordinary one with everything else varied.
 pub fn scenarios() -> Vec<NamedScenario> {
-    let of = |(name, traffic)| varied(traffic).map(|(what, scenario)| ([name, what], scenario));
-    TRAFFIC.into_iter().flat_map(of).collect()
+    let of = |(name, traffic): (String, _)| {
+        varied(traffic).map(|(what, scenario)| ([name.clone(), what.into()], scenario))
+    };
+    TRAFFIC.into_iter().map(|(name, traffic)| (name.to_owned(), traffic)).flat_map(of).collect()
 }
 
-fn varied(traffic: Traffic) -> [(&'static str, Scenario); 10] {
+/// Rows of brakes: for a tram and each other traffic each brake, with a good and a poor map.
+pub fn brakes() -> Vec<NamedScenario> {
+    let mut all = Vec::new();
+    for (name, traffic) in [("tram", Traffic::Tram)].into_iter().chain(TRAFFIC) {
+        for map_std_permille in MAPS_PERMILLE {
+            for (what, brake) in Brake::rows() {
+                let scenario = Scenario { map_std_permille, brake, ..usual(traffic) };
+                all.push(([name.into(), format!("{what}, map {map_std_permille} ‰")], scenario));
+            }
+        }
+    }
+    all
+}
+
+/// Standard deviations in ‰ of the map under the rows of brakes.
+const MAPS_PERMILLE: [f64; 2] = [0.1, 0.5];
+
+fn usual(traffic: Traffic) -> Scenario {
     let usual = Scenario {
         traffic,
         load: LoadSource::Weighed(20),
@@ -47,7 +67,22 @@ fn varied(traffic: Traffic) -> [(&'static str, Scenario); 10] {
         speed_noise_mps: 0.03,
         position_noise_m: 2.0,
         map_std_permille: 0.1,
+        brake: Brake::AS_TOLD,
     };
+    match traffic {
+        Traffic::Tram => Scenario {
+            load: LoadSource::Passengers,
+            rate_hz: 20,
+            speed_noise_mps: 0.008,
+            position_noise_m: 0.5,
+            ..usual
+        },
+        _ => usual,
+    }
+}
+
+fn varied(traffic: Traffic) -> [(&'static str, Scenario); 10] {
+    let usual = usual(traffic);
     let exact = Scenario { map_std_permille: 0.0, ..usual };
     let quiet = Scenario { speed_noise_mps: 0.0, position_noise_m: 0.0, ..exact };
     [
@@ -123,7 +158,7 @@ fn measure(
         }
     }
     let rows = QUANTITIES.iter().zip(&scores).filter(|(it, _)| settings.answers(**it));
-    Ok(rows.map(|(quantity, scores)| record(plan, *names, kind, *quantity, scores)).collect())
+    Ok(rows.map(|(quantity, scores)| record(plan, names, kind, *quantity, scores)).collect())
 }
 
 /// One drive.
@@ -139,12 +174,18 @@ fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
             bound.see(drive.world(), &moment, cycle_s);
         }
         let snapshot = pipeline.process(&moment.sample);
-        if moment.speed_mps < COUNTS_MPS {
-            continue;
-        }
         let answers = QUANTITIES.map(|quantity| answer(snapshot, quantity, &moment));
-        for (score, answer) in scores.iter_mut().zip(answers) {
-            score.push(time_s, cycle_s, answer);
+        let is_moving = moment.speed_mps >= COUNTS_MPS;
+        // A mass is one at a standstill, too.
+        let counts = [is_moving, is_moving || moment.is_standing];
+        for ((score, answer), counts) in scores.iter_mut().zip(answers).zip(counts) {
+            if counts {
+                score.push(time_s, cycle_s, answer);
+            }
+        }
+        scores[1].follow_stops(moment.is_standing, cycle_s, answers[1]);
+        if !is_moving {
+            continue;
         }
         if time_s >= next_s {
             next_s = COMPARED_GROWTH * time_s;
@@ -188,7 +229,7 @@ fn least_deviation(bound: &Matrix4<f64>, quantity: Quantity, moment: &Moment) ->
 /// One quantity of one pipeline in one scenario; `error_over_bound` is that at some instants of the drives.
 fn record(
     plan: &Plan<'_>,
-    [traffic, condition]: [&str; 2],
+    [traffic, condition]: &[String; 2],
     kind: PipelineKind,
     quantity: Quantity,
     scores: &[Score],
@@ -198,14 +239,16 @@ fn record(
     let wrong_s = scores.iter().map(|it| it.wrong_s).fold(0.0, f64::max);
     let hours = plan.hours * plan.seeds as f64;
     let record = Record::default()
-        .with("traffic", traffic)
-        .with("condition", condition)
+        .with("traffic", traffic.as_str())
+        .with("condition", condition.as_str())
         .with("pipeline", kind.name())
         .with("quantity", quantity.name())
         .with("seeds", plan.seeds)
         .with("first_seed", plan.first_seed);
     let record = all.usable(record).number("coverage_percent", coverage, 1);
-    all.first_use(record)
+    let record = all.usable_later(record);
+    let record = all.first_use(record);
+    all.known_again(record)
         .number("changes_per_h", all.count(|it| it.changes) as f64 / hours, 1)
         .number("longest_wrong_s", wrong_s, 1)
         .number("error_percent", all.rms_percent(|it| it.error_square), 2)

@@ -2,6 +2,7 @@
 
 use dynocar_model::train::{Davis, TrainModel};
 
+use super::brake::Brake;
 use super::mistakes::Mistakes;
 use crate::chance::Chance;
 
@@ -16,6 +17,8 @@ pub enum Traffic {
     Freight,
     /// Stops every 60 km, up to 290 km/h.
     HighSpeed,
+    /// Stops every 400 m, up to 43 km/h, gradients up to 60 ‰.
+    Tram,
 }
 
 /// How the load is known.
@@ -29,6 +32,9 @@ pub enum LoadSource {
     Unknown,
     /// The load changes at every stop; samples carry it, each time weighed anew with 3 %.
     Changing,
+    /// Samples carry no mass; tare and full load are declared, and a third of what there is room for changes
+    /// while the train stands.
+    Passengers,
 }
 
 /// One row of the table.
@@ -48,6 +54,8 @@ pub struct Scenario {
     pub position_noise_m: f64,
     /// Standard deviation in ‰ of the map's gradient.
     pub map_std_permille: f64,
+    /// The brake.
+    pub brake: Brake,
 }
 
 /// What differs between the kinds of traffic.
@@ -64,19 +72,29 @@ pub struct Habits {
     pub line_m: f64,
     /// Steepest gradient in ‰.
     pub steep_permille: f64,
+    /// Deceleration in m/s² that the brake of a standing train is told to exert.
+    pub holding_mps2: f64,
 }
 
 impl Traffic {
     /// Its habits.
     pub fn habits(self) -> Habits {
-        let habits = |stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille| {
-            Habits { stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille }
-        };
+        let habits =
+            |stop_m, top_mps, acceleration_mps2, standing_s, line_m, steep_permille| Habits {
+                stop_m,
+                top_mps,
+                acceleration_mps2,
+                standing_s,
+                line_m,
+                steep_permille,
+                holding_mps2: if self == Traffic::Tram { 1.2 } else { 0.3 },
+            };
         match self {
             Traffic::Metro => habits((900.0, 1700.0), 20.0, (1.0, 0.9), 30.0, 16e3, 15.0),
             Traffic::Emu => habits((5e3, 10e3), 38.0, (0.6, 0.7), 60.0, 70e3, 10.0),
             Traffic::Freight => habits((25e3, 40e3), 24.0, (0.15, 0.3), 180.0, 120e3, 6.0),
             Traffic::HighSpeed => habits((50e3, 80e3), 80.0, (0.45, 0.5), 180.0, 400e3, 12.0),
+            Traffic::Tram => habits((350.0, 450.0), 12.0, (1.0, 1.0), 20.0, 12e3, 60.0),
         }
     }
 
@@ -87,14 +105,21 @@ impl Traffic {
             Traffic::Emu => (400e3, 160.0, [1.5, 0.02, 0.0008]),
             Traffic::Freight => (1600e3, 600.0, [1.2, 0.01, 0.0010]),
             Traffic::HighSpeed => (480e3, 200.0, [0.8, 0.008, 0.000_45]),
+            Traffic::Tram => (38e3, 30.0, [4.0, 0.05, 0.004]),
         };
         TrainModel {
             length_m,
-            rotating_mass_factor: 0.06,
+            rotating_mass_factor: if self == Traffic::Tram { 0.10 } else { 0.06 },
+            full_mass_kg: (self == Traffic::Tram).then_some(mass_kg + ROOM_KG),
             ..TrainModel::bare("scenario", mass_kg, Davis { a, b, c })
         }
     }
 }
+
+/// Passengers that a tram has room for, in kg, and the standard deviation of how many change at a stop.
+pub const ROOM_KG: f64 = 12e3;
+/// See [`ROOM_KG`].
+pub const BOARDING_STD_KG: f64 = 4e3;
 
 /// Standard deviation of a weighing as a share of the mass, where the load changes.
 pub const WEIGHING_STD: f64 = 0.03;
@@ -162,6 +187,7 @@ impl World {
         truth.mass_kg *= match scenario.load {
             LoadSource::Exact | LoadSource::Weighed(_) => 1.0 + 0.3 * (random.uniform() - 0.5),
             LoadSource::Unknown | LoadSource::Changing => 1.0 + 0.24 * (random.uniform() - 0.5),
+            LoadSource::Passengers => 1.0 + random.uniform() * ROOM_KG / declared.mass_kg,
         };
         let mut stops_m = vec![500.0];
         while stops_m[stops_m.len() - 1] < habits.line_m {

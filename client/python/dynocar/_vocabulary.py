@@ -90,6 +90,7 @@ class Reason(_Vocabulary):
     IMPLAUSIBLE_MASS = 17  # A mass that cannot be true: a wrong unit
     IMPLAUSIBLE_GRADIENT = 18  # A gradient that cannot be true: a wrong unit or sign
     IMPLAUSIBLE_PRESSURE = 19  # A brake-cylinder pressure that cannot be true: a wrong unit
+    LOAD_MAY_HAVE_CHANGED = 20  # The train stood so long that the load may have changed; its interval allows for that
 
 
 class PipelineKind(_Vocabulary):

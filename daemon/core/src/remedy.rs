@@ -11,6 +11,7 @@ pub const fn of_reason(reason: Reason) -> &'static str {
         Reason::NotIdentifiable => {
             "drive on, or give one of the values that fit as well in train.toml"
         }
+        Reason::LoadMayHaveChanged => "nothing: the first seconds after departure weigh the load",
         Reason::EstimateStale => "of an earlier braking: the next braking renews it",
         Reason::OnlyLowerBound => {
             "the rail carries at least this; more shows only when wheels slide"

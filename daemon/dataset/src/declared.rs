@@ -133,6 +133,7 @@ mod tests {
             mass_kg: 200e3,
             length_m: 100.0,
             cars: 4,
+            full_mass_kg: None,
             passenger_mass_kg: 70.0,
             rotating_mass_factor: 0.06,
             resistance: Davis { a: 1.8, b: 0.03, c: 0.0035 },

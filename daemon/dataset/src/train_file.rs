@@ -32,7 +32,8 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
     root.allow(&["train", "resistance", "traction", "brake", "corrections", extra::TABLES])?;
     let train = root.need_table("train")?;
     let gamma = &rotating::FACTOR;
-    train.allow(&["name", "mass_t", "length_m", "cars", gamma.name, "passenger_mass_kg"])?;
+    let keys = ["name", "mass_t", "mass_full_t", "length_m", "cars", gamma.name];
+    train.allow(&[&keys[..], &["passenger_mass_kg"]].concat())?;
     let resistance = root.need_table("resistance")?;
     let (traction, drive) = match root.table("traction")? {
         Some(section) => {
@@ -51,6 +52,8 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
         None => (None, BrakeGear::default()),
     };
     let mass_t = train.required("mass_t", MASS, above_zero(1e5))?;
+    let full = format!("a mass in t above mass_t, {mass_t}, at most 100000");
+    let mass_full_t = train.optional("mass_full_t", &full, mass_t.next_up()..=1e5)?;
     let length_m =
         train.required("length_m", "a length in m above 0, at most 10000", above_zero(1e4))?;
     let is_count = |cars: f64| (1.0..=1000.0).contains(&cars) && cars.fract() == 0.0;
@@ -64,6 +67,7 @@ pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> 
     let mut model = TrainModel {
         name: train.quoted("name")?.unwrap_or("unnamed train").into(),
         mass_kg: mass_t * 1000.0,
+        full_mass_kg: mass_full_t.map(|mass_t| 1000.0 * mass_t),
         passenger_mass_kg: passenger_kg.unwrap_or(PASSENGER_MASS_DEFAULT_KG),
         length_m,
         cars: cars.unwrap_or(1.0) as u32,
@@ -290,7 +294,8 @@ release_pressure_pa = 21000.0
         assert_eq!(
             message,
             "train.toml:5: unknown key 'lenght_m' in [train]; did you mean 'length_m'? (choices: \
-             'name', 'mass_t', 'length_m', 'cars', 'rotating_mass_factor', 'passenger_mass_kg')"
+             'name', 'mass_t', 'mass_full_t', 'length_m', 'cars', 'rotating_mass_factor', \
+             'passenger_mass_kg')"
         );
         let message = refusal(&FULL.replace("[traction]", "[tractive]"));
         assert!(message.starts_with("train.toml:14: unknown key 'tractive'; did you mean"));

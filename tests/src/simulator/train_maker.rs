@@ -199,6 +199,7 @@ pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Ra
         mass_kg,
         length_m,
         cars: cars.2.len() as u32,
+        full_mass_kg: None,
         passenger_mass_kg: 70.0,
         rotating_mass_factor: ranges.rotating_mass_factor,
         resistance: declared_resistance,

@@ -186,7 +186,7 @@ impl Pipeline {
         let is_awaiting = !is_doubted
             && matches!(
                 self.snapshot.reason(),
-                Some(Reason::EstimateStale | Reason::OnlyLowerBound)
+                Some(Reason::EstimateStale | Reason::OnlyLowerBound | Reason::LoadMayHaveChanged)
             );
         self.snapshot.usable_quantities = self.usable.see(good, is_awaiting, sample.time_ns);
         &self.snapshot

@@ -104,6 +104,8 @@ pub struct TrainModel {
     pub name: String,
     /// Nominal gross mass in kg, without the rotating part.
     pub mass_kg: f64,
+    /// Gross mass in kg with a full load, where it is declared; the nominal mass is the tare then.
+    pub full_mass_kg: Option<f64>,
     /// Mass of a passenger in kg, where passengers are counted; the nominal mass is empty then.
     pub passenger_mass_kg: f64,
     /// Length in m.
@@ -139,6 +141,7 @@ impl TrainModel {
         TrainModel {
             name: name.into(),
             mass_kg,
+            full_mass_kg: None,
             passenger_mass_kg: 70.0,
             length_m: 0.0,
             cars: 1,
@@ -153,6 +156,13 @@ impl TrainModel {
             corrections: Corrections::default(),
             extra: Vec::new(),
         }
+    }
+
+    /// Middle and standard deviation in kg of a mass that is anything between tare and full, where both are
+    /// declared.
+    pub fn load_range(&self) -> Option<(f64, f64)> {
+        let full_kg = self.full_mass_kg?;
+        Some((0.5 * (self.mass_kg + full_kg), (full_kg - self.mass_kg) / 12_f64.sqrt()))
     }
 
     /// Weight in kN of a mass in kg.

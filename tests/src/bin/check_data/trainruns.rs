@@ -114,6 +114,7 @@ fn running_time_s(train: &TheirTrain, effort: &[Vec<f64>], sections: &[Vec<f64>]
         // Their gradient acts on the train as on a point.
         length_m: 0.0,
         cars: 1,
+        full_mass_kg: None,
         passenger_mass_kg: 70.0,
         rotating_mass_factor: train.inertia_kg / train.mass_kg - 1.0,
         resistance: Davis { a, b, c },

@@ -197,6 +197,11 @@ impl StopWatch {
         self.last.is_none()
     }
 
+    /// True while the train stands for so long that the mass may have changed.
+    pub fn is_due(&self) -> bool {
+        self.is_due
+    }
+
     /// Takes one sample in; true at the first moving sample after the mass may have changed.
     pub fn departs(&mut self, time_ns: i64, segment: u32, speed_mps: f64) -> bool {
         if !speed_mps.is_finite() {

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::motion_filter::{
-    BEHAVIOURS, DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, STATES, State, StateCovariance,
-    Step, WIND, behaviours,
+    BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, STATES, State,
+    StateCovariance, Step, WIND, behaviours,
 };
 use crate::filter::bank::{Bank, Mixture};
 use crate::filter::{Gaussian, NotPositiveDefinite};
@@ -87,6 +87,7 @@ impl MotionBank {
             let (keep, renewed) = filter.behaviour.over(gap_s, 0.0, 0.0);
             filter.belief.fade(DISTURBANCE, keep, renewed);
             filter.belief.fade(WIND, wind.0, wind.1);
+            filter.belief.replace(BRAKE_ERROR, 0.0, 1.0);
         }
     }
 

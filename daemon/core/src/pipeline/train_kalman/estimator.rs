@@ -10,7 +10,6 @@ use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, RejectionReason
 
 use super::TrainKalmanSettings;
 use super::bank::Measured;
-use super::braking_watch::BrakingWatch;
 use super::learned::{JumpShare, Learned, Resistance};
 use super::load::{Change, LoadWatch};
 use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
@@ -27,6 +26,8 @@ use crate::pipeline::{Estimator, KeptEstimate, Outcome};
 /// Motion in s before anything is called known; after a warm start, before it is confirmed.
 const MOVED_MIN_S: f64 = 20.0;
 const CONFIRMED_S: f64 = 3.0;
+/// Standard deviation in N/kN of the brake force from which speeds say nothing of the noise and of the model.
+const JUDGED_BRAKE_STD: f64 = 1.0;
 /// Deviations by which a first sample may differ from a kept mass that still counts.
 const KEPT_DEVIATIONS: f64 = 3.0;
 
@@ -46,8 +47,6 @@ pub struct TrainKalman {
     /// True when the speed of the newest sample was at least the lowest that is used.
     is_fast: bool,
     steps: Steps,
-    braking: BrakingWatch,
-    before_braking: Learned,
     systematic: Systematic,
     speeds: SpeedRange,
     health: InputHealth,
@@ -75,15 +74,13 @@ impl TrainKalman {
         let learned = Learned::new(&settings, &first);
         Ok(TrainKalman {
             report: Report::new(&learned.bank.published(0.0, 0.0)),
-            braking: BrakingWatch::default(),
-            before_braking: learned.clone(),
             learned,
             settings,
             train_kg: train.mass_kg,
             steps: Steps::new(&settings, train.length_m),
             first,
             gate: SampleGate::default(),
-            load: LoadWatch::new(&settings),
+            load: LoadWatch::new(&settings, train),
             last: None,
             last_time_ns: None,
             is_fast: false,
@@ -118,9 +115,6 @@ impl TrainKalman {
         let learned =
             (self.learned.bank.likeliest().belief.mean[FORCE_DELAY], self.learned.jumps.share);
         let step = self.steps.to((&from, &now), sample, learned, &self.first);
-        if self.braking.begins(now.brake) {
-            self.before_braking = self.learned.clone();
-        }
         let before_mps = self.learned.bank.likeliest().belief.mean[SPEED];
         self.learned.bank.predict(&step);
         let moved_mps = (self.learned.bank.likeliest().belief.mean[SPEED] - before_mps).abs();
@@ -130,30 +124,22 @@ impl TrainKalman {
             self.reset();
             return self.begin(now);
         };
-        if self.braking.refuses(measured.trust.normalised) {
-            self.take_back(step.by_wind);
-            return Outcome::Used;
-        }
         self.last = Some(now);
         if measured.trust.is_outlier() {
             self.learned.monitor.break_here();
             return Outcome::Rejected(RejectionReason::Outlier);
         }
-        self.learn(&measured, now.speed_mps);
+        if step.brake_std < JUDGED_BRAKE_STD * step.duration_s {
+            self.learn(&measured, now.speed_mps);
+        } else {
+            self.learned.monitor.break_here();
+        }
         self.speeds.push(now.speed_mps);
         self.systematic.see(step.travelled_m, sample.position_m, now.speed_mps);
         self.moved_s += step.duration_s;
         self.is_fresh_reset &= self.moved_s < self.moved_min_s;
         self.judge(step.by_wind);
         Outcome::Updated
-    }
-
-    /// Forgets a braking that the model cannot explain: its brake does not act as it reports.
-    fn take_back(&mut self, by_wind: f64) {
-        self.learned = self.before_braking.clone();
-        self.learned.monitor.break_here();
-        self.last = None;
-        self.judge(by_wind);
     }
 
     /// Learns the noise of speeds and of forces that jump from what a speed said.
@@ -174,11 +160,10 @@ impl TrainKalman {
 
     fn reset(&mut self) {
         self.learned.bank = self.first.bank(&self.settings);
-        let load_variance = self.load.prior_variance();
-        self.learned.bank.each(|it| it.replace(LOAD, 1.0, load_variance));
+        let (load, variance) = self.load.prior();
+        self.learned.bank.each(|it| it.replace(LOAD, load, variance));
         self.learned.noise.reset();
         self.learned.jumps = JumpShare::default();
-        self.braking = BrakingWatch::default();
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
         self.report = Report::new(&self.learned.bank.published(0.0, 0.0));
@@ -203,27 +188,26 @@ impl TrainKalman {
     /// Follows the load from sample to sample.
     fn follow_load(&mut self, sample: &ResolvedSample) {
         let change = self.load.see(sample);
-        if change.is_some() {
-            // What was learned before refers to the load before.
-            self.braking = BrakingWatch::default();
-        }
         if let Some((mass_kg, relative_variance)) = self.kept_mass.take() {
             let load = sample.mass_kg / mass_kg;
             let variance = load * load * relative_variance;
-            let allowed = KEPT_DEVIATIONS.powi(2) * (variance + self.load.prior_variance());
-            if (load - 1.0).powi(2) <= allowed {
+            let allowed = KEPT_DEVIATIONS.powi(2) * (variance + self.load.prior().1);
+            if (load - self.load.prior().0).powi(2) <= allowed {
                 return self.learned.bank.each(|it| it.replace(LOAD, load, variance));
             }
         }
         match change {
-            Some(Change::Anew(variance)) => {
-                self.learned.bank.each(|it| it.replace(LOAD, 1.0, variance))
+            Some(Change::Anew(load, variance)) => {
+                self.learned.bank.each(|it| it.replace(LOAD, load, variance))
             }
             Some(Change::Opened(variance, most)) => self.learned.bank.each(|it| {
                 let now = it.covariance[(LOAD, LOAD)];
                 it.disturb(LOAD, variance.min((most - now).max(0.0)));
             }),
             None => {}
+        }
+        if change.is_some() {
+            self.judge(0.0);
         }
         if self.load.has_departed {
             self.systematic.start();
@@ -243,7 +227,6 @@ impl Gated for TrainKalman {
         }
         if !self.is_under_way(sample) {
             self.last = None;
-            self.braking = BrakingWatch::default();
             return Outcome::Used;
         }
         let now = match unit {
@@ -253,10 +236,6 @@ impl Gated for TrainKalman {
                 return self.health.note(Outcome::Rejected(reason), sample);
             }
         };
-        if self.braking.is_still_refused(now.brake) {
-            self.last = None;
-            return self.health.note(Outcome::Used, sample);
-        }
         self.learned.noise.rounding.see(now.speed_mps);
         let last = self.last.filter(|last| {
             let since_s = now.seconds_since(last);
@@ -297,7 +276,7 @@ impl Estimator for TrainKalman {
     fn write(&self, snapshot: &mut ParameterSnapshot) {
         let declared_kg = self.load.declared_kg(self.train_kg);
         self.report.write(declared_kg, &self.speeds, snapshot);
-        write_status(snapshot, self.case().verdict());
+        write_status(snapshot, self.verdict());
         write_innovations(snapshot, &self.learned.monitor);
         snapshot.mass_source = self.mass_source() as u32;
         snapshot.generation = self.resets;

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::TrainKalmanSettings;
 use super::bank::{Measured, MotionBank};
 use super::motion_filter::{
-    BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State, StateCovariance,
+    BRAKE_ERROR, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State, StateCovariance,
     TRACTION_SCALE, WIND,
 };
 use crate::pipeline::InnovationMonitor;
@@ -147,7 +147,7 @@ impl Resistance {
         all.fixed_view_mut::<COEFFICIENTS, COEFFICIENTS>(RESISTANCE, RESISTANCE)
             .copy_from(&self.covariance);
         all[(TRACTION_SCALE, TRACTION_SCALE)] = settings.force_scale_std.powi(2);
-        all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.brake_scale_std.powi(2);
+        all[(BRAKE_ERROR, BRAKE_ERROR)] = 1.0;
         all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
         all[(WIND, WIND)] = settings.wind_std_mps.powi(2);
         MotionBank::new(&mean, &all)

@@ -1,6 +1,7 @@
 //! What is known of the load, and when it may have become another one.
 
 use dynocar_model::force::ResolvedSample;
+use dynocar_model::train::TrainModel;
 
 use crate::pipeline::motion::{StopWatch, is_same_mass};
 
@@ -9,8 +10,8 @@ use super::TrainKalmanSettings;
 /// What a sample changes in what is known of the load: the declared mass over the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
-    /// It is as far as known as a new weighing or a declaration allows: this variance about 1.
-    Anew(f64),
+    /// It is as far as known as a new weighing or a declaration allows: a mean and a variance.
+    Anew(f64, f64),
     /// It may have become another one by this variance, up to a greatest one.
     Opened(f64, f64),
 }
@@ -20,7 +21,8 @@ pub enum Change {
 pub struct LoadWatch {
     stops: StopWatch,
     mass_std: f64,
-    load_std: f64,
+    /// Mean and standard deviation where samples carry no mass.
+    declared: (f64, f64),
     load_change_std: f64,
     /// Mass in kg that the load factor refers to, once there was a sample.
     declared_kg: Option<f64>,
@@ -28,28 +30,37 @@ pub struct LoadWatch {
     pub is_weighed: bool,
     /// True when the train left a stop with the newest sample.
     pub has_departed: bool,
+    /// True from when the load may have changed at a stop to the departure.
+    is_open: bool,
     /// True when the load was weighed since the last departure.
     is_fresh: bool,
 }
 
 impl LoadWatch {
-    /// Before the first sample.
-    pub fn new(settings: &TrainKalmanSettings) -> Self {
+    /// Before the first sample of a train, whose load may be anything between tare and full where these are
+    /// declared.
+    pub fn new(settings: &TrainKalmanSettings, train: &TrainModel) -> Self {
+        let load_std = 0.01 * settings.load_std_percent;
+        let declared = train.load_range().map_or((1.0, load_std), |(middle_kg, std_kg)| {
+            (train.mass_kg / middle_kg, train.mass_kg * std_kg / (middle_kg * middle_kg))
+        });
         LoadWatch {
             stops: StopWatch::new(settings.stop_min_s),
             mass_std: 0.01 * settings.mass_std_percent,
-            load_std: 0.01 * settings.load_std_percent,
+            declared,
             load_change_std: 0.01 * settings.load_change_std_percent,
             declared_kg: None,
             is_weighed: false,
             has_departed: false,
+            is_open: false,
             is_fresh: false,
         }
     }
 
-    /// Variance of the load factor by what the samples or the train's file say of it.
-    pub fn prior_variance(&self) -> f64 {
-        if self.is_weighed { self.mass_std.powi(2) } else { self.load_std.powi(2) }
+    /// Mean and variance of the load factor by what the samples or the train's file say of it.
+    pub fn prior(&self) -> (f64, f64) {
+        let (mean, std) = if self.is_weighed { (1.0, self.mass_std) } else { self.declared };
+        (mean, std * std)
     }
 
     /// Mass in kg that the load factor refers to; the declared one before the first sample.
@@ -62,20 +73,25 @@ impl LoadWatch {
         self.is_weighed = sample.is_mass_measured;
         self.has_departed = self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps);
         let before_kg = self.declared_kg.replace(sample.mass_kg);
-        let anew = Change::Anew(self.prior_variance());
+        let was_open = std::mem::replace(&mut self.is_open, self.stops.is_due());
+        let (mean, variance) = self.prior();
+        let anew = Change::Anew(mean, variance);
         let Some(before_kg) = before_kg else { return Some(anew) };
         if self.is_weighed && !is_same_mass(before_kg, sample.mass_kg) {
             self.is_fresh = !self.has_departed;
             return Some(anew);
         }
-        let was_fresh = self.has_departed && std::mem::take(&mut self.is_fresh);
-        (self.has_departed && !was_fresh).then(|| self.opened()).flatten()
+        // At the stop, not at the departure: nobody knows who boards while the train stands.
+        let opens = !was_open && (self.is_open || self.has_departed);
+        let change = (opens && !self.is_fresh).then(|| self.opened()).flatten();
+        self.is_fresh &= !self.has_departed;
+        change
     }
 
     /// What may have boarded; a weighing that did not change leaves as much open as it is off itself.
     fn opened(&self) -> Option<Change> {
         let change = self.load_change_std.powi(2);
-        let most = self.prior_variance();
+        let most = self.prior().1;
         let by = if self.is_weighed { change.min(2.0 * most) } else { change };
         (most > 0.0).then_some(Change::Opened(by, most))
     }
@@ -83,16 +99,25 @@ impl LoadWatch {
 
 #[cfg(test)]
 mod tests {
+    use dynocar_model::train::Davis;
+
     use super::*;
 
     const SECOND_NS: i64 = 1_000_000_000;
+
+    fn train(full_mass_kg: Option<f64>) -> TrainModel {
+        TrainModel {
+            full_mass_kg,
+            ..TrainModel::bare("t", 100e3, Davis { a: 1.0, b: 0.0, c: 0.0 })
+        }
+    }
 
     /// What a train that stands from 10 to 40 s changes, with the mass that its samples carry.
     fn changes(
         settings: &TrainKalmanSettings,
         mass_kg: impl Fn(i64) -> Option<f64>,
     ) -> Vec<Change> {
-        let mut load = LoadWatch::new(settings);
+        let mut load = LoadWatch::new(settings, &train(None));
         let seen = (0..60).filter_map(|second| {
             let mass = mass_kg(second);
             load.see(&ResolvedSample {
@@ -109,14 +134,17 @@ mod tests {
     #[test]
     fn a_load_is_opened_at_a_stop_and_anew_where_it_was_weighed_again() {
         let settings = TrainKalmanSettings::default();
-        let (weighed, declared) = (Change::Anew(0.03 * 0.03), Change::Anew(0.15 * 0.15));
+        let (weighed, declared) = (Change::Anew(1.0, 0.03 * 0.03), Change::Anew(1.0, 0.15 * 0.15));
         let opened = Change::Opened(0.1 * 0.1, 0.15 * 0.15);
         let weighed_again = Change::Opened(2.0 * 0.03 * 0.03, 0.03 * 0.03);
         let same = |one: &[Change], other: &[Change]| {
             assert_eq!(one.len(), other.len(), "{one:?}");
             for pair in one.iter().zip(other) {
                 let (a, b) = match pair {
-                    (Change::Anew(a), Change::Anew(b)) => (a, b),
+                    (Change::Anew(one, a), Change::Anew(other, b)) => {
+                        assert_eq!(one, other, "{pair:?}");
+                        (a, b)
+                    }
                     (Change::Opened(a, most), Change::Opened(b, same)) => {
                         assert!((most / same - 1.0).abs() < 1e-12, "{pair:?}");
                         (a, b)
@@ -129,12 +157,35 @@ mod tests {
         same(&changes(&settings, |_| None), &[declared, opened]);
         same(&changes(&settings, |_| Some(100e3)), &[weighed, weighed_again]);
         let boarded = |second| Some(if second < 20 { 100e3 } else { 108e3 });
-        same(&changes(&settings, boarded), &[weighed, weighed]);
+        same(&changes(&settings, boarded), &[weighed, weighed_again, weighed]);
     }
 
     #[test]
     fn a_mass_that_is_exact_is_never_opened() {
         let exact = TrainKalmanSettings { mass_std_percent: 0.0, ..Default::default() };
-        assert_eq!(changes(&exact, |_| Some(100e3)), [Change::Anew(0.0)]);
+        assert_eq!(changes(&exact, |_| Some(100e3)), [Change::Anew(1.0, 0.0)]);
+    }
+
+    #[test]
+    fn between_tare_and_full_load_any_mass_is_as_likely() {
+        let load = LoadWatch::new(&TrainKalmanSettings::default(), &train(Some(140e3)));
+        let (mean, variance) = load.prior();
+        assert!((mean - 100.0 / 120.0).abs() < 1e-12);
+        let std_share = 40.0 / 12_f64.sqrt() / 120.0;
+        assert!((variance.sqrt() / mean - std_share).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_load_is_opened_while_the_train_stands() {
+        let mut load = LoadWatch::new(&TrainKalmanSettings::default(), &train(None));
+        let opened_at: Vec<i64> = (0..60)
+            .filter(|&second| {
+                let speed_mps = if (10..40).contains(&second) { 0.0 } else { 15.0 };
+                let time_ns = second * SECOND_NS;
+                let sample = ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() };
+                matches!(load.see(&sample), Some(Change::Opened(..)))
+            })
+            .collect();
+        assert_eq!(opened_at, [15]);
     }
 }

@@ -10,7 +10,7 @@
 //! both. Whoever takes the mass for exact puts its error into the resistance, and the other way round;
 //! here each is known as well as the other allows, and their covariance says how they depend.
 
-use dynocar_model::terms::{adhesion, delay, masses, traction};
+use dynocar_model::terms::{delay, masses, traction};
 
 use crate::settings;
 
@@ -19,7 +19,6 @@ pub use learned::declared_a_std;
 
 mod acting_forces;
 mod bank;
-mod braking_watch;
 mod estimator;
 mod learned;
 mod load;
@@ -48,11 +47,12 @@ settings! {
         drift_n_per_kn_per_sqrt_h: f64 = 0.01 => (0 to 10 "N/kN");
         /// Standard deviation of the scale of the traction force: 0.01 is 1 %.
         force_scale_std: f64 = traction::USUAL_STD => (0.000001 to 0.5);
-        /// Standard deviation of the scale of the brake force, which with friction is what pressure and
-        /// disc should exert, rarely what they do.
-        brake_scale_std: f64 = adhesion::DECLARED_BRAKE_STD => (0.000001 to 0.5);
-        /// Random walk of that scale over a minute: friction goes with heat, moisture and wear.
-        brake_scale_per_sqrt_min: f64 = 0.015 => (0 to 0.5);
+        /// Standard deviation of the brake force as a share of what is reported: friction goes with heat,
+        /// moisture and wear, and is blended with an electric brake.
+        brake_scale_std: f64 = 0.3 => (0.000001 to 1);
+        /// Time in s within which the brake follows its report, as a time constant; a faster one is none
+        /// the worse.
+        brake_lag_s: f64 = 1.5 => (0.01 to 60 "s");
         /// Standard deviation in m/s of the wind of the day along the line; gusts have half of it.
         wind_std_mps: f64 = 1.5 => (0 to 20 "m/s");
         /// Standard deviation in s of the delay of a force behind its report.

@@ -18,8 +18,8 @@ pub const LOAD: usize = 2;
 pub const RESISTANCE: usize = 3;
 /// Index of the error of the traction force's scale.
 pub const TRACTION_SCALE: usize = 6;
-/// Index of the error of the brake force's scale.
-pub const BRAKE_SCALE: usize = 7;
+/// Index of what of the brake force is not as reported, over its standard deviation at the time.
+pub const BRAKE_ERROR: usize = 7;
 /// Index of the delay in s of a force behind its report.
 pub const FORCE_DELAY: usize = 8;
 /// Index of the wind along the line in m/s, a headwind where the chainage grows.
@@ -67,8 +67,8 @@ pub struct Step {
     pub known: f64,
     /// Change of the traction force over the step in N/kN.
     pub traction_change: f64,
-    /// Change of the brake force over the step in N/kN.
-    pub brake_change: f64,
+    /// Standard deviation of the brake's impulse in N/kN s by how late and how strong it may be.
+    pub brake_std: f64,
     /// Variance in (N/kN s)² of the impulse by gusts, and by where on the line a known force acts.
     pub impulse_variance: f64,
     /// Share of [`jump_variance`] that the forces of this train bring.
@@ -86,8 +86,8 @@ pub struct Step {
     pub by_wind_square: f64,
     /// Share of the wind that is left, and the variance in (m/s)² of what comes to it.
     pub wind: (f64, f64),
-    /// Variance that comes to the scale of the brake force, and its greatest.
-    pub brake_variance: (f64, f64),
+    /// Share of the brake's error that is left, and the variance of what comes to it.
+    pub brake_error: (f64, f64),
 }
 
 /// The filter under one behaviour of the disturbance.
@@ -110,12 +110,14 @@ impl MotionFilter {
     pub fn predict(&mut self, step: &Step) {
         let state = self.belief.mean;
         let (load, later_s) = (state[LOAD], state[FORCE_DELAY] - step.delay_s);
-        let (by_traction, by_brake) = (1.0 + state[TRACTION_SCALE], 1.0 + state[BRAKE_SCALE]);
+        let by_traction = 1.0 + state[TRACTION_SCALE];
         let traction = step.traction - later_s * step.traction_change;
-        let brake = step.brake - later_s * step.brake_change;
-        let force = by_traction * traction - by_brake * brake;
-        let change = by_traction * step.traction_change - by_brake * step.brake_change;
-        let impulse = load * force - step.known - step.duration_s * state[DISTURBANCE];
+        let force = by_traction * traction - step.brake;
+        let change = by_traction * step.traction_change;
+        // Not times the load: a product of two unknowns would seem better known than it is.
+        let unexplained =
+            step.duration_s * state[DISTURBANCE] + step.brake_std * state[BRAKE_ERROR];
+        let impulse = load * force - step.known - unexplained;
         let resistance = |powers: &[f64; COEFFICIENTS]| -> f64 {
             (0..COEFFICIENTS).map(|i| powers[i] * state[RESISTANCE + i]).sum()
         };
@@ -141,7 +143,7 @@ impl MotionFilter {
         }
         gradient[WIND] = -seconds * (step.by_wind + 2.0 * step.by_wind_square * state[WIND]);
         gradient[TRACTION_SCALE] = per_inertia * load * traction;
-        gradient[BRAKE_SCALE] = -per_inertia * load * brake;
+        gradient[BRAKE_ERROR] = -per_inertia * step.brake_std;
         gradient[FORCE_DELAY] = -per_inertia * load * change;
 
         let jump = step.jump_share * jump_variance(load * change, step.duration_s);
@@ -159,9 +161,8 @@ impl MotionFilter {
         }
         let (keep, renewed) = step.wind;
         self.belief.fade(WIND, keep, renewed);
-        let (walked, most) = step.brake_variance;
-        let now = self.belief.covariance[(BRAKE_SCALE, BRAKE_SCALE)];
-        self.belief.disturb(BRAKE_SCALE, walked.min((most - now).max(0.0)));
+        let (keep, renewed) = step.brake_error;
+        self.belief.fade(BRAKE_ERROR, keep, renewed);
     }
 
     /// Variance in (m/s)² of the speed while a force changes that acts by d later than the step has it: its
@@ -244,7 +245,7 @@ mod tests {
             brake: 3.0,
             known: 0.9,
             traction_change: 4.0,
-            brake_change: -1.5,
+            brake_std: 0.7,
             impulse_variance: 0.0,
             jump_share: 0.0,
             force_rate: 0.0,
@@ -253,7 +254,7 @@ mod tests {
             by_wind: 0.07,
             by_wind_square: 0.002,
             wind: (1.0, 0.0),
-            brake_variance: (0.0, 0.0),
+            brake_error: (1.0, 0.0),
         }
     }
 

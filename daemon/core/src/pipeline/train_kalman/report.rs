@@ -46,6 +46,8 @@ pub struct Report {
     disturbance: (f64, f64),
     resistance: Level,
     mass: Level,
+    /// True once the mass was known.
+    was_mass_known: bool,
 }
 
 /// Standard deviation of w0 at the speeds driven, as a share of it: known below the first, unknown
@@ -66,6 +68,7 @@ impl Report {
             disturbance: published.disturbance,
             resistance: RESISTANCE_LEVEL,
             mass: MASS_LEVEL,
+            was_mass_known: false,
         }
     }
 
@@ -83,7 +86,17 @@ impl Report {
         systematic.widen(&self.mean, &mut self.covariance);
         self.disturbance = published.disturbance;
         self.resistance.see(self.resistance_std_share(speeds));
-        self.mass.see(self.covariance[(LOAD, LOAD)].max(0.0).sqrt() / self.mean[LOAD]);
+        self.mass.see(self.mass_std_share());
+        self.was_mass_known |= self.mass.is_known;
+    }
+
+    fn mass_std_share(&self) -> f64 {
+        self.covariance[(LOAD, LOAD)].max(0.0).sqrt() / self.mean[LOAD]
+    }
+
+    /// True from where a load that was known may have become another one until it is known again.
+    pub fn is_load_open(&self) -> bool {
+        self.was_mass_known && self.mass_std_share() > self.mass.enter_below
     }
 
     /// The greatest standard deviation of w0 as a share of it, at the middle and near the top of the

@@ -15,6 +15,9 @@ const FORCE_RATE_MEMORY_S: f64 = 0.5;
 /// gradient jump to and fro, the more often the more samples there are.
 const KNOWN_RATE_MEMORY_S: f64 = 1.0;
 
+/// Time in s over which what a brake exerts beside its report becomes something else.
+const BRAKE_ERROR_TIME_S: f64 = 3.0;
+
 /// What is remembered of samples to make steps of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steps {
@@ -25,18 +28,39 @@ pub struct Steps {
     force_rate: f64,
     /// Change of what is known to retard in N/kN per s.
     known_rate: f64,
+    /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
+    followed: f64,
+    seen_ns: Option<i64>,
 }
 
 impl Steps {
     /// Before the first sample of a train of a length in m.
     pub fn new(settings: &TrainKalmanSettings, train_length_m: f64) -> Self {
         let acting = ActingForces::default();
-        Steps { settings: *settings, train_length_m, acting, force_rate: 0.0, known_rate: 0.0 }
+        Steps {
+            settings: *settings,
+            train_length_m,
+            acting,
+            force_rate: 0.0,
+            known_rate: 0.0,
+            followed: 0.0,
+            seen_ns: None,
+        }
     }
 
     /// Takes in what is reported, also at a standstill.
     pub fn see(&mut self, now: &UnitSample) {
         self.acting.see((now.time_ns, now.segment), [now.traction, now.brake]);
+        let seen_ns = self.seen_ns.replace(now.time_ns).unwrap_or(i64::MIN);
+        let since_s = (now.time_ns.saturating_sub(seen_ns) as f64 * 1e-9).max(0.0);
+        let left = (-since_s / self.settings.brake_lag_s).exp();
+        self.followed = now.brake + left * (self.followed - now.brake);
+    }
+
+    /// Standard deviation in N/kN of a brake force that is reported, if it is that late and that strong.
+    fn brake_std(&self, brake: f64) -> f64 {
+        let late = (brake - self.followed).abs();
+        late.max(self.settings.brake_scale_std * brake)
     }
 
     /// A motion begins.
@@ -60,7 +84,7 @@ impl Steps {
         let settings = &self.settings;
         let duration_s = to.seconds_since(from);
         let faded = self.force_rate * (-duration_s / FORCE_RATE_MEMORY_S).exp();
-        let change = (to.traction - to.brake) - (from.traction - from.brake);
+        let change = to.traction - from.traction;
         self.force_rate = faded.max((change / duration_s).abs());
         let share = (duration_s / KNOWN_RATE_MEMORY_S).min(1.0);
         self.known_rate += share * ((to.known - from.known) / duration_s - self.known_rate);
@@ -68,7 +92,7 @@ impl Steps {
         let speed_mps = to.speed_mps.max(settings.speed_min_mps);
         let steps = (self.train_length_m / (speed_mps * duration_s)).max(1.0);
         let place_s = settings.position_std_m / speed_mps;
-        let walk = settings.brake_scale_per_sqrt_min.powi(2) * duration_s / 60.0;
+        let brake_kept = (-duration_s / BRAKE_ERROR_TIME_S).exp();
         let by_place = steps * (place_s * self.known_rate * duration_s).powi(2);
         // Over a time in which the speed's noise averages out gusts follow each other like noise.
         let by_wind = air.by_wind(to.speed_mps);
@@ -85,7 +109,7 @@ impl Steps {
             brake: acting.impulses[1],
             known: half_s * (from.known + to.known),
             traction_change: acting.changes[0],
-            brake_change: acting.changes[1],
+            brake_std: duration_s * self.brake_std(to.brake),
             jump_share,
             impulse_variance: by_place + by_gusts,
             force_rate: self.force_rate,
@@ -94,7 +118,7 @@ impl Steps {
             by_wind: sample.direction * by_wind,
             by_wind_square: air.by_wind_square(),
             wind: wind_over(duration_s, settings.wind_std_mps),
-            brake_variance: (walk, settings.brake_scale_std.powi(2)),
+            brake_error: (brake_kept, 1.0 - brake_kept * brake_kept),
         }
     }
 }

@@ -21,6 +21,7 @@ fn train() -> Arc<TrainModel> {
         mass_kg: 1e5,
         length_m: 120.0,
         cars: 6,
+        full_mass_kg: None,
         passenger_mass_kg: 70.0,
         rotating_mass_factor: 0.06,
         resistance: Davis { a: 1.2 * METRO.a, b: 0.8 * METRO.b, c: 1.2 * METRO.c },

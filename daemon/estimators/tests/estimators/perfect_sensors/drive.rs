@@ -95,6 +95,7 @@ pub fn train() -> Arc<TrainModel> {
         mass_kg: MASS_KG,
         length_m: 1.0,
         cars: 6,
+        full_mass_kg: None,
         passenger_mass_kg: 70.0,
         rotating_mass_factor: ROTATING,
         resistance: DAVIS,

@@ -46,7 +46,7 @@ impl TrainKalman {
     }
 
     pub(super) fn mass_source(&self) -> MassSource {
-        if self.report.load_variance() < 0.5 * self.load.prior_variance() {
+        if self.report.load_variance() < 0.5 * self.load.prior().1 {
             MassSource::Learned
         } else if self.load.is_weighed {
             MassSource::Weighed
@@ -60,7 +60,17 @@ impl TrainKalman {
         self.health.input_doubt().or(self.gate.input_doubt())
     }
 
-    pub(super) fn case(&self) -> Case {
+    /// Status and reason: a mass that only waits for the motion after a stop is called so.
+    pub(super) fn verdict(&self) -> (Status, Reason) {
+        let (status, reason) = self.case().verdict();
+        let is_waiting = reason == Reason::WeakExcitation
+            && self.contradiction().is_none()
+            && self.report.is_load_open()
+            && self.known_now() & Quantity::Resistance.bit() != 0;
+        (status, if is_waiting { Reason::LoadMayHaveChanged } else { reason })
+    }
+
+    fn case(&self) -> Case {
         let failure = (Status::Invalid, Reason::NumericalFailure);
         Case {
             fault: self.is_fresh_reset.then_some(failure),
@@ -69,7 +79,11 @@ impl TrainKalman {
             is_known: self.known_now() == COMPLETE,
             lacking: Status::Unestimated,
             contradiction: self.contradiction(),
-            caveat: Reason::None,
+            caveat: if self.report.is_load_open() {
+                Reason::LoadMayHaveChanged
+            } else {
+                Reason::None
+            },
         }
     }
 }

@@ -1,0 +1,114 @@
+//! Brakes as trains have them: electric above a speed, friction below, which follows its report late and
+//! exerts more or less than it says.
+
+use std::ops::Range;
+
+/// What the controller writes of the brake.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reported {
+    /// The force that electric and friction brake are told to exert.
+    Force,
+    /// What the driver demands, before any limit of jerk.
+    Demand,
+    /// The force as told, and the pressure that is in the cylinders.
+    Pressure,
+    /// The electric force alone.
+    ElectricForce,
+}
+
+/// A brake.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Brake {
+    /// Time constant in s with which friction follows what it is told.
+    pub lag_s: f64,
+    /// Friction force over what is told.
+    pub strength: f64,
+    /// Speeds in m/s between which friction takes over; infinite where it brakes alone.
+    pub hand_over_mps: (f64, f64),
+    /// What is written of it.
+    pub reported: Reported,
+    /// Greatest change of acceleration in m/s³.
+    pub jerk_mps3: f64,
+}
+
+impl Brake {
+    /// Friction never acts: the force is what is told, but for the mistakes of every train.
+    pub const AS_TOLD: Brake = Brake {
+        lag_s: 0.0,
+        strength: 1.0,
+        hand_over_mps: (0.0, 0.0),
+        reported: Reported::Force,
+        jerk_mps3: 0.6,
+    };
+
+    /// Electric down to 3 m/s, friction from 1 m/s on.
+    const BLENDED: Brake = Brake { hand_over_mps: (1.0, 3.0), jerk_mps3: 1.4, ..Brake::AS_TOLD };
+    const ALONE: (f64, f64) = (f64::INFINITY, f64::INFINITY);
+
+    /// Rows of brakes with their names.
+    pub fn rows() -> [(&'static str, Brake); 15] {
+        let blended = |lag_s, strength| Brake { lag_s, strength, ..Brake::BLENDED };
+        let alone =
+            |lag_s, strength| Brake { hand_over_mps: Brake::ALONE, ..blended(lag_s, strength) };
+        let told = |reported, brake: Brake| Brake { reported, ..brake };
+        [
+            ("blended, lag 0.1 s", blended(0.1, 1.0)),
+            ("blended, lag 0.25 s", blended(0.25, 1.0)),
+            ("blended, lag 0.5 s", blended(0.5, 1.0)),
+            ("blended, lag 1.5 s", blended(1.5, 1.0)),
+            ("blended, weak", blended(0.06, 0.88)),
+            ("blended, late and weak", blended(0.25, 0.88)),
+            ("friction, lag 0.25 s", alone(0.25, 1.0)),
+            ("friction, lag 1.5 s", alone(1.5, 1.0)),
+            ("friction, weak", alone(0.1, 0.88)),
+            ("friction, strong", alone(0.1, 1.1)),
+            ("friction, late and weak", alone(0.5, 0.88)),
+            ("as demand", told(Reported::Demand, blended(0.25, 1.0))),
+            ("with pressure", told(Reported::Pressure, alone(0.5, 0.88))),
+            ("electric force alone", told(Reported::ElectricForce, blended(0.25, 1.0))),
+            ("jerk 0.4 m/s³", Brake { jerk_mps3: 0.4, ..blended(0.25, 1.0) }),
+        ]
+    }
+
+    fn friction_share(&self, speed_mps: f64) -> f64 {
+        let Range { start, end } = self.hand_over_mps.0..self.hand_over_mps.1;
+        if start.is_infinite() {
+            1.0
+        } else if end > start {
+            ((end - speed_mps) / (end - start)).clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Pressure in Pa of a cylinder for each m/s² of deceleration.
+const PRESSURE_PA_PER_MPS2: f64 = 3e5;
+
+/// What of a brake acts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Friction {
+    /// Deceleration in m/s² by the pressure in the cylinders.
+    by_pressure_mps2: f64,
+}
+
+impl Friction {
+    /// Acceleration in m/s² of what is told, after a step in s at a speed in m/s.
+    pub fn acts_mps2(&mut self, brake: &Brake, told_mps2: f64, speed_mps: f64, step_s: f64) -> f64 {
+        let braked_mps2 = (-told_mps2).max(0.0);
+        let share = brake.friction_share(speed_mps);
+        let follows = if brake.lag_s > 0.0 { (step_s / brake.lag_s).min(1.0) } else { 1.0 };
+        self.by_pressure_mps2 += follows * (share * braked_mps2 - self.by_pressure_mps2);
+        told_mps2.max(0.0) - (1.0 - share) * braked_mps2 - brake.strength * self.by_pressure_mps2
+    }
+
+    /// Pressure in the cylinders in Pa.
+    pub fn pressure_pa(&self) -> f64 {
+        PRESSURE_PA_PER_MPS2 * self.by_pressure_mps2
+    }
+
+    /// Share of the force that is electric at a speed in m/s.
+    pub fn electric_share(brake: &Brake, speed_mps: f64) -> f64 {
+        1.0 - brake.friction_share(speed_mps)
+    }
+}
