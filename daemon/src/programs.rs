@@ -3,11 +3,12 @@
 //! A failure for machines: for whoever asked for a result as JSON, and for a program of ours that called another.
 
 use std::ffi::{OsStr, OsString};
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
 use serde::{Deserialize, Serialize};
 
 /// The program of what is done away from the controller.
@@ -42,6 +43,20 @@ pub fn call(package: &str) -> Command {
     command
 }
 
+/// Lets a program end when the thread that starts it does, whatever ends that: nothing goes on that nobody
+/// waits for.
+pub fn ends_with_this(command: &mut Command) -> &mut Command {
+    let parent = getpid();
+    // SAFETY: between fork and exec only system calls are made.
+    unsafe {
+        command.pre_exec(move || {
+            set_parent_process_death_signal(Some(Signal::TERM))?;
+            // It may have ended before.
+            if getppid() == Some(parent) { Ok(()) } else { Err(ErrorKind::BrokenPipe.into()) }
+        })
+    }
+}
+
 /// What the user called: `dynocar` where that called the program, else the program itself.
 pub fn called_as(package: &'static str) -> &'static str {
     let name = std::env::args_os().next().unwrap_or_default();
@@ -73,7 +88,7 @@ impl CallFailure {
 ///
 /// In words when it does not start or does not end with 0.
 pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, String), CallFailure> {
-    let output = command.args(["--json", "-"]).output();
+    let output = ends_with_this(command).args(["--json", "-"]).output();
     let output = output.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
     finished(package, output)
 }
@@ -94,7 +109,7 @@ pub fn taken_of<T>(
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
-    let program = command.spawn();
+    let program = ends_with_this(command).spawn();
     let mut program = program.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
     let stdout = program.stdout.take();
     // Beside what it writes for us it may write on standard error as much as it likes.

@@ -19,7 +19,7 @@ use dynocar_shared::{Quantity, TrainId};
 use tracing::{info, warn};
 
 use super::runtime::system::{
-    STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, set_fifo_priority,
+    STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, raise_open_files, set_fifo_priority,
 };
 use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
 use crate::ending::{self, EndingError};
@@ -72,8 +72,9 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let config = &config;
     let host = Host::of(config.process.root.as_deref())?;
     let stop = ending::flag()?;
+    raise_open_files();
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
-    let _roles = trains
+    let roles = trains
         .iter()
         .map(|&train| RoleLock::claim(&host, train, Role::Daemon))
         .collect::<Result<Vec<_>, _>>()?;
@@ -110,10 +111,12 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let watchdog = Watchdog::new(&supervisor, alive);
     supervisor.notify("READY=1");
     let trains = trains.into_iter().zip(counts).collect();
-    let mut watch = Watch::new(host, trains, watched);
+    let mut watch = Watch::new(host.clone(), trains, watched);
+    let mut lost_root = None;
     watch.until_stopped(&stop, || {
         watchdog.round(Instant::now());
-        workers.iter().any(JoinHandle::is_finished)
+        lost_root = roles.iter().find_map(|role| role.require_there(&host).err());
+        lost_root.is_some() || workers.iter().any(JoinHandle::is_finished)
     });
     supervisor.notify("STOPPING=1");
 
@@ -127,6 +130,9 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         let _ = helper.join();
     }
     watch.report_totals();
+    if let Some(error) = lost_root {
+        return Err(error.into());
+    }
     match ended {
         Some(name) if !was_asked => Err(RunError::ThreadEnded(name)),
         _ => Ok(()),

@@ -19,6 +19,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use super::users::Users;
 use super::wire::{Payload, Wire};
 use crate::error::ChannelError;
+use crate::process::Owned;
 
 /// How long a service that is being made or destroyed by another process is waited for.
 const SETTLING_TIME: Duration = Duration::from_millis(800);
@@ -43,6 +44,7 @@ impl Entrance {
         let name = ServiceName::new(&text).map_err(|error| refused(format!("{error:?}")))?;
         let start = Instant::now();
         loop {
+            let making = self.users.begin_making()?;
             let result = self
                 .node
                 .get()
@@ -56,6 +58,7 @@ impl Entrance {
                 .max_subscribers(T::RECEIVERS_MAX)
                 .max_nodes(T::SENDERS_MAX + T::RECEIVERS_MAX)
                 .open_or_create();
+            drop(making);
             match result {
                 Ok(service) => return Ok(service),
                 Err(error) if is_settling(&error) && start.elapsed() < SETTLING_TIME => {
@@ -123,7 +126,7 @@ fn explain(error: &PublishSubscribeOpenOrCreateError) -> String {
 
 /// Something of the transport's that is dropped by code of this crate.
 #[derive(Debug)]
-pub(super) struct Held<P>(Box<dyn Hold<P>>);
+pub(super) struct Held<P>(Owned<Box<dyn Hold<P>>>);
 
 trait Hold<P>: Debug {
     fn held(&self) -> &P;
@@ -140,7 +143,7 @@ impl<P: Debug> Hold<P> for Holder<P> {
 
 impl<P: Debug + 'static> Held<P> {
     pub(super) fn new(held: P) -> Self {
-        Held(Box::new(Holder(held)))
+        Held(Owned::new(Box::new(Holder(held))))
     }
 
     pub(super) fn get(&self) -> &P {

@@ -1,7 +1,7 @@
 //! What a thread asks of the system: memory that stays, a core of its own, a place in the queue.
 
 use rustix::mm::{MlockAllFlags, mlockall};
-use rustix::process::{Resource, getrlimit};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use rustix::thread::{CapabilitySet, CpuSet, capabilities, sched_setaffinity};
 
 /// Stack of a pipeline thread in bytes: opening the transport's ports takes more than half a MiB
@@ -100,6 +100,13 @@ pub fn stand_back() {
     const NICENESS: libc::c_int = 10;
     // SAFETY: no memory is involved; 0 names the calling thread. Who is nice needs no privilege.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICENESS) };
+}
+
+/// Lets this process open as many files as its hard limit allows; each connection of a reader takes some.
+pub fn raise_open_files() {
+    let limit = getrlimit(Resource::Nofile);
+    // What is refused is named once the limit is reached.
+    let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
 }
 
 #[cfg(test)]
