@@ -123,6 +123,17 @@ pub enum ChannelError {
         /// The transport's reason.
         reason: String,
     },
+    /// A program that is none of Dynocar's made a channel first, with settings of its own.
+    #[error(
+        "service {service}: made with other settings by a program that is none of Dynocar's, used by {users}; \
+         end that, and start it again after the daemon: who only opens a service takes its settings"
+    )]
+    Stranger {
+        /// The service.
+        service: String,
+        /// Who uses it.
+        users: String,
+    },
     /// Every place of a train's channel is taken.
     #[error(
         "{channel} of train {train}: all {limit} places are taken. Each reader and each publisher \

@@ -89,9 +89,9 @@ impl From<&ChannelError> for Code {
             ChannelError::Occupied { .. } => Code::Occupied,
             ChannelError::SeparateMemory { .. } => Code::SeparateMemory,
             ChannelError::IncompatiblePeer { .. } => Code::IncompatibleDaemon,
-            ChannelError::Transport { .. } | ChannelError::SharedMemoryFull { .. } => {
-                Code::Transport
-            }
+            ChannelError::Transport { .. }
+            | ChannelError::Stranger { .. }
+            | ChannelError::SharedMemoryFull { .. } => Code::Transport,
             ChannelError::NoPlaceLeft { .. } => Code::NoPlaceLeft,
             ChannelError::Send(_) => Code::SendRefused,
         }

@@ -10,11 +10,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use dynocar::output::report_line;
 use dynocar::storage::{SharedStorage, Storage, settle};
 
+use super::ages::{Aged, Ages};
 use super::keeping::{KeepError, Keeper};
 use crate::event::Event;
 
@@ -68,6 +69,7 @@ struct Housekeeping {
     output: PathBuf,
     rotation: Rotation,
     keeper: Option<Keeper>,
+    ages: Ages,
     progress: Arc<Progress>,
     /// The file whose name is on the disk.
     named: PathBuf,
@@ -90,10 +92,14 @@ impl Housekeeping {
                 }
                 self.progress.is_settling.store(false, Ordering::Release);
             }
-            Task::Begun { file } => self.keep(|keeper, _| keeper.begun(&file)),
+            Task::Begun { file } => {
+                self.ages.note_ended(&self.output, &file);
+                self.keep(|keeper, _| keeper.begun(&file));
+            }
             Task::Keep { event } => self.keep(|keeper, files| keeper.keep(&event, files)),
             Task::RemoveOldest { written } => {
-                remove_oldest(&*self.storage, &self.output, &written, self.rotation);
+                let files = self.ages.of_files(&self.output);
+                remove_oldest(&*self.storage, &files, &written, self.rotation);
             }
         }
     }
@@ -108,9 +114,9 @@ impl Housekeeping {
     }
 
     /// A problem of keeping is reported, and stops nothing.
-    fn keep(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), KeepError>) {
+    fn keep(&mut self, work: impl FnOnce(&mut Keeper, &[Aged]) -> Result<(), KeepError>) {
         let Some(keeper) = &mut self.keeper else { return };
-        let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
+        let files = self.ages.of_files(&self.output);
         if let Err(problem) = work(keeper, &files) {
             report_line(&problem.to_string());
         }
@@ -145,6 +151,7 @@ impl Housekeeper {
             output: output.into(),
             rotation,
             keeper,
+            ages: Ages::of_what_is_there(output),
             progress: Arc::clone(&progress),
             named: PathBuf::new(),
             is_failure_reported: false,
@@ -248,19 +255,14 @@ pub fn next(output: &Path) -> PathBuf {
 
 /// Removes the files that are too old, and the oldest until the rest takes no more than it may; never the
 /// one that is written.
-pub fn remove_oldest(storage: &dyn Storage, output: &Path, written: &Path, rotation: Rotation) {
+pub fn remove_oldest(storage: &dyn Storage, files: &[Aged], written: &Path, rotation: Rotation) {
     let most = rotation.keep_bytes.unwrap_or(u64::MAX);
-    let oldest = rotation.keep_age.and_then(|age| SystemTime::now().checked_sub(age));
-    let found = |(_, path): (u64, PathBuf)| {
-        let known = std::fs::metadata(&path).ok()?;
-        Some((known.modified().ok()?, known.len(), path))
-    };
-    let files: Vec<_> = numbered(output).into_iter().filter_map(found).collect();
-    let mut total: u64 = files.iter().map(|it| it.1).sum();
-    for (modified, length, path) in files.iter().filter(|it| it.2 != written) {
-        let is_too_old = oldest.is_some_and(|oldest| *modified < oldest);
+    let length_of = |path: &Path| std::fs::metadata(path).map_or(0, |it| it.len());
+    let mut total: u64 = files.iter().map(|it| length_of(&it.path)).sum();
+    for Aged { path, age } in files.iter().filter(|it| it.path != written) {
+        let is_too_old = rotation.keep_age.is_some_and(|most| *age > most);
         if total > most || is_too_old {
-            total -= length;
+            total -= length_of(path);
             // One that cannot be removed is reported when the disk is full.
             let _ = storage.remove(path);
         }

@@ -1,6 +1,7 @@
 //! The recorder: what is read of the trains' channels goes into files, which can be read up to the
 //! last flush, whatever ends it.
 
+mod ages;
 mod configuration;
 mod files;
 mod housekeeping;
