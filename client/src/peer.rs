@@ -10,7 +10,7 @@ use std::io::{Read, Seek, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use dynocar_shared::TrainId;
+use dynocar_shared::{ParameterSnapshot, TrainId};
 
 use crate::announcement::{Announcement, Role};
 use crate::error::ChannelError;
@@ -121,7 +121,13 @@ impl RoleLock {
                 }
             }
         }
-        let text = Announcement::of_this_process(role).to_text();
+        // Prefix and size are for those who read from outside, by the transport alone.
+        let text = Announcement::of_this_process(role).to_text()
+            + &format!(
+                "segments={}\nsnapshot_bytes={}\n",
+                host.segment_prefix(),
+                size_of::<ParameterSnapshot>()
+            );
         file.set_len(0)
             .and_then(|()| file.write_all(text.as_bytes()))
             .map_err(unusable(&path, "writing"))?;

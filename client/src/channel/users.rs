@@ -12,6 +12,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use iceoryx2::node::NodeState;
+use iceoryx2::prelude::{CallbackProgression, Node, ipc};
 use rustix::fs::FallocateFlags;
 
 use crate::error::ChannelError;
@@ -36,7 +38,7 @@ const PAUSE: Duration = Duration::from_millis(4);
 pub struct Users {
     lock: LockedFile,
     making: PathBuf,
-    transport: PathBuf,
+    host: Host,
     segment_prefix: String,
 }
 
@@ -50,10 +52,10 @@ impl Users {
         let users = Users {
             lock: LockedFile::new(host.open_root()?),
             making: host.root().join("services.lock"),
-            transport: host.transport_directory(),
+            host: host.clone(),
             segment_prefix: host.segment_prefix(),
         };
-        if users.lock.try_lock().is_ok() {
+        if users.lock.try_lock().is_ok() && !users.has_strangers() {
             users.remove_all();
         }
         // An exclusive lock becomes a shared one; another newcomer may come between, and finds nothing.
@@ -84,14 +86,29 @@ impl Users {
             // Somebody else's rubbish may stay.
             let _ = std::fs::remove_file(segment);
         }
-        let _ = std::fs::remove_dir_all(&self.transport);
+        let _ = std::fs::remove_dir_all(self.host.transport_directory());
+    }
+
+    /// True where a program lives that uses the transport without our lock: none of Dynocar's.
+    fn has_strangers(&self) -> bool {
+        let mut has_any = false;
+        if self.host.transport_directory().exists()
+            && let Ok(config) = self.host.transport_config()
+        {
+            // What cannot be listed is nobody's.
+            let _ = Node::<ipc::Service>::list(&config, |node| {
+                has_any |= matches!(node, NodeState::Alive(_));
+                CallbackProgression::Continue
+            });
+        }
+        has_any
     }
 
     /// Removes the descriptions of services whose maker, or remover, was killed. Nobody else makes one
     /// meanwhile, and who is removing one has done so in a moment.
     fn remove_half_made(&self) {
         let half_made = || {
-            let mut services = files_of(&self.transport.join("services"));
+            let mut services = files_of(&self.host.transport_directory().join("services"));
             let segments = self.segments(".dynamic");
             services.retain(|it| !is_complete(it, &segments));
             services
@@ -210,7 +227,7 @@ pub fn full(free: u64, needed: u64) -> ChannelError {
 
 impl Drop for Users {
     fn drop(&mut self) {
-        if self.lock.own().is_some_and(|lock| lock.try_lock().is_ok()) {
+        if self.lock.own().is_some_and(|lock| lock.try_lock().is_ok()) && !self.has_strangers() {
             self.remove_all();
             for segment in self.segments(COUNT_SUFFIX) {
                 let _ = std::fs::remove_file(segment);
