@@ -5,7 +5,7 @@
 //! spellings of one directory meet, two directories never do, and the sockets' names are short however
 //! long the root's is.
 
-use std::fs::{DirBuilder, File, Metadata, OpenOptions, Permissions};
+use std::fs::{DirBuilder, File, OpenOptions, Permissions};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
@@ -15,11 +15,10 @@ use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 
 use crate::error::ChannelError;
+use crate::identity::{Identity, SHARED_MEMORY, identity_of};
 
 /// Longest root directory in bytes: the system's limit of a path, less the names of files in it.
 const ROOT_BYTES_MAX: usize = 4000;
-/// Where the system keeps shared memory by name.
-pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
 /// Connections to dead senders whose last messages are still kept. A receiver looks through a
 /// place for each of them whenever it is polled: the transport's default of 128 took more than
@@ -35,19 +34,6 @@ const TRAINS: &str = "trains";
 pub struct Host {
     root: PathBuf,
     identity: Identity,
-}
-
-/// A directory, whatever it is called: its device and its inode.
-pub(crate) type Identity = [u64; 2];
-
-/// The identity of the directory at a path.
-pub(crate) fn identity_of(path: &Path) -> std::io::Result<Identity> {
-    std::fs::metadata(path).map(|it| identity(&it))
-}
-
-/// The identity of the file or directory of these attributes.
-pub(crate) fn identity(attributes: &Metadata) -> Identity {
-    [attributes.dev(), attributes.ino()]
 }
 
 impl Host {

@@ -33,7 +33,6 @@
 //!
 //! - [`host`]: where the run-time files of this host lie
 //! - [`peer`]: who serves and who drives a train, and whether we understand each other
-//! - [`process`]: whose ends these are, where a process forks
 //! - [`channel`]: the shared-memory ports, also used by the daemon
 //! - [`publisher`], [`reader`]: the two ends a controller holds
 //! - [`clock`]: the host's monotonic clock
@@ -45,8 +44,8 @@ pub mod clock;
 pub mod error;
 pub mod ffi;
 pub mod host;
+mod identity;
 pub mod peer;
-pub mod process;
 pub mod publisher;
 pub mod reader;
 

@@ -13,9 +13,10 @@ use std::time::Duration;
 use dynocar_shared::{ParameterSnapshot, TrainId};
 
 use crate::announcement::{Announcement, Role};
+use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
-use crate::host::{Host, identity, identity_of, open_private, unusable};
-use crate::process::LockedFile;
+use crate::host::{Host, open_private, unusable};
+use crate::identity::{identity, identity_of};
 
 /// What is known of the other side.
 #[derive(Clone, Debug, PartialEq, Eq)]

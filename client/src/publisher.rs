@@ -5,12 +5,12 @@ use std::time::{Duration, Instant};
 use dynocar_shared::{TrainId, TrainSample};
 
 use crate::announcement::Role;
+use crate::channel::process::Owner;
 use crate::channel::{SampleCount, Sender, Transport, Waker};
 use crate::clock::monotonic_now_ns;
 use crate::error::{ChannelError, SendRefused};
 use crate::host::Host;
 use crate::peer::{Peer, RoleLock};
-use crate::process::Owner;
 
 /// How long a publisher that is closed waits for the pipelines to take what is on its way.
 pub const CLOSE_PATIENCE: Duration = Duration::from_millis(200);

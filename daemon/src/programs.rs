@@ -3,13 +3,14 @@
 //! A failure for machines: for whoever asked for a result as JSON, and for a program of ours that called another.
 
 use std::ffi::{OsStr, OsString};
-use std::io::{self, BufRead, BufReader, ErrorKind, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
 use serde::{Deserialize, Serialize};
+
+use crate::runtime::system::ends_with_this;
 
 /// The program of what is done away from the controller.
 pub const WORKSHOP: &str = "dynocar-workshop";
@@ -41,20 +42,6 @@ pub fn call(package: &str) -> Command {
     let mut command = Command::new(beside_this(package).unwrap_or_else(|| package.into()));
     command.arg0(USUAL);
     command
-}
-
-/// Lets a program end when the thread that starts it does, whatever ends that: nothing goes on that nobody
-/// waits for.
-pub fn ends_with_this(command: &mut Command) -> &mut Command {
-    let parent = getpid();
-    // SAFETY: between fork and exec only system calls are made.
-    unsafe {
-        command.pre_exec(move || {
-            set_parent_process_death_signal(Some(Signal::TERM))?;
-            // It may have ended before.
-            if getppid() == Some(parent) { Ok(()) } else { Err(ErrorKind::BrokenPipe.into()) }
-        })
-    }
 }
 
 /// What the user called: `dynocar` where that called the program, else the program itself.

@@ -72,7 +72,6 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let config = &config;
     let host = Host::of(config.process.root.as_deref())?;
     let stop = ending::flag()?;
-    raise_open_files();
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
     let roles = trains
         .iter()
@@ -82,6 +81,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .iter()
         .map(|&train| SampleCount::open(&host, train).map(Arc::new))
         .collect::<Result<Vec<_>, _>>()?;
+    raise_open_files();
     // Grows with every start: the monotonic clock is common to all processes of the host.
     let epoch = monotonic_now_ns() as u64;
     if config.process.lock_memory {
@@ -130,11 +130,9 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         let _ = helper.join();
     }
     watch.report_totals();
-    if let Some(error) = lost_root {
-        return Err(error.into());
-    }
-    match ended {
-        Some(name) if !was_asked => Err(RunError::ThreadEnded(name)),
+    match (lost_root, ended) {
+        (Some(error), _) => Err(error.into()),
+        (None, Some(name)) if !was_asked => Err(RunError::ThreadEnded(name)),
         _ => Ok(()),
     }
 }

@@ -13,8 +13,8 @@ use iceoryx2::prelude::{BackpressureStrategy, ipc};
 use super::service::{Entrance, no_place_left};
 use super::users::Users;
 use super::wire::{Payload, Wire};
+use crate::channel::process::Owned;
 use crate::error::{ChannelError, SendRefused};
-use crate::process::Owned;
 
 /// What a sender asks of its port.
 trait Send<T>: Debug {

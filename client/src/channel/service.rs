@@ -19,8 +19,8 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::users::Users;
 use super::wire::{Payload, Wire};
+use crate::channel::process::Owned;
 use crate::error::ChannelError;
-use crate::process::Owned;
 
 /// How long a service that is being made or destroyed by another process is waited for.
 const SETTLING_TIME: Duration = Duration::from_millis(800);

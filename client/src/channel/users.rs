@@ -16,9 +16,10 @@ use iceoryx2::node::NodeState;
 use iceoryx2::prelude::{CallbackProgression, Node, ipc};
 use rustix::fs::FallocateFlags;
 
+use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
-use crate::host::{Host, SHARED_MEMORY, open_private, unusable};
-use crate::process::LockedFile;
+use crate::host::{Host, open_private, unusable};
+use crate::identity::SHARED_MEMORY;
 
 /// How the segment's name ends.
 const SUFFIX: &str = ".global_mgmt";

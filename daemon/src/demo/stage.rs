@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use crate::programs::ends_with_this;
+use crate::runtime::system::ends_with_this;
 use dynocar_client::{ChannelError, Host};
 use dynocar_shared::services::ROOT_VARIABLE;
 use rustix::process::{Pid, Signal, kill_process};

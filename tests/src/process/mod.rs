@@ -10,7 +10,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use dynocar::programs::ends_with_this;
+use dynocar::runtime::system::ends_with_this;
 use rustix::process::{Pid, Signal, kill_process};
 
 pub use site::Site;

@@ -3,7 +3,7 @@
 //! A disk may take seconds for each of these. They are done in the order in which they were asked for, in a
 //! thread of their own while a recorder runs, so that nobody who records waits for them.
 //!
-//! The files of a recording that rotates: their names, and which of them go.
+//! Which files of a recording that rotates go.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,8 +15,8 @@ use std::time::Duration;
 use dynocar::output::report_line;
 use dynocar::storage::{SharedStorage, Storage, settle};
 
-use super::ages::{Aged, Ages};
 use super::keeping::{KeepError, Keeper};
+use super::ring::{Aged, Ages};
 use crate::event::Event;
 
 /// What is to be done.
@@ -226,31 +226,6 @@ impl Rotation {
     pub fn is_on(self) -> bool {
         self.bytes.is_some() || self.age.is_some()
     }
-}
-
-/// The files of a rotating recording with their numbers, the oldest first.
-pub fn numbered(output: &Path) -> Vec<(u64, PathBuf)> {
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned() + "-";
-    let number_of = |path: &Path| {
-        let name = path.file_name()?.to_str()?.strip_prefix(&stem)?.strip_suffix(".mcap")?;
-        (name.len() == DIGITS).then(|| name.parse().ok())?
-    };
-    let folder = dynocar::storage::folder_of(output);
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<(u64, PathBuf)> =
-        entries.filter_map(|it| Some((number_of(&it.path())?, it.path()))).collect();
-    files.sort();
-    files
-}
-
-/// Digits of a file's number.
-const DIGITS: usize = 6;
-
-/// The name of the next file: `run-000007.mcap` for `run.mcap`.
-pub fn next(output: &Path) -> PathBuf {
-    let number = numbered(output).last().map_or(1, |newest| newest.0 + 1);
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    output.with_file_name(format!("{stem}-{number:0DIGITS$}.mcap"))
 }
 
 /// Removes the files that are too old, and the oldest until the rest takes no more than it may; never the

@@ -14,8 +14,8 @@ use dynocar::output::{report_line, write_file};
 use dynocar::storage::{SharedStorage, StorageError};
 use dynocar_shared::Status;
 
-use super::ages::Aged;
 use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes, unix_s};
+use super::ring::Aged;
 use crate::event::{Event, EventKind};
 
 /// Beside the ring: what is kept.

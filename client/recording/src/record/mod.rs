@@ -1,12 +1,12 @@
 //! The recorder: what is read of the trains' channels goes into files, which can be read up to the
 //! last flush, whatever ends it.
 
-mod ages;
 mod configuration;
 mod files;
 mod housekeeping;
 mod keeping;
 mod kept_event;
+mod ring;
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! How long ago the files of a ring ended, whatever happens to the clock on the wall.
+//! The files of a recording that rotates: their names, and how long ago they ended, whatever happens to the clock on the wall.
 //!
 //! A file that this recorder ended has the age that the monotonic clock gives it. Of those that were there
 //! before only their dates are known; they grow older by the monotonic clock from then on.
@@ -6,8 +6,6 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
-
-use super::housekeeping::numbered;
 
 /// A file of the ring.
 #[derive(Clone, Debug)]
@@ -77,4 +75,29 @@ impl Ages {
         files.reverse();
         files
     }
+}
+
+/// The files of a rotating recording with their numbers, the oldest first.
+pub fn numbered(output: &Path) -> Vec<(u64, PathBuf)> {
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned() + "-";
+    let number_of = |path: &Path| {
+        let name = path.file_name()?.to_str()?.strip_prefix(&stem)?.strip_suffix(".mcap")?;
+        (name.len() == DIGITS).then(|| name.parse().ok())?
+    };
+    let folder = dynocar::storage::folder_of(output);
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut files: Vec<(u64, PathBuf)> =
+        entries.filter_map(|it| Some((number_of(&it.path())?, it.path()))).collect();
+    files.sort();
+    files
+}
+
+/// Digits of a file's number.
+const DIGITS: usize = 6;
+
+/// The name of the next file: `run-000007.mcap` for `run.mcap`.
+pub fn next(output: &Path) -> PathBuf {
+    let number = numbered(output).last().map_or(1, |newest| newest.0 + 1);
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    output.with_file_name(format!("{stem}-{number:0DIGITS$}.mcap"))
 }
