@@ -8,9 +8,9 @@ use std::fs::File;
 use std::mem::ManuallyDrop;
 use std::ops::Deref;
 use std::os::fd::AsRawFd;
-use std::sync::OnceLock;
+use std::sync::Once;
 use std::sync::atomic::Ordering::{AcqRel, Acquire, Relaxed};
-use std::sync::atomic::{AtomicI32, AtomicU64};
+use std::sync::atomic::{AtomicI32, AtomicPtr, AtomicU64};
 
 use rustix::mm::{Advice, MapFlags, ProtFlags, madvise, mmap_anonymous};
 
@@ -18,15 +18,22 @@ use crate::clock::monotonic_now_ns;
 
 const PAGE_BYTES: usize = 4096;
 
-/// The word that marks this process, zero in a child that has opened nothing; `None` before anything
-/// was opened.
-static MARK: OnceLock<&'static AtomicU64> = OnceLock::new();
+/// No process's mark.
+static NONE: AtomicU64 = AtomicU64::new(0);
+/// Where the word is that marks this process, zero in a child that has opened nothing.
+static MARK: AtomicPtr<AtomicU64> = AtomicPtr::new((&raw const NONE).cast_mut());
+static MARK_IS_MADE: Once = Once::new();
+
+fn mark() -> &'static AtomicU64 {
+    // SAFETY: points to a static word or to one that stays mapped, and is only written as an atomic.
+    unsafe { &*MARK.load(Relaxed) }
+}
 
 /// Locked files that a child closes, -1 where there is none. What finds no place stays locked until the
 /// child has ended, too.
 static LOCKED: [AtomicI32; 1024] = [const { AtomicI32::new(-1) }; 1024];
 
-fn mark_page() -> &'static AtomicU64 {
+fn make_mark() {
     let (access, flags) = (ProtFlags::READ | ProtFlags::WRITE, MapFlags::PRIVATE);
     // SAFETY: a new mapping at a place of the system's choice.
     let place = unsafe { mmap_anonymous(std::ptr::null_mut(), PAGE_BYTES, access, flags) };
@@ -34,21 +41,18 @@ fn mark_page() -> &'static AtomicU64 {
         // A kernel without the advice leaves the mark to the handler below.
         // SAFETY: the mapping is ours, and nobody else knows of it.
         let _ = unsafe { madvise(place, PAGE_BYTES, Advice::LinuxWipeOnFork) };
-        // SAFETY: mapped for good, aligned, zeros are a valid number.
-        unsafe { &*place.cast::<AtomicU64>() }
+        place.cast::<AtomicU64>()
     });
     // SAFETY: the handler makes only calls that are allowed after a fork.
     unsafe { libc::pthread_atfork(None, None, Some(forget_parent)) };
-    // Without a page of its own a number of the library's does, by the handler alone.
+    // Without a page of its own a word of the library's does, by the handler alone.
     static PLAIN: AtomicU64 = AtomicU64::new(0);
-    page.unwrap_or(&PLAIN)
+    MARK.store(page.unwrap_or((&raw const PLAIN).cast_mut()), Relaxed);
 }
 
 /// In the child of a `fork()`.
 extern "C" fn forget_parent() {
-    if let Some(mark) = MARK.get() {
-        mark.store(0, Relaxed);
-    }
+    mark().store(0, Relaxed);
     for place in &LOCKED {
         let file = place.swap(-1, Relaxed);
         if file >= 0 {
@@ -60,9 +64,9 @@ extern "C" fn forget_parent() {
 
 /// This process's mark, made when it opens its first end; times make marks that no other process has.
 fn mark_of_this_process() -> u64 {
-    let mark = MARK.get_or_init(mark_page);
+    MARK_IS_MADE.call_once(make_mark);
     let fresh = monotonic_now_ns().unsigned_abs() | 1;
-    match mark.compare_exchange(0, fresh, AcqRel, Acquire) {
+    match mark().compare_exchange(0, fresh, AcqRel, Acquire) {
         Ok(_) => fresh,
         Err(present) => present,
     }
@@ -85,7 +89,7 @@ impl Owner {
     /// Two loads.
     #[inline]
     pub fn is_this_process(self) -> bool {
-        MARK.get().is_some_and(|mark| mark.load(Relaxed) == self.0)
+        mark().load(Relaxed) == self.0
     }
 }
 
