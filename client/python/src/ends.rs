@@ -13,9 +13,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{LocalKey, ThreadId, current};
 
-use dynocar_client::channel::Owner;
 use dynocar_client::ffi::Code;
-use dynocar_client::{ChannelError, Host, SamplePublisher, SnapshotReader};
+use dynocar_client::{ChannelError, Host, Owner, SamplePublisher, SnapshotReader};
 use dynocar_shared::TrainId;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

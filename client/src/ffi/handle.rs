@@ -5,8 +5,8 @@
 //! a mistake is a code instead of a data race.
 
 use super::error::{Code, Failure};
-use crate::channel::process::Owner;
-use crate::error::ChannelError;
+use dynocar_transport::ChannelError;
+use dynocar_transport::channel::Owner;
 
 /// One end of a channel, with the thread it belongs to.
 #[derive(Debug)]

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use crate::runtime::system::ends_with_this;
-use dynocar_client::{ChannelError, Host};
 use dynocar_shared::services::ROOT_VARIABLE;
+use dynocar_transport::{ChannelError, Host};
 use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 

@@ -11,8 +11,8 @@ use dynocar::config::DaemonConfig;
 use dynocar::ending::Ending;
 use dynocar::observing::Wanted;
 use dynocar::redrawn::can_draw;
-use dynocar_client::Host;
 use dynocar_shared::TrainId;
+use dynocar_transport::Host;
 
 use crate::watcher::Watcher;
 use crate::{plain, terminal};
