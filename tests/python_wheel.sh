@@ -22,7 +22,7 @@ environment builder maturin==1.16.0
 wheel=$(ls -t "$wheels"/dynocar-*.whl | head -n 1)
 
 cargo build --release --workspace --bin dynocar --bin dynocar-workshop --bin dynocar-played-daemon
-environment empty "$wheel[fleet]" ipykernel mypy nbclient pandas polars pyarrow pytest
+environment empty "$wheel[fleet]" iceoryx2==0.10.0 ipykernel mypy nbclient pandas polars pyarrow pytest
 # In another folder, so that nothing but the wheel is imported.
 project=$PWD
 # The daemons of the tests keep their states where everything else goes.

@@ -20,7 +20,10 @@
  *     which it does not know who sleeps), a publish makes a system call to wake each of them.
  *     All other calls open files or shared memory: make them before the cycle starts.
  *   - A handle belongs to the thread that opened it; every other thread gets
- *     DYNOCAR_ERROR_WRONG_THREAD. Do not use a handle after fork() or after closing it.
+ *     DYNOCAR_ERROR_WRONG_THREAD. Do not use a handle after closing it.
+ *   - In a child made by fork() each call with a handle of the parent gives
+ *     DYNOCAR_ERROR_FORKED_PROCESS and does nothing, closing included; the parent goes on as
+ *     before. The child opens ends of its own.
  *   - One controller drives a train: a second publisher for the same train is refused.
  *   - A train's snapshots have 12 places. Each open reader takes one until it is closed or its
  *     process ends; so do the daemon's metrics and its kept estimates. When all are taken, opening
@@ -92,7 +95,13 @@ enum {
     /* The daemon's configuration lets no pipeline answer this quantity for the train */
     DYNOCAR_ERROR_NOT_PROVIDED = 14,
     /* Every place of the train's channel is taken: close what is no longer needed */
-    DYNOCAR_ERROR_NO_PLACE_LEFT = 15
+    DYNOCAR_ERROR_NO_PLACE_LEFT = 15,
+    /* The handle was opened before fork(), in the parent: its ends are the parent's */
+    DYNOCAR_ERROR_FORKED_PROCESS = 16,
+    /* The root directory was removed or replaced: close what is open and open it again */
+    DYNOCAR_ERROR_ROOT_GONE = 17,
+    /* The daemon, or the controller, has a /dev/shm of its own: containers have to share one */
+    DYNOCAR_ERROR_SEPARATE_MEMORY = 18
 };
 
 /* Who serves a train. */

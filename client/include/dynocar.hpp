@@ -39,7 +39,8 @@ namespace dynocar {
 template <typename End> class [[nodiscard]] Opened {
   public:
     explicit Opened(End end) : end_(std::move(end)) {}
-    Opened(dynocar_code code, std::string error) : code_(code), error_(std::move(error)) {}
+    Opened(dynocar_code code, std::string error)
+        : end_(std::nullopt), code_(code), error_(std::move(error)) {}
 
     /* True when it was opened; only then may * and -> be used. */
     explicit operator bool() const noexcept { return end_.has_value(); }
@@ -54,7 +55,7 @@ template <typename End> class [[nodiscard]] Opened {
   private:
     std::optional<End> end_;
     dynocar_code code_ = DYNOCAR_OK;
-    std::string error_;
+    std::string error_ = {};
 };
 
 /* One cycle of a train. A quantity that is not set is missing, and so is one that is NaN. */

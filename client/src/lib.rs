@@ -39,6 +39,7 @@ pub mod ffi;
 pub mod publisher;
 pub mod reader;
 
+pub use dynocar_transport::channel::Owner;
 pub use dynocar_transport::{
     Announcement, ChannelError, Host, Peer, Role, SendRefused, monotonic_now_ns,
 };

@@ -6,6 +6,7 @@ use dynocar_shared::{TrainId, TrainSample};
 
 use dynocar_transport::Host;
 use dynocar_transport::Role;
+use dynocar_transport::channel::Owner;
 use dynocar_transport::channel::{SampleCount, Sender, Transport, Waker};
 use dynocar_transport::monotonic_now_ns;
 use dynocar_transport::peer::{Peer, RoleLock};
@@ -25,6 +26,7 @@ const PAUSE: Duration = Duration::from_millis(1);
 #[derive(Debug)]
 pub struct SamplePublisher {
     host: Host,
+    owner: Owner,
     train: TrainId,
     sender: Sender<TrainSample>,
     waker: Waker,
@@ -57,6 +59,7 @@ impl SamplePublisher {
         let start = count.begun();
         Ok(SamplePublisher {
             host: host.clone(),
+            owner: Owner::current(),
             train,
             sender,
             waker,
@@ -81,13 +84,17 @@ impl SamplePublisher {
     /// # Errors
     ///
     /// When the transport takes no message. The number is spent all the same, so that the
-    /// daemon counts the sample as lost.
+    /// daemon counts the sample as lost. In a child that was forked since, nothing is done.
     ///
     /// # Real-time
     ///
     /// Never waits. No system call while the pipelines are awake and no process comes or goes;
     /// see [`Sender::send`](dynocar_transport::channel::Sender::send) for the one allocation.
     pub fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, SendRefused> {
+        // Before anything is written: the page and the numbers are the parent's in a forked child.
+        if !self.owner.is_this_process() {
+            return Err(SendRefused);
+        }
         self.sequence += 1;
         sample.train_id = self.train.0;
         sample.sequence = self.sequence;
@@ -147,7 +154,7 @@ impl SamplePublisher {
 
 impl Drop for SamplePublisher {
     fn drop(&mut self) {
-        if self.flushed != self.sequence {
+        if self.owner.is_this_process() && self.flushed != self.sequence {
             self.flush(CLOSE_PATIENCE);
         }
     }

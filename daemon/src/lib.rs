@@ -7,6 +7,7 @@
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
 //! - [`ending`]: when a long-running program ends
+//! - [`log`]: the daemon's log, for which nobody waits
 //! - [`models`]: a store of models
 //! - [`observing`]: what an observer of trains sees, in one vocabulary
 //! - [`operator`]: what an operator reads, in one place
@@ -31,6 +32,7 @@ pub mod config;
 pub mod dataset;
 pub mod demo;
 pub mod ending;
+pub mod log;
 pub mod models;
 pub mod observing;
 pub mod operator;

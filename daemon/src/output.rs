@@ -8,6 +8,7 @@ use std::fs::{File, Metadata};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use serde::Serialize;
 
 use crate::storage::{self, Disk, Rights, Storage, folder_of};
@@ -54,8 +55,14 @@ pub fn print(text: &str) -> Result<(), OutputError> {
     }
 }
 
-/// Writes a line to standard error. What cannot be written there can be reported nowhere.
+/// Writes a line to standard error. What cannot be written there can be reported nowhere; nor what nobody
+/// takes from there for a second.
 pub fn report_line(line: &str) {
+    let stderr = io::stderr();
+    let second = Timespec { tv_sec: 1, tv_nsec: 0 };
+    if poll(&mut [PollFd::new(&stderr, PollFlags::OUT)], Some(&second)) == Ok(0) {
+        return;
+    }
     let _ = io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }
 

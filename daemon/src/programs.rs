@@ -10,6 +10,8 @@ use std::process::{Command, Output, Stdio};
 
 use serde::{Deserialize, Serialize};
 
+use crate::runtime::system::ends_with_this;
+
 /// The program of what is done away from the controller.
 pub const WORKSHOP: &str = "dynocar-workshop";
 /// The program of everything about recordings.
@@ -73,7 +75,7 @@ impl CallFailure {
 ///
 /// In words when it does not start or does not end with 0.
 pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, String), CallFailure> {
-    let output = command.args(["--json", "-"]).output();
+    let output = ends_with_this(command).args(["--json", "-"]).output();
     let output = output.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
     finished(package, output)
 }
@@ -94,7 +96,7 @@ pub fn taken_of<T>(
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
-    let program = command.spawn();
+    let program = ends_with_this(command).spawn();
     let mut program = program.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
     let stdout = program.stdout.take();
     // Beside what it writes for us it may write on standard error as much as it likes.

@@ -20,7 +20,7 @@ use dynocar_transport::{ChannelError, Host, Role, monotonic_now_ns};
 use tracing::{info, warn};
 
 use super::runtime::system::{
-    STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, set_fifo_priority,
+    STACK_BYTES, lock_all_memory, pin_to_core, prefault_stack, raise_open_files, set_fifo_priority,
 };
 use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
 use crate::ending::{self, EndingError};
@@ -74,7 +74,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let host = Host::of(config.process.root.as_deref())?;
     let stop = ending::flag()?;
     let trains: Vec<TrainId> = config.trains.iter().map(|train| train.id).collect();
-    let _roles = trains
+    let roles = trains
         .iter()
         .map(|&train| RoleLock::claim(&host, train, Role::Daemon))
         .collect::<Result<Vec<_>, _>>()?;
@@ -82,6 +82,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         .iter()
         .map(|&train| SampleCount::open(&host, train).map(Arc::new))
         .collect::<Result<Vec<_>, _>>()?;
+    raise_open_files();
     // Grows with every start: the monotonic clock is common to all processes of the host.
     let epoch = monotonic_now_ns() as u64;
     if config.process.lock_memory {
@@ -111,10 +112,12 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let watchdog = Watchdog::new(&supervisor, alive);
     supervisor.notify("READY=1");
     let trains = trains.into_iter().zip(counts).collect();
-    let mut watch = Watch::new(host, trains, watched);
+    let mut watch = Watch::new(host.clone(), trains, watched);
+    let mut lost_root = None;
     watch.until_stopped(&stop, || {
         watchdog.round(Instant::now());
-        workers.iter().any(JoinHandle::is_finished)
+        lost_root = roles.iter().find_map(|role| role.require_there(&host).err());
+        lost_root.is_some() || workers.iter().any(JoinHandle::is_finished)
     });
     supervisor.notify("STOPPING=1");
 
@@ -128,8 +131,9 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
         let _ = helper.join();
     }
     watch.report_totals();
-    match ended {
-        Some(name) if !was_asked => Err(RunError::ThreadEnded(name)),
+    match (lost_root, ended) {
+        (Some(error), _) => Err(error.into()),
+        (None, Some(name)) if !was_asked => Err(RunError::ThreadEnded(name)),
         _ => Ok(()),
     }
 }

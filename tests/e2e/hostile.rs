@@ -56,8 +56,10 @@ fn all_below(folder: &Path, found: &mut Vec<PathBuf>) {
 fn every_file_and_segment_is_closed_to_other_users() {
     let cast = cast();
     let root = cast.site.host().root().to_path_buf();
-    let mut found = vec![root.clone()];
+    let transport = cast.site.host().transport_directory();
+    let mut found = vec![root.clone(), transport.clone()];
     all_below(&root, &mut found);
+    all_below(&transport, &mut found);
     let segments = segment_paths(&cast.site);
     assert!(segments.len() > 10 && found.len() > 10, "{segments:?}, {found:?}");
     let user = std::fs::metadata(&root).unwrap().uid();
@@ -69,8 +71,8 @@ fn every_file_and_segment_is_closed_to_other_users() {
         assert_eq!(mode & 0o077, 0, "{}: {mode:o}", path.display());
         assert_eq!(attributes.uid(), user, "{}", path.display());
     }
-    // Within the directory files may be as they are: nobody else comes in.
-    assert_eq!(mode(&root).unwrap(), 0o700);
+    // Within the directories files may be as they are: nobody else comes in.
+    assert_eq!([&root, &transport].map(|it| mode(it).unwrap()), [0o700; 2]);
     for path in &found {
         let mode = mode(path).unwrap_or(0);
         assert_eq!(mode & 0o027, 0, "{}: {mode:o}", path.display());

@@ -7,6 +7,7 @@ mod ending;
 mod faults;
 mod golden;
 mod hostile;
+mod hosts;
 mod identical;
 mod implausible;
 mod operator;

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use dynocar_client::SamplePublisher;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{Process, Site, Terminal, Tie, await_true};
 use dynocar_transport::peer::RoleLock;
 use dynocar_transport::{Announcement, Role, monotonic_now_ns};
 use rustix::process::Signal;
@@ -263,4 +263,20 @@ fn signals_and_control_c_leave_the_terminal_as_it_was() {
     }
     screen.keys(&["echo typed", "Enter"]);
     await_true(|| screen.text().matches("typed").count() == 2, || screen.text());
+}
+
+#[test]
+fn a_terminal_that_cannot_draw_gets_plain_lines_in_its_letters() {
+    let site = Site::new();
+    let _daemon = daemon(&site);
+    for (term, locale) in [("dumb", "C.UTF-8"), ("xterm", "C"), ("", "C.UTF-8")] {
+        let mut terminal = Terminal::open();
+        let mut command = site.command(WATCH, &[]);
+        command.env("TERM", term).env("LC_ALL", locale);
+        let mut watch = terminal.start(command, Tie::Leader);
+        terminal.see("train 1: daemon");
+        assert_eq!(watch.end(Signal::TERM).code(), Some(0));
+        let shown = terminal.text();
+        assert!(!shown.contains('\x1b') && (locale != "C" || shown.is_ascii()), "{shown:?}");
+    }
 }

@@ -1,5 +1,7 @@
 //! Cores and priorities of a measurement.
 
+use std::time::Duration;
+
 use clap::Args;
 use dynocar::output::report_line;
 use dynocar::runtime::system::{pin_to_core, set_fifo_priority};
@@ -39,8 +41,42 @@ impl Cores {
         let controller = asked.controller_core.unwrap_or(0);
         let other = (controller + 1) % count.max(1);
         let server = asked.daemon_core.unwrap_or(other);
+        report_shared(&[controller, server]);
         Cores { controller, server, priority: asked.priority }
     }
+}
+
+/// How long the cores are watched before a measurement.
+const LOOK: Duration = Duration::from_millis(250);
+/// A greater share of a core than this is somebody's work, in percent.
+const TAKEN_PERCENT: u64 = 15;
+
+/// Says which cores others take time of, before anything is measured on them.
+fn report_shared(cores: &[usize]) {
+    let before: Vec<_> = cores.iter().map(|&core| times_of(core)).collect();
+    std::thread::sleep(LOOK);
+    for (&core, before) in cores.iter().zip(before) {
+        let Some((busy_before, all_before)) = before else { continue };
+        let Some((busy, all)) = times_of(core) else { continue };
+        let percent = 100 * (busy - busy_before) / (all - all_before).max(1);
+        if percent > TAKEN_PERCENT {
+            report_line(&format!(
+                "dynocar-bench: core {core} is not its own: others take {percent} % of it, and figures will be \
+                 wrong; end them, or name another core"
+            ));
+        }
+    }
+}
+
+/// Busy and all ticks of a core since the system started.
+fn times_of(core: usize) -> Option<(u64, u64)> {
+    let stat = std::fs::read_to_string("/proc/stat").ok()?;
+    let line = stat.lines().find_map(|line| line.strip_prefix(&format!("cpu{core} ")))?;
+    // user nice system idle iowait irq softirq steal; guests are counted among the users.
+    let ticks: Vec<u64> = line.split_whitespace().take(8).flat_map(str::parse).collect();
+    let [_, _, _, idle, waiting, ..] = ticks[..] else { return None };
+    let all = ticks.iter().sum();
+    Some((all - idle - waiting, all))
 }
 
 /// Runs something in a thread of its own, which it may bind to a core: threads and processes

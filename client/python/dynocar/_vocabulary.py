@@ -37,6 +37,9 @@ class Code(_Vocabulary):
     DOES_NOT_STOP = 13  # The train does not slow down, at the values given or at the edge of the bound
     NOT_PROVIDED = 14  # The daemon's configuration lets no pipeline answer this quantity for the train
     NO_PLACE_LEFT = 15  # Every place of the train's channel is taken: close what is no longer needed
+    FORKED_PROCESS = 16  # The handle was opened before fork(), in the parent: its ends are the parent's
+    ROOT_GONE = 17  # The root directory was removed or replaced: close what is open and open it again
+    SEPARATE_MEMORY = 18  # The daemon, or the controller, has a /dev/shm of its own: containers have to share one
 
 
 class Rail(_Vocabulary):

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{LocalKey, ThreadId, current};
 
 use dynocar_client::ffi::Code;
-use dynocar_client::{ChannelError, Host, SamplePublisher, SnapshotReader};
+use dynocar_client::{ChannelError, Host, Owner, SamplePublisher, SnapshotReader};
 use dynocar_shared::TrainId;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -60,6 +60,7 @@ impl End for SnapshotReader {
 
 /// What an object holds of its end.
 pub(crate) struct Handle<E: End> {
+    process: Owner,
     owner: ThreadId,
     number: u64,
     end: PhantomData<fn() -> E>,
@@ -82,7 +83,8 @@ impl<E: End> Handle<E> {
             Ok(())
         });
         opened.map_err(|error| of_channel(py, &error))?;
-        Ok(Handle { owner: current().id(), number, end: PhantomData })
+        let (process, owner) = (Owner::current(), current().id());
+        Ok(Handle { process, owner, number, end: PhantomData })
     }
 
     /// Works with the end; `work` calls nothing of Python, which may drop other ends meanwhile.
@@ -115,6 +117,9 @@ impl<E: End> Handle<E> {
     }
 
     fn require_owner(&self, py: Python<'_>) -> PyResult<()> {
+        if !self.process.is_this_process() {
+            return Err(of_code(py, Code::ForkedProcess));
+        }
         if self.owner == current().id() { Ok(()) } else { Err(of_code(py, Code::WrongThread)) }
     }
 }

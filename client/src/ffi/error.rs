@@ -69,18 +69,29 @@ codes! {
     NotProvided = 14 c"no pipeline answers this quantity for the train",
     /// Every place of the train's channel is taken: close what is no longer needed.
     NoPlaceLeft = 15 c"all places of the train's channel are taken",
+    /// The handle was opened before `fork()`, in the parent: its ends are the parent's.
+    ForkedProcess = 16 c"the handle was opened by the process that forked this one",
+    /// The root directory was removed or replaced: close what is open and open it again.
+    RootGone = 17 c"the root directory was removed or replaced",
+    /// The daemon, or the controller, has a `/dev/shm` of its own: containers have to share one.
+    SeparateMemory = 18 c"the other side has a /dev/shm of its own",
 }
 
 impl From<&ChannelError> for Code {
     fn from(error: &ChannelError) -> Self {
         match error {
-            ChannelError::Directory { .. } => Code::Directory,
-            ChannelError::RootName { .. } => Code::RootName,
+            ChannelError::Directory { .. }
+            | ChannelError::OpenFiles { .. }
+            | ChannelError::RootShared { .. }
+            | ChannelError::RootOfAnother { .. } => Code::Directory,
+            ChannelError::RootGone { .. } => Code::RootGone,
+            ChannelError::RootName { .. } | ChannelError::RootLength { .. } => Code::RootName,
             ChannelError::Occupied { .. } => Code::Occupied,
+            ChannelError::SeparateMemory { .. } => Code::SeparateMemory,
             ChannelError::IncompatiblePeer { .. } => Code::IncompatibleDaemon,
-            ChannelError::Transport { .. } | ChannelError::SharedMemoryFull { .. } => {
-                Code::Transport
-            }
+            ChannelError::Transport { .. }
+            | ChannelError::Stranger { .. }
+            | ChannelError::SharedMemoryFull { .. } => Code::Transport,
             ChannelError::NoPlaceLeft { .. } => Code::NoPlaceLeft,
             ChannelError::Send(_) => Code::SendRefused,
         }

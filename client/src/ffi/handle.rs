@@ -1,15 +1,17 @@
 //! What a `dynocar_publisher *` or a `dynocar_reader *` points to.
 //!
 //! The transport's ports belong to the thread that opened them. Rust holds a controller to that
-//! at compile time; here every call compares the thread, so that a mistake is a code instead of
-//! a data race.
+//! at compile time; here every call compares the thread, and the process where one has forked, so that
+//! a mistake is a code instead of a data race.
 
 use super::error::{Code, Failure};
 use dynocar_transport::ChannelError;
+use dynocar_transport::channel::Owner;
 
 /// One end of a channel, with the thread it belongs to.
 #[derive(Debug)]
 pub struct Handle<T> {
+    process: Owner,
     owner: ThreadMark,
     end: T,
 }
@@ -43,7 +45,8 @@ impl<T> Handle<T> {
         }
         // SAFETY: not NULL, hence writable.
         unsafe { place.write(std::ptr::null_mut()) };
-        let handle = Handle { owner: ThreadMark::of_this_thread(), end: make()? };
+        let end = make()?;
+        let handle = Handle { process: Owner::current(), owner: ThreadMark::of_this_thread(), end };
         // SAFETY: as above.
         unsafe { place.write(Box::into_raw(Box::new(handle))) };
         Ok(())
@@ -85,7 +88,12 @@ impl<T> Handle<T> {
         if handle.is_null() {
             return Err(Code::NullArgument);
         }
-        // SAFETY: the handle is alive; the owner never changes, so that any thread may read it.
+        // SAFETY: the handle is alive; its owners never change, so that any thread may read them.
+        let process = unsafe { (&raw const (*handle).process).read() };
+        if !process.is_this_process() {
+            return Err(Code::ForkedProcess);
+        }
+        // SAFETY: as above.
         let owner = unsafe { (&raw const (*handle).owner).read() };
         if owner == ThreadMark::of_this_thread() { Ok(()) } else { Err(Code::WrongThread) }
     }

@@ -79,7 +79,7 @@ fn the_wrapper_is_clean_cpp17_and_cpp20_also_without_exceptions_and_in_two_parts
     for standard in ["c++17", "c++20"] {
         for options in [&[][..], &["-fno-exceptions", "-fno-rtti"]] {
             let mut command = support::cpp_compiler(standard);
-            command.arg("-Wshadow").args(options).args(&parts).arg("-o");
+            command.args(["-Wshadow", "-Weffc++"]).args(options).args(&parts).arg("-o");
             command.arg(directory.path().join("program"));
             command.arg(library_directory().join("libdynocar_client.a"));
             must_succeed(command.args(["-lpthread", "-ldl", "-lm"]));

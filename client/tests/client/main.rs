@@ -4,6 +4,7 @@
 mod bindings;
 mod channels;
 mod foreign_controllers;
+mod forks;
 mod header;
 mod quantities;
 mod real_time;

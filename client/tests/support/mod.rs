@@ -132,6 +132,7 @@ impl Drop for TestRoot {
                 let _ = std::fs::remove_file(entry.path());
             }
         }
+        let _ = std::fs::remove_dir_all(self.host.transport_directory());
     }
 }
 
@@ -159,6 +160,10 @@ impl PlayedDaemon {
 
     pub fn root(&self) -> &Path {
         self.root.path()
+    }
+
+    pub fn host(&self) -> &Host {
+        &self.root.host
     }
 
     pub fn next_sample(&self) -> Option<TrainSample> {

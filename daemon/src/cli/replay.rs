@@ -14,7 +14,7 @@ use super::Failure;
 use super::companion::{self, Passed};
 use crate::dataset;
 use crate::output::report_line;
-use crate::redrawn::{Redrawn, bar};
+use crate::redrawn::{Redrawn, bar, can_draw};
 use crate::replay::{Rate, ReplayReport, Replayer};
 use crate::unpacking::program_for;
 
@@ -119,7 +119,7 @@ struct Progress<'r> {
 
 impl<'r> Progress<'r> {
     fn of(run: &'r Run) -> Self {
-        let redrawn = std::io::stderr().is_terminal().then(Redrawn::default);
+        let redrawn = (std::io::stderr().is_terminal() && can_draw()).then(Redrawn::default);
         Progress { run, redrawn, shown: None }
     }
 

@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use dynocar_client::ChannelError;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 
 use super::Failure;
 use crate::config::{DaemonConfig, LogFormat};
+use crate::log::{Log, Queue};
 use crate::run::{RunError, run};
 
 /// Run the daemon: read samples, estimate, publish snapshots.
@@ -25,17 +27,25 @@ pub struct RunArguments {
 /// A wrong configuration is an input failure, anything later a failure of the work.
 pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
     let config = DaemonConfig::load(&arguments.config)?;
-    start_log(&config)?;
-    run(&config).map_err(|error| match error {
+    let log = start_log(&config)?;
+    let ended = run(&config);
+    drop(log);
+    ended.map_err(|error| match error {
+        RunError::Channel(ChannelError::RootLength { .. }) => Failure::input(error),
         RunError::Setting(_) => Failure::Input(format!("{}: {error}", arguments.config.display())),
         error => Failure::work(error),
     })
 }
 
 /// Starts the log as the configuration wants it.
-pub fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
+///
+/// # Errors
+///
+/// A filter that cannot be read is an input failure.
+pub fn start_log(config: &DaemonConfig) -> Result<Log, Failure> {
+    let queue = Queue::start().map_err(Failure::work)?;
     let log = tracing_subscriber::fmt::layer()
-        .with_writer(std::io::stderr)
+        .with_writer(queue.clone())
         .with_ansi(false)
         // A log that cannot be written is reported nowhere, and ends no daemon.
         .log_internal_errors(false);
@@ -44,7 +54,7 @@ pub fn start_log(config: &DaemonConfig) -> Result<(), Failure> {
         LogFormat::Json => log.json().boxed(),
     };
     tracing_subscriber::registry().with(filter(&config.process.log)?).with(log).init();
-    Ok(())
+    Ok(Log(queue))
 }
 
 /// What is logged: a level, or levels by the modules that log.

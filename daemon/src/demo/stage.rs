@@ -4,6 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
+use crate::runtime::system::ends_with_this;
 use dynocar_shared::services::ROOT_VARIABLE;
 use dynocar_transport::{ChannelError, Host};
 use rustix::process::{Pid, Signal, kill_process};
@@ -105,7 +106,7 @@ impl Stage {
     fn start(&self, role: &'static str, arguments: &[&Path]) -> Result<Child, StageError> {
         let program = std::env::current_exe().map_err(system("finding this program"))?;
         let log = File::create(self.log(role)).map_err(system("writing a log"))?;
-        Command::new(program)
+        ends_with_this(&mut Command::new(program))
             .args(arguments)
             .env(ROOT_VARIABLE, self.host.root())
             // A show leaves nothing behind.

@@ -9,7 +9,7 @@ use dynocar_shared::{HALF_95, ParameterSnapshot, PipelineKind};
 use dynocar_dataset::Dataset;
 
 use crate::output::report_line;
-use crate::redrawn::{Redrawn, bar};
+use crate::redrawn::{Redrawn, bar, can_draw};
 
 /// How often a plain line is written for each pipeline.
 const PLAIN_EVERY: Duration = Duration::from_secs(3);
@@ -34,7 +34,7 @@ impl View {
             dataset.runs.len()
         ));
         report_line("controller, daemon and client are three processes; ± is a 95 % interval");
-        let redrawn = std::io::stderr().is_terminal().then(Redrawn::default);
+        let redrawn = (std::io::stderr().is_terminal() && can_draw()).then(Redrawn::default);
         View { total, redrawn, last_plain: None }
     }
 

@@ -1,7 +1,15 @@
-//! What a thread asks of the system: memory that stays, a core of its own, a place in the queue.
+//! What a thread asks of the system: memory that stays, a core of its own, a place in the queue, files, and
+//! programs that do not outlive it.
+
+use std::io::ErrorKind;
+use std::os::unix::process::CommandExt;
+use std::process::Command;
 
 use rustix::mm::{MlockAllFlags, mlockall};
-use rustix::process::{Resource, getrlimit};
+use rustix::process::{
+    Resource, Rlimit, Signal, getpid, getppid, getrlimit, set_parent_process_death_signal,
+    setrlimit,
+};
 use rustix::thread::{CapabilitySet, CpuSet, capabilities, sched_setaffinity};
 
 /// Stack of a pipeline thread in bytes: opening the transport's ports takes more than half a MiB
@@ -100,6 +108,27 @@ pub fn stand_back() {
     const NICENESS: libc::c_int = 10;
     // SAFETY: no memory is involved; 0 names the calling thread. Who is nice needs no privilege.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICENESS) };
+}
+
+/// Lets a program end when the thread that starts it does, whatever ends that: nothing goes on that nobody
+/// waits for.
+pub fn ends_with_this(command: &mut Command) -> &mut Command {
+    let parent = getpid();
+    // SAFETY: between fork and exec only system calls are made.
+    unsafe {
+        command.pre_exec(move || {
+            set_parent_process_death_signal(Some(Signal::TERM))?;
+            // It may have ended before.
+            if getppid() == Some(parent) { Ok(()) } else { Err(ErrorKind::BrokenPipe.into()) }
+        })
+    }
+}
+
+/// Lets this process open as many files as its hard limit allows; each connection of a reader takes some.
+pub fn raise_open_files() {
+    let limit = getrlimit(Resource::Nofile);
+    // What is refused is named once the limit is reached.
+    let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
 }
 
 #[cfg(test)]

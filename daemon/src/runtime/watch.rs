@@ -49,6 +49,8 @@ pub struct Watch {
     logs: Vec<PipelineLog>,
     refusals: HashMap<TrainId, RefusalLog>,
     controllers: HashMap<TrainId, Option<Announcement>>,
+    /// Why nobody could be looked up, the last time; said once.
+    failure: Option<String>,
 }
 
 impl Watch {
@@ -61,11 +63,12 @@ impl Watch {
         let readings = vec![TallyReading::default(); pipelines.len()];
         let logs = pipelines.iter().map(|_| PipelineLog::new(Instant::now())).collect();
         let (refusals, controllers) = (HashMap::new(), HashMap::new());
-        Watch { host, trains, pipelines, readings, logs, refusals, controllers }
+        let failure = None;
+        Watch { host, trains, pipelines, readings, logs, refusals, controllers, failure }
     }
 
     /// Watches until a signal asks the daemon to stop, or a pipeline thread has ended.
-    pub fn until_stopped(&mut self, stop: &AtomicBool, has_ended: impl Fn() -> bool) {
+    pub fn until_stopped(&mut self, stop: &AtomicBool, mut has_ended: impl FnMut() -> bool) {
         let mut round = 0;
         while !stop.load(Ordering::Relaxed) && !has_ended() {
             if round % ROUNDS_PER_PEER_CHECK == 0 {
@@ -106,8 +109,12 @@ impl Watch {
                 }
                 Ok(Peer::Compatible(peer) | Peer::Incompatible(peer)) => Some(peer),
                 Err(error) => {
-                    warn!(train = train.0, "{error}");
-                    None
+                    let error = error.to_string();
+                    if self.failure.as_ref() != Some(&error) {
+                        warn!(train = train.0, "{error}");
+                        self.failure = Some(error);
+                    }
+                    continue;
                 }
             };
             if self.controllers.get(&train) != Some(&seen) {
@@ -228,11 +235,7 @@ fn report_controller(train: TrainId, controller: Option<&Announcement>) {
             info!(train = train.0, process = theirs.process_id, "controller connected");
         }
         Some(theirs) => {
-            let error = ChannelError::IncompatiblePeer {
-                train,
-                theirs: Box::new(theirs.clone()),
-                ours: Box::new(ours),
-            };
+            let error = ChannelError::of_peer(train, theirs.clone(), Role::Daemon);
             warn!(train = train.0, "{error}");
         }
     }

@@ -49,7 +49,8 @@ impl Verdict {
             Verdict::Degraded => "look at the reasons of the pipelines in docs/guides/reading.md",
             Verdict::Stale => "the daemon hangs or was stopped: look at its log, and restart it",
             Verdict::Incompatible => {
-                "install the same release of Dynocar everywhere, and restart what is older"
+                "install the same release of Dynocar everywhere, and restart what is older; containers \
+                 have to share one /dev/shm"
             }
             Verdict::NoDaemon => "start it: `dynocar run --config FILE`; its log says why it ended",
         }
@@ -143,7 +144,13 @@ impl TrainHealth {
 pub fn look_at(host: &Host, train: TrainId) -> Result<TrainHealth, ChannelError> {
     let (verdict, daemon) = match Peer::look_up(host, train, Role::Daemon)? {
         Peer::Absent => (Verdict::NoDaemon, None),
-        Peer::Incompatible(peer) => (Verdict::Incompatible, Some(peer.to_string())),
+        Peer::Incompatible(peer) => {
+            let words = match ChannelError::of_peer(train, peer.clone(), Role::Controller) {
+                error @ ChannelError::SeparateMemory { .. } => error.to_string(),
+                _ => peer.to_string(),
+            };
+            (Verdict::Incompatible, Some(words))
+        }
         Peer::Compatible(peer) => (Verdict::Ok, Some(peer.to_string())),
     };
     if verdict != Verdict::Ok {

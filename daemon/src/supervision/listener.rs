@@ -1,7 +1,7 @@
-//! A loopback listener that answers `GET /metrics` and nothing else.
+//! A loopback listener that answers `GET` and `HEAD` of `/metrics` and nothing else.
 //!
-//! One connection at a time, a bounded request, a bounded time: whoever connects can neither grow
-//! nor hold up more than this thread.
+//! A bounded number of connections, each with a bounded request and a bounded time, none of which is
+//! waited for: whoever connects can neither grow nor hold up more than its own connection.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar_client::SnapshotReader;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use tracing::warn;
 
 use super::metrics;
@@ -19,8 +20,10 @@ use crate::shadow::Board;
 const REQUEST_BYTES_MAX: usize = 4096;
 /// How long a request may take to come, and an answer to be taken.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// How often the thread looks whether to stop, and whether somebody has come.
+/// How often the thread looks whether to stop.
 const ROUND: Duration = Duration::from_millis(50);
+/// Connections at a time; who comes beyond them waits to be accepted.
+const CONNECTIONS_MAX: usize = 32;
 
 /// Opens the listener.
 ///
@@ -41,82 +44,140 @@ pub fn serve(
     board: &Board,
     stop: &Arc<AtomicBool>,
 ) {
+    let mut connections: Vec<Connection> = Vec::new();
     while !stop.load(Ordering::Relaxed) {
-        match listener.accept() {
-            Ok((stream, _)) => {
-                // A client that goes away or dawdles is its own misfortune.
-                let _ = answer(stream, || metrics::text(readers, names, &board.read()));
-            }
-            Err(error) if error.kind() == ErrorKind::WouldBlock => {
-                // Keeps the channel empty, so that an answer is up to date at once.
-                readers.iter_mut().for_each(|reader| {
-                    reader.poll();
-                });
-                std::thread::sleep(ROUND);
-            }
-            Err(error) => {
-                warn!("metrics listener: {error}");
-                std::thread::sleep(ROUND);
+        wait_for_any(listener, &connections);
+        // Keeps the channel empty, so that an answer is up to date at once.
+        readers.iter_mut().for_each(|reader| {
+            reader.poll();
+        });
+        while connections.len() < CONNECTIONS_MAX {
+            match listener.accept() {
+                Ok((stream, _)) => connections.extend(Connection::new(stream)),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) => {
+                    warn!("metrics listener: {error}");
+                    std::thread::sleep(ROUND);
+                    break;
+                }
             }
         }
+        // A client that goes away or dawdles is its own misfortune.
+        connections.retain_mut(|it| {
+            it.advance(&mut || metrics::text(readers, names, &board.read()))
+                .is_ok_and(|is_done| !is_done)
+        });
     }
 }
 
-fn answer(mut stream: TcpStream, text: impl FnOnce() -> String) -> std::io::Result<()> {
-    stream.set_nonblocking(false)?;
-    stream.set_write_timeout(Some(PATIENCE))?;
-    let (status, content_type, body) = match read_request(&mut stream) {
-        Request::Metrics => ("200 OK", metrics::CONTENT_TYPE, text()),
-        Request::Other => ("404 Not Found", "text/plain", "only GET /metrics\n".to_owned()),
-        Request::TooLong => {
-            ("431 Request Header Fields Too Large", "text/plain", "too long\n".to_owned())
+/// Waits until somebody comes, or goes on, for one round at most.
+fn wait_for_any(listener: &TcpListener, connections: &[Connection]) {
+    let mut polled: Vec<PollFd<'_>> = connections
+        .iter()
+        .map(|it| {
+            let answers = it.answer.is_empty();
+            PollFd::new(&it.stream, if answers { PollFlags::IN } else { PollFlags::OUT })
+        })
+        .collect();
+    if connections.len() < CONNECTIONS_MAX {
+        polled.push(PollFd::new(listener, PollFlags::IN));
+    }
+    let round = Timespec { tv_sec: 0, tv_nsec: ROUND.subsec_nanos().into() };
+    // A failed wait is a short one.
+    let _ = poll(&mut polled, Some(&round));
+}
+
+/// A client, from the first byte of its request to the last of its answer.
+struct Connection {
+    stream: TcpStream,
+    request: Vec<u8>,
+    /// What is not sent yet; empty until the request is whole.
+    answer: Vec<u8>,
+    deadline: Instant,
+}
+
+impl Connection {
+    fn new(stream: TcpStream) -> Option<Self> {
+        stream.set_nonblocking(true).ok()?;
+        let deadline = Instant::now() + PATIENCE;
+        Some(Connection { stream, request: Vec::new(), answer: Vec::new(), deadline })
+    }
+
+    /// Goes on as far as it does without waiting; true when all is sent.
+    fn advance(&mut self, text: &mut impl FnMut() -> String) -> std::io::Result<bool> {
+        match self.go_on(text) {
+            Err(error)
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
+            {
+                if Instant::now() < self.deadline {
+                    Ok(false)
+                } else {
+                    Err(error)
+                }
+            }
+            result => result.map(|()| true),
         }
-        Request::None => return Ok(()),
-    };
-    let length = body.len();
-    let head = format!(
-        "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nContent-Length: {length}\r\n\
-         Connection: close\r\n\r\n"
-    );
-    stream.write_all(head.as_bytes())?;
-    stream.write_all(body.as_bytes())
+    }
+
+    fn go_on(&mut self, text: &mut impl FnMut() -> String) -> std::io::Result<()> {
+        while self.answer.is_empty() {
+            let mut bytes = [0; REQUEST_BYTES_MAX];
+            let room = REQUEST_BYTES_MAX - self.request.len();
+            let read = self.stream.read(&mut bytes[..room])?;
+            self.request.extend(&bytes[..read]);
+            if self.request.windows(4).any(|end| end == b"\r\n\r\n") {
+                self.answer = classify(&self.request).answer(&mut *text);
+                self.deadline = Instant::now() + PATIENCE;
+            } else if self.request.len() == REQUEST_BYTES_MAX {
+                self.answer = Request::TooLong.answer(&mut *text);
+            } else if read == 0 {
+                return Err(ErrorKind::UnexpectedEof.into());
+            }
+        }
+        while !self.answer.is_empty() {
+            let sent = self.stream.write(&self.answer)?;
+            self.answer.drain(..sent);
+        }
+        Ok(())
+    }
 }
 
 #[derive(Debug, PartialEq, Eq)]
 enum Request {
     Metrics,
+    /// The metrics' head alone.
+    Head,
     Other,
     TooLong,
-    /// The client went away or took too long.
-    None,
 }
 
-fn read_request(stream: &mut TcpStream) -> Request {
-    let deadline = Instant::now() + PATIENCE;
-    let mut bytes = [0; REQUEST_BYTES_MAX];
-    let mut length = 0;
-    loop {
-        let left = deadline.saturating_duration_since(Instant::now());
-        if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
-            return Request::None;
-        }
-        match stream.read(&mut bytes[length..]) {
-            Ok(0) => return if length == bytes.len() { Request::TooLong } else { Request::None },
-            Ok(read) => length += read,
-            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-            Err(_) => return Request::None,
-        }
-        if bytes[..length].windows(4).any(|end| end == b"\r\n\r\n") {
-            return classify(&bytes[..length]);
-        }
+impl Request {
+    fn answer(&self, text: impl FnOnce() -> String) -> Vec<u8> {
+        let (status, content_type, body) = match self {
+            Request::Metrics | Request::Head => ("200 OK", metrics::CONTENT_TYPE, text()),
+            Request::Other => ("404 Not Found", "text/plain", "only GET /metrics\n".to_owned()),
+            Request::TooLong => {
+                ("431 Request Header Fields Too Large", "text/plain", "too long\n".to_owned())
+            }
+        };
+        let length = body.len();
+        let head = format!(
+            "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nContent-Length: {length}\r\n\
+             Connection: close\r\n\r\n"
+        );
+        let body = if *self == Request::Head { String::new() } else { body };
+        (head + &body).into_bytes()
     }
 }
 
 fn classify(request: &[u8]) -> Request {
     let line = request.split(|&byte| byte == b'\r').next().unwrap_or_default();
     let words: Vec<&[u8]> = line.split(|&byte| byte == b' ').collect();
-    match &words[..] {
-        [b"GET", b"/metrics", version] if version.starts_with(b"HTTP/1.") => Request::Metrics,
+    let [method, target, version] = words[..] else { return Request::Other };
+    let path = target.split(|&byte| byte == b'?').next().unwrap_or_default();
+    match (method, path.strip_suffix(b"/").unwrap_or(path)) {
+        (b"GET", b"/metrics") if version.starts_with(b"HTTP/1.") => Request::Metrics,
+        (b"HEAD", b"/metrics") if version.starts_with(b"HTTP/1.") => Request::Head,
         _ => Request::Other,
     }
 }
@@ -126,8 +187,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_a_get_of_metrics_is_a_request_for_metrics() {
-        assert_eq!(classify(b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n"), Request::Metrics);
+    fn only_a_get_or_a_head_of_metrics_is_a_request_for_metrics() {
+        for target in ["/metrics", "/metrics/", "/metrics?name=x", "/metrics/?"] {
+            let request = |method| format!("{method} {target} HTTP/1.1\r\nHost: x\r\n\r\n");
+            assert_eq!(classify(request("GET").as_bytes()), Request::Metrics, "{target}");
+            assert_eq!(classify(request("HEAD").as_bytes()), Request::Head, "{target}");
+        }
         let others = ["POST /metrics HTTP/1.1", "GET / HTTP/1.1", "GET /metrics", "", "\0\u{1}"];
         for other in others {
             let request = format!("{other}\r\n\r\n");

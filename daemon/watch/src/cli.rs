@@ -10,6 +10,7 @@ use dynocar::cli::{Failure, carry_out};
 use dynocar::config::DaemonConfig;
 use dynocar::ending::Ending;
 use dynocar::observing::Wanted;
+use dynocar::redrawn::can_draw;
 use dynocar_shared::TrainId;
 use dynocar_transport::Host;
 
@@ -31,7 +32,7 @@ struct Arguments {
     /// Only this train; may be given several times
     #[arg(long = "train", value_name = "ID")]
     trains: Vec<u64>,
-    /// A line a second for each train, on a terminal too
+    /// A line a second for each train, on a terminal too; so it is where TERM is dumb or the locale is not of UTF-8
     #[arg(long)]
     plain: bool,
 }
@@ -55,7 +56,7 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
     terminal::end_though_stuck(Arc::clone(&ending.flag))
         .map_err(|error| Failure::Work(format!("watching for the end: {error}")))?;
     let mut watcher = Watcher::new(Wanted { host, trains }, config);
-    if arguments.plain || !std::io::stdout().is_terminal() {
+    if arguments.plain || !std::io::stdout().is_terminal() || !can_draw() {
         return plain::run(&mut watcher, &ending);
     }
     let has_colour = std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());

@@ -1,11 +1,12 @@
 //! Lines where there is no terminal: one a second for each train.
 
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 use dynocar::cli::Failure;
 use dynocar::ending::Ending;
 use dynocar::output::OutputError;
+use dynocar::redrawn::is_utf8;
 
 use crate::state::TrainState;
 use crate::watcher::Watcher;
@@ -33,6 +34,9 @@ pub fn run(watcher: &mut Watcher, ending: &Ending) -> Result<(), Failure> {
             if text.is_empty() {
                 text = format!("no daemon serves any train under {}\n", watcher.place());
             }
+            if std::io::stdout().is_terminal() && !is_utf8() {
+                text = in_ascii(&text);
+            }
             let mut output = std::io::stdout().lock();
             match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
                 Err(error)
@@ -47,6 +51,13 @@ pub fn run(watcher: &mut Watcher, ending: &Ending) -> Result<(), Failure> {
         std::thread::sleep(POLL_EVERY);
     }
     Ok(())
+}
+
+/// What is written on a terminal that knows no other letters.
+fn in_ascii(text: &str) -> String {
+    let letters =
+        text.replace('±', "+-").replace('…', "...").replace('‰', "o/oo").replace('²', "2");
+    letters.chars().map(|it| if it.is_ascii() { it } else { '?' }).collect()
 }
 
 /// A train in a line.

@@ -1,9 +1,12 @@
 //! What a side of the channel says of itself.
 
 use std::fmt;
+use std::path::Path;
 
 use dynocar_shared::services::TRANSPORT_VERSION;
 use dynocar_shared::{ParameterSnapshot, SCHEMA_MAJOR, TrainSample};
+
+use crate::identity::{SHARED_MEMORY, identity_of};
 
 /// A side of the channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -46,6 +49,9 @@ pub struct Announcement {
     pub sample_layout: u64,
     /// Layout hash of its [`ParameterSnapshot`].
     pub snapshot_layout: u64,
+    /// Which `/dev/shm` it sees: device and inode. Containers may have one each. `None` where it does not
+    /// say, as older releases, whose segments have other names.
+    pub memory: Option<[u64; 2]>,
 }
 
 impl Announcement {
@@ -59,21 +65,29 @@ impl Announcement {
             transport: TRANSPORT_VERSION.to_owned(),
             sample_layout: TrainSample::LAYOUT_HASH,
             snapshot_layout: ParameterSnapshot::LAYOUT_HASH,
+            memory: identity_of(Path::new(SHARED_MEMORY)).ok(),
         }
     }
 
     /// True when both sides map the same bytes.
     pub fn is_compatible_with(&self, other: &Announcement) -> bool {
+        self.understands(other) && self.memory == other.memory
+    }
+
+    /// True when both sides are of releases that understand each other.
+    pub(crate) fn understands(&self, other: &Announcement) -> bool {
         self.schema == other.schema
+            && self.memory.is_some() == other.memory.is_some()
             && self.transport == other.transport
             && self.sample_layout == other.sample_layout
             && self.snapshot_layout == other.snapshot_layout
     }
 
     pub(crate) fn to_text(&self) -> String {
+        let [device, inode] = self.memory.unwrap_or_default();
         format!(
             "role={}\nprocess_id={}\nversion={}\nschema={}\ntransport={}\nsample_layout={:016x}\n\
-             snapshot_layout={:016x}\n",
+             snapshot_layout={:016x}\nmemory_device={device:x}\nmemory_inode={inode:x}\n",
             self.role,
             self.process_id,
             self.version,
@@ -99,6 +113,7 @@ impl Announcement {
             transport: value("transport")?.to_owned(),
             sample_layout: hash("sample_layout")?,
             snapshot_layout: hash("snapshot_layout")?,
+            memory: hash("memory_device").zip(hash("memory_inode")).map(|(it, inode)| [it, inode]),
         })
     }
 }

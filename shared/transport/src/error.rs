@@ -22,16 +22,65 @@ pub enum ChannelError {
         /// The system's answer.
         source: std::io::Error,
     },
+    /// The process has as many open files as it may.
+    #[error(
+        "open files: the limit{} is reached, nothing more can be opened or connected; raise it by \
+         ulimit -n, of a unit by LimitNOFILE=", limit.map_or(String::new(), |it| format!(" of {it}"))
+    )]
+    OpenFiles {
+        /// The process's limit; `None` where it has none, and the system's is reached.
+        limit: Option<u64>,
+    },
     /// The run-time directory's name cannot be used for shared memory.
     #[error(
-        "{path}: expected an absolute path of at most {limit} bytes without spaces or special \
-         characters, see the variable DYNOCAR_ROOT"
+        "{path}: expected an absolute path without spaces or special characters, see the variable \
+         DYNOCAR_ROOT"
     )]
     RootName {
         /// The directory.
         path: PathBuf,
-        /// The longest name allowed, in bytes.
+    },
+    /// The run-time directory's name is longer than the system takes.
+    #[error(
+        "the root directory's name is {length} bytes long, at most {limit} can be used; see the \
+         variable DYNOCAR_ROOT: {path}"
+    )]
+    RootLength {
+        /// The directory.
+        path: PathBuf,
+        /// Its name's length in bytes.
+        length: usize,
+        /// The longest name in bytes.
         limit: usize,
+    },
+    /// The run-time directory is one that others use.
+    #[error(
+        "{path}: is in use by others: Dynocar needs a directory of its own, which it closes to other \
+         users; name one below it by the variable DYNOCAR_ROOT"
+    )]
+    RootShared {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The run-time directory belongs to another user.
+    #[error(
+        "{path}: belongs to user {owner}, who alone may use it; ask as that user: sudo -u '#{owner}' ..., \
+         or name a directory of your own by the variable DYNOCAR_ROOT"
+    )]
+    RootOfAnother {
+        /// The directory.
+        path: PathBuf,
+        /// Whose it is.
+        owner: u32,
+    },
+    /// The run-time directory is not the one that was opened.
+    #[error(
+        "{path}: the root directory was removed or replaced while it was in use; who opened it before and \
+         who opens it now do not meet. Open again; let no cleaner of old files into it"
+    )]
+    RootGone {
+        /// The directory.
+        path: PathBuf,
     },
     /// Another process already holds this role for the train.
     #[error("train {train}: already has a {role}: {holder}")]
@@ -53,6 +102,19 @@ pub enum ChannelError {
         /// What we are.
         ours: Box<Announcement>,
     },
+    /// The peer on the other side has a shared memory of its own, as containers may.
+    #[error(
+        "train {train}: the {} (process {}) has a /dev/shm of its own, so that nothing passes between it \
+         and this process; let the two share one: docker run --ipc=host, or --ipc=container:NAME with \
+         --ipc=shareable for the first; for Kubernetes one pod, or a volume of medium Memory at /dev/shm",
+        theirs.role, theirs.process_id
+    )]
+    SeparateMemory {
+        /// The train.
+        train: TrainId,
+        /// What the peer says of itself.
+        theirs: Box<Announcement>,
+    },
     /// The transport refused a node, a service or a port.
     #[error("{what}: iceoryx2 {} refused: {reason}", dynocar_shared::services::TRANSPORT_VERSION)]
     Transport {
@@ -60,6 +122,17 @@ pub enum ChannelError {
         what: String,
         /// The transport's reason.
         reason: String,
+    },
+    /// A program that is none of Dynocar's made a channel first, with settings of its own.
+    #[error(
+        "service {service}: made with other settings by a program that is none of Dynocar's, used by {users}; \
+         end that, and start it again after the daemon: who only opens a service takes its settings"
+    )]
+    Stranger {
+        /// The service.
+        service: String,
+        /// Who uses it.
+        users: String,
     },
     /// Every place of a train's channel is taken.
     #[error(
@@ -92,6 +165,18 @@ pub enum ChannelError {
     /// A message was not taken.
     #[error(transparent)]
     Send(#[from] SendRefused),
+}
+
+impl ChannelError {
+    /// Why nothing passes between an incompatible peer and this process.
+    pub fn of_peer(train: TrainId, theirs: Announcement, our_role: Role) -> Self {
+        let (theirs, ours) = (Box::new(theirs), Box::new(Announcement::of_this_process(our_role)));
+        if ours.understands(&theirs) {
+            ChannelError::SeparateMemory { train, theirs }
+        } else {
+            ChannelError::IncompatiblePeer { train, theirs, ours }
+        }
+    }
 }
 
 /// The transport took no message; the sender goes on, the message is lost.

@@ -1,20 +1,24 @@
 //! Where the run-time files of this host lie.
 //!
-//! Everything is under one root directory: `trains/` holds who serves and who drives each train,
-//! `iceoryx2-<version>/` belongs to the transport. Two roots never meet, not even in the names
-//! of their shared-memory segments, so that tests and separate installations stay apart.
+//! A root directory holds who serves and who drives each train, in `trains/`. The transport's files lie
+//! beside its segments in `/dev/shm`, under names that follow from the root's device and inode: two
+//! spellings of one directory meet, two directories never do, and the sockets' names are short however
+//! long the root's is.
 
 use std::fs::{DirBuilder, File, OpenOptions, Permissions};
-use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-use dynocar_shared::services::{ROOT_VARIABLE, SEGMENT_PREFIX, TRANSPORT_VERSION};
+use dynocar_shared::services::{ROOT_VARIABLE, SEGMENT_PREFIX};
 use iceoryx2::prelude::{Config, FileName, Path as TransportPath, SemanticString};
+use rustix::io::Errno;
+use rustix::process::{Resource, getrlimit};
 
 use crate::error::ChannelError;
+use crate::identity::{Identity, SHARED_MEMORY, identity_of};
 
-/// Longest root directory in bytes: the transport appends file names of its own.
-const ROOT_BYTES_MAX: usize = 150;
+/// Longest root directory in bytes: the system's limit of a path, less the names of files in it.
+const ROOT_BYTES_MAX: usize = 4000;
 
 /// Connections to dead senders whose last messages are still kept. A receiver looks through a
 /// place for each of them whenever it is polled: the transport's default of 128 took more than
@@ -22,10 +26,14 @@ const ROOT_BYTES_MAX: usize = 150;
 /// is older than what its successor says.
 const EXPIRED_CONNECTIONS: usize = 8;
 
+/// The announcements' directory in the root.
+const TRAINS: &str = "trains";
+
 /// The run-time directory of one host, or of one of its separate installations.
 #[derive(Clone, Debug)]
 pub struct Host {
     root: PathBuf,
+    identity: Identity,
 }
 
 impl Host {
@@ -61,14 +69,19 @@ impl Host {
     pub fn at(root: &Path) -> Result<Self, ChannelError> {
         let is_plain = |byte: &u8| byte.is_ascii_alphanumeric() || b"/._-+".contains(byte);
         let bytes = root.as_os_str().as_encoded_bytes();
-        if !root.is_absolute() || bytes.len() > ROOT_BYTES_MAX || !bytes.iter().all(is_plain) {
-            return Err(ChannelError::RootName { path: root.into(), limit: ROOT_BYTES_MAX });
+        if bytes.len() > ROOT_BYTES_MAX {
+            let (path, length, limit) = (root.into(), bytes.len(), ROOT_BYTES_MAX);
+            return Err(ChannelError::RootLength { path, length, limit });
         }
-        let host = Host { root: root.to_path_buf() };
-        for directory in [host.root.clone(), host.trains_directory(), host.transport_directory()] {
-            make_private_directory(&directory)?;
+        if !root.is_absolute() || !bytes.iter().all(is_plain) {
+            return Err(ChannelError::RootName { path: root.into() });
         }
-        Ok(host)
+        require_own(root)?;
+        for directory in [root, &root.join(TRAINS)] {
+            make_private_directory(directory)?;
+        }
+        let identity = identity_of(root).map_err(unusable(root, "looking at the directory"))?;
+        Ok(Host { root: root.to_path_buf(), identity })
     }
 
     /// The root directory.
@@ -78,30 +91,56 @@ impl Host {
 
     /// Where the announcements lie.
     pub fn trains_directory(&self) -> PathBuf {
-        self.root.join("trains")
+        self.root.join(TRAINS)
     }
 
-    fn transport_directory(&self) -> PathBuf {
-        self.root.join(format!("iceoryx2-{TRANSPORT_VERSION}"))
+    /// Where the transport keeps its files, apart from its segments: in memory, so that nothing of a dead
+    /// host's is left, and nothing is aged.
+    pub fn transport_directory(&self) -> PathBuf {
+        let prefix = self.segment_prefix();
+        Path::new(SHARED_MEMORY).join(format!(".{}", prefix.trim_end_matches('_')))
     }
 
     /// Prefix of this root's shared-memory segments.
     pub fn segment_prefix(&self) -> String {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        for byte in self.root.as_os_str().as_encoded_bytes() {
-            hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        for byte in self.identity.iter().flat_map(|it| it.to_le_bytes()) {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
         }
         format!("{SEGMENT_PREFIX}{:08x}_", hash as u32 ^ (hash >> 32) as u32)
+    }
+
+    /// Requires that the root is the directory that it was.
+    ///
+    /// # Errors
+    ///
+    /// [`ChannelError::RootGone`] when it was removed, or another one took its place.
+    pub fn require_root(&self) -> Result<(), ChannelError> {
+        match identity_of(&self.root) {
+            Ok(identity) if identity == self.identity => Ok(()),
+            _ => Err(ChannelError::RootGone { path: self.root.clone() }),
+        }
+    }
+
+    /// Opens the root, to be locked.
+    ///
+    /// # Errors
+    ///
+    /// [`ChannelError::RootGone`], and the system's refusals.
+    pub(crate) fn open_root(&self) -> Result<File, ChannelError> {
+        self.require_root()?;
+        File::open(&self.root).map_err(unusable(&self.root, "opening"))
     }
 
     /// The transport's configuration for this root.
     ///
     /// # Errors
     ///
-    /// When the transport does not take the root's name.
+    /// When the transport's directory cannot be made.
     pub(crate) fn transport_config(&self) -> Result<Config, ChannelError> {
         let directory = self.transport_directory();
-        let refused = || ChannelError::RootName { path: directory.clone(), limit: ROOT_BYTES_MAX };
+        make_private_directory(&directory)?;
+        let refused = || ChannelError::RootName { path: directory.clone() };
         let mut config = Config::default();
         config.global.prefix =
             FileName::new(self.segment_prefix().as_bytes()).map_err(|_| refused())?;
@@ -114,6 +153,39 @@ impl Host {
     }
 }
 
+/// The failure of a system call on a file or a directory.
+pub(crate) fn unusable<'a>(
+    path: &'a Path,
+    action: &'static str,
+) -> impl FnOnce(std::io::Error) -> ChannelError + 'a {
+    move |source| match source.raw_os_error().map(Errno::from_raw_os_error) {
+        Some(Errno::MFILE | Errno::NFILE) => {
+            ChannelError::OpenFiles { limit: getrlimit(Resource::Nofile).current }
+        }
+        _ => ChannelError::Directory { path: path.to_path_buf(), action, source },
+    }
+}
+
+/// Refuses a directory that others use: closing it to them would harm the system.
+fn require_own(root: &Path) -> Result<(), ChannelError> {
+    // What is not there, or cannot be looked at, is made or refused next.
+    let Ok(attributes) = std::fs::metadata(root) else { return Ok(()) };
+    let is_private = attributes.mode() & 0o077 == 0;
+    let is_used = || std::fs::read_dir(root).is_ok_and(|mut it| it.next().is_some());
+    let is_of_the_system = || {
+        attributes.mode() & 0o1000 != 0
+            || root.canonicalize().is_ok_and(|it| it.components().count() <= 2)
+    };
+    if attributes.is_dir()
+        && !is_private
+        && !root.join(TRAINS).is_dir()
+        && (is_used() || is_of_the_system())
+    {
+        return Err(ChannelError::RootShared { path: root.into() });
+    }
+    Ok(())
+}
+
 /// Opens a file of this user alone for reading and writing, and makes it when it is not there.
 pub(crate) fn open_private(path: &Path) -> std::io::Result<File> {
     let mut options = OpenOptions::new();
@@ -122,23 +194,18 @@ pub(crate) fn open_private(path: &Path) -> std::io::Result<File> {
 
 /// Makes a directory for this user only; an existing one must belong to this user.
 fn make_private_directory(path: &Path) -> Result<(), ChannelError> {
-    let failed =
-        |action| move |source| ChannelError::Directory { path: path.to_path_buf(), action, source };
+    let failed = |action| unusable(path, action);
     DirBuilder::new()
         .recursive(true)
         .mode(0o700)
         .create(path)
         .map_err(failed("making the directory"))?;
     let attributes = std::fs::metadata(path).map_err(failed("looking at the directory"))?;
-    let owner = std::os::unix::fs::MetadataExt::uid(&attributes);
+    let owner = attributes.uid();
     if owner != rustix::process::geteuid().as_raw() {
-        let source = std::io::Error::new(
-            std::io::ErrorKind::PermissionDenied,
-            format!("it belongs to user {owner}"),
-        );
-        return Err(failed("using the directory")(source));
+        return Err(ChannelError::RootOfAnother { path: path.into(), owner });
     }
-    if attributes.permissions().mode() & 0o077 != 0 {
+    if attributes.mode() & 0o077 != 0 {
         std::fs::set_permissions(path, Permissions::from_mode(0o700))
             .map_err(failed("closing the directory to other users"))?;
     }
@@ -158,11 +225,45 @@ mod tests {
     }
 
     #[test]
-    fn roots_of_other_names_have_other_segments() {
+    fn each_directory_has_segments_of_its_own_by_whatever_name() {
         let parent = tempfile::tempdir().unwrap();
         let one = Host::at(&parent.path().join("one")).unwrap();
         let other = Host::at(&parent.path().join("other")).unwrap();
         assert_ne!(one.segment_prefix(), other.segment_prefix());
+        std::os::unix::fs::symlink(one.root(), parent.path().join("link")).unwrap();
+        for spelling in ["one/", "./one", "link", "other/../one"] {
+            let same = Host::at(&parent.path().join(spelling)).unwrap();
+            assert_eq!(same.segment_prefix(), one.segment_prefix(), "{spelling}");
+        }
+        std::fs::rename(one.root(), parent.path().join("gone")).unwrap();
+        assert!(matches!(one.require_root(), Err(ChannelError::RootGone { .. })));
+    }
+
+    #[test]
+    fn a_root_may_be_as_long_as_the_system_lets_it() {
+        let parent = tempfile::tempdir().unwrap();
+        let mut root = parent.path().to_path_buf();
+        while root.as_os_str().len() < ROOT_BYTES_MAX - 101 {
+            root.push("d".repeat(100));
+        }
+        let host = Host::at(&root).unwrap();
+        assert!(host.transport_directory().as_os_str().len() < 40);
+        let message = Host::at(&root.join("d".repeat(101))).unwrap_err().to_string();
+        assert!(message.contains("bytes long, at most 4000"), "{message}");
+    }
+
+    #[test]
+    fn a_directory_that_others_use_is_refused_and_stays_as_it_was() {
+        let parent = tempfile::tempdir().unwrap();
+        let used = parent.path().join("used");
+        std::fs::create_dir_all(used.join("of others")).unwrap();
+        std::fs::set_permissions(&used, Permissions::from_mode(0o755)).unwrap();
+        let message = Host::at(&used).unwrap_err().to_string();
+        assert!(message.contains("a directory of its own"), "{message}");
+        assert_eq!(std::fs::metadata(&used).unwrap().mode() & 0o777, 0o755);
+        for system in ["/", "/tmp", "/dev/shm", "/usr", "/tmp/../usr/"] {
+            assert!(require_own(Path::new(system)).is_err(), "{system}");
+        }
     }
 
     #[test]

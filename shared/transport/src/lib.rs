@@ -12,6 +12,7 @@ pub mod channel;
 pub mod clock;
 pub mod error;
 pub mod host;
+mod identity;
 pub mod peer;
 
 pub use announcement::{Announcement, Role};

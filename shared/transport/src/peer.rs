@@ -7,14 +7,16 @@
 
 use std::fs::{File, TryLockError};
 use std::io::{Read, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
-use dynocar_shared::TrainId;
+use dynocar_shared::{ParameterSnapshot, TrainId};
 
 use crate::announcement::{Announcement, Role};
+use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
-use crate::host::{Host, open_private};
+use crate::host::{Host, open_private, unusable};
+use crate::identity::{identity, identity_of};
 
 /// What is known of the other side.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,8 +36,9 @@ impl Peer {
     ///
     /// # Errors
     ///
-    /// When the announcement exists but cannot be read.
+    /// When the announcement exists but cannot be read, or the root directory is gone.
     pub fn look_up(host: &Host, train: TrainId, role: Role) -> Result<Peer, ChannelError> {
+        host.require_root()?;
         let path = announcement_path(host, train, role);
         let file = match File::open(&path) {
             Ok(file) => file,
@@ -80,11 +83,7 @@ impl Peer {
     /// [`ChannelError::IncompatiblePeer`] when the peer is incompatible.
     pub fn require_compatible(self, train: TrainId, our_role: Role) -> Result<Peer, ChannelError> {
         match self {
-            Peer::Incompatible(theirs) => Err(ChannelError::IncompatiblePeer {
-                train,
-                theirs: Box::new(theirs),
-                ours: Box::new(Announcement::of_this_process(our_role)),
-            }),
+            Peer::Incompatible(theirs) => Err(ChannelError::of_peer(train, theirs, our_role)),
             peer => Ok(peer),
         }
     }
@@ -93,7 +92,8 @@ impl Peer {
 /// Holds a role for a train; dropping it, or dying, gives the role back.
 #[derive(Debug)]
 pub struct RoleLock {
-    _file: File,
+    file: LockedFile,
+    path: PathBuf,
 }
 
 /// A look-up holds the lock for a moment; a claim waits that long before it believes a refusal.
@@ -122,23 +122,36 @@ impl RoleLock {
                 }
             }
         }
-        let text = Announcement::of_this_process(role).to_text();
+        // Prefix and size are for those who read from outside, by the transport alone.
+        let text = Announcement::of_this_process(role).to_text()
+            + &format!(
+                "segments={}\nsnapshot_bytes={}\n",
+                host.segment_prefix(),
+                size_of::<ParameterSnapshot>()
+            );
         file.set_len(0)
             .and_then(|()| file.write_all(text.as_bytes()))
             .map_err(unusable(&path, "writing"))?;
-        Ok(RoleLock { _file: file })
+        Ok(RoleLock { file: LockedFile::new(file), path })
+    }
+
+    /// Requires that others find the announcement where they look for it.
+    ///
+    /// # Errors
+    ///
+    /// [`ChannelError::RootGone`] when somebody removed it.
+    pub fn require_there(&self, host: &Host) -> Result<(), ChannelError> {
+        let is_same =
+            || Some(identity_of(&self.path).ok()? == identity(&self.file.metadata().ok()?));
+        match is_same() {
+            Some(true) => host.require_root(),
+            _ => Err(ChannelError::RootGone { path: self.path.clone() }),
+        }
     }
 }
 
 fn announcement_path(host: &Host, train: TrainId, role: Role) -> PathBuf {
     host.trains_directory().join(format!("{train}.{role}"))
-}
-
-fn unusable<'a>(
-    path: &'a Path,
-    action: &'static str,
-) -> impl FnOnce(std::io::Error) -> ChannelError + 'a {
-    move |source| ChannelError::Directory { path: path.to_path_buf(), action, source }
 }
 
 /// `None` while the holder is still writing.

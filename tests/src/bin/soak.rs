@@ -13,7 +13,7 @@ use dynocar_tests::soak::arguments::{Arguments, Command, Months, Rounds};
 use dynocar_tests::soak::bad_samples::{Scene, Tally};
 use dynocar_tests::soak::months::story::Span;
 use dynocar_tests::soak::months::{self, Life, LifeSettings, Story, mistakes};
-use dynocar_tests::soak::{Programs, day, faults, hostile, load, state_kills};
+use dynocar_tests::soak::{Programs, day, faults, hostile, load, starts, state_kills};
 
 /// Tallies by the kind of estimator and whether sensors failed.
 type Tallies = BTreeMap<(String, bool), Tally>;
@@ -44,6 +44,10 @@ fn main() -> ExitCode {
         }
         Command::Hostile(Rounds { rounds, seed }) => {
             hostile::measure(&programs, rounds, seed).iter().for_each(|it| say(format!("{it:?}")));
+        }
+        Command::Starts(Rounds { rounds, seed }) => {
+            let summary = starts::run(&programs, rounds, seed);
+            say(format!("{rounds} roots: {summary:?}"));
         }
         Command::State(Rounds { rounds, seed }) => {
             let states = state_kills::kill_writers(&programs.peer, rounds, seed);

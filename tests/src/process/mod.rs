@@ -10,6 +10,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use dynocar::runtime::system::ends_with_this;
 use rustix::process::{Pid, Signal, kill_process};
 
 pub use site::Site;
@@ -28,7 +29,7 @@ pub struct Process {
 impl Process {
     /// Starts a program whose standard error goes into a file.
     fn start(mut command: Command, errors: PathBuf) -> Process {
-        let mut child = command
+        let mut child = ends_with_this(&mut command)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(File::create(&errors).expect("a file for standard error"))
@@ -47,7 +48,7 @@ impl Process {
 
     /// Starts a program whose streams go elsewhere.
     fn of(mut command: Command) -> Process {
-        let child = command.spawn().expect("the program to start");
+        let child = ends_with_this(&mut command).spawn().expect("the program to start");
         Process { child, lines: Arc::default(), errors: PathBuf::new() }
     }
 

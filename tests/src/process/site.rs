@@ -161,6 +161,7 @@ impl Drop for Site {
             // A file that another process removes first is gone as well.
             let _ = std::fs::remove_file(Path::new("/dev/shm").join(name));
         }
+        let _ = std::fs::remove_dir_all(self.host().transport_directory());
     }
 }
 

@@ -57,14 +57,19 @@ impl Terminal {
         Terminal { near: near.into(), far, shown: Vec::new(), seen: 0 }
     }
 
-    /// Starts a program on it, with all three streams.
+    /// Starts a program on it, with all three streams; a terminal that draws, unless the command says otherwise.
     ///
     /// # Panics
     ///
     /// When it cannot be started.
     pub fn start(&self, mut command: Command, tie: Tie) -> Process {
         let stream = || Stdio::from(self.far.as_fd().try_clone_to_owned().expect("a handle"));
-        command.stdin(stream()).stdout(stream()).stderr(stream()).env("TERM", "xterm");
+        command.stdin(stream()).stdout(stream()).stderr(stream());
+        for (name, value) in [("TERM", "xterm"), ("LC_ALL", "C.UTF-8")] {
+            if !command.get_envs().any(|it| it.0 == name) {
+                command.env(name, value);
+            }
+        }
         // SAFETY: between fork and exec only system calls are made.
         unsafe { command.pre_exec(move || bind(tie)) };
         Process::of(command)

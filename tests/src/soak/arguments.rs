@@ -58,6 +58,8 @@ pub enum Command {
     },
     /// Garbage into each kind of segment; prints who survives
     Hostile(Rounds),
+    /// `kill -9` of daemon, controller and client while they start, ten starts a round
+    Starts(Rounds),
     /// `kill -9` while a state file is written
     State(Rounds),
     /// Every pipeline under every failure of its sensors, a simulated scene each round; prints the

@@ -11,6 +11,7 @@
 //! - [`hostile`]: garbage written into shared memory
 //! - [`load`]: eight trains for hours, with faults
 //! - [`months`]: months of one train: learning, trying, adopting, taking back
+//! - [`starts`]: `kill -9` of daemon, controller and client while they start
 //! - [`state_kills`]: `kill -9` while a state file is written
 
 pub mod arguments;
@@ -20,6 +21,7 @@ pub mod faults;
 pub mod hostile;
 pub mod load;
 pub mod months;
+pub mod starts;
 pub mod state_kills;
 
 use std::path::{Path, PathBuf};

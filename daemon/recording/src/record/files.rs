@@ -13,8 +13,9 @@ use dynocar_transport::monotonic_now_ns;
 use mcap::McapError;
 
 use super::configuration::Configuration;
-use super::housekeeping::{Housekeeper, Rotation, Task, next};
+use super::housekeeping::{Housekeeper, Rotation, Task};
 use super::keeping::{self, Keeper};
+use super::ring::next;
 use super::{RecordError, Recorded};
 use crate::event::{Event, EventKind};
 use crate::topic::Message;

@@ -3,19 +3,20 @@
 //! A disk may take seconds for each of these. They are done in the order in which they were asked for, in a
 //! thread of their own while a recorder runs, so that nobody who records waits for them.
 //!
-//! The files of a recording that rotates: their names, and which of them go.
+//! Which files of a recording that rotates go.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use dynocar::output::report_line;
 use dynocar::storage::{SharedStorage, Storage, settle};
 
 use super::keeping::{KeepError, Keeper};
+use super::ring::{Aged, Ages};
 use crate::event::Event;
 
 /// What is to be done.
@@ -68,6 +69,7 @@ struct Housekeeping {
     output: PathBuf,
     rotation: Rotation,
     keeper: Option<Keeper>,
+    ages: Ages,
     progress: Arc<Progress>,
     /// The file whose name is on the disk.
     named: PathBuf,
@@ -90,10 +92,14 @@ impl Housekeeping {
                 }
                 self.progress.is_settling.store(false, Ordering::Release);
             }
-            Task::Begun { file } => self.keep(|keeper, _| keeper.begun(&file)),
+            Task::Begun { file } => {
+                self.ages.note_ended(&self.output, &file);
+                self.keep(|keeper, _| keeper.begun(&file));
+            }
             Task::Keep { event } => self.keep(|keeper, files| keeper.keep(&event, files)),
             Task::RemoveOldest { written } => {
-                remove_oldest(&*self.storage, &self.output, &written, self.rotation);
+                let files = self.ages.of_files(&self.output);
+                remove_oldest(&*self.storage, &files, &written, self.rotation);
             }
         }
     }
@@ -108,9 +114,9 @@ impl Housekeeping {
     }
 
     /// A problem of keeping is reported, and stops nothing.
-    fn keep(&mut self, work: impl FnOnce(&mut Keeper, &[PathBuf]) -> Result<(), KeepError>) {
+    fn keep(&mut self, work: impl FnOnce(&mut Keeper, &[Aged]) -> Result<(), KeepError>) {
         let Some(keeper) = &mut self.keeper else { return };
-        let files: Vec<PathBuf> = numbered(&self.output).into_iter().map(|it| it.1).collect();
+        let files = self.ages.of_files(&self.output);
         if let Err(problem) = work(keeper, &files) {
             report_line(&problem.to_string());
         }
@@ -145,6 +151,7 @@ impl Housekeeper {
             output: output.into(),
             rotation,
             keeper,
+            ages: Ages::of_what_is_there(output),
             progress: Arc::clone(&progress),
             named: PathBuf::new(),
             is_failure_reported: false,
@@ -221,46 +228,16 @@ impl Rotation {
     }
 }
 
-/// The files of a rotating recording with their numbers, the oldest first.
-pub fn numbered(output: &Path) -> Vec<(u64, PathBuf)> {
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned() + "-";
-    let number_of = |path: &Path| {
-        let name = path.file_name()?.to_str()?.strip_prefix(&stem)?.strip_suffix(".mcap")?;
-        (name.len() == DIGITS).then(|| name.parse().ok())?
-    };
-    let folder = dynocar::storage::folder_of(output);
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<(u64, PathBuf)> =
-        entries.filter_map(|it| Some((number_of(&it.path())?, it.path()))).collect();
-    files.sort();
-    files
-}
-
-/// Digits of a file's number.
-const DIGITS: usize = 6;
-
-/// The name of the next file: `run-000007.mcap` for `run.mcap`.
-pub fn next(output: &Path) -> PathBuf {
-    let number = numbered(output).last().map_or(1, |newest| newest.0 + 1);
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    output.with_file_name(format!("{stem}-{number:0DIGITS$}.mcap"))
-}
-
 /// Removes the files that are too old, and the oldest until the rest takes no more than it may; never the
 /// one that is written.
-pub fn remove_oldest(storage: &dyn Storage, output: &Path, written: &Path, rotation: Rotation) {
+pub fn remove_oldest(storage: &dyn Storage, files: &[Aged], written: &Path, rotation: Rotation) {
     let most = rotation.keep_bytes.unwrap_or(u64::MAX);
-    let oldest = rotation.keep_age.and_then(|age| SystemTime::now().checked_sub(age));
-    let found = |(_, path): (u64, PathBuf)| {
-        let known = std::fs::metadata(&path).ok()?;
-        Some((known.modified().ok()?, known.len(), path))
-    };
-    let files: Vec<_> = numbered(output).into_iter().filter_map(found).collect();
-    let mut total: u64 = files.iter().map(|it| it.1).sum();
-    for (modified, length, path) in files.iter().filter(|it| it.2 != written) {
-        let is_too_old = oldest.is_some_and(|oldest| *modified < oldest);
+    let length_of = |path: &Path| std::fs::metadata(path).map_or(0, |it| it.len());
+    let mut total: u64 = files.iter().map(|it| length_of(&it.path)).sum();
+    for Aged { path, age } in files.iter().filter(|it| it.path != written) {
+        let is_too_old = rotation.keep_age.is_some_and(|most| *age > most);
         if total > most || is_too_old {
-            total -= length;
+            total -= length_of(path);
             // One that cannot be removed is reported when the disk is full.
             let _ = storage.remove(path);
         }

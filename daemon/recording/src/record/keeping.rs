@@ -8,13 +8,14 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime};
 
 use dynocar::output::{report_line, write_file};
 use dynocar::storage::{SharedStorage, StorageError};
 use dynocar_shared::Status;
 
 use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes, unix_s};
+use super::ring::Aged;
 use crate::event::{Event, EventKind};
 
 /// Beside the ring: what is kept.
@@ -75,6 +76,8 @@ pub struct Keeper {
     keeping: Keeping,
     /// The newest event, which goes on until its end.
     open: Option<(PathBuf, KeptEvent)>,
+    /// When that is, by the clock that nobody sets.
+    until: Instant,
     is_full_reported: bool,
     /// No other recorder writes here.
     _lock: File,
@@ -147,26 +150,33 @@ impl Keeper {
         })?;
         forget_unfinished(&ring.join(KEPT_FOLDER));
         let open = kept_event::newest(&ring.join(KEPT_FOLDER));
+        // By its account, but never later than if it had begun now.
+        let left = open
+            .as_ref()
+            .map_or(0, |it| it.1.until_unix_s.saturating_sub(unix_s(SystemTime::now())));
+        let until = Instant::now() + Duration::from_secs(left).min(keeping.after);
+        let open = open.filter(|_| left > 0);
         Ok(Keeper {
             storage,
             ring: ring.into(),
             keeping,
             open,
+            until,
             is_full_reported: false,
             _lock: lock,
         })
     }
 
-    /// Keeps the files that reach back from now by no more than is kept before a moment; `files` are all of
-    /// the ring, the oldest first.
+    /// Keeps the files that reach back by no more than is kept before a moment; `files` are all of the ring,
+    /// the oldest first.
     ///
     /// # Errors
     ///
     /// When a file cannot be kept.
-    pub fn keep(&mut self, event: &Event, files: &[PathBuf]) -> Result<(), KeepError> {
+    pub fn keep(&mut self, event: &Event, files: &[Aged]) -> Result<(), KeepError> {
         let now = SystemTime::now();
         let reason = Reason::of(event, now);
-        let open = self.open.take().filter(|it| it.1.is_open(now));
+        let open = self.take_open();
         let is_new = open.is_none();
         let (folder, mut event) =
             open.unwrap_or_else(|| (self.new_folder(&reason), KeptEvent::default()));
@@ -176,10 +186,11 @@ impl Keeper {
         if is_news {
             event.reasons.push(reason);
         }
+        self.until = Instant::now() + self.keeping.after;
         let until_unix_s = unix_s(now + self.keeping.after);
         let is_longer = std::mem::replace(&mut event.until_unix_s, until_unix_s) != until_unix_s;
         let kept = match is_new {
-            true => self.make(&folder, &event, &self.near(now, files)),
+            true => self.make(&folder, &event, &self.near(files)),
             false if is_news || is_longer => Ok(event.write(&self.storage, &folder)?),
             false => Ok(()),
         };
@@ -191,17 +202,17 @@ impl Keeper {
         kept
     }
 
-    /// The files that reach back from now by no more than is kept before a moment, and the newest: it is being
-    /// written, whenever that was last.
-    fn near(&self, now: SystemTime, files: &[PathBuf]) -> Vec<PathBuf> {
-        let from = now.checked_sub(self.keeping.before).unwrap_or(UNIX_EPOCH);
-        let is_near = |path: &&PathBuf| {
-            let modified = fs::metadata(path).and_then(|it| it.modified());
-            modified.is_ok_and(|it| it >= from)
-        };
+    /// The newest event, unless it is at its end.
+    fn take_open(&mut self) -> Option<(PathBuf, KeptEvent)> {
+        self.open.take().filter(|_| Instant::now() < self.until)
+    }
+
+    /// The files that reach back by no more than is kept before a moment, and the newest: it is being written,
+    /// whenever that was last.
+    fn near(&self, files: &[Aged]) -> Vec<PathBuf> {
         let newest = files.len().saturating_sub(1);
-        let (older, newest) = files.split_at(newest);
-        older.iter().filter(is_near).chain(newest).cloned().collect()
+        let is_near = |it: &(usize, &Aged)| it.0 == newest || it.1.age <= self.keeping.before;
+        files.iter().enumerate().filter(is_near).map(|it| it.1.path.clone()).collect()
     }
 
     /// Makes an event: it takes its name when all of it is on the disk.
@@ -231,7 +242,7 @@ impl Keeper {
     ///
     /// When it cannot be kept.
     pub fn begun(&mut self, file: &Path) -> Result<(), KeepError> {
-        self.open = self.open.take().filter(|it| it.1.is_open(SystemTime::now()));
+        self.open = self.take_open();
         let Some((folder, _)) = &self.open else { return Ok(()) };
         let folder = folder.clone();
         self.link(file, &folder)?;

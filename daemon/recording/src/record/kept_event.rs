@@ -38,11 +38,6 @@ pub struct Reason {
 }
 
 impl KeptEvent {
-    /// True until its end.
-    pub fn is_open(&self, now: SystemTime) -> bool {
-        unix_s(now) <= self.until_unix_s
-    }
-
     /// Brings the account to the disk, with all names in the folder.
     ///
     /// # Errors

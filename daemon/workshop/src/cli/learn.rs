@@ -68,7 +68,7 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
         return Err(Failure::Input(format!("{runs}: expected the folder of recorded runs")));
     }
     let store = dynocar::cli::models::store(arguments.models.as_deref(), Some(&config))?;
-    start_log(&config)?;
+    let _log = start_log(&config)?;
     let stop = ending::flag().map_err(Failure::work)?;
     let settings = LearnerSettings {
         store,

@@ -6,6 +6,7 @@
 
 mod count;
 mod ports;
+pub(crate) mod process;
 mod service;
 mod transport;
 mod users;
@@ -14,6 +15,7 @@ mod wire;
 
 pub use count::SampleCount;
 pub use ports::{Ends, Receiver, Sender};
+pub use process::Owner;
 pub use transport::Transport;
 pub use wake::{Sleeper, Waker};
 pub use wire::{Payload, Wire};

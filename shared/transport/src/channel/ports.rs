@@ -13,6 +13,7 @@ use iceoryx2::prelude::{BackpressureStrategy, ipc};
 use super::service::{Entrance, no_place_left};
 use super::users::Users;
 use super::wire::{Payload, Wire};
+use crate::channel::process::Owned;
 use crate::error::{ChannelError, SendRefused};
 
 /// What a sender asks of its port.
@@ -55,7 +56,7 @@ fn refused<T: Payload>(train: TrainId, port: &str, reason: impl Debug) -> Channe
 /// The sending end of a channel.
 #[derive(Debug)]
 pub struct Sender<T: Payload> {
-    port: Box<dyn Send<T>>,
+    port: Owned<Box<dyn Send<T>>>,
     _users: Arc<Users>,
 }
 
@@ -76,7 +77,7 @@ pub(super) fn open_sender<T: Payload>(
             }
             error => refused::<T>(train, "sender", error),
         })?;
-    Ok(Sender { port: Box::new(publisher), _users: Arc::clone(&entrance.users) })
+    Ok(Sender { port: Owned::new(Box::new(publisher)), _users: Arc::clone(&entrance.users) })
 }
 
 impl<T: Payload> Sender<T> {
@@ -84,26 +85,29 @@ impl<T: Payload> Sender<T> {
     ///
     /// # Errors
     ///
-    /// When the transport refuses, for instance because the shared memory is full.
+    /// When the transport refuses, for instance because the shared memory is full; in a child that was
+    /// forked since.
     ///
     /// # Real-time
     ///
     /// No system call, save when a receiver has come or gone since. The transport takes one
     /// reference count of fixed size from the heap and gives it back within the call.
     pub fn send(&self, message: &T) -> Result<(), SendRefused> {
-        self.port.send(message)
+        self.port.own().ok_or(SendRefused)?.send(message)
     }
 
     /// Hands the history to receivers that have come since the last message.
     pub fn serve_newcomers(&self) {
-        self.port.serve_newcomers();
+        if let Some(port) = self.port.own() {
+            port.serve_newcomers();
+        }
     }
 }
 
 /// The receiving end of a channel.
 #[derive(Debug)]
 pub struct Receiver<T: Payload> {
-    port: Box<dyn Receive<T>>,
+    port: Owned<Box<dyn Receive<T>>>,
     _users: Arc<Users>,
 }
 
@@ -123,19 +127,19 @@ pub(super) fn open_receiver<T: Payload>(
             }
             error => refused::<T>(train, "receiver", error),
         })?;
-    Ok(Receiver { port: Box::new(subscriber), _users: Arc::clone(&entrance.users) })
+    Ok(Receiver { port: Owned::new(Box::new(subscriber)), _users: Arc::clone(&entrance.users) })
 }
 
 impl<T: Payload> Receiver<T> {
     /// Takes the next message, copied out of the shared memory; `None` when there is none.
     ///
-    /// A sender that cannot be connected counts as silent.
+    /// A sender that cannot be connected counts as silent; in a child that was forked since, all are.
     ///
     /// # Real-time
     ///
     /// No system call and no allocation, save when a sender has come or gone since.
     pub fn receive(&self) -> Option<T> {
-        self.port.next()
+        self.port.own()?.next()
     }
 }
 

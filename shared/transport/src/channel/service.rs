@@ -10,7 +10,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use dynocar_shared::TrainId;
-use iceoryx2::prelude::{Node, ServiceName, ipc};
+use iceoryx2::node::{NodeState, NodeView};
+use iceoryx2::prelude::{MessagingPattern, Node, Service, ServiceName, ipc};
 use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
@@ -18,6 +19,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::users::Users;
 use super::wire::{Payload, Wire};
+use crate::channel::process::Owned;
 use crate::error::ChannelError;
 
 /// How long a service that is being made or destroyed by another process is waited for.
@@ -43,6 +45,7 @@ impl Entrance {
         let name = ServiceName::new(&text).map_err(|error| refused(format!("{error:?}")))?;
         let start = Instant::now();
         loop {
+            let making = self.users.begin_making()?;
             let result = self
                 .node
                 .get()
@@ -56,6 +59,7 @@ impl Entrance {
                 .max_subscribers(T::RECEIVERS_MAX)
                 .max_nodes(T::SENDERS_MAX + T::RECEIVERS_MAX)
                 .open_or_create();
+            drop(making);
             match result {
                 Ok(service) => return Ok(service),
                 Err(error) if is_settling(&error) && start.elapsed() < SETTLING_TIME => {
@@ -64,10 +68,50 @@ impl Entrance {
                 Err(PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(
                     PublishSubscribeOpenError::ExceedsMaxNumberOfNodes,
                 )) => return Err(no_place_left::<T>(train, T::SENDERS_MAX + T::RECEIVERS_MAX)),
+                Err(error) if is_of_a_stranger(&error) => {
+                    let users = self.strangers_of(&name);
+                    return Err(ChannelError::Stranger { service: text, users });
+                }
                 Err(error) => return Err(refused(explain(&error))),
             }
         }
     }
+
+    /// The processes that use a service, by their programs.
+    fn strangers_of(&self, name: &ServiceName) -> String {
+        let pattern = MessagingPattern::PublishSubscribe;
+        let details = ipc::Service::details(name, self.node.get().config(), pattern);
+        let dynamic = details.ok().flatten().and_then(|it| it.dynamic_details);
+        let nodes = dynamic.map(|it| it.nodes).unwrap_or_default();
+        let known = nodes.iter().filter_map(|node| match node {
+            NodeState::Alive(view) => view.details().as_ref(),
+            _ => None,
+        });
+        let users: Vec<String> = known
+            .map(|it| format!("{} (process {})", it.executable(), it.process_id().value()))
+            .collect();
+        if users.is_empty() { "a process that is gone".into() } else { users.join(", ") }
+    }
+}
+
+/// True where the service was made with other settings than ours.
+fn is_of_a_stranger(error: &PublishSubscribeOpenOrCreateError) -> bool {
+    use PublishSubscribeOpenError as Open;
+    let PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(error) = error else {
+        return false;
+    };
+    matches!(
+        error,
+        Open::IncompatibleMessagingPattern
+            | Open::IncompatibleAttributes
+            | Open::DoesNotSupportRequestedMinBufferSize
+            | Open::DoesNotSupportRequestedMinHistorySize
+            | Open::DoesNotSupportRequestedMinSubscriberBorrowedSamples
+            | Open::DoesNotSupportRequestedAmountOfPublishers
+            | Open::DoesNotSupportRequestedAmountOfSubscribers
+            | Open::DoesNotSupportRequestedAmountOfNodes
+            | Open::IncompatibleOverflowBehavior
+    )
 }
 
 /// The refusal where every place of a channel is taken.
@@ -123,7 +167,7 @@ fn explain(error: &PublishSubscribeOpenOrCreateError) -> String {
 
 /// Something of the transport's that is dropped by code of this crate.
 #[derive(Debug)]
-pub(super) struct Held<P>(Box<dyn Hold<P>>);
+pub(super) struct Held<P>(Owned<Box<dyn Hold<P>>>);
 
 trait Hold<P>: Debug {
     fn held(&self) -> &P;
@@ -140,7 +184,7 @@ impl<P: Debug> Hold<P> for Holder<P> {
 
 impl<P: Debug + 'static> Held<P> {
     pub(super) fn new(held: P) -> Self {
-        Held(Box::new(Holder(held)))
+        Held(Owned::new(Box::new(Holder(held))))
     }
 
     pub(super) fn get(&self) -> &P {

@@ -34,6 +34,7 @@ impl Transport {
         let users = Users::enter(host)?;
         users.require_free_memory()?;
         let name = NodeName::new(name).map_err(|error| refused(format!("{error:?}")))?;
+        let making = users.begin_making()?;
         let node = NodeBuilder::new()
             .name(&name)
             .config(&host.transport_config()?)
@@ -41,6 +42,7 @@ impl Transport {
             .create::<ipc::Service>()
             .map_err(|error| refused(format!("{error:?}")))?;
         users.close_to_others();
+        drop(making);
         let entrance = Entrance { node: Held::new(node), users: Arc::new(users) };
         Ok(Transport { entrance })
     }
@@ -70,6 +72,10 @@ impl Transport {
     /// When there is not enough.
     pub fn reserve(&self) -> Result<(), ChannelError> {
         self.entrance.users.reserve()
+    }
+
+    pub(super) fn users(&self) -> &Users {
+        &self.entrance.users
     }
 
     pub(super) fn node(&self) -> &Node<ipc::Service> {

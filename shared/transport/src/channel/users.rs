@@ -2,25 +2,32 @@
 //!
 //! The transport keeps one small segment for each run-time directory for good (it numbers the
 //! nodes), open to every user of the host. Here it is closed to others, and removed by the last
-//! process that leaves. Every port holds a shared lock; who can turn it into an exclusive one is
-//! alone, and nobody can come in until the lock is let go.
+//! process that leaves. Every port holds a shared lock on the root directory, which also keeps
+//! systemd-tmpfiles out of it; who can have an exclusive one is alone, and nobody can come in until
+//! the lock is let go. What processes left that were killed is removed by whoever comes in alone;
+//! while others are there, what was left half made is, by whoever makes the next service.
 
-use std::fs::{File, OpenOptions, Permissions, TryLockError};
+use std::fs::{OpenOptions, Permissions, TryLockError};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use iceoryx2::node::NodeState;
+use iceoryx2::prelude::{CallbackProgression, Node, ipc};
 use rustix::fs::FallocateFlags;
 
+use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
-use crate::host::{Host, open_private};
+use crate::host::{Host, open_private, unusable};
+use crate::identity::SHARED_MEMORY;
 
-/// Where the system keeps shared memory by name.
-pub const SHARED_MEMORY: &str = "/dev/shm";
 /// How the segment's name ends.
 const SUFFIX: &str = ".global_mgmt";
 /// How the names of the pages end that count samples, see [`super::SampleCount`].
 pub const COUNT_SUFFIX: &str = ".count";
+/// The modes of a service's description and of a segment that are not complete: the transport's.
+const DESCRIPTION_IN_MAKING: u32 = 0o600;
+const SEGMENT_IN_MAKING: u32 = 0o200;
 /// What a few ports take with their services and connections, with a margin.
 const FREE_BYTES_MIN: u64 = 4 << 20;
 /// The last one to leave tidies up within microseconds; a newcomer waits for it.
@@ -30,7 +37,9 @@ const PAUSE: Duration = Duration::from_millis(4);
 /// A user of the transport, until dropped.
 #[derive(Debug)]
 pub struct Users {
-    lock: File,
+    lock: LockedFile,
+    making: PathBuf,
+    host: Host,
     segment_prefix: String,
 }
 
@@ -41,20 +50,82 @@ impl Users {
     ///
     /// When the lock cannot be had.
     pub fn enter(host: &Host) -> Result<Self, ChannelError> {
-        let path = host.root().join("users.lock");
-        let failed = |action| {
-            let path = path.clone();
-            move |source| ChannelError::Directory { path, action, source }
+        let users = Users {
+            lock: LockedFile::new(host.open_root()?),
+            making: host.root().join("services.lock"),
+            host: host.clone(),
+            segment_prefix: host.segment_prefix(),
         };
-        let lock = open_private(&path).map_err(failed("opening"))?;
-        for _ in 0..TRIES {
-            match lock.try_lock_shared() {
-                Ok(()) => return Ok(Users { lock, segment_prefix: host.segment_prefix() }),
-                Err(TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
-                Err(TryLockError::Error(source)) => return Err(failed("locking")(source)),
+        if users.lock.try_lock().is_ok() && !users.has_strangers() {
+            users.remove_all();
+        }
+        // An exclusive lock becomes a shared one; another newcomer may come between, and finds nothing.
+        wait_for(|| users.lock.try_lock_shared()).map_err(unusable(host.root(), "locking"))?;
+        Ok(users)
+    }
+
+    /// Makes services and nodes one process at a time, after what a killed one left half made is gone;
+    /// until the file is dropped.
+    ///
+    /// # Errors
+    ///
+    /// When the lock cannot be had.
+    pub fn begin_making(&self) -> Result<LockedFile, ChannelError> {
+        let file = open_private(&self.making).map_err(unusable(&self.making, "opening"))?;
+        let file = LockedFile::new(file);
+        wait_for(|| file.try_lock()).map_err(unusable(&self.making, "locking"))?;
+        self.remove_half_made();
+        Ok(file)
+    }
+
+    /// Removes what dead processes left, where nobody lives; the count of samples goes on.
+    fn remove_all(&self) {
+        for segment in self.segments("") {
+            if segment.to_string_lossy().ends_with(COUNT_SUFFIX) {
+                continue;
+            }
+            // Somebody else's rubbish may stay.
+            let _ = std::fs::remove_file(segment);
+        }
+        let _ = std::fs::remove_dir_all(self.host.transport_directory());
+    }
+
+    /// True where a program lives that uses the transport without our lock: none of Dynocar's.
+    fn has_strangers(&self) -> bool {
+        let mut has_any = false;
+        if self.host.transport_directory().exists()
+            && let Ok(config) = self.host.transport_config()
+        {
+            // What cannot be listed is nobody's.
+            let _ = Node::<ipc::Service>::list(&config, |node| {
+                has_any |= matches!(node, NodeState::Alive(_));
+                CallbackProgression::Continue
+            });
+        }
+        has_any
+    }
+
+    /// Removes the descriptions of services whose maker, or remover, was killed. Nobody else makes one
+    /// meanwhile, and who is removing one has done so in a moment.
+    fn remove_half_made(&self) {
+        let half_made = || {
+            let mut services = files_of(&self.host.transport_directory().join("services"));
+            let segments = self.segments(".dynamic");
+            services.retain(|it| !is_complete(it, &segments));
+            services
+        };
+        let first = half_made();
+        if !first.is_empty() {
+            std::thread::sleep(5 * PAUSE);
+            for service in half_made().iter().filter(|it| first.contains(it)) {
+                let _ = std::fs::remove_file(service);
             }
         }
-        Err(failed("locking")(std::io::ErrorKind::TimedOut.into()))
+        for segment in self.segments(SUFFIX) {
+            if mode_of(&segment) == Some(SEGMENT_IN_MAKING) {
+                let _ = std::fs::remove_file(segment);
+            }
+        }
     }
 
     /// Refuses to go on when there is plainly too little memory. The transport makes its segments
@@ -103,13 +174,47 @@ impl Users {
 
     fn segments(&self, suffix: &str) -> Vec<PathBuf> {
         let is_ours = |name: &str| name.starts_with(&self.segment_prefix) && name.ends_with(suffix);
-        std::fs::read_dir(Path::new(SHARED_MEMORY))
-            .into_iter()
-            .flatten()
-            .filter_map(|entry| Some(entry.ok()?.path()))
-            .filter(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_ours))
-            .collect()
+        let mut segments = files_of(Path::new(SHARED_MEMORY));
+        segments
+            .retain(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_ours));
+        segments
     }
+}
+
+/// True for a description that is written, and whose segment is ready.
+fn is_complete(service: &Path, segments: &[PathBuf]) -> bool {
+    let number = |text: &str, key: &str| -> Option<u128> {
+        text.lines().find_map(|line| line.strip_prefix(key))?.parse().ok()
+    };
+    let segment = || {
+        let text = std::fs::read_to_string(service).ok()?;
+        let low = number(&text, "payload_value = ")?;
+        let name = format!("_{}.dynamic", (number(&text, "unique_value = ")? << 64) | low);
+        segments.iter().find(|it| it.to_string_lossy().ends_with(&name))
+    };
+    mode_of(service) != Some(DESCRIPTION_IN_MAKING)
+        && segment().is_some_and(|it| mode_of(it) != Some(SEGMENT_IN_MAKING))
+}
+
+fn mode_of(path: &Path) -> Option<u32> {
+    std::fs::metadata(path).ok().map(|it| it.permissions().mode() & 0o777)
+}
+
+fn files_of(directory: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(directory).into_iter().flatten();
+    entries.filter_map(|entry| Some(entry.ok()?.path())).collect()
+}
+
+/// Takes a lock that others hold for moments only.
+fn wait_for(lock: impl Fn() -> Result<(), TryLockError>) -> std::io::Result<()> {
+    for _ in 0..TRIES {
+        match lock() {
+            Ok(()) => return Ok(()),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
+            Err(TryLockError::Error(source)) => return Err(source),
+        }
+    }
+    Err(std::io::ErrorKind::TimedOut.into())
 }
 
 /// The refusal where shared memory is full.
@@ -123,9 +228,9 @@ pub fn full(free: u64, needed: u64) -> ChannelError {
 
 impl Drop for Users {
     fn drop(&mut self) {
-        if self.lock.try_lock().is_ok() {
-            for segment in self.segments(SUFFIX).into_iter().chain(self.segments(COUNT_SUFFIX)) {
-                // Somebody else's rubbish may stay.
+        if self.lock.own().is_some_and(|lock| lock.try_lock().is_ok()) && !self.has_strangers() {
+            self.remove_all();
+            for segment in self.segments(COUNT_SUFFIX) {
                 let _ = std::fs::remove_file(segment);
             }
         }

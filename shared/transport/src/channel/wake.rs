@@ -36,6 +36,7 @@ fn wake_service(transport: &Transport) -> Result<PortFactory<ipc::Service>, Chan
         reason,
     };
     let name = ServiceName::new(WAKE_SERVICE).map_err(|error| refused(format!("{error:?}")))?;
+    let _making = transport.users().begin_making()?;
     transport
         .node()
         .service_builder(&name)

@@ -1,0 +1,380 @@
+//! Hosts as they are: roots of any length and spelling, cleaners, logs that stand still, limits.
+//!
+//! Whatever mounts does so in a mount namespace of its own.
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use dynocar_client::{Host, SamplePublisher, SnapshotReader};
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::soak::{Programs, starts};
+use rustix::process::Signal;
+
+const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
+const SOAK: &str = env!("CARGO_BIN_EXE_dynocar-soak");
+const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
+const TRAIN: TrainId = TrainId(1);
+
+fn daemon_at(site: &Site, root: &Path) -> Process {
+    let config = site.write_config(1, "", ECHO);
+    let run = ["run", "--config", config.to_str().expect("UTF-8")];
+    site.start_with(DYNOCAR, &run, &[("DYNOCAR_ROOT", root.to_str().expect("UTF-8"))])
+}
+
+/// Publishes some samples under a root and waits until the daemon there has counted every one.
+fn drive(host: &Host, daemon: &Process) {
+    const SAMPLES: u64 = 50;
+    let mut publisher = SamplePublisher::open(host, TRAIN).unwrap();
+    let mut reader = SnapshotReader::open(host, TRAIN).unwrap();
+    for index in 0..SAMPLES {
+        let mut sample = TrainSample::empty(TRAIN).with(SampleField::Speed, 20.0);
+        sample.time_ns = index as i64 * 1_000_000;
+        publisher.publish(&mut sample).unwrap();
+    }
+    await_true(
+        || {
+            reader.poll();
+            let last = publisher.sequence();
+            reader.readings(0).any(|it| it.snapshot.sample_sequence == last)
+        },
+        || format!("the last sample: {}", daemon.errors()),
+    );
+    let it = *reader.readings(0).next().unwrap().snapshot;
+    // The daemon counts the train's samples, of all its controllers.
+    let counted = it.samples_used + it.samples_rejected;
+    assert_eq!((counted, it.samples_lost), (publisher.sequence(), 0));
+}
+
+/// A shell script in a mount namespace of its own; the reason, where this user may make none.
+fn in_namespace(script: &str) -> Result<Command, String> {
+    let probe =
+        Command::new("unshare").args(["-m", "mount", "-t", "tmpfs", "none", "/mnt"]).output();
+    let probe = probe.map_err(|error| format!("unshare: {error}"))?;
+    if !probe.status.success() {
+        return Err(String::from_utf8_lossy(&probe.stderr).into_owned());
+    }
+    let mut made = Command::new("unshare");
+    made.args(["-m", "sh", "-c", script]);
+    Ok(made)
+}
+
+#[test]
+fn a_root_of_any_length_serves_and_one_beyond_the_systems_limit_is_refused_with_its_length() {
+    let site = Site::new();
+    for length in [28, 31, 36, 64, 108, 140, 150, 255, 1000, 3900] {
+        let mut root = site.path().to_path_buf();
+        while root.as_os_str().len() < length {
+            let missing = length.saturating_sub(root.as_os_str().len() + 1).clamp(1, 200);
+            root.push("d".repeat(missing));
+        }
+        let mut daemon = daemon_at(&site, &root);
+        daemon.await_error("serving");
+        drive(&Host::at(&root).unwrap(), &daemon);
+        assert!(daemon.end(Signal::TERM).success(), "{length}: {}", daemon.errors());
+    }
+    let long = PathBuf::from(format!("/{}", "d/".repeat(2010)));
+    let mut daemon = daemon_at(&site, &long);
+    assert_eq!(daemon.wait().code(), Some(2));
+    assert!(daemon.errors().contains("4021 bytes long, at most 4000"), "{}", daemon.errors());
+    assert!(Host::at(&long).unwrap_err().to_string().contains("4021 bytes long"));
+}
+
+#[test]
+fn processes_that_are_killed_while_they_start_leave_every_root_servable() {
+    let programs = Programs { dynocar: DYNOCAR.into(), peer: PEER.into() };
+    println!("{:?}", starts::run(&programs, 8, 1));
+}
+
+#[test]
+fn every_spelling_of_a_directory_is_one_root() {
+    let site = Site::new();
+    let root = site.path().join("spelled");
+    let mut daemon = daemon_at(&site, &root);
+    daemon.await_error("serving");
+    std::os::unix::fs::symlink(&root, site.path().join("link")).unwrap();
+    for spelling in ["spelled/", "./spelled", "link", "link/../spelled/."] {
+        drive(&Host::at(&site.path().join(spelling)).unwrap(), &daemon);
+    }
+    assert!(daemon.end(Signal::TERM).success());
+}
+
+#[test]
+fn two_installations_of_one_path_that_share_memory_count_nothing_of_each_other() {
+    let site = Site::new();
+    let config = site.write_config(1, "", ECHO);
+    let (root, config) = (site.path().join("root"), config.display().to_string());
+    let root = root.display();
+    let installation = format!(
+        "mkdir -p {root} && mount -t tmpfs -o mode=700 none {root} && \
+         {{ {DYNOCAR} run --config {config} & daemon=$!; sleep 0.5; timeout 2 {PEER} controller 1 2000; \
+         kill $daemon; wait $daemon; }} 2>&1"
+    );
+    let start = || {
+        let mut command = in_namespace(&installation)?;
+        command.env("DYNOCAR_ROOT", root.to_string()).stdout(Stdio::piped());
+        command.env("XDG_STATE_HOME", site.path());
+        Ok::<_, String>(command.spawn().unwrap())
+    };
+    let both = match [start(), start()] {
+        [Ok(one), Ok(other)] => [one, other],
+        [Err(reason), _] | [_, Err(reason)] => return println!("not tried: {reason}"),
+    };
+    for installation in both {
+        let output = installation.wait_with_output().unwrap();
+        let log = String::from_utf8_lossy(&output.stdout);
+        let totals =
+            log.lines().find(|line| line.contains("stopped")).unwrap_or_else(|| panic!("{log}"));
+        assert!(totals.contains(" rejected=0") && !totals.contains("used=0"), "{log}");
+        // What a killed controller was handing over is lost.
+        assert!(totals.contains(" lost=0 ") || totals.contains(" lost=1 "), "{log}");
+    }
+}
+
+#[test]
+fn a_root_in_use_is_locked_as_cleaners_honour_it_and_one_that_was_removed_ends_the_daemon_in_words()
+{
+    let site = Site::new();
+    let root = site.path().join("aged");
+    let mut daemon = daemon_at(&site, &root);
+    daemon.await_error("serving");
+    // systemd-tmpfiles passes over a directory that it cannot lock (tmpfiles.d(5)).
+    assert!(File::open(&root).unwrap().try_lock().is_err());
+    let host = Host::at(&root).unwrap();
+    let reader = SnapshotReader::open(&host, TRAIN).unwrap();
+    std::fs::remove_dir_all(&root).unwrap();
+    assert_eq!(daemon.wait().code(), Some(1));
+    let said = daemon.errors();
+    assert_eq!(said.matches("was removed or replaced").count(), 1, "{said}");
+    assert!(reader.daemon().unwrap_err().to_string().contains("was removed or replaced"));
+    let mut next = daemon_at(&site, &root);
+    next.await_error("serving");
+    drive(&Host::at(&root).unwrap(), &next);
+    assert!(next.end(Signal::TERM).success());
+}
+
+#[test]
+fn a_daemon_whose_announcement_was_removed_ends_in_words() {
+    let site = Site::new();
+    let root = site.path().join("aged");
+    let mut daemon = daemon_at(&site, &root);
+    daemon.await_error("serving");
+    std::fs::remove_file(root.join("trains/1.daemon")).unwrap();
+    assert_eq!(daemon.wait().code(), Some(1));
+    assert!(daemon.errors().contains("1.daemon: the root directory was removed"));
+}
+
+#[test]
+fn a_log_that_nobody_takes_holds_neither_work_nor_end_up() {
+    let site = Site::new();
+    let config = site.write_config(1, "log = \"trace\"", ECHO);
+    let socket = site.path().join("notify");
+    let supervisor = std::os::unix::net::UnixDatagram::bind(&socket).unwrap();
+    supervisor.set_nonblocking(true).unwrap();
+    let (mut reader, mut writer) = std::io::pipe().unwrap();
+    // A neighbour has filled the pipe.
+    let flags = rustix::fs::fcntl_getfl(&writer).unwrap();
+    rustix::fs::fcntl_setfl(&writer, flags | rustix::fs::OFlags::NONBLOCK).unwrap();
+    while writer.write(&[b'.'; 1024]).is_ok() {}
+    rustix::fs::fcntl_setfl(&writer, flags).unwrap();
+    let mut command = site.command(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
+    command
+        .env("NOTIFY_SOCKET", &socket)
+        .env("WATCHDOG_USEC", "1000000")
+        .env_remove("WATCHDOG_PID");
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(writer);
+    let mut daemon = command.spawn().unwrap();
+    let mut fed = 0;
+    let mut await_food = |portions| {
+        let wanted = fed + portions;
+        await_true(
+            || {
+                let mut message = [0; 4096];
+                while let Ok(length) = supervisor.recv(&mut message) {
+                    let message = String::from_utf8_lossy(&message[..length]).into_owned();
+                    fed += usize::from(message.contains("WATCHDOG=1"));
+                }
+                fed >= wanted
+            },
+            || "the watchdog to be fed".into(),
+        );
+    };
+    await_food(2);
+    // Each of these is worth a line of the log.
+    for _ in 0..3 {
+        drop(SamplePublisher::open(&site.host(), TRAIN).unwrap());
+        await_food(2);
+    }
+    rustix::process::kill_process(
+        rustix::process::Pid::from_raw(daemon.id() as i32).unwrap(),
+        Signal::TERM,
+    )
+    .unwrap();
+    let mut status = None;
+    await_true(
+        || {
+            status = daemon.try_wait().unwrap();
+            status.is_some()
+        },
+        || "the daemon's end".into(),
+    );
+    drop(command);
+    assert!(status.unwrap().success());
+    let mut log = String::new();
+    reader.read_to_string(&mut log).unwrap();
+    assert!(log.starts_with("...."), "what was in the pipe before");
+}
+
+#[test]
+fn separate_shared_memories_are_named_with_what_containers_need() {
+    let site = Site::new();
+    let daemon = daemon_at(&site, site.host().root());
+    daemon.await_error("serving");
+    let script = format!(
+        "mount -t tmpfs none /dev/shm && {{ {PEER} client 1 1000; {DYNOCAR} health; echo status $?; }} 2>&1"
+    );
+    let mut command = match in_namespace(&script) {
+        Ok(command) => command,
+        Err(reason) => return println!("not tried: {reason}"),
+    };
+    let output = command.env("DYNOCAR_ROOT", site.host().root()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("SeparateMemory"), "{said}");
+    assert!(said.contains("a /dev/shm of its own") && said.contains("--ipc="), "{said}");
+    assert!(said.contains("status 5"), "{said}");
+}
+
+#[test]
+fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
+    let site = Site::new();
+    let config = site.write_config(1, "", ECHO);
+    let run = |limits: &str| {
+        let script = format!("{limits} && exec {DYNOCAR} run --config {}", config.display());
+        site.start("sh", &["-c", &script])
+    };
+    let read = |readers: &mut Vec<SnapshotReader>| {
+        readers.iter_mut().for_each(|it| {
+            it.poll();
+        });
+        readers.iter().filter(|it| it.readings(0).next().is_some()).count()
+    };
+    let host = site.host();
+    let mut raised = run("ulimit -Sn 40");
+    raised.await_error("serving");
+    let open = |_| SnapshotReader::open(&host, TRAIN).unwrap();
+    let mut readers: Vec<SnapshotReader> = (0..11).map(open).collect();
+    await_true(|| read(&mut readers) == 11, || format!("eleven readers: {}", raised.errors()));
+    assert!(raised.end(Signal::TERM).success());
+    drop(readers);
+    let mut scarce = run("ulimit -n 40");
+    await_true(
+        || scarce.errors().contains("serving") || scarce.try_wait().is_some(),
+        || "a start, or its refusal".into(),
+    );
+    let mut readers: Vec<SnapshotReader> = (0..11).map(open).collect();
+    await_true(
+        || {
+            read(&mut readers);
+            scarce.errors().contains("ulimit -n")
+        },
+        || format!("the cause: {}", scarce.errors()),
+    );
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    assert_eq!(scarce.errors().matches("ulimit -n").count(), 1, "{}", scarce.errors());
+}
+
+#[test]
+fn metrics_are_answered_beside_slow_peers_with_head_slash_and_query() {
+    let site = Site::new();
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let lines = format!("[metrics]\nlisten = \"{port}\"");
+    let config = site.write_config(1, "", &format!("{ECHO}{lines}\n"));
+    let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
+    daemon.await_error("serving");
+    let connect = || std::net::TcpStream::connect(port).unwrap();
+    let ask = |request: &str| {
+        let mut stream = connect();
+        stream.write_all(format!("{request} HTTP/1.1\r\nHost: x\r\n\r\n").as_bytes()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        answer
+    };
+    await_true(|| ask("GET /metrics").contains("dynocar_"), || "the first snapshot".into());
+    // Whoever is slow is not waited for: its own answer comes after those of the quick.
+    let mut slow = connect();
+    slow.write_all(b"GET /metrics HTTP/1.1\r\n").unwrap();
+    let quick = ask("GET /metrics/?x=1");
+    slow.write_all(b"\r\n").unwrap();
+    let mut answer = String::new();
+    slow.read_to_string(&mut answer).unwrap();
+    for answer in [&quick, &answer] {
+        assert!(answer.starts_with("HTTP/1.1 200 OK") && answer.contains("dynocar_"), "{answer}");
+    }
+    let head = ask("HEAD /metrics");
+    assert!(head.starts_with("HTTP/1.1 200 OK") && head.ends_with("\r\n\r\n"), "{head}");
+    assert!(ask("GET /other").starts_with("HTTP/1.1 404"));
+}
+
+/// Processes that a process started, whoever looks after them now.
+fn children_of(process: u32) -> Vec<String> {
+    let tasks = format!("/proc/{process}/task/{process}/children");
+    let children = std::fs::read_to_string(tasks).unwrap_or_default();
+    children.split_whitespace().map(str::to_owned).collect()
+}
+
+#[test]
+fn whoever_starts_processes_takes_them_along_however_it_ends() {
+    let is_running = |process: &String| {
+        let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+        stat.rsplit(") ").next().is_some_and(|it| !it.is_empty() && !it.starts_with('Z'))
+    };
+    for (program, arguments, signal) in [
+        (DYNOCAR, &["demo", "--rate", "20"][..], Signal::KILL),
+        (DYNOCAR, &["demo", "--rate", "20"], Signal::TERM),
+        (SOAK, &["faults", "--rounds", "100"], Signal::TERM),
+        (SOAK, &["faults", "--rounds", "100"], Signal::KILL),
+    ] {
+        let site = Site::new();
+        let mut process = site.start(program, arguments);
+        let mut children = Vec::new();
+        await_true(
+            || {
+                children = children_of(process.id());
+                children.len() >= 2
+            },
+            || format!("the children of {program} {arguments:?}: {}", process.errors()),
+        );
+        process.end(signal);
+        await_true(|| !children.iter().any(is_running), || format!("the end of {children:?}"));
+    }
+}
+
+#[test]
+fn a_root_of_another_user_says_how_to_ask_and_one_of_the_system_keeps_its_mode() {
+    let site = Site::new();
+    let root = site.path().join("of-another");
+    std::fs::create_dir(&root).unwrap();
+    if std::os::unix::fs::chown(&root, Some(65534), Some(65534)).is_ok() {
+        let variables = [("DYNOCAR_ROOT", root.to_str().unwrap())];
+        let mut health = site.start_with(DYNOCAR, &["health"], &variables);
+        assert_eq!(health.wait().code(), Some(1));
+        assert!(health.errors().contains("sudo -u '#65534'"), "{}", health.errors());
+    }
+    let script = format!(
+        "mount -t tmpfs -o mode=755 none /run && mkdir /run/lock && chmod 755 /run/lock && touch /run/lock/x && \
+         for root in /run /var/run /run/lock /tmp; do DYNOCAR_ROOT=$root {DYNOCAR} health; echo $?; \
+         stat -c %a $root/.; ls $root/. | grep -c trains; done"
+    );
+    match in_namespace(&script) {
+        Err(reason) => println!("not tried: {reason}"),
+        Ok(mut command) => {
+            let output = command.output().unwrap();
+            let said = String::from_utf8_lossy(&output.stdout);
+            let expected = ["1", "755", "0", "1", "755", "0", "1", "755", "0", "1", "1777", "0"];
+            assert_eq!(said.lines().collect::<Vec<_>>(), expected, "{output:?}");
+        }
+    }
+}
