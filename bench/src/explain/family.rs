@@ -4,6 +4,7 @@ use std::io;
 use std::path::Path;
 
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_tests::simulator::dataset_writer::{
@@ -24,6 +25,8 @@ pub struct Case {
     pub seed: u64,
     /// The world it happens in.
     pub world: World,
+    /// Number of runs, a quarter of them held out.
+    pub runs: usize,
 }
 
 impl Case {
@@ -34,7 +37,9 @@ impl Case {
 
     /// What the simulator is asked for.
     pub fn settings(&self) -> SimulatorSettings {
-        self.scenario.settings(self.seed, self.world)
+        let holdout_runs = (self.runs / 4).max(1);
+        let settings = self.scenario.settings(self.seed, self.world);
+        SimulatorSettings { runs: self.runs, holdout_runs, ..settings }
     }
 
     /// Writes the dataset, with its truth beside it, as `<kind>-<seed>` into a folder.
@@ -65,6 +70,9 @@ pub struct FamilyArguments {
     /// What is a little wrong besides the effect
     #[arg(long, value_enum, default_value_t = World::Plain)]
     world: World,
+    /// Runs of a dataset, a quarter of them held out
+    #[arg(long, default_value_t = 8, value_parser = RangedU64ValueParser::<usize>::new().range(2..))]
+    runs: usize,
     /// Datasets at a time
     #[arg(long, default_value_t = 2)]
     threads: usize,
@@ -89,9 +97,9 @@ impl FamilyArguments {
 
     /// Every scenario with every seed, scenario by scenario.
     pub fn cases(&self, scenarios: &[Scenario]) -> Vec<Case> {
-        let (first, world) = (self.first_seed, self.world);
+        let (first, world, runs) = (self.first_seed, self.world, self.runs);
         let seeds = move || first..first + self.seeds as u64;
-        let of = |&scenario| seeds().map(move |seed| Case { scenario, seed, world });
+        let of = |&scenario| seeds().map(move |seed| Case { scenario, seed, world, runs });
         scenarios.iter().flat_map(of).collect()
     }
 

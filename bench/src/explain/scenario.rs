@@ -15,6 +15,8 @@ pub enum World {
     Coupled,
     /// Weights, map, curve constant, winds, forces and wheels, all a little wrong at once.
     Rough,
+    /// The same, with another rotating mass and rounded gradients.
+    Rougher,
 }
 
 impl World {
@@ -24,6 +26,7 @@ impl World {
             World::Plain => Deviations::PLAIN,
             World::Coupled => Deviations::COUPLED,
             World::Rough => Deviations::ROUGH,
+            World::Rougher => Deviations::ROUGHER,
         }
     }
 
@@ -31,7 +34,7 @@ impl World {
     pub fn everyday(self) -> &'static [EffectKind] {
         match self {
             World::Plain | World::Coupled => &[],
-            World::Rough => &[
+            World::Rough | World::Rougher => &[
                 EffectKind::ActuatorDelay,
                 EffectKind::BearingTemperature,
                 EffectKind::CurveResistance,

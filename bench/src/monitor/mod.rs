@@ -24,9 +24,6 @@ use crate::statistics::median;
 pub struct MonitorArguments {
     #[command(flatten)]
     family: FamilyArguments,
-    /// Runs of a quarter of an hour in each dataset
-    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u16).range(2..))]
-    runs: u16,
 }
 
 impl MonitorArguments {
@@ -36,9 +33,9 @@ impl MonitorArguments {
     ///
     /// When there is no such kind, or the result cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
-        let (family, runs) = (&self.family, usize::from(self.runs));
+        let family = &self.family;
         let watched = family.over(&family.scenarios(Scenario::all())?, |case| {
-            let watched = watch(&simulate(&SimulatorSettings { runs, ..case.settings() }));
+            let watched = watch(&case.simulate());
             if family.verbose {
                 print_case(case, &watched);
             }

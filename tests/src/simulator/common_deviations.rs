@@ -17,6 +17,10 @@ pub struct CommonDeviations {
     pub speed_scale: f64,
     /// What cold bearings add at the start over the basic resistance, and their time constant in s.
     pub warming: (f64, f64),
+    /// What the declared rotating-mass factor lacks.
+    pub rotating_mass: f64,
+    /// Length in m over which the line rounds each step of its gradient.
+    pub vertical_curve_m: f64,
     /// Waves of the map's error: ‰, length in m, phase.
     waves: Vec<[f64; 3]>,
 }
@@ -48,7 +52,11 @@ impl CommonDeviations {
                 [each_permille, wave_m, random.uniform(0.0, std::f64::consts::TAU)]
             })
             .collect();
+        let rotating_mass = deviations.rotating_mass * random.gaussian();
+        let vertical_curve_m = deviations.vertical_curve_m * random.uniform(0.5, 1.5);
         CommonDeviations {
+            rotating_mass,
+            vertical_curve_m,
             curve_constant,
             force_gains,
             force_late_s: rounded(late_s, 0.05),

@@ -32,6 +32,10 @@ pub struct Deviations {
     /// Mean share of the basic resistance by which cold bearings raise it at the start of a run, a
     /// half to one and a half of it.
     pub warming_share: f64,
+    /// Of the rotating-mass factor.
+    pub rotating_mass: f64,
+    /// Mean length in m over which the line rounds each step of its gradient, a half to one and a half of it.
+    pub vertical_curve_m: f64,
     /// Cars on couplings instead of a rigid train: the leading one, which carries the tacho, moves
     /// against the others.
     pub has_couplings: bool,
@@ -53,6 +57,8 @@ impl Deviations {
         run_resistance_share: 0.0,
         wheel_share: 0.0,
         warming_share: 0.0,
+        rotating_mass: 0.0,
+        vertical_curve_m: 0.0,
         has_couplings: false,
     };
 
@@ -81,4 +87,8 @@ impl Deviations {
         warming_share: 0.05,
         ..Deviations::PLAIN
     };
+
+    /// The same, and what hides in many runs as it is in all of them: another rotating mass and rounded gradients.
+    pub const ROUGHER: Deviations =
+        Deviations { rotating_mass: 0.004, vertical_curve_m: 80.0, ..Deviations::ROUGH };
 }

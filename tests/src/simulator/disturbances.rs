@@ -197,6 +197,7 @@ impl Disturbances {
         [self.traction_gain, self.brake_gain] = common.force_gains;
         self.delay_s = common.force_late_s;
         self.speed_scale = common.speed_scale;
+        self.rotating_mass_factor += common.rotating_mass;
         let (share, tau_s) = common.warming;
         if share > 0.0 {
             self.cold_bearings = Some((share * train.ordinary_w0_n_per_kn(), tau_s));
@@ -205,6 +206,9 @@ impl Disturbances {
         if !profile.is_empty() {
             let error = LinearProfile::new(profile.clone()).expect("ascending chainages");
             self.gradient = with_error(&self.gradient, &profile, &error);
+        }
+        if common.vertical_curve_m > 0.0 {
+            self.gradient = rounded_steps(&self.gradient, common.vertical_curve_m);
         }
     }
 
@@ -357,6 +361,24 @@ fn with_error(
         .map(|k| (starts[k], map.value_at(starts[k]) + error.at(middle(k))))
         .collect();
     StepProfile::new(&entries).expect("sorted chainages")
+}
+
+/// A step profile whose steps are rounded over a length in m, in small steps.
+fn rounded_steps(profile: &StepProfile, length_m: f64) -> StepProfile {
+    const PIECE_M: f64 = 10.0;
+    let entries: Vec<(f64, f64)> = profile.entries().collect();
+    let mut starts = vec![entries[0].0];
+    for (start_m, _) in &entries[1..] {
+        let pieces = (length_m / PIECE_M).ceil();
+        let at = |k: f64| start_m + length_m * (k / pieces - 0.5);
+        starts.extend((0..=pieces as usize).map(|k| at(k as f64)));
+    }
+    starts.retain(|&m| m >= entries[0].0);
+    starts.sort_by(f64::total_cmp);
+    starts.dedup();
+    let middle = |k: usize| 0.5 * (starts[k] + starts.get(k + 1).unwrap_or(&starts[k]));
+    let rounded = (0..starts.len()).map(|k| (starts[k], profile.mean_around(middle(k), length_m)));
+    StepProfile::new(&rounded.collect::<Vec<_>>()).expect("sorted chainages")
 }
 
 /// A profile of `value` within ordered intervals and zero elsewhere.

@@ -18,7 +18,9 @@ pub fn caveats(
     std: &[f64],
     identifiability: &[Identifiability],
 ) -> Vec<String> {
-    let mut caveats = vec![worse_held_out(effects, score), small_beside(outcome, effects)];
+    let contradictions = effects.iter().filter_map(|effect| effect.contradiction.clone());
+    let mut caveats: Vec<String> = contradictions.map(|it| format!(" {it}")).collect();
+    caveats.extend([worse_held_out(effects, score), small_beside(outcome, effects)]);
     caveats.push(undetermined(search.problem, &outcome.fit, std));
     caveats.extend(not_held(identifiability));
     caveats
@@ -32,7 +34,7 @@ pub fn trimmed(sentences: &[String]) -> Vec<String> {
 
 /// What is certain and small in the model beside the effects that are named; empty without either.
 fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
-    let small: Vec<String> = outcome.small_trials().map(small).collect();
+    let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();
     if small.is_empty() || effects.is_empty() {
         return String::new();
     }

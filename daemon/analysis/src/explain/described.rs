@@ -3,7 +3,7 @@
 use dynocar_shared::HALF_95;
 
 use super::answer::{EffectAnswer, Location, ParameterValue, PlaceUncertainty};
-use super::selection::Trial;
+use super::selection::{Outcome, Trial};
 
 /// An effect with its numbers, where it acts, and how surely that is known.
 pub(super) fn describe(effect: &EffectAnswer) -> String {
@@ -83,10 +83,13 @@ fn mass_factors(value: &ParameterValue) -> Option<String> {
     Some(format!("mass_factor = {}", listed.join(", ")))
 }
 
-/// What is certain and small: its kind with its numbers.
-pub(super) fn small(trial: &Trial) -> String {
+/// What is certain and small: its kind with its numbers in the model, or in the trial that took it in where nothing
+/// is named.
+pub(super) fn small(outcome: &Outcome, trial: &Trial) -> String {
     let effect = &trial.fit.model.effects[trial.last()];
-    let parameters = effect.parameters().iter().zip(trial.fit.effect_parameters(trial.last()));
+    let tried = trial.fit.effect_parameters(trial.last());
+    let values = outcome.values(trial.kind).unwrap_or(tried);
+    let parameters = effect.parameters().iter().zip(values);
     let each = parameters.map(|(spec, value)| format!("{} = {value:.4}", spec.name));
     let numbers = each.collect::<Vec<_>>().join(", ");
     format!("{} ({numbers})", trial.kind.name())

@@ -20,7 +20,7 @@ use super::evidence::p_value;
 use super::identifiability::identifiability;
 use super::score::{self, Score};
 use super::selection::{
-    Deviations, Outcome, Search, deciding_score, discounted, few_runs_factor, penalty,
+    Deviations, Outcome, ScaleSources, Search, deciding_score, discounted, few_runs_factor, penalty,
 };
 use super::unexplained::Unexplained;
 use crate::dataset::DatasetDiagnostic;
@@ -140,6 +140,7 @@ fn effect_answers(
     Deviations { std, covariance, c }: &Deviations,
 ) -> Vec<EffectAnswer> {
     let fit = &outcome.fit;
+    let apart = ScaleSources::of(search.problem, outcome).filter(ScaleSources::are_apart);
     let mut answers: Vec<(f64, EffectAnswer)> = fit
         .model
         .effects
@@ -176,6 +177,9 @@ fn effect_answers(
                 p_value: p_value(score),
                 error_reduction: reduction,
                 meaning: Meaning::of(search.problem, fit, index, &rest),
+                contradiction: apart
+                    .filter(|_| effect.nature().changes_speed_scale)
+                    .map(|sources| sources.sentence()),
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
                 } else {
@@ -244,7 +248,7 @@ fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Consi
         }
     }
     for trial in outcome.small_trials() {
-        let reason = format!("certain and small: {}", small(trial));
+        let reason = format!("certain and small: {}", small(outcome, trial));
         list.push(Considered { kind: trial.kind.name(), evidence: Some(trial.evidence), reason });
     }
     for (kind, reason) in &outcome.not_testable {
@@ -281,7 +285,7 @@ fn statement(
         Verdict::None => {
             let text = "Nothing undeclared is found: the declared model with a, b, c refitted \
                         explains the runs.";
-            let small: Vec<String> = outcome.small_trials().map(small).collect();
+            let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();
             let small = match &small[..] {
                 [] => String::new(),
                 all => format!(" Certain, and too small to matter: {}.", all.join(", ")),

@@ -3,7 +3,7 @@
 //! and a finished model is fitted beside.
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Parameter, bearings, curve, delay, traction};
+use dynocar_model::terms::{Parameter, bearings, curve, delay, rotating, traction};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
@@ -24,15 +24,19 @@ enum Figure {
     Curves,
     /// By a share of a when bearings are cold.
     Warming,
+    /// By so much of the rotating-mass factor: seldom weighed, the same in every run, and for the motion a scale
+    /// of all that acts, gradients among it, as a wheel's is.
+    RotatingMass,
 }
 
 /// All of them with the standard deviations of their errors.
-const FIGURES: [(Figure, f64); 5] = [
+const FIGURES: [(Figure, f64); 6] = [
     (Figure::Traction, traction::USUAL_STD),
     (Figure::Brake, traction::USUAL_STD),
     (Figure::Lateness, delay::USUAL_STD_S),
     (Figure::Curves, curve::USUAL_STD),
     (Figure::Warming, bearings::USUAL_STD),
+    (Figure::RotatingMass, rotating::USUAL_STD),
 ];
 /// What is looked for, in standard deviations, and the step of differences.
 const BEYOND: f64 = 10.0;
@@ -54,6 +58,7 @@ pub fn usual_errors(a_n_per_kn: f64, is_in: impl Fn(EffectKind) -> bool) -> Cand
         Figure::Lateness => !is_in(EffectKind::ActuatorDelay),
         Figure::Curves => !is_in(EffectKind::CurveResistance),
         Figure::Warming => !is_in(EffectKind::BearingTemperature),
+        Figure::RotatingMass => !is_in(EffectKind::RotatingMass),
         Figure::Brake => true,
     };
     let free: Vec<(Figure, f64)> = FIGURES.into_iter().filter(|it| is_free(it.0)).collect();
@@ -93,6 +98,9 @@ impl Hypothesis for UsualErrors {
                 Figure::Brake => forces.iter_mut().for_each(|it| it.brake_n *= 1.0 + error),
                 Figure::Curves => {
                     forces.iter_mut().for_each(|it| it.resistance.curve_n_per_kn *= 1.0 + error);
+                }
+                Figure::RotatingMass => {
+                    forces.iter_mut().for_each(|it| it.rotating_mass_factor += error);
                 }
                 Figure::Warming => {
                     let delta_a = error * self.a_n_per_kn;
@@ -157,8 +165,11 @@ mod tests {
     fn a_figure_that_an_effect_is_about_has_no_usual_error_beside_it() {
         let free = |kind: EffectKind| usual_errors(1.0, |own| own == kind).start.len();
         assert_eq!(free(EffectKind::LocalResistance), FIGURES.len());
-        use EffectKind::{ActuatorDelay, BearingTemperature, CurveResistance, TractionGain};
-        for kind in [TractionGain, ActuatorDelay, CurveResistance, BearingTemperature] {
+        use EffectKind::{
+            ActuatorDelay, BearingTemperature, CurveResistance, RotatingMass, TractionGain,
+        };
+        for kind in [TractionGain, ActuatorDelay, CurveResistance, BearingTemperature, RotatingMass]
+        {
             assert_eq!(free(kind), FIGURES.len() - 1, "{kind:?}");
         }
     }

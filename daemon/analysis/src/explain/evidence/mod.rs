@@ -11,6 +11,7 @@ mod adjoint;
 mod bins;
 mod cleaning;
 mod criterion;
+mod drift;
 mod fade;
 mod fit;
 mod integral;

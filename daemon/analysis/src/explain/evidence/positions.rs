@@ -17,21 +17,15 @@ use super::bins::SEGMENT_GAP_MAX_S;
 /// drifts by that error, so that what lies before the first and behind the last says nothing, and
 /// would show a wheel nearer to the declared one than it is.
 pub(super) fn distance_ratio(recording: &Recording) -> Option<(f64, f64)> {
-    const END_ERROR_M: f64 = 10.0;
-    const CORRECTION_MIN_M: f64 = 1.0;
-    const DISTANCE_MIN_M: f64 = 1500.0;
     let steps = distances(recording);
-    let is_corrected =
-        |step: &Distances| (step.by_position_m - step.by_speed_m).abs() > CORRECTION_MIN_M;
-    let first = steps.iter().position(is_corrected).map_or(0, |at| at + 1);
-    let end = steps.iter().rposition(is_corrected).map_or(0, |at| at + 1);
     let total = |steps: &[Distances]| {
         steps.iter().fold(Distances::default(), |sum, step| Distances {
             by_position_m: sum.by_position_m + step.by_position_m,
             by_speed_m: sum.by_speed_m + step.by_speed_m,
+            ..sum
         })
     };
-    let between = total(steps.get(first..end).unwrap_or_default());
+    let between = total(between_corrections(&steps));
     let compared = if between.by_speed_m < DISTANCE_MIN_M { total(&steps) } else { between };
     if compared.by_speed_m < DISTANCE_MIN_M || compared.by_position_m < 0.5 * compared.by_speed_m {
         return None;
@@ -42,15 +36,43 @@ pub(super) fn distance_ratio(recording: &Recording) -> Option<(f64, f64)> {
     ))
 }
 
+/// What a position is usually good for in m where a run begins and ends, and at a balise.
+pub(super) const END_ERROR_M: f64 = 10.0;
+/// A position that leaves the integrated speed by more than this in m was corrected.
+const CORRECTION_MIN_M: f64 = 1.0;
+/// A shorter way in m shows nothing of the wheels.
+pub(super) const DISTANCE_MIN_M: f64 = 1500.0;
+
 /// A way in m by position and by integrated speed.
 #[derive(Clone, Copy, Default)]
-struct Distances {
-    by_position_m: f64,
-    by_speed_m: f64,
+pub(super) struct Distances {
+    /// Number of the sample where it ends.
+    pub to: usize,
+    pub by_position_m: f64,
+    pub by_speed_m: f64,
+}
+
+impl Distances {
+    /// By how many m the position is ahead of the speed.
+    pub fn missed_m(&self) -> f64 {
+        self.by_position_m - self.by_speed_m
+    }
+
+    /// Whether a balise corrected the position.
+    pub fn is_corrected(&self) -> bool {
+        self.missed_m().abs() > CORRECTION_MIN_M
+    }
+}
+
+/// The steps from the first correction to the last.
+pub(super) fn between_corrections(steps: &[Distances]) -> &[Distances] {
+    let first = steps.iter().position(Distances::is_corrected).map_or(0, |at| at + 1);
+    let end = steps.iter().rposition(Distances::is_corrected).map_or(0, |at| at + 1);
+    steps.get(first..end).unwrap_or_default()
 }
 
 /// The distances between samples with a position.
-fn distances(recording: &Recording) -> Vec<Distances> {
+pub(super) fn distances(recording: &Recording) -> Vec<Distances> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let mut distances = Vec::with_capacity(samples.len());
     let mut last: Option<(usize, f64)> = None;
@@ -61,6 +83,7 @@ fn distances(recording: &Recording) -> Vec<Distances> {
         {
             let mean_mps = 0.5 * (sample.speed_mps + samples[k].speed_mps);
             distances.push(Distances {
+                to: i,
                 by_position_m: sample.direction * (position_m - before_m),
                 by_speed_m: mean_mps * (time_s[i] - time_s[k]),
             });

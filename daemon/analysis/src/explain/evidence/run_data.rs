@@ -5,13 +5,14 @@ use dynocar_model::simulate::{Recording, SimulateError};
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::train::TrainModel;
 use dynocar_model::validation::Validator;
-use dynocar_shared::TrainSample;
+use dynocar_shared::{SampleField, TrainSample};
 
 use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};
 use crate::statistics::span;
 
 use super::bins::{self, Bin};
 use super::cleaning;
+use super::drift::drift_m;
 use super::positions::{by_part_s, distance_ratio};
 use super::sample_forces::DeclaredForces;
 
@@ -136,28 +137,68 @@ impl RunData {
 /// The first run without usable samples.
 pub fn prepare(dataset: &Dataset) -> Result<Vec<RunData>, RunDataError> {
     let train = &dataset.train;
-    let mut validator = Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg);
-    let mut resolver = ForceResolver::new(train.clone(), dataset.track.clone());
-    let mut resolve =
-        |sample: &TrainSample| validator.check(sample).ok().map(|valid| resolver.resolve(&valid));
-    dataset.runs.iter().map(|run| prepare_run(train, run, &mut resolve)).collect()
+    let mut reader = Reader {
+        validator: Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg),
+        resolver: ForceResolver::new(train.clone(), dataset.track.clone()),
+    };
+    dataset.runs.iter().map(|run| prepare_run(train, run, &mut reader)).collect()
 }
 
-/// A run whose samples are resolved one after the other, as a daemon takes them.
+/// Takes samples one after the other, as a daemon does.
+#[derive(Clone)]
+struct Reader {
+    validator: Validator,
+    resolver: ForceResolver,
+}
+
+impl Reader {
+    /// Those of a run, cleaned, with how many values were replaced.
+    fn read(&mut self, rows: &[TrainSample]) -> (Vec<ResolvedSample>, usize) {
+        let resolve = |row| Some(self.resolver.resolve(&self.validator.check(row).ok()?));
+        let mut samples: Vec<ResolvedSample> = rows.iter().filter_map(resolve).collect();
+        let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
+        let time_s: Vec<f64> =
+            samples.iter().map(|sample| (sample.time_ns - first_ns) as f64 * 1e-9).collect();
+        let replaced = cleaning::clean(&mut samples, bins::sampling_period_s(&time_s));
+        (samples, replaced)
+    }
+}
+
+/// Moves the positions of a run's rows by what its samples show.
+fn move_positions(rows: &mut [TrainSample], samples: &[ResolvedSample], moved_m: &[f64]) {
+    let mut moved = samples.iter().zip(moved_m).peekable();
+    for row in rows {
+        // Refused rows stay as they are.
+        if let Some((_, moved_m)) = moved.next_if(|(sample, _)| sample.time_ns == row.time_ns)
+            && let Some(position_m) = row.get(SampleField::Position)
+        {
+            row.set(SampleField::Position, position_m + moved_m);
+        }
+    }
+}
+
+/// A run made ready, with an odometer's drift taken out before anything is looked up at its positions.
 fn prepare_run(
     train: &TrainModel,
     run: &Run,
-    resolve: &mut dyn FnMut(&TrainSample) -> Option<ResolvedSample>,
+    reader: &mut Reader,
 ) -> Result<RunData, RunDataError> {
     let numbered = run.samples.iter().map(|it| TrainSample { run: run.number, ..*it });
-    let mut samples: Vec<ResolvedSample> = numbered.filter_map(|sample| resolve(&sample)).collect();
-    let rejected = run.samples.len() - samples.len();
-    let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
-    let time_s: Vec<f64> =
-        samples.iter().map(|sample| (sample.time_ns - first_ns) as f64 * 1e-9).collect();
-    let replaced = cleaning::clean(&mut samples, bins::sampling_period_s(&time_s));
-    let recording = Recording::new(samples)
-        .map_err(|source| RunDataError::Simulate { file: run.file.clone(), source })?;
+    let mut rows: Vec<TrainSample> = numbered.collect();
+    let unusable = |source| RunDataError::Simulate { file: run.file.clone(), source };
+    let before = reader.clone();
+    let (samples, mut replaced) = reader.read(&rows);
+    let mut recording = Recording::new(samples).map_err(unusable)?;
+    let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
+    if let Some(moved_m) = drift_m(&recording).filter(|_| is_position_recorded) {
+        move_positions(&mut rows, recording.samples(), &moved_m);
+        *reader = before;
+        let (samples, replaced_again) = reader.read(&rows);
+        replaced = replaced_again;
+        recording = Recording::new(samples).map_err(unusable)?;
+    }
+    let rejected = rows.len() - recording.samples().len();
+    let first_ns = recording.samples().first().map_or(0, |sample| sample.time_ns);
     let declared = DeclaredForces::of(recording.samples(), train.rotating_mass_factor);
     let smooth_mps = smoothed(&recording);
     let of_samples = |of: &Covariate| {
@@ -172,7 +213,6 @@ fn prepare_run(
     let positions_m = recording.samples().iter().filter_map(|sample| sample.position_m);
     let span_m = span(positions_m);
     let bins = bins::bins(&recording);
-    let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
     let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
     let speed_late_s = match is_position_recorded {
         true => by_part_s(&recording),

@@ -129,6 +129,9 @@ pub fn sureness(p_value: f64) -> String {
 
 /// What a person should do about an effect; `None` for one without a name.
 pub fn to_do(effect: &EffectAnswer) -> Option<&'static str> {
+    if effect.contradiction.is_some() {
+        return Some("find out which of the two is wrong before anything is replaced");
+    }
     let kind = EffectKind::from_name(effect.kind).filter(|kind| *kind != EffectKind::Unknown)?;
     Some(KindRow::of(kind).to_do)
 }
@@ -269,6 +272,7 @@ mod tests {
             p_value: 1e-9,
             error_reduction: 0.8,
             meaning: Meaning::default(),
+            contradiction: None,
             runners_up: Vec::new(),
         };
         assert_eq!(

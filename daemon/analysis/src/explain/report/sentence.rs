@@ -85,6 +85,7 @@ mod tests {
             p_value: 1e-9,
             error_reduction: 0.8,
             meaning: Meaning::default(),
+            contradiction: None,
             runners_up: Vec::new(),
         }
     }

@@ -16,7 +16,9 @@ use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
-use crate::explain::effects::{Candidate, map_error, map_error_as_fitted, usual_errors};
+use crate::explain::effects::{
+    Candidate, map_error, map_error_as_fitted, usual_errors, vertical_curves,
+};
 use crate::explain::evidence::Fit;
 use crate::explain::gradient_prior::SURVEYED;
 use crate::explain::places::span_m;
@@ -50,6 +52,10 @@ fn is_sought(kind: EffectKind) -> bool {
     )
 }
 
+/// Why a mass of single runs is none.
+const AS_LOADS_ARE: &str =
+    "its runs stand out from the others no more than the largest of as many loads do";
+
 impl Search<'_> {
     /// What was found with the usual errors beside it.
     pub fn beside_usual_errors(&self, outcome: &mut Outcome) -> Arc<Beside> {
@@ -68,15 +74,17 @@ impl Search<'_> {
         beside
     }
 
-    /// The errors of the map; `None` where a gradient is fitted anyway, and where there is no map or no measured
-    /// position.
-    fn map_errors(&self, fit: &Fit) -> Option<Candidate> {
+    /// The errors of the map and how it rounds its steps; none where a gradient is fitted anyway, and where there is
+    /// no map or no measured position.
+    fn map_errors(&self, fit: &Fit) -> Vec<Candidate> {
         let is_fitted = fit.model.effects.iter().any(|effect| effect.is_gradient());
-        if is_fitted || self.track.is_none() || self.problem.distance_ratio.is_none() {
-            return None;
-        }
-        let span_m = span_m(&self.scan(fit)?).filter(|[low, high]| high > low)?;
-        Some(map_error(span_m, SURVEYED))
+        let track = self.track.filter(|_| !is_fitted && self.problem.distance_ratio.is_some());
+        let span_m = self.scan(fit).and_then(|scan| span_m(&scan));
+        let (Some(track), Some(span_m)) = (track, span_m.filter(|[low, high]| high > low)) else {
+            return Vec::new();
+        };
+        let rounded = vertical_curves(track.clone(), self.train.length_m);
+        vec![map_error(span_m, SURVEYED), rounded]
     }
 
     /// Takes in what is certain beside the usual errors; false for nothing.
@@ -158,6 +166,9 @@ impl Search<'_> {
             if outcome.is_certain(kind) && joint.holds_none(index) {
                 return Some((index, Refusal::Chance));
             }
+            if effects[index].place().windows.is_some() && joint.is_as_loads_are(index) {
+                return Some((index, Refusal::Contradiction(AS_LOADS_ARE)));
+            }
             // A form may be greatest where what it follows ends.
             let may_fall = kind != EffectKind::Unknown && at_bound(&outcome.fit, index).is_none();
             let bound = at_bound(beside, index).filter(|_| may_fall);
@@ -181,6 +192,25 @@ pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -
     if !fit.model.effects.is_empty() {
         let theta = joint.fit.theta[..count].to_vec();
         outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
+    }
+    if std::env::var("DBG").is_ok() {
+        for (i, run) in search.problem.runs.iter().enumerate() {
+            let f = joint.fit.own_factors(i);
+            eprintln!(
+                "{} dir {} load {:+.4} res {:+.4} wind {:+.2}",
+                run.file, run.direction, f[0], f[1], f[2]
+            );
+        }
+        eprintln!(
+            "theta {:?} shared {} scatter {:?}",
+            joint.fit.theta, joint.shared, joint.fit.noise.scatter
+        );
+        for (n, (e, r)) in joint.fit.model.effects.iter().zip(joint.fit.model.ranges()).enumerate()
+        {
+            if !e.is_gradient() {
+                eprintln!("{n} {:?} {:?}", e, &joint.fit.theta[r])
+            }
+        }
     }
     let mut deviations = deviations_beside(&joint.fit, count, joint.shared);
     let model = &outcome.fit.model;

@@ -12,14 +12,14 @@ const HELD_SHARE: f64 = 1e-4;
 const RUNS_MIN: usize = 2;
 
 /// By how much the first so many parameters move when each run is left out, to second order, with all
-/// others held; `None` for a run without which they are not determined.
-fn moves_without_each_run(fit: &Fit, count: usize) -> Vec<Option<DVector<f64>>> {
+/// others held; of a run without which they are not determined nothing.
+fn moves_without_each_run(fit: &Fit, count: usize) -> Vec<DVector<f64>> {
     let information = fit.information();
     let moved = |run: &RunNormal| {
         let rest = Cholesky::new(first(&(&information - &run.information), count))?;
         Some(-rest.solve(&run.score.rows(0, count)))
     };
-    fit.runs.iter().map(moved).collect()
+    fit.runs.iter().filter_map(moved).collect()
 }
 
 /// What a matrix says of the first so many parameters.
@@ -147,18 +147,16 @@ fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
     let covariance = factor.inverse();
     let runs = fit.runs.len() as f64;
     let mut scatter = DVector::zeros(count);
-    let moves = moves_without_each_run(fit, count);
-    for moved in moves.iter().flatten() {
-        scatter += moved.component_mul(moved);
+    for moved in moves_without_each_run(fit, count) {
+        scatter += moved.component_mul(&moved);
     }
-    // What one run alone determines scatters with none.
-    let least = if moves.iter().all(Option::is_some) { 0.0 } else { 1.0 };
     let left = (runs - 1.0) / runs;
     let freedom = PRIOR_RUNS + runs - 1.0;
     let enlarged = |i: usize| {
         let seen = left * scatter[i] / covariance[(i, i)];
         let both = (PRIOR_RUNS + (runs - 1.0) * seen) / freedom;
-        students_factor(freedom) * both.max(least).sqrt()
+        // Runs that agree better than their noise lets them share it: without one of them it stays.
+        students_factor(freedom) * both.max(1.0).sqrt()
     };
     let enlarged: Vec<f64> = (0..count).map(enlarged).collect();
     let scaled =

@@ -10,6 +10,7 @@ mod refusal;
 mod revision;
 mod search;
 mod small;
+mod sources;
 mod trying;
 
 pub use acceptance::deciding_score;
@@ -21,3 +22,4 @@ pub use outcome::{Outcome, Trial};
 pub use price::{discounted, model_penalty, penalty};
 pub use refusal::Refusal;
 pub use search::{OBSERVATIONS_MIN, Progress, Search};
+pub use sources::ScaleSources;

@@ -9,6 +9,7 @@ use super::by_run::deviations_beside;
 use super::refusal::Refusal;
 use crate::explain::effects::SharedHypothesis;
 use crate::explain::evidence::{Fit, acceptance_score};
+use crate::statistics::rms;
 
 /// Named effects at most.
 const EFFECTS_MAX: usize = 4;
@@ -75,6 +76,21 @@ impl Beside {
         let std = deviations_beside(&self.fit, range.end, self.shared).std[range.start];
         size.abs() < HALF_95 * std
     }
+
+    /// Whether a change of mass in single runs is what loads are anyway: the largest of so many deviations is
+    /// about √(2 ln n) of their standard deviation, which the other runs show.
+    pub(super) fn is_as_loads_are(&self, index: usize) -> bool {
+        let fit = &self.fit;
+        let effect = &fit.model.effects[index];
+        if effect.kind() != EffectKind::MassChange {
+            return false;
+        }
+        let range = fit.model.ranges()[index].clone();
+        let std = deviations_beside(fit, range.end, self.shared).std;
+        let away =
+            range.map(|i| (fit.theta[i] - effect.none()) / std[i].hypot(fit.noise.scatter.force));
+        rms(&away.collect::<Vec<_>>()) < (2.0 * (fit.runs.len() as f64).ln()).sqrt()
+    }
 }
 
 /// What the search found.
@@ -131,6 +147,11 @@ impl Outcome {
     /// Kinds that are not looked for again.
     pub(super) fn fallen_kinds(&self) -> Vec<EffectKind> {
         self.fallen.iter().map(|(kind, _)| *kind).collect()
+    }
+
+    /// The values of an effect of the model by its kind.
+    pub fn values(&self, kind: EffectKind) -> Option<&[f64]> {
+        Some(self.fit.effect_parameters(self.fit.model.position(kind)?))
     }
 
     /// The trials of what is certain and small, as they were when it was taken in.

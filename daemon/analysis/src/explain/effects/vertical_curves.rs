@@ -1,0 +1,111 @@
+//! Vertical curves: a line rounds the steps of its gradient, and a map states the steps. The same in every
+//! run and at every step, so that no number of runs shows it as scatter: a train feels less of each step than the
+//! map says, as if its inertia were greater. How long the curves are is not known; no effect, but what a finished
+//! model is fitted beside.
+
+use std::sync::Arc;
+
+use dynocar_model::terms::Parameter;
+use dynocar_model::terms::extra::Covariate;
+use dynocar_model::track::Track;
+use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::DMatrix;
+
+use super::{Candidate, Handling, Hypothesis, Nature, On};
+use crate::explain::evidence::{RunData, SampleForces};
+
+/// Length in m over which a step is rounded for a share of 1; what a train feels grows with the square of the
+/// length.
+const LENGTH_M: f64 = 60.0;
+/// Standard deviation of the share, its greatest, and the step of differences: lengths up to 190 m.
+const USUAL_STD: f64 = 1.0;
+const SHARE_MAX: f64 = 10.0;
+const STEP: f64 = 0.1;
+/// Places at which the mean over the length is taken.
+const PLACES: usize = 4;
+
+#[derive(Debug)]
+struct Rounded {
+    track: Arc<Track>,
+    train_length_m: f64,
+    parameters: [Parameter; 1],
+    information: DMatrix<f64>,
+}
+
+/// Steps that are rounded over some length, at none.
+pub fn vertical_curves(track: Arc<Track>, train_length_m: f64) -> Candidate {
+    let rounded = Rounded {
+        track,
+        train_length_m,
+        parameters: [Parameter::new("vertical_curves", (0.0, SHARE_MAX), STEP)],
+        information: DMatrix::from_element(1, 1, USUAL_STD.powi(-2)),
+    };
+    Candidate::new(rounded, vec![0.0])
+}
+
+impl Rounded {
+    /// What a share of 1 adds in ‰ along the travel at a chainage in m.
+    fn added_permille(&self, centre_m: f64, direction: f64) -> f64 {
+        let at = |offset_m: f64| {
+            let place_m = centre_m + offset_m;
+            self.track.gradient_towards_permille(direction, place_m, self.train_length_m)
+        };
+        let place_m = |k: usize| LENGTH_M * ((k as f64 + 0.5) / PLACES as f64 - 0.5);
+        let around: f64 = (0..PLACES).filter_map(|k| at(place_m(k))).sum();
+        direction * (around / PLACES as f64 - at(0.0).unwrap_or(0.0))
+    }
+}
+
+impl Hypothesis for Rounded {
+    fn nature(&self) -> Nature<'_> {
+        Nature {
+            prior: Some(&self.information),
+            handling: Handling::Gradient,
+            ..Nature::of(EffectKind::None, &self.parameters)
+        }
+    }
+
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
+        let places = run.known(Covariate::Chainage, first).zip(&run.directions[first..]);
+        for (force, (centre_m, direction)) in forces.iter_mut().zip(places) {
+            if let Some(centre_m) = centre_m {
+                force.gradient_permille +=
+                    parameters[0] * self.added_permille(centre_m, *direction);
+            }
+        }
+    }
+
+    fn gradient_permille(&self, _parameter: usize, run: &RunData, permille: &mut Vec<f64>) {
+        let places = run.known(Covariate::Chainage, 0).zip(&run.directions);
+        let added = places.map(|(centre_m, direction)| {
+            centre_m.map_or(0.0, |centre_m| self.added_permille(centre_m, *direction))
+        });
+        permille.clear();
+        permille.extend(added);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_is_rounded_to_both_sides_and_a_slope_stays() {
+        let steps = [(0.0, 0.0), (1000.0, 8.0)];
+        let track = Track::new("line".into(), None, Some(&steps), None, None).unwrap();
+        let rounded = |length_m| Rounded {
+            track: Arc::new(track.clone()),
+            train_length_m: length_m,
+            parameters: [Parameter::new("vertical_curves", (0.0, SHARE_MAX), STEP)],
+            information: DMatrix::identity(1, 1),
+        };
+        let (short, train) = (rounded(10.0), rounded(80.0));
+        // Where the train comes under the step it climbs already, and less where it would be on it.
+        assert!(train.added_permille(960.0, 1.0) > 0.2 && train.added_permille(1040.0, 1.0) < -0.2);
+        assert_eq!(train.added_permille(960.0, -1.0), -train.added_permille(960.0, 1.0));
+        assert!(short.added_permille(985.0, 1.0) > train.added_permille(985.0, 1.0));
+        for chainage_m in [800.0, 1000.0, 1200.0] {
+            assert!(train.added_permille(chainage_m, 1.0).abs() < 1e-12);
+        }
+    }
+}

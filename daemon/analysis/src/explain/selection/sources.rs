@@ -1,0 +1,87 @@
+//! What each source of evidence alone says of the scale of the speeds, and whether they agree.
+
+use dynocar_shared::HALF_95;
+use nalgebra::Cholesky;
+
+use super::outcome::Outcome;
+use crate::explain::answer::WithStd;
+use crate::explain::evidence::FitProblem;
+
+/// The scale of the speeds by positions alone, and by gradients and forces alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScaleSources {
+    /// By positions.
+    pub positions: WithStd,
+    /// By gradients and forces beside the usual errors of what is declared.
+    pub motion: WithStd,
+}
+
+impl ScaleSources {
+    /// Of a finished model with a wrong wheel; `None` without one, or where one of the two says nothing.
+    pub fn of(problem: &FitProblem, outcome: &Outcome) -> Option<Self> {
+        let fit = &outcome.beside.as_ref()?.1.fit;
+        let scales = |number: &usize| fit.model.effects[*number].nature().changes_speed_scale;
+        let wheel = (0..outcome.fit.model.effects.len()).find(scales)?;
+        let i = fit.model.ranges()[wheel].start;
+        let variance = Cholesky::new(fit.free_information())?.inverse()[(i, i)];
+        let (ratio, std) = problem.distance_ratio?;
+        let positions = WithStd { value: ratio.recip(), std: std / (ratio * ratio) };
+        Some(ScaleSources {
+            positions,
+            motion: without(WithStd { value: fit.theta[i], std: variance.sqrt() }, positions)?,
+        })
+    }
+
+    /// Whether they are further apart than their 95 % intervals allow.
+    pub fn are_apart(&self) -> bool {
+        let allowed = HALF_95 * (self.positions.std + self.motion.std);
+        (self.positions.value - self.motion.value).abs() > allowed
+    }
+
+    /// Both in a sentence.
+    pub fn sentence(&self) -> String {
+        let percent = |it: WithStd| {
+            format!("{:+.2} ± {:.2} %", 100.0 * (it.value - 1.0), 100.0 * HALF_95 * it.std)
+        };
+        format!(
+            "Positions and motion contradict each other: by positions alone the speeds read {}, by \
+             gradients and forces alone {}. One of them is wrong by more than usual, and no part is to be \
+             replaced before it is known which.",
+            percent(self.positions),
+            percent(self.motion)
+        )
+    }
+}
+
+/// What is left of an estimate without one of its sources; `None` where that is nothing.
+fn without(both: WithStd, source: WithStd) -> Option<WithStd> {
+    let [all, own] = [both.std, source.std].map(|std| std.powi(-2));
+    let left = all - own;
+    (left > 0.0).then(|| WithStd {
+        value: (all * both.value - own * source.value) / left,
+        std: left.sqrt().recip(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_two_sources_say_together_is_taken_apart_again() {
+        let positions = WithStd { value: 1.015, std: 0.001 };
+        // Motion at 1.003 ± 0.002: weights of 4 to 1.
+        let both = WithStd { value: 1.0126, std: (0.8f64).sqrt() * 1e-3 };
+        let motion = without(both, positions).expect("motion says something");
+        assert!((motion.value - 1.003).abs() < 1e-9 && (motion.std - 0.002).abs() < 1e-9);
+        let apart = ScaleSources { positions, motion };
+        assert!(apart.are_apart());
+        assert!(
+            apart.sentence().contains("+1.50 ± 0.20 %")
+                && apart.sentence().contains("+0.30 ± 0.39 %")
+        );
+        let near = WithStd { value: 1.012, ..motion };
+        assert!(!ScaleSources { positions, motion: near }.are_apart());
+        assert_eq!(without(positions, positions), None);
+    }
+}
