@@ -64,3 +64,4 @@ mod promises;
 mod sizes;
 mod troubles;
 mod unrun;
+mod words;

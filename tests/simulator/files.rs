@@ -35,17 +35,24 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
     assert_ne!(dataset_files(&first), dataset_files(&simulate(&settings(6))));
 }
 
-/// The canonical column of a line such as `speed = { column = "v", unit = "km/h" }`:
-/// (file column, unit, scale).
-fn column(dataset_toml: &str, canonical: &str) -> Option<(String, String, f64)> {
+/// A mapped column of a line such as `speed = { column = "v", unit = "km/h" }`.
+struct MappedColumn {
+    column: String,
+    unit: String,
+    scale: f64,
+}
+
+/// Returns the column of a canonical quantity.
+fn column(dataset_toml: &str, canonical: &str) -> Option<MappedColumn> {
     let line = dataset_toml.lines().find(|line| line.starts_with(&format!("{canonical} = {{")))?;
     let quoted: Vec<&str> = line.split('"').collect();
     let scale = line.split("scale = ").nth(1).map(|rest| rest.trim_end_matches(" }"));
-    Some((quoted[1].into(), quoted[3].into(), scale.map_or(1.0, |text| text.parse().unwrap())))
+    let scale = scale.map_or(1.0, |text| text.parse().unwrap());
+    Some(MappedColumn { column: quoted[1].into(), unit: quoted[3].into(), scale })
 }
 
 /// SI value of a cell; `None` when it is empty.
-fn si(cell: &str, (_, unit, scale): &(String, String, f64)) -> Option<f64> {
+fn si(cell: &str, MappedColumn { unit, scale, .. }: &MappedColumn) -> Option<f64> {
     let value = cell.parse::<f64>().ok()? * scale;
     Some(match unit.as_str() {
         "s" | "m" | "m/s" | "N" | "Pa" | "degC" | "1" => value,
@@ -73,7 +80,8 @@ fn assert_column(
     let run = &dataset.runs[1];
     let csv = text_of(dataset, &run.plan.file());
     let mut lines = csv.lines();
-    let index = lines.next().unwrap().split(delimiter).position(|name| name == column.0).unwrap();
+    let index =
+        lines.next().unwrap().split(delimiter).position(|name| name == column.column).unwrap();
     assert_eq!(csv.lines().count(), run.samples.len() + 1);
     for (line, sample) in lines.zip(&run.samples) {
         let cell = line.split(delimiter).nth(index).unwrap();

@@ -29,6 +29,18 @@ pub struct Table {
     pub published_baseline_percent: f64,
 }
 
+/// Scores that stand side by side in a row.
+struct Compared<'s> {
+    /// Of the paper's method, where it is measured.
+    em: Option<&'s Score>,
+    /// Of the paper's baseline, where it is measured.
+    ekf: Option<&'s Score>,
+    /// Of our smoother.
+    ours: &'s Score,
+    /// Degrees of freedom of its normalised squared error.
+    freedom: f64,
+}
+
 impl Table {
     /// The initial value of a run.
     pub fn initial(&self, seed: u64) -> f64 {
@@ -63,13 +75,13 @@ impl Table {
         let mut rows = Vec::new();
         rows.extend(self.pair(
             "the present",
-            (Some(&em_end), Some(&ekf), &present, at_present),
+            Compared { em: Some(&em_end), ekf: Some(&ekf), ours: &present, freedom: at_present },
             &bound(&self.braking, knowledge, 0),
             seeds,
         ));
         let back = self.pair(
             "5 s back",
-            (Some(&em_middle), None, &back, at_back),
+            Compared { em: Some(&em_middle), ekf: None, ours: &back, freedom: at_back },
             &bound(&self.braking, knowledge, LAG_STEPS),
             seeds,
         );
@@ -93,7 +105,7 @@ impl Table {
         let bounds = bound(&self.braking, Knowledge::Law(scale_std), 0);
         self.pair(
             "the present, the law known but for its scale",
-            (None, None, &score, score.nees_freedom()),
+            Compared { em: None, ekf: None, ours: &score, freedom: score.nees_freedom() },
             &bounds,
             seeds,
         )
@@ -103,10 +115,11 @@ impl Table {
     fn pair(
         &self,
         what: &str,
-        (em, ekf, ours, freedom): (Option<&Score>, Option<&Score>, &Score, f64),
+        compared: Compared<'_>,
         bounds: &[BoundAt],
         seeds: Seeds,
     ) -> Vec<Row> {
+        let Compared { em, ekf, ours, freedom } = compared;
         let row = |what: &str, unit| ours.row(freedom, self.row(what, unit, seeds));
         vec![
             Row {

@@ -97,6 +97,13 @@ impl Actuator<'_> {
     }
 }
 
+/// Beginning of a run.
+struct Departure {
+    run: usize,
+    direction: f64,
+    start_m: f64,
+}
+
 impl Drive {
     /// Drives a train over a surveyed line, there and back.
     pub fn new(train: &TrainModel, survey: &Track, pressure_pa_per_n: f64) -> Self {
@@ -104,7 +111,7 @@ impl Drive {
         let mut noise = ChaCha8Rng::seed_from_u64(17);
         let mut start_m = 500.0;
         for (run, direction) in [1.0, -1.0].into_iter().enumerate() {
-            drive.run(train, survey, (run, direction, start_m));
+            drive.run(train, survey, Departure { run, direction, start_m });
             start_m = drive.instants[drive.instants.len() - 1].position_m;
         }
         for (instant, sample) in drive.instants.iter().zip(&mut drive.samples) {
@@ -127,7 +134,7 @@ impl Drive {
         &mut self,
         train: &TrainModel,
         survey: &Track,
-        (run, direction, start_m): (usize, f64, f64),
+        Departure { run, direction, start_m }: Departure,
     ) {
         let commands = commands();
         let mut actuator = Actuator { commands: &commands, acting: 0.0 };

@@ -15,7 +15,7 @@ use tracing::warn;
 use super::conclusion::{Conclusion, Explained};
 use super::error::LearnError;
 use super::memory::Memory;
-use super::pool::{self, Bounds, Pool};
+use super::pool::{self, Bounds, Declared, Pool};
 use super::source::{FoundRun, Places, report_unusable, runs_of};
 use crate::report::provenance::hex;
 use dynocar::models::{Action, ModelHash, ModelText, Moment, Store, TrainModels};
@@ -192,7 +192,7 @@ impl Learner {
         let (model, track) = (Arc::new(model), track.map(Arc::new));
         let mut outcome = Outcome::TooFewRuns;
         for choice in choices {
-            let declared = (&text, &model, track.as_ref());
+            let declared = Declared { text: &text, train: &model, track: track.as_ref() };
             let read = pool::read(choice, declared, &self.settings.bounds, &mut self.memory);
             let Some(pool) = read else { continue };
             let found = match explain_pool(pool, &mut self.memory, stop) {

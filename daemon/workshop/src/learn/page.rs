@@ -48,7 +48,8 @@ pub fn html(learner: &Learner, now: SystemTime) -> Result<String, LearnError> {
         let open: Vec<&OpenQuestion> = learner.memory().open_of(train).collect();
         let errors = errors_by_day(&history, &Trials::read(models.folder()))
             .map_err(|error| LearnError::Report(error.to_string()))?;
-        main += &of_train(train, &history, (&events, &open, errors));
+        let page = TrainPage { history: &history, events: &events, open: &open, errors };
+        main += &page.html(train);
     }
     Ok(document("History of the models", &header, &main, &made))
 }
@@ -57,23 +58,30 @@ fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-fn of_train(
-    train: TrainId,
-    history: &History,
-    (events, open, errors): (&[Numbered<MaintenanceEvent>], &[&OpenQuestion], String),
-) -> String {
-    let mut html = String::new();
-    let mut section = |name: &str, title: &str, body: String| {
-        html += &html::section(&format!("train-{train}-{name}"), title, &body);
-    };
-    section("models", &format!("Train {train}: models"), models(history));
-    if !errors.is_empty() {
-        section("errors", "Error by day", errors);
+/// Contents of one train's sections.
+struct TrainPage<'p> {
+    history: &'p History,
+    events: &'p [Numbered<MaintenanceEvent>],
+    open: &'p [&'p OpenQuestion],
+    /// The plot of the error by day, as HTML; empty without a measured error.
+    errors: String,
+}
+
+impl TrainPage<'_> {
+    fn html(self, train: TrainId) -> String {
+        let mut html = String::new();
+        let mut section = |name: &str, title: &str, body: String| {
+            html += &html::section(&format!("train-{train}-{name}"), title, &body);
+        };
+        section("models", &format!("Train {train}: models"), models(self.history));
+        if !self.errors.is_empty() {
+            section("errors", "Error by day", self.errors);
+        }
+        section("decisions", "Decisions", decisions(&self.history.decisions));
+        section("events", "Maintenance events", of_events(self.events));
+        section("open", "Open questions", of_questions(self.open));
+        html
     }
-    section("decisions", "Decisions", decisions(&history.decisions));
-    section("events", "Maintenance events", of_events(events));
-    section("open", "Open questions", of_questions(open));
-    html
 }
 
 fn models(history: &History) -> String {

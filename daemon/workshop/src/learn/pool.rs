@@ -87,14 +87,25 @@ fn spread(length: usize, most: usize) -> BTreeSet<usize> {
     (0..count).map(|k| (2 * k + 1) * length / (2 * count)).collect()
 }
 
+/// A declared model, as text and as read.
+pub struct Declared<'d> {
+    /// Its files.
+    pub text: &'d ModelText,
+    /// The train.
+    pub train: &'d Arc<TrainModel>,
+    /// The line, where one is declared.
+    pub track: Option<&'d Arc<Track>>,
+}
+
 /// Reads runs under a model, the newest first until the bounds are reached; what cannot be read is reported once
 /// and left out. `None` where fewer than two are left: one to fit, one to judge.
 pub fn read(
     chosen: &[FoundRun],
-    (text, train, track): (&ModelText, &Arc<TrainModel>, Option<&Arc<Track>>),
+    declared: Declared<'_>,
     bounds: &Bounds,
     memory: &mut Memory,
 ) -> Option<Pool> {
+    let Declared { text, train, track } = declared;
     let mut kept: Vec<(FoundRun, Run)> = Vec::new();
     let (mut time_s, mut samples) = (0.0, 0);
     let mut head: Option<(PathBuf, Overlay, DatasetHead)> = None;
