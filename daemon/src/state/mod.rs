@@ -24,9 +24,9 @@ pub mod place;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use dynocar_client::Host;
 use dynocar_core::pipeline::KeptEstimate;
 use dynocar_shared::TrainId;
+use dynocar_transport::Host;
 use tracing::{info, warn};
 
 use crate::config::{DaemonConfig, PipelineConfig, StateConfig, TrainConfig};
