@@ -40,11 +40,11 @@ static double resistance_n(dynocar_reader *reader, double speed_mps, origin *fro
         && dynocar_snapshot_resistance(&reading.snapshot, speed_mps, MASS_KG, &resistance)
                == DYNOCAR_OK) {
         from->name = "the daemon";
-        from->reason = dynocar_status_name(reading.status);
+        from->reason = dynocar_use_state_name(dynocar_reading_use_state(&reading));
         return resistance.force_n;
     }
     from->name = "the built-in parameters";
-    from->reason = code == DYNOCAR_OK                   ? dynocar_reason_name(reading.reason)
+    from->reason = code == DYNOCAR_OK                   ? dynocar_reading_why(&reading)
                    : code == DYNOCAR_ERROR_NOT_PROVIDED ? "not_provided"
                                                         : "no_snapshot";
     return built_in_force_n(speed_mps);

@@ -39,7 +39,7 @@ Resistance resistance(dynocar::Reader &reader, double speed_mps)
 {
     const auto reading = reader.resistance();
     if (const auto found = reading.resistance_at(speed_mps, MASS_KG)) {
-        return {found->force_n, "the daemon", reading.status_name()};
+        return {found->force_n, "the daemon", reading.use_state_name()};
     }
     return {built_in_force_n(speed_mps), "the built-in parameters", reading.why()};
 }

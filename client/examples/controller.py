@@ -34,7 +34,7 @@ def resistance(reader: dynocar.SnapshotReader, speed_mps: float) -> tuple[float,
     if snapshot.is_usable:
         estimate = snapshot.resistance_at(speed_mps, MASS_KG)
         if estimate is not None:
-            return estimate.force_n, f"the daemon ({snapshot.status.name.lower()})"
+            return estimate.force_n, f"the daemon ({snapshot.use_state.name.lower()})"
     return built_in_force_n(speed_mps), f"the built-in parameters ({snapshot.why})"
 
 

@@ -31,10 +31,10 @@ fn resistance(reader: &SnapshotReader, speed_mps: f64) -> (f64, [&'static str; 2
         && reading.is_usable()
         && let Some(estimate) = reading.snapshot.resistance_at(speed_mps)
     {
-        return (estimate.force_n(MASS_KG).0, ["the daemon", reading.status().name()]);
+        return (estimate.force_n(MASS_KG).0, ["the daemon", reading.use_state().name()]);
     }
     let why = match answer {
-        Ok(reading) => reading.reason().map_or("a reason of another release", |it| it.name()),
+        Ok(reading) => reading.why(),
         Err(why) => why.name(),
     };
     (built_in_force_n(speed_mps), ["the built-in parameters", why])

@@ -29,8 +29,8 @@ static int learned(dynocar_reader *reader, uint32_t quantity, dynocar_reading *r
         dynocar_reader_quantity(reader, quantity, dynocar_monotonic_now_ns(), reading);
     const char *why = code == DYNOCAR_ERROR_NOT_PROVIDED ? "not_provided" : "no_snapshot";
     if (code == DYNOCAR_OK) {
-        why = reading->is_usable ? dynocar_status_name(reading->status)
-                                 : dynocar_reason_name(reading->reason);
+        why = reading->is_usable ? dynocar_use_state_name(DYNOCAR_USE_USABLE)
+                                 : dynocar_reading_why(reading);
     }
     printf("%s: the %s (%s)\n", dynocar_quantity_name(quantity),
            reading->is_usable ? "daemon" : "built-in values", why);

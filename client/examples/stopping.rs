@@ -7,9 +7,7 @@ use std::time::Duration;
 
 use dynocar_client::{Host, NoAnswer, SnapshotReader, monotonic_now_ns};
 use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop};
-use dynocar_shared::{
-    Parameter, ParameterSnapshot, Quantity, RailCondition, Status, TrainId, Uncertain,
-};
+use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, RailCondition, TrainId, Uncertain};
 
 /// The train of config/demo/train.toml, which config/daemon.toml serves as train 1.
 const MASS_KG: f64 = 1_799_200.0;
@@ -27,11 +25,11 @@ fn learned(reader: &SnapshotReader, quantity: Quantity) -> Option<&ParameterSnap
     if let Ok(reading) = &answer
         && reading.is_usable()
     {
-        println!("{quantity}: the daemon ({})", Status::Estimated);
+        println!("{quantity}: the daemon ({})", reading.use_state());
         return Some(reading.snapshot);
     }
     let why = match answer {
-        Ok(reading) => reading.reason().map_or("a reason of another release", |it| it.name()),
+        Ok(reading) => reading.why(),
         Err(why) => why.name(),
     };
     println!("{quantity}: the built-in values ({why})");

@@ -112,14 +112,26 @@ enum {
     DYNOCAR_DAEMON_INCOMPATIBLE = 2
 };
 
-/* What a controller may do with an estimate. Of an estimated one, too, the reason may remark
- * something. */
+/* How the estimate of a pipeline stands as a whole. Of an estimated one, too, the reason may
+ * remark something. */
 enum {
-    /* Not enough data yet; the values are the declared or the initial ones */
+    /* Not all that is estimated is known yet; what is not is declared, kept or initial */
     DYNOCAR_STATUS_UNESTIMATED = 1,
-    DYNOCAR_STATUS_ESTIMATED = 2, /* The values may be used */
+    DYNOCAR_STATUS_ESTIMATED = 2, /* All that is estimated is known */
     DYNOCAR_STATUS_DEGRADED = 3, /* There are values, with a reservation named by the reason */
     DYNOCAR_STATUS_INVALID = 4 /* The values must not be used */
+};
+
+/* Whether a controller may use the values for what it asked for, in one word. */
+enum {
+    /* The values may be used, whatever the status of the estimate as a whole */
+    DYNOCAR_USE_USABLE = 1,
+    DYNOCAR_USE_LEARNING = 2, /* Not known well enough yet */
+    /* Known, and held back until it has held for a while without doubt */
+    DYNOCAR_USE_CONFIRMING = 3,
+    DYNOCAR_USE_DOUBTED = 4, /* Something speaks against the values or the samples */
+    /* There are no values: the daemon is silent, or the estimate has failed */
+    DYNOCAR_USE_UNAVAILABLE = 5
 };
 
 /* Why a status is what it is. Of weak excitation, excited and missing_manoeuvres say more. */
@@ -558,6 +570,13 @@ dynocar_code dynocar_reader_close(dynocar_reader *reader);
 
 /* ---- Reading a snapshot; no handle, any thread ---- */
 
+/* The state of use of what was asked for, DYNOCAR_USE_...; NULL is unavailable. REAL-TIME */
+uint32_t dynocar_reading_use_state(const dynocar_reading *reading);
+
+/* Why, in one word: the reason behind the status, or "confirming" for what is known and held back
+ * until it has held for a while. Never NULL, never to be freed. REAL-TIME */
+const char *dynocar_reading_why(const dynocar_reading *reading);
+
 /* Resistance at a finite speed for a train of mass_kg (>= 0; 0 when only w0 is wanted).
  * DYNOCAR_ERROR_NOT_IN_SNAPSHOT unless the pipeline estimates all three of a, b, c. REAL-TIME */
 dynocar_code dynocar_snapshot_resistance(const dynocar_parameter_snapshot *snapshot,
@@ -664,6 +683,7 @@ const char *dynocar_quantity_name(uint32_t quantity);
 const char *dynocar_mass_source_name(uint32_t mass_source);
 const char *dynocar_parameter_name(uint32_t parameter);
 const char *dynocar_status_name(uint32_t status);
+const char *dynocar_use_state_name(uint32_t use_state);
 const char *dynocar_reason_name(uint32_t reason);
 const char *dynocar_rejection_name(uint32_t reason);
 const char *dynocar_manoeuvre_name(uint32_t bit);

@@ -163,16 +163,24 @@ class Reading {
   public:
     Reading(dynocar_code code, const dynocar_reading &raw) noexcept : code_(code), raw_(raw) {}
 
-    /* True while the values may be used: status ESTIMATED, and the daemon is not silent. */
+    /* True while the values may be used, whatever the status of the estimate as a whole. */
     bool is_usable() const noexcept { return code_ == DYNOCAR_OK && raw_.is_usable != 0; }
     explicit operator bool() const noexcept { return is_usable(); }
-    /* In one word: the reason behind the status ("none" where there is nothing to remark), or
-     * "no_snapshot" or "not_provided". For what somebody reads. */
+    /* The state of use: DYNOCAR_USE_..., and its name. */
+    std::uint32_t use_state() const noexcept
+    {
+        return code_ == DYNOCAR_OK ? dynocar_reading_use_state(&raw_)
+                                   : std::uint32_t{DYNOCAR_USE_UNAVAILABLE};
+    }
+    const char *use_state_name() const noexcept { return dynocar_use_state_name(use_state()); }
+    /* Why, in one word: the reason behind the status ("none" only beside what is usable),
+     * "confirming" for what is known and held back, or "no_snapshot" or "not_provided". For what
+     * somebody reads. */
     const char *why() const noexcept
     {
         switch (code_) {
         case DYNOCAR_OK:
-            return dynocar_reason_name(raw_.reason);
+            return dynocar_reading_why(&raw_);
         case DYNOCAR_ERROR_NO_SNAPSHOT:
             return "no_snapshot";
         case DYNOCAR_ERROR_NOT_PROVIDED:

@@ -2,7 +2,9 @@
 
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::snapshot::PARAMETERS_MAX;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId};
+use dynocar_shared::{
+    ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId, UseState,
+};
 
 use dynocar_transport::ChannelError;
 use dynocar_transport::Host;
@@ -68,6 +70,17 @@ impl Reading<'_> {
                     usable != 0 && it.quantities & !usable == 0
                 }
             }
+    }
+
+    /// Returns the state of use of what was asked for, in one word.
+    pub fn use_state(&self) -> UseState {
+        UseState::of(self.status(), self.is_usable())
+    }
+
+    /// Returns why the state of use is what it is, in one word: the reason behind the status, or
+    /// `confirming` for what is known and held back. `none` stands only beside what is usable.
+    pub fn why(&self) -> &'static str {
+        self.use_state().why(self.reason())
     }
 }
 

@@ -88,7 +88,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     if config.process.lock_memory {
         lock_memory();
     }
-    let state = state::Taken::up(config);
+    let state = state::Taken::up(config, &host);
     let (mut plans, watched) = plan_workers(config, &host, epoch, &stop, state.as_ref(), &counts)?;
     let board = Board::default();
     let shadow = plan_shadow(config, &mut plans);

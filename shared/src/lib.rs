@@ -40,4 +40,5 @@ pub use snapshot::ParameterSnapshot;
 pub use stopping::{EffortPoint, RailAdhesion, Stop, StoppingError, StoppingEstimate};
 pub use vocabulary::{
     Manoeuvre, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
+    UseState,
 };

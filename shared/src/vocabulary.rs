@@ -47,7 +47,9 @@ macro_rules! vocabulary {
 
 // Behind the macro, which it uses.
 mod effects;
+mod use_state;
 pub use effects::{EffectKind, KINDS, KindRow, separating_run};
+pub use use_state::UseState;
 
 vocabulary! {
     /// The kind of estimator behind a snapshot.
@@ -165,11 +167,11 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// What a controller may do with an estimate.
+    /// How the estimate of a pipeline stands as a whole; what of it may be used says the state of use.
     Status: u32 {
-        /// Not enough data yet; the values are the declared or the initial ones.
+        /// Not all that is estimated is known yet; what is not is declared, kept or initial.
         Unestimated = 1 "unestimated",
-        /// The values may be used.
+        /// All that is estimated is known.
         Estimated = 2 "estimated",
         /// There are values, with a reservation named by the reason.
         Degraded = 3 "degraded",

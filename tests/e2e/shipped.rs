@@ -55,7 +55,7 @@ fn every_shipped_example_comes_to_a_usable_resistance_from_the_shipped_daemon() 
         let program = Program::start(command.env(ROOT_VARIABLE, site.host().root()));
         let mut said = Vec::new();
         let is_answered = std::iter::from_fn(|| program.next_line(|| {})).any(|line| {
-            let is_answer = line.contains("the daemon (estimated)");
+            let is_answer = line.contains("the daemon (usable)");
             said.push(line);
             is_answer
         });

@@ -9,12 +9,15 @@ use dynocar::replay::{Rate, Replayer};
 use dynocar::state::{entry::StateContent, file};
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::identify::published_samples;
-use dynocar_client::SnapshotReader;
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_core::pipeline::{KeptEstimate, Pipeline};
 use dynocar_estimators::EstimatorSettings;
-use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainId, TrainSample};
+use dynocar_shared::{
+    Parameter, ParameterSnapshot, PipelineKind, Quantity, Status, TrainId, TrainSample,
+};
 use dynocar_tests::process::{Process, Site, await_true};
 use dynocar_tests::soak::state_kills::kill_writers;
+use dynocar_tests::tram;
 use dynocar_transport::monotonic_now_ns;
 use rustix::process::Signal;
 
@@ -281,4 +284,115 @@ fn a_state_directory_that_cannot_be_used_is_a_warning_and_one_that_is_not_wanted
     let open = open.parent().unwrap().to_str().unwrap();
     let log = stop(daemon_of_user(&cast, &shipped(&cast, ""), open));
     assert!(log.contains("chmod 700 it"), "{log}");
+}
+
+/// The tram as a pipeline serves it.
+fn tram_pipeline() -> Pipeline {
+    let train = Arc::new(tram::declared());
+    let settings = EstimatorSettings::default_of(PipelineKind::TrainKalman).unwrap();
+    let estimator = settings.build(&train).unwrap();
+    Pipeline::new(TRAIN, 0, train, None, estimator)
+}
+
+const IN_USE: [Quantity; 2] = [Quantity::Resistance, Quantity::Mass];
+
+#[test]
+fn a_tram_goes_on_with_what_was_in_use_from_the_first_sample_after_a_restart_at_any_moment() {
+    let samples = tram::samples(1, 900);
+    let mut first = tram_pipeline();
+    let (mut restarts, mut cycles, mut held) = (0, [0; 2], [0; 2]);
+    let mut kept: Option<KeptEstimate> = None;
+    let rate = tram::RATE_HZ as usize;
+    for (index, sample) in samples.iter().enumerate() {
+        let before = *first.process(sample);
+        if index % rate == 0
+            && let Ok(now) = KeptEstimate::of(&before)
+            && !kept.as_ref().is_some_and(|it| it.has_values_of(&now))
+        {
+            kept = Some(now);
+        }
+        let Some(kept) = kept.as_ref().filter(|_| index > 4000 && index % 137 == 0) else {
+            continue;
+        };
+        restarts += 1;
+        let next = index + 2 * rate;
+        let age_ns = sample.time_ns - kept.use_before.sample_time_ns;
+        let mut warm = tram_pipeline();
+        warm.warm_start(&kept.after(2.0 + 1e-9 * age_ns as f64));
+        let after: Vec<ParameterSnapshot> =
+            samples[next..].iter().take(20 * rate).map(|it| *warm.process(it)).collect();
+        for (place, quantity) in IN_USE.into_iter().enumerate() {
+            if before.is_usable_for(quantity) {
+                let since = after.iter().position(|it| it.is_usable_for(quantity));
+                cycles[place] = cycles[place].max(since.map_or(usize::MAX, |cycles| cycles + 1));
+                held[place] += after.iter().filter(|it| it.is_usable_for(quantity)).count();
+            }
+        }
+        let (mass_t, std_t) = (after[0].values[3], after[0].std(Parameter::Mass).unwrap());
+        assert!((mass_t - tram::LOADED_T).abs() < 4.0 * std_t, "{mass_t} ± {std_t} t");
+    }
+    assert!(restarts > 90, "{restarts}");
+    assert_eq!(cycles, [1, 1], "cycles until resistance and mass are usable");
+    let all = restarts * 20 * rate;
+    println!("{restarts} restarts; of 20 s after each usable: {held:?} of {all} cycles");
+}
+
+#[test]
+fn a_killed_daemon_s_successor_answers_a_driving_controller_with_its_first_samples() {
+    let cast = Cast::new();
+    cast.site.write("train.toml", tram::FILE);
+    let text = "[state]\ndirectory = \"state\"\ninterval_s = 3600\n[[trains]]\nid = 1\nfile = \"train.toml\"\n\
+                [[threads]]\nname = \"all\"\n[[pipelines]]\nkind = \"train_kalman\"\nthread = \"all\"\n";
+    let config = cast.site.write("daemon.toml", text);
+    let start = || {
+        let daemon = cast.site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
+        daemon.await_error("serving");
+        daemon
+    };
+    let mut daemon = start();
+    let mut publisher = SamplePublisher::open(&cast.site.host(), TRAIN).unwrap();
+    let mut reader = SnapshotReader::open(&cast.site.host(), TRAIN).unwrap();
+    let newest = |reader: &mut SnapshotReader| {
+        reader.poll();
+        let reading = reader.latest(PipelineKind::TrainKalman, monotonic_now_ns());
+        reading.map(|it| *it.snapshot)
+    };
+    // While the train drives, 4 s after it left its seventh stop.
+    let samples = tram::samples(1, 600);
+    let stands = |index: usize| samples[index].speed_mps == 0.0;
+    let departures = (1..samples.len()).filter(|&it| stands(it - 1) && !stands(it));
+    let killed = departures.into_iter().nth(7).unwrap() + 80;
+    let mut drive = |reader: &mut SnapshotReader, samples: &[TrainSample]| {
+        let mut answers = Vec::new();
+        for sample in samples {
+            let mut sample = *sample;
+            publisher.publish(&mut sample).expect("a sample to be taken");
+            let is_answered = |it: &ParameterSnapshot| it.sample_sequence >= sample.sequence;
+            await_true(
+                || newest(reader).is_some_and(|it| is_answered(&it)),
+                || "the answer to a sample".into(),
+            );
+            answers.extend(newest(reader));
+        }
+        answers
+    };
+    let before = *drive(&mut reader, &samples[..killed]).last().unwrap();
+    assert!(IN_USE.iter().all(|&it| before.is_usable_for(it)), "{:?}", before.reason());
+    // The keeper leaves what is newest each second.
+    let left = cast.site.host().root().join("train-1.state");
+    let is_newest = || {
+        let text = file::read(&left).ok().flatten()?;
+        let content = StateContent::from_text(&left, &text).ok()?;
+        Some(content.estimates.first()?.estimate.use_before.sample_time_ns == before.sample_time_ns)
+    };
+    await_true(|| is_newest() == Some(true), || "what a dying daemon leaves".into());
+    daemon.kill();
+    assert!(!cast.state_file().exists(), "the hour of the disk has not passed");
+    daemon = start();
+    let after = drive(&mut reader, &samples[killed + 40..killed + 60]);
+    let usable_after = |quantity| after.iter().position(|it| it.is_usable_for(quantity));
+    assert_eq!(IN_USE.map(usable_after), [Some(0), Some(0)], "{:?}", after[0].reason());
+    assert!((after[0].values[3] / before.values[3] - 1.0).abs() < 0.01);
+    stop(daemon);
+    assert!(!left.exists() && cast.state_file().exists(), "an orderly end leaves the disk's alone");
 }

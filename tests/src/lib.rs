@@ -13,6 +13,7 @@
 //! - [`simulator`]: recorded runs of random trains with known, undeclared effects
 //! - [`soak`]: seeded faults, for seconds in the tests and for hours by `dynocar-soak`
 //! - [`sources`]: the project's own sources
+//! - [`tram`]: a tram from stop to stop
 
 pub mod browser;
 pub mod documents;
@@ -25,3 +26,4 @@ pub mod sensor_failures;
 pub mod simulator;
 pub mod soak;
 pub mod sources;
+pub mod tram;

@@ -8,6 +8,7 @@ use crate::open_loop::controller::Outcome;
 use crate::open_loop::trial::Trial;
 use crate::output::{Record, table};
 use crate::rig::quantiles::{cells, for_people, pooled};
+use crate::rig::usage::waits_in_words;
 
 const MEBIBYTE: f64 = 1024.0 * 1024.0;
 
@@ -32,15 +33,13 @@ pub fn of(load: &Load, trial: &Trial) -> (Value, String) {
     let text = format!(
         "{trains} trains at {rate_hz} Hz for {seconds} s\n{}\n\
          daemon: {:.0} % of a core, {:.1} MiB resident ({:.1} MiB at first); samples left at most {} \
-         late\n\
-         ready but without a processor: publishers {:.2} %, daemon {:.2} % of the time\n",
+         late\n{}\n",
         table(&records),
         trial.cpu_percent,
         trial.rss_bytes as f64 / MEBIBYTE,
         trial.rss_start_bytes as f64 / MEBIBYTE,
         for_people(trial.publisher_lag_ns as f64),
-        100.0 * publishers_s / seconds,
-        100.0 * daemon_s / seconds
+        waits_in_words(trial.waits_s, seconds)
     );
     (all, text)
 }

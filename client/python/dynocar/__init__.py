@@ -65,6 +65,7 @@ from ._vocabulary import (
     Reason,
     RejectionReason,
     Status,
+    UseState,
 )
 
 __version__ = version()
@@ -107,6 +108,7 @@ __all__ = [
     "Snapshot",
     "SnapshotReader",
     "Status",
+    "UseState",
     "Table",
     "WorkError",
     "__version__",

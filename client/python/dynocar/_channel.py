@@ -23,6 +23,7 @@ from ._vocabulary import (
     Reason,
     RejectionReason,
     Status,
+    UseState,
 )
 
 PathLike = str | os.PathLike[str]
@@ -54,6 +55,8 @@ class Snapshot:
         self.reason = Reason(reading.reason)
         self.is_stale = reading.is_stale
         self.is_usable = reading.is_usable
+        self.use_state = UseState(reading.use_state)
+        self._why = reading.why
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name} {words}" for name, words in self._intervals())
@@ -71,8 +74,8 @@ class Snapshot:
         """Which pipeline, its status with the reason, and whether the values may be used."""
         if self.code != Code.OK:
             return f"{self.why}, not usable"
-        reason = "" if self.reason == Reason.NONE else f" ({self.why})"
-        use = "usable" if self.is_usable else "not usable"
+        reason = "" if self.reason == Reason.NONE else f" ({self.reason.name.lower()})"
+        use = "usable" if self.is_usable else f"not usable ({self.use_state.name.lower()})"
         return f"{self.pipeline_kind.name.lower()} {self.status.name.lower()}{reason}, {use}"
 
     def _intervals(self) -> list[tuple[str, str]]:
@@ -89,8 +92,12 @@ class Snapshot:
 
     @property
     def why(self) -> str:
-        """Why, in one word: the reason, ``no_snapshot`` or ``not_provided``."""
-        return (self.reason if self.code == Code.OK else self.code).name.lower()
+        """Why, in one word: the reason, ``no_snapshot`` or ``not_provided``.
+
+        ``confirming`` is what is known and held back until it has held; ``none`` stands only beside what
+        is usable.
+        """
+        return self._why if self.code == Code.OK else self.code.name.lower()
 
     @property
     def pipeline_kind(self) -> PipelineKind:

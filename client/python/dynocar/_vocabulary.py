@@ -60,15 +60,25 @@ class DaemonState(_Vocabulary):
 
 
 class Status(_Vocabulary):
-    """What a controller may do with an estimate. Only ``ESTIMATED`` values may be used.
+    """How the estimate of a pipeline stands as a whole. ``UseState`` says what may be used.
 
     ``docs/guides/reading.md`` says what each status and each reason means.
     """
 
-    UNESTIMATED = 1  # Not enough data yet; the values are the declared or the initial ones
-    ESTIMATED = 2  # The values may be used
+    UNESTIMATED = 1  # Not all that is estimated is known yet; what is not is declared, kept or initial
+    ESTIMATED = 2  # All that is estimated is known
     DEGRADED = 3  # There are values, with a reservation named by the reason
     INVALID = 4  # The values must not be used
+
+
+class UseState(_Vocabulary):
+    """Whether a controller may use the values for what it asked for, in one word."""
+
+    USABLE = 1  # The values may be used, whatever the status of the estimate as a whole
+    LEARNING = 2  # Not known well enough yet
+    CONFIRMING = 3  # Known, and held back until it has held for a while without doubt
+    DOUBTED = 4  # Something speaks against the values or the samples
+    UNAVAILABLE = 5  # There are no values: the daemon is silent, or the estimate has failed
 
 
 class Reason(_Vocabulary):

@@ -48,6 +48,17 @@ impl Reading {
     }
 
     #[getter]
+    fn use_state(&self) -> u32 {
+        self.copy.use_state() as u32
+    }
+
+    /// Why the state of use is what it is.
+    #[getter]
+    fn why(&self) -> &'static str {
+        self.copy.why()
+    }
+
+    #[getter]
     fn snapshot(&self) -> ParameterSnapshot {
         ParameterSnapshot(self.copy.snapshot)
     }

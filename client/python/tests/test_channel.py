@@ -264,7 +264,7 @@ def test_the_example_uses_the_daemon_and_falls_back(played: PlayedDaemon) -> Non
     try:
         example.wait_for_line("the built-in parameters (no_snapshot)")
         played.order("answer")
-        example.wait_for_line("the daemon (estimated)")
+        example.wait_for_line("the daemon (usable)")
         played.order("silence")
         example.wait_for_line("the built-in parameters (daemon_silent)")
     finally:
@@ -288,7 +288,7 @@ def test_the_shipped_example_is_answered_by_the_shipped_daemon(root: str) -> Non
         replay = dynocar_command("replay", ROOT / "config/demo", "--rate", 1000, env=environment)
         assert replay.returncode == 0, replay.stderr
         example = Lines(sys.executable, EXAMPLE, 1, PATIENCE_S, env=environment)
-        example.wait_for_line("the daemon (estimated)")
+        example.wait_for_line("the daemon (usable)")
         example.process.kill()
         example.process.wait(PATIENCE_S)
     finally:

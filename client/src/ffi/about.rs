@@ -7,7 +7,7 @@ use std::path::Path;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
     Manoeuvre, MassSource, Parameter, ParameterSnapshot, PipelineKind, Quantity, Reason,
-    RejectionReason, SCHEMA_MAJOR, Status, TrainId, TrainSample, vocabulary,
+    RejectionReason, SCHEMA_MAJOR, Status, TrainId, TrainSample, UseState, vocabulary,
 };
 
 use super::error::{Code, Failure, Message, guard_in_words};
@@ -183,6 +183,8 @@ export_names! {
     dynocar_parameter_name: Parameter by |it| it as u32,
     /// The name of a [`Status`].
     dynocar_status_name: Status by |it| it as u32,
+    /// The name of a [`UseState`].
+    dynocar_use_state_name: UseState by |it| it as u32,
     /// The name of a [`Reason`].
     dynocar_reason_name: Reason by |it| it as u32,
     /// The name of a [`RejectionReason`].

@@ -4,10 +4,10 @@ use std::ffi::c_char;
 
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{
-    ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId, wire_struct,
+    ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId, UseState, wire_struct,
 };
 
-use super::about::host_of;
+use super::about::{dynocar_reason_name, dynocar_use_state_name, host_of};
 use super::error::{Code, Message, guard, guard_in_words};
 use super::handle::Handle;
 use crate::reader::{Reading, SnapshotReader};
@@ -57,6 +57,57 @@ impl From<Reading<'_>> for ReadingCopy {
             is_usable: u32::from(reading.is_usable()),
             snapshot: *reading.snapshot,
         }
+    }
+}
+
+impl ReadingCopy {
+    /// The state of use of what was asked for; a status of a newer peer reads as invalid.
+    pub fn use_state(&self) -> UseState {
+        let status = Status::from_number(self.status).unwrap_or(Status::Invalid);
+        UseState::of(status, self.is_usable != 0)
+    }
+
+    /// Why that is so, see [`Reading::why`].
+    pub fn why(&self) -> &'static str {
+        self.use_state().why(Reason::from_number(self.reason))
+    }
+}
+
+/// The state of use of a reading, a [`UseState`] by number; NULL is unavailable.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+///
+/// # Real-time
+///
+/// Safe for the control cycle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynocar_reading_use_state(reading: *const ReadingCopy) -> u32 {
+    // SAFETY: promised by the caller.
+    unsafe { reading.as_ref() }.map_or(UseState::Unavailable, ReadingCopy::use_state) as u32
+}
+
+/// Why the state of use is what it is, see [`Reading::why`]. Never NULL, never to be freed.
+///
+/// # Safety
+///
+/// See [the module](super#safety).
+///
+/// # Real-time
+///
+/// Safe for the control cycle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynocar_reading_why(reading: *const ReadingCopy) -> *const c_char {
+    // SAFETY: promised by the caller.
+    let Some(reading) = (unsafe { reading.as_ref() }) else {
+        return dynocar_reason_name(Reason::DaemonSilent as u32);
+    };
+    let state = reading.use_state();
+    if reading.why() == state.name() {
+        dynocar_use_state_name(state as u32)
+    } else {
+        dynocar_reason_name(reading.reason)
     }
 }
 

@@ -99,7 +99,7 @@ fn assert_example_falls_back(command: &mut Command) {
     command.env(ROOT_VARIABLE, daemon.root()).args([TRAIN.to_string(), "6000".into()]);
     let controller = Program::start(command);
     let built_in = |reason| format!("the built-in parameters ({reason})");
-    let (ours, silent) = ("the daemon (estimated)".to_owned(), built_in("daemon_silent"));
+    let (ours, silent) = ("the daemon (usable)".to_owned(), built_in("daemon_silent"));
     let mut is_answering = false;
     let mut origins = Vec::new();
     while !(origins.contains(&ours) && origins.last() == Some(&silent)) {

@@ -63,12 +63,8 @@ fn lines_of(health: &TrainHealth) -> String {
     let daemon = health.daemon.as_deref().unwrap_or("nobody serves it");
     let mut text = format!("train {}: {}: {daemon}\n", health.train, health.verdict.name());
     for it in &health.pipelines {
-        let reason = it.reason.map_or("unknown", dynocar_shared::Reason::name);
-        let (kind, status, age_ms) = (it.kind, it.status, it.age_ms);
-        text += &format!(
-            "  pipeline {} ({kind}): {status} ({reason}), vouched {age_ms} ms ago",
-            it.index
-        );
+        let (kind, words, age_ms) = (it.kind, it.in_words(), it.age_ms);
+        text += &format!("  pipeline {} ({kind}): {words}; vouched {age_ms} ms ago", it.index);
         if let Some(suspicion) = it.suspicion {
             text += &format!("; suspected: {suspicion}, {}", suspicion.force());
         }

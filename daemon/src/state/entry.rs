@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_core::pipeline::KeptEstimate;
+use dynocar_core::pipeline::{KeptEstimate, UseBefore};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::Parameter;
 use serde::{Deserialize, Serialize};
@@ -82,6 +82,12 @@ struct RawEstimate {
     parameters: Vec<String>,
     values: Vec<f64>,
     covariance: Vec<f64>,
+    /// Of a release that did not keep how it was used, nothing is known.
+    #[serde(default)]
+    sample_time_ns: i64,
+    #[serde(default)]
+    usable_quantities: u32,
+    speeds_mps: Option<(f64, f64)>,
 }
 
 impl StateContent {
@@ -98,6 +104,9 @@ impl StateContent {
             parameters: it.estimate.parameters().iter().map(Parameter::to_string).collect(),
             values: it.estimate.values().to_vec(),
             covariance: it.estimate.covariance().to_vec(),
+            sample_time_ns: it.estimate.use_before.sample_time_ns,
+            usable_quantities: it.estimate.use_before.usable_quantities,
+            speeds_mps: it.estimate.use_before.speeds_mps,
         });
         toml::to_string(&RawState {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -130,9 +139,15 @@ impl StateContent {
         let stored = |it: RawEstimate| {
             let parameters: Option<Vec<_>> =
                 it.parameters.iter().map(|name| Parameter::from_name(name)).collect();
-            let estimate =
+            let mut estimate =
                 KeptEstimate::new(&parameters.unwrap_or_default(), &it.values, &it.covariance)
                     .map_err(|reason| malformed(format!("estimates.{}: {reason}", it.pipeline)))?;
+            estimate.use_before = UseBefore {
+                sample_time_ns: it.sample_time_ns,
+                usable_quantities: it.usable_quantities,
+                speeds_mps: it.speeds_mps.filter(|it| (it.0 + it.1).is_finite()),
+                elapsed_s: 0.0,
+            };
             if !it.estimated_unix_s.is_finite() {
                 return Err(malformed(format!("estimates.{}: no finite time", it.pipeline)));
             }

@@ -6,8 +6,9 @@
 //!
 //! A file is replaced as a whole, see [`mod@crate::storage`].
 
-use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use super::{StateError, StateProblem};
@@ -87,7 +88,23 @@ pub fn replace(path: &Path, content: &str) -> Result<(), StateError> {
     replace_on(&Disk, path, content)
 }
 
-/// The same on any storage.
+/// Replaces a state file as a whole for whoever comes after a process that died; not brought to the disk.
+///
+/// # Errors
+///
+/// The system's answer; the file there was stays as it is.
+pub fn leave(path: &Path, content: &str) -> Result<(), StateError> {
+    let new = beside(path);
+    let write = || {
+        let mut options = OpenOptions::new();
+        let options = options.write(true).create(true).truncate(true).mode(0o600);
+        options.open(&new)?.write_all(&bytes_of(content))
+    };
+    write().map_err(failed(&new, "writing"))?;
+    std::fs::rename(&new, path).map_err(failed(path, "renaming"))
+}
+
+/// As [`replace`], on any storage.
 ///
 /// # Errors
 ///

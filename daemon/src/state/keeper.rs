@@ -1,6 +1,6 @@
 //! The thread that writes the states: a client of the daemon's own snapshots.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -12,22 +12,26 @@ use dynocar_transport::{ChannelError, Host, monotonic_now_ns};
 use tracing::{info, warn};
 
 use super::entry::{ModelKey, StateContent, StoredEstimate, settings_hash};
-use super::{StateProblem, file, path_of, unix_now_s};
+use super::{StateError, StateProblem, file, path_of, unix_now_s};
 use crate::config::DaemonConfig;
 
 /// How often the keeper looks whether to stop.
 const ROUND: Duration = Duration::from_millis(50);
+/// How often what a daemon that dies at once leaves is written.
+const LEAVE_EVERY: Duration = Duration::from_secs(1);
 
 /// One train's state with the reader it is kept from.
 struct KeptTrain {
     reader: SnapshotReader,
     content: StateContent,
-    is_changed: bool,
+    /// Whether the file is older than the content: the one on the disk, and the one in the run-time directory.
+    is_changed: [bool; 2],
 }
 
 /// Keeps the states of all trains.
 pub struct Keeper {
-    directory: PathBuf,
+    /// On the disk, and in the run-time directory.
+    directories: [PathBuf; 2],
     interval: Duration,
     /// Name and settings hash by number of the pipeline.
     pipelines: Vec<(String, u64)>,
@@ -56,25 +60,30 @@ impl Keeper {
                 Ok(KeptTrain {
                     reader: SnapshotReader::open(host, train.id)?,
                     content: StateContent { key: ModelKey::of(train), estimates },
-                    is_changed: false,
+                    is_changed: [false; 2],
                 })
             })
             .collect::<Result<_, ChannelError>>()?;
         let name =
             |it: &crate::config::PipelineConfig| (it.name.clone(), settings_hash(&it.estimator));
         let pipelines = config.pipelines.iter().map(name).collect();
-        Ok(Keeper { directory, interval, pipelines, trains, stop })
+        let directories = [directory, host.root().to_owned()];
+        Ok(Keeper { directories, interval, pipelines, trains, stop })
     }
 
-    /// Writes what is validated, every so often and at the end.
+    /// Writes what is validated, every so often and at the end, when nothing is left in the run-time directory.
     pub fn run(&mut self) {
-        let mut last = Instant::now();
+        let (mut last, mut left) = (Instant::now(), Instant::now());
         while !self.stop.load(Ordering::Relaxed) {
             std::thread::sleep(ROUND);
             if last.elapsed() >= self.interval {
                 last = Instant::now();
                 self.gather();
-                self.write();
+                self.write(0, file::replace);
+            } else if left.elapsed() >= LEAVE_EVERY {
+                left = Instant::now();
+                self.gather();
+                self.write(1, file::leave);
             } else {
                 for train in &mut self.trains {
                     train.reader.poll();
@@ -82,7 +91,12 @@ impl Keeper {
             }
         }
         self.gather();
-        self.write();
+        self.write(0, file::replace);
+        for train in self.trains.iter().filter(|it| !it.is_changed[0]) {
+            let id = dynocar_shared::TrainId(train.content.key.train);
+            // What was never left cannot be removed.
+            let _ = std::fs::remove_file(path_of(&self.directories[1], id));
+        }
     }
 
     fn gather(&mut self) {
@@ -99,22 +113,23 @@ impl Keeper {
                 if let Some((name, settings)) = self.pipelines.get(index) {
                     let is_news =
                         keep(&mut train.content, name, *settings, reading.snapshot, now_s);
-                    train.is_changed |= is_news;
+                    train.is_changed = train.is_changed.map(|is_changed| is_changed || is_news);
                 }
             }
         }
     }
 
-    fn write(&mut self) {
-        for train in self.trains.iter_mut().filter(|train| train.is_changed) {
-            let path = path_of(&self.directory, dynocar_shared::TrainId(train.content.key.train));
+    fn write(&mut self, place: usize, replace: fn(&Path, &str) -> Result<(), StateError>) {
+        for train in self.trains.iter_mut().filter(|train| train.is_changed[place]) {
+            let id = dynocar_shared::TrainId(train.content.key.train);
+            let path = path_of(&self.directories[place], id);
             let written = train
                 .content
                 .to_text()
                 .map_err(|error| StateProblem::Malformed(error.to_string()).at(&path))
-                .and_then(|text| file::replace(&path, &text));
+                .and_then(|text| replace(&path, &text));
             match written {
-                Ok(()) => train.is_changed = false,
+                Ok(()) => train.is_changed[place] = false,
                 Err(error) => warn!("state not kept, tried again later: {error}"),
             }
         }
@@ -139,7 +154,9 @@ fn keep(
         estimate,
     };
     match content.estimates.iter_mut().find(|it| it.pipeline == pipeline) {
-        Some(before) if before.estimate == stored.estimate && before.settings == settings => {
+        Some(before)
+            if before.estimate.has_values_of(&stored.estimate) && before.settings == settings =>
+        {
             // The same again, without a sample since: it does not become younger by that.
             false
         }

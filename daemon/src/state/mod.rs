@@ -2,6 +2,7 @@
 //!
 //! A thread of its own polls the published snapshots as any client does, and writes what is
 //! validated (see [`KeptEstimate`]) from time to time; the pipeline threads know nothing of it.
+//! A second copy lies in the run-time directory, a second old at most: it is what a daemon leaves that dies at once.
 //! The next daemon takes the file up when it is whole, of the same train, wheel set, model and
 //! settings, and not too old; else it says why not and starts cold.
 //!
@@ -25,6 +26,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use dynocar_core::pipeline::KeptEstimate;
 use dynocar_shared::TrainId;
+use dynocar_transport::Host;
 use tracing::{info, warn};
 
 use crate::config::{DaemonConfig, PipelineConfig, StateConfig, TrainConfig};
@@ -55,13 +57,25 @@ pub fn load(directory: &Path, train: &TrainConfig) -> Result<Vec<StoredEstimate>
     Ok(content.estimates)
 }
 
-/// The states of all trains, taken up or refused; each refusal is logged.
-pub fn load_all(directory: &Path, trains: &[TrainConfig]) -> Vec<Vec<StoredEstimate>> {
+/// The states of all trains, taken up or refused, of each pipeline the newest of all directories; each refusal is
+/// logged.
+pub fn load_all(directories: [&Path; 2], trains: &[TrainConfig]) -> Vec<Vec<StoredEstimate>> {
     let take_up = |train: &TrainConfig| {
-        load(directory, train).unwrap_or_else(|error| {
-            warn!(train = train.id.0, "state refused, cold start: {error}");
-            Vec::new()
-        })
+        let mut newest: Vec<StoredEstimate> = Vec::new();
+        for directory in directories {
+            let found = load(directory, train).unwrap_or_else(|error| {
+                warn!(train = train.id.0, "state refused, cold start: {error}");
+                Vec::new()
+            });
+            for it in found {
+                match newest.iter_mut().find(|known| known.pipeline == it.pipeline) {
+                    Some(known) if known.estimated_unix_s >= it.estimated_unix_s => {}
+                    Some(known) => *known = it,
+                    None => newest.push(it),
+                }
+            }
+        }
+        newest
     };
     trains.iter().map(take_up).collect()
 }
@@ -106,12 +120,12 @@ pub struct Taken<'a> {
 
 impl<'a> Taken<'a> {
     /// Takes the states up; `None` when the daemon is to keep none, or cannot, which the log says.
-    pub fn up(config: &'a DaemonConfig) -> Option<Self> {
+    pub fn up(config: &'a DaemonConfig, host: &Host) -> Option<Self> {
         let state = config.state.as_ref()?;
         match place::prepare(state.directory.as_deref()) {
             Ok(directory) => {
                 info!(directory = %directory.display(), "state");
-                let stored = load_all(&directory, &config.trains);
+                let stored = load_all([&directory, host.root()], &config.trains);
                 Some(Taken { config: state, directory, stored })
             }
             Err(error) => {

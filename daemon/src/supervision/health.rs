@@ -6,7 +6,7 @@ use dynocar_client::SnapshotReader;
 use dynocar_core::remedy::{of_reason, of_refusal};
 use dynocar_model::named;
 use dynocar_shared::vocabulary::KindRow;
-use dynocar_shared::{PipelineKind, Reason, RejectionReason, Status, TrainId};
+use dynocar_shared::{PipelineKind, Quantity, Reason, RejectionReason, Status, TrainId, UseState};
 use dynocar_transport::{ChannelError, Host, Peer, Role, monotonic_now_ns};
 
 use crate::operator::refusals;
@@ -37,6 +37,7 @@ impl Verdict {
     pub const fn of(status: Status, reason: Option<Reason>) -> Self {
         match (status, reason) {
             (Status::Degraded | Status::Invalid, _) => Verdict::Degraded,
+            (_, Some(Reason::BadInput)) => Verdict::Degraded,
             (_, Some(reason)) if reason.is_implausible_input() => Verdict::Degraded,
             (Status::Estimated | Status::Unestimated, _) => Verdict::Ok,
         }
@@ -79,6 +80,8 @@ pub struct PipelineHealth {
     pub status: Status,
     /// Why.
     pub reason: Option<Reason>,
+    /// The quantities that it answers, each with its state of use and why, in one word.
+    pub uses: Vec<(Quantity, UseState, &'static str)>,
     /// Since the daemon last vouched for it, in ms.
     pub age_ms: i64,
     /// True when that is too long ago.
@@ -90,6 +93,22 @@ pub struct PipelineHealth {
 }
 
 impl PipelineHealth {
+    /// Returns status and reason, then each quantity with its state of use and what ends it.
+    pub fn in_words(&self) -> String {
+        let reason = match self.reason {
+            Some(Reason::None) => String::new(),
+            reason => format!(" ({})", reason.map_or("unknown", Reason::name)),
+        };
+        let of_quantity = |&(quantity, state, why): &(Quantity, UseState, &'static str)| match state
+        {
+            UseState::Usable => format!("; {quantity} usable"),
+            _ if why == state.name() => format!("; {quantity} {state}: {}", state.ends()),
+            _ => format!("; {quantity} {state} ({why}): {}", state.ends()),
+        };
+        let uses: String = self.uses.iter().map(of_quantity).collect();
+        format!("{}{reason}{uses}", self.status)
+    }
+
     fn verdict(&self) -> Verdict {
         if self.is_stale { Verdict::Stale } else { Verdict::of(self.status, self.reason) }
     }
@@ -182,6 +201,14 @@ fn pipelines_of(reader: &mut SnapshotReader) -> Vec<PipelineHealth> {
         kind: reading.snapshot.pipeline_kind().map_or("unknown", PipelineKind::name),
         status: reading.status(),
         reason: reading.reason(),
+        uses: Quantity::ALL
+            .iter()
+            .filter(|&&quantity| reading.snapshot.answers(quantity))
+            .map(|&quantity| {
+                let asked = dynocar_client::Reading { quantity: Some(quantity), ..reading };
+                (quantity, asked.use_state(), asked.why())
+            })
+            .collect(),
         age_ms: reading.age_ns / 1_000_000,
         is_stale: reading.is_stale,
         suspicion: Suspicion::of(reading.snapshot),
@@ -201,6 +228,7 @@ mod tests {
         let waiting = |reason| Verdict::of(Status::Unestimated, Some(reason));
         assert_eq!(waiting(Reason::OnlyLowerBound), Verdict::Ok);
         assert_eq!(waiting(Reason::EstimateStale), Verdict::Ok);
+        assert_eq!(waiting(Reason::BadInput), Verdict::Degraded, "samples that are refused");
         let large = Verdict::of(Status::Degraded, Some(Reason::InnovationsTooLarge));
         assert_eq!(large, Verdict::Degraded);
         let silent = PipelineHealth { is_stale: true, ..pipeline(Reason::DaemonSilent) };
@@ -213,11 +241,37 @@ mod tests {
             kind: "adhesion_law",
             status: Status::Degraded,
             reason: Some(reason),
+            uses: Vec::new(),
             age_ms: 0,
             is_stale: false,
             suspicion: None,
             refused: Vec::new(),
         }
+    }
+
+    #[test]
+    fn each_quantity_says_whether_it_may_be_used_why_and_what_ends_it() {
+        let held_back = PipelineHealth {
+            status: Status::Estimated,
+            uses: vec![
+                (Quantity::Resistance, UseState::Usable, "none"),
+                (Quantity::Mass, UseState::Confirming, "confirming"),
+            ],
+            ..pipeline(Reason::None)
+        };
+        let words = held_back.in_words();
+        assert!(words.starts_with("estimated; resistance usable; mass confirming: "), "{words}");
+        assert!(words.ends_with("up to 10 min"), "{words}");
+        let waiting = PipelineHealth {
+            status: Status::Unestimated,
+            uses: vec![(Quantity::Adhesion, UseState::Learning, "only_lower_bound")],
+            ..pipeline(Reason::OnlyLowerBound)
+        };
+        let words = waiting.in_words();
+        assert!(
+            words.ends_with("; adhesion learning (only_lower_bound): driving ends it"),
+            "{words}"
+        );
     }
 
     #[test]

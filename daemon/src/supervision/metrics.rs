@@ -32,6 +32,7 @@ struct Families {
     resets: Counters,
     status: Gauges,
     usable: Gauges,
+    use_state: Gauges,
     vouched_age: Gauges,
     latency: Gauges,
     value: Gauges,
@@ -62,7 +63,7 @@ impl Families {
     }
 
     /// The same of what goes up and down.
-    fn gauges(&self) -> [(&'static str, &'static str, &Gauges); 15] {
+    fn gauges(&self) -> [(&'static str, &'static str, &Gauges); 16] {
         [
             ("status", "1 for the status that holds", &self.status),
             (
@@ -70,6 +71,7 @@ impl Families {
                 "1 while a controller may use the quantity that the pipeline answers",
                 &self.usable,
             ),
+            ("quantity_use", "1 for the state of use that holds, and why", &self.use_state),
             ("vouched_age_seconds", "Time since the snapshot was vouched for", &self.vouched_age),
             ("latency_seconds", "From sample to snapshot, the newest", &self.latency),
             ("parameter_value", "Value in the parameter's unit", &self.value),
@@ -146,9 +148,12 @@ impl Families {
             self.status.get_or_create(&with("status", status.name())).set(holds);
         }
         for &quantity in Quantity::ALL.iter().filter(|&&quantity| it.answers(quantity)) {
-            let is_usable = Reading { quantity: Some(quantity), ..*reading }.is_usable();
-            let labels = with("quantity", quantity.name());
-            self.usable.get_or_create(&labels).set(f64::from(u8::from(is_usable)));
+            let asked = Reading { quantity: Some(quantity), ..*reading };
+            let mut labels = with("quantity", quantity.name());
+            self.usable.get_or_create(&labels).set(f64::from(u8::from(asked.is_usable())));
+            labels.extend([("use", asked.use_state().name().to_owned())]);
+            labels.extend([("why", asked.why().to_owned())]);
+            self.use_state.get_or_create(&labels).set(1.0);
         }
         self.vouched_age.get_or_create(&labels).set(reading.age_ns as f64 * 1e-9);
         if it.sample_sequence > 0 {
@@ -292,6 +297,9 @@ mod tests {
         assert_eq!(Quantity::ALL[..2], [Quantity::Resistance, Quantity::Mass]);
         assert_eq!(shown(false)[..2], [[false, true], [true, false]]);
         assert_eq!(shown(true)[..2], [[false, true]; 2], "nobody may use what nobody vouches for");
+        let text = text_of(&snapshot, false);
+        let held_back = "quantity=\"resistance\",use=\"confirming\",why=\"confirming\"";
+        assert!(has(&text, "dynocar_quantity_use", held_back, "1.0"), "{text}");
         assert!(shown(false)[2..].iter().all(|it| *it == [false; 2]), "others answer these");
     }
 }

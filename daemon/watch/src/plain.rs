@@ -66,11 +66,12 @@ pub fn line(train: &TrainState) -> String {
     for row in rows(train, &[0.5]) {
         let words = [row.label.trim(), &row.number, &row.interval, row.unit];
         let value = words.into_iter().filter(|it| !it.is_empty()).collect::<Vec<_>>().join(" ");
-        let status = match row.status {
-            Some(status) => format!(" {} ({})", status.name(), row.reason),
+        let state = match row.use_state {
+            Some(state) if row.why.is_empty() => format!(" {state}"),
+            Some(state) => format!(" {state} ({})", row.why),
             None => String::new(),
         };
-        parts.push(value + &status);
+        parts.push(value + &state);
     }
     if !train.pipelines.is_empty() {
         parts.extend(

@@ -3,7 +3,9 @@
 use std::collections::VecDeque;
 
 use dynocar_client::Reading;
-use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId};
+use dynocar_shared::{
+    ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId, UseState,
+};
 
 /// Who serves a train, as far as one can see.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,9 +62,24 @@ impl PipelineState {
         kind_of(&self.snapshot)
     }
 
-    /// The reason's name.
-    pub fn reason_name(&self) -> &'static str {
-        self.reason.map_or("unknown", Reason::name)
+    /// The status, with its reason where there is one.
+    pub fn status_words(&self) -> String {
+        match self.reason {
+            Some(Reason::None) => self.status.to_string(),
+            reason => format!("{} ({})", self.status, reason.map_or("unknown", Reason::name)),
+        }
+    }
+
+    /// The state of use of a quantity that it answers.
+    pub fn use_of(&self, quantity: Quantity) -> UseState {
+        UseState::of(self.status, self.snapshot.is_usable_for(quantity))
+    }
+
+    /// Why that is so, in one word; empty where there is nothing to remark.
+    pub fn why(&self, quantity: Quantity) -> &'static str {
+        let state = self.use_of(quantity);
+        let why = state.why(self.reason);
+        if why == "none" || why == state.name() { "" } else { why }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use dynocar::operator::suspicion::{Suspicion, force_words};
 use dynocar::operator::{duration, refusals};
-use dynocar_shared::{HALF_95, Parameter, Quantity, Status};
+use dynocar_shared::{HALF_95, Parameter, Quantity, UseState};
 
 use crate::state::{Daemon, PipelineState, TrainState};
 
@@ -17,10 +17,10 @@ pub struct Row {
     pub interval: String,
     /// The unit of both.
     pub unit: &'static str,
-    /// The status, for a quantity.
-    pub status: Option<Status>,
-    /// Why.
-    pub reason: &'static str,
+    /// The state of use, for a quantity.
+    pub use_state: Option<UseState>,
+    /// Why; empty where there is nothing to remark.
+    pub why: &'static str,
     /// Age in s of the newest sample behind it.
     pub age_s: Option<f64>,
 }
@@ -32,8 +32,8 @@ pub fn rows(train: &TrainState, shares: &[f64]) -> Vec<Row> {
         let Some(pipeline) = train.answering(quantity) else { continue };
         let head = Row {
             label: quantity.name().replace('_', " "),
-            status: Some(pipeline.status),
-            reason: pipeline.reason_name(),
+            use_state: Some(pipeline.use_of(quantity)),
+            why: pipeline.why(quantity),
             age_s: pipeline.sample_age_s,
             ..Row::default()
         };

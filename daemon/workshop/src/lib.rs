@@ -18,6 +18,7 @@
 
 pub mod annotation;
 pub mod cli;
+pub mod clock;
 pub mod fmu;
 pub mod learn;
 pub mod paths;

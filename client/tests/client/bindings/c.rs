@@ -20,9 +20,10 @@ const LENGTHS: [(usize, &str); 3] = [
     (COVARIANCE_ENTRIES, "DYNOCAR_COVARIANCE_ENTRIES"),
 ];
 /// Names of Rust in meanings, and what C calls them.
-const NAMES: [(&str, &str); 10] = [
+const NAMES: [(&str, &str); 11] = [
     ("PipelineKind", "DYNOCAR_PIPELINE_..."),
     ("Status", "DYNOCAR_STATUS_..."),
+    ("UseState", "DYNOCAR_USE_..."),
     ("RejectionReason", "DYNOCAR_REJECTED_..."),
     ("Reason", "DYNOCAR_REASON_..."),
     ("Quantity", "DYNOCAR_QUANTITY_..."),

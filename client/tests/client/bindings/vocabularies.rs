@@ -7,7 +7,7 @@ use dynocar_client::ffi::{Code, Rail};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
     Manoeuvre, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason, SampleField,
-    Status,
+    Status, UseState,
 };
 
 /// A number with its name and what it means.
@@ -124,11 +124,18 @@ pub fn of_answers() -> Vec<Vocabulary> {
         Vocabulary {
             prefix: "STATUS",
             class: "Status",
-            about: "What a controller may do with an estimate.",
+            about: "How the estimate of a pipeline stands as a whole.",
             in_c: "Of an estimated one, too, the reason may remark something.",
-            in_python: "Only ``ESTIMATED`` values may be used.\n\n    ``docs/guides/reading.md`` says \
+            in_python: "``UseState`` says what may be used.\n\n    ``docs/guides/reading.md`` says \
                         what each status and each reason means.\n    ",
             members: members!(Status),
+            ..PLAIN
+        },
+        Vocabulary {
+            prefix: "USE",
+            class: "UseState",
+            about: "Whether a controller may use the values for what it asked for, in one word.",
+            members: members!(UseState),
             ..PLAIN
         },
         Vocabulary {

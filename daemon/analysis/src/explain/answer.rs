@@ -223,6 +223,23 @@ pub struct RunnerUp {
     pub evidence_less: f64,
 }
 
+impl RunnerUp {
+    /// Returns the formula, and whether the data speak less or more for it than for the form that was taken.
+    pub fn in_words(&self) -> String {
+        let formula = in_plain_words(&self.formula);
+        match self.evidence_less.round() {
+            0.0 => format!("{formula} (evidence the same)"),
+            less @ 0.0.. => format!("{formula} (evidence less by {less:.0})"),
+            more => format!("{formula} (evidence more by {:.0})", -more),
+        }
+    }
+}
+
+/// Returns a formula with its powers in words, for people.
+pub fn in_plain_words(formula: &str) -> String {
+    formula.replace(")^", ") to the power of ")
+}
+
 /// What the data say of one number at no effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Identifiability {

@@ -1,7 +1,7 @@
 //! What of an estimate outlives the daemon, and what it is worth later.
 //!
-//! A stored estimate comes back as a prior, never as an estimate: a pipeline that starts from it
-//! reports `unestimated` with the stored values until its own samples have confirmed them.
+//! A stored estimate comes back as a prior: a pipeline that starts from it reports `unestimated` with the
+//! stored values until its own samples have confirmed them. One that was in use moments ago goes on.
 
 use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
 use dynocar_shared::{Parameter, ParameterSnapshot, Status};
@@ -16,7 +16,38 @@ pub struct KeptEstimate {
     parameters: Vec<Parameter>,
     values: Vec<f64>,
     covariance: Vec<f64>,
+    /// Covariance before any time had passed.
+    first_covariance: Vec<f64>,
+    /// When and how it was used.
+    pub use_before: UseBefore,
 }
+
+/// How an estimate was used when it was kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UseBefore {
+    /// Time in ns of the newest sample behind it, controller's clock.
+    pub sample_time_ns: i64,
+    /// The quantities that a controller might use, one bit each.
+    pub usable_quantities: u32,
+    /// Lowest and highest speed in m/s driven.
+    pub speeds_mps: Option<(f64, f64)>,
+    /// Time in s that has passed since, by the clock of the daemon's host.
+    pub elapsed_s: f64,
+}
+
+impl UseBefore {
+    /// Returns the time in s that has passed up to a sample's time in ns, where the use may go on: minutes
+    /// at most, by the controller's clock and by the host's.
+    pub fn interrupted_s(&self, time_ns: i64) -> Option<f64> {
+        let since_s = time_ns.saturating_sub(self.sample_time_ns) as f64 * 1e-9;
+        let is_short = |elapsed_s: f64| (0.0..=RESUMED_MAX_S).contains(&elapsed_s);
+        let is_known = self.sample_time_ns != 0 && is_short(since_s);
+        (is_known && is_short(self.elapsed_s.max(0.0))).then(|| since_s.max(self.elapsed_s))
+    }
+}
+
+/// Time in s after which a use that was broken off does not go on by itself.
+const RESUMED_MAX_S: f64 = 600.0;
 
 /// Why an estimate is not worth keeping, or a kept one not worth taking up.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -65,6 +96,8 @@ impl KeptEstimate {
             parameters: parameters.to_vec(),
             values: values.to_vec(),
             covariance: covariance.to_vec(),
+            first_covariance: covariance.to_vec(),
+            use_before: UseBefore::default(),
         };
         if kept.is_sound() { Ok(kept) } else { Err(NotKept::NotSound) }
     }
@@ -92,7 +125,33 @@ impl KeptEstimate {
             snapshot.parameters[..count].iter().map(|&it| Parameter::from_number(it)).collect();
         let parameters = parameters.ok_or(NotKept::Parameters)?;
         let entries = count * (count + 1) / 2;
-        KeptEstimate::new(&parameters, &snapshot.values[..count], &snapshot.covariance[..entries])
+        let kept = KeptEstimate::new(
+            &parameters,
+            &snapshot.values[..count],
+            &snapshot.covariance[..entries],
+        )?;
+        let speeds_mps = (snapshot.speed_min_mps, snapshot.speed_max_mps);
+        let use_before = UseBefore {
+            sample_time_ns: snapshot.sample_time_ns,
+            usable_quantities: snapshot.usable_quantities,
+            speeds_mps: (speeds_mps.1 > speeds_mps.0).then_some(speeds_mps),
+            elapsed_s: 0.0,
+        };
+        Ok(KeptEstimate { use_before, ..kept })
+    }
+
+    /// Returns true when another one says the same of the parameters.
+    pub fn has_values_of(&self, other: &KeptEstimate) -> bool {
+        let all = |it: &KeptEstimate| {
+            (it.parameters.clone(), it.values.clone(), it.first_covariance.clone())
+        };
+        all(self) == all(other)
+    }
+
+    /// Returns the variance of a parameter's value before any time had passed.
+    pub fn first_variance(&self, parameter: Parameter) -> Option<f64> {
+        let index = self.parameters.iter().position(|&it| it == parameter)?;
+        Some(self.first_covariance[packed_index(index, index)])
     }
 
     /// The parameters.
@@ -117,6 +176,7 @@ impl KeptEstimate {
     #[must_use]
     pub fn after(&self, elapsed_s: f64) -> Self {
         let mut aged = self.clone();
+        aged.use_before.elapsed_s += elapsed_s;
         for i in 0..self.parameters.len() {
             let (share, time_s) = wander(self.parameters[i]);
             let grown = 1.0 - (-2.0 * elapsed_s.max(0.0) / time_s).exp();
@@ -210,10 +270,25 @@ mod tests {
     }
 
     #[test]
+    fn a_use_goes_on_within_minutes_by_the_clocks_of_both_sides() {
+        let mut it = snapshot();
+        let second_ns = 1_000_000_000;
+        it.sample_time_ns = 100 * second_ns;
+        let kept = KeptEstimate::of(&it).unwrap();
+        assert_eq!(kept.after(2.0).use_before.interrupted_s(103 * second_ns), Some(3.0));
+        assert_eq!(kept.after(7.0).use_before.interrupted_s(103 * second_ns), Some(7.0));
+        assert_eq!(kept.after(2.0).use_before.interrupted_s(99 * second_ns), None, "another clock");
+        assert_eq!(kept.after(2.0).use_before.interrupted_s(900 * second_ns), None);
+        assert_eq!(kept.after(900.0).use_before.interrupted_s(103 * second_ns), None);
+        assert_eq!(kept.after(50.0).first_variance(Parameter::DavisA), Some(0.04));
+    }
+
+    #[test]
     fn variances_grow_with_time_towards_a_bound_and_never_shrink() {
         let kept = KeptEstimate::of(&snapshot()).unwrap();
         assert_eq!(kept.after(0.0), kept);
-        assert_eq!(kept.after(-5.0), kept, "a clock that was set back ages nothing");
+        let set_back = kept.after(-5.0);
+        assert_eq!(set_back.covariance(), kept.covariance(), "a clock set back ages nothing");
         let variance = |elapsed_s: f64| kept.after(elapsed_s).covariance()[0];
         assert!(variance(60.0) > variance(0.0));
         assert!(variance(86_400.0) > variance(3_600.0));

@@ -19,7 +19,7 @@ mod usable;
 
 pub use estimator::{Echo, Estimator, Outcome};
 pub use judge::InnovationMonitor;
-pub use kept::{KeptEstimate, NotKept};
+pub use kept::{KeptEstimate, NotKept, UseBefore};
 pub use settings::SettingError;
 
 use std::sync::Arc;
@@ -87,6 +87,9 @@ impl Pipeline {
     /// estimator has no use for it.
     pub fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
         let is_taken = self.estimator.warm_start(kept);
+        if is_taken {
+            self.usable = Usable::resumed(kept.use_before.usable_quantities);
+        }
         self.write_estimate();
         is_taken
     }

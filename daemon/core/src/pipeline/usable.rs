@@ -47,7 +47,7 @@ impl Switch {
             return;
         }
         if self.is_usable && !is_awaiting {
-            let is_forgotten = self.used_s >= FORGET_S || self.enter_s == ENTER_S;
+            let is_forgotten = self.used_s >= FORGET_S || self.enter_s <= ENTER_S;
             self.enter_s = match is_forgotten {
                 true => RETURN_FIRST_S,
                 false => (2.0 * self.enter_s).min(RETURN_MAX_S),
@@ -73,6 +73,17 @@ impl Default for Usable {
 }
 
 impl Usable {
+    /// Goes on where quantities, one bit each, were usable before a restart: those are with the first good estimate.
+    pub fn resumed(usable: u32) -> Self {
+        let mut resumed = Usable::default();
+        for (switch, quantity) in resumed.switches.iter_mut().zip(Quantity::ALL) {
+            if usable & quantity.bit() != 0 {
+                switch.enter_s = 0.0;
+            }
+        }
+        resumed
+    }
+
     /// Takes in which quantities are good at a time of the controller's clock in ns, one bit each, and
     /// whether the others merely wait for an event; gives those that may be used.
     ///
@@ -137,6 +148,22 @@ mod tests {
         let (waiting, _) = changes_of(1000, true, is_braking);
         assert_eq!(waiting, 20, "ten brakings of 20 s");
         assert!(changes(1000, is_braking).0 < 12, "a doubt each time");
+    }
+
+    #[test]
+    fn what_was_usable_before_a_restart_is_with_the_first_good_estimate_and_doubted_as_ever() {
+        let mut usable = Usable::resumed(MASS);
+        let both = MASS | Quantity::Resistance.bit();
+        assert_eq!(usable.see(both, false, 0), MASS);
+        let mut at = |good: u32, tenths: i64| usable.see(good, false, tenths * 100_000_000);
+        (1..=6).for_each(|tenth| {
+            at(0, tenth);
+        });
+        let back = (7..).find(|&tenth| at(MASS, tenth) == MASS);
+        assert!(
+            back.is_some_and(|tenth| (56..=57).contains(&tenth)),
+            "5 s after a doubt: {back:?}"
+        );
     }
 
     #[test]

@@ -27,9 +27,10 @@ Tab, Shift-Tab    next train, train before
 ← →, 1, 2         overview, pipelines
 ?                 this, and back
 
-± is a 95 % interval. A controller may use what is estimated; degraded has a
-reservation that the reason names; invalid must not be used. What each reason
-means and asks for: docs/guides/reading.md.
+± is a 95 % interval. A controller may use what is usable; learning is not known
+yet; confirming is known and has to hold without doubt, 2 s at first, after
+doubts up to 10 min; doubted ends with its reason; unavailable has no values.
+What each reason means and asks for: docs/guides/reading.md.
 
 Unexplained is the force that the model lacks, retarding positive. Evidence is
 twice the log-likelihood ratio for the suspected effect. Small plots show the

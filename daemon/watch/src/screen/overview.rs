@@ -11,7 +11,7 @@ use super::style::{Palette, heading};
 use crate::state::{PipelineState, Point, TrainState};
 use crate::words::{Row, residual, rows};
 
-/// Columns of the table after the number: interval and unit, status, reason; the age takes the rest.
+/// Columns of the table after the number: interval and unit, state of use, why; the age takes the rest.
 const COLUMNS: [usize; 3] = [20, 15, 26];
 /// The same in a narrow terminal.
 const COLUMNS_NARROW: [usize; 3] = [12, 12, 22];
@@ -73,19 +73,19 @@ fn quantities(
 }
 
 fn line_of(row: Row, columns: [usize; 3], palette: Palette) -> Line<'static> {
-    let [interval, status, reason] = columns;
+    let [interval, state, why] = columns;
     let number = format!("{:>9}  ", row.number);
     let interval_and_unit = format!("{} {}", row.interval, row.unit);
     let label = format!("{:<15}", row.label);
-    let Some(of_quantity) = row.status else {
+    let Some(of_quantity) = row.use_state else {
         return Line::raw(label + &number + interval_and_unit.trim_start());
     };
     let age = row.age_s.map_or("never".to_owned(), duration);
     Line::from(vec![
         Span::styled(label, palette.strong()),
         Span::raw(format!("{number}{:<interval$}", interval_and_unit.trim())),
-        Span::styled(format!("{:<status$}", of_quantity.name()), palette.status(of_quantity)),
-        Span::raw(format!("{:<reason$}{age}", row.reason)),
+        Span::styled(format!("{:<state$}", of_quantity.name()), palette.use_state(of_quantity)),
+        Span::raw(format!("{:<why$}{age}", row.why)),
     ])
 }
 
@@ -154,8 +154,7 @@ fn lines_of(pipeline: &PipelineState, palette: Palette) -> Vec<Line<'static>> {
     let mut lines = vec![
         Line::from(vec![
             Span::styled(format!("{} {name}  ", it.pipeline_index), palette.strong()),
-            Span::styled(pipeline.status.name(), palette.status(pipeline.status)),
-            Span::raw(format!(" ({})", pipeline.reason_name())),
+            Span::styled(pipeline.status_words(), palette.status(pipeline.status)),
         ]),
         Line::raw(format!(
             "  {rate}/s, newest {age} ago, answered in {latency_us:.0} µs; used {}, rejected {}, lost {}",

@@ -1,6 +1,6 @@
 //! Colours, or none, and headings.
 
-use dynocar_shared::Status;
+use dynocar_shared::{Status, UseState};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::Line;
 
@@ -43,6 +43,16 @@ impl Palette {
     /// Curves.
     pub fn curve(self) -> Style {
         self.coloured(Color::Cyan)
+    }
+
+    /// A state of use.
+    pub fn use_state(self, state: UseState) -> Style {
+        match state {
+            UseState::Usable => self.coloured(Color::Green),
+            UseState::Confirming | UseState::Doubted => self.coloured(Color::Yellow),
+            UseState::Unavailable => self.alarm(),
+            UseState::Learning => self.faint(),
+        }
     }
 
     /// A status.

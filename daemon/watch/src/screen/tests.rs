@@ -54,9 +54,11 @@ fn train() -> TrainState {
     let weak = (Status::Estimated, Reason::WeakExcitation);
     let mut resistance = pipeline(0, PipelineKind::TrajectoryKalman, weak, &davis);
     resistance.snapshot.quantities = Quantity::Resistance.bit();
+    resistance.snapshot.usable_quantities = Quantity::Resistance.bit();
     let mass = [(Parameter::Mass, 1697.4, 6.1), (Parameter::AccelerationBias, 1e-4, 1e-4)];
     let mut mass = pipeline(1, PipelineKind::MassKalman, good, &mass);
     mass.snapshot.quantities = Quantity::Mass.bit();
+    mass.snapshot.usable_quantities = Quantity::Mass.bit();
     let bound = (Status::Unestimated, Reason::OnlyLowerBound);
     let adhesion = [(Parameter::AdhesionLowerBound, 0.0943, 0.0)];
     let mut adhesion = pipeline(2, PipelineKind::AdhesionLaw, bound, &adhesion);
@@ -197,10 +199,10 @@ fn a_line_says_all_of_a_train() {
     let line = plain::line(&suspected());
     for part in [
         "train 1: daemon 0.1.0 (process 4711)",
-        "resistance estimated (weak_excitation)",
+        "resistance usable (weak_excitation)",
         "a 1.498 ± 0.053 N/kN",
-        "mass 1697 ± 12 t estimated (none)",
-        "adhesion ≥ 0.094 unestimated (only_lower_bound)",
+        "mass 1697 ± 12 t usable",
+        "adhesion ≥ 0.094 learning (only_lower_bound)",
         "suspect dragging_brake",
         "used 20310, rejected 2 (most: outlier), lost 0",
         "next: 60 s coasting from 25 m/s (90 km/h) halves the interval of c",

@@ -1,9 +1,7 @@
 //! The answer of `dynocar explain` for people: a verdict of at most two sentences, then a list of what was
 //! found, where, how large, what it removes from the error, and what to do.
 
-use dynocar_analysis::explain::answer::{
-    Considered, EffectAnswer, ExplainAnswer, RunnerUp, Verdict,
-};
+use dynocar_analysis::explain::answer::{Considered, EffectAnswer, ExplainAnswer, Verdict};
 use dynocar_analysis::explain::described::precision;
 use dynocar_analysis::explain::report::{effect as effect_words, words};
 use dynocar_analysis::explain::stop_to_stop::Metric;
@@ -95,8 +93,8 @@ fn found(effect: &EffectAnswer) -> String {
     if !means.is_empty() {
         rows += &row("means", &means);
     }
-    for RunnerUp { formula, evidence_less } in &effect.runners_up {
-        rows += &row("or else", &format!("{formula} (evidence less by {evidence_less:.0})"));
+    for other in &effect.runners_up {
+        rows += &row("or else", &other.in_words());
     }
     rows += &row("sure", &effect_words::sureness(effect.p_value));
     if let Some(to_do) = effect_words::to_do(effect) {

@@ -5,7 +5,7 @@ use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use super::words::{self, joined, kind_name, number};
 use crate::explain::answer::{
-    EffectAnswer, Location, MassWindow, Meaning, ParameterValue, RunWindow,
+    EffectAnswer, Location, MassWindow, Meaning, ParameterValue, RunWindow, in_plain_words,
 };
 use crate::statistics::span;
 
@@ -69,7 +69,7 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
                     .replace('-', "−")
                 }));
             }
-            ParameterValue::Formula(formula) => sizes.insert(0, formula.clone()),
+            ParameterValue::Formula(formula) => sizes.insert(0, in_plain_words(formula)),
             ParameterValue::Windows(windows) => {
                 let all = in_order(windows, |it| (&it.window.run, it.window.t_start_s));
                 sizes.extend(all.take(PLACES_MAX).map(|MassWindow { window, mass_factor }| {

@@ -148,6 +148,11 @@ impl OutlierRow {
 pub struct SpeedRange(Option<(f64, f64)>);
 
 impl SpeedRange {
+    /// Goes on from the lowest and the highest speed in m/s driven before.
+    pub fn resumed(speeds_mps: Option<(f64, f64)>) -> Self {
+        SpeedRange(speeds_mps)
+    }
+
     /// Takes in a speed in m/s.
     pub fn push(&mut self, speed_mps: f64) {
         let (low, high) = self.0.unwrap_or((speed_mps, speed_mps));

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, RejectionReason, Status};
+use dynocar_shared::{
+    Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason, Status,
+};
 
 use super::TrainKalmanSettings;
 use super::bank::Measured;
@@ -18,10 +20,10 @@ use super::steps::Steps;
 use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
 use crate::pipeline::momentum::UnitSample;
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};
-use crate::pipeline::output::{DAVIS, write_innovations, write_status};
+use crate::pipeline::output::{DAVIS, contract_unit, write_innovations, write_status};
 use crate::pipeline::sample_gate::{Gated, SampleGate};
 use crate::pipeline::settings::SettingError;
-use crate::pipeline::{Estimator, KeptEstimate, Outcome};
+use crate::pipeline::{Estimator, KeptEstimate, Outcome, UseBefore};
 
 /// Motion in s before anything is called known; after a warm start, before it is confirmed.
 const MOVED_MIN_S: f64 = 20.0;
@@ -30,6 +32,8 @@ const CONFIRMED_S: f64 = 3.0;
 const JUDGED_BRAKE_STD: f64 = 1.0;
 /// Deviations by which a first sample may differ from a kept mass that still counts.
 const KEPT_DEVIATIONS: f64 = 3.0;
+/// Greatest acceleration and deceleration in m/s² by which a train can have come to a stop and left it.
+const STOPPING_MPS2: f64 = 1.5;
 
 /// Resistance and mass of a train by Kalman filters over every sample.
 #[derive(Clone, Debug)]
@@ -52,11 +56,19 @@ pub struct TrainKalman {
     health: InputHealth,
     moved_s: f64,
     moved_min_s: f64,
-    /// Mass in kg kept from earlier, with its relative variance, until the first sample.
-    kept_mass: Option<(f64, f64)>,
+    /// What was kept from earlier, until the first sample.
+    kept: Option<Kept>,
     report: Report,
     is_fresh_reset: bool,
     resets: u64,
+}
+
+/// What counts of a kept estimate with the first sample.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    /// Mass in kg with its relative variance, and with that before any time had passed.
+    mass: Option<(f64, [f64; 2])>,
+    use_before: UseBefore,
 }
 
 impl TrainKalman {
@@ -92,7 +104,7 @@ impl TrainKalman {
             health: InputHealth::default(),
             moved_s: 0.0,
             moved_min_s: MOVED_MIN_S,
-            kept_mass: None,
+            kept: None,
             is_fresh_reset: false,
             resets: 0,
         })
@@ -185,16 +197,41 @@ impl TrainKalman {
         }
     }
 
+    /// Takes up what was kept with the first sample; true when its mass counts. A train that moves again so soon
+    /// has not stood long enough for another load.
+    fn take_up(&mut self, kept: &Kept, sample: &ResolvedSample) -> bool {
+        let interrupted_s = kept.use_before.interrupted_s(sample.time_ns);
+        let is_same_load = sample.speed_mps > STANDING_MPS
+            && interrupted_s
+                .is_some_and(|it| it < self.settings.stop_min_s + sample.speed_mps / STOPPING_MPS2);
+        let mass = kept.mass.and_then(|(mass_kg, relative_variances)| {
+            let load = sample.mass_kg / mass_kg;
+            let variance = load * load * relative_variances[usize::from(is_same_load)];
+            let (usual, spread) = self.load.prior();
+            let allowed = KEPT_DEVIATIONS.powi(2) * (variance + spread);
+            ((load - usual).powi(2) <= allowed).then_some((load, variance))
+        });
+        let (load, variance) = mass.unwrap_or(self.load.prior());
+        self.learned.bank.each(|it| it.replace(LOAD, load, variance));
+        if interrupted_s.is_some() {
+            let mut known = kept.use_before.usable_quantities;
+            if mass.is_none() {
+                known &= !Quantity::Mass.bit();
+            }
+            self.speeds = SpeedRange::resumed(kept.use_before.speeds_mps);
+            self.moved_min_s = 0.0;
+            self.report = Report::resumed(&self.learned.bank.published(0.0, 0.0), known);
+        }
+        mass.is_some()
+    }
+
     /// Follows the load from sample to sample.
     fn follow_load(&mut self, sample: &ResolvedSample) {
         let change = self.load.see(sample);
-        if let Some((mass_kg, relative_variance)) = self.kept_mass.take() {
-            let load = sample.mass_kg / mass_kg;
-            let variance = load * load * relative_variance;
-            let allowed = KEPT_DEVIATIONS.powi(2) * (variance + self.load.prior().1);
-            if (load - self.load.prior().0).powi(2) <= allowed {
-                return self.learned.bank.each(|it| it.replace(LOAD, load, variance));
-            }
+        if let Some(kept) = self.kept.take()
+            && self.take_up(&kept, sample)
+        {
+            return;
         }
         match change {
             Some(Change::Anew(load, variance)) => {
@@ -289,11 +326,14 @@ impl Estimator for TrainKalman {
         self.learned.bank = self.first.bank(&self.settings);
         self.report = Report::new(&self.learned.bank.published(0.0, 0.0));
         self.moved_min_s = CONFIRMED_S;
-        self.kept_mass = kept.moments([Parameter::Mass]).and_then(|(mass_kg, variance)| {
-            let relative_variance = variance[(0, 0)] / (mass_kg[0] * mass_kg[0]);
-            (mass_kg[0] > 0.0 && relative_variance.is_finite())
-                .then_some((mass_kg[0], relative_variance))
+        let mass = kept.moments([Parameter::Mass]).zip(kept.first_variance(Parameter::Mass));
+        let mass = mass.and_then(|((mass_kg, aged), first)| {
+            let (mass_kg, aged) = (mass_kg[0], aged[(0, 0)]);
+            let unit = contract_unit(Parameter::Mass);
+            let relative = [aged, first / (unit * unit)].map(|it| it / (mass_kg * mass_kg));
+            (mass_kg > 0.0 && relative[0].is_finite()).then_some((mass_kg, relative))
         });
+        self.kept = Some(Kept { mass, use_before: kept.use_before });
         true
     }
 }

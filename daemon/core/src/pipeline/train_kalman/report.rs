@@ -72,6 +72,14 @@ impl Report {
         }
     }
 
+    /// Before any sample, where these quantities, one bit each, were known a moment ago.
+    pub fn resumed(published: &Published, known: u32) -> Self {
+        let mut report = Report::new(published);
+        report.resistance.is_known = known & Quantity::Resistance.bit() != 0;
+        report.mass.is_known = known & Quantity::Mass.bit() != 0;
+        report
+    }
+
     /// Takes over what is believed now, its covariance times a factor and widened by what is
     /// systematic, and judges it at the speeds driven.
     pub fn take(

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
-use dynocar_shared::{ParameterSnapshot, Status};
+use dynocar_shared::{ParameterSnapshot, Quantity, Status};
 use rand::{RngExt, SeedableRng};
 
 use super::{TrainKalman, TrainKalmanSettings};
@@ -72,6 +72,35 @@ fn after_a_restart_the_mass_and_the_resistance_are_known_with_the_first_seconds(
     assert!(std(&after, 0) < 1.5 * std(&before, 0));
     // Between the two somebody may have boarded.
     assert!(std(&after, 3) < 0.015 * after.values[3]);
+}
+
+#[test]
+fn what_was_in_use_goes_on_with_the_first_sample_unless_minutes_have_passed() {
+    const BOTH: u32 = Quantity::Resistance.bit() | Quantity::Mass.bit();
+    let mut before = driven(&mut estimator(), 0, 300);
+    (before.sample_time_ns, before.usable_quantities) = (300_000_000_000, BOTH);
+    let first = |after_s: i64, elapsed_s: f64, speed_mps: f64| {
+        let mut warm = estimator();
+        assert!(warm.warm_start(&KeptEstimate::of(&before).unwrap().after(elapsed_s)));
+        let time_ns = (300 + after_s) * 1_000_000_000;
+        warm.update(&ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() });
+        let mut snapshot = ParameterSnapshot::empty();
+        warm.write(&mut snapshot);
+        let std_t = snapshot.covariance[packed_index(3, 3)].sqrt();
+        (snapshot.status(), warm.known(snapshot.status()) & BOTH, std_t)
+    };
+    let std_t = before.covariance[packed_index(3, 3)].sqrt();
+    let (status, known, moving_t) = first(3, 2.5, 15.0);
+    assert_eq!((status, known), (Status::Estimated, BOTH));
+    assert!((moving_t / std_t - 1.0).abs() < 0.01, "{moving_t} t, before {std_t} t");
+    let (status, known, standing_t) = first(12, 12.0, 0.0);
+    assert_eq!((status, known), (Status::Estimated, BOTH));
+    assert!((4.0..10.0).contains(&standing_t), "somebody may have boarded: {standing_t} t");
+    assert!(first(40, 40.0, 15.0).2 > 4.0, "it may have stopped meanwhile");
+    for (after_s, elapsed_s) in [(700, 700.0), (3, 700.0), (-20, 3.0)] {
+        let (status, known, _) = first(after_s, elapsed_s, 15.0);
+        assert_eq!((status, known), (Status::Unestimated, 0), "{after_s} s, {elapsed_s} s");
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ use dynocar_analysis::dataset::{
 use dynocar_core::plausibility::InputFault;
 
 use crate::cli::text::{TextTable, WIDTH, short, wrap};
+use crate::clock::moment;
 use crate::run_facts::{self, mass_t, recorded, recorded_in_words};
 
 type Read = Result<Run, DatasetError>;
@@ -176,11 +177,12 @@ fn diagnostics(manifest: &Manifest, runs: &[Read], of_dataset: &[DatasetDiagnost
     if text.is_empty() { text } else { format!("\nnotes\n{text}") }
 }
 
-/// A time of a run: in s, or as the clock that its file shows.
+/// A time of a run: in s, as a date where it counts from 1970, or as the clock that its file shows.
 fn time(manifest: &Manifest, run: &Run, time_s: f64) -> String {
     let has_format = manifest.mapping(Quantity::Time).is_some_and(|it| it.format.is_some());
     if !has_format || is_parquet(&run.file) {
-        return format!("{} s", short(time_s, 3));
+        let in_s = || format!("{} s", short(time_s, 3));
+        return moment(time_s).map_or_else(in_s, |it| it.to_string());
     }
     let of_day_s = time_s.rem_euclid(86_400.0);
     let minutes = (of_day_s / 60.0).floor();

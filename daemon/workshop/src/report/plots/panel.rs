@@ -5,6 +5,8 @@ use dynocar_analysis::explain::report::panels::{Panel, PanelBin};
 use plotters::element::{Circle, PathElement};
 use plotters::style::{Color, RGBColor};
 
+use crate::clock::moment;
+
 use super::axes::{
     Axis, Chart, band, chart, frame, padded, range_with_zero, shade, stroke, zero_line,
 };
@@ -24,6 +26,7 @@ const APART: f64 = 0.004;
 ///
 /// When the drawing fails.
 pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
+    let (panel, since) = &from_start(panel);
     let svg = picture(&label(panel, has_effect), "panel", SIZE, |area| {
         let is_category = panel.covariate.is_category();
         let room = if is_category { 0.0 } else { 0.03 };
@@ -33,7 +36,10 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
             _ => padded(panel.bins.iter().map(|bin| bin.at), room),
         };
         let y = vertical_range(&panel.bins, has_effect);
-        let title = axis_title(panel.covariate);
+        let title = match since {
+            Some(since) => format!("{since}, s"),
+            None => axis_title(panel.covariate),
+        };
         let labels = if is_category { panel.bins.len().clamp(3, 13) } else { 6 };
         let x_axis = Axis { range: x, title: &title, labels, is_whole: is_category };
         let y_axis =
@@ -54,8 +60,24 @@ pub fn draw(panel: &Panel, has_effect: bool) -> Result<Plot, PlotError> {
         Ok(vec![frame(&chart)])
     })?;
     let covariate = panel.covariate;
-    let reading = reading(covariate.title(), covariate.unit(), &panel.bins, has_effect);
+    let name = since.as_deref().unwrap_or(covariate.title());
+    let reading = reading(name, covariate.unit(), &panel.bins, has_effect);
     Ok(Plot { svg, readings: vec![reading] })
+}
+
+/// The panel with times of a run from its start where they count from 1970, and what they are then.
+fn from_start(panel: &Panel) -> (Panel, Option<String>) {
+    let mut panel = panel.clone();
+    let first_s = panel.bins.first().map_or(0.0, |bin| bin.at);
+    let start = match panel.covariate {
+        Covariate::TimeInRun(_) => moment(first_s),
+        _ => None,
+    };
+    if start.is_some() {
+        panel.bins.iter_mut().for_each(|bin| bin.at -= first_s.floor());
+        panel.acting.iter_mut().flatten().for_each(|time_s| *time_s -= first_s.floor());
+    }
+    (panel, start.map(|start| format!("Time since {start}")))
 }
 
 /// A mean of a bin, with its half width.
@@ -63,7 +85,7 @@ type Mean = fn(&PanelBin) -> (f64, f64);
 
 /// Bins as a pointer reads them.
 pub(super) fn reading(
-    name: &'static str,
+    name: &str,
     unit: &'static str,
     bins: &[PanelBin],
     has_effect: bool,
@@ -182,6 +204,17 @@ mod tests {
         assert_eq!(svg.matches("<polygon").count(), 1);
         assert!(svg.contains("Chainage, km") && svg.contains("fill=\"#E4EEF7\""));
         assert!(svg.contains("at most 1.40 N/kN before and 0.01 N/kN after"));
+    }
+
+    #[test]
+    fn times_that_count_from_1970_are_shown_from_their_start_with_its_date() {
+        let mut of_run = Panel { covariate: Covariate::TimeInRun(0), ..panel() };
+        of_run.bins.iter_mut().for_each(|bin| bin.at += 1_738_479_600.0);
+        let plot = draw(&of_run, true).unwrap();
+        assert!(plot.svg.contains("Time since 2025-02-02T07:00:00Z, s"), "{}", plot.svg);
+        assert_eq!(plot.readings[0].at[..2], [0.0, 1.0]);
+        let from_start = Panel { covariate: Covariate::TimeInRun(0), ..panel() };
+        assert!(draw(&from_start, true).unwrap().svg.contains("Time in the run, s"));
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub struct Series {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     /// What the horizontal axis shows.
-    pub name: &'static str,
+    pub name: String,
     /// Its unit; empty for a pure number.
     pub unit: &'static str,
     /// True where the data are points, false where they are a line between them.
@@ -37,8 +37,8 @@ pub struct Reading {
 
 impl Reading {
     /// A chart without data yet.
-    pub fn new(name: &'static str, unit: &'static str, is_points: bool, at: Vec<f64>) -> Self {
-        Reading { name, unit, is_points, at, series: Vec::new() }
+    pub fn new(name: impl Into<String>, unit: &'static str, is_points: bool, at: Vec<f64>) -> Self {
+        Reading { name: name.into(), unit, is_points, at, series: Vec::new() }
     }
 
     /// The same with a series more.

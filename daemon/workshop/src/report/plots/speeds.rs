@@ -4,6 +4,8 @@ use dynocar_analysis::explain::report::timeline::{SpeedPoint, Trace};
 use plotters::element::PathElement;
 use plotters::style::RGBColor;
 
+use crate::clock::moment;
+
 use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, shade, stroke, zero_line};
 use super::picture::{
     ACTING, AFTER, BEFORE, DrawError, MEASURED, Plot, PlotError, SCALE, Width, before_name, picture,
@@ -16,13 +18,14 @@ use super::reading::Reading;
 ///
 /// When the drawing fails.
 pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotError> {
+    let (trace, time) = &from_start(trace);
     let (nominal, above, below) = width.size();
     let size = (nominal, above + below);
     let svg = picture(&label(trace, has_effect), width.class(), size, |area| {
         let (speeds, errors) = area.split_vertically(above * SCALE);
         let points = || trace.pieces.iter().flatten();
         let x = padded(points().map(|point| point.time_s), 0.01);
-        let labels = width.labels();
+        let (labels, title) = (width.labels(), format!("{time}, s"));
         let x_axis = |title| Axis { range: x, title, labels, is_whole: true };
 
         let all = points().flat_map(|p| [p.measured_mps, p.before_mps, p.after_mps]);
@@ -41,7 +44,7 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
         let y = range_with_zero(away);
         let y_axis =
             Axis { range: y, title: "Predicted minus measured, m/s", labels: 5, is_whole: false };
-        let mut lower = chart(&errors, &x_axis("Time in the recording, s"), &y_axis)?;
+        let mut lower = chart(&errors, &x_axis(&title), &y_axis)?;
         shade(&mut lower, ACTING, &trace.acting_s)?;
         zero_line(&mut lower)?;
         for (_, colour, speed) in predicted(has_effect) {
@@ -49,7 +52,7 @@ pub fn draw(trace: &Trace, width: Width, has_effect: bool) -> Result<Plot, PlotE
         }
         Ok(vec![frame(&upper), frame(&lower)])
     })?;
-    Ok(Plot { svg, readings: readings(trace, has_effect) })
+    Ok(Plot { svg, readings: readings(trace, time, has_effect) })
 }
 
 /// One of the speeds of a point, its name and its colour.
@@ -64,12 +67,24 @@ fn predicted(has_effect: bool) -> impl Iterator<Item = Predicted> {
     both.into_iter().take(1 + usize::from(has_effect))
 }
 
-fn readings(trace: &Trace, has_effect: bool) -> Vec<Reading> {
+/// The run with its times from its start where they count from 1970, and what they are.
+fn from_start(trace: &Trace) -> (Trace, String) {
+    let mut trace = trace.clone();
+    let first_s = trace.pieces.iter().flatten().map(|point| point.time_s).reduce(f64::min);
+    let Some((start, start_s)) = first_s.and_then(|it| Some((moment(it)?, it.floor()))) else {
+        return (trace, "Time in the recording".into());
+    };
+    trace.pieces.iter_mut().flatten().for_each(|point| point.time_s -= start_s);
+    trace.acting_s.iter_mut().flatten().for_each(|time_s| *time_s -= start_s);
+    (trace, format!("Time since {start}"))
+}
+
+fn readings(trace: &Trace, time: &str, has_effect: bool) -> Vec<Reading> {
     let values = |value: &dyn Fn(&SpeedPoint) -> f64| -> Vec<f64> {
         // Nothing is read between two pieces.
         trace.pieces.iter().flat_map(|it| it.iter().map(value).chain([f64::NAN])).collect()
     };
-    let time = || Reading::new("Time in the recording", "s", false, values(&|p| p.time_s));
+    let time = || Reading::new(time, "s", false, values(&|p| p.time_s));
     let (mut speeds, mut errors) =
         (time().with("measured", "m/s", values(&|p| p.measured_mps), Vec::new()), time());
     for (name, _, speed) in predicted(has_effect) {
@@ -105,4 +120,37 @@ fn label(trace: &Trace, has_effect: bool) -> String {
         };
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use dynocar_analysis::dataset::Role;
+
+    use super::*;
+
+    #[test]
+    fn times_that_count_from_1970_are_shown_from_their_start_with_its_date() {
+        let drawn = |from_s: f64| {
+            let point = |k: u32| SpeedPoint {
+                time_s: from_s + f64::from(k),
+                measured_mps: 10.0,
+                before_mps: 10.5,
+                after_mps: 10.1,
+            };
+            let trace = Trace {
+                file: "01.csv".into(),
+                role: Role::Fit,
+                pieces: vec![(0..100).map(point).collect()],
+                rmse_mps: None,
+                acting_s: vec![[from_s + 20.0, from_s + 40.0]],
+            };
+            draw(&trace, Width::Narrow, true).unwrap()
+        };
+        let plot = drawn(1_738_479_600.0);
+        assert!(plot.svg.contains("Time since 2025-02-02T07:00:00Z, s"), "{}", plot.svg);
+        assert!(!plot.svg.contains("17384796"), "{}", plot.svg);
+        assert_eq!(plot.readings[1].name, "Time since 2025-02-02T07:00:00Z");
+        assert_eq!(plot.readings[1].at[..2], [0.0, 1.0]);
+        assert!(drawn(0.0).svg.contains("Time in the recording, s"));
+    }
 }

@@ -141,12 +141,8 @@ pub fn candidates(subject: &Subject) -> Section {
         body += &format!("<p>{}</p>\n", escape(caveat.trim()));
     }
     let forms = subject.explanation.answer.effects.iter().flat_map(|effect| &effect.runners_up);
-    let forms: Vec<String> = forms
-        .map(|other| {
-            let less = minus(&format!("{:.0}", other.evidence_less));
-            format!("<li>{} (evidence less by {less})</li>\n", escape(&minus(&other.formula)))
-        })
-        .collect();
+    let forms: Vec<String> =
+        forms.map(|other| format!("<li>{}</li>\n", escape(&minus(&other.in_words())))).collect();
     if !forms.is_empty() {
         body += "<p>Other forms that the force outside the library may have:</p>\n<ul>\n";
         body += &(forms.concat() + "</ul>\n");

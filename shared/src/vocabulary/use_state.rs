@@ -1,0 +1,78 @@
+//! Whether a controller may use what it asked for, why, and what ends that.
+
+use super::{Reason, Status};
+
+vocabulary! {
+    /// Whether a controller may use the values for what it asked for, in one word.
+    UseState: u32 {
+        /// The values may be used, whatever the status of the estimate as a whole.
+        Usable = 1 "usable",
+        /// Not known well enough yet.
+        Learning = 2 "learning",
+        /// Known, and held back until it has held for a while without doubt.
+        Confirming = 3 "confirming",
+        /// Something speaks against the values or the samples.
+        Doubted = 4 "doubted",
+        /// There are no values: the daemon is silent, or the estimate has failed.
+        Unavailable = 5 "unavailable",
+    }
+}
+
+impl UseState {
+    /// Returns the state of use of values whose pipeline has this status.
+    pub const fn of(status: Status, is_usable: bool) -> Self {
+        match status {
+            Status::Invalid => UseState::Unavailable,
+            _ if is_usable => UseState::Usable,
+            Status::Unestimated => UseState::Learning,
+            Status::Estimated => UseState::Confirming,
+            Status::Degraded => UseState::Doubted,
+        }
+    }
+
+    /// Returns why, in one word: the reason behind the status where there is one, else the state itself.
+    pub const fn why(self, reason: Option<Reason>) -> &'static str {
+        match (self, reason) {
+            (UseState::Confirming, _) => self.name(),
+            (UseState::Usable, Some(reason)) => reason.name(),
+            (_, Some(Reason::None)) => self.name(),
+            (_, Some(reason)) => reason.name(),
+            (_, None) => "unknown",
+        }
+    }
+
+    /// Returns what ends it, in words.
+    pub const fn ends(self) -> &'static str {
+        match self {
+            UseState::Usable => "half a second of doubt ends it",
+            UseState::Learning => "driving ends it",
+            UseState::Confirming => {
+                "2 s without doubt end it, after a doubt 5 s, after each further one twice as long, up to 10 min"
+            }
+            UseState::Doubted => "it ends with its reason",
+            UseState::Unavailable => "a daemon, or an estimate learned anew, ends it",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_usable_never_gives_none_for_a_reason() {
+        for &status in Status::ALL {
+            for &reason in Reason::ALL {
+                let state = UseState::of(status, false);
+                assert_ne!(state, UseState::Usable);
+                assert_ne!(state.why(Some(reason)), "none", "{status} ({reason})");
+            }
+            let is_usable = UseState::of(status, true) == UseState::Usable;
+            assert_eq!(is_usable, status != Status::Invalid);
+        }
+        let held_back = UseState::of(Status::Estimated, false);
+        assert_eq!(held_back.why(Some(Reason::AtBound)), "confirming");
+        let failed = UseState::of(Status::Invalid, true);
+        assert_eq!(failed.why(Some(Reason::NumericalFailure)), "numerical_failure");
+    }
+}
