@@ -79,8 +79,6 @@ pub use train_file::parse_train;
 
 use std::sync::Arc;
 
-use dynocar_shared::SampleField;
-
 use dynocar_model::track::Track;
 use dynocar_model::train::{Drive, TrainModel};
 #[cfg(feature = "parallel")]
@@ -154,6 +152,17 @@ impl Dataset {
         self.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max)
     }
 
+    /// What it declares, without runs.
+    pub fn without_runs(&self) -> Dataset {
+        Dataset {
+            name: self.name.clone(),
+            description: self.description.clone(),
+            train: self.train.clone(),
+            track: self.track.clone(),
+            runs: Vec::new(),
+        }
+    }
+
     /// The same with forces that act `late_s` before their stamps taken where they act.
     pub fn with_forces_moved(&self, late_s: f64) -> Dataset {
         let mut dataset = self.clone();
@@ -172,16 +181,9 @@ impl Dataset {
         dataset
     }
 
-    /// Forgets the forces of all samples without traction, for a train whose friction brake is not
-    /// recorded: there the true force is unknown.
+    /// [`Run::keep_traction_only`] of all runs.
     pub fn keep_traction_only(&mut self) {
-        for sample in self.runs.iter_mut().flat_map(|run| &mut run.samples) {
-            let pulls = sample.get(SampleField::TractionForce).is_some_and(|force| force > 0.0);
-            let brakes = sample.get(SampleField::BrakeForce).is_some_and(|force| force > 0.0);
-            if !pulls || brakes {
-                sample.valid &= !(SampleField::TractionForce.bit() | SampleField::BrakeForce.bit());
-            }
-        }
+        self.runs.iter_mut().for_each(Run::keep_traction_only);
     }
 }
 

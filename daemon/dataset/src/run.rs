@@ -1,5 +1,7 @@
 //! One run, from its file to the samples that the pipelines take.
 
+use std::mem::take;
+
 use dynocar_model::train::Drive;
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -86,6 +88,24 @@ impl Run {
         match own.filter(|values| values.iter().any(Option::is_some)) {
             Some(own) => Some((own, false)),
             None => Some((self.extra(Quantity::LinePower)?, true)),
+        }
+    }
+
+    /// Takes what was recorded at its samples out of it, with what is known of the run; that stays here alone.
+    pub fn split_off_samples(&mut self) -> Run {
+        let (samples, extras) = (take(&mut self.samples), take(&mut self.extras));
+        Run { samples, extras, ..self.clone() }
+    }
+
+    /// Forgets the forces of all samples without traction, for a train whose friction brake is not
+    /// recorded: there the true force is unknown.
+    pub fn keep_traction_only(&mut self) {
+        for sample in &mut self.samples {
+            let pulls = sample.get(SampleField::TractionForce).is_some_and(|force| force > 0.0);
+            let brakes = sample.get(SampleField::BrakeForce).is_some_and(|force| force > 0.0);
+            if !pulls || brakes {
+                sample.valid &= !(SampleField::TractionForce.bit() | SampleField::BrakeForce.bit());
+            }
         }
     }
 

@@ -14,6 +14,7 @@ use super::bins::{self, Bin};
 use super::cleaning;
 use super::positions::{by_part_s, distance_ratio};
 use super::sample_forces::DeclaredForces;
+use super::thinning::thinned;
 
 /// A run, ready for fitting and for open-loop simulation.
 #[derive(Clone, Debug)]
@@ -129,24 +130,43 @@ impl RunData {
     }
 }
 
-/// Makes all runs of a dataset ready.
+/// How densely the samples of a run that is made ready lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Density {
+    /// As recorded.
+    Recorded,
+    /// About a second apart, each the mean of those that it stands for; a run whose force comes from its power stays
+    /// as recorded.
+    Thinned,
+}
+
+/// Makes all runs of a dataset ready, as recorded.
 ///
 /// # Errors
 ///
 /// The first run without usable samples.
 pub fn prepare(dataset: &Dataset) -> Result<Vec<RunData>, RunDataError> {
+    prepare_at(dataset, Density::Recorded)
+}
+
+/// Makes all runs of a dataset ready.
+///
+/// # Errors
+///
+/// The first run without usable samples.
+pub fn prepare_at(dataset: &Dataset, density: Density) -> Result<Vec<RunData>, RunDataError> {
     let train = &dataset.train;
     let mut validator = Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg);
     let mut resolver = ForceResolver::new(train.clone(), dataset.track.clone());
     let mut resolve =
         |sample: &TrainSample| validator.check(sample).ok().map(|valid| resolver.resolve(&valid));
-    dataset.runs.iter().map(|run| prepare_run(train, run, &mut resolve)).collect()
+    dataset.runs.iter().map(|run| prepare_run(train, (run, density), &mut resolve)).collect()
 }
 
 /// A run whose samples are resolved one after the other, as a daemon takes them.
 fn prepare_run(
     train: &TrainModel,
-    run: &Run,
+    (run, density): (&Run, Density),
     resolve: &mut dyn FnMut(&TrainSample) -> Option<ResolvedSample>,
 ) -> Result<RunData, RunDataError> {
     let numbered = run.samples.iter().map(|it| TrainSample { run: run.number, ..*it });
@@ -156,8 +176,17 @@ fn prepare_run(
     let time_s: Vec<f64> =
         samples.iter().map(|sample| (sample.time_ns - first_ns) as f64 * 1e-9).collect();
     let replaced = cleaning::clean(&mut samples, bins::sampling_period_s(&time_s));
-    let recording = Recording::new(samples)
-        .map_err(|source| RunDataError::Simulate { file: run.file.clone(), source })?;
+    let unusable = |source| RunDataError::Simulate { file: run.file.clone(), source };
+    let mut recording = Recording::new(samples).map_err(unusable)?;
+    let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
+    let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
+    let speed_late_s = match is_position_recorded {
+        true => by_part_s(&recording),
+        false => Vec::new(),
+    };
+    if density == Density::Thinned && run.power().is_none() {
+        recording = Recording::new(thinned(&recording)).map_err(unusable)?;
+    }
     let declared = DeclaredForces::of(recording.samples(), train.rotating_mass_factor);
     let smooth_mps = smoothed(&recording);
     let of_samples = |of: &Covariate| {
@@ -172,12 +201,6 @@ fn prepare_run(
     let positions_m = recording.samples().iter().filter_map(|sample| sample.position_m);
     let span_m = span(positions_m);
     let bins = bins::bins(&recording);
-    let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
-    let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
-    let speed_late_s = match is_position_recorded {
-        true => by_part_s(&recording),
-        false => Vec::new(),
-    };
     let power = RunPower::of(run, recording.samples());
     Ok(RunData {
         file: run.file.clone(),

@@ -10,7 +10,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
 use super::acceptance::{is_material, is_possible};
-use super::by_run::{Deviations, deviations_beside};
+use super::by_run::{Deviations, deviations, deviations_beside};
 use super::outcome::{Beside, Outcome, Round, Trial};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
@@ -182,6 +182,14 @@ pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -
         let theta = joint.fit.theta[..count].to_vec();
         outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
     }
+    deviations_given(outcome, step_s)
+}
+
+/// How surely the parameters of a model are known that was moved beside the usual errors last, from samples so many s
+/// apart.
+pub fn deviations_given(outcome: &Outcome, step_s: f64) -> Deviations {
+    let count = outcome.fit.theta.len();
+    let Some((_, joint)) = &outcome.beside else { return deviations(&outcome.fit) };
     let mut deviations = deviations_beside(&joint.fit, count, joint.shared);
     let model = &outcome.fit.model;
     for (effect, range) in model.effects.iter().zip(model.ranges()) {

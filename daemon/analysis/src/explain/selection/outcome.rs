@@ -113,6 +113,16 @@ impl Outcome {
         self.fit.model.effects.iter().map(|effect| effect.kind()).collect()
     }
 
+    /// The finished model with the usual errors beside it, where it was fitted so.
+    pub fn beside(&self) -> Option<Arc<Beside>> {
+        self.beside.as_ref().map(|(_, beside)| beside.clone())
+    }
+
+    /// Puts another fit with the usual errors in the place of that.
+    pub fn set_beside(&mut self, beside: Beside) {
+        self.beside = Some((self.likeliest.theta.clone(), beside.into()));
+    }
+
     /// Whether nothing more is looked for.
     pub(super) fn is_full(&self) -> bool {
         self.fit.model.effects.len() >= EFFECTS_MAX + self.small.len()

@@ -4,12 +4,10 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::super::model::UpdatedModel;
 use super::super::noise::{Noise, RunScatter};
-use super::super::run_scatter::{RunFilters, SharedFilters};
-use super::super::run_scatter::{ScatterFilter, remove};
-use super::super::whitener::Whitener;
+use super::super::run_scatter::{RunFilters, SharedFilters, remove};
 use super::memory::RunMemory;
 use super::plan::Plan;
-use super::{Fit, FitProblem};
+use super::{Fit, FitProblem, RunNormal};
 use crate::explain::hypothesis::SharedHypothesis;
 use crate::parallel;
 
@@ -123,6 +121,51 @@ impl FitProblem {
         self.at(model, theta, noise)
     }
 
+    /// A fit where more runs say the same model's parameters too, each of them beside one of its own: a step to
+    /// the least cost of all, with what they say there to first order.
+    pub fn joined_by(&self, fit: &Fit, more: &[RunNormal]) -> Fit {
+        let mut all = fit.clone();
+        for (own, more) in all.runs.iter_mut().zip(more) {
+            own.add(more);
+        }
+        let Some((theta, _)) = self.bounded_step(&all, &all.score(), 0.0) else { return all };
+        let step = DVector::from_iterator(
+            theta.len(),
+            theta.iter().zip(&all.theta).map(|(to, from)| to - from),
+        );
+        for run in &mut all.runs {
+            run.score -= &run.information * &step;
+        }
+        (all.prior_information, all.prior_score, _) = self.prior(&all.model, &theta);
+        all.theta = theta;
+        all
+    }
+
+    /// A fit where more runs say its parameters too: a, b and c where all fit best, and the effects moved by what is
+    /// given.
+    pub fn with_davis_joined(&self, fit: &Fit, more: &[RunNormal], moved: &[f64]) -> Fit {
+        let mut all = fit.clone();
+        for (own, more) in all.runs.iter_mut().zip(more) {
+            own.add(more);
+        }
+        let (information, score) = (all.information(), all.score());
+        let moved = DVector::from_column_slice(moved);
+        let pull = score.rows(0, 3) - information.view((0, 3), (3, moved.len())) * &moved;
+        let own = information.view((0, 0), (3, 3)).into_owned();
+        let Some(factor) = Cholesky::new(own) else { return fit.clone() };
+        let step = factor.solve(&pull);
+        let mut theta = fit.theta.clone();
+        for (i, value) in theta.iter_mut().enumerate() {
+            if i < 3 {
+                let (lower, upper) = self.declared_bounds(i);
+                *value = (*value + step[i]).clamp(lower, upper);
+            } else {
+                *value += moved[i - 3];
+            }
+        }
+        self.at(&fit.model, theta, fit.noise)
+    }
+
     fn fit_remembering(
         &self,
         model: &UpdatedModel,
@@ -184,10 +227,7 @@ impl FitProblem {
 
     fn filters(&self, noise: Noise) -> SharedFilters {
         let filters = parallel::of_each_number(self.runs.len(), |index| {
-            let whitener = Whitener::new(&self.runs[index], noise);
-            let scatter =
-                ScatterFilter::new(&self.scatter_columns[index], &whitener, noise.scatter);
-            RunFilters { whitener, scatter }
+            RunFilters::new(&self.runs[index], &self.scatter_columns[index], noise)
         });
         filters.into()
     }

@@ -65,6 +65,24 @@ pub struct RunNormal {
     pub cost: f64,
 }
 
+impl RunNormal {
+    /// Of no run, for so many parameters.
+    pub fn none(count: usize) -> Self {
+        RunNormal {
+            information: DMatrix::zeros(count, count),
+            score: DVector::zeros(count),
+            cost: 0.0,
+        }
+    }
+
+    /// Adds those of another run at the same parameters.
+    pub fn add(&mut self, other: &RunNormal) {
+        self.information += &other.information;
+        self.score += &other.score;
+        self.cost += other.cost;
+    }
+}
+
 /// A fitted model.
 #[derive(Clone)]
 pub struct Fit {
