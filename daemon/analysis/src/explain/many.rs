@@ -18,12 +18,18 @@ use crate::parallel;
 
 /// So many fit runs are all looked at, as they were recorded.
 pub const FIT_RUNS_MAX: usize = 32;
-/// Of more, so many are looked at.
-pub const FIT_RUNS_HELD: usize = 24;
+/// Of more, a quarter is looked at, but so many at least and at most.
+const FIT_RUNS_HELD: [usize; 2] = [12, 32];
 /// So many holdout runs are held for what may act in them.
-const HOLDOUT_RUNS_HELD: usize = 8;
+const HOLDOUT_RUNS_HELD: usize = 6;
 /// The golden ratio less 1: its multiples, less their whole parts, lie evenly, and in step with no order of the runs.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// How many of so many fit runs are held.
+fn fit_runs_held(fit: usize) -> usize {
+    let [least, most] = FIT_RUNS_HELD;
+    (fit / 4).clamp(least, most)
+}
 
 /// Which of many runs are held in memory.
 ///
@@ -53,7 +59,7 @@ impl Held {
         let mut seen = [0, 0];
         let groups = roles.map(|role| {
             let (seen, runs, most) = match role {
-                Role::Fit => (&mut seen[0], fit, FIT_RUNS_HELD),
+                Role::Fit => (&mut seen[0], fit, fit_runs_held(fit)),
                 Role::Holdout => (&mut seen[1], holdout, HOLDOUT_RUNS_HELD),
             };
             let count = most.min(runs);
@@ -224,7 +230,8 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
             false => "it acts in some runs only, and these alone say how large it is",
         };
         format!(
-            " Effects were looked for in {FIT_RUNS_HELD} of {fit} fit runs, evenly chosen; {sizes}."
+            " Effects were looked for in {} of {fit} fit runs, evenly chosen; {sizes}.",
+            fit_runs_held(fit)
         )
     }
 }
@@ -235,8 +242,8 @@ mod tests {
 
     fn held(fit: usize, holdout: usize) -> Option<Held> {
         let roles = (0..fit + holdout).map(|index| {
-            let is_held_out = index * holdout / (fit + holdout)
-                != (index + 1) * holdout / (fit + holdout);
+            let is_held_out =
+                index * holdout / (fit + holdout) != (index + 1) * holdout / (fit + holdout);
             if is_held_out { Role::Holdout } else { Role::Fit }
         });
         Held::of(roles)
@@ -252,10 +259,11 @@ mod tests {
                 let own = held.groups.iter().filter(|it| it.role == role);
                 own.filter(|it| it.is_held).count()
             };
-            assert_eq!(count(Role::Fit), FIT_RUNS_HELD, "{fit} + {holdout}");
+            assert_eq!(count(Role::Fit), fit_runs_held(fit), "{fit} + {holdout}");
             assert_eq!(count(Role::Holdout), holdout.min(HOLDOUT_RUNS_HELD), "{fit} + {holdout}");
             let others: usize = held.others(Role::Fit).iter().map(Vec::len).sum();
-            assert_eq!(others + FIT_RUNS_HELD, fit);
+            assert_eq!(others + fit_runs_held(fit), fit);
+            assert!(fit_runs_held(fit) <= FIT_RUNS_HELD[1]);
         }
     }
 
@@ -264,7 +272,8 @@ mod tests {
         for fit in [48, 96, 192, 768] {
             let held = held(fit, 0).unwrap();
             let forth = (0..fit).filter(|index| held.holds(*index) && index % 2 == 0).count();
-            assert!((8..=16).contains(&forth), "{forth} of {FIT_RUNS_HELD} of {fit}");
+            let share = forth as f64 / fit_runs_held(fit) as f64;
+            assert!((0.3..0.7).contains(&share), "{share} of {fit}");
         }
     }
 }

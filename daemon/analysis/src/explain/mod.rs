@@ -89,7 +89,8 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         return explained(Cow::Borrowed(dataset), None, progress);
     };
     let runs = dataset.runs.iter().enumerate().filter(|(index, _)| held.holds(*index));
-    let chosen = Dataset { runs: runs.map(|(_, run)| run.clone()).collect(), ..dataset.without_runs() };
+    let chosen =
+        Dataset { runs: runs.map(|(_, run)| run.clone()).collect(), ..dataset.without_runs() };
     let read = |index: usize| Ok(dataset.runs[index].clone());
     explained(Cow::Owned(chosen), Some(Many { dataset, held: &held, read: &read }), progress)
 }

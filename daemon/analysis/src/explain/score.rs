@@ -179,7 +179,8 @@ impl Score {
     /// The scores of the holdout runs with the errors of the models without and with the effects on the fit runs.
     pub fn of(problem: &FitProblem, holdout: Vec<RunScore>, before: &Fit, after: &Fit) -> Self {
         let summed = |parts: &mut dyn Iterator<Item = [SpeedError; 2]>| {
-            let add = |sum: [SpeedError; 2], own: [SpeedError; 2]| [sum[0] + own[0], sum[1] + own[1]];
+            let add =
+                |sum: [SpeedError; 2], own: [SpeedError; 2]| [sum[0] + own[0], sum[1] + own[1]];
             parts.fold([SpeedError::default(); 2], add)
         };
         let fitted = problem.runs.iter();

@@ -15,8 +15,8 @@ use dynocar_model::simulate::Restart;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub use super::explained::text;
-use super::threads::Threads;
 use super::explained_runs::ExplainedRuns;
+use super::threads::Threads;
 use crate::annotation::annotate;
 use crate::report;
 use crate::report::provenance::{Provenance, for_shell, own_command_line};

@@ -94,9 +94,7 @@ impl ExplainedRuns {
         let declared = many.chosen.without_runs();
         let chosen = std::mem::replace(&mut many.chosen, declared);
         let ManyRuns { folder, head, held, .. } = &*many;
-        let read = |index| {
-            read(folder, head, self.traction_only, index).map_err(Problem::Unread)
-        };
+        let read = |index| read(folder, head, self.traction_only, index).map_err(Problem::Unread);
         let many = Many { dataset: &self.dataset, held, read: &read };
         explain_many(chosen, many, progress).map_err(|problem| match problem {
             Problem::Unread(error) => LoadError::from(error).into(),
@@ -128,7 +126,8 @@ impl ExplainedRuns {
     /// The failure of a run that cannot be used, with what may be the matter.
     fn unusable(&self, error: RunDataError) -> Failure {
         let RunDataError::Simulate { file, source } = error;
-        let label = DatasetFolder::at(&self.path).map_or(file.clone(), |folder| folder.label(&file));
+        let label =
+            DatasetFolder::at(&self.path).map_or(file.clone(), |folder| folder.label(&file));
         let diagnostics: String =
             self.dataset.diagnostics().iter().map(|diagnostic| format!("; {diagnostic}")).collect();
         Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{diagnostics}"))

@@ -4,7 +4,6 @@
 //! is not linear in the speed changes by the variance of the speed within a second. Where what is known of the
 //! samples changes (a gap, rest, a sliding wheel, a missing value), a mean ends.
 
-
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::simulate::{Recording, STANDING_MPS};
 use dynocar_model::terms::Resistance;
@@ -32,6 +31,7 @@ pub(super) fn thinned(recording: &Recording) -> Vec<ResolvedSample> {
             first = i;
         }
     }
+    means.shrink_to_fit();
     means
 }
 

@@ -11,7 +11,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
 use super::acceptance::{is_material, is_possible};
 use super::by_run::{Deviations, deviations, deviations_beside};
-use super::outcome::{Beside, Outcome, Round, Trial};
+use super::outcome::{Beside, Outcome, Trial, round_of};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
 use super::search::Search;
@@ -62,7 +62,7 @@ impl Search<'_> {
         let usual = usual_errors(fit.theta[0], |kind| fit.model.has(kind));
         let shared = usual.start.len();
         let errors = self.map_errors(fit).into_iter().chain([usual]).map(Candidate::parts);
-        let fit = self.problem.with_runs_apart(&self.problem.grown(fit, errors));
+        let fit = self.problem.with_runs_apart(self.problem.grown(fit, errors));
         let beside = Arc::new(Beside { fit, shared });
         outcome.beside = Some((outcome.fit.theta.clone(), beside.clone()));
         beside
@@ -108,7 +108,7 @@ impl Search<'_> {
         let Some(found) = best else { return false };
         let grown = self.problem.grown(&outcome.fit, [found.last_parts()]);
         outcome.fit = self.problem.with_own_noise(&grown);
-        outcome.certain.push((found.kind, Round::from(tried)));
+        outcome.certain.push((found.kind, round_of(tried)));
         true
     }
 

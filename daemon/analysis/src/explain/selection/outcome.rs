@@ -52,6 +52,12 @@ impl Trial {
 /// The best trial of each kind, the strongest first.
 pub type Round = Arc<[Trial]>;
 
+/// A round to remember: how good the trials were, and no more by observation.
+pub(super) fn round_of(mut trials: Vec<Trial>) -> Round {
+    trials.iter_mut().for_each(|trial| trial.fit.forget_series());
+    trials.into()
+}
+
 /// A model with the usual errors beside it.
 #[derive(Clone)]
 pub struct Beside {

@@ -85,14 +85,21 @@ impl FitProblem {
 
     /// The model of a fit where loads and winds of ordinary days may set the runs apart, as far as they
     /// show it.
-    pub fn with_runs_apart(&self, fit: &Fit) -> Fit {
+    pub fn with_runs_apart(&self, fit: Fit) -> Fit {
         let most = RunScatter::MOST_BESIDE;
         let noise = Noise { scatter: most, scatter_most: most, ..fit.noise };
-        let mut fit = self.again(fit, noise);
+        let mut fit = self.renewed(fit, noise);
         for _ in 0..APART_TURNS {
-            fit = self.with_own_noise(&fit);
+            let noise = self.noise_left_by(&fit);
+            fit = self.renewed(fit, noise);
         }
         fit
+    }
+
+    /// Fits the model of a fit again, under another noise, with the room that the fit took.
+    fn renewed(&self, fit: Fit, noise: Noise) -> Fit {
+        let Fit { model, theta, memories, .. } = fit;
+        self.fit_remembering(&model, (theta, noise), memories.to_vec())
     }
 
     /// A model at given parameters, not fitted.
@@ -189,11 +196,11 @@ impl FitProblem {
         let steps = if promises(&fit, promised) { STEPS_MAX } else { 0 };
         for _ in 0..steps {
             let score = fit.score();
-            let next = self.descend(plan, &fit, &score, (filters, &mut memories));
-            let Some(next) = next else { break };
-            let gained = fit.cost - next.cost;
-            fit = next;
-            if gained < DECREASE_MIN {
+            let before = fit.cost;
+            if !self.descend(plan, &mut fit, &score, (filters, &mut memories)) {
+                break;
+            }
+            if before - fit.cost < DECREASE_MIN {
                 break;
             }
         }
@@ -232,27 +239,31 @@ impl FitProblem {
         filters.into()
     }
 
-    /// A step of Levenberg and Marquardt within the bounds, damped until the cost falls; `None`
+    /// A step of Levenberg and Marquardt within the bounds, damped until the cost falls; false
     /// when no step promises or brings a decrease.
     fn descend(
         &self,
         plan: &Plan,
-        fit: &Fit,
+        fit: &mut Fit,
         score: &DVector<f64>,
         (filters, memories): (&SharedFilters, &mut [RunMemory]),
-    ) -> Option<Fit> {
+    ) -> bool {
         for damping in [0.0, 0.01, 0.3, 10.0, 300.0] {
-            let (theta, promised) = self.bounded_step(fit, score, damping)?;
+            let Some((theta, promised)) = self.bounded_step(fit, score, damping) else {
+                return false;
+            };
             if promised < DECREASE_MIN {
-                return None;
+                return false;
             }
             let left = self.left(plan, &theta, filters, memories);
             if self.cost(&fit.model, &theta, &left) < fit.cost {
-                let at = (theta, fit.noise);
-                return Some(self.linearised(plan, &fit.model, at, left, (filters, memories)));
+                let (model, at) = (fit.model.clone(), (theta, fit.noise));
+                fit.forget_series();
+                *fit = self.linearised(plan, &model, at, left, (filters, memories));
+                return true;
             }
         }
-        None
+        false
     }
 
     /// The damped step within the bounds, and the decrease of the cost that it promises, which is never negative:

@@ -127,6 +127,16 @@ impl Fit {
         *self.open_loop_mps.get_or_init(find)
     }
 
+    /// Forgets what it holds by observation: what is left says how good the model is, and starts other fits, but is
+    /// no place to look around.
+    pub fn forget_series(&mut self) {
+        self.innovations = Vec::new();
+        self.columns = Vec::new();
+        self.residuals = Vec::new();
+        self.filters = Vec::new();
+        self.memories = Arc::default();
+    }
+
     /// Information matrix of all runs and the prior, with what is held at its bounds.
     pub fn information(&self) -> DMatrix<f64> {
         let mut information = self.free_information();
