@@ -67,7 +67,10 @@ impl Held {
             let first = |number: usize| (number * runs).div_ceil(count);
             let (from, end) = (first(number), first(number + 1));
             let share = (GOLDEN * number as f64).fract();
-            let is_held = *seen == from + (share * (end - from) as f64) as usize;
+            let within = (share * (end - from) as f64) as usize;
+            // What acts in the newest run may be about to last.
+            let is_last = number + 1 == count;
+            let is_held = *seen == if is_last { end - 1 } else { from + within };
             *seen += 1;
             Group { role, number, is_held }
         });
@@ -263,6 +266,8 @@ mod tests {
             assert_eq!(count(Role::Holdout), holdout.min(HOLDOUT_RUNS_HELD), "{fit} + {holdout}");
             let others: usize = held.others(Role::Fit).iter().map(Vec::len).sum();
             assert_eq!(others + fit_runs_held(fit), fit);
+            let newest = held.groups.iter().rfind(|it| it.role == Role::Fit);
+            assert!(newest.is_some_and(|it| it.is_held));
             assert!(fit_runs_held(fit) <= FIT_RUNS_HELD[1]);
         }
     }
