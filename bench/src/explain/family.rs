@@ -24,8 +24,6 @@ pub struct Case {
     pub seed: u64,
     /// The world it happens in.
     pub world: World,
-    /// So many times the scenario's runs.
-    pub times: usize,
 }
 
 impl Case {
@@ -36,12 +34,7 @@ impl Case {
 
     /// What the simulator is asked for.
     pub fn settings(&self) -> SimulatorSettings {
-        let settings = self.scenario.settings(self.seed, self.world);
-        SimulatorSettings {
-            runs: self.times * settings.runs,
-            holdout_runs: self.times * settings.holdout_runs,
-            ..settings
-        }
+        self.scenario.settings(self.seed, self.world)
     }
 
     /// Writes the dataset, with its truth beside it, as `<kind>-<seed>` into a folder.
@@ -72,9 +65,6 @@ pub struct FamilyArguments {
     /// What is a little wrong besides the effect
     #[arg(long, value_enum, default_value_t = World::Plain)]
     world: World,
-    /// So many times the usual runs in each dataset
-    #[arg(long, value_name = "COUNT", default_value_t = 1)]
-    times: usize,
     /// Datasets at a time
     #[arg(long, default_value_t = 2)]
     threads: usize,
@@ -99,9 +89,9 @@ impl FamilyArguments {
 
     /// Every scenario with every seed, scenario by scenario.
     pub fn cases(&self, scenarios: &[Scenario]) -> Vec<Case> {
-        let (first, world, times) = (self.first_seed, self.world, self.times);
+        let (first, world) = (self.first_seed, self.world);
         let seeds = move || first..first + self.seeds as u64;
-        let of = |&scenario| seeds().map(move |seed| Case { scenario, seed, world, times });
+        let of = |&scenario| seeds().map(move |seed| Case { scenario, seed, world });
         scenarios.iter().flat_map(of).collect()
     }
 

@@ -171,7 +171,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         let Some(joint) = outcome.beside().filter(|_| is_common(&outcome.fit)) else {
             return Ok(());
         };
-        (search.progress)(0.9, "reading all runs");
+        (search.progress)(0.95, "reading all runs");
         let more = self.normals(problem, preparation, [&joint.fit, &outcome.fit, &outcome.base])?;
         let [beside, own, base] = more;
         let fit = problem.joined_by(&joint.fit, &beside);
