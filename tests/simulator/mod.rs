@@ -7,6 +7,7 @@ mod effects;
 mod files;
 mod fits;
 mod force_sampling;
+mod many_runs;
 mod modulated_stops;
 mod parts;
 mod physics;

@@ -82,9 +82,6 @@ pub use train_file::parse_train;
 
 use std::sync::Arc;
 
-use dynocar_shared::SampleField;
-
-use dynocar_core::plausibility::InputFault;
 use dynocar_model::track::Track;
 use dynocar_model::train::{Drive, TrainModel};
 #[cfg(feature = "parallel")]
@@ -158,6 +155,17 @@ impl Dataset {
         self.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max)
     }
 
+    /// What it declares, without runs.
+    pub fn without_runs(&self) -> Dataset {
+        Dataset {
+            name: self.name.clone(),
+            description: self.description.clone(),
+            train: self.train.clone(),
+            track: self.track.clone(),
+            runs: Vec::new(),
+        }
+    }
+
     /// The same with forces that act `late_s` before their stamps taken where they act.
     pub fn with_forces_moved(&self, late_s: f64) -> Dataset {
         let mut dataset = self.clone();
@@ -182,28 +190,9 @@ impl Dataset {
         self.train.drive.is_none() && self.runs.iter().any(by_power)
     }
 
-    /// Forgets the forces of all samples without traction, for a train whose friction brake is not
-    /// recorded: there the true force is unknown. While it pulls no brake acts, be one recorded or not, and what is
-    /// wrong with a recorded one spoils nothing.
+    /// [`Run::keep_traction_only`] of all runs.
     pub fn keep_traction_only(&mut self) {
-        for sample in self.runs.iter_mut().flat_map(|run| &mut run.samples) {
-            let pulls = sample.get(SampleField::TractionForce).is_some_and(|force| force > 0.0);
-            let brakes = sample.get(SampleField::BrakeForce).is_some_and(|force| force > 0.0);
-            if !pulls || brakes {
-                sample.valid &= !(SampleField::TractionForce.bit() | SampleField::BrakeForce.bit());
-            } else {
-                sample.set(
-                    SampleField::BrakeForce,
-                    sample.get(SampleField::BrakeForce).unwrap_or(0.0),
-                );
-            }
-        }
-        for run in &mut self.runs {
-            let of_brake = |it: &Diagnostic| {
-                it.fault.is_some_and(|(detected, _)| detected.fault == InputFault::BrakeScale)
-            };
-            run.diagnostics.retain(|it| !of_brake(it));
-        }
+        self.runs.iter_mut().for_each(Run::keep_traction_only);
     }
 }
 

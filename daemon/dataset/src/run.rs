@@ -1,5 +1,8 @@
 //! One run, from its file to the samples that the pipelines take.
 
+use std::mem::take;
+
+use dynocar_core::plausibility::InputFault;
 use dynocar_model::train::Drive;
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -87,6 +90,31 @@ impl Run {
             Some(own) => Some((own, false)),
             None => Some((self.extra(Quantity::LinePower)?, true)),
         }
+    }
+
+    /// Takes what was recorded at its samples out of it, with what is known of the run; that stays here alone.
+    pub fn split_off_samples(&mut self) -> Run {
+        let (samples, extras) = (take(&mut self.samples), take(&mut self.extras));
+        Run { samples, extras, ..self.clone() }
+    }
+
+    /// Forgets the forces of all samples without traction, for a train whose friction brake is not
+    /// recorded: there the true force is unknown. While it pulls no brake acts, be one recorded or not, and faults of
+    /// a recorded brake spoil nothing.
+    pub fn keep_traction_only(&mut self) {
+        for sample in &mut self.samples {
+            let pulls = sample.get(SampleField::TractionForce).is_some_and(|force| force > 0.0);
+            let brake_n = sample.get(SampleField::BrakeForce).unwrap_or(0.0);
+            if !pulls || brake_n > 0.0 {
+                sample.valid &= !(SampleField::TractionForce.bit() | SampleField::BrakeForce.bit());
+            } else {
+                sample.set(SampleField::BrakeForce, brake_n);
+            }
+        }
+        let of_brake = |it: &Diagnostic| {
+            it.fault.is_some_and(|(detected, _)| detected.fault == InputFault::BrakeScale)
+        };
+        self.diagnostics.retain(|it| !of_brake(it));
     }
 
     /// What is recorded of a quantity beyond those of a sample.

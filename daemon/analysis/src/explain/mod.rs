@@ -13,6 +13,7 @@
 //!   usually wrong
 //! - [`gradient_prior`]: how maps err
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
+//! - [`many`]: some of many runs, and what all of them say
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
 //!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
@@ -31,6 +32,7 @@ pub mod force_time;
 pub mod gradient_prior;
 pub mod hypothesis;
 pub mod identifiability;
+pub mod many;
 pub mod meaning;
 pub mod places;
 pub mod report;
@@ -42,12 +44,18 @@ pub mod stop_to_stop;
 pub mod unexplained;
 pub mod verdict;
 
+use std::borrow::Cow;
+
 use dynocar_core::plausibility::Severity;
 
+use crate::dataset::dataset_diagnostic::diagnostics;
 use crate::dataset::{Dataset, Role};
 use answer::ExplainAnswer;
-use evidence::{FitProblem, RunData, RunDataError};
-use score::{PredictedRun, Score};
+use answer::WithStd;
+use drive::EstimatedDrive;
+use evidence::{Density, FitProblem, RunData, RunDataError};
+use many::{Held, Many, Preparation};
+use score::{RunScore, Score};
 use selection::{Deviations, Outcome, Progress, Search};
 use unexplained::Unexplained;
 
@@ -63,38 +71,66 @@ pub struct Explanation {
     pub deviations: Deviations,
     /// Open-loop errors.
     pub score: Score,
-    /// Predicted measured speeds of all runs by the grown model.
-    pub predictions: Vec<PredictedRun>,
     /// What the search found.
     pub outcome: Outcome,
+    /// How runs are made ready for its models.
+    pub preparation: Preparation,
 }
 
 /// Explains what the declared model of a dataset leaves.
 ///
-/// Holdout runs are read once, to score the finished model.
+/// Holdout runs are read once, to score the finished model. Of [many](many) fit runs the search looks at some.
 ///
 /// # Errors
 ///
 /// When a run has no usable sample.
 pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, RunDataError> {
+    let Some(held) = Held::of(dataset.runs.iter().map(|run| run.role)) else {
+        return explained(Cow::Borrowed(dataset), None, progress);
+    };
+    let runs = dataset.runs.iter().enumerate().filter(|(index, _)| held.holds(*index));
+    let chosen =
+        Dataset { runs: runs.map(|(_, run)| run.clone()).collect(), ..dataset.without_runs() };
+    let read = |index: usize| Ok(dataset.runs[index].clone());
+    explained(Cow::Owned(chosen), Some(Many { dataset, held: &held, read: &read }), progress)
+}
+
+/// Explains what the declared model leaves of many runs, of which the held ones are in memory.
+///
+/// # Errors
+///
+/// When a run has no usable sample, or cannot be read.
+pub fn explain_many<E: From<RunDataError> + Send>(
+    held: Dataset,
+    many: Many<E>,
+    progress: Progress,
+) -> Result<Explanation, E> {
+    explained(Cow::Owned(held), Some(many), progress)
+}
+
+fn explained<E: From<RunDataError> + Send>(
+    dataset: Cow<Dataset>,
+    many: Option<Many<E>>,
+    progress: Progress,
+) -> Result<Explanation, E> {
     progress(0.0, "reading the runs");
-    let estimated_drive = drive::estimated(dataset)?;
-    let retaken = estimated_drive.as_ref().map(|it| dataset.with_drive(it.drive));
-    let dataset = retaken.as_ref().unwrap_or(dataset);
-    let late = force_time::estimated(dataset)?;
-    let moved = late.map(|late| dataset.with_forces_moved(late.value));
-    let dataset = moved.as_ref().unwrap_or(dataset);
+    let all = many.as_ref().map_or(&*dataset, |many| many.dataset);
+    let density = if many.is_some() { Density::Thinned } else { Density::Recorded };
+    let Prepared { estimated_drive, late, preparation, runs } = Prepared::of(&dataset, density)?;
+    let track = preparation.track().map(|track| &**track);
+    let diagnostics = diagnostics(preparation.train(), track, &all.runs);
+    let step_s = dataset.step_s();
+    drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
-        evidence::prepare(dataset)?.into_iter().partition(|run| run.role == Role::Fit);
-    let problem = FitProblem::new(fit_runs, dataset.train.resistance);
+        runs.into_iter().partition(|run| run.role == Role::Fit);
+    let problem = FitProblem::new(fit_runs, preparation.train().resistance);
     let search = Search {
         problem: &problem,
         holdout: &holdout,
-        train: &dataset.train,
-        track: dataset.track.as_ref(),
+        train: preparation.train(),
+        track: preparation.track(),
         progress,
     };
-    let diagnostics = dataset.diagnostics();
     // An effect that explains wrong units is none.
     let is_possible =
         diagnostics.iter().all(|diagnostic| diagnostic.severity < Severity::Fundamental);
@@ -103,10 +139,20 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    let deviations = selection::given_usual_errors(&search, &mut outcome, dataset.step_s());
+    let mut deviations = selection::given_usual_errors(&search, &mut outcome, step_s);
     progress(0.95, "scoring the holdout runs");
-    let score = Score::of(&problem, &holdout, &outcome.base, &outcome.fit);
-    let predictions = score::predictions(&problem, &holdout, &outcome.fit);
+    let scores = match &many {
+        Some(many) => {
+            many.join(&search, &preparation, &mut outcome)?;
+            deviations = selection::deviations_given(&outcome, step_s);
+            many.scores(&holdout, &preparation, &outcome)?
+        }
+        None => {
+            let score = |run: &RunData| RunScore::of(run, &outcome.base, &outcome.fit);
+            holdout.iter().map(score).collect()
+        }
+    };
+    let score = Score::of(&problem, scores, &outcome.base, &outcome.fit);
     let mut answer = verdict::answer(&search, &outcome, &deviations, &known, &score, diagnostics);
     if let Some(estimated) = estimated_drive {
         answer.add_caveat(&estimated.answer.sentence());
@@ -116,6 +162,32 @@ pub fn explain(dataset: &Dataset, progress: Progress) -> Result<Explanation, Run
         answer.add_caveat(&force_time::sentence(late));
         answer.force_late_s = Some(late);
     }
+    if let Some(many) = &many {
+        answer.add_caveat(&many.sentence(&outcome));
+    }
     progress(1.0, "done");
-    Ok(Explanation { answer, problem, holdout, deviations, score, predictions, outcome })
+    Ok(Explanation { answer, problem, holdout, deviations, score, outcome, preparation })
+}
+
+/// Runs made ready, with what was found of their forces.
+struct Prepared {
+    estimated_drive: Option<EstimatedDrive>,
+    late: Option<WithStd>,
+    preparation: Preparation,
+    runs: Vec<RunData>,
+}
+
+impl Prepared {
+    fn of(dataset: &Dataset, density: Density) -> Result<Self, RunDataError> {
+        let estimated_drive = drive::estimated(dataset)?;
+        let (declared, drive) = (dataset, estimated_drive.as_ref().map(|it| it.drive));
+        let retaken = drive.map(|drive| dataset.with_drive(drive));
+        let dataset = retaken.as_ref().unwrap_or(dataset);
+        let late = force_time::estimated(dataset)?;
+        let moved = late.map(|late| dataset.with_forces_moved(late.value));
+        let dataset = moved.as_ref().unwrap_or(dataset);
+        let runs = evidence::prepare_at(dataset, density)?;
+        let preparation = Preparation::new(declared, drive, late.map(|late| late.value));
+        Ok(Prepared { estimated_drive, late, preparation, runs })
+    }
 }

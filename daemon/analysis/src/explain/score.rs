@@ -23,15 +23,27 @@ pub struct Score {
     pub fit_runs: [SpeedError; 2],
 }
 
-/// Predicted measured speeds of a run.
+/// Errors of the models without and with the effects over one run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PredictedRun {
-    /// The run's file.
-    pub file: String,
-    /// Times in s, in the recording's own count.
-    pub time_s: Vec<f64>,
-    /// Predicted measured speeds in m/s.
-    pub speed_mps: Vec<f64>,
+pub struct RunScore {
+    /// The whole run: before and after.
+    full: [SpeedError; 2],
+    /// Restarted every 60 s: before and after.
+    window60: [SpeedError; 2],
+    /// Root mean square errors in m/s from stop to stop: before and after.
+    stop_to_stop_mps: Vec<[f64; 2]>,
+}
+
+impl RunScore {
+    /// Of a run by the models without and with the effects.
+    pub fn of(run: &RunData, before: &Fit, after: &Fit) -> Self {
+        let both = |restart| [before, after].map(|fit| run_error(fit, run, restart));
+        RunScore {
+            full: both(Restart::FullRun),
+            window60: both(Restart::WINDOW_60),
+            stop_to_stop_mps: stop_errors_mps(run, before, after),
+        }
+    }
 }
 
 /// Speeds of a run predicted open loop.
@@ -66,16 +78,19 @@ fn errors_at<const N: usize>(
 /// Errors of recorded runs from stop to stop, by the models without and with the effects; `None`
 /// where none of them goes from stop to stop.
 pub fn stop_to_stop(runs: &[RunData], before: &Fit, after: &Fit) -> Option<StopToStop> {
-    let errors_mps = |fit: &Fit, run: &RunData| {
+    let of_run = |run: &RunData| stop_errors_mps(run, before, after);
+    StopToStop::from_errors(runs.iter().map(of_run).collect())
+}
+
+/// The same of one run, in m/s.
+fn stop_errors_mps(run: &RunData, before: &Fit, after: &Fit) -> Vec<[f64; 2]> {
+    let errors_mps = |fit: &Fit| {
         let prediction = predicted(fit, run, Restart::AtDepartures);
         let within = |part| SpeedError::within(&run.recording, &prediction, part).rmse_mps();
         stop_runs(&run.recording).into_iter().filter_map(within).collect::<Vec<f64>>()
     };
-    let of_run = |run: &RunData| {
-        let pairs = errors_mps(before, run).into_iter().zip(errors_mps(after, run));
-        pairs.map(|(before, after)| [before, after]).collect()
-    };
-    StopToStop::from_errors(runs.iter().map(of_run).collect())
+    let pairs = errors_mps(before).into_iter().zip(errors_mps(after));
+    pairs.map(|(before, after)| [before, after]).collect()
 }
 
 /// Open-loop errors of the fit runs: as fitted, and each run by what the others say of it.
@@ -152,16 +167,6 @@ pub fn reduction(problem: &FitProblem, smaller: &Fit, larger: &Fit) -> f64 {
     FitErrors::of(problem, larger).reduction_from(&FitErrors::of(problem, smaller))
 }
 
-/// Predictions of all runs, fit and holdout.
-pub fn predictions(problem: &FitProblem, holdout: &[RunData], fit: &Fit) -> Vec<PredictedRun> {
-    let of_run = |run: &RunData| PredictedRun {
-        file: run.file.clone(),
-        time_s: run.recording.time_s().iter().map(|time| run.offset_s + time).collect(),
-        speed_mps: predicted(fit, run, Restart::FullRun).speed_mps().to_vec(),
-    };
-    problem.runs.iter().chain(holdout).map(of_run).collect()
-}
-
 /// Errors without and with the effects over some parts together, in m/s, and what is taken away.
 pub fn pooled(parts: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> {
     let sum =
@@ -171,22 +176,23 @@ pub fn pooled(parts: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> 
 }
 
 impl Score {
-    /// Scores the model without and with the effects on fit and holdout runs.
-    pub fn of(problem: &FitProblem, holdout: &[RunData], before: &Fit, after: &Fit) -> Self {
-        let both = |run: &RunData, restart: Restart| {
-            [run_error(before, run, restart), run_error(after, run, restart)]
+    /// The scores of the holdout runs with the errors of the models without and with the effects on the fit runs.
+    pub fn of(problem: &FitProblem, holdout: Vec<RunScore>, before: &Fit, after: &Fit) -> Self {
+        let summed = |parts: &mut dyn Iterator<Item = [SpeedError; 2]>| {
+            let add =
+                |sum: [SpeedError; 2], own: [SpeedError; 2]| [sum[0] + own[0], sum[1] + own[1]];
+            parts.fold([SpeedError::default(); 2], add)
         };
-        let summed = |runs: &[RunData], restart: Restart| {
-            runs.iter().fold([SpeedError::default(); 2], |sum, run| {
-                let own = both(run, restart);
-                [sum[0] + own[0], sum[1] + own[1]]
-            })
-        };
+        let fitted = problem.runs.iter();
+        let of_fitted =
+            |run: &RunData| [before, after].map(|fit| run_error(fit, run, Restart::FullRun));
         Score {
-            holdout_runs: holdout.iter().map(|run| both(run, Restart::FullRun)).collect(),
-            holdout_window60: summed(holdout, Restart::WINDOW_60),
-            holdout_stop_to_stop: stop_to_stop(holdout, before, after),
-            fit_runs: summed(&problem.runs, Restart::FullRun),
+            holdout_runs: holdout.iter().map(|run| run.full).collect(),
+            holdout_window60: summed(&mut holdout.iter().map(|run| run.window60)),
+            fit_runs: summed(&mut fitted.map(of_fitted)),
+            holdout_stop_to_stop: StopToStop::from_errors(
+                holdout.into_iter().map(|run| run.stop_to_stop_mps).collect(),
+            ),
         }
     }
 

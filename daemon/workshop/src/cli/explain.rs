@@ -6,21 +6,22 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use dynocar_analysis::dataset::{Dataset, DatasetFiles, Role, SourcePosition};
-use dynocar_analysis::explain::evidence::RunDataError;
+use dynocar_analysis::dataset::{Dataset, Role};
+use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::report::timeline::Timeline;
+use dynocar_analysis::explain::score::predicted;
 use dynocar_analysis::explain::selection::Progress;
-use dynocar_analysis::explain::{Explanation, explain};
+use dynocar_model::simulate::Restart;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub use super::explained::text;
+use super::explained_runs::ExplainedRuns;
 use super::threads::Threads;
 use crate::annotation::annotate;
 use crate::report;
 use crate::report::provenance::{Provenance, for_shell, own_command_line};
 use crate::updated::{UPDATED_FILES, UPDATED_MARK, UpdatedFiles, UpdatedModelError, write_updated};
 use dynocar::cli::Failure;
-use dynocar::dataset::{self, DatasetFolder};
 use dynocar::output::{
     OutputError, give, report_line, require_files, require_folder, require_new,
     require_replaceable, write_file, write_in_folder,
@@ -69,9 +70,9 @@ pub struct ExplainArguments {
 pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     require_names(arguments)?;
     let path = &arguments.dataset;
-    let dataset = read(path, arguments.traction_only)?;
+    let mut runs = ExplainedRuns::at(path, arguments.traction_only)?;
     if let Some(folder) = &arguments.predictions {
-        for name in prediction_names(&dataset).values() {
+        for name in prediction_names(&runs.dataset).values() {
             require_replaceable(&folder.join(name), PREDICTIONS_HEADER)?;
         }
     }
@@ -81,12 +82,13 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
         bar.set_position(bar.position().max((1000.0 * share) as u64));
         bar.set_message(what.replace('_', " "));
     };
-    let explained = arguments.threads.work(|| explain(&dataset, &progress))?;
+    let explained = arguments.threads.work(|| runs.explain(&progress))?;
     bar.finish_and_clear();
-    let mut explanation = explained.map_err(|error| unusable(path, &dataset, error))?;
+    let mut explanation = explained?;
     if let Some(folder) = &arguments.predictions {
-        explanation.answer.predictions = write_predictions(folder, &dataset, &explanation)?;
+        explanation.answer.predictions = write_predictions(folder, &runs, &explanation)?;
     }
+    let dataset = runs.dataset;
     if let Some(folder) = &arguments.grown {
         if explanation.answer.impossibilities().next().is_none() {
             report_updated(&grow(folder, path, &explanation)?);
@@ -122,18 +124,9 @@ pub fn answer(
     traction_only: bool,
     progress: Progress,
 ) -> Result<(Dataset, Explanation), Failure> {
-    let dataset = read(path, traction_only)?;
-    let explanation =
-        explain(&dataset, progress).map_err(|error| unusable(path, &dataset, error))?;
-    Ok((dataset, explanation))
-}
-
-fn read(path: &Path, traction_only: bool) -> Result<Dataset, Failure> {
-    let mut dataset = dataset::load(path)?;
-    if traction_only {
-        dataset.keep_traction_only();
-    }
-    Ok(dataset)
+    let mut runs = ExplainedRuns::at(path, traction_only)?;
+    let explanation = runs.explain(progress)?;
+    Ok((runs.dataset, explanation))
 }
 
 /// Refuses wrong names of results before the work begins.
@@ -151,15 +144,6 @@ fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
         })),
         _ => Ok(()),
     }
-}
-
-/// The failure of a run that cannot be used, with what may be the matter.
-fn unusable(path: &Path, dataset: &Dataset, error: RunDataError) -> Failure {
-    let RunDataError::Simulate { file, source } = error;
-    let label = DatasetFolder::at(path).map_or(file.clone(), |folder| folder.label(&file));
-    let diagnostics: String =
-        dataset.diagnostics().iter().map(|diagnostic| format!("; {diagnostic}")).collect();
-    Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{diagnostics}"))
 }
 
 /// Writes the updated model of the dataset at a path into a folder.
@@ -248,17 +232,19 @@ fn prediction_names(dataset: &Dataset) -> BTreeMap<String, String> {
 /// Writes one file for each holdout run; gives the files by run.
 fn write_predictions(
     folder: &Path,
-    dataset: &Dataset,
+    runs: &ExplainedRuns,
     explanation: &Explanation,
-) -> Result<BTreeMap<String, String>, OutputError> {
-    let names = prediction_names(dataset);
+) -> Result<BTreeMap<String, String>, Failure> {
+    let names = prediction_names(&runs.dataset);
     let mut files = BTreeMap::new();
-    for run in &explanation.predictions {
+    for (index, run) in runs.dataset.runs.iter().enumerate() {
         let Some(name) = names.get(&run.file) else { continue };
+        let run = runs.prepared(index, explanation)?;
+        let prediction = predicted(&explanation.outcome.fit, &run, Restart::FullRun);
         let mut text = String::from(PREDICTIONS_HEADER);
-        for (time_s, speed_mps) in run.time_s.iter().zip(&run.speed_mps) {
+        for (time_s, speed_mps) in run.recording.time_s().iter().zip(prediction.speed_mps()) {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "{time_s:.3},{speed_mps:.4}");
+            let _ = writeln!(text, "{:.3},{speed_mps:.4}", run.offset_s + time_s);
         }
         let path = write_in_folder(folder, name, &text)?;
         files.insert(run.file.clone(), path.display().to_string());

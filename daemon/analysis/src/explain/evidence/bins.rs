@@ -9,7 +9,7 @@ const BIN_S: f64 = 2.0;
 /// A bin is at least this many sampling periods wide.
 const BIN_SAMPLES_MIN: f64 = 2.0;
 /// Below this speed in m/s the train's motion is not used: holding brakes and stiction act.
-const MOVING_MPS: f64 = 0.8;
+pub(super) const MOVING_MPS: f64 = 0.8;
 /// A longer step in s between samples ends a segment of motion.
 pub(super) const SEGMENT_GAP_MAX_S: f64 = 5.0;
 /// Segments of fewer bins say nothing.

@@ -50,7 +50,10 @@ pub fn integrate_bins<const N: usize>(
     mut bins: [&mut Vec<f64>; N],
 ) {
     let mut integral = Integral::START;
-    bins.iter_mut().for_each(|bins| bins.clear());
+    for bins in &mut bins {
+        bins.clear();
+        bins.reserve_exact(run.bins.len());
+    }
     for bin in &run.bins {
         let means = integral.mean(run, bin, &accelerations);
         bins.iter_mut().zip(means).for_each(|(bins, mean)| bins.push(mean));

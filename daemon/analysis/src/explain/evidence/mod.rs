@@ -25,6 +25,7 @@ mod run_scatter;
 mod sample_forces;
 #[cfg(test)]
 mod test_runs;
+mod thinning;
 mod whitener;
 
 pub use adjoint::Adjoint;
@@ -38,7 +39,7 @@ pub use fit::{Fit, FitProblem, RunNormal};
 pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RunScatter};
 pub use noise_search::{RUNS_A_TASK, coarse_step};
-pub use run_data::{RunData, RunDataError, RunPower, prepare};
+pub use run_data::{Density, RunData, RunDataError, RunPower, prepare, prepare_at};
 pub use run_scatter::{PRIOR_RUNS, RunFactors, WeightedFilter};
 pub use sample_forces::SampleForces;
 #[cfg(test)]

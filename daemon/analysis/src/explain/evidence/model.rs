@@ -229,7 +229,10 @@ impl UpdatedModel {
         let scale = self.speed_scale(theta, &acts);
         let (pass, acting) = (self.pass(&acts), &mut forces.acting);
         let (mut integral, mut rest, mut done) = (Integral::START, &run.bins[..], 0);
-        bins.iter_mut().for_each(|bins| bins.clear());
+        for bins in &mut bins {
+            bins.clear();
+            bins.reserve_exact(run.bins.len());
+        }
         while let Some(bin) = rest.first() {
             let first = if pass.looks_back { done } else { bin.first };
             let own = pass.bins(first, rest);

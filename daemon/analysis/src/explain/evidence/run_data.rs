@@ -15,6 +15,7 @@ use super::cleaning;
 use super::drift::drift_m;
 use super::positions::{by_part_s, distance_ratio};
 use super::sample_forces::DeclaredForces;
+use super::thinning::thinned;
 
 /// A run, ready for fitting and for open-loop simulation.
 #[derive(Clone, Debug)]
@@ -130,18 +131,37 @@ impl RunData {
     }
 }
 
-/// Makes all runs of a dataset ready.
+/// How densely the samples of a run that is made ready lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Density {
+    /// As recorded.
+    Recorded,
+    /// About a second apart, each the mean of those that it stands for; a run whose force comes from its power stays
+    /// as recorded.
+    Thinned,
+}
+
+/// Makes all runs of a dataset ready, as recorded.
 ///
 /// # Errors
 ///
 /// The first run without usable samples.
 pub fn prepare(dataset: &Dataset) -> Result<Vec<RunData>, RunDataError> {
+    prepare_at(dataset, Density::Recorded)
+}
+
+/// Makes all runs of a dataset ready.
+///
+/// # Errors
+///
+/// The first run without usable samples.
+pub fn prepare_at(dataset: &Dataset, density: Density) -> Result<Vec<RunData>, RunDataError> {
     let train = &dataset.train;
     let mut reader = Reader {
         validator: Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg),
         resolver: ForceResolver::new(train.clone(), dataset.track.clone()),
     };
-    dataset.runs.iter().map(|run| prepare_run(train, run, &mut reader)).collect()
+    dataset.runs.iter().map(|run| prepare_run(train, (run, density), &mut reader)).collect()
 }
 
 /// Takes samples one after the other, as a daemon does.
@@ -180,7 +200,7 @@ fn move_positions(rows: &mut [TrainSample], samples: &[ResolvedSample], moved_m:
 /// A run made ready, with an odometer's drift taken out before anything is looked up at its positions.
 fn prepare_run(
     train: &TrainModel,
-    run: &Run,
+    (run, density): (&Run, Density),
     reader: &mut Reader,
 ) -> Result<RunData, RunDataError> {
     let numbered = run.samples.iter().map(|it| TrainSample { run: run.number, ..*it });
@@ -199,6 +219,14 @@ fn prepare_run(
     }
     let rejected = rows.len() - recording.samples().len();
     let first_ns = recording.samples().first().map_or(0, |sample| sample.time_ns);
+    let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
+    let speed_late_s = match is_position_recorded {
+        true => by_part_s(&recording),
+        false => Vec::new(),
+    };
+    if density == Density::Thinned && run.power().is_none() {
+        recording = Recording::new(thinned(&recording)).map_err(unusable)?;
+    }
     let declared = DeclaredForces::of(recording.samples(), train.rotating_mass_factor);
     let smooth_mps = smoothed(&recording);
     let of_samples = |of: &Covariate| {
@@ -213,11 +241,6 @@ fn prepare_run(
     let positions_m = recording.samples().iter().filter_map(|sample| sample.position_m);
     let span_m = span(positions_m);
     let bins = bins::bins(&recording);
-    let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
-    let speed_late_s = match is_position_recorded {
-        true => by_part_s(&recording),
-        false => Vec::new(),
-    };
     let power = RunPower::of(run, recording.samples());
     Ok(RunData {
         file: run.file.clone(),

@@ -13,7 +13,7 @@ use dynocar_model::train::Davis;
 use nalgebra::{SMatrix, SVector};
 
 use super::integral::integrate_bins;
-use super::noise::RunScatter;
+use super::noise::{Noise, RunScatter};
 use super::run_data::RunData;
 use super::whitener::{Whitener, robust_weight};
 
@@ -231,6 +231,13 @@ pub(super) struct Whitened {
 }
 
 impl RunFilters {
+    /// Those of a run from the columns of its own factors.
+    pub fn new(run: &RunData, columns: &Columns, noise: Noise) -> Self {
+        let whitener = Whitener::new(run, noise);
+        let scatter = ScatterFilter::new(columns, &whitener, noise.scatter);
+        RunFilters { whitener, scatter }
+    }
+
     /// Robust innovations of a series of bin differences.
     pub fn whitened(&self, residual: &[f64], scratch: &mut Vec<f64>) -> Whitened {
         self.whitener.whiten(residual, scratch);

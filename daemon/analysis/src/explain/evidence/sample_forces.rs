@@ -104,7 +104,9 @@ impl DeclaredForces {
             let resistance = resistances.len() - 1;
             DeclaredSample { mass_kg, traction_n, brake_n, gradient_permille, resistance }
         });
-        DeclaredForces { rotating_mass_factor, samples: samples.collect(), resistances }
+        let samples = samples.collect();
+        resistances.shrink_to_fit();
+        DeclaredForces { rotating_mass_factor, samples, resistances }
     }
 
     /// What acts at some samples, in their order.

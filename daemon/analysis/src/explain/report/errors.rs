@@ -75,10 +75,11 @@ impl Errors {
         let (fit, holdout) = (&explanation.problem.runs[..], &explanation.holdout[..]);
         let pair = |runs: &[RunData], restart| error_pair(runs, before, after, restart);
         let mut scored = pair(holdout, Restart::FullRun);
+        let are_all = explanation.score.holdout_runs.len() == holdout.len();
         if let (Some(scored), Some(interval), true) =
-            (&mut scored, explanation.answer.error_reduction_interval, holdout.len() > 1)
+            (&mut scored, explanation.answer.error_reduction_interval, are_all && holdout.len() > 1)
         {
-            // The page and the answer for machines state one interval.
+            // The page and the answer for machines state one interval of the same runs.
             scored.reduction.interval = Some(interval);
         }
         Errors {

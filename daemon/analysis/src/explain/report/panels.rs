@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::covariates::{COMMON, Covariate};
 use super::windows::Window;
-use crate::dataset::{Dataset, Role};
+use crate::dataset::Dataset;
 use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow};
 use crate::explain::evidence::RunData;
@@ -182,7 +182,9 @@ fn sections(run: &RunData, holds: impl Fn(&ResolvedSample, f64) -> bool) -> Vec<
 pub fn panels(dataset: &Dataset, explanation: &Explanation, windows: &[Window]) -> Vec<Panel> {
     let (runs, zones) = (&explanation.problem.runs, zones(explanation));
     let covariance = covariance(explanation);
-    let numbers: Vec<f64> = dataset.with_role(Role::Fit).map(|run| f64::from(run.number)).collect();
+    let number = |file: &str| dataset.runs.iter().find(|run| run.file == file).map(|it| it.number);
+    let numbers: Vec<f64> =
+        runs.iter().map(|run| f64::from(number(&run.file).unwrap_or(0))).collect();
     let panel = |covariate: Covariate, file: Option<String>| {
         let mut bins = bins(covariate, windows.iter(), runs, &covariance);
         if covariate == Covariate::Run {

@@ -10,8 +10,8 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
 use super::acceptance::{is_material, is_possible};
-use super::by_run::{Deviations, deviations_beside};
-use super::outcome::{Beside, Outcome, Round, Trial};
+use super::by_run::{Deviations, deviations, deviations_beside};
+use super::outcome::{Beside, Outcome, Trial, round_of};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
 use super::search::Search;
@@ -68,7 +68,7 @@ impl Search<'_> {
         let usual = usual_errors(fit.theta[0], |kind| fit.model.has(kind));
         let shared = usual.start.len();
         let errors = self.map_errors(fit).into_iter().chain([usual]).map(Candidate::parts);
-        let fit = self.problem.with_runs_apart(&self.problem.grown(fit, errors));
+        let fit = self.problem.with_runs_apart(self.problem.grown(fit, errors));
         let beside = Arc::new(Beside { fit, shared });
         outcome.beside = Some((outcome.fit.theta.clone(), beside.clone()));
         beside
@@ -116,7 +116,7 @@ impl Search<'_> {
         let Some(found) = best else { return false };
         let grown = self.problem.grown(&outcome.fit, [found.last_parts()]);
         outcome.fit = self.problem.with_own_noise(&grown);
-        outcome.certain.push((found.kind, Round::from(tried)));
+        outcome.certain.push((found.kind, round_of(tried)));
         true
     }
 
@@ -193,25 +193,14 @@ pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -
         let theta = joint.fit.theta[..count].to_vec();
         outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
     }
-    if std::env::var("DBG").is_ok() {
-        for (i, run) in search.problem.runs.iter().enumerate() {
-            let f = joint.fit.own_factors(i);
-            eprintln!(
-                "{} dir {} load {:+.4} res {:+.4} wind {:+.2}",
-                run.file, run.direction, f[0], f[1], f[2]
-            );
-        }
-        eprintln!(
-            "theta {:?} shared {} scatter {:?}",
-            joint.fit.theta, joint.shared, joint.fit.noise.scatter
-        );
-        for (n, (e, r)) in joint.fit.model.effects.iter().zip(joint.fit.model.ranges()).enumerate()
-        {
-            if !e.is_gradient() {
-                eprintln!("{n} {:?} {:?}", e, &joint.fit.theta[r])
-            }
-        }
-    }
+    deviations_given(outcome, step_s)
+}
+
+/// How surely the parameters of a model are known that was moved beside the usual errors last, from samples so many s
+/// apart.
+pub fn deviations_given(outcome: &Outcome, step_s: f64) -> Deviations {
+    let count = outcome.fit.theta.len();
+    let Some((_, joint)) = &outcome.beside else { return deviations(&outcome.fit) };
     let mut deviations = deviations_beside(&joint.fit, count, joint.shared);
     let model = &outcome.fit.model;
     for (effect, range) in model.effects.iter().zip(model.ranges()) {

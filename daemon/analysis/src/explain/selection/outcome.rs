@@ -53,6 +53,12 @@ impl Trial {
 /// The best trial of each kind, the strongest first.
 pub type Round = Arc<[Trial]>;
 
+/// A round to remember: how good the trials were, and no more by observation.
+pub(super) fn round_of(mut trials: Vec<Trial>) -> Round {
+    trials.iter_mut().for_each(|trial| trial.fit.forget_series());
+    trials.into()
+}
+
 /// A model with the usual errors beside it.
 #[derive(Clone)]
 pub struct Beside {
@@ -127,6 +133,16 @@ impl Outcome {
     /// The kinds of the model's effects.
     pub(super) fn kinds(&self) -> Vec<EffectKind> {
         self.fit.model.effects.iter().map(|effect| effect.kind()).collect()
+    }
+
+    /// The finished model with the usual errors beside it, where it was fitted so.
+    pub fn beside(&self) -> Option<Arc<Beside>> {
+        self.beside.as_ref().map(|(_, beside)| beside.clone())
+    }
+
+    /// Puts another fit with the usual errors in the place of that.
+    pub fn set_beside(&mut self, beside: Beside) {
+        self.beside = Some((self.likeliest.theta.clone(), beside.into()));
     }
 
     /// Whether nothing more is looked for.

@@ -1,7 +1,7 @@
 //! What was accepted on trial again, beside what came after it.
 
 use super::acceptance::{is_accepted, may_be};
-use super::outcome::{Outcome, Round};
+use super::outcome::{Outcome, Round, round_of};
 use super::search::Search;
 use crate::explain::evidence::{EQUAL, Fit};
 use crate::explain::score::reduction;
@@ -33,7 +33,7 @@ impl Search<'_> {
                 stands = best.kind;
                 others_stay = false;
             }
-            tried.push((stands, trials.into()));
+            tried.push((stands, round_of(trials)));
         }
         outcome.instead = tried;
     }

@@ -7,7 +7,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::outcome::{Outcome, Round, Trial};
+use super::outcome::{Outcome, Trial, round_of};
 use super::price::model_penalty;
 use crate::explain::effects::Effect;
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, RunData, UpdatedModel};
@@ -118,7 +118,7 @@ impl Search<'_> {
             let trials = self.round(&outcome.fit, &mut outcome.not_testable);
             let next = self.best(&trials, &fruitless).map(|trial| (trial.kind, trial.fit.clone()));
             let small = next.is_none().then(|| self.with_certain_and_small(&trials)).flatten();
-            let round = Round::from(trials);
+            let round = round_of(trials);
             outcome.rounds.push(round.clone());
             if let Some((kinds, fit)) = small {
                 outcome.small.extend(kinds);

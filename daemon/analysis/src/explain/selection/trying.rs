@@ -1,5 +1,7 @@
 //! What is tried in a round: every kind beside the model, fitted, and the best once more under their own noise.
 
+use std::sync::{Mutex, PoisonError};
+
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::outcome::Trial;
@@ -159,7 +161,13 @@ impl Search<'_> {
         let candidates = effect.propose(scan)?;
         let is_only = candidates.len() == 1 && candidates.iter().all(Candidate::is_fixed);
         let best = self.best_attempt(base, base.0, candidates);
-        Ok(best.map(|trial| Trial { is_only, ..trial }))
+        Ok(best.map(|mut trial| {
+            if trial.bic_gain <= FINALIST_MIN {
+                // It goes no further.
+                trial.fit.forget_series();
+            }
+            Trial { is_only, ..trial }
+        }))
     }
 
     /// The candidate that explains most for its price, fitted on top of a fit.
@@ -169,9 +177,21 @@ impl Search<'_> {
         onto: &Fit,
         candidates: Vec<Candidate>,
     ) -> Option<Trial> {
-        let attempt = |_, candidate| self.attempt(base, onto, candidate);
-        let attempts = parallel::of_each_owned(candidates, attempt);
-        attempts.into_iter().max_by(|one, other| one.bic_gain.total_cmp(&other.bic_gain))
+        // The best so far alone keeps its series.
+        let best: Mutex<Option<(usize, Trial)>> = Mutex::new(None);
+        parallel::of_each_owned(candidates, |number, candidate| {
+            let tried = (number, self.attempt(base, onto, candidate));
+            let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
+            let rank = |(number, trial): &(usize, Trial)| (trial.bic_gain, *number);
+            let is_better = best.as_ref().is_none_or(|best| {
+                let (own, best) = (rank(&tried), rank(best));
+                own.0.total_cmp(&best.0).then(own.1.cmp(&best.1)).is_gt()
+            });
+            if is_better {
+                *best = Some(tried);
+            }
+        });
+        best.into_inner().unwrap_or_else(PoisonError::into_inner).map(|it| it.1)
     }
 
     /// Fits a candidate on top of a fit; its evidence counts against `base`. What promises less than a gain is not
@@ -210,7 +230,9 @@ impl Search<'_> {
                 look(own).map_or((None, false), |(trial, many)| (Some(trial), many))
             };
             let noises = if attempt == 0 && many { own.stiffer() } else { Vec::new() };
-            let stiff = parallel::of_each(&noises, |noise| look(*noise));
+            let least = best.bic_gain + 1.0;
+            let may_win = |(trial, _): &(Trial, bool)| trial.bic_gain > least;
+            let stiff = parallel::of_each(&noises, |noise| look(*noise).filter(may_win));
             let mut is_better = false;
             for again in again.into_iter().chain(stiff.into_iter().flatten().map(|it| it.0)) {
                 if again.bic_gain > best.bic_gain + 1.0 {

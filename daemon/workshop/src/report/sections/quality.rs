@@ -28,13 +28,23 @@ pub fn section(subject: &Subject) -> Section {
         used.iter().filter_map(|(_, data)| Some(data.as_ref()?.samples().len())).sum();
     let rows: usize = used.iter().map(|(run, _)| run.quality.lines.rows).sum();
     let moving_s: f64 = used.iter().filter_map(|(_, data)| Some(data.as_ref()?.moving_s())).sum();
-    let mut body = format!(
-        "<p>{} of {} rows were used, {:.1} h of motion. Nothing is dropped silently: what was \
-         rejected, replaced or missing is counted here.</p>\n",
-        grouped(samples),
-        grouped(rows),
-        moving_s / 3600.0
-    );
+    let counted =
+        "Nothing is dropped silently: what was rejected, replaced or missing is counted here.";
+    let searched = used.iter().filter(|(_, data)| data.is_some()).count();
+    let mut body = if searched < used.len() {
+        format!(
+            "<p>The search looked at {searched} of {} runs, each second as one mean, {:.1} h of motion. {counted}</p>\n",
+            grouped(used.len()),
+            moving_s / 3600.0
+        )
+    } else {
+        format!(
+            "<p>{} of {} rows were used, {:.1} h of motion. {counted}</p>\n",
+            grouped(samples),
+            grouped(rows),
+            moving_s / 3600.0
+        )
+    };
     body += &runs_table(&used);
     body += &counts_table(&used);
     body += &sources(subject);

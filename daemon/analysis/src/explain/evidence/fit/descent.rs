@@ -4,12 +4,10 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::super::model::UpdatedModel;
 use super::super::noise::{Noise, RunScatter};
-use super::super::run_scatter::{RunFilters, SharedFilters};
-use super::super::run_scatter::{ScatterFilter, remove};
-use super::super::whitener::Whitener;
+use super::super::run_scatter::{RunFilters, SharedFilters, remove};
 use super::memory::RunMemory;
 use super::plan::Plan;
-use super::{Fit, FitProblem};
+use super::{Fit, FitProblem, RunNormal};
 use crate::explain::hypothesis::SharedHypothesis;
 use crate::parallel;
 
@@ -87,14 +85,21 @@ impl FitProblem {
 
     /// The model of a fit where loads and winds of ordinary days may set the runs apart, as far as they
     /// show it.
-    pub fn with_runs_apart(&self, fit: &Fit) -> Fit {
+    pub fn with_runs_apart(&self, fit: Fit) -> Fit {
         let most = RunScatter::MOST_BESIDE;
         let noise = Noise { scatter: most, scatter_most: most, ..fit.noise };
-        let mut fit = self.again(fit, noise);
+        let mut fit = self.renewed(fit, noise);
         for _ in 0..APART_TURNS {
-            fit = self.with_own_noise(&fit);
+            let noise = self.noise_left_by(&fit);
+            fit = self.renewed(fit, noise);
         }
         fit
+    }
+
+    /// Fits the model of a fit again, under another noise, with the room that the fit took.
+    fn renewed(&self, fit: Fit, noise: Noise) -> Fit {
+        let Fit { model, theta, memories, .. } = fit;
+        self.fit_remembering(&model, (theta, noise), memories.to_vec())
     }
 
     /// A model at given parameters, not fitted.
@@ -123,6 +128,51 @@ impl FitProblem {
         self.at(model, theta, noise)
     }
 
+    /// A fit where more runs say the same model's parameters too, each of them beside one of its own: a step to
+    /// the least cost of all, with what they say there to first order.
+    pub fn joined_by(&self, fit: &Fit, more: &[RunNormal]) -> Fit {
+        let mut all = fit.clone();
+        for (own, more) in all.runs.iter_mut().zip(more) {
+            own.add(more);
+        }
+        let Some((theta, _)) = self.bounded_step(&all, &all.score(), 0.0) else { return all };
+        let step = DVector::from_iterator(
+            theta.len(),
+            theta.iter().zip(&all.theta).map(|(to, from)| to - from),
+        );
+        for run in &mut all.runs {
+            run.score -= &run.information * &step;
+        }
+        (all.prior_information, all.prior_score, _) = self.prior(&all.model, &theta);
+        all.theta = theta;
+        all
+    }
+
+    /// A fit where more runs say its parameters too: a, b and c where all fit best, and the effects moved by what is
+    /// given.
+    pub fn with_davis_joined(&self, fit: &Fit, more: &[RunNormal], moved: &[f64]) -> Fit {
+        let mut all = fit.clone();
+        for (own, more) in all.runs.iter_mut().zip(more) {
+            own.add(more);
+        }
+        let (information, score) = (all.information(), all.score());
+        let moved = DVector::from_column_slice(moved);
+        let pull = score.rows(0, 3) - information.view((0, 3), (3, moved.len())) * &moved;
+        let own = information.view((0, 0), (3, 3)).into_owned();
+        let Some(factor) = Cholesky::new(own) else { return fit.clone() };
+        let step = factor.solve(&pull);
+        let mut theta = fit.theta.clone();
+        for (i, value) in theta.iter_mut().enumerate() {
+            if i < 3 {
+                let (lower, upper) = self.declared_bounds(i);
+                *value = (*value + step[i]).clamp(lower, upper);
+            } else {
+                *value += moved[i - 3];
+            }
+        }
+        self.at(&fit.model, theta, fit.noise)
+    }
+
     fn fit_remembering(
         &self,
         model: &UpdatedModel,
@@ -146,11 +196,11 @@ impl FitProblem {
         let steps = if promises(&fit, promised) { STEPS_MAX } else { 0 };
         for _ in 0..steps {
             let score = fit.score();
-            let next = self.descend(plan, &fit, &score, (filters, &mut memories));
-            let Some(next) = next else { break };
-            let gained = fit.cost - next.cost;
-            fit = next;
-            if gained < DECREASE_MIN {
+            let before = fit.cost;
+            if !self.descend(plan, &mut fit, &score, (filters, &mut memories)) {
+                break;
+            }
+            if before - fit.cost < DECREASE_MIN {
                 break;
             }
         }
@@ -184,35 +234,36 @@ impl FitProblem {
 
     fn filters(&self, noise: Noise) -> SharedFilters {
         let filters = parallel::of_each_number(self.runs.len(), |index| {
-            let whitener = Whitener::new(&self.runs[index], noise);
-            let scatter =
-                ScatterFilter::new(&self.scatter_columns[index], &whitener, noise.scatter);
-            RunFilters { whitener, scatter }
+            RunFilters::new(&self.runs[index], &self.scatter_columns[index], noise)
         });
         filters.into()
     }
 
-    /// A step of Levenberg and Marquardt within the bounds, damped until the cost falls; `None`
+    /// A step of Levenberg and Marquardt within the bounds, damped until the cost falls; false
     /// when no step promises or brings a decrease.
     fn descend(
         &self,
         plan: &Plan,
-        fit: &Fit,
+        fit: &mut Fit,
         score: &DVector<f64>,
         (filters, memories): (&SharedFilters, &mut [RunMemory]),
-    ) -> Option<Fit> {
+    ) -> bool {
         for damping in [0.0, 0.01, 0.3, 10.0, 300.0] {
-            let (theta, promised) = self.bounded_step(fit, score, damping)?;
+            let Some((theta, promised)) = self.bounded_step(fit, score, damping) else {
+                return false;
+            };
             if promised < DECREASE_MIN {
-                return None;
+                return false;
             }
             let left = self.left(plan, &theta, filters, memories);
             if self.cost(&fit.model, &theta, &left) < fit.cost {
-                let at = (theta, fit.noise);
-                return Some(self.linearised(plan, &fit.model, at, left, (filters, memories)));
+                let (model, at) = (fit.model.clone(), (theta, fit.noise));
+                fit.forget_series();
+                *fit = self.linearised(plan, &model, at, left, (filters, memories));
+                return true;
             }
         }
-        None
+        false
     }
 
     /// The damped step within the bounds, and the decrease of the cost that it promises, which is never negative:

@@ -8,12 +8,13 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::super::model::UpdatedModel;
 use super::super::noise::Noise;
-use super::super::run_scatter::WeightedFilter;
-use super::super::run_scatter::{RunFilters, SharedFilters, Whitened};
+use super::super::run_data::RunData;
+use super::super::run_scatter::scatter_columns;
+use super::super::run_scatter::{RunFilters, SharedFilters, WeightedFilter, Whitened};
 use super::super::whitener::Whitener;
 use super::memory::RunMemory;
 use super::plan::{At, Plan};
-use super::{Column, Fit, FitProblem, RunNormal};
+use super::{Column, Fit, FitProblem, RunNormal, declared_response};
 use crate::parallel;
 
 /// What a model leaves of one run at given parameters.
@@ -154,6 +155,15 @@ impl FitProblem {
         }
         let step = Cholesky::new(information)?.solve(&score);
         Some(cost - score.dot(&step)).filter(|reached| reached.is_finite())
+    }
+
+    /// Normal equations of a run that is none of the problem's, under the model, the parameters and the noise of a fit.
+    pub fn normal_of(&self, run: &RunData, fit: &Fit) -> RunNormal {
+        let (plan, declared) = (Plan::of(&fit.model), declared_response(run));
+        let filters = RunFilters::new(run, &scatter_columns(run, self.declared), fit.noise);
+        let at = At { plan: &plan, run, declared: &declared, theta: &fit.theta };
+        let mut memory = RunMemory::default();
+        Left::of(at, &filters, &mut memory).normal(&fit.model, at, &filters, &mut memory).0
     }
 
     /// Normal equations of one run, by number.

@@ -65,6 +65,24 @@ pub struct RunNormal {
     pub cost: f64,
 }
 
+impl RunNormal {
+    /// Of no run, for so many parameters.
+    pub fn none(count: usize) -> Self {
+        RunNormal {
+            information: DMatrix::zeros(count, count),
+            score: DVector::zeros(count),
+            cost: 0.0,
+        }
+    }
+
+    /// Adds those of another run at the same parameters.
+    pub fn add(&mut self, other: &RunNormal) {
+        self.information += &other.information;
+        self.score += &other.score;
+        self.cost += other.cost;
+    }
+}
+
 /// A fitted model.
 #[derive(Clone)]
 pub struct Fit {
@@ -107,6 +125,16 @@ impl Fit {
     /// Errors in m/s of what it predicts, found once.
     pub fn open_loop_mps(&self, find: impl FnOnce() -> [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         *self.open_loop_mps.get_or_init(find)
+    }
+
+    /// Forgets what it holds by observation: what is left says how good the model is, and starts other fits, but is
+    /// no place to look around.
+    pub fn forget_series(&mut self) {
+        self.innovations = Vec::new();
+        self.columns = Vec::new();
+        self.residuals = Vec::new();
+        self.filters = Vec::new();
+        self.memories = Arc::default();
     }
 
     /// Information matrix of all runs and the prior, with what is held at its bounds.

@@ -1,0 +1,148 @@
+//! A run thinned to samples about a second apart, each the mean of those that it stands for.
+//!
+//! Speeds and forces are averaged alike, so that the mean speed is still the integral of the mean acceleration; what
+//! is not linear in the speed changes by the variance of the speed within a second. Where what is known of the
+//! samples changes (a gap, rest, a sliding wheel, a missing value), a mean ends.
+
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::simulate::{Recording, STANDING_MPS};
+use dynocar_model::terms::Resistance;
+
+use super::bins::{MOVING_MPS, SEGMENT_GAP_MAX_S};
+
+/// Time in s that a mean stands for.
+const MEAN_S: f64 = 1.0;
+
+/// The samples of a recording, thinned.
+pub(super) fn thinned(recording: &Recording) -> Vec<ResolvedSample> {
+    let (samples, time_s) = (recording.samples(), recording.time_s());
+    let mut means: Vec<ResolvedSample> = Vec::new();
+    let mut first = 0;
+    for i in 1..=samples.len() {
+        // The small margin keeps rounded times from splitting a mean.
+        let is_end = i == samples.len()
+            || time_s[i] - time_s[first] >= MEAN_S * (1.0 - 1e-6)
+            || time_s[i] - time_s[i - 1] > SEGMENT_GAP_MAX_S
+            || recording.starts(i)
+            || recording.is_simulated(i) != recording.is_simulated(i - 1)
+            || traits(&samples[i]) != traits(&samples[i - 1]);
+        if is_end {
+            means.push(mean(&samples[first..i], means.last()));
+            first = i;
+        }
+    }
+    means.shrink_to_fit();
+    means
+}
+
+/// What the samples of a mean have in common.
+fn traits(sample: &ResolvedSample) -> (u32, bool, [bool; 5], [bool; 8]) {
+    let speeds = [0.0, STANDING_MPS, MOVING_MPS].map(|least| sample.speed_mps > least);
+    let known = [
+        sample.position_m,
+        sample.traction_force_n,
+        sample.brake_force_n,
+        sample.gradient_permille,
+        sample.curvature_per_m,
+        sample.tunnel_share,
+        sample.brake_cylinder_pressure_pa,
+        sample.ambient_temperature_degc,
+    ];
+    let [moves, is_off, runs] = speeds;
+    let states = [moves, is_off, runs, sample.is_mass_measured, sample.is_sliding];
+    (sample.segment, sample.direction > 0.0, states, known.map(|it| it.is_some()))
+}
+
+/// The mean of samples that follow each other, behind another.
+fn mean(samples: &[ResolvedSample], before: Option<&ResolvedSample>) -> ResolvedSample {
+    let (first, count) = (&samples[0], samples.len() as f64);
+    let of = |value: fn(&ResolvedSample) -> f64| samples.iter().map(value).sum::<f64>() / count;
+    let known = |value: fn(&ResolvedSample) -> Option<f64>| {
+        let sum: Option<f64> = samples.iter().map(value).sum();
+        sum.map(|sum| sum / count)
+    };
+    let since_ns: i64 = samples.iter().map(|sample| sample.time_ns - first.time_ns).sum();
+    let time_ns = first.time_ns + since_ns / samples.len() as i64;
+    let before = before.filter(|before| before.segment == first.segment);
+    let mut parts = [0.0; Resistance::PARTS];
+    for sample in samples {
+        for (sum, part) in parts.iter_mut().zip(sample.resistance.parts()) {
+            *sum += part / count;
+        }
+    }
+    ResolvedSample {
+        time_ns,
+        step_s: before.map_or(0.0, |before| (time_ns - before.time_ns) as f64 * 1e-9),
+        position_m: known(|it| it.position_m),
+        speed_mps: of(|it| it.speed_mps),
+        mass_kg: of(|it| it.mass_kg),
+        inertial_mass_kg: of(|it| it.inertial_mass_kg),
+        weight_kn: of(|it| it.weight_kn),
+        traction_force_n: known(|it| it.traction_force_n),
+        brake_force_n: known(|it| it.brake_force_n),
+        gradient_permille: known(|it| it.gradient_permille),
+        gradient_std_permille: of(|it| it.gradient_std_permille),
+        curvature_per_m: known(|it| it.curvature_per_m),
+        resistance: Resistance::of_parts(parts),
+        extra_n_per_kn: of(|it| it.extra_n_per_kn),
+        tunnel_share: known(|it| it.tunnel_share),
+        brake_cylinder_pressure_pa: known(|it| it.brake_cylinder_pressure_pa),
+        ambient_temperature_degc: known(|it| it.ambient_temperature_degc),
+        since_cold_s: of(|it| it.since_cold_s),
+        ..*first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::coasting;
+    use super::*;
+
+    fn at(second: f64, speed_mps: f64, traction_n: f64) -> ResolvedSample {
+        ResolvedSample {
+            time_ns: (second * 1e9).round() as i64,
+            speed_mps,
+            traction_force_n: Some(traction_n),
+            ..coasting()
+        }
+    }
+
+    fn thin(samples: Vec<ResolvedSample>) -> Vec<ResolvedSample> {
+        thinned(&Recording::new(samples).unwrap())
+    }
+
+    #[test]
+    fn a_mean_stands_for_a_second_and_keeps_speeds_forces_and_their_integral() {
+        let samples: Vec<_> =
+            (0..50).map(|k| at(0.2 * f64::from(k), 10.0 + 0.1 * f64::from(k), 1e3)).collect();
+        let means = thin(samples.clone());
+        assert_eq!(means.len(), 10);
+        let mean_of = |samples: &[ResolvedSample]| {
+            samples.iter().map(|it| it.speed_mps).sum::<f64>() / samples.len() as f64
+        };
+        assert!((mean_of(&means) - mean_of(&samples)).abs() < 1e-12);
+        assert_eq!(means[3].time_ns, 3_400_000_000);
+        assert_eq!(means[3].traction_force_n, Some(1e3));
+    }
+
+    #[test]
+    fn a_stop_a_gap_and_a_missing_force_end_a_mean() {
+        let mut samples: Vec<_> = (0..20).map(|k| at(0.2 * f64::from(k), 10.0, 0.0)).collect();
+        samples[7].speed_mps = 0.0;
+        samples[12].traction_force_n = None;
+        samples.truncate(18);
+        samples.push(at(30.0, 10.0, 0.0));
+        let means = thin(samples);
+        let at_rest: Vec<_> = means.iter().filter(|it| it.speed_mps == 0.0).collect();
+        assert_eq!((at_rest.len(), at_rest[0].time_ns), (1, 1_400_000_000));
+        assert_eq!(means.last().map(|it| it.time_ns), Some(30_000_000_000));
+    }
+
+    #[test]
+    fn samples_a_second_apart_stay_as_they_are() {
+        let samples: Vec<_> = (0..9).map(|k| at(f64::from(k), 10.0, 0.0)).collect();
+        let means = thin(samples.clone());
+        assert_eq!(means.len(), samples.len());
+        assert!(means.iter().zip(&samples).all(|(one, other)| one.time_ns == other.time_ns));
+    }
+}

@@ -1,0 +1,284 @@
+//! Many runs: the search looks at some of them, evenly chosen and thinned to a second; then all of them say how large
+//! it is what was found, and how well it predicts.
+//!
+//! Whatever the number of runs, so many are held in memory. All others are read one after the other and reduced to
+//! their normal equations at the finished model, which add up, or to their errors. What acts in some runs only is known
+//! of those that the search looked at: then these alone say how large it is.
+
+use std::sync::Arc;
+
+use dynocar_model::track::Track;
+use dynocar_model::train::{Drive, TrainModel};
+
+use super::evidence::{Density, Fit, FitProblem, RunData, RunDataError, RunNormal, prepare_at};
+use super::score::RunScore;
+use super::selection::{Beside, Outcome, Search};
+use crate::dataset::{Dataset, Role, Run};
+use crate::parallel;
+
+/// So many fit runs are all looked at, as they were recorded.
+pub const FIT_RUNS_MAX: usize = 32;
+/// Of more, a quarter is looked at, but so many at least and at most.
+const FIT_RUNS_HELD: [usize; 2] = [12, 32];
+/// So many holdout runs are held for what may act in them.
+const HOLDOUT_RUNS_HELD: usize = 6;
+/// The golden ratio less 1: its multiples, less their whole parts, lie evenly, and in step with no order of the runs.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// How many of so many fit runs are held.
+fn fit_runs_held(fit: usize) -> usize {
+    let [least, most] = FIT_RUNS_HELD;
+    (fit / 4).clamp(least, most)
+}
+
+/// Which of many runs are held in memory.
+///
+/// Fit runs that follow each other make a group, of which one run is held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Held {
+    /// By run, what it is one of.
+    groups: Vec<Group>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Group {
+    role: Role,
+    /// Its number among those of the role.
+    number: usize,
+    is_held: bool,
+}
+
+impl Held {
+    /// Of runs with these roles in their order; `None` where all are held.
+    pub fn of(roles: impl Iterator<Item = Role> + Clone) -> Option<Self> {
+        let count = |role| roles.clone().filter(|own| *own == role).count();
+        let (fit, holdout) = (count(Role::Fit), count(Role::Holdout));
+        if fit <= FIT_RUNS_MAX {
+            return None;
+        }
+        let mut seen = [0, 0];
+        let groups = roles.map(|role| {
+            let (seen, runs, most) = match role {
+                Role::Fit => (&mut seen[0], fit, fit_runs_held(fit)),
+                Role::Holdout => (&mut seen[1], holdout, HOLDOUT_RUNS_HELD),
+            };
+            let count = most.min(runs);
+            let number = *seen * count / runs;
+            let first = |number: usize| (number * runs).div_ceil(count);
+            let (from, end) = (first(number), first(number + 1));
+            let share = (GOLDEN * number as f64).fract();
+            let within = (share * (end - from) as f64) as usize;
+            // What acts in the newest run may be about to last.
+            let is_last = number + 1 == count;
+            let is_held = *seen == if is_last { end - 1 } else { from + within };
+            *seen += 1;
+            Group { role, number, is_held }
+        });
+        Some(Held { groups: groups.collect() })
+    }
+
+    /// Whether a run is held, by its place from 0.
+    pub fn holds(&self, index: usize) -> bool {
+        self.groups[index].is_held
+    }
+
+    /// The places of the runs of a role that are not held, by group.
+    fn others(&self, role: Role) -> Vec<Vec<usize>> {
+        let own = || self.groups.iter().enumerate().filter(|(_, group)| group.role == role);
+        let count = own().map(|(_, group)| group.number + 1).max().unwrap_or(0);
+        let mut others = vec![Vec::new(); count];
+        for (index, group) in own().filter(|(_, group)| !group.is_held) {
+            others[group.number].push(index);
+        }
+        others
+    }
+}
+
+/// How a run is made ready for the finished model.
+#[derive(Clone, Debug)]
+pub struct Preparation {
+    /// Train and line, without runs.
+    declared: Dataset,
+    drive: Option<Drive>,
+    late_s: Option<f64>,
+    train: Arc<TrainModel>,
+}
+
+impl Preparation {
+    /// With forces from the power of another drive, and moved in time, where that was found.
+    pub fn new(declared: &Dataset, drive: Option<Drive>, late_s: Option<f64>) -> Self {
+        let declared = declared.without_runs();
+        let train = drive.map_or(declared.train.clone(), |it| declared.with_drive(it).train);
+        Preparation { declared, drive, late_s, train }
+    }
+
+    /// The train, with the drive that was found.
+    pub fn train(&self) -> &TrainModel {
+        &self.train
+    }
+
+    /// The line.
+    pub fn track(&self) -> Option<&Arc<Track>> {
+        self.declared.track.as_ref()
+    }
+
+    /// A run made ready.
+    ///
+    /// # Errors
+    ///
+    /// When it has no usable sample.
+    pub fn run(&self, run: Run, density: Density) -> Result<RunData, RunDataError> {
+        let mut one = Dataset { runs: vec![run], ..self.declared.clone() };
+        if let Some(drive) = self.drive {
+            one = one.with_drive(drive);
+        }
+        if let Some(late_s) = self.late_s {
+            one = one.with_forces_moved(late_s);
+        }
+        Ok(prepare_at(&one, density)?.remove(0))
+    }
+}
+
+/// Runs of which not all are in memory.
+pub struct Many<'a, E> {
+    /// All of them, with what is known of each; none needs to have its samples.
+    pub dataset: &'a Dataset,
+    /// Which of them are held.
+    pub held: &'a Held,
+    /// Reads one by its place.
+    pub read: &'a (dyn Fn(usize) -> Result<Run, E> + Sync),
+}
+
+/// Whether a model's effects act in each run alike.
+fn is_common(fit: &Fit) -> bool {
+    fit.model.effects.iter().all(|effect| {
+        let place = effect.place();
+        let nature = effect.nature();
+        place.windows.is_none() && place.runs.is_none() && !nature.is_one_number_a_run
+    })
+}
+
+impl<E: From<RunDataError> + Send> Many<'_, E> {
+    /// Moves a model that was found in the held runs to where all fit it best: beside the usual errors, and the one
+    /// that predicts.
+    pub(super) fn join(
+        &self,
+        search: &Search,
+        preparation: &Preparation,
+        outcome: &mut Outcome,
+    ) -> Result<(), E> {
+        let problem = search.problem;
+        let Some(joint) = outcome.beside().filter(|_| is_common(&outcome.fit)) else {
+            return Ok(());
+        };
+        (search.progress)(0.95, "reading all runs");
+        let more = self.normals(problem, preparation, [&joint.fit, &outcome.fit, &outcome.base])?;
+        let [beside, own, base] = more;
+        let fit = problem.joined_by(&joint.fit, &beside);
+        let effects = 3..outcome.fit.theta.len();
+        let moved: Vec<f64> = effects.map(|i| fit.theta[i] - joint.fit.theta[i]).collect();
+        outcome.set_beside(Beside { fit, shared: joint.shared });
+        outcome.fit = problem.with_davis_joined(&outcome.fit, &own, &moved);
+        outcome.base = problem.with_davis_joined(&outcome.base, &base, &[]);
+        Ok(())
+    }
+
+    /// What the fit runs that are not held say of some models, by group.
+    fn normals<const N: usize>(
+        &self,
+        problem: &FitProblem,
+        preparation: &Preparation,
+        fits: [&Fit; N],
+    ) -> Result<[Vec<RunNormal>; N], E> {
+        let mut sums = fits.map(|_| Vec::new());
+        for group in self.held.others(Role::Fit) {
+            let each = parallel::of_each(&group, |index| -> Result<_, E> {
+                let run = preparation.run((self.read)(*index)?, Density::Thinned)?;
+                Ok(fits.map(|fit| problem.normal_of(&run, fit)))
+            });
+            let mut sum = fits.map(|fit| RunNormal::none(fit.theta.len()));
+            for own in each {
+                sum.iter_mut().zip(&own?).for_each(|(sum, own)| sum.add(own));
+            }
+            sums.iter_mut().zip(sum).for_each(|(sums, sum)| sums.push(sum));
+        }
+        Ok(sums)
+    }
+
+    /// The errors of the holdout runs; of the held ones alone where something acts in some runs only.
+    pub(super) fn scores(
+        &self,
+        holdout: &[RunData],
+        preparation: &Preparation,
+        outcome: &Outcome,
+    ) -> Result<Vec<RunScore>, E> {
+        let score = |run: &RunData| RunScore::of(run, &outcome.base, &outcome.fit);
+        if !is_common(&outcome.fit) {
+            return Ok(parallel::of_each(holdout, score));
+        }
+        let roles = self.dataset.runs.iter().map(|run| run.role).enumerate();
+        let own: Vec<usize> = roles.filter(|it| it.1 == Role::Holdout).map(|it| it.0).collect();
+        let scores = parallel::of_each(&own, |index| -> Result<_, E> {
+            let run = preparation.run((self.read)(*index)?, Density::Recorded)?;
+            Ok(score(&run))
+        });
+        scores.into_iter().collect()
+    }
+
+    /// How many runs say what, as a sentence to follow another.
+    pub(super) fn sentence(&self, outcome: &Outcome) -> String {
+        let fit = self.dataset.with_role(Role::Fit).count();
+        let sizes = match is_common(&outcome.fit) {
+            true => "all of them say how large it is",
+            false => "it acts in some runs only, and these alone say how large it is",
+        };
+        format!(
+            " Effects were looked for in {} of {fit} fit runs, evenly chosen; {sizes}.",
+            fit_runs_held(fit)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn held(fit: usize, holdout: usize) -> Option<Held> {
+        let roles = (0..fit + holdout).map(|index| {
+            let is_held_out =
+                index * holdout / (fit + holdout) != (index + 1) * holdout / (fit + holdout);
+            if is_held_out { Role::Holdout } else { Role::Fit }
+        });
+        Held::of(roles)
+    }
+
+    #[test]
+    fn few_runs_are_all_held_and_of_many_as_many_whatever_their_number() {
+        assert_eq!(held(FIT_RUNS_MAX, 8), None);
+        assert_eq!(held(0, 300), None);
+        for (fit, holdout) in [(33, 3), (48, 16), (192, 64), (1000, 0), (767, 257)] {
+            let held = held(fit, holdout).unwrap();
+            let count = |role| {
+                let own = held.groups.iter().filter(|it| it.role == role);
+                own.filter(|it| it.is_held).count()
+            };
+            assert_eq!(count(Role::Fit), fit_runs_held(fit), "{fit} + {holdout}");
+            assert_eq!(count(Role::Holdout), holdout.min(HOLDOUT_RUNS_HELD), "{fit} + {holdout}");
+            let others: usize = held.others(Role::Fit).iter().map(Vec::len).sum();
+            assert_eq!(others + fit_runs_held(fit), fit);
+            let newest = held.groups.iter().rfind(|it| it.role == Role::Fit);
+            assert!(newest.is_some_and(|it| it.is_held));
+            assert!(fit_runs_held(fit) <= FIT_RUNS_HELD[1]);
+        }
+    }
+
+    #[test]
+    fn runs_in_both_directions_by_turns_are_held_of_both() {
+        for fit in [48, 96, 192, 768] {
+            let held = held(fit, 0).unwrap();
+            let forth = (0..fit).filter(|index| held.holds(*index) && index % 2 == 0).count();
+            let share = forth as f64 / fit_runs_held(fit) as f64;
+            assert!((0.3..0.7).contains(&share), "{share} of {fit}");
+        }
+    }
+}

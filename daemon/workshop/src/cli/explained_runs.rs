@@ -1,0 +1,149 @@
+//! The runs of a dataset that is explained: in memory where they are few, else those that the search looks at.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use dynocar_analysis::dataset::{
+    Dataset, DatasetError, DatasetFiles, DatasetHead, Manifest, Run, SourcePosition,
+};
+use dynocar_analysis::explain::evidence::{Density, RunData, RunDataError};
+use dynocar_analysis::explain::many::{Held, Many};
+use dynocar_analysis::explain::selection::Progress;
+use dynocar_analysis::explain::{Explanation, explain, explain_many};
+use dynocar_analysis::parallel;
+
+use dynocar::cli::Failure;
+use dynocar::dataset::{DatasetFolder, LoadError, open};
+
+/// The runs of a dataset.
+pub struct ExplainedRuns {
+    /// All of them; of many, what is known of each but its samples.
+    pub dataset: Dataset,
+    path: PathBuf,
+    traction_only: bool,
+    many: Option<ManyRuns>,
+}
+
+/// Runs of which some are in memory.
+struct ManyRuns {
+    folder: DatasetFolder,
+    head: DatasetHead,
+    held: Held,
+    /// Those that are, until they are explained.
+    chosen: Dataset,
+}
+
+/// Why the runs are not explained.
+enum Problem {
+    Unread(DatasetError),
+    Unusable(RunDataError),
+}
+
+impl From<RunDataError> for Problem {
+    fn from(error: RunDataError) -> Self {
+        Problem::Unusable(error)
+    }
+}
+
+impl ExplainedRuns {
+    /// Those of the dataset at a path.
+    ///
+    /// # Errors
+    ///
+    /// The first mistake, with file, line and choices.
+    pub fn at(path: &Path, traction_only: bool) -> Result<Self, Failure> {
+        let (folder, head) = open(path)?;
+        let held = Held::of(head.manifest.runs.iter().map(|run| run.role));
+        let read = |index| {
+            let mut run = read(&folder, &head, traction_only, index)?;
+            let is_held = held.as_ref().is_none_or(|held| held.holds(index));
+            let whole = run.split_off_samples();
+            Ok((run, is_held.then_some(whole)))
+        };
+        let runs = parallel::of_each_number(head.manifest.runs.len(), read).into_iter();
+        let runs: Result<Vec<(Run, Option<Run>)>, DatasetError> = runs.collect();
+        let (known, chosen): (Vec<Run>, Vec<Option<Run>>) =
+            runs.map_err(LoadError::from)?.into_iter().unzip();
+        let Manifest { name, description, .. } = &head.manifest;
+        let dataset = |runs| Dataset {
+            name: name.clone(),
+            description: description.clone(),
+            train: head.train.clone(),
+            track: head.track.clone(),
+            runs,
+        };
+        let chosen = dataset(chosen.into_iter().flatten().collect());
+        let path = path.to_path_buf();
+        let Some(held) = held else {
+            return Ok(ExplainedRuns { dataset: chosen, path, traction_only, many: None });
+        };
+        let dataset = dataset(known);
+        let many = Some(ManyRuns { folder, head, held, chosen });
+        Ok(ExplainedRuns { dataset, path, traction_only, many })
+    }
+
+    /// Explains them.
+    ///
+    /// # Errors
+    ///
+    /// When a run has no usable sample, or cannot be read any more.
+    pub fn explain(&mut self, progress: Progress) -> Result<Explanation, Failure> {
+        let Some(many) = &mut self.many else {
+            return explain(&self.dataset, progress).map_err(|error| self.unusable(error));
+        };
+        let declared = many.chosen.without_runs();
+        let chosen = std::mem::replace(&mut many.chosen, declared);
+        let ManyRuns { folder, head, held, .. } = &*many;
+        let read = |index| read(folder, head, self.traction_only, index).map_err(Problem::Unread);
+        let many = Many { dataset: &self.dataset, held, read: &read };
+        explain_many(chosen, many, progress).map_err(|problem| match problem {
+            Problem::Unread(error) => LoadError::from(error).into(),
+            Problem::Unusable(error) => self.unusable(error),
+        })
+    }
+
+    /// A run made ready for the models of an explanation, by its place.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read any more.
+    pub fn prepared<'e>(
+        &self,
+        index: usize,
+        explanation: &'e Explanation,
+    ) -> Result<Cow<'e, RunData>, Failure> {
+        let Some(ManyRuns { folder, head, .. }) = &self.many else {
+            let file = &self.dataset.runs[index].file;
+            let mut all = explanation.problem.runs.iter().chain(&explanation.holdout);
+            let known = all.find(|run| run.file == *file);
+            return known.map(Cow::Borrowed).ok_or_else(|| Failure::work(file));
+        };
+        let run = read(folder, head, self.traction_only, index).map_err(LoadError::from)?;
+        let run = explanation.preparation.run(run, Density::Recorded);
+        run.map(Cow::Owned).map_err(|error| self.unusable(error))
+    }
+
+    /// The failure of a run that cannot be used, with what may be the matter.
+    fn unusable(&self, error: RunDataError) -> Failure {
+        let RunDataError::Simulate { file, source } = error;
+        let label =
+            DatasetFolder::at(&self.path).map_or(file.clone(), |folder| folder.label(&file));
+        let diagnostics: String =
+            self.dataset.diagnostics().iter().map(|diagnostic| format!("; {diagnostic}")).collect();
+        Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{diagnostics}"))
+    }
+}
+
+/// Reads one run.
+fn read(
+    folder: &DatasetFolder,
+    head: &DatasetHead,
+    traction_only: bool,
+    index: usize,
+) -> Result<Run, DatasetError> {
+    let mut run = head.read_run(folder, index)?;
+    if traction_only {
+        run.keep_traction_only();
+    }
+    Ok(run)
+}
