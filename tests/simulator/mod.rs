@@ -12,6 +12,7 @@ mod parts;
 mod physics;
 mod places;
 mod plausibility;
+mod recorded_days;
 mod residual_monitor;
 mod rough;
 mod stops;

@@ -1,6 +1,6 @@
 //! The law of simulated stops against the true one, and the next stop against its bound.
 
-use dynocar_analysis::stops::{Curve, Law};
+use dynocar_analysis::stops::{Curve, Gradient, Law};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -55,7 +55,7 @@ fn the_law_of_one_stop_holds_the_true_one_and_the_next_stop_keeps_its_bound() {
             inside += i32::from(off <= 1.96 * point.std_mps2);
         }
         let (_, distance_m) = stop(factors[1], 30.0, &mut random);
-        let next = law.stopping_distance(30.0).unwrap();
+        let next = law.stopping_distance(30.0, &Gradient::default()).unwrap();
         kept += i32::from(distance_m <= next.distance_bound_m);
     }
     let rms = (error / f64::from(looks)).sqrt();
@@ -78,10 +78,10 @@ fn many_stops_show_their_own_repeatability_and_slower_ones_say_nothing_of_faster
         .collect();
     let law = Law::of(&curves, 0.03).unwrap();
     assert!((0.05..0.11).contains(&law.repeatability), "{}", law.repeatability);
-    assert!((law.response_s - 1.0).abs() < 0.3, "{}", law.response_s);
+    assert!((law.response.lost_s() - 1.0).abs() < 0.3, "{:?}", law.response);
     assert_eq!((law.points[4].stops, law.points[19].stops), (30, 15));
-    assert!(law.stopping_distance(40.0).is_none());
+    assert!(law.stopping_distance(40.0, &Gradient::default()).is_none());
     let (_, distance_m) = stop(1.0, 28.0, &mut random);
-    let next = law.stopping_distance(28.0).unwrap();
+    let next = law.stopping_distance(28.0, &Gradient::default()).unwrap();
     assert!((next.distance_m / distance_m - 1.0).abs() < 0.05, "{next:?} and {distance_m}");
 }

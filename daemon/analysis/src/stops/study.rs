@@ -1,12 +1,14 @@
 //! All of it over a dataset: the law from the stops of fit runs, tried on those held out.
 
-use dynocar_shared::TrainSample;
+use dynocar_model::terms::wheel::STANDING_MPS;
 use serde::Serialize;
 
 use super::curve::{Curve, Point};
-use super::find::{FindSettings, FoundBy, find};
-use super::friction::{FrictionPoint, friction};
-use super::law::{Law, StoppingDistance};
+use super::day::Day;
+use super::find::{FindSettings, FoundBy, began_ns, find, usable};
+use super::friction::friction;
+use super::law::{Gradient, Law, StoppingDistance};
+use super::recorded::{Manner, RecordedStop};
 use crate::dataset::{Dataset, GradientSource, Role, Run};
 
 /// How stops are found, and what is assumed of them.
@@ -18,45 +20,6 @@ pub struct StudySettings {
     pub repeatability: f64,
 }
 
-/// How a train was brought to a stand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Manner {
-    /// By all of the brake from its command on.
-    Full,
-    /// As the driver wanted: the deceleration is his, and no law of the brake.
-    Modulated,
-}
-
-/// A recorded stop.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RecordedStop {
-    /// The run's file.
-    pub file: String,
-    /// What the run is for.
-    pub role: Role,
-    /// Time in s at which the brake was applied, as in the file.
-    pub from_s: f64,
-    /// Speed in m/s then.
-    pub from_mps: f64,
-    /// Distance in m from then to standstill.
-    pub distance_m: f64,
-    /// Time in s from then to standstill.
-    pub time_s: f64,
-    /// What showed that the brake was applied.
-    pub found_by: FoundBy,
-    /// Whether the brake was applied in full.
-    pub manner: Manner,
-    /// Why it shows no law of the brake; `None` for a stop that does.
-    pub no_law: Option<String>,
-    /// Deceleration over speed, from fast to slow, of a stop that shows no law.
-    pub decelerations: Vec<Point>,
-    /// For a stop held out: what the law said of it.
-    pub predicted: Option<StoppingDistance>,
-    /// The friction behind it.
-    pub friction: Vec<FrictionPoint>,
-}
-
 /// What the stops of a dataset say.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
@@ -66,6 +29,8 @@ pub struct Study {
     pub law: Option<Law>,
     /// How long the next stop is, from slow to fast.
     pub distances: Vec<StoppingDistance>,
+    /// All stops together: from which speeds how long, how hard, and how long the train stood.
+    pub day: Day,
     /// What these stops do not determine.
     pub cannot_tell: Vec<String>,
 }
@@ -88,45 +53,55 @@ impl Study {
             }
             _ => from_mps.to_vec(),
         };
-        let predict = |speed_mps: f64| law.as_ref()?.stopping_distance(speed_mps);
+        let predict =
+            |speed_mps: f64| law.as_ref()?.stopping_distance(speed_mps, &Gradient::default());
         let distances = speeds.into_iter().filter_map(predict).collect();
         for stop in stops.iter_mut().filter(|stop| is(stop, Role::Holdout)) {
             stop.predicted = predict(stop.from_mps);
         }
         let cannot_tell = cannot_tell(dataset, &stops, law.as_ref());
-        Study { stops, distances, cannot_tell, law }
+        let day = Day::of(&stops);
+        Study { stops, distances, day, cannot_tell, law }
     }
 }
 
 /// The stops of a run, each with its curve.
 fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(RecordedStop, Curve)> {
-    let samples = usable(&run.samples);
-    let stops = find(&samples, dataset.train.brake.as_ref(), &settings.find);
+    let mut all = usable(&run.samples);
+    let stops = find(&all, dataset.train.brake.as_ref(), &settings.find);
+    for stop in stops.iter().filter(|it| it.found_by == FoundBy::Speed) {
+        all[*stop.samples.start()].time_ns = began_ns(&all[stop.samples.clone()]);
+    }
     let studied = stops.into_iter().filter_map(|stop| {
         let end = *stop.samples.end();
-        let full = stop.full_from.and_then(|from| Curve::of(&samples[from..=end]));
+        let full = stop.full_from.and_then(|from| Curve::of(&all[from..=end]));
         let no_law = why_no_law(full.as_ref(), stop.found_by, settings.find.share_min);
         let (from, curve) = match (full, stop.full_from, &no_law) {
             (Some(curve), Some(from), None) => (from, curve),
-            _ => (*stop.samples.start(), Curve::of(&samples[stop.samples])?),
+            _ => (*stop.samples.start(), Curve::of(&all[stop.samples])?),
         };
-        let samples = &samples[from..=end];
+        let samples = &all[from..=end];
         let is_full = no_law.is_none();
         let friction = match is_full {
             true => friction(samples, &curve, &dataset.train, dataset.track.as_ref()),
             false => Vec::new(),
         };
+        let moves = all[end..].iter().find(|it| it.speed_mps > STANDING_MPS);
+        let dwell_s = moves.map(|it| 1e-9 * (it.time_ns - all[end].time_ns) as f64);
+        let time_s = curve.points.last()?.time_s;
         let stop = RecordedStop {
             file: run.file.clone(),
             role: run.role,
             from_s: 1e-9 * samples[0].time_ns as f64,
             from_mps: curve.from_mps(),
             distance_m: curve.distance_m(),
-            time_s: curve.points.last()?.time_s,
+            time_s,
+            mean_deceleration_mps2: curve.from_mps() / time_s,
+            dwell_s,
             found_by: stop.found_by,
             manner: if is_full { Manner::Full } else { Manner::Modulated },
             no_law,
-            decelerations: if is_full { Vec::new() } else { decelerations(&curve) },
+            decelerations: decelerations(&curve),
             predicted: None,
             friction,
         };
@@ -164,17 +139,6 @@ fn decelerations(curve: &Curve) -> Vec<Point> {
         Some(Point { speed_mps, ..*curve.at_speed(speed_mps)? })
     };
     (1..=fastest).rev().filter_map(at).collect()
-}
-
-/// The samples with a speed, each later than the one before.
-fn usable(samples: &[TrainSample]) -> Vec<TrainSample> {
-    let mut last_ns = i64::MIN;
-    let is_usable = |sample: &&TrainSample| {
-        let is_later = sample.time_ns > last_ns && sample.speed_mps.is_finite();
-        last_ns = if is_later { sample.time_ns } else { last_ns };
-        is_later
-    };
-    samples.iter().filter(is_usable).copied().collect()
 }
 
 fn cannot_tell(dataset: &Dataset, found: &[RecordedStop], law: Option<&Law>) -> Vec<String> {
