@@ -95,6 +95,8 @@ pub struct Law {
     pub repeatability: f64,
     /// Degrees of freedom of the repeatability.
     pub freedom: f64,
+    /// Each stop's deceleration over the law's, the mean over the speeds, from weak to strong.
+    pub factors: Vec<f64>,
     /// Number of stops.
     pub stops: usize,
 }
@@ -157,7 +159,10 @@ impl Law {
         if points.is_empty() || points.iter().any(|point| point.deceleration_mps2 <= 0.0) {
             return None;
         }
-        let squares = factors.iter().filter(|it| it.1 > 0.0).map(|(f, n)| (f / n - 1.0).powi(2));
+        let means = factors.iter().filter(|it| it.1 > 0.0).map(|(sum, count)| sum / count);
+        let mut factors: Vec<f64> = means.collect();
+        factors.sort_by(f64::total_cmp);
+        let squares = factors.iter().map(|factor| (factor - 1.0).powi(2));
         let freedom = ASSUMED_FREEDOM + built.len() as f64 - 1.0;
         let assumed = ASSUMED_FREEDOM * assumed_repeatability * assumed_repeatability;
         let repeatability = ((assumed + squares.sum::<f64>()) / freedom).sqrt();
@@ -167,7 +172,14 @@ impl Law {
             point.next_std_mps2 = next.hypot(point.std_mps2);
         }
         let response = Response::of(&built);
-        Some(Law { points, response, repeatability, freedom, stops: built.len() })
+        Some(Law { points, response, repeatability, freedom, factors, stops: built.len() })
+    }
+
+    /// Takes a deceleration in m/s² over speed out of the law, as that by the resistance.
+    pub fn take_out(&mut self, deceleration_mps2: impl Fn(f64) -> f64) {
+        for point in &mut self.points {
+            point.deceleration_mps2 -= deceleration_mps2(point.speed_mps);
+        }
     }
 
     /// The fastest speed in m/s that a stop was seen from.

@@ -37,6 +37,8 @@ pub struct RecordedStop {
     pub mean_deceleration_mps2: f64,
     /// Time in s until the train moved again; `None` where the run ends before.
     pub dwell_s: Option<f64>,
+    /// Mean gradient in ‰ along the travel, which is taken out of the decelerations; `None` where it is unknown.
+    pub gradient_permille: Option<f64>,
     /// What showed that the brake was applied.
     pub found_by: FoundBy,
     /// Whether the brake was applied in full.

@@ -1,6 +1,10 @@
 //! All of it over a dataset: the law from the stops of fit runs, tried on those held out.
 
+use dynocar_model::terms::gradient;
 use dynocar_model::terms::wheel::STANDING_MPS;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
+use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
 
 use super::curve::{Curve, Point};
@@ -39,7 +43,15 @@ impl Study {
     /// Studies the stops of a dataset; predicts the next one from some speeds in m/s, or from
     /// steps of 5 m/s and the fastest when there are none.
     pub fn of(dataset: &Dataset, settings: &StudySettings, from_mps: &[f64]) -> Self {
-        let found = dataset.runs.iter().flat_map(|run| found_in(dataset, run, settings));
+        Study::of_all(std::slice::from_ref(dataset), settings, from_mps)
+    }
+
+    /// Studies the stops of several datasets of one train together.
+    pub fn of_all(datasets: &[Dataset], settings: &StudySettings, from_mps: &[f64]) -> Self {
+        let found = datasets
+            .iter()
+            .flat_map(|dataset| dataset.runs.iter().map(move |run| (dataset, run)))
+            .flat_map(|(dataset, run)| found_in(dataset, run, settings));
         let (mut stops, curves): (Vec<RecordedStop>, Vec<Curve>) = found.unzip();
         let is = |stop: &RecordedStop, role| stop.role == role && stop.manner == Manner::Full;
         let of_law = stops.iter().zip(curves).filter(|(stop, _)| is(stop, Role::Fit));
@@ -53,13 +65,17 @@ impl Study {
             }
             _ => from_mps.to_vec(),
         };
-        let predict =
-            |speed_mps: f64| law.as_ref()?.stopping_distance(speed_mps, &Gradient::default());
-        let distances = speeds.into_iter().filter_map(predict).collect();
+        let rotating_mass_factor =
+            datasets.first().map_or(0.0, |dataset| dataset.train.rotating_mass_factor);
+        let predict = |speed_mps: f64, permille: f64| {
+            let gradient = Gradient { permille, rotating_mass_factor };
+            law.as_ref()?.stopping_distance(speed_mps, &gradient)
+        };
+        let distances = speeds.into_iter().filter_map(|it| predict(it, 0.0)).collect();
         for stop in stops.iter_mut().filter(|stop| is(stop, Role::Holdout)) {
-            stop.predicted = predict(stop.from_mps);
+            stop.predicted = predict(stop.from_mps, stop.gradient_permille.unwrap_or(0.0));
         }
-        let cannot_tell = cannot_tell(dataset, &stops, law.as_ref());
+        let cannot_tell = cannot_tell(datasets, &stops, law.as_ref());
         let day = Day::of(&stops);
         Study { stops, distances, day, cannot_tell, law }
     }
@@ -75,8 +91,12 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
     let studied = stops.into_iter().filter_map(|stop| {
         let end = *stop.samples.end();
         let full = stop.full_from.and_then(|from| Curve::of(&all[from..=end]));
-        let no_law = why_no_law(full.as_ref(), stop.found_by, settings.find.share_min);
-        let (from, curve) = match (full, stop.full_from, &no_law) {
+        let slid = all[stop.samples.clone()].iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0);
+        let no_law = match slid {
+            true => Some("the wheels slid: their speed is not the train's".into()),
+            false => why_no_law(full.as_ref(), stop.found_by, settings.find.share_min),
+        };
+        let (from, mut curve) = match (full, stop.full_from, &no_law) {
             (Some(curve), Some(from), None) => (from, curve),
             _ => (*stop.samples.start(), Curve::of(&all[stop.samples])?),
         };
@@ -86,6 +106,7 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
             true => friction(samples, &curve, &dataset.train, dataset.track.as_ref()),
             false => Vec::new(),
         };
+        let gradient_permille = level(&mut curve, samples, dataset);
         let moves = all[end..].iter().find(|it| it.speed_mps > STANDING_MPS);
         let dwell_s = moves.map(|it| 1e-9 * (it.time_ns - all[end].time_ns) as f64);
         let time_s = curve.points.last()?.time_s;
@@ -98,6 +119,7 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
             time_s,
             mean_deceleration_mps2: curve.from_mps() / time_s,
             dwell_s,
+            gradient_permille,
             found_by: stop.found_by,
             manner: if is_full { Manner::Full } else { Manner::Modulated },
             no_law,
@@ -108,6 +130,25 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
         Some((stop, curve))
     });
     studied.collect()
+}
+
+/// Takes the gradient, where every sample knows it, out of a stop's decelerations; its mean in ‰ along the travel.
+fn level(curve: &mut Curve, samples: &[TrainSample], dataset: &Dataset) -> Option<f64> {
+    let train = &dataset.train;
+    let at = |sample: &TrainSample| {
+        let direction = f64::from(sample.direction);
+        let on_track = || {
+            let at = (sample.get(SampleField::Position)?, direction);
+            gradient::along_travel_permille(dataset.track.as_deref()?, at, train.length_m, 0.0)
+        };
+        on_track().or_else(|| Some(direction * sample.get(SampleField::Gradient)?))
+    };
+    let permille: Vec<f64> = samples.iter().map(at).collect::<Option<_>>()?;
+    let inertia = 1.0 + train.rotating_mass_factor;
+    for (point, permille) in curve.points.iter_mut().zip(&permille) {
+        point.deceleration_mps2 -= 1e-3 * STANDARD_GRAVITY_MPS2 * permille / inertia;
+    }
+    Some(permille.iter().sum::<f64>() / permille.len() as f64)
 }
 
 /// Why a stop shows no law of the brake; `full` is its part under all of the brake.
@@ -141,9 +182,10 @@ fn decelerations(curve: &Curve) -> Vec<Point> {
     (1..=fastest).rev().filter_map(at).collect()
 }
 
-fn cannot_tell(dataset: &Dataset, found: &[RecordedStop], law: Option<&Law>) -> Vec<String> {
+fn cannot_tell(datasets: &[Dataset], found: &[RecordedStop], law: Option<&Law>) -> Vec<String> {
     let mut said = Vec::new();
-    if dataset.runs.iter().any(|run| run.gradient_source == GradientSource::Unknown) {
+    let mut runs = datasets.iter().flat_map(|dataset| &dataset.runs);
+    if runs.any(|run| run.gradient_source == GradientSource::Unknown) {
         said.push(
             "the gradient is unknown: 1 permille along a whole stop is 0.01 m/s² of its \
              deceleration, and of its friction"

@@ -46,7 +46,7 @@ fn positive(text: &str) -> Result<f64, String> {
     above_zero(text, 200.0, "expected a speed above 0 and up to 200 m/s")
 }
 
-fn share(text: &str) -> Result<f64, String> {
+pub(super) fn share(text: &str) -> Result<f64, String> {
     above_zero(text, 1.0, "expected a share above 0 and up to 1")
 }
 
@@ -103,10 +103,10 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
 }
 
 /// Head and cells of a table's columns.
-type Columns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
+pub(super) type Columns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
 
 /// A table of some rows; `left` are the columns of words.
-fn table<'t, T: 't>(
+pub(super) fn table<'t, T: 't>(
     columns: Columns<T>,
     left: &[usize],
     rows: impl Iterator<Item = &'t T>,
