@@ -1,6 +1,7 @@
 //! The simulator of trains, and what is learned from its recordings.
 
 mod advice;
+mod brake_steps;
 mod couplings;
 mod drive_power;
 mod effects;

@@ -6,17 +6,17 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
 /// Friction that grows as the speed falls, as cast-iron blocks have it.
-fn true_mps2(speed_mps: f64) -> f64 {
+pub fn true_mps2(speed_mps: f64) -> f64 {
     0.3 + 0.7 / (1.0 + speed_mps / 12.0)
 }
 
-fn normal(random: &mut StdRng) -> f64 {
+pub fn normal(random: &mut StdRng) -> f64 {
     (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
 }
 
 /// A stop by a brake of so much of the true deceleration after a dead time of 1 s, at 5 Hz,
 /// with noise and in steps of 0.2 m/s; and its true distance.
-fn stop(factor: f64, from_mps: f64, random: &mut StdRng) -> (Vec<TrainSample>, f64) {
+pub fn stop(factor: f64, from_mps: f64, random: &mut StdRng) -> (Vec<TrainSample>, f64) {
     let (mut samples, mut speed_mps, mut distance_m) = (Vec::new(), from_mps, 0.0);
     let step_s = 0.01;
     for k in 0.. {

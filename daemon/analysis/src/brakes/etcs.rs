@@ -16,8 +16,9 @@ pub struct EtcsBrake {
     pub gamma_service: Steps,
     /// A_brake_normal_service in m/s².
     pub gamma_normal_service: Steps,
-    /// Kdry_rst.
-    pub k_dry: Steps,
+    /// Kdry_rst, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k_dry: Option<Steps>,
     /// Kwet_rst, where it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub k_wet: Option<Steps>,
@@ -36,10 +37,10 @@ pub struct EtcsBrake {
 }
 
 impl EtcsBrake {
-    /// The parameters with Kdry_rst at a level of confidence; what is not measured takes its place by what is said
-    /// beside it. `None` where neither data nor components reach the level.
-    pub fn of(found: &Parameters, ebcl: u32, declared_k_wet: Option<f64>) -> Option<Self> {
-        let k_dry = found.k_dry.iter().find(|it| it.ebcl == ebcl)?.k_dry()?;
+    /// The parameters with Kdry_rst at a level of confidence, where data or components reach it. Service steps that
+    /// were not measured are the normal service, else the emergency steps.
+    pub fn of(found: &Parameters, ebcl: Option<u32>, declared_k_wet: Option<f64>) -> Self {
+        let k_dry = ebcl.and_then(|ebcl| found.k_dry.iter().find(|it| it.ebcl == ebcl)?.k_dry());
         // Boundaries of the factors are those of the emergency steps.
         let over = |value: f64| Steps {
             boundaries: found.emergency.boundaries.clone(),
@@ -48,11 +49,11 @@ impl EtcsBrake {
         let normal = found.normal_service.clone();
         let service = found.service.clone().or(normal.clone());
         let service = service.unwrap_or_else(|| found.emergency.clone());
-        Some(EtcsBrake {
+        EtcsBrake {
             gamma_emergency: found.emergency.clone(),
             gamma_normal_service: normal.unwrap_or_else(|| service.clone()),
             gamma_service: service,
-            k_dry: over(k_dry),
+            k_dry: k_dry.map(over),
             k_wet: found.k_wet.clone().or(declared_k_wet.map(over)),
             k_n_pos: Steps::constant(0.0),
             k_n_neg: Steps::constant(0.0),
@@ -60,7 +61,7 @@ impl EtcsBrake {
             t_bs1: found.build_up_s,
             t_bs2: found.build_up_s,
             t_be: found.build_up_s,
-        })
+        }
     }
 }
 
@@ -72,13 +73,14 @@ impl EtcsBrake {
 pub fn read(root: &Item) -> Result<EtcsBrake, DatasetError> {
     let gamma = |key| steps(root, key, "a deceleration in m/s² above 0, at most 10", 1e-6);
     let factor = |key| steps(root, key, "a number from 0 to 10", 0.0);
+    let known = |key| root.has(key).then(|| factor(key)).transpose();
     let time = |key| root.required(key, "a time in s from 0 to 300", 0.0..=300.0);
     Ok(EtcsBrake {
         gamma_emergency: gamma("gamma_emergency")?,
         gamma_service: gamma("gamma_service")?,
         gamma_normal_service: gamma("gamma_normal_service")?,
-        k_dry: factor("k_dry")?,
-        k_wet: root.has("k_wet").then(|| factor("k_wet")).transpose()?,
+        k_dry: known("k_dry")?,
+        k_wet: known("k_wet")?,
         k_n_pos: factor("k_n_pos")?,
         k_n_neg: factor("k_n_neg")?,
         t_traction_cut_off: time("t_traction_cut_off")?,

@@ -20,7 +20,7 @@ pub const HEAD: &str = "brake_curve,speed_kph,grade_1_in_x,stopping_distance_m";
 /// Traction's cut-off, build-up and rotating mass, then a deceleration at each knot.
 const FREE: usize = 3 + KNOTS.len();
 /// Relative error of a row beyond which it counts more than by its square, so that no row is sacrificed.
-const ROW_ERROR: f64 = 0.02;
+const ROW_ERROR: f64 = 0.01;
 /// Dead times and build-ups in s from which the search starts.
 const STARTS_S: [(f64, f64); 4] = [(0.5, 1.0), (0.5, 6.0), (1.0, 20.0), (0.5, 60.0)];
 

@@ -85,15 +85,16 @@ pub fn execute(arguments: &BrakesArguments) -> Result<(), Failure> {
     let Some(law) = &study.law else { return Err(without_law(&study)) };
     let answer = answer(arguments, &datasets, &study, law)?;
     if let Some(file) = &arguments.etcs {
-        let etcs =
-            answer.ebcl.and_then(|it| EtcsBrake::of(&answer.parameters, it, arguments.k_wet));
-        let Some(etcs) = etcs else {
+        let is_reached = |it: &Correction| Some(it.ebcl) == answer.ebcl && it.k_dry().is_some();
+        if let Some(ebcl) = arguments.ebcl
+            && !answer.parameters.k_dry.iter().any(is_reached)
+        {
             return Err(Failure::Input(format!(
-                "--ebcl {}: {} stops support no such level, and no [brake] units are declared",
-                arguments.ebcl.unwrap_or(0),
+                "--ebcl {ebcl}: {} stops support no such level, and no [brake] units are declared",
                 law.stops
             )));
-        };
+        }
+        let etcs = EtcsBrake::of(&answer.parameters, answer.ebcl, arguments.k_wet);
         write_json(file, &etcs)?;
         report_line(&format!("etcs_brake_params: {}", file.display()));
     }
@@ -207,6 +208,7 @@ fn said(
             law.stops
         ),
     ];
+    said.push(format!("nothing is said of speeds above {:.1} m/s", law.fastest_mps()));
     let mut unless = |is_there: bool, words: &str| {
         if !is_there {
             said.push(words.into());
@@ -215,7 +217,7 @@ fn said(
     let is_modelled = parameters.k_dry.iter().any(|it| it.modelled.is_some());
     unless(
         is_modelled,
-        "beyond that only a model of components speaks: declare [brake] units and how they differ and fail",
+        "beyond that only a model of components speaks (declare [brake] units and how they differ and fail)",
     );
     unless(
         parameters.k_wet.is_some(),
