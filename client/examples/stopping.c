@@ -74,6 +74,10 @@ static dynocar_stop built_in_stop(double speed_mps)
     stop.w0_std_n_per_kn = 0.3;
     stop.brake_scale = 1.0;
     stop.brake_scale_std = 0.1;
+    /* Declared, or law.response of `dynocar stops --json`. */
+    stop.dead_time_s = 0.8;
+    stop.build_up_s = 2.0;
+    stop.response_std_s = 0.3;
     /* A wet rail, until the daemon knows better. */
     stop.rail = DYNOCAR_RAIL_WET_LAW;
     stop.adhesion = 1.0;

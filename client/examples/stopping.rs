@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use dynocar_client::{Host, NoAnswer, SnapshotReader, monotonic_now_ns};
-use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop};
+use dynocar_shared::stopping::{BrakeResponse, EffortPoint, RailAdhesion, Stop};
 use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, RailCondition, TrainId, Uncertain};
 
 /// The train of config/demo/train.toml, which config/daemon.toml serves as train 1.
@@ -45,6 +45,13 @@ fn stop(reader: &SnapshotReader, speed_mps: f64) -> Stop<'static> {
         rotating_mass_factor: 0.04,
         w0_std_n_per_kn: 0.3,
         brake_scale: Uncertain::new(1.0, 0.1),
+        // Declared, or `law.response` of `dynocar stops --json`.
+        response: BrakeResponse {
+            dead_time_s: 0.8,
+            build_up_s: 2.0,
+            std_s: 0.3,
+            ..BrakeResponse::IMMEDIATE
+        },
         // A wet rail, until the daemon knows better.
         adhesion: RailAdhesion::Law(RailCondition::Wet, Uncertain::new(1.0, 0.1)),
         ..Stop::level(speed_mps, MASS_KG, [1.498, 0.0147, 0.00086], &EFFORT)

@@ -606,7 +606,7 @@ enum {
 
 /* The stop that is asked about. Set all to 0 first; standard deviations may stay 0. */
 typedef struct dynocar_stop {
-    /* Speed in m/s at which the brakes act in full */
+    /* Speed in m/s at which the brake is commanded */
     double from_speed_mps;
     /* Speed in m/s at which the stop is over; 0 for standstill */
     double to_speed_mps;
@@ -628,6 +628,16 @@ typedef struct dynocar_stop {
     double brake_scale;
     /* Its standard deviation */
     double brake_scale_std;
+    /* Time in s after the command until traction is cut off; it holds the speed till then */
+    double traction_cut_off_s;
+    /* Time in s after that without any force of traction or brake */
+    double dead_time_s;
+    /* Time in s over which the brake force then grows linearly to its full value */
+    double build_up_s;
+    /* Greatest growth in m/s³ of the deceleration by the brake; 0 for no limit */
+    double jerk_limit_mps3;
+    /* Standard deviation in s of the time that a stop loses until the brake acts in full */
+    double response_std_s;
     /* Adhesion coefficient, or the scale of a law */
     double adhesion;
     /* Its standard deviation */
@@ -841,7 +851,7 @@ DYNOCAR_AT_(dynocar_resistance, force_n, 16);
 DYNOCAR_AT_(dynocar_resistance, force_std_n, 24);
 DYNOCAR_AT_(dynocar_resistance, is_extrapolated, 32);
 
-DYNOCAR_SIZE_(dynocar_stop, 112);
+DYNOCAR_SIZE_(dynocar_stop, 152);
 DYNOCAR_AT_(dynocar_stop, from_speed_mps, 0);
 DYNOCAR_AT_(dynocar_stop, to_speed_mps, 8);
 DYNOCAR_AT_(dynocar_stop, mass_kg, 16);
@@ -853,9 +863,14 @@ DYNOCAR_AT_(dynocar_stop, davis_c, 56);
 DYNOCAR_AT_(dynocar_stop, w0_std_n_per_kn, 64);
 DYNOCAR_AT_(dynocar_stop, brake_scale, 72);
 DYNOCAR_AT_(dynocar_stop, brake_scale_std, 80);
-DYNOCAR_AT_(dynocar_stop, adhesion, 88);
-DYNOCAR_AT_(dynocar_stop, adhesion_std, 96);
-DYNOCAR_AT_(dynocar_stop, rail, 104);
+DYNOCAR_AT_(dynocar_stop, traction_cut_off_s, 88);
+DYNOCAR_AT_(dynocar_stop, dead_time_s, 96);
+DYNOCAR_AT_(dynocar_stop, build_up_s, 104);
+DYNOCAR_AT_(dynocar_stop, jerk_limit_mps3, 112);
+DYNOCAR_AT_(dynocar_stop, response_std_s, 120);
+DYNOCAR_AT_(dynocar_stop, adhesion, 128);
+DYNOCAR_AT_(dynocar_stop, adhesion_std, 136);
+DYNOCAR_AT_(dynocar_stop, rail, 144);
 
 DYNOCAR_SIZE_(dynocar_effort_point, 16);
 DYNOCAR_AT_(dynocar_effort_point, speed_mps, 0);

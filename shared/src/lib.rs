@@ -37,7 +37,9 @@ pub use sample::{SampleField, TrainId, TrainSample};
 pub use services::SCHEMA_MAJOR;
 pub use sleeper::SleeperState;
 pub use snapshot::ParameterSnapshot;
-pub use stopping::{EffortPoint, RailAdhesion, Stop, StoppingError, StoppingEstimate};
+pub use stopping::{
+    BrakeResponse, EffortPoint, RailAdhesion, Stop, StoppingError, StoppingEstimate,
+};
 pub use vocabulary::{
     Manoeuvre, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
     UseState,

@@ -11,6 +11,7 @@ mod simulator;
 mod support;
 
 // Commands, and what is shipped with them.
+mod brakes;
 mod careless;
 mod check;
 mod explain_again;

@@ -71,7 +71,9 @@ fn one_stop_predicts_the_next_and_shows_how_friction_goes_with_speed() {
     let (said_m, bound_m) = (number(&said["distance_m"]), number(&said["distance_bound_m"]));
     assert!((said_m * 1.02 / second_m - 1.0).abs() < 0.03, "{said_m} and {second_m}");
     assert!(bound_m > second_m, "{bound_m}");
-    assert!((number(&answer["law"]["response_s"]) - 1.0).abs() < 0.3);
+    let response = &answer["law"]["response"];
+    let lost_s = number(&response["dead_time_s"]) + 0.5 * number(&response["build_up_s"]);
+    assert!((lost_s - 1.0).abs() < 0.3, "{response}");
     let points = answer["law"]["points"].as_array().unwrap();
     for point in points.iter().filter(|it| (3.0..26.0).contains(&number(&it["speed_mps"]))) {
         let truth = 0.35 + 0.6 / (1.0 + number(&point["speed_mps"]) / 10.0);

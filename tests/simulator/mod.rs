@@ -1,6 +1,7 @@
 //! The simulator of trains, and what is learned from its recordings.
 
 mod advice;
+mod brake_steps;
 mod couplings;
 mod drive_power;
 mod effects;
@@ -13,6 +14,7 @@ mod parts;
 mod physics;
 mod places;
 mod plausibility;
+mod recorded_days;
 mod residual_monitor;
 mod rough;
 mod stops;

@@ -1,22 +1,22 @@
 //! The law of simulated stops against the true one, and the next stop against its bound.
 
-use dynocar_analysis::stops::{Curve, Law};
+use dynocar_analysis::stops::{Curve, Gradient, Law};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
 /// Friction that grows as the speed falls, as cast-iron blocks have it.
-fn true_mps2(speed_mps: f64) -> f64 {
+pub fn true_mps2(speed_mps: f64) -> f64 {
     0.3 + 0.7 / (1.0 + speed_mps / 12.0)
 }
 
-fn normal(random: &mut StdRng) -> f64 {
+pub fn normal(random: &mut StdRng) -> f64 {
     (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
 }
 
 /// A stop by a brake of so much of the true deceleration after a dead time of 1 s, at 5 Hz,
 /// with noise and in steps of 0.2 m/s; and its true distance.
-fn stop(factor: f64, from_mps: f64, random: &mut StdRng) -> (Vec<TrainSample>, f64) {
+pub fn stop(factor: f64, from_mps: f64, random: &mut StdRng) -> (Vec<TrainSample>, f64) {
     let (mut samples, mut speed_mps, mut distance_m) = (Vec::new(), from_mps, 0.0);
     let step_s = 0.01;
     for k in 0.. {
@@ -55,7 +55,7 @@ fn the_law_of_one_stop_holds_the_true_one_and_the_next_stop_keeps_its_bound() {
             inside += i32::from(off <= 1.96 * point.std_mps2);
         }
         let (_, distance_m) = stop(factors[1], 30.0, &mut random);
-        let next = law.stopping_distance(30.0).unwrap();
+        let next = law.stopping_distance(30.0, &Gradient::default()).unwrap();
         kept += i32::from(distance_m <= next.distance_bound_m);
     }
     let rms = (error / f64::from(looks)).sqrt();
@@ -78,10 +78,10 @@ fn many_stops_show_their_own_repeatability_and_slower_ones_say_nothing_of_faster
         .collect();
     let law = Law::of(&curves, 0.03).unwrap();
     assert!((0.05..0.11).contains(&law.repeatability), "{}", law.repeatability);
-    assert!((law.response_s - 1.0).abs() < 0.3, "{}", law.response_s);
+    assert!((law.response.lost_s() - 1.0).abs() < 0.3, "{:?}", law.response);
     assert_eq!((law.points[4].stops, law.points[19].stops), (30, 15));
-    assert!(law.stopping_distance(40.0).is_none());
+    assert!(law.stopping_distance(40.0, &Gradient::default()).is_none());
     let (_, distance_m) = stop(1.0, 28.0, &mut random);
-    let next = law.stopping_distance(28.0).unwrap();
+    let next = law.stopping_distance(28.0, &Gradient::default()).unwrap();
     assert!((next.distance_m / distance_m - 1.0).abs() < 0.05, "{next:?} and {distance_m}");
 }

@@ -1,6 +1,6 @@
 //! Braking distance and time for C; the mathematics are [`dynocar_shared::stopping`].
 
-use dynocar_shared::stopping::{EffortPoint, RailAdhesion, Stop, StoppingError};
+use dynocar_shared::stopping::{BrakeResponse, EffortPoint, RailAdhesion, Stop, StoppingError};
 use dynocar_shared::{RailCondition, Uncertain, vocabulary, wire_struct};
 
 use super::error::{Code, guard};
@@ -26,7 +26,7 @@ wire_struct! {
     /// The stop that is asked about; `dynocar_stop` in C. All numbers finite.
     #[derive(Default)]
     pub struct StopRequest {
-        /// Speed in m/s at which the brakes act in full.
+        /// Speed in m/s at which the brake is commanded.
         pub from_speed_mps: f64,
         /// Speed in m/s at which the stop is over; 0 for standstill.
         pub to_speed_mps: f64,
@@ -48,6 +48,16 @@ wire_struct! {
         pub brake_scale: f64,
         /// Its standard deviation.
         pub brake_scale_std: f64,
+        /// Time in s after the command until traction is cut off; it holds the speed till then.
+        pub traction_cut_off_s: f64,
+        /// Time in s after that without any force of traction or brake.
+        pub dead_time_s: f64,
+        /// Time in s over which the brake force then grows linearly to its full value.
+        pub build_up_s: f64,
+        /// Greatest growth in m/s³ of the deceleration by the brake; 0 for no limit.
+        pub jerk_limit_mps3: f64,
+        /// Standard deviation in s of the time that a stop loses until the brake acts in full.
+        pub response_std_s: f64,
         /// Adhesion coefficient, or the scale of a law.
         pub adhesion: f64,
         /// Its standard deviation.
@@ -100,6 +110,13 @@ impl StopRequest {
             w0_std_n_per_kn: self.w0_std_n_per_kn,
             gradient_permille: self.gradient_permille,
             brake_scale: Uncertain::new(self.brake_scale, self.brake_scale_std),
+            response: BrakeResponse {
+                traction_cut_off_s: self.traction_cut_off_s,
+                dead_time_s: self.dead_time_s,
+                build_up_s: self.build_up_s,
+                jerk_limit_mps3: self.jerk_limit_mps3,
+                std_s: self.response_std_s,
+            },
             adhesion: match rail {
                 Rail::Unlimited => RailAdhesion::Unlimited,
                 Rail::Coefficient => RailAdhesion::Coefficient(adhesion),
@@ -120,7 +137,7 @@ impl StopRequest {
 ///
 /// # Real-time
 ///
-/// Safe for the control cycle: some 500 evaluations of the deceleration.
+/// Safe for the control cycle: some 800 evaluations of the deceleration.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynocar_stopping_estimate(
     stop: *const StopRequest,
@@ -174,6 +191,11 @@ mod tests {
             davis_a: 1.5,
             brake_scale: 1.0,
             brake_scale_std: 0.05,
+            traction_cut_off_s: 0.3,
+            dead_time_s: 0.5,
+            build_up_s: 1.5,
+            jerk_limit_mps3: 0.7,
+            response_std_s: 0.2,
             adhesion: 0.1,
             adhesion_std: 0.01,
             rail: Rail::Coefficient as u64,
@@ -210,6 +232,7 @@ mod tests {
         let cases = [
             (StopRequest { mass_kg: f64::NAN, ..request() }, 0.99, Code::BadNumber),
             (StopRequest { rail: 9, ..request() }, 0.99, Code::BadNumber),
+            (StopRequest { build_up_s: -1.0, ..request() }, 0.99, Code::BadNumber),
             (request(), 1.0, Code::BadNumber),
             (StopRequest { gradient_permille: -500.0, ..request() }, 0.99, Code::DoesNotStop),
         ];

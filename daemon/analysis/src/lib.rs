@@ -11,6 +11,7 @@
 //! - [`identify`]: the daemon's pipelines over recorded runs
 //! - [`survey`]: a line and its gradient from recordings with GNSS
 //! - [`stops`]: what recorded stops say of a brake of unknown force
+//! - [`brakes`]: the same brake as train protection asks for it
 //! - [`explain`]: which undeclared effect explains what the declared model leaves
 //! - [`driven`]: the train itself, force in and speed out, by the law that `explain` predicts with
 //! - [`advice`]: what to drive next, so that the estimates become sharper
@@ -18,6 +19,7 @@
 //! - [`parallel`]: work on all threads
 
 pub mod advice;
+pub mod brakes;
 pub mod driven;
 pub mod explain;
 pub mod identify;

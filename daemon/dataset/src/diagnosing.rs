@@ -26,6 +26,8 @@ const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
 
 /// A moving train's columns that all keep their values for so many s are diagnosed.
 const STANDS_STILL_MIN_S: f64 = 10.0;
+/// ... so many times longer than any other such interval.
+const EXCEPTION: f64 = 3.0;
 /// The speed in m/s from which a train surely moves.
 const MOVING_MPS: f64 = 1.0;
 
@@ -206,7 +208,8 @@ fn of_content(
     }
 }
 
-/// The longest interval of a moving train in which no column but the time changes.
+/// The longest interval of a moving train in which no column but the time changes, where it is an exception: coarse
+/// speeds keep their value through every cruise. A recorder that pauses with a train has not hung.
 fn stands_still(run: &Resolved) -> Option<Diagnostic> {
     let columns: Vec<&[f64]> = run
         .table
@@ -216,19 +219,29 @@ fn stands_still(run: &Resolved) -> Option<Diagnostic> {
         .collect();
     let same = |one: f64, other: f64| one == other || (one.is_nan() && other.is_nan());
     let repeats = |row: usize| columns.iter().all(|values| same(values[row], values[row - 1]));
-    let mut longest: Option<(f64, usize)> = None;
-    let mut start = 0;
+    let is_pause = |row: usize| run.times_s[row] - run.times_s[row - 1] >= STANDS_STILL_MIN_S;
+    let (mut longest, mut second_s, mut start) = ((0.0, 0), 0.0, 0);
     for row in 1..run.times_s.len() {
-        if !repeats(row) {
+        if !repeats(row) || is_pause(row) {
             start = row;
         }
         let for_s = run.times_s[row] - run.times_s[start];
-        let moves = run.speeds.speed_mps[row] >= MOVING_MPS;
-        if moves && for_s >= STANDS_STILL_MIN_S && longest.is_none_or(|(most, _)| for_s > most) {
-            longest = Some((for_s, start));
+        if run.speeds.speed_mps[row] < MOVING_MPS {
+            continue;
+        }
+        if for_s > longest.0 {
+            if longest.1 != start {
+                second_s = longest.0;
+            }
+            longest = (for_s, start);
+        } else if start != longest.1 && for_s > second_s {
+            second_s = for_s;
         }
     }
-    let (for_s, start) = longest?;
+    let (for_s, start) = longest;
+    if for_s < STANDS_STILL_MIN_S || for_s < EXCEPTION * second_s {
+        return None;
+    }
     let (from_s, speed_mps) = (run.times_s[start], run.speeds.speed_mps[start]);
     let text = format!(
         "from {from_s} s every column but the time keeps its value for {for_s:.1} s, at \

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use dynocar_model::terms::{Key, curve, extra, rotating, tunnel};
 use dynocar_model::train::{
-    BrakeGear, Corrections, Davis, Drive, EffortCurve, FrictionBrake, TrainModel,
+    BrakeComponents, BrakeGear, Corrections, Davis, Drive, EffortCurve, FrictionBrake, TrainModel,
 };
 
 use super::corrections::{read_corrections, read_extra};
@@ -18,6 +18,15 @@ pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
 pub const PASSENGER_MASS_DEFAULT_KG: f64 = 70.0;
 /// A friction brake is released up to this pressure in Pa unless a train says otherwise.
 pub const RELEASE_PRESSURE_DEFAULT_PA: f64 = 20e3;
+#[rustfmt::skip]
+const BRAKE_KEYS: [&str; 18] = [
+    "max_force_kn", "effort", "cylinder_diameter_mm", "disc_radius_mm", "wheel_radius_mm", "efficiency",
+    "ratio", "friction", "pads", "force_per_pressure_n_per_pa", "release_pressure_pa", "units",
+    "failure_probability", UNIT_STDS[0], UNIT_STDS[1], UNIT_STDS[2], UNIT_STDS[3], UNIT_STDS[4],
+];
+/// Relative standard deviations of what a brake's units differ in.
+const UNIT_STDS: [&str; 5] =
+    ["friction_std", "pressure_std", "efficiency_std", "common_std", "mass_std"];
 /// Which masses a train and a run of it may have.
 pub(super) const MASS: &str = "a mass in t above 0, at most 100000";
 
@@ -133,20 +142,31 @@ fn friction_brake(section: &Item) -> Result<Option<FrictionBrake>, DatasetError>
     }))
 }
 
+/// How the brake's units differ and fail.
+fn components(section: &Item) -> Result<Option<BrakeComponents>, DatasetError> {
+    if !["units", "failure_probability"].iter().chain(&UNIT_STDS).any(|key| section.has(key)) {
+        return Ok(None);
+    }
+    let units = section.required("units", "a number of units from 1 to 10000", 1.0..=1e4)? as u32;
+    let failure = "a probability from 0 to 0.5";
+    let failure = section.optional("failure_probability", failure, 0.0..=0.5)?;
+    let mut stds = [0.0; UNIT_STDS.len()];
+    for (std, key) in stds.iter_mut().zip(UNIT_STDS) {
+        let given =
+            section.optional(key, "a relative standard deviation from 0 to 0.5", 0.0..=0.5)?;
+        *std = given.unwrap_or(0.0);
+    }
+    let [friction_std, pressure_std, efficiency_std, common_std, mass_std] = stds;
+    let failure_probability = failure.unwrap_or(0.0);
+    #[rustfmt::skip]
+    let found = BrakeComponents {
+        units, friction_std, pressure_std, efficiency_std, common_std, mass_std, failure_probability,
+    };
+    Ok(Some(found))
+}
+
 fn brake(section: &Item) -> Result<(Option<EffortCurve>, BrakeGear), DatasetError> {
-    section.allow(&[
-        "max_force_kn",
-        "effort",
-        "cylinder_diameter_mm",
-        "disc_radius_mm",
-        "wheel_radius_mm",
-        "efficiency",
-        "ratio",
-        "friction",
-        "pads",
-        "force_per_pressure_n_per_pa",
-        "release_pressure_pa",
-    ])?;
+    section.allow(&BRAKE_KEYS)?;
     let max_force_kn = section.optional("max_force_kn", FORCE, FORCES_KN)?;
     let curve = effort(section)?;
     if max_force_kn.is_some() && curve.is_some() {
@@ -165,6 +185,7 @@ fn brake(section: &Item) -> Result<(Option<EffortCurve>, BrakeGear), DatasetErro
         friction: share("friction")?,
         pads: section.optional("pads", "from 1 to 100000", 1.0..=1e5)?,
         friction_brake: friction_brake(section)?,
+        components: components(section)?,
     };
     Ok((curve.or(constant), gear))
 }
@@ -244,6 +265,9 @@ friction = 0.28
 pads = 95
 force_per_pressure_n_per_pa = 0.25
 release_pressure_pa = 21000.0
+units = 24
+friction_std = 0.05
+failure_probability = 0.001
 "#;
 
     fn refusal(text: &str) -> String {
@@ -273,6 +297,12 @@ release_pressure_pa = 21000.0
             friction_brake: Some(FrictionBrake {
                 force_per_pressure_n_per_pa: 0.25,
                 release_pressure_pa: 21e3,
+            }),
+            components: Some(BrakeComponents {
+                units: 24,
+                friction_std: 0.05,
+                failure_probability: 0.001,
+                ..BrakeComponents::default()
             }),
         };
         assert_eq!(train.brake_gear, gear);

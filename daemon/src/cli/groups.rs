@@ -8,7 +8,10 @@ use clap::Command;
 const GROUPS: [(&str, &[&str]); 5] = [
     ("Begin", &["demo", "init", "import", "check"]),
     ("Drive, with a controller", &["run", "health", "replay"]),
-    ("Learn, from recorded runs", &["identify", "explain", "survey", "stops", "learn", "models"]),
+    (
+        "Learn, from recorded runs",
+        &["identify", "explain", "survey", "stops", "brakes", "learn", "models"],
+    ),
     ("Look, and keep", &["watch", "record", "flight-recorder", "keep", "recover", "convert"]),
     ("Connect, with other programs", &["live", "fmu", "completions", "man"]),
 ];

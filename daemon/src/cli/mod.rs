@@ -56,6 +56,8 @@ enum Command {
     Identify(Passed),
     /// Estimate deceleration and stopping distance from recorded stops, without forces.
     Stops(Passed),
+    /// Estimate the brake's parameters for train protection (ETCS) from recorded stops, and stopping distances.
+    Brakes(Passed),
     /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
     Survey(Passed),
     /// Write the estimators, or the train itself, as an FMU for a simulator.
@@ -100,6 +102,7 @@ impl Command {
             Command::Explain(passed) => workshop("explain", passed),
             Command::Identify(passed) => workshop("identify", passed),
             Command::Stops(passed) => workshop("stops", passed),
+            Command::Brakes(passed) => workshop("brakes", passed),
             Command::Survey(passed) => workshop("survey", passed),
             Command::Fmu(passed) => workshop("fmu", passed),
             Command::Learn(passed) => workshop("learn", passed),

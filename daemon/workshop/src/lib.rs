@@ -5,6 +5,7 @@
 //!
 //! # Layout
 //!
+//! - [`brakes_page`]: the parameters of a brake as a page of HTML
 //! - [`cli`]: its commands, one file each
 //! - [`fmu`]: the estimators as an FMU
 //! - [`annotation`]: an explanation beside the data that it explains
@@ -17,6 +18,7 @@
 //! - [`track_text`]: the text of a line's file
 
 pub mod annotation;
+pub mod brakes_page;
 pub mod cli;
 pub mod clock;
 pub mod fmu;

@@ -1,10 +1,11 @@
 //! Stopping distances against closed forms, the papers' figures and sampled stops.
 
 use crate::quantile::normal_quantile;
+use crate::resistance::STANDARD_GRAVITY_MPS2;
 use crate::snapshot::packed_index;
 use crate::{
-    EffortPoint, Parameter, ParameterSnapshot, RailAdhesion, RailCondition, Stop, StoppingError,
-    StoppingEstimate, Uncertain,
+    BrakeResponse, EffortPoint, Parameter, ParameterSnapshot, RailAdhesion, RailCondition, Stop,
+    StoppingError, StoppingEstimate, Uncertain,
 };
 
 const NO_RESISTANCE: [f64; 3] = [0.0, 0.0, 0.0];
@@ -204,4 +205,181 @@ fn adhesion_learned_at_the_end_of_a_braking_does_not_shorten_the_next_one_from_f
     assert!(from(RailAdhesion::learned(&snapshot).unwrap()).distance_m > dry.distance_m);
     snapshot.parameters[0] = Parameter::AdhesionLowerBound as u32;
     assert_eq!(RailAdhesion::learned(&snapshot), None);
+}
+
+/// A stop at 1 m/s² from 20 m/s on the level by a brake that comes as given.
+fn coming(response: BrakeResponse) -> StoppingEstimate {
+    Stop { response, ..Stop::level(20.0, 1e5, NO_RESISTANCE, &constant(1e5)) }
+        .estimate(0.95)
+        .unwrap()
+}
+
+#[test]
+fn a_brake_that_builds_up_gives_the_closed_form() {
+    const NONE: BrakeResponse = BrakeResponse::IMMEDIATE;
+    // A ramp of T s loses a T/2 of speed, and v T - a T²/6 of distance are run in it.
+    let ramp = coming(BrakeResponse { dead_time_s: 1.5, build_up_s: 4.0, ..NONE });
+    let expected_m = 20.0 * 5.5 - 16.0 / 6.0 + 18.0 * 18.0 / 2.0;
+    assert!((ramp.distance_m - expected_m).abs() < 1e-3, "{ramp:?}");
+    assert!((ramp.time_s - (5.5 + 18.0)).abs() < 1e-6, "{ramp:?}");
+    // A jerk limit of 0.25 m/s³ is that ramp, and the slower of both counts.
+    let jerk = BrakeResponse { dead_time_s: 1.5, jerk_limit_mps3: 0.25, ..NONE };
+    assert!((coming(jerk).distance_m - expected_m).abs() < 1e-3);
+    let both = coming(BrakeResponse { build_up_s: 1.0, ..jerk });
+    assert!((both.distance_m - expected_m).abs() < 1e-3);
+    // A train on the level runs on alike, held by traction or not.
+    let held = coming(BrakeResponse { traction_cut_off_s: 1.5, build_up_s: 4.0, ..NONE });
+    assert!((held.distance_m - expected_m).abs() < 1e-3);
+    // An uncertain response moves the bound by its quantile at the speed of the command.
+    let unsure = coming(BrakeResponse { dead_time_s: 1.5, std_s: 0.5, ..NONE });
+    assert!((unsure.distance_bound_m - unsure.distance_m - 1.6449 * 0.5 * 20.0).abs() < 1e-2);
+}
+
+#[test]
+fn a_train_on_a_slope_gains_speed_before_the_brake_comes() {
+    let slope = |response: BrakeResponse| {
+        let effort = constant(1e5);
+        let stop = Stop::level(20.0, 1e5, NO_RESISTANCE, &effort);
+        Stop { gradient_permille: -20.0, response, ..stop }.estimate(0.9).unwrap().distance_m
+    };
+    let free = BrakeResponse { dead_time_s: 10.0, ..BrakeResponse::IMMEDIATE };
+    let (gains, least) = (0.0200 * STANDARD_GRAVITY_MPS2, 1.0 - 0.0200 * STANDARD_GRAVITY_MPS2);
+    let faster = 20.0 + 10.0 * gains;
+    let expected_m = 10.0 * 0.5 * (20.0 + faster) + faster * faster / (2.0 * least);
+    assert!((slope(free) - expected_m).abs() < 1e-6);
+    let held = BrakeResponse { traction_cut_off_s: 10.0, ..BrakeResponse::IMMEDIATE };
+    assert!((slope(held) - 200.0 - 400.0 / (2.0 * least)).abs() < 1e-6);
+    // Uphill it stands before a slow brake has come.
+    let effort = constant(1e5);
+    let uphill = Stop { gradient_permille: 30.0, ..Stop::level(2.0, 1e5, NO_RESISTANCE, &effort) };
+    let slow = BrakeResponse { build_up_s: 1e2, ..BrakeResponse::IMMEDIATE };
+    let stands = Stop { response: slow, ..uphill }.estimate(0.9).unwrap();
+    let by_the_slope_m = 4.0 / (2.0 * 0.030 * STANDARD_GRAVITY_MPS2);
+    assert!(stands.distance_m < by_the_slope_m && stands.distance_m > 0.7 * by_the_slope_m);
+}
+
+/// A train whose brake differs from stop to stop.
+struct Braked {
+    from_mps: f64,
+    mass_kg: f64,
+    davis: [f64; 3],
+    force_n: f64,
+    response: BrakeResponse,
+    /// Time in s by which the acting force follows the grown one.
+    lag_s: f64,
+    /// Relative standard deviation of the force.
+    brake_std: f64,
+    /// Whether the brake eases off by its jerk limit before the train stands.
+    is_soft: bool,
+}
+
+impl Braked {
+    /// Distance in m by small steps of time, with a force and a dead time in standard deviations off.
+    fn driven_m(&self, gradient_permille: f64, force_off: f64, time_off: f64) -> f64 {
+        let BrakeResponse { dead_time_s, build_up_s, jerk_limit_mps3, std_s, .. } = self.response;
+        let (full_mps2, step_s) = (self.force_n / self.mass_kg, 1e-3);
+        let growth_mps3 = match build_up_s {
+            0.0 => jerk_limit_mps3,
+            build_up_s => full_mps2 / build_up_s,
+        };
+        let comes_s = dead_time_s - self.lag_s + time_off * std_s;
+        let (mut time_s, mut speed_mps, mut distance_m) = (0.0, self.from_mps, 0.0);
+        let (mut grown_mps2, mut acting_mps2) = (0.0_f64, 0.0);
+        while speed_mps > 0.0 {
+            let is_easing = self.is_soft && speed_mps < 0.5 * grown_mps2 * grown_mps2 / growth_mps3;
+            if time_s >= comes_s {
+                grown_mps2 = match is_easing {
+                    true => (grown_mps2 - growth_mps3 * step_s).max(0.1),
+                    false => (grown_mps2 + growth_mps3 * step_s).min(full_mps2),
+                };
+            }
+            acting_mps2 += (grown_mps2 - acting_mps2) * (step_s / self.lag_s).min(1.0);
+            let [a, b, c] = self.davis;
+            let w0 = a + speed_mps * (b + speed_mps * c);
+            let slope_mps2 = 1e-3 * STANDARD_GRAVITY_MPS2 * (w0 + gradient_permille);
+            let brake_mps2 = acting_mps2 * (1.0 + self.brake_std * force_off);
+            speed_mps -= step_s * (brake_mps2 + slope_mps2);
+            distance_m += step_s * speed_mps.max(0.0);
+            time_s += step_s;
+        }
+        distance_m
+    }
+
+    fn estimate(&self, gradient_permille: f64) -> StoppingEstimate {
+        let effort = constant(self.force_n);
+        let stop = Stop {
+            gradient_permille,
+            brake_scale: Uncertain::new(1.0, self.brake_std),
+            response: self.response,
+            ..Stop::level(self.from_mps, self.mass_kg, self.davis, &effort)
+        };
+        stop.estimate(0.95).unwrap()
+    }
+}
+
+const TRAM: Braked = Braked {
+    from_mps: 12.0,
+    mass_kg: 42_000.0,
+    davis: [5.0, 0.06, 0.0048],
+    force_n: 48_000.0,
+    response: BrakeResponse {
+        dead_time_s: 0.6,
+        jerk_limit_mps3: 0.8,
+        std_s: 0.1,
+        ..BrakeResponse::IMMEDIATE
+    },
+    lag_s: 0.25,
+    brake_std: 0.04,
+    is_soft: true,
+};
+
+const METRO: Braked = Braked {
+    from_mps: 20.0,
+    mass_kg: 230_000.0,
+    davis: [2.1, 0.02, 0.0016],
+    force_n: 220_000.0,
+    response: BrakeResponse { dead_time_s: 0.9, jerk_limit_mps3: 0.6, ..TRAM.response },
+    lag_s: 0.4,
+    ..TRAM
+};
+
+const FREIGHT: Braked = Braked {
+    from_mps: 22.0,
+    mass_kg: 1_500_000.0,
+    davis: [1.5, 0.015, 0.0009],
+    force_n: 750_000.0,
+    response: BrakeResponse {
+        dead_time_s: 3.0,
+        build_up_s: 20.0,
+        std_s: 1.0,
+        ..BrakeResponse::IMMEDIATE
+    },
+    lag_s: 0.5,
+    brake_std: 0.05,
+    is_soft: false,
+};
+
+#[test]
+fn stops_of_a_tram_a_metro_and_a_freight_train_keep_their_bounds() {
+    for (name, train, error_max_m) in
+        [("tram", TRAM, 1.0), ("metro", METRO, 1.0), ("freight", FREIGHT, 5.0)]
+    {
+        // Force and dead time by a lattice of rank 1, each stop on a gradient of its own.
+        let drawn = |index: i32, by: f64| normal_quantile((f64::from(index) * by + 0.5).fract());
+        let stops: Vec<(f64, bool)> = (0..200)
+            .map(|index| {
+                let gradient = f64::from(index % 5 - 2) * 4.0;
+                let force = drawn(index, 0.618_034).unwrap();
+                let time = drawn(index, 0.754_878).unwrap();
+                let found = train.estimate(gradient);
+                let driven_m = train.driven_m(gradient, force, time);
+                (driven_m - found.distance_m, driven_m <= found.distance_bound_m)
+            })
+            .collect();
+        let held = stops.iter().filter(|stop| stop.1).count();
+        let mean_m = stops.iter().map(|stop| stop.0).sum::<f64>() / stops.len() as f64;
+        println!("{name}: {held} of {} within the bound, mean error {mean_m:+.2} m", stops.len());
+        assert!(held >= 188, "{name}: {held}");
+        assert!(mean_m.abs() < error_max_m, "{name}: {mean_m}");
+    }
 }

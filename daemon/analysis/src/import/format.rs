@@ -26,6 +26,7 @@ pub(super) enum Kind {
     TtobenchTrain,
     TtobenchTrack,
     OsrdRollingStock,
+    OsrdBrake,
 }
 
 const ROLLING_STOCK: &str = "https://railtoolkit.org/schema/rolling-stock.json";
@@ -34,7 +35,7 @@ const VERSIONS: [&str; 2] = ["2022.05", "2024.07"];
 
 const EXPECTED: &str = "expected a railtoolkit rolling stock or running path (a key 'schema'), a \
                         TTOBench track or train ('metadata' with 'stops' or 'mass'), or an OSRD \
-                        rolling stock ('rolling_resistance')";
+                        rolling stock ('rolling_resistance') or brake ('gamma_emergency')";
 const RAILML: &str = "railML is not imported: its licence forbids an open implementation without \
                       certification; convert the file to railtoolkit's schema, or write train.toml \
                       and track.toml by hand";
@@ -77,7 +78,7 @@ pub(super) fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, Datas
     let has = |key: &str| root.has(key);
     let recognised = if has("schema") {
         Some(Format::Railtoolkit)
-    } else if has("rolling_resistance") {
+    } else if has("rolling_resistance") || has("gamma_emergency") {
         Some(Format::Osrd)
     } else if has("metadata") && (has("mass") || has("stops")) {
         Some(Format::Ttobench)
@@ -86,6 +87,7 @@ pub(super) fn kind_of(root: &Item, forced: Option<Format>) -> Result<Kind, Datas
     };
     match forced.or(recognised) {
         Some(Format::Railtoolkit) => railtoolkit(root),
+        Some(Format::Osrd) if has("gamma_emergency") => Ok(Kind::OsrdBrake),
         Some(Format::Osrd) => Ok(Kind::OsrdRollingStock),
         Some(Format::Ttobench) if has("mass") => Ok(Kind::TtobenchTrain),
         Some(Format::Ttobench) => Ok(Kind::TtobenchTrack),

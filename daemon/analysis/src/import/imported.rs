@@ -118,7 +118,7 @@ pub struct ImportedTrain {
     /// Name for people.
     pub name: String,
     /// Mass in kg.
-    pub mass_kg: f64,
+    pub mass_kg: Option<f64>,
     /// Length in m.
     pub length_m: Option<f64>,
     /// Number of cars.
@@ -129,6 +129,8 @@ pub struct ImportedTrain {
     pub resistance: Option<Davis>,
     /// Greatest traction force: (m/s, N), by speed.
     pub traction: Option<Vec<(f64, f64)>>,
+    /// Deceleration by all of the brake: (m/s, m/s²), by speed.
+    pub brake_mps2: Option<Vec<(f64, f64)>>,
     /// What became of the file's fields.
     pub account: Account,
 }

@@ -77,6 +77,7 @@ pub fn import(
             Kind::RunningPath => imported.lines.extend(running_path::lines(&root)?),
             Kind::TtobenchTrain => imported.trains.push(ttobench_train::train(&root)?),
             Kind::TtobenchTrack => imported.lines.push(ttobench_track::line(&root)?),
+            Kind::OsrdBrake => imported.trains.push(osrd::brake_alone(&root)?),
             Kind::OsrdRollingStock => imported.trains.push(osrd::train(&root, reading)?),
         }
     }

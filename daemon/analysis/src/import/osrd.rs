@@ -6,13 +6,14 @@
 use dynocar_model::train::{Davis, TrainModel};
 
 use super::imported::{Account, ImportedTrain, Reading, force_n};
+use crate::brakes::{Steps, read};
 use crate::dataset::document::{Item, above_zero};
 use crate::dataset::train_file::growing;
 use crate::dataset::{DatasetError, unusual_resistance};
 
 /// Why fields have no place, and which.
 const WITHOUT_PLACE: [(&str, &str); 9] = [
-    ("a deceleration, no force: write [brake] by hand", "const_gamma, gamma, etcs_brake_params"),
+    ("a deceleration, no force: write [brake] by hand", "const_gamma, gamma"),
     ("no limit of speed has a place", "max_speed"),
     (
         "train.toml holds no way of starting up",
@@ -56,12 +57,17 @@ pub(super) fn train(root: &Item, reading: &Reading) -> Result<ImportedTrain, Dat
         Some(name) => name.text("a name")?,
         None => "unnamed train",
     };
+    let brake_mps2 = match root.get("etcs_brake_params") {
+        Some(item) => Some(brake(&item, "etcs_brake_params.", &mut account)?),
+        None => None,
+    };
     account.rest("", root, &WITHOUT_PLACE);
     Ok(ImportedTrain {
         id: name.into(),
         place: root.place(),
         name: name.into(),
-        mass_kg,
+        mass_kg: Some(mass_kg),
+        brake_mps2,
         length_m,
         cars: None,
         rotating_mass_factor: inertia.map(|inertia| inertia - 1.0),
@@ -69,6 +75,51 @@ pub(super) fn train(root: &Item, reading: &Reading) -> Result<ImportedTrain, Dat
         traction,
         account,
     })
+}
+
+/// A brake alone, as `dynocar brakes` writes it.
+pub(super) fn brake_alone(root: &Item) -> Result<ImportedTrain, DatasetError> {
+    let mut account = Account::default();
+    let brake_mps2 = Some(brake(root, "", &mut account)?);
+    for key in ["mass_t", "length_m", "rotating_mass_factor", "a, b, c"] {
+        account.unknown(key, "the file holds a brake alone");
+    }
+    account.rest("", root, &[]);
+    Ok(ImportedTrain {
+        id: "brake".into(),
+        place: root.place(),
+        name: "unnamed train".into(),
+        mass_kg: None,
+        length_m: None,
+        cars: None,
+        rotating_mass_factor: None,
+        resistance: None,
+        traction: None,
+        brake_mps2,
+        account,
+    })
+}
+
+/// The emergency deceleration over speed; a step is one over 0.01 m/s.
+fn brake(
+    item: &Item,
+    prefix: &str,
+    account: &mut Account,
+) -> Result<Vec<(f64, f64)>, DatasetError> {
+    let Steps { boundaries, values } = read(item)?.gamma_emergency;
+    let how = "m/s² times the inertial mass, under [brake]";
+    account.taken(&format!("{prefix}gamma_emergency"), "effort", how);
+    let others = "gamma_service, gamma_normal_service, k_dry, k_wet, k_n_pos, k_n_neg, \
+                  t_traction_cut_off, t_bs1, t_bs2, t_be";
+    let why = "read; train.toml holds the brake's greatest force alone";
+    for key in others.split(", ").filter(|key| item.has(key)) {
+        account.left(&format!("{prefix}{key}"), why);
+    }
+    let mut points = vec![(0.0, values[0])];
+    for (boundary_mps, pair) in boundaries.iter().zip(values.windows(2)) {
+        points.extend([(*boundary_mps, pair[0]), (boundary_mps + 0.01, pair[1])]);
+    }
+    Ok(points)
 }
 
 fn resistance(

@@ -10,7 +10,7 @@ use dynocar_core::filter::{Gaussian, NotPositiveDefinite};
 const SPEED: usize = 0;
 const DECELERATION: usize = 1;
 /// Fewest samples of a stop.
-const SAMPLES_MIN: usize = 10;
+const SAMPLES_MIN: usize = 4;
 /// A normalised innovation beyond which a speed counts less (Huber 1964).
 const HUBER: f64 = 3.0;
 /// The brake builds up until the deceleration reaches this share of what follows...

@@ -7,6 +7,8 @@ use dynocar_model::train::EffortCurve;
 use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
 
+use crate::statistics::middle;
+
 /// Below this speed in m/s a driver may let the brake go, so that the stop is soft.
 const SOFT_MPS: f64 = 2.0;
 /// Without a record of the brake, a train that loses less than this in m/s² is not braking.
@@ -15,20 +17,27 @@ const BRAKING_MPS2: f64 = 0.2;
 const LOOK_BACK_S: f64 = 3.0;
 /// Share of the brake's effort from which on it is applied at all.
 const APPLIED_AT_ALL: f64 = 0.1;
-/// Without a record of the brake, a driver eases and renews it at a platform: it is applied as long as
-/// the train loses this much in m/s²...
-const EASED_MPS2: f64 = 0.1;
-/// ... over this time in s.
-const EASED_LOOK_S: f64 = 10.0;
-/// A longer time in s between two samples ends a stop.
-const GAP_MAX_S: f64 = 3.0;
+/// Without a record of the brake, a driver eases and renews it on the way down and creeps to the mark: the
+/// fall goes on where the train was faster by this rate in m/s²...
+const FALLING_MPS2: f64 = 0.08;
+/// ... and a step of a coarse recorder in m/s...
+const STEP_MPS: f64 = 0.3;
+/// ... at some moment of this time in s before...
+const EASED_S: f64 = 15.0;
+/// ... or, slower than this in m/s, creeping, of this time in s.
+const CREEPING: (f64, f64) = (2.5, 40.0);
+/// A longer time in s between two samples, or so many usual ones, ends a stop.
+const GAP_MAX: (f64, f64) = (3.0, 1.6);
+/// A recorder that pauses while a slow train stands may leave out the standstill: the train could come to it
+/// in the pause at this deceleration in m/s².
+const COMES_TO_STAND_MPS2: f64 = 0.5;
 
 /// What counts as a stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FindSettings {
     /// Least share of the brake's effort that counts as applied.
     pub share_min: f64,
-    /// Slowest speed in m/s that a stop starts from.
+    /// Slowest speed in m/s that a train has to reach before it stops again.
     pub from_mps: f64,
 }
 
@@ -59,7 +68,29 @@ pub struct Stop {
     pub found_by: FoundBy,
 }
 
-/// The stops of a run, in order. Recorders may pause while the train stands.
+/// The samples with a speed, each later than the one before, with the standstills that a pausing recorder left
+/// out.
+pub fn usable(samples: &[TrainSample]) -> Vec<TrainSample> {
+    let mut usable: Vec<TrainSample> = Vec::with_capacity(samples.len());
+    for sample in samples.iter().filter(|it| it.speed_mps.is_finite()) {
+        if let Some(&last) = usable.last() {
+            if sample.time_ns <= last.time_ns {
+                continue;
+            }
+            let pause_s = 1e-9 * (sample.time_ns - last.time_ns) as f64;
+            let stops_s = last.speed_mps / COMES_TO_STAND_MPS2;
+            let is_slow = last.speed_mps.max(sample.speed_mps) <= CREEPING.0;
+            if is_slow && last.speed_mps > STANDING_MPS && pause_s > GAP_MAX.0.max(2.0 * stops_s) {
+                let time_ns = last.time_ns + (1e9 * stops_s) as i64;
+                usable.push(TrainSample { time_ns, speed_mps: 0.0, ..last });
+            }
+        }
+        usable.push(*sample);
+    }
+    usable
+}
+
+/// The stops of a run of [`usable`] samples, in order.
 pub fn find(
     samples: &[TrainSample],
     brake: Option<&EffortCurve>,
@@ -68,40 +99,115 @@ pub fn find(
     let full = applied(samples, brake, settings.share_min);
     let at_all = applied(samples, brake, APPLIED_AT_ALL.min(settings.share_min));
     let found_by = if full.is_some() { FoundBy::Brake } else { FoundBy::Speed };
-    let is_applied =
-        |applied: &Option<Vec<bool>>, index: usize, look_s: f64, least_mps2: f64| match applied {
-            Some(applied) => applied[index] || samples[index].speed_mps < SOFT_MPS,
-            None => loses_speed(samples, index, look_s, least_mps2),
-        };
-    let is_full = |index: usize| is_applied(&full, index, LOOK_BACK_S, BRAKING_MPS2);
-    let is_any = |index: usize| is_applied(&at_all, index, EASED_LOOK_S, EASED_MPS2);
+    let gap_max_s = GAP_MAX.0.max(GAP_MAX.1 * usual_interval_s(samples));
+    let start = |end: usize, applied: &Option<Vec<bool>>| match applied {
+        Some(applied) => start(samples, end, gap_max_s, |index| {
+            applied[index] || samples[index].speed_mps < SOFT_MPS
+        }),
+        None => start(samples, end, gap_max_s, |index| loses_speed(samples, index)),
+    };
     let ends = (1..samples.len()).filter(|&index| {
         samples[index].speed_mps <= STANDING_MPS && samples[index - 1].speed_mps > STANDING_MPS
     });
     let is_fast = |index: &usize| samples[*index].speed_mps >= settings.from_mps;
     let stop = |end: usize| {
-        let full_from = Some(start(samples, end, is_full)).filter(is_fast);
-        let mut from = start(samples, end, is_any);
-        // A long look sees the brake before it comes.
-        while at_all.is_none() && from < end && !is_full(from) {
-            from += 1;
-        }
+        let mut full_from = Some(start(end, &full)).filter(is_fast);
+        let from = match &at_all {
+            Some(_) => Some(start(end, &at_all)).filter(is_fast),
+            None => None,
+        };
+        let from = match from {
+            Some(from) => from,
+            None => {
+                let from = fall(samples, end, gap_max_s);
+                // A brake that was eased before it was applied in full is the driver's.
+                let soon_s = time_s(samples, from) + gap_max_s;
+                let is_soon = |it: &usize| at_all.is_some() || time_s(samples, *it) <= soon_s;
+                full_from = full_from.filter(is_soon);
+                from
+            }
+        };
         let from = full_from.map_or(from, |full| full.min(from));
-        is_fast(&from).then_some(Stop { samples: from..=end, full_from, found_by })
+        Stop { samples: from..=end, full_from, found_by }
     };
-    ends.filter_map(stop).collect()
+    // A train that only moved up has not stopped again.
+    let runs = ends.filter(|&end| {
+        let since = samples[..end].iter().rev().take_while(|it| it.speed_mps > STANDING_MPS);
+        since.map(|it| it.speed_mps).fold(0.0, f64::max) >= settings.from_mps
+    });
+    runs.map(stop).collect()
+}
+
+/// The time in s between most samples.
+fn usual_interval_s(samples: &[TrainSample]) -> f64 {
+    let mut intervals: Vec<f64> =
+        samples.windows(2).map(|it| 1e-9 * (it[1].time_ns - it[0].time_ns) as f64).collect();
+    middle(&mut intervals).unwrap_or(0.0)
 }
 
 /// The first sample from which on the brake is applied until the end of a stop.
-fn start(samples: &[TrainSample], end: usize, is_braking: impl Fn(usize) -> bool) -> usize {
-    let follows = |index: usize| time_s(samples, index) - time_s(samples, index - 1) <= GAP_MAX_S;
+fn start(
+    samples: &[TrainSample],
+    end: usize,
+    gap_max_s: f64,
+    is_braking: impl Fn(usize) -> bool,
+) -> usize {
     let mut from = end;
-    while from > 0 && follows(from) && is_braking(from - 1) {
+    while from > 0 && follows(samples, from, gap_max_s) && is_braking(from - 1) {
         from -= 1;
     }
-    // What is left of an earlier stop at the same place belongs to that.
-    let stood = (from..end).rev().find(|&at| samples[at].speed_mps <= STANDING_MPS);
-    stood.map_or(from, |stood| stood + 1)
+    from
+}
+
+/// Whether a sample goes on with the motion that the one before it belongs to.
+fn follows(samples: &[TrainSample], index: usize, gap_max_s: f64) -> bool {
+    let is_moving = samples[index - 1].speed_mps > STANDING_MPS;
+    is_moving && time_s(samples, index) - time_s(samples, index - 1) <= gap_max_s
+}
+
+/// The last sample at which the speed began to fall to a standstill, with the brake eased on the way or not.
+fn fall(samples: &[TrainSample], end: usize, gap_max_s: f64) -> usize {
+    let mut from = end;
+    loop {
+        let (now_s, speed_mps) = (time_s(samples, from), samples[from].speed_mps);
+        let eased_s = if speed_mps <= CREEPING.0 { CREEPING.1 } else { EASED_S };
+        let (mut at, mut before) = (from, None);
+        while at > 0 && before.is_none() && follows(samples, at, gap_max_s) {
+            at -= 1;
+            let over_s = now_s - time_s(samples, at);
+            let gained_mps = samples[at].speed_mps - speed_mps;
+            if over_s > eased_s || gained_mps < -2.0 * STEP_MPS {
+                break;
+            }
+            let rate_mps2 = if speed_mps <= CREEPING.0 { 0.0 } else { FALLING_MPS2 };
+            before = (gained_mps >= rate_mps2 * over_s + STEP_MPS).then_some(at);
+        }
+        match before {
+            Some(at) => from = at,
+            None => break,
+        }
+    }
+    while from > 0
+        && follows(samples, from, gap_max_s)
+        && samples[from - 1].speed_mps > samples[from].speed_mps
+    {
+        from -= 1;
+    }
+    from
+}
+
+/// Where between its first two samples a stop began, that goes on as it is seen from the second one on: its time in ns.
+pub fn began_ns(samples: &[TrainSample]) -> i64 {
+    let [first, second, .., _] = samples else { return samples[0].time_ns };
+    let over_s = 1e-9 * (second.time_ns - first.time_ns) as f64;
+    let until_s = 1e-9 * second.time_ns as f64 + GAP_MAX.0.max(1.5 * over_s);
+    let later = samples[2..].iter().find(|it| 1e-9 * it.time_ns as f64 >= until_s);
+    let later = later.unwrap_or(&samples[samples.len() - 1]);
+    let rate_mps2 =
+        (second.speed_mps - later.speed_mps) / (1e-9 * (later.time_ns - second.time_ns) as f64);
+    let fell_s = (first.speed_mps - second.speed_mps) / rate_mps2;
+    let late_s = if fell_s.is_finite() { (over_s - fell_s).clamp(0.0, 0.99 * over_s) } else { 0.0 };
+    first.time_ns + (1e9 * late_s) as i64
 }
 
 /// Whether the brake is applied at each sample; `None` where no sample shows it.
@@ -123,17 +229,15 @@ fn applied(
     is_known.then_some(applied)
 }
 
-/// Whether a train loses so much in m/s² over a time in s after a sample, or until it stands.
-fn loses_speed(samples: &[TrainSample], index: usize, look_s: f64, least_mps2: f64) -> bool {
-    let lost = |from: usize, to: usize| {
-        let over_s = time_s(samples, to) - time_s(samples, from);
-        over_s > 0.0 && samples[from].speed_mps - samples[to].speed_mps >= least_mps2 * over_s
-    };
-    let now_s = time_s(samples, index);
-    let later = (index..samples.len()).find(|&it| time_s(samples, it) >= now_s + look_s);
-    let later = later.unwrap_or(samples.len() - 1);
-    let stands = (index..=later).find(|&it| samples[it].speed_mps <= STANDING_MPS);
-    lost(index, stands.unwrap_or(later))
+/// Whether a train brakes in the time after a sample, or until it stands.
+fn loses_speed(samples: &[TrainSample], index: usize) -> bool {
+    let later_s = time_s(samples, index) + LOOK_BACK_S;
+    let is_over =
+        |it: &usize| time_s(samples, *it) >= later_s || samples[*it].speed_mps <= STANDING_MPS;
+    let later = (index..samples.len()).find(is_over).unwrap_or(samples.len() - 1);
+    let over_s = time_s(samples, later) - time_s(samples, index);
+    let lost_mps = samples[index].speed_mps - samples[later].speed_mps;
+    over_s > 0.0 && lost_mps >= BRAKING_MPS2 * over_s
 }
 
 fn time_s(samples: &[TrainSample], index: usize) -> f64 {
@@ -191,6 +295,6 @@ mod tests {
         let soft = run(|time_s| Some(if (59.9..78.5).contains(&time_s) { 100e3 } else { 0.0 }));
         assert_eq!(starts_s(&soft).len(), 1);
         let released = run(|time_s| Some(if (59.9..70.0).contains(&time_s) { 100e3 } else { 0.0 }));
-        assert!(found(&released).is_empty());
+        let [Stop { full_from: None, .. }] = found(&released)[..] else { panic!("one stop") };
     }
 }

@@ -98,7 +98,7 @@ fn with_brake(train: &TrainModel, curve: &Curve) -> Option<TrainModel> {
         ratio: Some(1.0),
         friction: Some(DECLARED_FRICTION),
         pads: Some(force_n / per_pad_n),
-        friction_brake: None,
+        ..BrakeGear::default()
     };
     (force_n > 0.0).then(|| TrainModel { brake_gear: gear, ..train.clone() })
 }

@@ -1,5 +1,6 @@
 //! Deceleration over speed of all stops, how much stops differ, and how long the next one is.
 
+use dynocar_shared::{BrakeResponse, EffortPoint, Stop, StoppingEstimate, Uncertain};
 use serde::Serialize;
 
 use super::curve::{Curve, Point};
@@ -8,6 +9,8 @@ use super::curve::{Curve, Point};
 const GRID_MPS: f64 = 1.0;
 /// What the assumed repeatability counts for: as much as that of so many stops more than one.
 const ASSUMED_FREEDOM: f64 = 4.0;
+/// Relative standard deviation of the response of a stop that is assumed likewise.
+const ASSUMED_RESPONSE: f64 = 0.1;
 /// Standard normal quantile of a bound that 95 % of stops keep.
 const BOUND: f64 = 1.645;
 
@@ -26,18 +29,74 @@ pub struct LawPoint {
     pub stops: usize,
 }
 
+/// How the brake came after its command.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Response {
+    /// Time in s without brake.
+    pub dead_time_s: f64,
+    /// Time in s over which the deceleration then grows to its full value.
+    pub build_up_s: f64,
+    /// Standard deviation in s from stop to stop of the time that a stop loses until then.
+    pub std_s: f64,
+}
+
+impl Response {
+    /// That of some stops, each by the time it loses and the moment of that loss, as a ramp has them.
+    fn of(built: &[(&Curve, &Point)]) -> Self {
+        let count = built.len() as f64;
+        let losses: Vec<[f64; 2]> = built.iter().map(|(curve, from)| lost(curve, from)).collect();
+        let mean = |k: usize| losses.iter().map(|it| it[k]).sum::<f64>() / count;
+        let lost_s = mean(0).max(0.0);
+        let squares = losses.iter().map(|it| (it[0] - lost_s).powi(2)).sum::<f64>();
+        // A ramp of T s after d s: the loss is d + T/2, its first moment (d + T/2)²/2 + T²/24.
+        let build_up_s = (24.0 * (mean(1) - 0.5 * lost_s * lost_s)).max(0.0).sqrt();
+        let build_up_s = build_up_s.min(2.0 * lost_s);
+        let assumed = ASSUMED_FREEDOM * (ASSUMED_RESPONSE * lost_s).powi(2);
+        Response {
+            dead_time_s: lost_s - 0.5 * build_up_s,
+            build_up_s,
+            std_s: ((assumed + squares) / (ASSUMED_FREEDOM + count - 1.0)).sqrt(),
+        }
+    }
+
+    /// The same for a stop that is asked about.
+    pub fn shared(&self) -> BrakeResponse {
+        let Response { dead_time_s, build_up_s, std_s } = *self;
+        BrakeResponse { dead_time_s, build_up_s, std_s, ..BrakeResponse::IMMEDIATE }
+    }
+
+    /// Time in s that a stop loses, as if the brake then came at once.
+    pub fn lost_s(&self) -> f64 {
+        self.dead_time_s + 0.5 * self.build_up_s
+    }
+}
+
+/// Time in s that a stop lost until its brake had built up, and the first moment of that loss in s².
+fn lost(curve: &Curve, from: &Point) -> [f64; 2] {
+    let lost_s = from.time_s - (curve.from_mps() - from.speed_mps) / from.deceleration_mps2;
+    let pairs = curve.points.windows(2).take_while(|it| it[1].time_s <= from.time_s);
+    let moment = pairs.map(|it| {
+        let share =
+            0.5 * (it[0].deceleration_mps2 + it[1].deceleration_mps2) / from.deceleration_mps2;
+        0.5 * (it[1].time_s.powi(2) - it[0].time_s.powi(2)) * (1.0 - share)
+    });
+    [lost_s, moment.sum()]
+}
+
 /// Deceleration over speed, and how much stops differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Law {
     /// The speeds, growing.
     pub points: Vec<LawPoint>,
-    /// Time in s that a stop loses while the brake builds up, as if it then came at once.
-    pub response_s: f64,
+    /// How the brake comes after its command.
+    pub response: Response,
     /// Standard deviation of a stop's deceleration over the law's: from the stops, and what was
     /// assumed beforehand.
     pub repeatability: f64,
     /// Degrees of freedom of the repeatability.
     pub freedom: f64,
+    /// Each stop's deceleration over the law's, the mean over the speeds, from weak to strong.
+    pub factors: Vec<f64>,
     /// Number of stops.
     pub stops: usize,
 }
@@ -53,6 +112,15 @@ pub struct StoppingDistance {
     pub time_s: f64,
     /// 95 % of stops are no longer, in m.
     pub distance_bound_m: f64,
+}
+
+/// Where a stop is asked about; the default is the line of the stops that the law is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gradient {
+    /// Gradient in ‰, climbing positive, above that of the law's stops.
+    pub permille: f64,
+    /// gamma: how much less it acts than on a train without rotating parts.
+    pub rotating_mass_factor: f64,
 }
 
 impl Law {
@@ -91,7 +159,10 @@ impl Law {
         if points.is_empty() || points.iter().any(|point| point.deceleration_mps2 <= 0.0) {
             return None;
         }
-        let squares = factors.iter().filter(|it| it.1 > 0.0).map(|(f, n)| (f / n - 1.0).powi(2));
+        let means = factors.iter().filter(|it| it.1 > 0.0).map(|(sum, count)| sum / count);
+        let mut factors: Vec<f64> = means.collect();
+        factors.sort_by(f64::total_cmp);
+        let squares = factors.iter().map(|factor| (factor - 1.0).powi(2));
         let freedom = ASSUMED_FREEDOM + built.len() as f64 - 1.0;
         let assumed = ASSUMED_FREEDOM * assumed_repeatability * assumed_repeatability;
         let repeatability = ((assumed + squares.sum::<f64>()) / freedom).sqrt();
@@ -100,22 +171,15 @@ impl Law {
             let next = own * (1.0 + 1.0 / point.stops as f64).sqrt();
             point.next_std_mps2 = next.hypot(point.std_mps2);
         }
-        let responses = built.iter().map(|(curve, from)| {
-            from.time_s - (curve.from_mps() - from.speed_mps) / from.deceleration_mps2
-        });
-        let response_s = responses.sum::<f64>().max(0.0) / built.len() as f64;
-        Some(Law { points, response_s, repeatability, freedom, stops: built.len() })
+        let response = Response::of(&built);
+        Some(Law { points, response, repeatability, freedom, factors, stops: built.len() })
     }
 
-    /// Deceleration in m/s² at a speed within what was driven; below the slowest as there.
-    fn deceleration_mps2(&self, speed_mps: f64) -> f64 {
-        let after = self.points.partition_point(|point| point.speed_mps <= speed_mps);
-        let clamp = |index: usize| &self.points[index.min(self.points.len() - 1)];
-        let (low, high) = (clamp(after.saturating_sub(1)), clamp(after));
-        let span = high.speed_mps - low.speed_mps;
-        let share = if span > 0.0 { (speed_mps - low.speed_mps) / span } else { 0.0 };
-        let share = share.clamp(0.0, 1.0);
-        low.deceleration_mps2 + share * (high.deceleration_mps2 - low.deceleration_mps2)
+    /// Takes a deceleration in m/s² over speed out of the law, as that by the resistance.
+    pub fn take_out(&mut self, deceleration_mps2: impl Fn(f64) -> f64) {
+        for point in &mut self.points {
+            point.deceleration_mps2 -= deceleration_mps2(point.speed_mps);
+        }
     }
 
     /// The fastest speed in m/s that a stop was seen from.
@@ -123,25 +187,39 @@ impl Law {
         self.points[self.points.len() - 1].speed_mps
     }
 
-    /// How long the next stop from a speed is; `None` above the speeds of the stops.
-    pub fn stopping_distance(&self, from_mps: f64) -> Option<StoppingDistance> {
+    /// How long the next stop from a speed on a gradient is; `None` above the speeds of the stops, and where it does
+    /// not stop.
+    pub fn stopping_distance(
+        &self,
+        from_mps: f64,
+        gradient: &Gradient,
+    ) -> Option<StoppingDistance> {
         // While the brake builds up, a stop loses a few steps of the grid.
         if !(0.0..self.fastest_mps() + 3.0 * GRID_MPS).contains(&from_mps) {
             return None;
         }
-        let steps = (from_mps / (0.05 * GRID_MPS)).ceil().max(1.0);
-        let step_mps = from_mps / steps;
-        let (mut distance_m, mut time_s) = (0.0, 0.0);
-        for k in 0..steps as u32 {
-            let speed_mps = step_mps * (f64::from(k) + 0.5);
-            let over_s = step_mps / self.deceleration_mps2(speed_mps);
-            time_s += over_s;
-            distance_m += speed_mps * over_s;
-        }
-        distance_m += from_mps * self.response_s;
-        let spread = self.repeatability * (1.0 + 1.0 / self.stops as f64).sqrt();
-        let distance_bound_m = distance_m * (1.0 + student(BOUND, self.freedom) * spread);
-        let time_s = time_s + self.response_s;
+        let inertia = 1.0 + gradient.rotating_mass_factor;
+        let effort: Vec<EffortPoint> = self
+            .points
+            .iter()
+            .map(|it| EffortPoint {
+                speed_mps: it.speed_mps,
+                force_n: inertia * it.deceleration_mps2,
+            })
+            .collect();
+        let stop = Stop {
+            rotating_mass_factor: gradient.rotating_mass_factor,
+            gradient_permille: gradient.permille,
+            response: BrakeResponse { std_s: 0.0, ..self.response.shared() },
+            ..Stop::level(from_mps, 1.0, [0.0; 3], &effort)
+        };
+        let StoppingEstimate { distance_m, time_s, .. } = stop.estimate(0.95).ok()?;
+        let next = (1.0 + 1.0 / self.stops as f64).sqrt();
+        let weaker = student(BOUND, self.freedom) * self.repeatability * next;
+        let weaker = Stop { brake_scale: Uncertain::exact(1.0 - weaker), ..stop };
+        let later_m = student(BOUND, self.freedom) * self.response.std_s * next * from_mps;
+        let bound_m = weaker.estimate(0.95).ok()?.distance_m - distance_m;
+        let distance_bound_m = distance_m + bound_m.hypot(later_m);
         Some(StoppingDistance { from_mps, distance_m, time_s, distance_bound_m })
     }
 }

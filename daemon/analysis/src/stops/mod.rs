@@ -6,16 +6,21 @@
 //! - [`Law`]: deceleration over speed of all stops, and how much stops differ
 //! - [`StoppingDistance`]: how long the next stop is, with a bound
 //! - [`friction`]: the pipelines of Jin 2020 and Xie 2019 over a stop, fed with a brake of unknown force
+//! - [`Day`]: all stops together, whatever the driver wanted
 //! - [`Study`]: all of it over a dataset
 
 mod curve;
+mod day;
 mod find;
 mod friction;
 mod law;
+mod recorded;
 mod study;
 
 pub use curve::{Curve, Point};
+pub use day::{Day, DecelerationSpread, FromSpeed, Spread};
 pub use find::{FindSettings, FoundBy, Stop, find};
 pub use friction::{FrictionPoint, friction};
-pub use law::{Law, LawPoint, StoppingDistance};
-pub use study::{Manner, RecordedStop, Study, StudySettings};
+pub use law::{Gradient, Law, LawPoint, Response, StoppingDistance};
+pub use recorded::{Manner, RecordedStop};
+pub use study::{Study, StudySettings};

@@ -1,12 +1,18 @@
 //! All of it over a dataset: the law from the stops of fit runs, tried on those held out.
 
-use dynocar_shared::TrainSample;
+use dynocar_model::terms::gradient;
+use dynocar_model::terms::wheel::STANDING_MPS;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
+use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
 
 use super::curve::{Curve, Point};
-use super::find::{FindSettings, FoundBy, find};
-use super::friction::{FrictionPoint, friction};
-use super::law::{Law, StoppingDistance};
+use super::day::Day;
+use super::find::{FindSettings, FoundBy, began_ns, find, usable};
+use super::friction::friction;
+use super::law::{Gradient, Law, StoppingDistance};
+use super::recorded::{Manner, RecordedStop};
 use crate::dataset::{Dataset, GradientSource, Role, Run};
 
 /// How stops are found, and what is assumed of them.
@@ -18,45 +24,6 @@ pub struct StudySettings {
     pub repeatability: f64,
 }
 
-/// How a train was brought to a stand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Manner {
-    /// By all of the brake from its command on.
-    Full,
-    /// As the driver wanted: the deceleration is his, and no law of the brake.
-    Modulated,
-}
-
-/// A recorded stop.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RecordedStop {
-    /// The run's file.
-    pub file: String,
-    /// What the run is for.
-    pub role: Role,
-    /// Time in s at which the brake was applied, as in the file.
-    pub from_s: f64,
-    /// Speed in m/s then.
-    pub from_mps: f64,
-    /// Distance in m from then to standstill.
-    pub distance_m: f64,
-    /// Time in s from then to standstill.
-    pub time_s: f64,
-    /// What showed that the brake was applied.
-    pub found_by: FoundBy,
-    /// Whether the brake was applied in full.
-    pub manner: Manner,
-    /// Why it shows no law of the brake; `None` for a stop that does.
-    pub no_law: Option<String>,
-    /// Deceleration over speed, from fast to slow, of a stop that shows no law.
-    pub decelerations: Vec<Point>,
-    /// For a stop held out: what the law said of it.
-    pub predicted: Option<StoppingDistance>,
-    /// The friction behind it.
-    pub friction: Vec<FrictionPoint>,
-}
-
 /// What the stops of a dataset say.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
@@ -66,6 +33,8 @@ pub struct Study {
     pub law: Option<Law>,
     /// How long the next stop is, from slow to fast.
     pub distances: Vec<StoppingDistance>,
+    /// All stops together: from which speeds how long, how hard, and how long the train stood.
+    pub day: Day,
     /// What these stops do not determine.
     pub cannot_tell: Vec<String>,
 }
@@ -74,7 +43,15 @@ impl Study {
     /// Studies the stops of a dataset; predicts the next one from some speeds in m/s, or from
     /// steps of 5 m/s and the fastest when there are none.
     pub fn of(dataset: &Dataset, settings: &StudySettings, from_mps: &[f64]) -> Self {
-        let found = dataset.runs.iter().flat_map(|run| found_in(dataset, run, settings));
+        Study::of_all(std::slice::from_ref(dataset), settings, from_mps)
+    }
+
+    /// Studies the stops of several datasets of one train together.
+    pub fn of_all(datasets: &[Dataset], settings: &StudySettings, from_mps: &[f64]) -> Self {
+        let found = datasets
+            .iter()
+            .flat_map(|dataset| dataset.runs.iter().map(move |run| (dataset, run)))
+            .flat_map(|(dataset, run)| found_in(dataset, run, settings));
         let (mut stops, curves): (Vec<RecordedStop>, Vec<Curve>) = found.unzip();
         let is = |stop: &RecordedStop, role| stop.role == role && stop.manner == Manner::Full;
         let of_law = stops.iter().zip(curves).filter(|(stop, _)| is(stop, Role::Fit));
@@ -88,51 +65,90 @@ impl Study {
             }
             _ => from_mps.to_vec(),
         };
-        let predict = |speed_mps: f64| law.as_ref()?.stopping_distance(speed_mps);
-        let distances = speeds.into_iter().filter_map(predict).collect();
+        let rotating_mass_factor =
+            datasets.first().map_or(0.0, |dataset| dataset.train.rotating_mass_factor);
+        let predict = |speed_mps: f64, permille: f64| {
+            let gradient = Gradient { permille, rotating_mass_factor };
+            law.as_ref()?.stopping_distance(speed_mps, &gradient)
+        };
+        let distances = speeds.into_iter().filter_map(|it| predict(it, 0.0)).collect();
         for stop in stops.iter_mut().filter(|stop| is(stop, Role::Holdout)) {
-            stop.predicted = predict(stop.from_mps);
+            stop.predicted = predict(stop.from_mps, stop.gradient_permille.unwrap_or(0.0));
         }
-        let cannot_tell = cannot_tell(dataset, &stops, law.as_ref());
-        Study { stops, distances, cannot_tell, law }
+        let cannot_tell = cannot_tell(datasets, &stops, law.as_ref());
+        let day = Day::of(&stops);
+        Study { stops, distances, day, cannot_tell, law }
     }
 }
 
 /// The stops of a run, each with its curve.
 fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(RecordedStop, Curve)> {
-    let samples = usable(&run.samples);
-    let stops = find(&samples, dataset.train.brake.as_ref(), &settings.find);
+    let mut all = usable(&run.samples);
+    let stops = find(&all, dataset.train.brake.as_ref(), &settings.find);
+    for stop in stops.iter().filter(|it| it.found_by == FoundBy::Speed) {
+        all[*stop.samples.start()].time_ns = began_ns(&all[stop.samples.clone()]);
+    }
     let studied = stops.into_iter().filter_map(|stop| {
         let end = *stop.samples.end();
-        let full = stop.full_from.and_then(|from| Curve::of(&samples[from..=end]));
-        let no_law = why_no_law(full.as_ref(), stop.found_by, settings.find.share_min);
-        let (from, curve) = match (full, stop.full_from, &no_law) {
-            (Some(curve), Some(from), None) => (from, curve),
-            _ => (*stop.samples.start(), Curve::of(&samples[stop.samples])?),
+        let full = stop.full_from.and_then(|from| Curve::of(&all[from..=end]));
+        let slid = all[stop.samples.clone()].iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0);
+        let no_law = match slid {
+            true => Some("the wheels slid: their speed is not the train's".into()),
+            false => why_no_law(full.as_ref(), stop.found_by, settings.find.share_min),
         };
-        let samples = &samples[from..=end];
+        let (from, mut curve) = match (full, stop.full_from, &no_law) {
+            (Some(curve), Some(from), None) => (from, curve),
+            _ => (*stop.samples.start(), Curve::of(&all[stop.samples])?),
+        };
+        let samples = &all[from..=end];
         let is_full = no_law.is_none();
         let friction = match is_full {
             true => friction(samples, &curve, &dataset.train, dataset.track.as_ref()),
             false => Vec::new(),
         };
+        let gradient_permille = level(&mut curve, samples, dataset);
+        let moves = all[end..].iter().find(|it| it.speed_mps > STANDING_MPS);
+        let dwell_s = moves.map(|it| 1e-9 * (it.time_ns - all[end].time_ns) as f64);
+        let time_s = curve.points.last()?.time_s;
         let stop = RecordedStop {
             file: run.file.clone(),
             role: run.role,
             from_s: 1e-9 * samples[0].time_ns as f64,
             from_mps: curve.from_mps(),
             distance_m: curve.distance_m(),
-            time_s: curve.points.last()?.time_s,
+            time_s,
+            mean_deceleration_mps2: curve.from_mps() / time_s,
+            dwell_s,
+            gradient_permille,
             found_by: stop.found_by,
             manner: if is_full { Manner::Full } else { Manner::Modulated },
             no_law,
-            decelerations: if is_full { Vec::new() } else { decelerations(&curve) },
+            decelerations: decelerations(&curve),
             predicted: None,
             friction,
         };
         Some((stop, curve))
     });
     studied.collect()
+}
+
+/// Takes the gradient, where every sample knows it, out of a stop's decelerations; its mean in ‰ along the travel.
+fn level(curve: &mut Curve, samples: &[TrainSample], dataset: &Dataset) -> Option<f64> {
+    let train = &dataset.train;
+    let at = |sample: &TrainSample| {
+        let direction = f64::from(sample.direction);
+        let on_track = || {
+            let at = (sample.get(SampleField::Position)?, direction);
+            gradient::along_travel_permille(dataset.track.as_deref()?, at, train.length_m, 0.0)
+        };
+        on_track().or_else(|| Some(direction * sample.get(SampleField::Gradient)?))
+    };
+    let permille: Vec<f64> = samples.iter().map(at).collect::<Option<_>>()?;
+    let inertia = 1.0 + train.rotating_mass_factor;
+    for (point, permille) in curve.points.iter_mut().zip(&permille) {
+        point.deceleration_mps2 -= 1e-3 * STANDARD_GRAVITY_MPS2 * permille / inertia;
+    }
+    Some(permille.iter().sum::<f64>() / permille.len() as f64)
 }
 
 /// Why a stop shows no law of the brake; `full` is its part under all of the brake.
@@ -166,20 +182,10 @@ fn decelerations(curve: &Curve) -> Vec<Point> {
     (1..=fastest).rev().filter_map(at).collect()
 }
 
-/// The samples with a speed, each later than the one before.
-fn usable(samples: &[TrainSample]) -> Vec<TrainSample> {
-    let mut last_ns = i64::MIN;
-    let is_usable = |sample: &&TrainSample| {
-        let is_later = sample.time_ns > last_ns && sample.speed_mps.is_finite();
-        last_ns = if is_later { sample.time_ns } else { last_ns };
-        is_later
-    };
-    samples.iter().filter(is_usable).copied().collect()
-}
-
-fn cannot_tell(dataset: &Dataset, found: &[RecordedStop], law: Option<&Law>) -> Vec<String> {
+fn cannot_tell(datasets: &[Dataset], found: &[RecordedStop], law: Option<&Law>) -> Vec<String> {
     let mut said = Vec::new();
-    if dataset.runs.iter().any(|run| run.gradient_source == GradientSource::Unknown) {
+    let mut runs = datasets.iter().flat_map(|dataset| &dataset.runs);
+    if runs.any(|run| run.gradient_source == GradientSource::Unknown) {
         said.push(
             "the gradient is unknown: 1 permille along a whole stop is 0.01 m/s² of its \
              deceleration, and of its friction"

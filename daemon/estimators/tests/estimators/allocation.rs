@@ -56,7 +56,7 @@ fn train() -> Arc<TrainModel> {
             ratio: Some(2.55),
             friction: Some(0.35),
             pads: Some(48.0),
-            friction_brake: None,
+            ..BrakeGear::default()
         },
         ..TrainModel::bare("test", 200_000.0, resistance)
     })

@@ -79,6 +79,28 @@ pub struct BrakeGear {
     pub pads: Option<f64>,
     /// What the friction brake makes of its pressure, where its force is not recorded.
     pub friction_brake: Option<FrictionBrake>,
+    /// How its units differ and fail, where that is declared.
+    pub components: Option<BrakeComponents>,
+}
+
+/// The units of a brake, each of which gives the same share of its force: how they differ, from one to the
+/// next and from stop to stop, and how often one fails. Standard deviations are relative.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BrakeComponents {
+    /// Number of units that fail one by one.
+    pub units: u32,
+    /// Standard deviation of a unit's friction.
+    pub friction_std: f64,
+    /// Standard deviation of a unit's pressure.
+    pub pressure_std: f64,
+    /// Standard deviation of a unit's efficiency.
+    pub efficiency_std: f64,
+    /// Standard deviation of what all units have in common, as weather and a batch of pads.
+    pub common_std: f64,
+    /// Standard deviation of the train's mass.
+    pub mass_std: f64,
+    /// Probability that a unit gives nothing in a stop.
+    pub failure_probability: f64,
 }
 
 /// A friction brake that is known by its pressure: force = gain * (pressure - release pressure).

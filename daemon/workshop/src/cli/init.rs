@@ -74,7 +74,7 @@ fn describe(
     if let Some(mass_t) = recorded_mass_t(&guess) {
         let from = "t, the middle of the mass that the recordings hold".into();
         let figures = vec![("mass_t", Value::Float(mass_t), from)];
-        *train = arguments.train.text(WRITER, &Found { figures, traction: None })?;
+        *train = arguments.train.text(WRITER, &Found { figures, ..Found::default() })?;
     }
     let name = texts::name_of(arguments.folder());
     let folder = arguments.folder();

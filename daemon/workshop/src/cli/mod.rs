@@ -1,6 +1,7 @@
 //! The commands of the workshop, one file each; what `check`, `explain` and `identify` answer is there for
 //! other callers, too. A user calls them as `dynocar`'s.
 
+pub mod brakes;
 pub mod check;
 mod documents;
 pub mod explain;
@@ -40,6 +41,7 @@ enum Command {
     Check(CheckArguments),
     Identify(identify::IdentifyArguments),
     Stops(stops::StopsArguments),
+    Brakes(brakes::BrakesArguments),
     Survey(survey::SurveyArguments),
     Fmu(fmu::FmuArguments),
     Learn(learn::LearnArguments),
@@ -56,6 +58,7 @@ impl Command {
             Command::Check(arguments) => check::run(arguments),
             Command::Identify(arguments) => identify::execute(arguments),
             Command::Stops(arguments) => stops::execute(arguments),
+            Command::Brakes(arguments) => brakes::execute(arguments),
             Command::Survey(arguments) => survey::execute(arguments),
             Command::Fmu(arguments) => fmu::execute(arguments),
             Command::Learn(arguments) => learn::execute(arguments),
@@ -70,6 +73,7 @@ impl Command {
             Command::Explain(arguments) => &arguments.json,
             Command::Identify(arguments) => &arguments.json,
             Command::Stops(arguments) => &arguments.json,
+            Command::Brakes(arguments) => &arguments.json,
             Command::Survey(arguments) => &arguments.json,
             // `check` has an answer of its own for what is wrong.
             _ => return None,

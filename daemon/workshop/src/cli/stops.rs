@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar_analysis::dataset::DatasetDiagnostic;
 use dynocar_analysis::stops::{
-    FindSettings, FrictionPoint, LawPoint, RecordedStop, StoppingDistance, Study, StudySettings,
+    DecelerationSpread, FindSettings, FrictionPoint, FromSpeed, Gradient, LawPoint, RecordedStop,
+    Spread, StoppingDistance, Study, StudySettings,
 };
 use serde::Serialize;
 
@@ -36,6 +37,8 @@ pub struct StopsArguments {
     pub(super) json: Option<PathBuf>,
 }
 
+/// So many modulated stops are shown one by one.
+const SINGLE_MAX: usize = 12;
 /// Speeds in m/s at which the deceleration of a modulated stop is shown.
 const SHOWN_MPS: [f64; 6] = [25.0, 20.0, 15.0, 10.0, 5.0, 3.0];
 
@@ -43,7 +46,7 @@ fn positive(text: &str) -> Result<f64, String> {
     above_zero(text, 200.0, "expected a speed above 0 and up to 200 m/s")
 }
 
-fn share(text: &str) -> Result<f64, String> {
+pub(super) fn share(text: &str) -> Result<f64, String> {
     above_zero(text, 1.0, "expected a share above 0 and up to 1")
 }
 
@@ -76,15 +79,16 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
     let study = Study::of(&dataset, &settings, &arguments.from);
     if study.stops.is_empty() {
         return Err(Failure::Input(format!(
-            "{}: no run holds a stop: a brake that is applied, or a speed that falls, from {} m/s or \
-             more to standstill",
+            "{}: no run holds a stop: a train that reached {} m/s or more and then stands",
             arguments.dataset.display(),
             find.from_mps
         )));
     }
     for speed_mps in &arguments.from {
         let why = match &study.law {
-            Some(law) if law.stopping_distance(*speed_mps).is_some() => continue,
+            Some(law) if law.stopping_distance(*speed_mps, &Gradient::default()).is_some() => {
+                continue;
+            }
             Some(law) => format!(
                 "--from {speed_mps}: the stops were seen from {:.1} m/s down; nothing is reported of faster ones",
                 law.fastest_mps()
@@ -99,10 +103,10 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
 }
 
 /// Head and cells of a table's columns.
-type Columns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
+pub(super) type Columns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
 
 /// A table of some rows; `left` are the columns of words.
-fn table<'t, T: 't>(
+pub(super) fn table<'t, T: 't>(
     columns: Columns<T>,
     left: &[usize],
     rows: impl Iterator<Item = &'t T>,
@@ -120,6 +124,8 @@ const STOPS: Columns<RecordedStop> = &[
     ("m/s", |it| format!("{:.1}", it.from_mps)),
     ("s", |it| format!("{:.1}", it.time_s)),
     ("m", |it| format!("{:.0}", it.distance_m)),
+    ("m/s²", |it| format!("{:.2}", it.mean_deceleration_mps2)),
+    ("stood s", |it| it.dwell_s.map_or("-".into(), |it| format!("{it:.0}"))),
     ("brake", |it| format!("{:?}", it.manner).to_lowercase()),
     ("found by", |it| format!("{:?}", it.found_by).to_lowercase()),
     ("predicted m", |it| it.predicted.map_or("-".into(), |it| format!("{:.0}", it.distance_m))),
@@ -148,23 +154,62 @@ const FRICTION: Columns<FrictionPoint> = &[
     ("adhesion ≥", |it| it.adhesion_at_least.map_or("-".into(), |it| format!("{it:.3}"))),
 ];
 
+fn spread(it: &Spread, digits: usize) -> String {
+    format!("{:.digits$} ({:.digits$} to {:.digits$})", it.median, it.low, it.high)
+}
+
+const FROM_SPEEDS: Columns<FromSpeed> = &[
+    ("from m/s", |it| format!("{:.0} to {:.0}", it.from_mps[0], it.from_mps[1])),
+    ("stops", |it| it.stops.to_string()),
+    ("m", |it| spread(&it.distance_m, 0)),
+    ("s", |it| spread(&it.time_s, 0)),
+    ("mean m/s²", |it| spread(&it.mean_deceleration_mps2, 2)),
+];
+
+const CHOSEN: Columns<DecelerationSpread> = &[
+    ("at m/s", |it| format!("{:.0}", it.speed_mps)),
+    ("stops", |it| it.stops.to_string()),
+    ("m/s²", |it| spread(&it.deceleration_mps2, 2)),
+    ("hardest tenth above", |it| format!("{:.2}", it.deceleration_mps2.high)),
+];
+
+/// All stops together, where there are several.
+fn day(study: &Study) -> String {
+    if study.stops.len() < 3 {
+        return String::new();
+    }
+    let mut text = format!(
+        "\nall stops together: the middle (and what 8 of 10 lie within)\n{}\n{}the middle is the driver's \
+         choice; the brake gives at least what the hardest tenth took\n",
+        table(FROM_SPEEDS, &[], study.day.from_speeds.iter()),
+        table(CHOSEN, &[], study.day.decelerations.iter())
+    );
+    if let Some(dwell_s) = &study.day.dwell_s {
+        text += &format!("the train stood for {} s\n", spread(dwell_s, 0));
+    }
+    text
+}
+
 fn text(answer: &StopsAnswer) -> String {
     let study = &answer.study;
     let mut text = format!(
-        "{}\n{}\n{}{}",
+        "{}\n{}\n{}{}{}",
         answer.dataset,
         diagnostics(&answer.diagnostics),
-        table(STOPS, &[0, 1, 6, 7], study.stops.iter()),
+        table(STOPS, &[0, 1, 8, 9], study.stops.iter()),
+        day(study),
         modulated(&study.stops)
     );
     if let Some(law) = &study.law {
         let step = (law.points.len() / 12).max(1);
         text += &format!(
-            "\ndeceleration over speed, the mean of the stops by all of the brake\n{}builds up in \
-             {:.2} s; stops repeat within {:.1} % (standard deviation)\n\nthe next stop, from command \
+            "\ndeceleration over speed, the mean of the stops by all of the brake\n{}comes after {:.2} s \
+             and builds up in {:.2} s (lost: ± {:.2} s from stop to stop); stops repeat within {:.1} % (standard deviation)\n\nthe next stop, from command \
              to standstill\n{}{}",
             table(LAW, &[], law.points.iter().rev().step_by(step)),
-            law.response_s,
+            law.response.dead_time_s,
+            law.response.build_up_s,
+            HALF_95 * law.response.std_s,
             100.0 * law.repeatability,
             table(DISTANCES, &[], study.distances.iter()),
             friction(&study.stops)
@@ -182,7 +227,7 @@ fn modulated(stops: &[RecordedStop]) -> String {
     let others: Vec<&RecordedStop> = stops.iter().filter(|it| it.no_law.is_some()).collect();
     let fastest = others.iter().map(|it| it.from_mps).fold(0.0, f64::max);
     let speeds: Vec<f64> = SHOWN_MPS.into_iter().filter(|it| *it <= fastest).collect();
-    if speeds.is_empty() {
+    if speeds.is_empty() || others.len() > SINGLE_MAX {
         return String::new();
     }
     let mut header = vec!["run".into(), "from s".into()];

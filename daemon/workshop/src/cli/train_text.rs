@@ -67,6 +67,8 @@ pub struct Found {
     pub figures: Vec<(&'static str, Value, String)>,
     /// Greatest traction force: (m/s, N), by speed.
     pub traction: Option<Vec<(f64, f64)>>,
+    /// Deceleration by all of the brake: (m/s, m/s²), by speed.
+    pub brake_mps2: Option<Vec<(f64, f64)>>,
 }
 
 impl Found {
@@ -208,8 +210,13 @@ impl TrainArguments {
             };
         }
         text += CURVES;
-        text += &found.traction.as_deref().map_or(TRACTION.into(), effort);
-        text += BRAKE;
+        text += &found.traction.as_deref().map_or(TRACTION.into(), |it| effort(EFFORT, it));
+        let inertia = self.rotating_mass_factor.or(found.number("rotating_mass_factor"));
+        let inertial_kg = 1e3 * mass_t * (1.0 + inertia.unwrap_or(ROTATING_MASS_DEFAULT));
+        text += &found.brake_mps2.as_deref().map_or(BRAKE.into(), |points| {
+            let forces = points.iter().map(|it| (it.0, inertial_kg * it.1));
+            effort(BRAKE_EFFORT, &forces.collect::<Vec<_>>())
+        });
         // The file's own reader judges the figures; only what was given can be wrong.
         parse_train("train", &text)
             .map_err(|error| Failure::Input(format!("the train as given: {}", error.words)))?;
@@ -222,8 +229,8 @@ pub fn converted(value: f64) -> Value {
     Value::Float(format!("{value:.8e}").parse().unwrap_or(value))
 }
 
-fn effort(points: &[(f64, f64)]) -> String {
-    let mut text = String::from(EFFORT);
+fn effort(head: &str, points: &[(f64, f64)]) -> String {
+    let mut text = String::from(head);
     for &(speed_mps, force_n) in points {
         text += &format!("  [{}, {}],\n", converted(speed_mps), converted(force_n / 1000.0));
     }
@@ -261,6 +268,12 @@ const EFFORT: &str = "
 effort = [
 ";
 
+const BRAKE_EFFORT: &str = "
+# The greatest brake force over the speed: [speed in m/s, force in kN].
+[brake]
+effort = [
+";
+
 const BRAKE: &str = "\
 # [brake]
 # max_force_kn = 200.0
@@ -294,7 +307,7 @@ mod tests {
         let none = TrainArguments::default();
         let from = "t, the middle of what the recordings hold".to_string();
         let figures = vec![("mass_t", Value::Float(321.5), from)];
-        let found = Found { figures, traction: None };
+        let found = Found { figures, ..Found::default() };
         let made = none.text("x", &found).unwrap();
         assert!(made.text.contains("mass_t = 321.5 ") && made.text.contains("recordings hold"));
         assert!(!made.defaults.iter().any(|it| it.starts_with("mass_t")));

@@ -88,7 +88,7 @@ pub fn train() -> Arc<TrainModel> {
         ratio: Some(2.55),
         friction: Some(FRICTION),
         pads: Some(1.0 / (PA_PER_N * force_n_per_pa_and_pad())),
-        friction_brake: None,
+        ..BrakeGear::default()
     };
     Arc::new(TrainModel {
         name: "metro".into(),

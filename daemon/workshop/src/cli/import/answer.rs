@@ -19,13 +19,12 @@ use crate::track_text::TrackText;
 /// A figure that no train has is an input failure.
 pub fn train(train: &ImportedTrain, arguments: &TrainArguments) -> Result<TrainText, Failure> {
     let from = |key: &str| origin(&train.account, key);
-    let mut figures = vec![
-        ("name", Value::String(train.name.clone()), "as the file names it".to_string()),
-        ("mass_t", converted(train.mass_kg / 1000.0), from("mass_t")),
-    ];
+    let name = Value::String(train.name.clone());
+    let mut figures = vec![("name", name, "as the file names it".to_string())];
     let mut number = |key: &'static str, value: Option<f64>| {
         figures.extend(value.map(|value| (key, converted(value), from(key))));
     };
+    number("mass_t", train.mass_kg.map(|mass_kg| mass_kg / 1000.0));
     number("length_m", train.length_m);
     number("rotating_mass_factor", train.rotating_mass_factor);
     number("a", train.resistance.map(|davis| davis.a));
@@ -33,7 +32,8 @@ pub fn train(train: &ImportedTrain, arguments: &TrainArguments) -> Result<TrainT
     number("c", train.resistance.map(|davis| davis.c));
     figures.extend(train.cars.map(|cars| ("cars", Value::Integer(cars.into()), from("cars"))));
     let writer = format!("dynocar import from {}", train.place);
-    arguments.text(&writer, &Found { figures, traction: train.traction.clone() })
+    let (traction, brake_mps2) = (train.traction.clone(), train.brake_mps2.clone());
+    arguments.text(&writer, &Found { figures, traction, brake_mps2 })
 }
 
 /// From which field a key is.

@@ -1,0 +1,14 @@
+//! The brake as train protection asks for it: steps of deceleration, how far stops fall short of them, and tables
+//! of stopping distances.
+
+mod components;
+mod etcs;
+mod parameters;
+mod steps;
+mod table;
+
+pub use components::{Weakest, weakest, weakest_plain};
+pub use etcs::{EtcsBrake, read};
+pub use parameters::{Correction, LEVELS, Parameters, corrections, lower_bound, usual, wet_share};
+pub use steps::{STEPS_MAX, Steps};
+pub use table::{HEAD, TableLaw, TableRow, parse, write};

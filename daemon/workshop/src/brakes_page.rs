@@ -1,0 +1,135 @@
+//! The parameters of a brake as one page of HTML.
+
+use std::fmt::Write as _;
+
+use dynocar_analysis::brakes::{Correction, Parameters};
+use dynocar_analysis::stops::Law;
+use serde::Serialize;
+
+use crate::report::html::Column::{Numbers, Words};
+use crate::report::html::{self, document, escape, table};
+use crate::report::provenance::Provenance;
+
+/// Width and height of the picture.
+const SIZE: (f64, f64) = (980.0, 380.0);
+/// Room in it for numbers at the left and below.
+const MARGIN: f64 = 50.0;
+
+/// What is reported.
+#[derive(Debug, Serialize)]
+pub struct BrakesAnswer {
+    /// Names of the datasets.
+    pub datasets: Vec<String>,
+    /// How many stops the parameters are from, of how many.
+    pub stops: [usize; 2],
+    /// The law of the stops by all of the brake.
+    pub law: Law,
+    /// The parameters.
+    pub parameters: Parameters,
+    /// The level of Kdry_rst in the file.
+    pub ebcl: Option<u32>,
+    /// What holds of them, and what does not.
+    pub said: Vec<String>,
+}
+
+/// The page: decelerations over speed, steps, corrections, and what they are not.
+pub fn html(answer: &BrakesAnswer, made: &Provenance) -> String {
+    let name = escape(&answer.datasets.join(", "));
+    let header = format!(
+        "<p class=\"kicker\">Dynocar · brake</p>\n<h1>{name}</h1>\n<p class=\"facts\">{} of {} stops by all \
+         of the brake · {}</p>\n",
+        answer.stops[0], answer.stops[1], made.day
+    );
+    let mut main = String::new();
+    let mut section = |id: &str, title: &str, body: &str| main += &html::section(id, title, body);
+    section("curve", "Deceleration over speed", &picture(answer));
+    let steps = &answer.parameters.emergency;
+    let starts = std::iter::once(0.0).chain(steps.boundaries.iter().copied());
+    let rows: Vec<(f64, f64)> = starts.zip(steps.values.iter().copied()).collect();
+    let body = table(
+        "A_brake_emergency",
+        &[
+            ("from m/s", Numbers, &|it: &(f64, f64)| format!("{:.1}", it.0)),
+            ("m/s²", Numbers, &|it: &(f64, f64)| format!("{:.3}", it.1)),
+        ],
+        &rows,
+    );
+    section("steps", "Steps below the curve", &body);
+    let share = |it: Option<f64>| it.map_or("–".into(), |it| format!("{it:.3}"));
+    let body = table(
+        "Kdry_rst by level of confidence",
+        &[
+            ("EBCL", Numbers, &|it: &Correction| it.ebcl.to_string()),
+            ("one stop in", Numbers, &|it: &Correction| format!("{:.0e}", 1.0 / it.probability)),
+            ("measured", Numbers, &|it: &Correction| share(it.measured)),
+            ("95 % from", Numbers, &|it: &Correction| share(it.measured_95[0])),
+            ("to", Numbers, &|it: &Correction| share(it.measured_95[1])),
+            ("components", Numbers, &|it: &Correction| share(it.modelled)),
+            ("Kdry_rst", Numbers, &|it: &Correction| share(it.k_dry())),
+        ],
+        &answer.parameters.k_dry,
+    );
+    section("corrections", "How far stops fall short of the mean", &body);
+    let body = table(
+        "What holds, and what does not",
+        &[("", Words, &|it: &String| escape(it))],
+        &answer.said,
+    );
+    section("said", "No safety case", &body);
+    document(&format!("{name} – brake"), &header, &main, made)
+}
+
+fn picture(answer: &BrakesAnswer) -> String {
+    let (law, parameters) = (&answer.law, &answer.parameters);
+    let top = 1.1 * law.points.iter().map(|it| it.deceleration_mps2).fold(0.1, f64::max);
+    let fastest = law.fastest_mps();
+    let x = |speed: f64| MARGIN + (SIZE.0 - 2.0 * MARGIN) * speed / fastest;
+    let y = |value: f64| SIZE.1 - MARGIN - (SIZE.1 - 2.0 * MARGIN) * value / top;
+    let path = |points: &[(f64, f64)]| {
+        let mut path = String::new();
+        for (k, (speed, value)) in points.iter().enumerate() {
+            let _ =
+                write!(path, "{}{:.1},{:.1}", if k == 0 { "M" } else { "L" }, x(*speed), y(*value));
+        }
+        path
+    };
+    let mean: Vec<(f64, f64)> =
+        law.points.iter().map(|it| (it.speed_mps, it.deceleration_mps2)).collect();
+    let bound: Vec<(f64, f64)> = parameters.bound.iter().map(|it| (it[0], it[1])).collect();
+    let mut steps = Vec::new();
+    let (starts, ends) = (&parameters.emergency.boundaries, &parameters.emergency.boundaries);
+    let starts = std::iter::once(0.0).chain(starts.iter().copied());
+    let ends = ends.iter().copied().chain([fastest]);
+    for ((from, to), value) in starts.zip(ends).zip(&parameters.emergency.values) {
+        steps.extend([(from, *value), (to, *value)]);
+    }
+    let mut svg = format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"Deceleration over speed: mean, \
+         bound and steps\">\n",
+        SIZE.0, SIZE.1
+    );
+    for (line, colour, width) in [(&mean, "after", 2), (&bound, "muted", 1), (&steps, "before", 3)]
+    {
+        let _ = writeln!(
+            svg,
+            "<path d=\"{}\" fill=\"none\" stroke=\"var(--{colour})\" stroke-width=\"{width}\"/>",
+            path(line)
+        );
+    }
+    let mut word = |at: (f64, f64), words: String| {
+        let _ = writeln!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"var(--muted)\" font-size=\"15\">{words}</text>",
+            at.0, at.1
+        );
+    };
+    for k in 0..=4 {
+        let share = f64::from(k) / 4.0;
+        word((x(share * fastest) - 10.0, SIZE.1 - 20.0), format!("{:.0}", share * fastest));
+        word((4.0, y(share * top) + 5.0), format!("{:.2}", share * top));
+    }
+    word((SIZE.0 - 40.0, SIZE.1 - 20.0), "m/s".into());
+    word((4.0, 20.0), "m/s²".into());
+    svg + "</svg>\n<p class=\"note\">Thin: the mean of the stops, and the bound that it lies above; thick: the \
+           steps.</p>\n"
+}

@@ -1,0 +1,147 @@
+//! `dynocar brakes` over simulated emergency stops, and what it writes.
+
+use std::fmt::Write as _;
+use std::process::{Command, Output};
+
+use dynocar_tests::process::Site;
+use serde_json::Value;
+
+const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
+
+const TRAIN: &str = "[train]\nmass_t = 100\nlength_m = 80\nrotating_mass_factor = 0.05\n\
+    [resistance]\na = 1\nb = 0.02\nc = 0.0004\n[brake]\nmax_force_kn = 100\n";
+
+/// Deceleration in m/s² of the true brake.
+fn true_mps2(speed_mps: f64) -> f64 {
+    0.5 + 0.5 / (1.0 + speed_mps / 10.0)
+}
+
+/// Twelve stops from 30 m/s, each a few percent off, the handle as given; `slides` marks sliding wheels.
+fn recording(handle: f64, slides: bool) -> String {
+    let mut text = String::from("t,v,b,s\n");
+    let (mut time_s, step_s) = (0.0, 0.02);
+    for stop in 0..12 {
+        let factor = 1.0 + 0.01 * f64::from(stop % 5 - 2);
+        let (mut speed_mps, mut rows) = (30.0_f64, 0);
+        let applied_s = time_s + 20.0;
+        let mut stands_s = 0.0;
+        while stands_s < 5.0 {
+            if rows % 10 == 0 {
+                let is_braking = f64::from(u8::from(time_s >= applied_s)) * handle;
+                writeln!(text, "{time_s:.2},{speed_mps:.2},{is_braking},{}", u8::from(slides))
+                    .unwrap();
+            }
+            if time_s >= applied_s + 1.0 {
+                speed_mps = (speed_mps - step_s * factor * true_mps2(speed_mps)).max(0.0);
+            }
+            stands_s += if speed_mps == 0.0 { step_s } else { 0.0 };
+            time_s += step_s;
+            rows += 1;
+        }
+        // Away again before the next, faster than anything that is looked for.
+        for k in 0..150 {
+            writeln!(text, "{:.2},{:.2},0,0", time_s + 0.2 * f64::from(k), 0.2 * f64::from(k))
+                .unwrap();
+        }
+        time_s += 30.0;
+    }
+    text
+}
+
+fn site(handle: f64, slides: bool, train: &str) -> Site {
+    let site = Site::new();
+    let manifest = "[dataset]\nname = \"brake\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
+        time = { column = \"t\", unit = \"s\" }\nspeed = { column = \"v\", unit = \"m/s\" }\n\
+        brake_handle = { column = \"b\", unit = \"1\" }\nwheel_slide = { column = \"s\", unit = \"1\" }\n\
+        [[runs]]\nfile = \"run.csv\"\n";
+    site.write("dataset.toml", manifest);
+    site.write("train.toml", train);
+    site.write("run.csv", &recording(handle, slides));
+    site
+}
+
+fn dynocar(arguments: &[&str]) -> Output {
+    Command::new(DYNOCAR).args(arguments).output().unwrap()
+}
+
+fn words(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn the_parameters_are_written_for_osrd_read_back_and_reported() {
+    let components = "units = 16\nfriction_std = 0.05\nfailure_probability = 0.001\n";
+    let site = site(1.0, false, &format!("{TRAIN}{components}"));
+    let at = |name: &str| site.path().join(name).display().to_string();
+    let (folder, etcs, page) =
+        (site.path().display().to_string(), at("etcs.json"), at("page.html"));
+    let table = at("table.csv");
+    let options = ["--etcs", &etcs, "--report", &page, "--distances", &table, "--k-wet", "0.8"];
+    let output = dynocar(&[&["brakes", &folder][..], &options, &["--json", "-"]].concat());
+    assert!(output.status.success(), "{}", words(&output));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["stops"][0], 12, "{answer}");
+    let levels = answer["parameters"]["k_dry"].as_array().unwrap();
+    assert_eq!(levels.len(), 10);
+    // Twelve stops show one in ten and no rarer ones; beyond speak the components, ever weaker.
+    assert!(levels[1]["measured"].is_number() && levels[2]["measured"].is_null(), "{levels:?}");
+    let modelled: Vec<f64> = levels.iter().map(|it| it["modelled"].as_f64().unwrap()).collect();
+    assert!(modelled.windows(2).all(|it| it[1] < it[0]) && modelled[9] > 0.3, "{modelled:?}");
+    let written: Value = serde_json::from_str(&std::fs::read_to_string(&etcs).unwrap()).unwrap();
+    for key in [
+        "gamma_emergency",
+        "gamma_service",
+        "gamma_normal_service",
+        "k_dry",
+        "k_wet",
+        "k_n_pos",
+        "k_n_neg",
+    ] {
+        let list = |name: &str| written[key][name].as_array().unwrap().len();
+        assert!(
+            list("values") == list("boundaries") + 1 && list("values") <= 7,
+            "{key}: {written}"
+        );
+    }
+    let values = written["gamma_emergency"]["values"].as_array().unwrap();
+    assert!(values.iter().all(|it| (0.55..1.0).contains(&it.as_f64().unwrap())), "{values:?}");
+    let (t_be, page) = (written["t_be"].as_f64().unwrap(), std::fs::read_to_string(&page).unwrap());
+    assert!((0.7..2.0).contains(&t_be), "{t_be}");
+    assert!(page.contains("no safety case") && page.contains("<svg"));
+    let out = at("imported");
+    let output = dynocar(&["import", &etcs, "--out", &out]);
+    assert!(output.status.success(), "{}", words(&output));
+    let train = std::fs::read_to_string(at("imported/train.toml")).unwrap();
+    assert!(train.contains("[brake]\neffort = ["), "{train}");
+    // The table of distances is read as a brake of the same kind.
+    let output = dynocar(&["brakes", "--table", &table, "--json", "-"]);
+    assert!(output.status.success(), "{}", words(&output));
+    let laws: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(laws[0]["error_median"].as_f64().unwrap() < 0.02, "{laws}");
+    let text = String::from_utf8(dynocar(&["brakes", &folder]).stdout).unwrap();
+    assert!(text.contains("no safety case") && text.contains("A_brake_emergency"), "{text}");
+}
+
+#[test]
+fn stops_that_show_no_brake_are_named_with_what_remains() {
+    for (handle, slides, expected) in
+        [(0.5, false, "0.85 of its effort"), (1.0, true, "the wheels slid")]
+    {
+        let site = site(handle, slides, TRAIN);
+        let output = dynocar(&["brakes", &site.path().display().to_string()]);
+        assert_eq!(output.status.code(), Some(2));
+        let said = words(&output);
+        assert!(said.contains(expected) && said.contains("dynocar stops"), "{said}");
+    }
+    let site = site(1.0, false, TRAIN);
+    let folder = site.path().display().to_string();
+    let etcs = site.path().join("etcs.json").display().to_string();
+    let output = dynocar(&["brakes", &folder, "--etcs", &etcs, "--ebcl", "6"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(words(&output).contains("12 stops support no such level"), "{}", words(&output));
+    let wrong = "{\"gamma_emergency\": {\"boundaries\": [9, 5], \"values\": [1, 1, 1]}}";
+    site.write("wrong.json", wrong);
+    let output = dynocar(&["import", &site.path().join("wrong.json").display().to_string()]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(words(&output).contains("a speed above the one before"), "{}", words(&output));
+}
