@@ -9,7 +9,6 @@ use crate::open_loop::controller::Outcome;
 use crate::open_loop::trial::{Answerer, Extent, Trial};
 use crate::output::{Record, table};
 use crate::rig::quantiles::{self, cells};
-use crate::rig::usage::waits_in_words;
 use crate::statistics::median;
 
 /// A case with its trial of every round.
@@ -42,8 +41,6 @@ pub fn of(measured: &Measured) -> (Value, String) {
     let rests = at_rest.iter().map(|(idle, it)| json!({ "idle": idle, "cpu_percent": it }));
     let mut all = json!(costs);
     all["cases"] = json!(records);
-    let waits_s = waits_s(cases);
-    all["waits"] = json!({ "publishers_s": waits_s[0], "daemon_s": waits_s[1] });
     all["at_rest"] = rests.collect();
     all["rate_hz"] = json!(rate_hz);
     all["rounds"] = json!(rounds);
@@ -66,8 +63,6 @@ pub fn of(measured: &Measured) -> (Value, String) {
             costs.publish_ns
         ),
     ];
-    let trials = cases.iter().map(|(_, trials)| trials.len()).sum::<usize>();
-    lines.push(waits_in_words(waits_s, extent.seconds * trials as f64));
     lines.extend(
         at_rest.iter().map(|(idle, it)| format!("no samples ({idle}): {it:.2} % of a core")),
     );
@@ -81,12 +76,6 @@ pub fn of(measured: &Measured) -> (Value, String) {
         );
     }
     (all, lines.join("\n") + "\n")
-}
-
-/// For how long in s publishers and the daemon were ready but without a processor, over all trials.
-fn waits_s(cases: &[Rounds]) -> [f64; 2] {
-    let trials = || cases.iter().flat_map(|(_, trials)| trials);
-    [0, 1].map(|which| trials().map(|it| it.waits_s[which]).sum())
 }
 
 /// A case: its quantiles, medians over the rounds of its ratio to the floor, and how often the daemon's thread was made

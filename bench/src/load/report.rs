@@ -8,7 +8,6 @@ use crate::open_loop::controller::Outcome;
 use crate::open_loop::trial::Trial;
 use crate::output::{Record, table};
 use crate::rig::quantiles::{cells, for_people, pooled};
-use crate::rig::usage::waits_in_words;
 
 const MEBIBYTE: f64 = 1024.0 * 1024.0;
 
@@ -33,13 +32,15 @@ pub fn of(load: &Load, trial: &Trial) -> (Value, String) {
     let text = format!(
         "{trains} trains at {rate_hz} Hz for {seconds} s\n{}\n\
          daemon: {:.0} % of a core, {:.1} MiB resident ({:.1} MiB at first); samples left at most {} \
-         late\n{}\n",
+         late\n\
+         ready but without a processor: publishers {:.2} %, daemon {:.2} % of the time\n",
         table(&records),
         trial.cpu_percent,
         trial.rss_bytes as f64 / MEBIBYTE,
         trial.rss_start_bytes as f64 / MEBIBYTE,
         for_people(trial.publisher_lag_ns as f64),
-        waits_in_words(trial.waits_s, seconds)
+        100.0 * publishers_s / seconds,
+        100.0 * daemon_s / seconds
     );
     (all, text)
 }

@@ -34,15 +34,6 @@ pub fn of(process_id: u32, thread: &str) -> Usage {
     }
 }
 
-/// Returns for what share of a time in s publishers and the daemon were ready but without a processor, in words: on a busy
-/// host the latencies are the host's.
-pub fn waits_in_words(waits_s: [f64; 2], seconds: f64) -> String {
-    let [publishers, daemon] = waits_s.map(|it| 100.0 * it / seconds);
-    format!(
-        "ready but without a processor: publishers {publishers:.2} %, daemon {daemon:.2} % of the time"
-    )
-}
-
 fn number(text: Option<&str>) -> u64 {
     text.and_then(|it| it.trim().parse().ok()).unwrap_or(0)
 }
@@ -79,12 +70,6 @@ mod tests {
         });
         more.collect::<Vec<_>>().into_iter().for_each(|it| it.join().unwrap());
         assert!(switches.unwrap().join().unwrap() > 0);
-    }
-
-    #[test]
-    fn waits_are_shares_of_the_time() {
-        let words = waits_in_words([0.5, 2.0], 40.0);
-        assert!(words.ends_with("publishers 1.25 %, daemon 5.00 % of the time"), "{words}");
     }
 
     #[test]
