@@ -59,7 +59,7 @@ mod tests {
     /// True chainages in m of a train at 20 m/s, and its recording: wheels that count by a scale, balises that
     /// correct them, and one that is wrong by some m.
     fn recorded(scale: f64, balises_m: &[f64], wrong: (f64, f64)) -> (Vec<f64>, Recording) {
-        let mut odometer_m = 0.0;
+        let mut odometer_m = -4.0 * scale;
         let true_m = |k: i32| 4.0 * f64::from(k);
         let sample = |k: i32| {
             odometer_m += 4.0 * scale;
