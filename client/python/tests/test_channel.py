@@ -214,6 +214,25 @@ def open_in_a_thread_that_ends(root: str) -> None:
     assert len(held) == 1
 
 
+def test_a_forked_child_is_refused_and_takes_nothing_of_its_parents(played: PlayedDaemon) -> None:
+    publisher = dynocar.SamplePublisher(TRAIN, played.root)
+    reader = dynocar.SnapshotReader(TRAIN, played.root)
+    drive(publisher, reader)
+    child = os.fork()
+    if child == 0:
+        codes = []
+        for call in [lambda: publish(publisher, 0), reader.poll, reader.resistance, reader.close]:
+            try:
+                call()
+            except dynocar.ChannelError as error:
+                codes.append(error.code)
+        del publisher, reader
+        gc.collect()
+        os._exit(0 if codes == [Code.FORKED_PROCESS] * 4 else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    drive(publisher, reader)
+
+
 def test_another_thread_is_refused_and_the_end_stays_good(played: PlayedDaemon) -> None:
     reader = dynocar.SnapshotReader(TRAIN, played.root)
     errors = []
