@@ -31,27 +31,16 @@
 //!
 //! # Layout
 //!
-//! - [`host`]: where the run-time files of this host lie
-//! - [`peer`]: who serves and who drives a train, and whether we understand each other
-//! - [`channel`]: the shared-memory ports, also used by the daemon
 //! - [`publisher`], [`reader`]: the two ends a controller holds
-//! - [`clock`]: the host's monotonic clock
 //! - [`ffi`]: the same for C and C++
+//! - what both stand on is the package `dynocar-transport`
 
-mod announcement;
-pub mod channel;
-pub mod clock;
-pub mod error;
 pub mod ffi;
-pub mod host;
-pub mod peer;
 pub mod publisher;
 pub mod reader;
 
-pub use announcement::{Announcement, Role};
-pub use clock::monotonic_now_ns;
-pub use error::{ChannelError, SendRefused};
-pub use host::Host;
-pub use peer::Peer;
+pub use dynocar_transport::{
+    Announcement, ChannelError, Host, Peer, Role, SendRefused, monotonic_now_ns,
+};
 pub use publisher::SamplePublisher;
 pub use reader::{NoAnswer, Reading, SnapshotReader};

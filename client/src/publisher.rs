@@ -4,12 +4,12 @@ use std::time::{Duration, Instant};
 
 use dynocar_shared::{TrainId, TrainSample};
 
-use crate::announcement::Role;
-use crate::channel::{SampleCount, Sender, Transport, Waker};
-use crate::clock::monotonic_now_ns;
-use crate::error::{ChannelError, SendRefused};
-use crate::host::Host;
-use crate::peer::{Peer, RoleLock};
+use dynocar_transport::Host;
+use dynocar_transport::Role;
+use dynocar_transport::channel::{SampleCount, Sender, Transport, Waker};
+use dynocar_transport::monotonic_now_ns;
+use dynocar_transport::peer::{Peer, RoleLock};
+use dynocar_transport::{ChannelError, SendRefused};
 
 /// How long a publisher that is closed waits for the pipelines to take what is on its way.
 pub const CLOSE_PATIENCE: Duration = Duration::from_millis(200);
@@ -86,7 +86,7 @@ impl SamplePublisher {
     /// # Real-time
     ///
     /// Never waits. No system call while the pipelines are awake and no process comes or goes;
-    /// see [`Sender::send`](crate::channel::Sender::send) for the one allocation.
+    /// see [`Sender::send`](dynocar_transport::channel::Sender::send) for the one allocation.
     pub fn publish(&mut self, sample: &mut TrainSample) -> Result<u64, SendRefused> {
         self.sequence += 1;
         sample.train_id = self.train.0;

@@ -4,12 +4,12 @@ use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::snapshot::PARAMETERS_MAX;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, Reason, Status, TrainId};
 
-use crate::announcement::Role;
-use crate::channel::{Receiver, Transport};
-use crate::clock::monotonic_now_ns;
-use crate::error::ChannelError;
-use crate::host::Host;
-use crate::peer::Peer;
+use dynocar_transport::ChannelError;
+use dynocar_transport::Host;
+use dynocar_transport::Peer;
+use dynocar_transport::Role;
+use dynocar_transport::channel::{Receiver, Transport};
+use dynocar_transport::monotonic_now_ns;
 
 /// A snapshot older than this counts as stale, in ns. The daemon republishes every 50 ms.
 pub const STALE_AFTER_NS: i64 = 250_000_000;

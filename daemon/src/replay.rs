@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use dynocar_client::{ChannelError, Host, Peer, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::services::SAMPLE_BUFFER;
 use dynocar_shared::{ParameterSnapshot, RejectionReason, TrainId, TrainSample};
+use dynocar_transport::{ChannelError, Host, Peer, monotonic_now_ns};
 
 /// How fast recorded time passes.
 #[derive(Clone, Copy, Debug, PartialEq)]

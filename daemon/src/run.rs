@@ -12,10 +12,11 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use dynocar_client::channel::SampleCount;
-use dynocar_client::peer::RoleLock;
-use dynocar_client::{ChannelError, Host, Role, SnapshotReader, monotonic_now_ns};
+use dynocar_client::SnapshotReader;
 use dynocar_shared::{Quantity, TrainId};
+use dynocar_transport::channel::SampleCount;
+use dynocar_transport::peer::RoleLock;
+use dynocar_transport::{ChannelError, Host, Role, monotonic_now_ns};
 use tracing::{info, warn};
 
 use super::runtime::system::{

@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 
 use dynocar::config::is_slow;
 use dynocar_analysis::identify::default_estimators;
-use dynocar_client::channel::SampleCount;
-use dynocar_client::{Host, SamplePublisher, SnapshotReader};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_transport::Host;
+use dynocar_transport::channel::SampleCount;
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

@@ -11,9 +11,10 @@ use dynocar::models::{
 use dynocar::replay::{Rate, ReplayReport, Replayer};
 use dynocar::shadow::record;
 use dynocar_analysis::dataset::Dataset;
-use dynocar_client::{SnapshotReader, monotonic_now_ns};
+use dynocar_client::SnapshotReader;
 use dynocar_shared::{ParameterSnapshot, Status, TrainId};
 use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_transport::monotonic_now_ns;
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

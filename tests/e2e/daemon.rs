@@ -1,8 +1,9 @@
 //! The daemon as a user runs it: start, stop, refusals.
 
-use dynocar_client::{Announcement, Role, SamplePublisher, SnapshotReader};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_transport::{Announcement, Role};
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

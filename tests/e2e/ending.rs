@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
-use dynocar_client::{Peer, Role};
 use dynocar_recording::reading::{Ending, read};
 use dynocar_recording::recording::Recording;
 use dynocar_shared::TrainId;
 use dynocar_tests::process::{Process, Site, Terminal, Tie, await_true};
+use dynocar_transport::{Peer, Role};
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

@@ -1,9 +1,10 @@
 //! A real daemon fed with samples that cannot be true: degraded, reported once in words, and seen by
 //! `dynocar health`.
 
-use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{PipelineKind, Reason, SampleField, Status, TrainId, TrainSample};
 use dynocar_tests::process::{Site, await_true};
+use dynocar_transport::monotonic_now_ns;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const TRAIN: TrainId = TrainId(1);

@@ -56,7 +56,7 @@ fn what_is_pure_knows_no_channel_clock_or_logger() {
     for package in PURE {
         assert_free_of(
             package,
-            &["iceoryx2", "tracing", "log", "tokio", "rustix", "libc", "dynocar-client"],
+            &["iceoryx2", "tracing", "log", "tokio", "rustix", "libc", "dynocar-transport"],
         );
     }
 }
@@ -133,7 +133,7 @@ fn the_workshop_has_no_network_and_no_format_of_recordings() {
 
 #[test]
 fn what_a_controller_links_pulls_in_no_estimator() {
-    for package in ["dynocar-client", "dynocar-shared"] {
+    for package in ["dynocar-client", "dynocar-transport", "dynocar-shared"] {
         assert_free_of(
             package,
             &[
@@ -149,7 +149,7 @@ fn what_a_controller_links_pulls_in_no_estimator() {
 
 #[test]
 fn what_a_simulator_loads_has_no_channel() {
-    assert_free_of("dynocar-fmu", &["iceoryx2", "dynocar-client", "tracing", "rustix", "clap"]);
+    assert_free_of("dynocar-fmu", &["iceoryx2", "dynocar-transport", "tracing", "rustix", "clap"]);
 }
 
 #[test]
@@ -171,6 +171,23 @@ fn the_terminal_stays_out_of_daemon_and_controller() {
 fn what_serves_viewers_is_in_no_controller_no_daemon_and_no_recorder() {
     for package in ["dynocar", "dynocar-client", "dynocar-recording", "dynocar-watch"] {
         assert_free_of(package, &["dynocar-live", "foxglove", "tokio", "tungstenite"]);
+    }
+}
+
+#[test]
+fn what_serves_trains_and_what_reads_recordings_stand_on_the_transport_and_on_no_client() {
+    let folders = [
+        "shared/transport/src",
+        "daemon/src/runtime",
+        "daemon/src/shadow",
+        "daemon/recording/src",
+        "daemon/parquet/src",
+        "daemon/live/src",
+        "daemon/workshop/src",
+    ];
+    for file in folders.into_iter().flat_map(rust_files) {
+        let text = std::fs::read_to_string(&file).expect("a source file");
+        assert!(!text.contains("dynocar_client"), "{}", file.display());
     }
 }
 

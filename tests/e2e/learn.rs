@@ -6,14 +6,14 @@ use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 use dynocar::models::{ModelText, Store, TrainModels};
-use dynocar_client::channel::Transport;
-use dynocar_client::peer::RoleLock;
-use dynocar_client::{Role, monotonic_now_ns};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 use dynocar_tests::process::{Process, Site};
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use dynocar_transport::channel::Transport;
+use dynocar_transport::peer::RoleLock;
+use dynocar_transport::{Role, monotonic_now_ns};
 use dynocar_workshop::learn::{Bounds, LearnError, Learner, LearnerSettings};
 use rustix::process::Signal;
 

@@ -9,14 +9,15 @@ use std::sync::Arc;
 
 use dynocar::runtime::exchange::Exchange;
 use dynocar_analysis::identify::published_samples;
-use dynocar_client::channel::{Sender, Transport};
-use dynocar_client::{NoAnswer, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{NoAnswer, SamplePublisher, SnapshotReader};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
 };
 use dynocar_tests::process::Site;
+use dynocar_transport::channel::{Sender, Transport};
+use dynocar_transport::monotonic_now_ns;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use dynocar_transport::monotonic_now_ns;
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

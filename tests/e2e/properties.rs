@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_client::channel::Transport;
-use dynocar_client::{SnapshotReader, monotonic_now_ns};
+use dynocar_client::SnapshotReader;
 use dynocar_core::pipeline::{KeptEstimate, Pipeline};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::{Davis, TrainModel};
@@ -11,6 +10,8 @@ use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,
 };
 use dynocar_tests::process::Site;
+use dynocar_transport::channel::Transport;
+use dynocar_transport::monotonic_now_ns;
 use proptest::prelude::*;
 
 const TRAIN: TrainId = TrainId(1);

@@ -3,9 +3,10 @@
 
 use std::time::Duration;
 
-use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_transport::monotonic_now_ns;
 
 use crate::hold_the_cores;
 

@@ -9,12 +9,13 @@ use dynocar::replay::{Rate, Replayer};
 use dynocar::state::{entry::StateContent, file};
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::identify::published_samples;
-use dynocar_client::{SnapshotReader, monotonic_now_ns};
+use dynocar_client::SnapshotReader;
 use dynocar_core::pipeline::{KeptEstimate, Pipeline};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
 use dynocar_tests::soak::state_kills::kill_writers;
+use dynocar_transport::monotonic_now_ns;
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

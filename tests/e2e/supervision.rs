@@ -8,11 +8,12 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-use dynocar_client::channel::Transport;
-use dynocar_client::peer::RoleLock;
-use dynocar_client::{Announcement, Role, SamplePublisher, monotonic_now_ns};
+use dynocar_client::SamplePublisher;
 use dynocar_shared::{ParameterSnapshot, SampleField, Status, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_transport::channel::Transport;
+use dynocar_transport::peer::RoleLock;
+use dynocar_transport::{Announcement, Role, monotonic_now_ns};
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
-const FOLDERS: [&str; 16] = [
+const FOLDERS: [&str; 17] = [
     "daemon/src",
     "daemon/workshop/src",
     "daemon/model/src",
@@ -15,13 +15,14 @@ const FOLDERS: [&str; 16] = [
     "daemon/analysis/src",
     "daemon/fmu/src",
     "shared/src",
+    "shared/transport/src",
     "client/src",
     "client/python/dynocar/fleet",
     "client/python/src",
-    "client/recording/src",
-    "client/parquet/src",
-    "client/watch/src",
-    "client/live/src",
+    "daemon/recording/src",
+    "daemon/parquet/src",
+    "daemon/watch/src",
+    "daemon/live/src",
 ];
 /// A call whose first literal is a message, and the folder in which it is one.
 const CALLS: [(&str, &str); 17] = [
@@ -35,7 +36,7 @@ const CALLS: [(&str, &str); 17] = [
     ("Failure::Work(", "daemon/src/cli"),
     ("Failure::Input(", "daemon/workshop/src/cli"),
     ("Failure::Work(", "daemon/workshop/src/cli"),
-    ("Failure::Work(", "client/recording/src/cli"),
+    ("Failure::Work(", "daemon/recording/src/cli"),
     ("Error::new_err(", "client/python/src"),
     ("InputError(", "client/python/dynocar/fleet"),
     ("WorkError(", "client/python/dynocar/fleet"),

@@ -7,10 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use dynocar_client::peer::RoleLock;
-use dynocar_client::{Announcement, Role, SamplePublisher, monotonic_now_ns};
+use dynocar_client::SamplePublisher;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_transport::peer::RoleLock;
+use dynocar_transport::{Announcement, Role, monotonic_now_ns};
 use rustix::process::Signal;
 
 #[path = "../../client/tests/support/mod.rs"]

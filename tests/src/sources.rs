@@ -3,14 +3,11 @@
 use std::path::{Path, PathBuf};
 
 /// The source folders of all packages.
-pub const FOLDERS: [&str; 17] = [
+pub const FOLDERS: [&str; 18] = [
     "shared/src",
+    "shared/transport/src",
     "client/src",
-    "client/live/src",
-    "client/parquet/src",
     "client/python/src",
-    "client/recording/src",
-    "client/watch/src",
     "daemon/model/src",
     "daemon/core/src",
     "daemon/estimators/src",
@@ -19,6 +16,10 @@ pub const FOLDERS: [&str; 17] = [
     "daemon/fmu/src",
     "daemon/src",
     "daemon/workshop/src",
+    "daemon/recording/src",
+    "daemon/parquet/src",
+    "daemon/live/src",
+    "daemon/watch/src",
     "bench/src",
     "tests/src",
 ];

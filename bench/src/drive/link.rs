@@ -3,10 +3,11 @@
 //! nothing, however much faster than real time it goes, and a seed gives the same figures on any machine.
 
 use dynocar::config::IdleStrategy;
-use dynocar_client::{Reading, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{Reading, SamplePublisher, SnapshotReader};
 use dynocar_model::train::{EffortCurve, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site};
+use dynocar_transport::monotonic_now_ns;
 use serde_json::json;
 
 use crate::output::Failure;

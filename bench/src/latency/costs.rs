@@ -1,9 +1,10 @@
 //! What one poll and one publish cost the controller, on its own core.
 
-use dynocar_client::channel::{Receiver, Sender, Transport};
-use dynocar_client::{SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 use dynocar_tests::process::Site;
+use dynocar_transport::channel::{Receiver, Sender, Transport};
+use dynocar_transport::monotonic_now_ns;
 use serde::Serialize;
 
 use crate::output::Failure;

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use dynocar_client::monotonic_now_ns;
 use dynocar_shared::TrainSample;
 use dynocar_tests::process::Process;
+use dynocar_transport::monotonic_now_ns;
 use hdrhistogram::Histogram;
 
 use super::traffic::Traffic;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_client::Host;
+use dynocar_transport::Host;
 use iceoryx2::prelude::{
     Config, FileName, NodeBuilder, Path as TransportPath, SemanticString, ServiceName,
     SignalHandlingMode, ipc,

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use dynocar::config::DaemonConfig;
-use dynocar_client::channel::Transport;
-use dynocar_client::{Host, monotonic_now_ns};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
+use dynocar_transport::channel::Transport;
+use dynocar_transport::{Host, monotonic_now_ns};
 
 use super::plain;
 use super::sockets::{self, Datagrams, End, TRAIN};

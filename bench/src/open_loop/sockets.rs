@@ -7,9 +7,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use dynocar::dataset::load_train;
-use dynocar_client::channel::Payload;
-use dynocar_client::monotonic_now_ns;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
+use dynocar_transport::channel::Payload;
+use dynocar_transport::monotonic_now_ns;
 
 use super::wire::Wire;
 use crate::output::{Failure, during};

@@ -4,9 +4,9 @@ use std::process::Stdio;
 
 use dynocar::config::IdleStrategy;
 use dynocar::programs::{LIVE, RECORDING, call};
-use dynocar_client::monotonic_now_ns;
 use dynocar_shared::{PipelineKind, TrainId};
 use dynocar_tests::process::{Process, Site};
+use dynocar_transport::monotonic_now_ns;
 
 use super::controller::{Controller, Outcome, drive, settle};
 use super::sockets::{Datagrams, End, TRAIN};

@@ -1,9 +1,9 @@
 //! The controller's end of each transport.
 
-use dynocar_client::channel::{Receiver, Sender, Transport};
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 use dynocar_tests::process::Site;
+use dynocar_transport::channel::{Receiver, Sender, Transport};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::ipc;
 

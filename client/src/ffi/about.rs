@@ -11,10 +11,10 @@ use dynocar_shared::{
 };
 
 use super::error::{Code, Failure, Message, guard_in_words};
-use crate::announcement::Role;
-use crate::error::ChannelError;
-use crate::host::Host;
-use crate::peer::Peer;
+use dynocar_transport::ChannelError;
+use dynocar_transport::Host;
+use dynocar_transport::Peer;
+use dynocar_transport::Role;
 
 vocabulary! {
     /// Who serves a train; `DYNOCAR_DAEMON_…` in C.
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn dynocar_daemon_state(
 /// Safe for the control cycle.
 #[unsafe(no_mangle)]
 pub extern "C" fn dynocar_monotonic_now_ns() -> i64 {
-    crate::clock::monotonic_now_ns()
+    dynocar_transport::monotonic_now_ns()
 }
 
 /// The library's release, for instance `0.1.0`. Never NULL, never to be freed.

@@ -3,8 +3,8 @@
 use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::error::{ChannelError, SendRefused};
 use crate::reader::NoAnswer;
+use dynocar_transport::{ChannelError, SendRefused};
 
 /// Declares the codes with their numbers and texts, so that none is without a text.
 macro_rules! codes {

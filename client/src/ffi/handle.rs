@@ -5,7 +5,7 @@
 //! a data race.
 
 use super::error::{Code, Failure};
-use crate::error::ChannelError;
+use dynocar_transport::ChannelError;
 
 /// One end of a channel, with the thread it belongs to.
 #[derive(Debug)]

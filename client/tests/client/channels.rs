@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use dynocar_client::channel::{Sender, Sleeper, Transport};
-use dynocar_client::{Host, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::services::SAMPLE_BUFFER;
 use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Reason, SampleField, Status, TrainId, TrainSample,
 };
+use dynocar_transport::channel::{Sender, Sleeper, Transport};
+use dynocar_transport::{Host, monotonic_now_ns};
 
 const TRAIN: TrainId = TrainId(11);
 

@@ -1,8 +1,9 @@
 //! Asking for a quantity: the reader follows what the daemon says in its snapshots.
 
-use dynocar_client::channel::{Sender, Transport};
-use dynocar_client::{ChannelError, Host, NoAnswer, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{NoAnswer, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, Quantity, Status, TrainId};
+use dynocar_transport::channel::{Sender, Transport};
+use dynocar_transport::{ChannelError, Host, monotonic_now_ns};
 
 const TRAIN: TrainId = TrainId(11);
 

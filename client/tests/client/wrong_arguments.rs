@@ -11,9 +11,9 @@ use dynocar_client::ffi::publisher::*;
 use dynocar_client::ffi::reader::*;
 use dynocar_client::ffi::snapshot::*;
 use dynocar_client::ffi::{Code, ReadingCopy, Resistance};
-use dynocar_client::peer::RoleLock;
-use dynocar_client::{Announcement, Role};
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainId, TrainSample};
+use dynocar_transport::peer::RoleLock;
+use dynocar_transport::{Announcement, Role};
 
 use crate::support::TestRoot;
 

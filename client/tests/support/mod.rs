@@ -9,14 +9,14 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver as Lines, RecvTimeoutError, channel};
 use std::time::Duration;
 
-use dynocar_client::channel::{Receiver, SampleCount, Sender, Transport};
-use dynocar_client::peer::RoleLock;
-use dynocar_client::{Host, Role, monotonic_now_ns};
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason, Status, TrainId,
     TrainSample,
 };
+use dynocar_transport::channel::{Receiver, SampleCount, Sender, Transport};
+use dynocar_transport::peer::RoleLock;
+use dynocar_transport::{Host, Role, monotonic_now_ns};
 
 pub const TRAIN: TrainId = TrainId(11);
 /// Where the played daemon's only pipeline stands in its configuration.

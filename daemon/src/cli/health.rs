@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use dynocar_client::{Host, Peer, Role};
 use dynocar_shared::TrainId;
+use dynocar_transport::{Host, Peer, Role};
 
 use super::Failure;
 use crate::config::DaemonConfig;

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use dynocar_client::Host;
 use dynocar_dataset::Run;
 use dynocar_shared::{PipelineKind, TrainId};
+use dynocar_transport::Host;
 
 use super::Failure;
 use super::companion::{self, Passed};

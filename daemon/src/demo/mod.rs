@@ -10,8 +10,9 @@ mod view;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use dynocar_client::{SnapshotReader, monotonic_now_ns};
+use dynocar_client::SnapshotReader;
 use dynocar_shared::{ParameterSnapshot, TrainId};
+use dynocar_transport::monotonic_now_ns;
 
 pub use summary::{DemoAnswer, Summary};
 
@@ -41,7 +42,7 @@ pub enum DemoError {
     Dataset(#[from] LoadError),
     /// A channel could not be opened.
     #[error(transparent)]
-    Channel(#[from] dynocar_client::ChannelError),
+    Channel(#[from] dynocar_transport::ChannelError),
     /// It could not learn when to end.
     #[error(transparent)]
     Ending(#[from] EndingError),

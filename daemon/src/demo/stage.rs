@@ -4,8 +4,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use dynocar_client::{ChannelError, Host};
 use dynocar_shared::services::ROOT_VARIABLE;
+use dynocar_transport::{ChannelError, Host};
 use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 

@@ -7,8 +7,8 @@
 mod event;
 mod train;
 
-use dynocar_client::{ChannelError, Host, Peer, Role};
 use dynocar_shared::TrainId;
+use dynocar_transport::{ChannelError, Host, Peer, Role};
 
 pub use event::{Change, EventKind};
 pub use train::ObservedTrain;

@@ -1,11 +1,10 @@
 //! One train: who serves and drives it, the reader of its snapshots, and what was seen of its pipelines.
 
-use dynocar_client::{
-    Announcement, ChannelError, Host, Peer, Reading, Role, SnapshotReader, monotonic_now_ns,
-};
+use dynocar_client::{Reading, SnapshotReader};
 use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, TrainId};
+use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role, monotonic_now_ns};
 
 use super::event::{Change, EventKind};
 use crate::operator::pipeline_name;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use dynocar_client::channel::Sleeper;
+use dynocar_transport::channel::Sleeper;
 
 use crate::config::IdleStrategy;
 

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar_client::channel::SampleCount;
-use dynocar_client::{Announcement, ChannelError, Host, Peer, Role};
 use dynocar_core::plausibility::InputFault;
 use dynocar_core::remedy::{of_reason, of_refusal};
 use dynocar_shared::snapshot::REJECTION_REASONS;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 use dynocar_shared::{Reason, RejectionReason, Status, TrainId};
+use dynocar_transport::channel::SampleCount;
+use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role};
 use tracing::{info, warn};
 
 use super::status_log::{RefusalLog, State, StatusLog};

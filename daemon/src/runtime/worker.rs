@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use dynocar_client::channel::{Receiver, SampleCount, Sender, Sleeper, Transport};
-use dynocar_client::{ChannelError, Host, monotonic_now_ns};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::motion::STANDING_MPS;
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
+use dynocar_transport::channel::{Receiver, SampleCount, Sender, Sleeper, Transport};
+use dynocar_transport::{ChannelError, Host, monotonic_now_ns};
 
 use super::exchange::Exchange;
 use super::idle::Idler;

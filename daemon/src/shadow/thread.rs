@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use dynocar_client::channel::{Receiver, Transport};
-use dynocar_client::{ChannelError, Host};
 use dynocar_shared::{TrainId, TrainSample};
+use dynocar_transport::channel::{Receiver, Transport};
+use dynocar_transport::{ChannelError, Host};
 use tracing::{info, warn};
 
 use super::figures::Board;

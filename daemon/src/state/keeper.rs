@@ -5,9 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar_client::{ChannelError, Host, SnapshotReader, monotonic_now_ns};
+use dynocar_client::SnapshotReader;
 use dynocar_core::pipeline::KeptEstimate;
 use dynocar_shared::ParameterSnapshot;
+use dynocar_transport::{ChannelError, Host, monotonic_now_ns};
 use tracing::{info, warn};
 
 use super::entry::{ModelKey, StateContent, StoredEstimate, settings_hash};

@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use dynocar_client::{ChannelError, Host, Peer, Role, SnapshotReader, monotonic_now_ns};
+use dynocar_client::SnapshotReader;
 use dynocar_core::remedy::{of_reason, of_refusal};
 use dynocar_model::named;
 use dynocar_shared::vocabulary::KindRow;
 use dynocar_shared::{PipelineKind, Reason, RejectionReason, Status, TrainId};
+use dynocar_transport::{ChannelError, Host, Peer, Role, monotonic_now_ns};
 
 use crate::operator::refusals;
 use crate::operator::suspicion::Suspicion;

@@ -1,8 +1,9 @@
 //! The daemon's numbers as OpenMetrics text, taken from its snapshots as any client takes them.
 
-use dynocar_client::{Reading, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{Reading, SnapshotReader};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status};
+use dynocar_transport::monotonic_now_ns;
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;

@@ -7,8 +7,9 @@
 
 use std::time::{Duration, Instant};
 
-use dynocar_client::{Host, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_transport::{Host, monotonic_now_ns};
 
 /// The ports connect with the first messages, and a new controller wakes every thread that it
 /// knows nothing of for half a second.

@@ -11,8 +11,9 @@
 use std::io::Write;
 use std::time::Duration;
 
-use dynocar_client::{Host, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_transport::{Host, monotonic_now_ns};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

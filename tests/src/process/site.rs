@@ -4,8 +4,8 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use dynocar_client::Host;
 use dynocar_shared::services::ROOT_VARIABLE;
+use dynocar_transport::Host;
 use tempfile::TempDir;
 
 use super::Process;

@@ -6,8 +6,8 @@
 
 use std::time::Duration;
 
-use dynocar_client::monotonic_now_ns;
 use dynocar_client::reader::STALE_AFTER_NS;
+use dynocar_transport::monotonic_now_ns;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustix::process::Signal;

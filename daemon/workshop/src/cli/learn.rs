@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::SystemTime;
 
 use clap::Args;
-use dynocar_client::Host;
+use dynocar_transport::Host;
 
 use super::threads::Threads;
 use crate::learn::watch::{Suspicions, TimeOfDay, watch};

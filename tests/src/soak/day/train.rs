@@ -3,9 +3,10 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use dynocar_client::{Host, SamplePublisher, SnapshotReader, monotonic_now_ns};
+use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
+use dynocar_transport::{Host, monotonic_now_ns};
 
 use crate::process::{Process, WATCHDOG, await_true};
 use crate::simulator::dataset_writer::write_dataset;

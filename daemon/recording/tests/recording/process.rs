@@ -7,13 +7,13 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use crate::support_site::{Controller, TRAIN, TestSite, await_true};
-use dynocar_client::channel::Transport;
-use dynocar_client::monotonic_now_ns;
 use dynocar_recording::event::EventKind;
 use dynocar_recording::reading::{Ending, read};
 use dynocar_recording::recording::Recording;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
+use dynocar_transport::channel::Transport;
+use dynocar_transport::monotonic_now_ns;
 use rustix::process::{Pid, Signal, kill_process};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-recording");

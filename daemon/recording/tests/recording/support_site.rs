@@ -7,8 +7,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use dynocar::config::DaemonConfig;
-use dynocar_client::{Host, Peer, Role, SamplePublisher, monotonic_now_ns};
+use dynocar_client::SamplePublisher;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_transport::{Host, Peer, Role, monotonic_now_ns};
 
 pub const TRAIN: TrainId = TrainId(1);
 const TRAIN_FILE: &str = "[train]\nname = \"t\"\nmass_t = 200.0\nlength_m = 120.0\ncars = 6\n\

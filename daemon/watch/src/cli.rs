@@ -10,8 +10,8 @@ use dynocar::cli::{Failure, carry_out};
 use dynocar::config::DaemonConfig;
 use dynocar::ending::Ending;
 use dynocar::observing::Wanted;
-use dynocar_client::Host;
 use dynocar_shared::TrainId;
+use dynocar_transport::Host;
 
 use crate::watcher::Watcher;
 use crate::{plain, terminal};

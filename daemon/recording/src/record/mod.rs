@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 use configuration::{Configuration, Maintenance};
 use dynocar::output::report_line;
 use dynocar::storage::{Disk, SharedStorage, folder_of};
-use dynocar_client::ChannelError;
 use dynocar_shared::TrainId;
+use dynocar_transport::ChannelError;
 use mcap::McapError;
 
 use crate::event::{Event, EventKind};

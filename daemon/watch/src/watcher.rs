@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use dynocar::config::{DaemonConfig, PipelineConfig};
 use dynocar::observing::{ObservedTrain, Wanted};
-use dynocar_client::{Host, Role, monotonic_now_ns};
 use dynocar_shared::TrainId;
+use dynocar_transport::{Host, Role, monotonic_now_ns};
 
 use super::state::History;
 use crate::advisor::Advisor;

@@ -12,10 +12,10 @@ use std::time::{Duration, Instant};
 
 use dynocar::observing::{self, Change, ObservedTrain};
 use dynocar::output::report_line;
-use dynocar_client::channel::{Receiver, Transport};
-use dynocar_client::{ChannelError, Host, Role, monotonic_now_ns};
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
 use dynocar_shared::{TrainId, TrainSample};
+use dynocar_transport::channel::{Receiver, Transport};
+use dynocar_transport::{ChannelError, Host, Role, monotonic_now_ns};
 
 use super::event::{Event, EventKind};
 use super::topic::Message;

@@ -7,8 +7,8 @@ use clap::{ArgGroup, Args};
 use dynocar::cli::Failure;
 use dynocar::output::report_line;
 use dynocar::{ending, observing};
-use dynocar_client::Host;
 use dynocar_shared::TrainId;
+use dynocar_transport::Host;
 
 use crate::record::{Keeping, Rotation, SYNC, Settings, record, request_keeping};
 use crate::train_channels::Wanted;

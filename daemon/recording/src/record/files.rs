@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use dynocar::storage::{SharedStorage, folder_of};
-use dynocar_client::monotonic_now_ns;
 use dynocar_shared::TrainId;
+use dynocar_transport::monotonic_now_ns;
 use mcap::McapError;
 
 use super::configuration::Configuration;

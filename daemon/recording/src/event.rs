@@ -1,8 +1,8 @@
 //! What happens around samples and snapshots, as messages of a recording.
 
 use dynocar::observing::Change;
-use dynocar_client::monotonic_now_ns;
 use dynocar_shared::TrainId;
+use dynocar_transport::monotonic_now_ns;
 
 use crate::message::message;
 

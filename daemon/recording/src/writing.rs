@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::Write;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use dynocar_client::monotonic_now_ns;
 use dynocar_shared::{ParameterSnapshot, TrainSample};
+use dynocar_transport::monotonic_now_ns;
 pub use mcap::McapError;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
