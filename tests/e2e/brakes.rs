@@ -141,7 +141,9 @@ fn stops_that_show_no_brake_are_named_with_what_remains() {
     assert!(words(&output).contains("12 stops support no such level"), "{}", words(&output));
     let wrong = "{\"gamma_emergency\": {\"boundaries\": [9, 5], \"values\": [1, 1, 1]}}";
     site.write("wrong.json", wrong);
-    let output = dynocar(&["import", &site.path().join("wrong.json").display().to_string()]);
+    let (wrong, out) = (site.path().join("wrong.json"), site.path().join("out"));
+    let (wrong, out) = (wrong.display().to_string(), out.display().to_string());
+    let output = dynocar(&["import", &wrong, "--out", &out]);
     assert_eq!(output.status.code(), Some(2));
     assert!(words(&output).contains("a speed above the one before"), "{}", words(&output));
 }

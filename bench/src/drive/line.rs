@@ -154,7 +154,7 @@ fn gear(brake_max_n: f64) -> BrakeGear {
         ratio: Some(2.5),
         friction: Some(0.35),
         pads: Some(1.0),
-        friction_brake: None,
+        ..BrakeGear::default()
     };
     let of_one_n = declared_gear(&one_pad).declared_force_n(FULL_PRESSURE_PA);
     BrakeGear { pads: Some(brake_max_n / of_one_n), ..one_pad }

@@ -41,7 +41,7 @@ pub fn train() -> TrainModel {
             ratio: Some(2.55),
             friction: Some(0.28),
             pads: Some(95.0),
-            friction_brake: None,
+            ..BrakeGear::default()
         },
         ..TrainModel::bare("CRH3", 536_000.0, resistance)
     }

@@ -249,7 +249,6 @@ mod tests {
         for level in 6..=9 {
             let found = weakest(&brake, 0.1_f64.powi(level), 1 << 14, 3);
             let again = weakest(&brake, 0.1_f64.powi(level), 1 << 14, 5);
-            println!("1e-{level}: {found:?}");
             assert!(found.gain > 100.0 && found.error < 0.1, "{level}: {found:?}");
             assert!((found.share / again.share - 1.0).abs() < 0.01, "{found:?} {again:?}");
         }

@@ -173,25 +173,25 @@ pub fn parse(text: &str) -> Result<Vec<(String, Vec<TableRow>)>, String> {
     }
     let mut tables: Vec<(String, Vec<TableRow>)> = Vec::new();
     for (index, line) in lines {
-        let wrong = |what: &str| format!("line {}: {line}: expected {what}", index + 1);
+        let expects = |what: &str| format!("line {}: {line}: expected {what}", index + 1);
         let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-        let [name, speed, gradient, distance] = cells[..] else { return Err(wrong("4 cells")) };
+        let [name, speed, gradient, distance] = cells[..] else { return Err(expects("4 cells")) };
         let number = |cell: &str, what: &str, most: f64| {
-            let number: f64 = cell.parse().map_err(|_| wrong(what))?;
+            let number: f64 = cell.parse().map_err(|_| expects(what))?;
             (number.abs() > 0.0 && number.abs() <= most)
                 .then_some(number)
-                .ok_or_else(|| wrong(what))
+                .ok_or_else(|| expects(what))
         };
         let positive = |cell: &str, what: &str, most: f64| {
             number(cell, what, most)
-                .and_then(|it| (it > 0.0).then_some(it).ok_or_else(|| wrong(what)))
+                .and_then(|it| (it > 0.0).then_some(it).ok_or_else(|| expects(what)))
         };
         let gradient_permille = match gradient {
             "Level" => 0.0,
             steep => 1000.0 / number(steep, "Level or a gradient of 1 in x, x from 5", 1e6)?,
         };
         if gradient_permille.abs() > 200.0 {
-            return Err(wrong("Level or a gradient of 1 in x, x from 5"));
+            return Err(expects("Level or a gradient of 1 in x, x from 5"));
         }
         let row = TableRow {
             from_mps: positive(speed, "a speed in km/h above 0, at most 700", 700.0)? / 3.6,

@@ -141,9 +141,8 @@ fn without_law(study: &Study) -> Failure {
     for (stop, why) in reasons.take(5) {
         words += &format!("; {} at {:.0} s: {why}", stop.file, stop.from_s);
     }
-    Failure::Input(
-        words + "; `dynocar stops` reports what they hold, --applied lowers what counts as all",
-    )
+    words += "; `dynocar stops` reports what they hold, --applied lowers what counts as all";
+    Failure::Input(words)
 }
 
 fn answer(

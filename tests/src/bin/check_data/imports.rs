@@ -40,11 +40,12 @@ pub fn check(report: &mut Report, folder: &Path) {
             let found = it.trains.first().ok_or("no train")?;
             let davis = found.resistance.ok_or("no resistance")?;
             let factor = found.rotating_mass_factor.ok_or("no rotating mass")?;
-            let weight_kn = found.mass_kg * THEIR_GRAVITY_MPS2 / 1000.0;
+            let mass_kg = found.mass_kg.unwrap_or_default();
+            let weight_kn = mass_kg * THEIR_GRAVITY_MPS2 / 1000.0;
             let pairs = [
-                (found.mass_kg, train.mass_kg),
+                (mass_kg, train.mass_kg),
                 (found.length_m.unwrap_or_default(), train.length_m),
-                (found.mass_kg * (1.0 + factor), train.inertia_kg),
+                (mass_kg * (1.0 + factor), train.inertia_kg),
                 (davis.a * weight_kn, train.resistance[0]),
                 (davis.b * weight_kn, train.resistance[1]),
                 (davis.c * weight_kn, train.resistance[2]),

@@ -268,7 +268,7 @@ pub(crate) mod tests {
             ratio: Some(2.55),
             friction: Some(0.28),
             pads: Some(95.0),
-            friction_brake: None,
+            ..BrakeGear::default()
         }
     }
 
