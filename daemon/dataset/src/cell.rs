@@ -82,8 +82,8 @@ pub fn truth(cell: &[u8]) -> Option<f64> {
 
 /// True for a cell that begins as no number does: a word.
 pub fn is_word(cell: &[u8]) -> bool {
-    let begins = |byte: &u8| byte.is_ascii_digit() || b"+-.,".contains(byte);
-    cell.first().is_some_and(|byte| !begins(byte))
+    let first = cell.iter().find(|byte| !b"+-.,".contains(byte));
+    first.is_some_and(|byte| !byte.is_ascii_digit())
 }
 
 /// A greater number in SI units is none of a railway's; its square or sum might be infinite.
