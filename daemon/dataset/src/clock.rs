@@ -310,7 +310,7 @@ fn elapsed_s(cell: &[u8]) -> Option<f64> {
     let mut part = || parts.next()?.parse::<f64>().ok().filter(|it| *it >= 0.0);
     let (hours, minutes, seconds) = (part()?, part()?, part()?);
     let is_clock = parts.next().is_none() && minutes < 60.0 && seconds < 60.0 && hours < 1e6;
-    is_clock.then(|| sign * days * DAY_S + sign * (hours * 3600.0 + minutes * 60.0 + seconds))
+    is_clock.then_some(sign * days * DAY_S + sign * (hours * 3600.0 + minutes * 60.0 + seconds))
 }
 
 /// A cell without its half of the day, and whether that is the second one.

@@ -56,7 +56,8 @@ pub struct Text {
 impl Text {
     /// The same, with its file where there are several.
     pub fn of_file(self, label: &str, files: usize) -> Self {
-        Text { file: (files > 1).then(|| format!("{label}, ")).unwrap_or_default(), ..self }
+        let file = if files > 1 { format!("{label}, ") } else { String::new() };
+        Text { file, ..self }
     }
 }
 
