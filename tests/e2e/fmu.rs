@@ -63,9 +63,14 @@ fn expected(snapshot: &ParameterSnapshot, reported: SnapshotField, speed_mps: f6
         SnapshotField::ResistanceStd => real(resistance.map(|it| it.w0_std_n_per_kn)),
         SnapshotField::UnexplainedForce => snapshot.unexplained_force_n.to_bits(),
         SnapshotField::UnexplainedForceStd => snapshot.unexplained_force_std_n.to_bits(),
-        SnapshotField::SuspectedEffect => snapshot.suspected_effect.into(),
-        SnapshotField::Status => snapshot.status.into(),
-        SnapshotField::Reason => snapshot.reason.into(),
+        SnapshotField::SuspectedEffect | SnapshotField::SuspectedEffectNumber => {
+            snapshot.suspected_effect.into()
+        }
+        SnapshotField::Status | SnapshotField::StatusNumber => snapshot.status.into(),
+        SnapshotField::Reason | SnapshotField::ReasonNumber => snapshot.reason.into(),
+        SnapshotField::Usable(quantity) => {
+            (snapshot.usable_quantities & quantity.bit() != 0).into()
+        }
         SnapshotField::Rejected => snapshot.samples_rejected,
     }
 }
@@ -84,6 +89,7 @@ fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
         let snapshot = &snapshots[PIPELINES.iter().position(|&kind| kind == of).unwrap()];
         let got = match variable.meaning.kind() {
             Kind::Real => fmu.real(reference).unwrap().to_bits(),
+            Kind::Boolean => u64::from(fmu.boolean(reference).unwrap()),
             _ => fmu.integer(reference).unwrap() as u64,
         };
         let name = variable.name;

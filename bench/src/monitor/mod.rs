@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 
 use clap::Args;
 use dynocar::output::report_line;
-use dynocar_tests::simulator::{SimulatorSettings, simulate};
 use serde_json::json;
 
 use self::watch::{Watched, watch};

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use dynocar::cli::Failure;
-use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::Explanation;
-use dynocar_analysis::explain::score::PredictedRun;
+use dynocar_analysis::explain::score::predicted;
+use dynocar_model::simulate::Restart;
 use dynocar_workshop::cli::explain as command;
+use dynocar_workshop::cli::explained_runs::ExplainedRuns;
 use dynocar_workshop::report::images::images;
 use dynocar_workshop::report::provenance::command_line;
 use pyo3::prelude::*;
@@ -21,7 +23,7 @@ use crate::table::Table;
 pub(crate) struct Explained {
     path: PathBuf,
     traction_only: bool,
-    dataset: Dataset,
+    runs: ExplainedRuns,
     explanation: Explanation,
 }
 
@@ -37,8 +39,8 @@ pub(crate) fn explain(
     let explained = in_background(py, progress.as_ref(), move |progress| {
         command::answer(&of, traction_only, progress)
     })?;
-    let (dataset, explanation) = explained.map_err(|failure| of_failure(py, &failure))?;
-    Ok(Explained { path, traction_only, dataset, explanation })
+    let (runs, explanation) = explained.map_err(|failure| of_failure(py, &failure))?;
+    Ok(Explained { path, traction_only, runs, explanation })
 }
 
 #[pymethods]
@@ -58,25 +60,33 @@ impl Explained {
         arguments.extend(["--report", "report.html"].map(str::to_owned));
         let page = py.detach(|| {
             let command = command_line(arguments);
-            command::page(&self.path, &self.dataset, &self.explanation, command)
+            command::page(&self.path, &self.runs.dataset, &self.explanation, command)
         });
         page.map_err(|failure| of_failure(py, &failure))
     }
 
     /// Names and SVG of the report's plots.
     fn plots(&self, py: Python<'_>) -> PyResult<Vec<(String, String)>> {
-        let drawn = py.detach(|| images(&self.dataset, &self.explanation));
+        let drawn = py.detach(|| images(&self.runs.dataset, &self.explanation));
         drawn.map_err(|error| of_failure(py, &Failure::work(error)))
     }
 
     /// Speeds that the updated model predicts, by run.
-    fn predictions(&self) -> PyResult<Vec<(String, Table)>> {
-        let table = |run: &PredictedRun| -> PyResult<(String, Table)> {
-            let columns = [("time_s", &run.time_s), ("speed_mps", &run.speed_mps)];
-            let columns = columns.map(|(name, values)| (name.to_owned(), values.clone())).to_vec();
+    fn predictions(&self, py: Python<'_>) -> PyResult<Vec<(String, Table)>> {
+        let runs = &self.runs.dataset.runs;
+        let of_role = |role| (0..runs.len()).filter(move |index| runs[*index].role == role);
+        let table = |index: usize| -> PyResult<(String, Table)> {
+            let run = self.runs.prepared(index, &self.explanation);
+            let run = run.map_err(|failure| of_failure(py, &failure))?;
+            let prediction = predicted(&self.explanation.outcome.fit, &run, Restart::FullRun);
+            let time_s = run.recording.time_s().iter().map(|time_s| run.offset_s + time_s);
+            let columns = vec![
+                ("time_s".to_owned(), time_s.collect()),
+                ("speed_mps".to_owned(), prediction.speed_mps().to_vec()),
+            ];
             Ok((run.file.clone(), Table::of(columns)?))
         };
-        self.explanation.predictions.iter().map(table).collect()
+        of_role(Role::Fit).chain(of_role(Role::Holdout)).map(table).collect()
     }
 
     /// Writes the updated model into a folder; gives the files, and the kinds that they cannot express.

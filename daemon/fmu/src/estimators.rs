@@ -3,7 +3,7 @@
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::quantities::candidates;
 use dynocar_shared::{
-    Parameter, ParameterSnapshot, PipelineKind, Quantity, SampleField, Status, TrainSample,
+    Parameter, ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainSample,
 };
 
 use crate::units::{self, Unit};
@@ -118,19 +118,18 @@ const VARIABLES: &[Variable] = &[
     // For hosts that drop enumerations; below the others, whose references stay.
     reported("resistance.status_number", RESISTANCE, SnapshotField::StatusNumber, units::NONE, STATUS),
     reported("resistance.reason_number", RESISTANCE, SnapshotField::ReasonNumber, units::NONE, REASON),
-    reported("resistance.usable", RESISTANCE, SnapshotField::Usable, units::NONE, USABLE),
+    reported("resistance.usable", RESISTANCE, SnapshotField::Usable(Quantity::Resistance), units::NONE, USABLE),
     reported("mass.status_number", MASS, SnapshotField::StatusNumber, units::NONE, STATUS),
     reported("mass.reason_number", MASS, SnapshotField::ReasonNumber, units::NONE, REASON),
-    reported("mass.usable", MASS, SnapshotField::Usable, units::NONE, USABLE),
+    reported("mass.usable", MASS, SnapshotField::Usable(Quantity::Mass), units::NONE, USABLE),
     reported("adhesion.status_number", ADHESION, SnapshotField::StatusNumber, units::NONE, STATUS),
     reported("adhesion.reason_number", ADHESION, SnapshotField::ReasonNumber, units::NONE, REASON),
-    reported("adhesion.usable", ADHESION, SnapshotField::Usable, units::NONE, USABLE),
+    reported("adhesion.usable", ADHESION, SnapshotField::Usable(Quantity::Adhesion), units::NONE, USABLE),
     reported("brake_friction.status_number", BRAKE, SnapshotField::StatusNumber, units::NONE, STATUS),
     reported("brake_friction.reason_number", BRAKE, SnapshotField::ReasonNumber, units::NONE, REASON),
-    reported("brake_friction.usable", BRAKE, SnapshotField::Usable, units::NONE, USABLE),
+    reported("brake_friction.usable", BRAKE, SnapshotField::Usable(Quantity::BrakeFriction), units::NONE, USABLE),
     reported("monitor.status_number", MONITOR, SnapshotField::StatusNumber, units::NONE, STATUS),
     reported("monitor.reason_number", MONITOR, SnapshotField::ReasonNumber, units::NONE, REASON),
-    reported("monitor.usable", MONITOR, SnapshotField::Usable, units::NONE, USABLE),
     reported("monitor.suspected_effect_number", MONITOR, SnapshotField::SuspectedEffectNumber, units::NONE, "The effect that the model may lack"),
 ];
 
@@ -193,9 +192,9 @@ impl Estimators {
         }
     }
 
-    /// Whether an estimate may be used.
-    pub fn is_usable(&self, of: PipelineKind) -> bool {
-        self.snapshot(of).status() == Status::Estimated
+    /// Returns whether the values of a quantity may be used, with the daemon's hysteresis.
+    pub fn is_usable(&self, of: PipelineKind, quantity: Quantity) -> bool {
+        self.snapshot(of).usable_quantities & quantity.bit() != 0
     }
 }
 

@@ -13,7 +13,7 @@ use crate::inputs::{Inputs, nanoseconds};
 use crate::plant::{
     BEGINNING, STEP_MAX_S, least_step_s, reported, require_drivable, with_beginning,
 };
-use crate::variables::{Begins, Interface, Kind, Meaning, Variable};
+use crate::variables::{Begins, Interface, Kind, Meaning, SnapshotField, Variable};
 
 /// By so much of the time a point may be off, as sums of steps are rounded.
 const POINT_TOLERANCE: f64 = 1e-9;
@@ -251,7 +251,9 @@ impl Model {
     pub fn boolean(&self, reference: u32) -> Result<bool, ModelError> {
         Ok(match (self.got(reference, Kind::Boolean)?.meaning, &self.behind) {
             (Meaning::Begins(_), _) => self.beginning.is_held_at_rest,
-            (Meaning::Estimate(of, _), Behind::Estimators(it)) => it.is_usable(of),
+            (Meaning::Estimate(of, SnapshotField::Usable(quantity)), Behind::Estimators(it)) => {
+                it.is_usable(of, quantity)
+            }
             _ => self.inputs.sample.flags & FLAG_WHEEL_SLIDE != 0,
         })
     }

@@ -3,7 +3,7 @@
 
 use dynocar_analysis::driven::ForcePart;
 use dynocar_shared::layout::{FieldLayout, hex_digits, layout_hash};
-use dynocar_shared::{Parameter, PipelineKind, SampleField};
+use dynocar_shared::{Parameter, PipelineKind, Quantity, SampleField};
 
 use crate::error::ModelError;
 use crate::units::Unit;
@@ -92,8 +92,8 @@ pub enum SnapshotField {
     StatusNumber,
     /// The reason likewise.
     ReasonNumber,
-    /// Whether the values may be used.
-    Usable,
+    /// Whether the values of this quantity may be used.
+    Usable(Quantity),
     /// How many samples were refused.
     Rejected,
 }
@@ -212,7 +212,7 @@ impl Meaning {
                 SnapshotField::Status => Kind::Enumeration(Vocabulary::Status),
                 SnapshotField::Reason => Kind::Enumeration(Vocabulary::Reason),
                 SnapshotField::SuspectedEffect => Kind::Enumeration(Vocabulary::Effect),
-                SnapshotField::Usable => Kind::Boolean,
+                SnapshotField::Usable(_) => Kind::Boolean,
                 SnapshotField::Rejected
                 | SnapshotField::SuspectedEffectNumber
                 | SnapshotField::StatusNumber

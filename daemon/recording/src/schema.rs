@@ -41,7 +41,8 @@ pub static DESCRIPTORS: LazyLock<Vec<u8>> = LazyLock::new(|| descriptors().encod
 
 /// True where other descriptors describe the fields of a message as this release's do.
 pub fn is_described_alike(message: &str, descriptors: &[u8]) -> bool {
-    let fields = |bytes: &[u8]| -> Option<Vec<(Option<String>, Option<i32>, Option<i32>)>> {
+    type Described = (Option<String>, Option<i32>, Option<i32>);
+    let fields = |bytes: &[u8]| -> Option<Vec<Described>> {
         let files = FileDescriptorSet::decode(bytes).ok()?;
         let (package, name) = message.rsplit_once('.')?;
         let mut files = files.file.into_iter().filter(|it| it.package() == package);

@@ -7,7 +7,8 @@ use dynocar_analysis::stops::Law;
 use serde::Serialize;
 
 use crate::report::html::Column::{Numbers, Words};
-use crate::report::html::{self, document, escape, table};
+use crate::report::html::{self, escape, table};
+use crate::report::page::document;
 use crate::report::provenance::Provenance;
 
 /// Width and height of the picture.

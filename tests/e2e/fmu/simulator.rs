@@ -10,7 +10,7 @@ use dynocar_fmu::ffi::life::{
     fmi2Instantiate, fmi2SetupExperiment,
 };
 use dynocar_fmu::ffi::values::{
-    fmi2GetInteger, fmi2GetReal, fmi2SetBoolean, fmi2SetInteger, fmi2SetReal,
+    fmi2GetBoolean, fmi2GetInteger, fmi2GetReal, fmi2SetBoolean, fmi2SetInteger, fmi2SetReal,
     fmi2SetRealInputDerivatives, fmi2SetString,
 };
 use dynocar_fmu::{ESTIMATORS, Interface};
@@ -143,6 +143,14 @@ impl Fmu {
         // SAFETY: the arrays hold one element each.
         let went = unsafe { fmi2GetReal(self.component, &reference, 1, &mut value) };
         (went == Status::Ok).then_some(value)
+    }
+
+    /// A truth value.
+    pub fn boolean(&self, reference: u32) -> Option<bool> {
+        let mut value = 0;
+        // SAFETY: the arrays hold one element each.
+        let went = unsafe { fmi2GetBoolean(self.component, &reference, 1, &mut value) };
+        (went == Status::Ok).then_some(value != 0)
     }
 
     /// A whole number.

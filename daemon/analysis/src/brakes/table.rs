@@ -241,7 +241,6 @@ mod tests {
 
     #[test]
     fn the_law_behind_a_table_is_found_and_a_wrong_row_is_named() {
-        let brake = TableRow { from_mps: 30.0, gradient_permille: 0.0, distance_m: 0.0 };
         let mut rows = Vec::new();
         for (speed, permille) in
             (1..=16).flat_map(|k| [-20.0, -5.0, 0.0, 10.0].map(|it| (2.0 * f64::from(k), it)))
@@ -262,12 +261,7 @@ mod tests {
                 ..Stop::level(speed, 1.0, [0.0; 3], &effort)
             };
             let distance_m = stop.estimate(0.5).unwrap().distance_m;
-            rows.push(TableRow {
-                from_mps: speed,
-                gradient_permille: permille,
-                distance_m,
-                ..brake
-            });
+            rows.push(TableRow { from_mps: speed, gradient_permille: permille, distance_m });
         }
         let law = TableLaw::of("true", &rows).unwrap();
         assert!(law.error_max < 0.01, "{law:?}");

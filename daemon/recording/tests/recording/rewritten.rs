@@ -82,7 +82,8 @@ fn what_other_tools_compress_or_strip_is_read_and_what_they_cut_is_cut() {
         let other = at(&format!("{name}.mcap"));
         rewritten(&whole, &other, compression, (usize::MAX, keeps_metadata));
         assert_eq!(Recording::load(&other).unwrap().samples, samples, "{name}");
-        let recovered = recover(&[other.clone()], &at(&format!("{name}_again.mcap"))).unwrap();
+        let recovered =
+            recover(std::slice::from_ref(&other), &at(&format!("{name}_again.mcap"))).unwrap();
         assert_eq!(recovered.messages as usize, count, "{name}");
         let folder = at(name);
         let unpacked = to_dataset(&[other], &folder, None, &ModelFiles::default()).unwrap();

@@ -123,10 +123,10 @@ pub fn answer(
     path: &Path,
     traction_only: bool,
     progress: Progress,
-) -> Result<(Dataset, Explanation), Failure> {
+) -> Result<(ExplainedRuns, Explanation), Failure> {
     let mut runs = ExplainedRuns::at(path, traction_only)?;
     let explanation = runs.explain(progress)?;
-    Ok((runs.dataset, explanation))
+    Ok((runs, explanation))
 }
 
 /// Refuses wrong names of results before the work begins.

@@ -6,7 +6,7 @@ pub mod check;
 mod documents;
 pub mod explain;
 mod explained;
-mod explained_runs;
+pub mod explained_runs;
 mod fmu;
 pub mod identify;
 mod import;

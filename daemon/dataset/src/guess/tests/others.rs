@@ -183,7 +183,8 @@ fn times_are_read_as_they_were_recorded() {
     let with = |form: fn((u64, u64, u64, u64)) -> String, from_s: f64| {
         move |time: f64| form(clock(time, from_s))
     };
-    let cases: [(&str, Box<dyn Fn(f64) -> String>); 11] = [
+    type Written = Box<dyn Fn(f64) -> String>;
+    let cases: [(&str, Written); 11] = [
         (
             "AM",
             Box::new(with(
