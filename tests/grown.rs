@@ -1,4 +1,4 @@
-//! What docs/walkthrough.md adds, at work: tests/growth.py runs this where it has been added.
+//! Additions of docs/walkthrough.md at work: tests/growth.py runs this where they have been made.
 
 use std::sync::Arc;
 

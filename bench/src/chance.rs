@@ -41,7 +41,7 @@ impl Chance {
         self.0.random_range(range)
     }
 
-    /// Numbers from 0 on, so many of them, in an order of chance.
+    /// Returns the numbers from 0 to `count - 1` in random order.
     pub fn order(&mut self, count: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..count).collect();
         order.shuffle(&mut self.0);

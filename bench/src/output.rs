@@ -12,7 +12,7 @@ use serde_json::Value;
 /// Why a command fails, in words; exit status 1, or 2 for [`Usage`].
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// What the command line has wrong, and what was expected: exit status 2.
+/// A mistake on the command line, with the expected form: exit status 2.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Usage(pub String);
@@ -26,11 +26,11 @@ pub fn expect(holds: bool, words: impl FnOnce() -> String) -> Result<(), Failure
     if holds { Ok(()) } else { Err(Usage(words()).into()) }
 }
 
-/// What a name on the command line stands for.
+/// Returns the value for which a name on the command line stands.
 ///
 /// # Errors
 ///
-/// When it is none of those that there are, with these.
+/// If no entry has this name; the message lists the names.
 pub fn named<T: Copy>(option: &str, name: &str, all: &[(&str, T)]) -> Result<T, Failure> {
     let found = all.iter().find(|(own, _)| *own == name).map(|(_, it)| *it);
     found.ok_or_else(|| {
@@ -131,7 +131,7 @@ impl Record {
         self.shown(name, text, value)
     }
 
-    /// With one more number of so many decimals; empty where there is none.
+    /// Adds a number with `decimals` decimals; empty where there is no number.
     #[must_use]
     pub fn number(
         self,

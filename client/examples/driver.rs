@@ -26,7 +26,7 @@ const SLEW_N_PER_S: f64 = 150e3;
 const ROTATING_MASS_FACTOR: f64 = 0.04;
 const BUILT_IN: Parameters =
     Parameters { mass_kg: 1_799_200.0, davis: [1.498, 0.0147, 0.00086], is_learned: false };
-/// What nobody declared: another load, and more resistance.
+/// Undeclared truth: another load, and more resistance.
 const TRUTH: Parameters =
     Parameters { mass_kg: 2_050_000.0, davis: [2.1, 0.019, 0.00115], is_learned: false };
 
@@ -114,7 +114,7 @@ fn coasting_place_m(known: &Parameters) -> f64 {
     late_m
 }
 
-/// What may be used of the daemon's answers, else the built-in parameters.
+/// Returns the usable answers of the daemon, else the built-in parameters.
 fn known(reader: &SnapshotReader) -> Parameters {
     let (mut known, now_ns) = (BUILT_IN, monotonic_now_ns());
     if let Ok(reading) = reader.mass(now_ns)

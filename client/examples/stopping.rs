@@ -19,7 +19,7 @@ const EFFORT: [EffortPoint; 2] = [
 ];
 const ASKED: [Quantity; 3] = [Quantity::Resistance, Quantity::BrakeFriction, Quantity::Adhesion];
 
-/// What the daemon says of a quantity, as far as it may be used; reports where it comes from.
+/// Returns the daemon's snapshot of a quantity if it may be used; reports its source.
 fn learned(reader: &SnapshotReader, quantity: Quantity) -> Option<&ParameterSnapshot> {
     let answer = reader.quantity(quantity, monotonic_now_ns());
     if let Ok(reading) = &answer

@@ -1,4 +1,4 @@
-//! What a train controller links: publish samples, poll parameter snapshots.
+//! The library that a train controller links: publish samples, poll parameter snapshots.
 //!
 //! ```no_run
 //! use dynocar_client::{Host, SamplePublisher, SnapshotReader};

@@ -16,7 +16,7 @@ use dynocar_transport::monotonic_now_ns;
 /// A snapshot older than this counts as stale, in ns. The daemon republishes every 50 ms.
 pub const STALE_AFTER_NS: i64 = 250_000_000;
 
-/// A time so far ahead in ns is none that this host's clock has given.
+/// Largest lead in ns of a time that this host's clock can have given.
 const CLOCK_TOLERANCE_NS: i64 = 1_000_000_000;
 
 /// Reads the newest snapshot of each pipeline of one train.
@@ -40,7 +40,7 @@ pub struct Reading<'a> {
     pub age_ns: i64,
     /// True when the daemon has been silent for too long.
     pub is_stale: bool,
-    /// What was asked for; `None` where a pipeline was.
+    /// Quantity that was asked for; `None` where a pipeline was.
     pub quantity: Option<Quantity>,
 }
 

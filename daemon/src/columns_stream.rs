@@ -14,7 +14,7 @@ type Header = (usize, Vec<(String, bool)>);
 const BYTES: usize = size_of::<f64>();
 /// Bytes that are read at once.
 const CHUNK: usize = 1 << 16;
-/// For so many rows room is made before they come: what promises more may be damaged.
+/// Largest number of rows for which room is made before they come: a file that promises more may be damaged.
 const ROWS_RESERVED_MAX: usize = 1 << 24;
 
 /// Hands columns over.
@@ -82,7 +82,7 @@ pub fn read(mut input: impl BufRead) -> Option<Vec<RunColumn>> {
     let empty = |has_values: bool| {
         has_values.then(|| {
             let mut values = Vec::new();
-            // What does not fit now is asked for again as it comes.
+            // Bytes that do not fit now are asked for again as they come.
             let _ = values.try_reserve_exact(rows.min(ROWS_RESERVED_MAX));
             values
         })
@@ -104,7 +104,7 @@ pub fn read(mut input: impl BufRead) -> Option<Vec<RunColumn>> {
     }
 }
 
-/// Takes so many values of a column; `None` where they end before.
+/// Takes `rows` values of a column; `None` where they end before.
 fn take(input: &mut impl Read, rows: usize, chunk: &mut [u8], values: &mut Vec<f64>) -> Option<()> {
     let mut left = rows.checked_mul(BYTES)?;
     while left > 0 {

@@ -38,7 +38,7 @@ pub enum LoadError {
     NoManifest {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// Kind of file that was found.
         found: &'static str,
     },
     /// A recording cannot be unpacked.
@@ -168,7 +168,7 @@ fn other_kind(path: &Path, error: DatasetError) -> LoadError {
     LoadError::NoManifest { path: path.into(), found }
 }
 
-/// What a TOML file is.
+/// Kind of a TOML file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FileKind {
@@ -182,8 +182,8 @@ pub enum FileKind {
     Daemon,
 }
 
-/// What a TOML file is, by its tables. A dataset names its train and track in tables of the
-/// same names, so that `[dataset]` decides first.
+/// Returns the kind of a TOML file by its tables. A dataset names its train and track in tables of the same names,
+/// so that `[dataset]` decides first.
 pub fn kind_of(keys: &[String]) -> Option<FileKind> {
     let has = |name: &str| keys.iter().any(|key| key == name);
     let kinds = [

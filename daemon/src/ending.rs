@@ -103,7 +103,7 @@ fn watch(terminals: Arc<Vec<OwnedFd>>, flag: Arc<AtomicBool>) -> io::Result<()> 
 
 /// Waits, at most so long, for one of the terminals to go.
 fn is_one_gone(terminals: &[OwnedFd], at_most: Option<&Timespec>) -> bool {
-    // What there is to read or write is none of our business: the end is always reported.
+    // The data to read or write do not matter here: the end is always reported.
     let mut polled: Vec<PollFd<'_>> =
         terminals.iter().map(|it| PollFd::new(it, PollFlags::empty())).collect();
     loop {
@@ -121,7 +121,7 @@ fn outlives_its_terminal() -> bool {
     is_ignored(&status, SIGHUP)
 }
 
-/// What the kernel's page on a process says of a signal.
+/// Returns whether the kernel's page on a process says that it ignores a signal.
 fn is_ignored(status: &str, signal: i32) -> bool {
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());

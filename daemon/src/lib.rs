@@ -1,4 +1,4 @@
-//! What runs beside a controller: the daemon, its command line and its files.
+//! The programs beside a controller: the daemon, its command line and its files.
 //!
 //! # Layout
 //!

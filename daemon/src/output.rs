@@ -32,7 +32,7 @@ pub enum OutputError {
     Name {
         /// The file.
         path: PathBuf,
-        /// What is there, and what was expected.
+        /// Problem, and the expected state.
         problem: &'static str,
     },
     /// A number or name that JSON cannot hold.
@@ -103,7 +103,7 @@ pub fn write_json(file: &Path, value: &impl Serialize) -> Result<(), OutputError
 ///
 /// # Errors
 ///
-/// What is wrong with the name.
+/// Problem of the name.
 pub fn require_file(path: &Path, mark: &str) -> Result<(), OutputError> {
     let refuse = |kind, words| {
         Err(OutputError::File { path: path.into(), source: io::Error::new(kind, words) })
@@ -124,11 +124,11 @@ pub fn require_file(path: &Path, mark: &str) -> Result<(), OutputError> {
     }
 }
 
-/// Refuses a file in a folder for results that is there and is none of this command's.
+/// Refuses to replace a file in a folder for results that another command wrote.
 ///
 /// # Errors
 ///
-/// What is there.
+/// Existing state.
 pub fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
     if file.exists() { require_file(file, mark) } else { Ok(()) }
 }
@@ -137,7 +137,7 @@ pub fn require_replaceable(file: &Path, mark: &str) -> Result<(), OutputError> {
 ///
 /// # Errors
 ///
-/// What is wrong with the first that is wrong.
+/// Problem of the first wrong one.
 pub fn require_files(files: &[(&Option<PathBuf>, &str)]) -> Result<(), OutputError> {
     let named = files.iter().filter_map(|(file, mark)| Some((file.as_ref()?, mark)));
     named.into_iter().try_for_each(|(file, mark)| require_file(file, mark))

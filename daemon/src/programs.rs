@@ -32,7 +32,7 @@ const PROGRAMS: [&str; 7] = [USUAL, WORKSHOP, RECORDING, PARQUET, WATCH, LIVE, B
 /// Bytes of a program's output that are read at once.
 const READ_AT_ONCE: usize = 1 << 16;
 
-/// What a user calls who calls a program through this one.
+/// Name of the calling program that is usual.
 const USUAL: &str = "dynocar";
 
 /// A call of a program that lies where this one lies; else the search path has it. It bears the name
@@ -44,7 +44,7 @@ pub fn call(package: &str) -> Command {
     command
 }
 
-/// What the user called: `dynocar` where that called the program, else the program itself.
+/// Returns the name that the user called: `dynocar` where that called the program, else the program itself.
 pub fn called_as(package: &'static str) -> &'static str {
     let name = std::env::args_os().next().unwrap_or_default();
     let is_usual = Path::new(&name).file_name().is_some_and(|it| it == USUAL);
@@ -106,7 +106,7 @@ pub fn taken_of<T>(
         let taken = stdout.map(|it| {
             let mut input = BufReader::with_capacity(READ_AT_ONCE, it);
             let taken = take(&mut input);
-            // A pipe that breaks is told by how the program ended.
+            // How the program ended shows a broken pipe.
             let _ = input.read_to_end(&mut rest);
             taken
         });
@@ -139,7 +139,7 @@ fn beside_this(package: &str) -> Option<OsString> {
     program.is_file().then(|| program.into_os_string())
 }
 
-/// What follows the name of a program of the project in a file's name; nothing for another file.
+/// Returns the rest of a file's name after the name of a program of the project; empty for another file.
 fn ending(file: &str) -> &str {
     let endings = PROGRAMS.iter().filter_map(|program| file.strip_prefix(program));
     endings.min_by_key(|ending| ending.len()).unwrap_or("")
@@ -169,10 +169,10 @@ pub struct ErrorAnswer {
     pub exit_status: u8,
 }
 
-/// What stands in the place of a result.
+/// Document of an error in place of a result.
 #[derive(Serialize, Deserialize)]
 pub struct ErrorDocument {
-    /// Why there is none.
+    /// Reason for the missing result.
     pub error: ErrorAnswer,
 }
 

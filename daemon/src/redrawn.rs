@@ -21,7 +21,7 @@ pub fn can_draw() -> bool {
     std::env::var("TERM").is_ok_and(|it| !it.is_empty() && it != "dumb") && is_utf8()
 }
 
-/// What was last drawn on the terminal of standard error.
+/// Latest drawing on the terminal of standard error.
 #[derive(Debug, Default)]
 pub struct Redrawn {
     lines: usize,
@@ -39,7 +39,7 @@ impl Redrawn {
     }
 }
 
-/// The letters that draw lines over so many others.
+/// Returns the letters that draw lines over the lines drawn before.
 fn drawing(before: usize, lines: &[String], columns: usize) -> String {
     let mut text = String::new();
     if before > 0 {
@@ -52,7 +52,7 @@ fn drawing(before: usize, lines: &[String], columns: usize) -> String {
     text
 }
 
-/// A bar of a share from 0 to 1, in so many letters.
+/// Returns a bar of a share from 0 to 1, `letters` letters long.
 pub fn bar(share: f64, letters: usize) -> String {
     let full = (share.clamp(0.0, 1.0) * letters as f64).round() as usize;
     "█".repeat(full) + &"░".repeat(letters - full)

@@ -10,7 +10,7 @@ use dynocar_transport::{ChannelError, Host, Peer, monotonic_now_ns};
 /// How fast recorded time passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rate {
-    /// So many times as fast as it was recorded.
+    /// This many times as fast as it was recorded.
     Times(f64),
     /// As fast as every pipeline follows without a loss.
     Max,
@@ -30,7 +30,7 @@ impl std::str::FromStr for Rate {
     }
 }
 
-/// What became of a replay.
+/// Summary of a replay.
 #[derive(Clone, Debug, Default)]
 pub struct ReplayReport {
     /// Samples handed to the channel.
@@ -45,7 +45,7 @@ pub struct ReplayReport {
     before: Vec<ParameterSnapshot>,
 }
 
-/// What one pipeline made of a replay's samples.
+/// Counts of one pipeline over a replay's samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Taken {
     /// Samples that entered the estimate.
@@ -59,7 +59,7 @@ pub struct Taken {
 }
 
 impl ReplayReport {
-    /// What a pipeline made of this replay's samples alone, from its snapshot at the end.
+    /// Returns the counts of a pipeline over this replay's samples alone, from its snapshot at the end.
     pub fn taken(&self, after: &ParameterSnapshot) -> Taken {
         let is_same = |it: &&ParameterSnapshot| {
             (it.epoch, it.pipeline_index) == (after.epoch, after.pipeline_index)
@@ -129,7 +129,7 @@ impl Replayer {
         loop {
             let is_there = matches!(self.reader.daemon(), Ok(Peer::Compatible(_)));
             if is_there && self.all_answer() {
-                // What the controller before has left is not ours.
+                // The samples that the controller before has left are not ours.
                 self.await_taken(0);
                 self.report.before = self.newest();
                 return true;

@@ -52,7 +52,7 @@ pub enum RunError {
     /// The system gives no thread.
     #[error("{what}: {source}")]
     System {
-        /// What was asked for.
+        /// Requested service.
         what: &'static str,
         /// The system's answer.
         source: std::io::Error,

@@ -26,7 +26,7 @@ pub enum Rights {
     Like(Permissions),
 }
 
-/// What a file system does for this module; each operation is one at which power may fail.
+/// Operations of a file system for this module; at each of them power may fail.
 pub trait Storage {
     /// Makes a file that was not there, writes it and brings it to the disk.
     ///
@@ -161,13 +161,13 @@ impl Storage for Disk {
 /// The last action: the file is replaced, though not yet for good.
 const TO_THE_DISK: &str = "bringing the directory to the disk";
 
-/// What the system did not do.
+/// Failed operation of the system.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {action} failed: {source}")]
 pub struct StorageError {
     /// The file or directory.
     pub path: PathBuf,
-    /// What was tried.
+    /// Attempted action.
     pub action: &'static str,
     /// The system's answer.
     pub source: io::Error,
@@ -248,8 +248,8 @@ pub fn make_once(
 ///
 /// # Errors
 ///
-/// The system's answer; a folder that one may write in but not read cannot be brought to the disk, and
-/// is none.
+/// Returns the system's answer; a folder that one may write in but not read cannot be synced to the disk, and does
+/// not count as a failure.
 pub fn settle(storage: &(impl Storage + ?Sized), path: &Path) -> io::Result<()> {
     storage.sync_file(path)?;
     match storage.sync_directory(folder_of(path)) {

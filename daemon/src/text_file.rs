@@ -10,13 +10,13 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 /// A longer file is refused instead of filling the memory.
 const BYTES_MAX: u64 = 4 << 30;
-/// What is said of UTF-16 where it is not declared.
+/// Message about UTF-16 that is not declared.
 const UTF_16: &str =
     "UTF-16: save the file as UTF-8, or, for runs, set encoding = \"utf-16le\" in [dataset]";
-/// So many bytes distinguish other formats from text.
+/// Bytes that distinguish other formats from text.
 const HEAD_BYTES: u64 = 1024;
 
-/// What a path leads to that is neither a file nor a folder.
+/// Returns the kind of a path that leads to neither a file nor a folder.
 fn irregular(kind: FileType) -> Option<&'static str> {
     let kinds = [
         (kind.is_fifo(), "a pipe"),
@@ -96,8 +96,7 @@ pub fn require_regular(path: &Path) -> Result<(), FileProblem> {
 ///
 /// # Errors
 ///
-/// When there is none, it is no regular file, too large, of another format, not UTF-8 or not
-/// readable.
+/// If there is no file, it is not a regular file, too large, of another format, not UTF-8 or not readable.
 pub fn read_text(path: &Path) -> Result<String, FileProblem> {
     String::from_utf8(read_bytes(path, UTF_8)?).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
@@ -109,7 +108,7 @@ pub fn read_text(path: &Path) -> Result<String, FileProblem> {
 ///
 /// # Errors
 ///
-/// When there is none, it is no regular file, too large, of another format or not readable.
+/// If there is no file, it is not a regular file, too large, of another format or not readable.
 pub fn read_bytes(path: &Path, encoding: &'static Encoding) -> Result<Vec<u8>, FileProblem> {
     let (mut bytes, file) = begin(path, HEAD_BYTES)?;
     if let Some(what) = other_format(&bytes, encoding) {
@@ -120,11 +119,11 @@ pub fn read_bytes(path: &Path, encoding: &'static Encoding) -> Result<Vec<u8>, F
     Ok(bytes)
 }
 
-/// The first bytes of a file, at most so many.
+/// Returns the first bytes of a file, at most `bytes_max`.
 ///
 /// # Errors
 ///
-/// When there is none, it is no regular file, too large or not readable.
+/// If there is no file, it is not a regular file, too large or not readable.
 pub fn read_beginning(path: &Path, bytes_max: u64) -> Result<Vec<u8>, FileProblem> {
     begin(path, bytes_max).map(|(bytes, _)| bytes)
 }

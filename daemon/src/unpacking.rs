@@ -13,7 +13,7 @@ use crate::columns_stream;
 use crate::output::report_line;
 use crate::programs::{CallFailure, PARQUET, RECORDING, call, output_of, taken_of};
 
-/// The program that knows a recording's format, by the recording's name; `None` for what is none: a file of
+/// Returns the program that knows a recording's format, by the recording's name; `None` for other files: a file of
 /// MCAP, and a folder or a file of Parquet.
 fn program_of(path: &Path) -> Option<&'static str> {
     match path.extension()?.to_str()? {
@@ -60,7 +60,7 @@ pub enum UnpackError {
     Content {
         /// The recording.
         path: PathBuf,
-        /// What the program says; it names the file.
+        /// Message of the program; it names the file.
         problem: String,
     },
     /// It cannot be done, whatever it holds.

@@ -28,13 +28,13 @@ pub trait Words {
     ///
     /// # Panics
     ///
-    /// When there is none.
+    /// If there is no such word.
     fn word(&self, index: usize) -> u64;
     /// Sets a word by its place; an integer keeps the bits that it has room for.
     ///
     /// # Panics
     ///
-    /// When there is none.
+    /// If there is no such word.
     fn set_word(&mut self, index: usize, word: u64);
 }
 
@@ -153,7 +153,7 @@ macro_rules! wire_struct {
                     size: ::core::mem::size_of::<$ty>(),
                 } ),*
             ];
-            /// What each field means, in the order of `LAYOUT`, as its documentation has it.
+            /// Meaning of each field, in the order of `LAYOUT`, from its documentation.
             pub const MEANINGS: &'static [&'static str] = &[ $( concat!($($doc),*) ),* ];
             /// Hash over the layout; peers with different hashes are incompatible.
             pub const LAYOUT_HASH: u64 = $crate::layout::layout_hash(

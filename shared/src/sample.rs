@@ -1,4 +1,4 @@
-//! What a controller writes each control cycle.
+//! Sample that a controller writes each control cycle.
 
 use crate::wire_struct;
 
@@ -125,7 +125,7 @@ measured! {
     BrakeCylinderPressure = brake_cylinder_pressure_pa [-5e4, 2e6];
     /// dv/dt in m/s², as measured.
     Acceleration = acceleration_mps2 [-20.0, 20.0];
-    /// What an accelerometer reads along the track in m/s²: dv/dt + g * gradient.
+    /// Reading of an accelerometer along the track in m/s²: dv/dt + g * gradient.
     SpecificForce = specific_force_mps2 [-20.0, 20.0];
     /// The train's gross mass in kg, without the rotating part.
     Mass = mass_kg [0.0, INFINITY];

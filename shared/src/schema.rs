@@ -1,5 +1,5 @@
-//! What a sample and a snapshot say, field by field: the one table from which everything comes that
-//! writes them down under names, such as recordings and the page of their fields.
+//! Fields of a sample and a snapshot: the one table from which recordings, the page of their fields and all others
+//! that write them under names are made.
 //!
 //! Names, types and meanings are those of the structs; the units are those in the names.
 
@@ -26,7 +26,7 @@ pub struct Field {
     pub index: usize,
     /// Name, type, offset and size.
     pub layout: &'static FieldLayout,
-    /// What it is.
+    /// Meaning of the field.
     pub meaning: &'static str,
     /// When it has no value.
     pub missing: Missing,

@@ -1,4 +1,4 @@
-//! What the daemon answers, one snapshot for each train and pipeline.
+//! Answer of the daemon: one snapshot for each train and pipeline.
 
 use crate::vocabulary::{
     EffectKind, MassSource, Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status,
@@ -157,7 +157,7 @@ impl ParameterSnapshot {
         }
     }
 
-    /// What a controller may do with the estimate; an unknown number reads as invalid.
+    /// Returns the permitted use of the estimate; an unknown number reads as invalid.
     pub const fn status(&self) -> Status {
         match Status::from_number(self.status) {
             Some(status) => status,

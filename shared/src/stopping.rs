@@ -50,7 +50,7 @@ impl BrakeResponse {
     };
 }
 
-/// What the rail carries.
+/// Adhesion of the rail.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RailAdhesion {
     /// The rail carries any brake force.
@@ -103,7 +103,7 @@ pub struct Stop<'a> {
     pub brake_scale: Uncertain,
     /// How the brake comes after its command.
     pub response: BrakeResponse,
-    /// What the rail carries.
+    /// Adhesion of the rail.
     pub adhesion: RailAdhesion,
     /// Gravity in m/s²: [`STANDARD_GRAVITY_MPS2`], but 9.8 in the papers.
     pub gravity_mps2: f64,

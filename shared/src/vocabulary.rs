@@ -21,7 +21,7 @@ macro_rules! vocabulary {
                 match self { $( $name::$item => $text ),* }
             }
 
-            /// What the member means, as its documentation has it.
+            /// Returns the meaning of the member, from its documentation.
             pub const fn meaning(self) -> &'static str {
                 match self { $( $name::$item => concat!($($doc),*) ),* }
             }
@@ -100,8 +100,8 @@ vocabulary! {
 }
 
 vocabulary! {
-    /// What a controller asks for; the daemon's configuration says which pipeline answers it, and
-    /// each snapshot repeats that.
+    /// Quantity that a controller asks for; the daemon's configuration says which pipeline answers it, and each
+    /// snapshot repeats that.
     Quantity: u32 {
         /// Basic resistance over speed: Davis a, b and c.
         Resistance = 0 "resistance",
@@ -161,7 +161,7 @@ vocabulary! {
         Declared = 1 "declared",
         /// The controller's samples, which carry it.
         Weighed = 2 "weighed",
-        /// What forces do to the train.
+        /// Effect of forces on the train.
         Learned = 3 "learned",
     }
 }

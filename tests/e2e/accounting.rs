@@ -37,7 +37,7 @@ fn all_pipelines() -> (String, usize) {
     (text, kinds.len())
 }
 
-/// Publishes so many samples of a steady train at once.
+/// Publishes `samples` samples of a steady train at once.
 fn burst(publisher: &mut SamplePublisher, samples: u64) {
     for _ in 0..samples {
         let mut sample = TrainSample::empty(TRAIN).with(SampleField::Speed, 20.0);
@@ -55,7 +55,7 @@ fn snapshots(reader: &mut SnapshotReader) -> Vec<ParameterSnapshot> {
     reader.readings(0).map(|reading| *reading.snapshot).collect()
 }
 
-/// Waits until so many pipelines account for so many samples each.
+/// Waits until `pipelines` pipelines account for this many samples each.
 fn await_accounts(reader: &mut SnapshotReader, pipelines: usize, offered: u64, daemon: &Process) {
     let mut found = Vec::new();
     await_true(
@@ -72,7 +72,7 @@ fn a_burst_to_a_fresh_daemon_is_counted_by_every_pipeline() {
     let site = Site::new();
     let (text, pipelines) = all_pipelines();
     let mut publisher = SamplePublisher::open(&site.host(), TRAIN).unwrap();
-    // What no daemon could see is in no account.
+    // Samples that no daemon could see are in no account.
     burst(&mut publisher, 300);
     let daemon = daemon(&site, &text);
     burst(&mut publisher, 1_600);

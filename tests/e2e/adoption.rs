@@ -188,7 +188,7 @@ fn decided_by_rule(declared: &str, rival: &str, adopted_by_hand: bool) {
     assert!(last.reason.contains("open loop over 60 s"), "{}", last.reason);
     let log = stop(daemon);
     assert!(log.contains("decided by rule"), "{log}");
-    // What was measured is there for the next daemon.
+    // The measurements are there for the next daemon.
     let record = record::Trials::read(cast.models().folder());
     let error = |model| record.of(model).and_then(|it| it.error_mps).unwrap();
     let (better, worse) = if adopted_by_hand { (declared, rival) } else { (rival, declared) };

@@ -79,7 +79,7 @@ fn plausible_wrong_forces_mislead_no_estimator_that_fits_motion_to_them() {
         all += tally;
     }
     println!("{all:?}, trusted {trusted_shares:.2?}");
-    // What is left are forces that stay wrong for seconds, by chance as a jump of the resistance does.
+    // The remaining cases are forces that stay wrong for seconds, by chance as a jump of the resistance does.
     assert!(1000 * all.wrong <= all.trusted, "trusted and wrong at a look: {all:?}");
     // Refusing to estimate would keep the promise as well.
     let [first, second, ..] = trusted_shares[..] else { unreachable!("six rates") };

@@ -1,5 +1,5 @@
-//! What a careless first user does: wrong paths, wrong kinds of files, recordings that lack
-//! something. Every command says in words what is wrong and ends.
+//! Mistakes of a careless first user: wrong paths, wrong kinds of files, recordings that lack something. Every
+//! command describes the mistake and ends.
 
 use std::ffi::OsStr;
 use std::fmt::Write as _;

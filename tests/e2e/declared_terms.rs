@@ -38,14 +38,14 @@ fn last_snapshot(
     *pipeline.snapshot()
 }
 
-/// What an estimator says: name, value and standard deviation.
+/// Returns the estimates of a snapshot: name, value and standard deviation.
 fn estimates(snapshot: &ParameterSnapshot) -> Vec<(String, f64, f64)> {
     let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
     let mut all: Vec<(String, f64, f64)> = Parameter::ALL
         .iter()
         .filter(|parameter| !davis.contains(parameter))
         .filter_map(|&it| Some((it.to_string(), snapshot.value(it)?, snapshot.std(it)?)))
-        // What is not yet estimated has no standard deviation.
+        // A quantity that is not yet estimated has no standard deviation.
         .filter(|(_, _, std)| *std > 0.0)
         .collect();
     for speed_mps in SPEEDS_MPS {
@@ -56,7 +56,7 @@ fn estimates(snapshot: &ParameterSnapshot) -> Vec<(String, f64, f64)> {
     all
 }
 
-/// What moved, in words; a mass is expected to move by a factor.
+/// Describes the changed estimates; a mass is expected to change by a factor.
 fn moved(base: &ParameterSnapshot, now: &ParameterSnapshot, mass_factor: f64) -> Vec<String> {
     let (before, after) = (estimates(base), estimates(now));
     let share_max = match base.pipeline_kind() {

@@ -20,7 +20,7 @@ const WATCH: &str = env!("CARGO_BIN_EXE_dynocar-watch-under-test");
 const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
 const TRAIN: TrainId = TrainId(1);
 
-/// What ends a program.
+/// Ways in which a program ends.
 #[derive(Clone, Copy, Debug)]
 enum End {
     /// A signal.

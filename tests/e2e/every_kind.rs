@@ -14,7 +14,7 @@ fn is_found(kind: EffectKind) {
     assert_eq!(found, [kind.name()], "{}", answer.statement);
     let [before_mps, after_mps] = answer.fit_runs.expect("runs to fit");
     assert!(after_mps < before_mps, "{kind}: {}", answer.statement);
-    // What a run left out was loaded with, as one is here, nobody can know.
+    // The load of a run that was left out, as one is here, nobody can know.
     let is_predictable = kind != EffectKind::MassChange;
     if is_predictable {
         assert!(answer.rmse_after < answer.rmse_before, "{kind}: {}", answer.statement);

@@ -306,7 +306,7 @@ fn an_effect_that_predicts_the_runs_held_out_worse_is_reported_as_that() {
     assert!(answer.rmse_after > answer.rmse_before, "{}", answer.statement);
     assert!(answer.statement.contains("held out are predicted worse"), "{}", answer.statement);
 
-    // What it means on the fit runs: 2 N/kN over the distance driven there.
+    // The meaning on the fit runs: 2 N/kN over the distance driven there.
     let (mut work_kj, mut distance_m) = (0.0, 0.0);
     for run in &explanation.problem.runs {
         for pair in run.samples().windows(2) {

@@ -1,4 +1,4 @@
-//! What `dynocar explain --grown` writes is a dataset that is explained as it lies there.
+//! The files of `dynocar explain --grown` are a dataset that can be explained as it lies there.
 
 use std::path::Path;
 

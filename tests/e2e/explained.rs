@@ -1,4 +1,4 @@
-//! A simulated dataset of each kind of effect and what `explain` makes of it, reckoned once for all tests.
+//! A simulated dataset of each kind of effect and the answer of `explain` to it, computed once for all tests.
 
 use std::sync::OnceLock;
 

@@ -19,7 +19,7 @@ fn simulated(seed: u64) -> (SimulatedDataset, Law) {
     (simulated, law)
 }
 
-/// What is said of a force that must be called unknown, and the error over the true model's.
+/// Returns the answer on a force that must be called unknown, and the error over the true model's.
 fn explained(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<Extra>, f64) {
     let dataset = read_files(&dataset_files(simulated));
     let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");

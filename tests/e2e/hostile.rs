@@ -1,4 +1,4 @@
-//! What processes of another user and of the same user can do, tried.
+//! Attempts of processes of another user and of the same user.
 
 use std::fs::OpenOptions;
 use std::os::unix::fs::{FileExt, MetadataExt, PermissionsExt};

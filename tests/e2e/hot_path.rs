@@ -1,5 +1,5 @@
-//! What a controller and a pipeline's thread do in every cycle: they allocate nothing, make no system call, and
-//! neither fault nor wait. The allocator is of this program alone, and counts by thread.
+//! Each cycle of a controller and of a pipeline's thread allocates nothing, makes no system call, and neither
+//! faults nor waits. The allocator is of this program alone, and counts by thread.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -176,7 +176,7 @@ fn nothing_is_overwritten_and_nothing_is_written_of_bad_input() {
     assert!(said(&output).contains("expected a share from 0 to 1"), "{}", said(&output));
 }
 
-/// What a browser makes of a drawing: its root, the number of its lines, its texts.
+/// Returns a drawing as a browser sees it: its root, the number of its lines, its texts.
 fn look(browser: &mut Browser, file: &Path) -> (String, u64, String) {
     browser.open(&format!("file://{}", file.display()));
     assert!(browser.conduct().console_errors.is_empty(), "{:?}", browser.conduct());

@@ -16,7 +16,7 @@ use crate::commands::{done, dynocar, run, said};
 
 const DEMO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo");
 
-/// What a manifest says of its columns: quantity, column, unit and factor.
+/// Returns the columns of a manifest: quantity, column, unit and factor.
 fn columns(manifest: &Manifest) -> Vec<(String, String, &'static str, f64)> {
     let columns = manifest.columns.iter();
     columns
@@ -98,7 +98,7 @@ fn recordings_of_five_houses_in_any_unit_are_described_as_they_were_written() {
         done(&site, &["check", "made"]);
     }
     assert!(right > 100, "{right} columns");
-    // What no name gives and no motion reveals stays open: °F, and counts of a thousandth.
+    // Columns that no name gives and no motion reveals stay open: °F, and counts of a thousandth.
     assert!(wrong.len() * 15 <= right, "{right} right, wrong: {wrong:#?}");
 }
 

@@ -1,4 +1,4 @@
-//! What `dynocar init` refuses, and that it leaves no trace then.
+//! Refusals of `dynocar init`, which leave no trace.
 
 use std::fs::{create_dir_all, read_to_string, write};
 use std::process::{Command, Stdio};

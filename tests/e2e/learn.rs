@@ -194,7 +194,7 @@ fn a_dragging_brake_is_an_event_with_its_runs_and_no_model() {
         event.windows.iter().all(|it| it.run.starts_with("runs/") && it.t_end_s > it.t_start_s)
     );
     assert!(event.acted.is_some() && said.contains(&event.sentence), "{said}");
-    // What is learned from the same runs again is no other event.
+    // Findings from the same runs again are no other event.
     std::fs::remove_file(work.path("models/learn/learn.state")).unwrap();
     work.learn(&[]);
     assert_eq!(models.events().unwrap(), events);

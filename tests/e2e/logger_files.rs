@@ -32,7 +32,7 @@ fn logged(times: impl Fn(u32) -> String) -> Vec<u8> {
         let w0 = 1.0 + 0.02 * speed_mps + 0.0004 * speed_mps * speed_mps;
         speed_mps = (speed_mps + (force_kn - 0.981 * w0) / 105.0).max(0.0);
     }
-    // What Windows writes: one byte for each of these letters.
+    // Text as Windows writes it: one byte for each of these letters.
     let byte = |letter: char| u8::try_from(u32::from(letter)).expect("a letter of Latin-1");
     text.chars().map(byte).collect()
 }

@@ -1,4 +1,4 @@
-//! What waits for no controller's cycle: commands as a user runs them, what `explain` finds, the simulator of
+//! Tests that wait for no controller's cycle: commands as a user runs them, findings of `explain`, the simulator of
 //! trains, the sources and documents as text, and hardship that is counted in samples, however slow the machine.
 
 #[path = "init/commands.rs"]
@@ -34,7 +34,7 @@ mod stops;
 mod survey_command;
 mod two_programs;
 
-// What `explain` finds, and what it does not.
+// Findings of `explain`, and their limits.
 mod declared_terms;
 mod every_kind;
 mod explain;

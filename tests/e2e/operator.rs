@@ -1,4 +1,4 @@
-//! What an operator reads of a real daemon: in its log, and from `dynocar health`.
+//! Texts of a real daemon for an operator: in its log, and from `dynocar health`.
 
 use std::time::Duration;
 

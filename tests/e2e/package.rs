@@ -10,7 +10,7 @@ use dynocar_tests::process::Site;
 use crate::commands::{DYNOCAR, done, dynocar, said};
 use crate::support::{compiler, library_directory, must_succeed, require};
 
-/// What the package must hold, for the programs that are tested.
+/// Files that the package must hold, for the tested programs.
 const FILES: [&str; 20] = [
     "usr/bin/dynocar",
     "usr/bin/dynocar-workshop",

@@ -1,4 +1,4 @@
-//! What is found on pages: links, headings, paragraphs, and commands word by word.
+//! Links, headings, paragraphs, and commands of the pages, word by word.
 
 use dynocar_tests::documents::Page;
 

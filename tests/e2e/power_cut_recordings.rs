@@ -34,7 +34,7 @@ fn sample(sequence: u64) -> TrainSample {
     TrainSample { sequence, ..TrainSample::empty(TrainId(1)) }
 }
 
-/// What was said at a moment, after so many steps of the disk.
+/// Statement at a moment, after so many steps of the disk.
 #[derive(Clone, Debug)]
 struct Mark {
     steps: usize,
@@ -164,7 +164,7 @@ fn check(left: &Left, promise: &Promise, known: &mut Known) -> Result<(), String
     Ok(())
 }
 
-/// What a disk has to hold.
+/// Files that a disk has to hold.
 struct Promise {
     lasting: u64,
     oldest: u64,
@@ -188,7 +188,7 @@ fn recovered(contents: &[Vec<u8>]) -> Vec<u64> {
     for (path, content) in files.iter().zip(contents) {
         std::fs::write(path, content).unwrap();
     }
-    // One alone of which there is nothing is reported to be none.
+    // A single file of which nothing is left is reported as no recording.
     let notes = LossyDisk::new(Neglect::Nothing);
     if files.is_empty() || recover_on(&NotedDisk { notes }, &files, &path).is_err() {
         return Vec::new();

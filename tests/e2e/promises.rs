@@ -1,5 +1,5 @@
-//! What the documents promise is held: every test they name exists, every `unsafe` is counted and
-//! justified, every licence allowed, every dependency of a controller reviewed.
+//! The promises of the documents are held: every test they name exists, every `unsafe` is counted and justified,
+//! every licence allowed, every dependency of a controller reviewed.
 
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -45,7 +45,7 @@ fn every_test_that_the_promises_name_exists() {
     }
 }
 
-/// What stands between backticks and names a Rust file by its path, with the name in it, if any.
+/// Returns the text between backticks that names a Rust file by its path, with the name in it, if any.
 fn named_places(document: &str) -> impl Iterator<Item = (&str, Option<&str>)> {
     let codes = document.split('`').skip(1).step_by(2).filter(|code| code.contains('/'));
     codes.filter_map(|code| match code.split_once(".rs::") {

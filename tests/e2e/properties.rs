@@ -1,4 +1,4 @@
-//! What holds for any sample and any snapshot, whatever its bits.
+//! Properties of any sample and any snapshot, whatever its bits.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! What the kernel says of a pipeline thread at work, and what the daemon says when the kernel
-//! refuses it a privilege.
+//! Counters of the kernel for a pipeline thread at work, and messages of the daemon when the kernel refuses it a
+//! privilege.
 
 use std::time::Duration;
 

@@ -55,7 +55,7 @@ fn place(seen: &Value, [across, down]: [f64; 2]) -> [f64; 2] {
     [left + across * width, top + down * height]
 }
 
-/// What the numbers below a plot say of a place.
+/// Returns the value of the numbers below a plot at a place.
 fn by_labels(seen: &Value, x_px: f64) -> f64 {
     let labels = seen["labels"].as_array().unwrap();
     let [first, last] =

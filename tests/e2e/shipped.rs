@@ -1,5 +1,5 @@
-//! What is shipped together works together: the daemon with `config/daemon.toml`, the demo's
-//! recording, and the examples in C, C++ and Rust as they are (that in Python: `client/python/tests`).
+//! The shipped parts work together: the daemon with `config/daemon.toml`, the demo's recording, and the examples in
+//! C, C++ and Rust as they are (that in Python: `client/python/tests`).
 
 use std::path::Path;
 use std::process::Command;
@@ -63,7 +63,7 @@ fn every_shipped_example_comes_to_a_usable_resistance_from_the_shipped_daemon() 
     }
 }
 
-/// What a configuration also offers in comments.
+/// Returns a configuration with the offers in its comments switched on.
 fn with_its_offers(text: &str) -> String {
     let offered = |line: &str| {
         let rest = line.strip_prefix("# ")?;

@@ -1,4 +1,4 @@
-//! What a supervisor and an operator see: notifications, verdicts, metrics, the unit file.
+//! Outputs for a supervisor and an operator: notifications, verdicts, metrics, the unit file.
 
 use std::collections::HashMap;
 use std::io::{Read, Write};
@@ -58,7 +58,7 @@ fn a_stopped_daemon_no_longer_feeds_the_watchdog() {
     let variables = [("NOTIFY_SOCKET", path.to_str().unwrap()), ("WATCHDOG_USEC", "400000")];
     let daemon = daemon(&site, ECHO, &variables);
     daemon.signal(Signal::STOP);
-    // What was sent before the stop is heard first; then silence, for five times the limit.
+    // Messages sent before the stop are heard first; then silence, for five times the limit.
     socket.set_read_timeout(Some(Duration::from_secs(2))).unwrap();
     let mut buffer = [0; 256];
     let mut heard = 0;

@@ -1,4 +1,4 @@
-//! What the data do not determine is said.
+//! The undetermined parts of an answer are stated.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -138,7 +138,7 @@ impl Source {
         panic!("{}: a literal without an end", self.path)
     }
 
-    /// What only tests hold is no message to users.
+    /// Removes the messages that only tests hold.
     fn drop_tests(&mut self) {
         while let Some(start) = self.code.find("#[cfg(test)]") {
             let item = start + self.code[start..].find(['{', ';']).expect("an item") + 1;
@@ -260,7 +260,7 @@ fn words_in(message: &str) -> usize {
     message.split([' ', GAP]).filter(is_word).count()
 }
 
-/// A message of which the page shows the beginning shows so many words at least.
+/// A message of which the page shows the beginning shows this many words at least.
 const BEGINNING_MIN: usize = 8;
 
 /// Whether an entry of the page is a message: all of it, or its beginning before a mark of omission.

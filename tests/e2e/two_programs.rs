@@ -66,7 +66,7 @@ fn the_workshop_is_found_next_to_the_program_else_on_the_search_path() {
                 .map(|arguments| run(program, search_path, &arguments).stdout);
             assert!(asked == option && !asked.is_empty(), "{command}: {}", words(&asked));
         }
-        // What the workshop finds wrong is said, and ends, as if there were one program.
+        // Problems found by the workshop are reported, and end the command, as if there were one program.
         let output = run(program, search_path, &["explain", "no-such-dataset"]);
         assert_eq!(output.status.code(), Some(2));
         assert!(words(&output.stderr).starts_with("dynocar: no-such-dataset: no such file"));

@@ -12,7 +12,7 @@ fn program_sources(package: &str, file: &str) -> Vec<PathBuf> {
     }
 }
 
-/// The first line with a test, or with code on a page where that is to be none; a block of text is no code.
+/// Returns the first line with a test, or with code on a page where no code may stand; a block of text is no code.
 fn unrun(text: &str, (has_tests, has_code): (bool, bool)) -> Option<&str> {
     let mut is_open = false;
     text.lines().find(|line| {

@@ -1,4 +1,4 @@
-//! What `explain` fits, written as files, is what the daemon then applies, to the bit.
+//! The fit of `explain`, written as files, is applied by the daemon to the bit.
 
 use dynocar_analysis::dataset::{Dataset, parse_track, parse_train};
 use dynocar_analysis::explain::effects::{Candidate, LIBRARY, On, Past, UNKNOWN};
@@ -50,7 +50,7 @@ fn fitted_forces(fit: &Fit, run: &RunData) -> (Vec<SampleForces>, f64) {
     (forces, speed_scale)
 }
 
-/// What the daemon resolves, in the terms of a fit: its mass is that of the section.
+/// Asserts that the daemon resolves the same forces as the fit; its mass is that of the section.
 fn assert_same_forces(kind: EffectKind, fit: &Fit, declared: &RunData, grown: &RunData) {
     let (fitted, speed_scale) = fitted_forces(fit, declared);
     assert_eq!(fitted.len(), grown.declared.all().len());

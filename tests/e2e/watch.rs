@@ -236,7 +236,7 @@ fn in_a_terminal_it_shows_all_resizes_and_leaves_the_terminal_as_it_was() {
     let left = screen.shows(&["ended 0"]);
     assert!(left.contains("written before"), "what was there is back: {left}");
     assert!(!left.contains("what to drive next"), "{left}");
-    // What is typed shows again, and a line is a line.
+    // Typed letters show again, and a line is a line.
     screen.keys(&["echo typed", "Enter"]);
     await_true(|| screen.text().matches("typed").count() == 2, || screen.text());
 }

@@ -1,4 +1,4 @@
-//! What `advice` promises is what the daemon's pipelines then know.
+//! The promises of `advice` are kept by the daemon's pipelines.
 //!
 //! A train is driven about at random, and then over each manoeuvre of the catalogue; the forecast made
 //! from the snapshot before a manoeuvre is held against the snapshot after it. Motion and forces are the

@@ -79,7 +79,7 @@ fn the_efficiency_is_reported_within_its_interval_from_the_lines_power() {
     assert!(errors.iter().all(|error| error.abs() < ERROR_MAX), "{errors:?}");
 }
 
-/// What `explain` finds in the dataset of a seed, as the names of its effects.
+/// Returns the names of the effects that `explain` finds in the dataset of a seed.
 fn found(seed: u64, effects: EffectRequest) -> Vec<&'static str> {
     let truth = true_drive(seed, true);
     let dataset = dataset(seed, &truth, effects);

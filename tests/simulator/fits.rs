@@ -10,7 +10,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{Deviations, EffectRequest, SimulatorSettings, simulate};
 
-/// What the library proposes for a train with late forces beside a, b and c alone.
+/// Shows the proposals of the library for a train with late forces beside a, b and c alone.
 fn proposed(look: impl Fn(&Explanation, &Scan, Vec<Candidate>)) {
     let simulated = simulate(&SimulatorSettings {
         deviations: Deviations::ROUGH,
@@ -69,7 +69,7 @@ fn what_looks_back_does_the_same_block_by_block() {
             let mut at_once: Vec<SampleForces> = run.declared.all().collect();
             let on = On { run, first: 0, past: &mut Past::default() };
             hypothesis.apply(&parameters, on, &mut at_once);
-            // What a run before left is forgotten.
+            // Findings in an earlier run are forgotten.
             let mut past = Past::default();
             for run in [&problem.runs[2], run] {
                 let declared: Vec<SampleForces> = run.declared.all().collect();

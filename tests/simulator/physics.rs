@@ -188,7 +188,7 @@ fn couplings_move_the_leading_car_and_not_the_train() {
 fn the_declared_model_predicts_an_ideal_null_recording() {
     for dataset in IDEAL.iter() {
         let score = oracle::score(dataset);
-        // What is left: commands that change between samples, and unequal cars.
+        // The remaining difference: commands that change between samples, and unequal cars.
         assert!(score.full_run.declared_mps < 0.03, "{}: {score:?}", name(dataset));
         assert!(score.window60.declared_mps < 0.03, "{}: {score:?}", name(dataset));
         assert_eq!(score.full_run.declared_mps, score.full_run.true_mps, "{}", name(dataset));

@@ -21,7 +21,7 @@ const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 /// A change of the description that no file contradicts.
 #[derive(Clone, Copy, Debug)]
 enum InputFault {
-    /// Quantities are read so many times too large.
+    /// Quantities are read this many times too large.
     Scale(&'static [&'static str], f64),
     /// Two columns are exchanged, or the sign of their difference.
     Exchange,
@@ -35,7 +35,7 @@ enum InputFault {
 
 const FORCES: &[&str] = &["traction_force", "brake_force", "control_force"];
 
-/// What goes wrong, the code of the diagnostic, and the reason of the pipelines.
+/// Faults, the code of the diagnostic, and the reason of the pipelines.
 const FAULTS: [(&str, InputFault, &str, Reason); 17] = [
     ("kN as N", InputFault::Scale(FORCES, 1e-3), "forces_scale", Reason::ImplausibleForces),
     ("N as kN", InputFault::Scale(FORCES, 1e3), "forces_scale", Reason::ImplausibleForces),
@@ -156,8 +156,8 @@ fn write(files: &[(String, String)], fault: Option<InputFault>, folder: &Path) {
     }
 }
 
-/// What a command prints on the terminal, on one line, and its answer, or its error, as where no
-/// sample is usable.
+/// Returns the terminal output of a command, on one line, and its answer, or its error, as where no sample is
+/// usable.
 fn printed(folder: &Path, command: &[&str]) -> (String, Value) {
     let file = folder.join(format!("{}.json", command[0]));
     let run = Command::new(DYNOCAR)

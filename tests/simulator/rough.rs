@@ -1,4 +1,4 @@
-//! What is found where everything declared is a little off: weights, map, winds, forces, wheels, curve constant.
+//! Findings where everything declared is a little off: weights, map, winds, forces, wheels, curve constant.
 
 use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
@@ -40,7 +40,7 @@ fn kinds(answer: &ExplainAnswer) -> Vec<&'static str> {
     answer.effects.iter().map(|effect| effect.kind).collect()
 }
 
-/// What was found of a kind and its standard deviation.
+/// Returns the found value of a kind and its standard deviation.
 fn found(answer: &ExplainAnswer, kind: EffectKind, parameter: &str) -> Option<[f64; 2]> {
     let written = serde_json::to_value(answer).unwrap();
     let effects = written["effects"].as_array()?;

@@ -21,7 +21,7 @@ fn railway(seed: u64, effects: EffectRequest) -> SimulatorSettings {
     }
 }
 
-/// What became of a simulated railway.
+/// Outcome of a simulated railway.
 struct Case {
     truth: SimulatedDataset,
     answer: SurveyAnswer,

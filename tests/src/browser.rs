@@ -25,7 +25,7 @@ const ARGUMENTS: &str = "--headless --no-sandbox --disable-gpu --disable-quic --
     --disable-background-networking --disable-component-update --disable-sync \
     --disable-dev-shm-usage --disable-breakpad --remote-debugging-pipe";
 
-/// What a page did while it was opened.
+/// Conduct of a page while it was opened.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Conduct {
     /// Errors and warnings of console, scripts and loading.
@@ -203,13 +203,13 @@ impl Browser {
         }
     }
 
-    /// What the page did since it was opened.
+    /// Returns the conduct of the page since it was opened.
     ///
     /// # Panics
     ///
     /// When the browser is gone.
     pub fn conduct(&mut self) -> Conduct {
-        // What comes before the answer to a later request has been read with it.
+        // Bytes before the answer to a later request have been read with it.
         self.value("new Promise(done => requestAnimationFrame(done)), 0");
         self.conduct.clone()
     }

@@ -70,7 +70,7 @@ impl Page {
         })
     }
 
-    /// What is said outside blocks of code, line by line.
+    /// Returns the text outside blocks of code, line by line.
     pub fn prose(&self) -> impl Iterator<Item = &str> {
         self.lines().filter(|(language, _)| language.is_none()).map(|(_, line)| line)
     }

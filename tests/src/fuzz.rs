@@ -47,7 +47,7 @@ pub enum Target {
     Sample,
 }
 
-/// What readers stumble over.
+/// Tokens over which readers stumble.
 const TOKENS: [&str; 26] = [
     "nan",
     "-inf",
@@ -328,7 +328,7 @@ fn mutate(input: &mut Vec<u8>, others: &[Vec<u8>], random: &mut ChaCha8Rng) {
     }
 }
 
-/// Feeds the corpus, then so many mutations of it; gives the number of accepted inputs.
+/// Feeds the corpus, then `rounds` mutations of it; returns the number of accepted inputs.
 ///
 /// # Panics
 ///

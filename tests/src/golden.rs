@@ -1,4 +1,4 @@
-//! What every estimator makes of the demo's recorded runs, bit for bit, as a small text file.
+//! Estimates of every estimator from the demo's recorded runs, bit for bit, as a small text file.
 //!
 //! Rust's arithmetic gives the same bits on every machine, but `exp`, `ln` and the like come from
 //! the C library and may differ in the last place from one release to the next. The file
@@ -22,7 +22,7 @@ pub fn path() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("golden/demo.txt")
 }
 
-/// What one estimator made of the runs.
+/// Estimates of one estimator from the runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GoldenLine {
     /// The kind of estimator.
@@ -74,8 +74,8 @@ pub fn fingerprint() -> u64 {
     hash
 }
 
-/// What the samples made of a snapshot: without the times of this run of the daemon, and without
-/// what its configuration stamps on it.
+/// Returns a snapshot as made by the samples: without the times of this run of the daemon, and without the stamps
+/// of its configuration.
 pub fn without_stamps(snapshot: &ParameterSnapshot) -> ParameterSnapshot {
     ParameterSnapshot {
         epoch: 0,

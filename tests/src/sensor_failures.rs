@@ -165,10 +165,10 @@ impl SensorFailure {
     }
 }
 
-/// What is left of good samples.
+/// Good samples after the failure of a sensor.
 #[derive(Clone, Debug)]
 pub struct Spoiled {
-    /// What arrives, in order.
+    /// Arriving samples, in order.
     pub samples: Vec<TrainSample>,
     /// How many never do.
     pub dropped: u64,

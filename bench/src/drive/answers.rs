@@ -9,7 +9,7 @@ use super::knowledge::Knowledge;
 use super::train::Train;
 use crate::scenarios::score::{Answer, COUNTS_MPS, Score};
 
-/// What the driver asks for.
+/// Quantities that the driver asks for.
 pub const ASKED: [Quantity; 4] =
     [Quantity::Resistance, Quantity::Mass, Quantity::BrakeFriction, Quantity::Adhesion];
 
@@ -17,7 +17,7 @@ fn value(snapshot: &ParameterSnapshot, parameter: Parameter) -> Option<Uncertain
     Some(Uncertain::new(snapshot.value(parameter)?, snapshot.std(parameter)?))
 }
 
-/// What is declared with each usable answer in its place.
+/// Returns the declared parameters with each usable answer in its place.
 pub fn learned<'a>(
     declared: &Knowledge,
     declared_friction: f64,
@@ -54,8 +54,8 @@ pub fn learned<'a>(
     known
 }
 
-/// What a driver keeps from its last braking for the next one: the daemon calls both stale once the train
-/// no longer brakes, which is when the next braking is planned. No stop is bounded by it.
+/// Answers of the last braking that a driver keeps for the next one: the daemon calls them stale once the train no
+/// longer brakes, which is when the next braking is planned. No stop is bounded by them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
     brake_scale: Option<Uncertain>,
@@ -65,7 +65,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// What the driver drives by, for what is usable now, by [`ASKED`].
+    /// Returns the parameters by which the driver drives, from the answers usable now, by [`ASKED`].
     pub fn recall(
         &mut self,
         learned: &Knowledge,

@@ -24,7 +24,7 @@ const LATE: (f64, f64) = (1.5, 0.01);
 /// Deceleration in m/s² of a train that is too fast without having to stop.
 const REGULATING_MPS2: f64 = 0.3;
 
-/// What the driver does.
+/// Phase of a driver's journey.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Accelerates and cruises.
@@ -35,7 +35,7 @@ pub enum Phase {
     Braking,
 }
 
-/// What the driver measures.
+/// Measurements available to the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// Time in s since the train may start.
@@ -92,7 +92,7 @@ impl Driver {
         }
     }
 
-    /// What it does.
+    /// Returns the present phase.
     pub fn phase(&self) -> Phase {
         self.phase
     }
@@ -126,7 +126,7 @@ impl Driver {
         let traction_n = self.ability.traction.force_n(speed_mps);
         let possible_n = free_n.clamp(-self.ability.brake_max_n, traction_n);
         if possible_n != free_n {
-            // What cannot be had is not commanded, or the limit of the jerk would start from there.
+            // Only attainable forces are commanded, or the limit of the jerk would start from the others.
             self.commanded_mps2 = self.unexplained_mps2
                 + self.knowledge.acceleration_mps2(possible_n, speed_mps, slope);
         }

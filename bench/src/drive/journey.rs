@@ -15,8 +15,8 @@ use super::train::Train;
 const TIMETABLE: (f64, f64) = (1.08, 3.0);
 /// Confidence of the bounds.
 pub const CONFIDENCE: f64 = 0.99;
-/// What a controller presumes of the rail where it knows nothing: a wet one, and mostly more slippery
-/// than the law says.
+/// Adhesion that a controller assumes where it knows nothing of the rail: a wet one, usually more slippery than the
+/// law says.
 const UNKNOWN_RAIL: RailAdhesion = RailAdhesion::Law(RailCondition::Wet, Uncertain::new(0.8, 0.12));
 /// Brake and rail of the fixed worst case.
 const WORST: (f64, f64) = (0.7, 0.45);
@@ -38,7 +38,7 @@ pub struct Look {
     pub true_m: f64,
 }
 
-/// What a leg was worth.
+/// Scores of one driven leg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrivenLeg {
     /// Place of the standing train beyond the stopping point in m.
@@ -87,7 +87,7 @@ impl Journey {
         }
     }
 
-    /// What is declared, with the load as it was weighed.
+    /// Returns the declared parameters, with the load as it was weighed.
     pub fn declared(&self, sample: &TrainSample) -> Knowledge {
         let declared = &self.train.declared;
         let weighed = sample.get(SampleField::Mass);

@@ -1,4 +1,4 @@
-//! What a driver holds for true of its train, and what the train can do.
+//! Beliefs of a driver about its train, and the train's abilities.
 
 use dynocar_model::train::{Davis, EffortCurve};
 use dynocar_shared::Uncertain;
@@ -19,11 +19,11 @@ pub struct Knowledge {
     pub w0_std_n_per_kn: f64,
     /// Exerted over reported brake force.
     pub brake_scale: Uncertain,
-    /// What the rail carries, where that is known.
+    /// Adhesion of the rail, where it is known.
     pub rail: Option<RailAdhesion>,
 }
 
-/// What the train can do, as declared.
+/// Declared abilities of the train.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ability {
     /// Greatest traction force over speed.

@@ -1,4 +1,4 @@
-//! What the world of ordinary mistakes does not have: brakes, rails, wind, tunnels, curves and loads.
+//! Deviations that the world of ordinary mistakes lacks: brakes, rails, wind, tunnels, curves and loads.
 
 use dynocar_core::pipeline::braking::intake::DeclaredGear;
 use dynocar_model::train::{BrakeGear, EffortCurve, TrainModel};
@@ -12,7 +12,7 @@ use crate::scenarios::brake::Brake;
 use crate::scenarios::mistakes::Mistakes;
 use crate::scenarios::world::{LoadSource, Scenario, Traffic, World};
 
-/// What is particular about brakes, rail or daemon.
+/// Particular brakes, rail or behaviour of the daemon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     /// In words.
@@ -47,7 +47,7 @@ pub const CONDITIONS: [Condition; 5] = [
 pub struct Service {
     /// Kind of traffic.
     pub traffic: Traffic,
-    /// What is particular.
+    /// Particular condition of this drive.
     pub condition: Condition,
     /// Cycle of the controller in ms.
     pub cycle_ms: u32,
@@ -114,7 +114,7 @@ pub fn traffic_name(traffic: Traffic) -> &'static str {
     }
 }
 
-/// What a train of this traffic can do with its declared load.
+/// Returns the abilities of a train of this traffic with its declared load.
 pub fn ability(traffic: Traffic) -> Ability {
     let (habits, train) = (traffic.habits(), traffic.declared());
     let inertial_kg = train.mass_kg * (1.0 + train.rotating_mass_factor);
@@ -160,12 +160,12 @@ fn gear(brake_max_n: f64) -> BrakeGear {
     BrakeGear { pads: Some(brake_max_n / of_one_n), ..one_pad }
 }
 
-/// The gear as the daemon reckons with it.
+/// Brake gear as the daemon assumes it.
 pub fn declared_gear(gear: &BrakeGear) -> DeclaredGear {
     DeclaredGear::of(gear).expect("a gear with every quantity")
 }
 
-/// What acts on the train and is in no file.
+/// Forces that act on the train and stand in no file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hidden {
     /// Exerted over reported brake force, of the train and of all days.
@@ -228,7 +228,7 @@ impl Hidden {
         self.curves_m.iter().find(here).map_or(0.0, |curve| 1.0 / curve.2)
     }
 
-    /// What tunnels add to the resistance to air, as a share of it.
+    /// Returns the tunnels' addition to the air resistance, as a share of it.
     pub fn tunnel_share(&self, chainage_m: f64) -> f64 {
         let is_inside = |tunnel: &(f64, f64)| (tunnel.0..tunnel.1).contains(&chainage_m);
         if self.tunnels_m.iter().any(is_inside) { 0.4 } else { 0.0 }

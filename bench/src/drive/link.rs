@@ -13,7 +13,7 @@ use serde_json::json;
 use crate::output::Failure;
 use crate::rig::site::{DaemonPlan, ThreadPlan, await_all};
 
-/// What config/daemon.toml recommends, with the brake's friction, which these trains can give.
+/// Pipelines recommended by config/daemon.toml, with the friction of the brake, which these trains can provide.
 const KINDS: [PipelineKind; 4] = [
     PipelineKind::TrainKalman,
     PipelineKind::AdhesionLaw,
@@ -114,7 +114,7 @@ impl Link {
         Ok(())
     }
 
-    /// What a train's driver may use of a quantity.
+    /// Returns the snapshot of a quantity that a train's driver may use.
     pub fn usable(&self, train: usize, quantity: Quantity) -> Option<&ParameterSnapshot> {
         let answer = self.ends[train].reader.quantity(quantity, monotonic_now_ns()).ok();
         answer.filter(Reading::is_usable).map(|reading| reading.snapshot)

@@ -1,5 +1,5 @@
-//! What a controller gains: an automatic driver with declared parameters, with the daemon's answers, and
-//! with the true ones.
+//! Gain of a controller: an automatic driver with declared parameters, with the daemon's answers, and with the true
+//! ones.
 //!
 //! - [`knowledge`]: what a driver holds for true of its train, and what the train can do
 //! - [`answers`]: from the daemon's answers to what the driver drives by, and whether they were right
@@ -41,7 +41,7 @@ use crate::output::{
 use crate::parallel;
 use crate::scenarios::world::Traffic;
 
-/// What a controller gains: an automatic driver with declared parameters, with the daemon's answers, and
+/// Measures the gain of a controller: an automatic driver with declared parameters, with the daemon's answers, and
 /// with the true ones.
 ///
 /// Exit status 1 where the driver with Dynocar is worse than with declared parameters.

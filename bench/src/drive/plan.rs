@@ -53,7 +53,7 @@ const THIRDS: usize = 8;
 /// Share of the time left by which a plan may be early.
 const EARLY_SHARE: f64 = 5e-4;
 
-/// What the driver drives by.
+/// Plan that the driver follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Cruising speed in m/s.
@@ -73,7 +73,7 @@ pub struct Planner<'a> {
     pub leg: &'a Leg,
     /// The train.
     pub knowledge: &'a Knowledge,
-    /// What it can do.
+    /// Abilities of the train.
     pub ability: &'a Ability,
 }
 

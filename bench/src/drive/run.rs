@@ -45,12 +45,12 @@ pub struct Extent {
     pub first_seed: u64,
 }
 
-/// What a train did.
+/// Record of a driven train.
 #[derive(Clone, Debug)]
 pub struct Driven {
     /// Its legs.
     pub legs: Vec<DrivenLeg>,
-    /// What the daemon's answers were worth, by [`ASKED`].
+    /// Scores of the daemon's answers, by [`ASKED`].
     pub scores: [Score; 4],
 }
 
@@ -142,14 +142,14 @@ const MIDWAY_S: f64 = 40.0;
 /// Time in ms for which a driver does not yet know that the daemon is gone, as a reader presumes.
 const UNNOTICED_MS: u32 = 250;
 
-/// What becomes of the daemon, by the first train's legs.
+/// Ways in which the daemon dies, by the first train's legs.
 #[derive(Clone, Copy, Debug)]
 enum Death {
     /// It stays, or another has come.
     Never,
     /// It dies in the middle of this leg.
     On(usize),
-    /// It is dead for so many cycles; another comes in the middle of this leg.
+    /// The daemon is dead for this many cycles; another comes in the middle of this leg.
     Until(usize, u32),
 }
 

@@ -1,4 +1,4 @@
-//! What the legs of all trains come to, with intervals.
+//! Statistics of the legs of all trains, with intervals.
 
 use super::answers::ASKED;
 use super::journey::DrivenLeg;
@@ -16,7 +16,7 @@ const SAME_STOP_M: f64 = 1.0;
 /// Statistics of a service's legs: mean and standard deviation of the place beyond the stopping point in m, stops
 /// within 0.3 and 0.5 m in %; then what is compared, of which less is better.
 const STATISTICS: usize = 8;
-/// What is compared: name, place among the statistics, and what is no difference that anybody would notice.
+/// Compared measures: name, place among the statistics, and the difference that nobody would notice.
 const MEASURES: [(&str, usize, f64); 4] = [
     ("stop_error_rms_m", STOP_RMS, 0.03),
     ("energy_percent", ENERGY, 0.3),
@@ -78,12 +78,12 @@ pub struct Scored {
     pub service: Service,
     /// Declared, Dynocar, true.
     pub lines: Vec<Line>,
-    /// What the answers were worth, by quantity.
+    /// Scores of the answers, by quantity.
     pub answers: Vec<Record>,
-    /// What differs with Dynocar beyond the noise.
+    /// Differences with Dynocar beyond the noise.
     pub differences: Vec<Record>,
-    /// What is worse with Dynocar, in words, where that is not paid back by a better stop, or where stops or
-    /// bounds are worse.
+    /// Losses with Dynocar, in words, where they are not paid back by a better stop, or where stops or bounds are
+    /// worse.
     pub broken: Option<String>,
 }
 
@@ -186,7 +186,7 @@ fn line(service: &Service, (informant, name): (Informant, &str), drives: &Drives
     Line { record, figures, bounds: [looks.len(), exceeded] }
 }
 
-/// What an answer was worth.
+/// Returns the record of the score of one answer.
 fn answer(service: &Service, index: usize, driven: &[Driven], stops: usize) -> Record {
     let scores: Vec<Score> = driven.iter().map(|it| it.scores[index].clone()).collect();
     let all = Scores(&scores);

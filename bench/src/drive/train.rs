@@ -30,9 +30,9 @@ pub struct Train {
     hidden: Hidden,
     /// As declared.
     pub declared: TrainModel,
-    /// Its brake gear, as the daemon reckons with it.
+    /// Brake gear as the daemon assumes it.
     pub gear: DeclaredGear,
-    /// What it can do, as declared.
+    /// Declared abilities of the train.
     pub ability: Ability,
     seed: u64,
     random: Chance,
@@ -237,7 +237,7 @@ impl Train {
         at.distance_m - self.motion.distance_m
     }
 
-    /// What the controller measures and writes.
+    /// Returns the sample that the controller measures and writes.
     pub fn sample(&mut self) -> TrainSample {
         let World { scenario, speed_scale, .. } = &self.world;
         let speed_mps = match self.motion.speed_mps > 0.0 {

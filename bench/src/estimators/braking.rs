@@ -53,7 +53,7 @@ fn braking(samples: usize, seed: u64) -> Vec<Observation> {
     XIE_TABLE_2.simulate(seed)[..samples].iter().map(observation).collect()
 }
 
-/// An engine over some brakings, each from a fresh start and of so many updates.
+/// Measures an engine over some brakings, each from a fresh start and of a fixed number of updates.
 fn case(
     name: &str,
     brakings: &Rc<[Vec<Observation>]>,

@@ -79,7 +79,7 @@ impl Case {
             .with("met", met)
     }
 
-    /// Time of so many passes.
+    /// Measures the time of `passes` passes.
     pub fn time(&mut self, passes: usize) -> Duration {
         let start = now();
         (0..passes).for_each(|_| (self.pass)());

@@ -142,7 +142,7 @@ const WINDOWS: usize = 10;
 const SLIDE: usize = 10;
 const FIT_NOISE_MPS: f64 = 0.18;
 
-/// Fits over windows of so many samples, each from the coefficients that the window before gave.
+/// Fits over windows of `samples` samples, each from the coefficients that the window before gave.
 fn fit(samples: usize) -> Case {
     let mut random = Chance::new(samples as u64);
     let truth = Davis { a: 0.79, b: 0.0229, c: 0.001493 };

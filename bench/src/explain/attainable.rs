@@ -1,5 +1,4 @@
-//! What any search could attain: the true law with its numbers, and a, b, c, estimated from the
-//! same runs.
+//! Best attainable result of any search: the true law with its numbers, and a, b, c, estimated from the same runs.
 
 use std::sync::Arc;
 
@@ -22,7 +21,7 @@ struct TrueLaw {
     parameters: Vec<Parameter>,
 }
 
-/// The numbers of a law besides its size; one that only scales another is none.
+/// The numbers of a law besides its size; a number that only scales another does not count.
 fn numbers_of(law: &mut Law) -> Vec<&mut f64> {
     match law {
         Law::Band { centre_mps, width_mps } => vec![centre_mps, width_mps],

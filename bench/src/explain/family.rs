@@ -16,7 +16,7 @@ use super::scenario::{Scenario, World};
 use crate::output::{Failure, OutputArguments, named};
 use crate::parallel;
 
-/// What is simulated.
+/// A simulated case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Case {
     /// The family.
@@ -35,7 +35,7 @@ impl Case {
         simulate(&self.settings())
     }
 
-    /// What the simulator is asked for.
+    /// Returns the settings of the simulator.
     pub fn settings(&self) -> SimulatorSettings {
         let holdout_runs = (self.runs / 4).max(1);
         let settings = self.scenario.settings(self.seed, self.world);
@@ -67,7 +67,7 @@ pub struct FamilyArguments {
     /// Only this kind, as tunnel_drag, or none, two_effects, none_poor_recording; may be repeated
     #[arg(long = "kind", value_name = "NAME")]
     kinds: Vec<String>,
-    /// What is a little wrong besides the effect
+    /// Errors simulated besides the effect
     #[arg(long, value_enum, default_value_t = World::Plain)]
     world: World,
     /// Runs of a dataset, a quarter of them held out

@@ -106,7 +106,7 @@ fn is_exactly(
     verdict == right && (right == "unknown" || expected == found)
 }
 
-/// What the answer says, for people, and what it was if that is in no library.
+/// Describes the answer for people, and the true form if it is in no library.
 fn details(
     simulated: &SimulatedDataset,
     answer: &ExplainAnswer,

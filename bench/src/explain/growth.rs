@@ -9,7 +9,7 @@ use super::family::{explained, read};
 use super::scenario::{Scenario, World};
 use crate::output::Record;
 
-/// The data are made so many times more.
+/// Factors by which the data are multiplied.
 const FACTORS: [usize; 3] = [1, 4, 16];
 
 /// Explains one dataset of each scenario at every size, one after the other on one thread.

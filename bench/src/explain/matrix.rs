@@ -10,12 +10,12 @@ use super::scenario::Scenario;
 use crate::output::{Record, counts, table};
 use crate::statistics::{median, quantiles, root_mean_square, share};
 
-/// An error at most so many times another is as good.
+/// An error at most this many times another is as good.
 const NEAR: f64 = 1.1;
-/// Shares of nulls of which the greatest acceptance score of a candidate is told.
+/// Shares of nulls whose greatest acceptance score of a candidate is reported.
 const SHARES: [f64; 7] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0];
 
-/// What came of every scenario, for machines and for people.
+/// Returns the results of every scenario, for machines and for people.
 pub fn of(grades: &[(Scenario, Vec<Grade>)]) -> (Value, String) {
     let kinds: Vec<Record> = grades.iter().map(|(kind, own)| record(kind.name(), own)).collect();
     let all = || grades.iter().flat_map(|(_, grades)| grades);
@@ -80,7 +80,7 @@ fn intervals<'a>(grades: impl Iterator<Item = &'a Grade>) -> (usize, f64) {
     (all, held)
 }
 
-/// What came out for one kind; medians are of right answers, and shares of a tenth of all.
+/// Returns the record of one kind; medians are of right answers, and shares of a tenth of all.
 fn record(kind: &str, grades: &[Grade]) -> Record {
     let mut instead = BTreeMap::new();
     for wrong in grades.iter().filter(|grade| !grade.is_right) {

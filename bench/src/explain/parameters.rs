@@ -86,7 +86,7 @@ fn gradient_errors(
         .collect()
 }
 
-/// What acts on a run of a dataset.
+/// Returns the disturbances of a run of a dataset.
 fn disturbances(simulated: &SimulatedDataset, plan: &RunPlan) -> Disturbances {
     let SimulatedDataset { effects, train, line, settings, .. } = simulated;
     Disturbances::of(effects, train, line, plan, settings)

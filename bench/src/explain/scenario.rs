@@ -1,4 +1,4 @@
-//! What is simulated: one kind, two at once, or a poor recording, and what is a little wrong besides.
+//! Simulated scenarios: one kind, two at once, or a poor recording, and the usual errors besides.
 
 use clap::ValueEnum;
 use dynocar_shared::vocabulary::EffectKind;
@@ -154,7 +154,7 @@ impl Scenario {
         }
     }
 
-    /// What the simulator is asked for in a world.
+    /// Returns the settings of the simulator in a world.
     pub fn settings(self, seed: u64, world: World) -> SimulatorSettings {
         let effects = match self {
             // 0.5 to 1.1 N/kN at half the speed below which it acts.

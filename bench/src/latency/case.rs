@@ -1,4 +1,4 @@
-//! What is measured together with what.
+//! Cases of the latency measurement, and which are measured together.
 
 use dynocar::config::IdleStrategy;
 use dynocar_shared::PipelineKind;

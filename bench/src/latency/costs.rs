@@ -1,4 +1,4 @@
-//! What one poll and one publish cost the controller, on its own core.
+//! Cost of one poll and one publish to the controller, on its own core.
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
@@ -15,7 +15,7 @@ const TRAIN: TrainId = TrainId(1);
 /// Calls that are timed together, so that the clock's own cost is spread.
 const CALLS: u64 = 256;
 
-/// So many pipelines are many.
+/// Number of pipelines that counts as many.
 pub const MANY: u32 = 16;
 
 /// Costs in ns, each the median over batches or calls.
@@ -43,7 +43,7 @@ struct Ends {
 }
 
 impl Ends {
-    /// Of a train with so many pipelines, each of which has answered.
+    /// Opens a train with `pipelines` pipelines, each of which has answered.
     fn open(pipelines: u32) -> Result<Self, Failure> {
         let site = site();
         let transport = Transport::open(&site.host(), "dynocar-bench-costs")?;
@@ -72,7 +72,7 @@ impl Ends {
     }
 }
 
-/// Measures the costs over so many batches.
+/// Measures the costs over `batches` batches.
 ///
 /// # Errors
 ///

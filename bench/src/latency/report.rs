@@ -14,14 +14,14 @@ use crate::statistics::median;
 /// A case with its trial of every round.
 type Rounds = (Case, Vec<Trial>);
 
-/// What was measured.
+/// Measured latencies.
 #[derive(Clone, Debug)]
 pub struct Measured {
     /// Each case with its trial of every round.
     pub cases: Vec<Rounds>,
-    /// What a call costs.
+    /// Cost of each call.
     pub costs: Costs,
-    /// What a daemon takes while no sample comes: processor time in % of a core, by idle strategy.
+    /// Load of a daemon while no sample comes: processor time in % of a core, by idle strategy.
     pub at_rest: Vec<(String, f64)>,
     /// How it was driven.
     pub extent: Extent,
@@ -32,7 +32,7 @@ pub fn pooled(trials: &[Trial], of: fn(&Outcome) -> &Histogram<u64>) -> Histogra
     quantiles::pooled(trials.iter().flat_map(|it| &it.pipelines).map(of))
 }
 
-/// What was measured, for machines and for people.
+/// Returns the measured latencies, for machines and for people.
 pub fn of(measured: &Measured) -> (Value, String) {
     let Measured { cases, costs, at_rest, extent } = measured;
     let (rate_hz, cores) = (extent.traffic.rate_hz, extent.cores);

@@ -3,7 +3,7 @@
 //! One process stands for all controllers: it publishes every train's samples at their appointed
 //! times and polls the trains in turn, on a core of its own.
 //!
-//! - [`plan`]: so many trains with some pipelines
+//! - [`plan`]: a number of trains with some pipelines
 //! - [`search`]: the highest rate without loss; growth with trains and pipelines
 //! - [`report`]: the result
 
@@ -40,7 +40,7 @@ pub struct LoadArguments {
     /// The pipelines, by name and with commas between; fast, slow or all for the groups
     #[arg(long, value_delimiter = ',', default_value = "all", value_name = "NAMES")]
     pipelines: Vec<String>,
-    /// What the daemon's threads do while no sample comes: busy, adaptive (look for a while, then sleep) or event
+    /// Idle strategy of the daemon's threads: busy, adaptive (spin, then sleep) or event
     #[arg(long, value_name = "STRATEGY", default_value = "adaptive")]
     idle: String,
     /// Samples that leave at once

@@ -1,4 +1,4 @@
-//! So many trains with some pipelines, against one daemon.
+//! Several trains with some pipelines, against one daemon.
 
 use dynocar::config::IdleStrategy;
 use dynocar_shared::PipelineKind;
@@ -7,14 +7,14 @@ use crate::open_loop::trial::{Answerer, Extent, Setting, Trial, run};
 use crate::output::Failure;
 use crate::rig::cores::in_thread;
 
-/// So many trains with some pipelines.
+/// Several trains with some pipelines.
 #[derive(Clone, Debug)]
 pub struct Load {
     /// The pipelines of the daemon.
     pub pipelines: Vec<PipelineKind>,
-    /// What its threads do while no sample comes.
+    /// Idle strategy of its threads.
     pub idle: IdleStrategy,
-    /// What is put on it.
+    /// Extent of the load.
     pub extent: Extent,
 }
 

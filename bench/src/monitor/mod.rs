@@ -61,8 +61,8 @@ impl MonitorArguments {
     }
 }
 
-/// What came out for one kind; times are of motion. Datasets are those in which it acts, or all nulls, which are
-/// right where they stayed silent.
+/// Returns the record of one kind; times are of motion. Datasets are those in which it acts, or all nulls, which
+/// are right where the monitor stayed silent.
 fn record(scenario: Scenario, all: &[Watched]) -> Record {
     let is_null = scenario.is_null();
     let watched: Vec<&Watched> = all.iter().filter(|it| is_null || it.has_acted).collect();

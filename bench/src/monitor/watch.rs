@@ -17,7 +17,7 @@ const CARRIED_SHARE: f64 = 0.9;
 /// A longer step in s between samples is a gap, not driving.
 const STEP_MAX_S: f64 = 5.0;
 
-/// What the monitor said of a dataset; times are of motion.
+/// Statements of the monitor about a dataset; times are of motion.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Watched {
     /// The kinds that are undeclared.

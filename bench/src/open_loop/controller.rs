@@ -22,7 +22,7 @@ const READY_EVERY_NS: i64 = 5_000_000;
 /// How long in s after the last sample slow pipelines may go on without anything new.
 const SETTLED_AFTER: Duration = Duration::from_secs(1);
 
-/// What became of the samples of one pipeline, over all trains.
+/// Counts of the samples of one pipeline, over all trains.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Samples sent.
@@ -72,7 +72,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller that has sent nothing, and hears so many pipelines.
+    /// A controller that has sent nothing, and receives from `pipelines` pipelines.
     pub fn new(wire: Box<dyn Wire>, traffic: Traffic, pipelines: usize) -> Self {
         let in_flight = vec![(0, 0); IN_FLIGHT].into();
         let answers = vec![[Answer::default(); 2]; pipelines];
@@ -104,7 +104,7 @@ impl Controller {
         Ok(())
     }
 
-    /// So many samples leave from a time in ns on; what came of earlier ones does not count.
+    /// Sends `count` samples from a time in ns on; results of earlier ones do not count.
     pub fn begin(&mut self, start_ns: i64, count: u64) {
         self.traffic.begin(start_ns, count);
         self.sent_before = self.sent;

@@ -16,7 +16,7 @@ use crate::rig::cores::{bind, prioritise};
 /// A process of a measurement; started by the measuring commands, not by people.
 #[derive(Debug, Args)]
 pub struct PeerArguments {
-    /// What it does
+    /// Kind of the peer
     #[arg(value_enum)]
     kind: PeerKind,
     /// The site's folder, or the daemon's configuration
@@ -32,7 +32,7 @@ pub struct PeerArguments {
     blocks: bool,
 }
 
-/// What a process of a measurement does.
+/// Role of a process of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum PeerKind {
     /// The daemon itself, as `dynocar run` starts it

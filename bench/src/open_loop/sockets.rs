@@ -140,7 +140,7 @@ impl Socket for Datagrams {
     }
 }
 
-/// What a call gave, but for what a receiver or sender has to live with.
+/// Returns the result of a call, or `None` for errors that a receiver or sender has to tolerate.
 fn unless_passing(result: std::io::Result<usize>) -> Result<Option<usize>, Failure> {
     use ErrorKind::{ConnectionRefused, Interrupted, NotFound, TimedOut, WouldBlock};
     match result.map_err(|error| (error.kind(), error)) {

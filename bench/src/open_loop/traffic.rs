@@ -39,7 +39,7 @@ impl Traffic {
         Traffic { plan, motion, random, start_ns, number: 0, count: 0, next }
     }
 
-    /// So many samples from a time on.
+    /// Begins `count` samples from a time on.
     pub fn begin(&mut self, start_ns: i64, count: u64) {
         (self.start_ns, self.number, self.count, self.next.1) = (start_ns, 0, count, start_ns);
         self.appoint();
@@ -58,7 +58,7 @@ impl Traffic {
         }
     }
 
-    /// What would be measured at a time in ns.
+    /// Returns the sample that would be measured at a time in ns.
     pub fn sample(&mut self, time_ns: i64) -> TrainSample {
         self.motion.sample(time_ns)
     }

@@ -1,4 +1,4 @@
-//! One trial: so many trains at one rate against one answerer, with processes of its own.
+//! One trial: several trains at one rate against one answerer, with processes of its own.
 
 use std::process::Stdio;
 
@@ -67,7 +67,7 @@ impl Companion {
 pub struct Setting {
     /// Who answers.
     pub answerer: Answerer,
-    /// What the answering threads do while no sample comes.
+    /// Idle strategy of the answering threads.
     pub idle: IdleStrategy,
     /// Who reads the same channels.
     pub companions: &'static [Companion],
@@ -75,7 +75,7 @@ pub struct Setting {
     pub candidates: u32,
 }
 
-/// What is put on it.
+/// Extent of the load.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
     /// Number of trains.
@@ -93,7 +93,7 @@ pub struct Extent {
     pub seed: u64,
 }
 
-/// What one trial brought.
+/// Result of one trial.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// By pipeline that is polled.

@@ -32,7 +32,7 @@ pub trait Wire {
     }
 }
 
-/// What a controller links: Dynocar's client library.
+/// The client library that a controller links.
 pub struct Client {
     publisher: SamplePublisher,
     reader: SnapshotReader,

@@ -41,7 +41,7 @@ impl Socket for ZeroMq {
     }
 }
 
-/// What a call gave, but for what a receiver or sender has to live with.
+/// Returns the result of a call, or `None` for errors that a receiver or sender has to tolerate.
 fn unless_passing<T>(result: zmq::Result<T>) -> Result<Option<T>, Failure> {
     match result {
         Ok(given) => Ok(Some(given)),

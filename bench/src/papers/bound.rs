@@ -18,7 +18,7 @@ use dynocar_shared::RailCondition;
 
 use crate::statistics::{mean, root_mean_square};
 
-/// What is known of the coefficient beforehand.
+/// Prior knowledge of the coefficient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Knowledge {
     /// How the share of the declared brake force moves.

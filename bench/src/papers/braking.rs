@@ -91,7 +91,7 @@ impl From<WalkSettings> for ShareStep {
 /// One braking.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Braking {
-    /// What is looked for.
+    /// Coefficient that is estimated.
     pub sought: BrakingCoefficient,
     /// Draws the coefficient instead of taking the papers' curve.
     pub drawn: Option<ShareStep>,

@@ -57,8 +57,8 @@ pub struct Scored {
     pub std: f64,
 }
 
-/// Runs a pipeline over a braking and scores its updates once for each lag: as if an estimate
-/// belonged to the moment so many steps before its update.
+/// Runs a pipeline over a braking and scores its updates once for each lag: as if an estimate belonged to the
+/// moment that many steps before its update.
 pub fn run<const LAGS: usize>(
     settings: &EstimatorSettings,
     moments: &[Moment],
@@ -141,7 +141,7 @@ impl Score {
         2.0 / ((both - own).max(0.0) + own / runs(self))
     }
 
-    /// A row with coverage and consistency, of so many degrees of freedom.
+    /// Returns a row with coverage and consistency, with `freedom` degrees of freedom.
     pub fn row(&self, freedom: f64, row: Row) -> Row {
         Row { nees_freedom: Some(freedom), ..self.errors.row(row) }
     }
@@ -242,7 +242,7 @@ pub fn known_law(sought: BrakingCoefficient) -> EstimatorSettings {
     })
 }
 
-/// What the smoother presumes of a coefficient.
+/// Returns the step of a coefficient that the smoother assumes.
 pub fn presumed(sought: BrakingCoefficient) -> ShareStep {
     SmootherSettings::default().walk(sought).into()
 }

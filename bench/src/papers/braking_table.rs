@@ -17,7 +17,7 @@ pub struct Table {
     pub paper: &'static str,
     /// Its table.
     pub table: &'static str,
-    /// What is looked for, in words.
+    /// Name of the estimated coefficient, in words.
     pub name: &'static str,
     /// The braking.
     pub braking: Braking,

@@ -28,8 +28,8 @@ use crate::statistics::mean;
 
 const PAPER: &str = "Liu 2018";
 
-/// Residuals of the fit beyond so many standard deviations count linearly: 5 % of outliers then
-/// cost a fifth of the accuracy, and their absence 1 %.
+/// Residuals of the fit beyond this many standard deviations count linearly: 5 % of outliers then cost a fifth of
+/// the accuracy, and their absence 1 %.
 const OUTLIER_THRESHOLD: f64 = 2.5;
 
 /// Table 1's last column in (N/kN)², but for the gated method.

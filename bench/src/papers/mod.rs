@@ -49,7 +49,7 @@ pub struct PapersArguments {
     csv: Option<PathBuf>,
 }
 
-/// What measures the rows of a paper.
+/// Function that measures the rows of a paper.
 type Measure = fn(Seeds) -> Vec<Row>;
 
 /// Every paper, by year.

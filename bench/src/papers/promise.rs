@@ -1,10 +1,10 @@
-//! What is promised of our methods, row by row, and whether a measurement keeps it.
+//! Promises of our methods, row by row, and whether a measurement keeps them.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::row::Row;
 
-/// What a row's own figure has to obey.
+/// Limit that a row's own figure has to obey.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Limit {
     /// Ours over the bound, at most.
@@ -66,7 +66,7 @@ const BAND_PROBABILITY: f64 = 0.99;
 pub struct Verdict {
     /// The 99 % chi-square band of the mean NEES per degree of freedom.
     pub nees_band: Option<(f64, f64)>,
-    /// What is promised, in words; empty where nothing is.
+    /// Promises in words; empty where nothing is promised.
     pub promised: Vec<String>,
     /// The promises that this measurement breaks.
     pub broken: Vec<String>,

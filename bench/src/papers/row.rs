@@ -16,9 +16,9 @@ pub struct Row {
     pub paper: &'static str,
     /// Table or figure of the paper.
     pub table: &'static str,
-    /// What is measured, in words.
+    /// Measured quantity, in words.
     pub quantity: String,
-    /// What has to be known of it besides.
+    /// Note that a reader of the row needs.
     pub note: String,
     /// Unit of the figures.
     pub unit: &'static str,
@@ -72,7 +72,7 @@ pub struct Seeds {
 }
 
 impl Seeds {
-    /// So many runs from seed 0 on.
+    /// Returns `count` runs from seed 0 on.
     pub fn from_zero(count: usize) -> Self {
         Seeds { first: 0, count }
     }
@@ -82,13 +82,13 @@ impl Seeds {
         self.first..self.first + self.count as u64
     }
 
-    /// The first of them, so many at most.
+    /// Returns the first of them, at most `count`.
     #[must_use]
     pub fn at_most(self, count: usize) -> Self {
         Seeds { count: self.count.min(count), ..self }
     }
 
-    /// So many seeds for each; other seeds than those of other first seeds.
+    /// Returns `runs` seeds for each; other seeds than those of other first seeds.
     #[must_use]
     pub fn each(self, runs: usize) -> Self {
         Seeds { first: self.first * runs as u64, count: self.count * runs }

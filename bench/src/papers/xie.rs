@@ -50,7 +50,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     rows
 }
 
-/// What the printed cap and the printed density make of the EM.
+/// Returns the rows of the EM with the printed cap and the printed density.
 fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
     let capped = |initial, what| {
         let [score] = score(&table.braking, seeds, [MIDDLE_STEPS], |seed| {

@@ -1,4 +1,4 @@
-//! What measurements of processes need: a place of their own, cores, pipelines, histograms.
+//! Tools that measurements of processes need: a place of their own, cores, pipelines, histograms.
 //!
 //! - [`site`]: a run-time directory with a daemon, gone afterwards
 //! - [`cores`]: cores and priorities

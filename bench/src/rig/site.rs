@@ -46,7 +46,7 @@ pub struct ThreadPlan {
     pub name: &'static str,
     /// The core it is bound to.
     pub core: Option<usize>,
-    /// What it does while no sample comes.
+    /// Idle strategy of the thread.
     pub idle: IdleStrategy,
     /// Its real-time priority.
     pub priority: Option<u8>,

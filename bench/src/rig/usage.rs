@@ -1,8 +1,8 @@
-//! What the kernel says of a process and its threads.
+//! Counters of the kernel for a process and its threads.
 
 use std::path::{Path, PathBuf};
 
-/// What the kernel says so far.
+/// Counters of the kernel so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Usage {
     /// Processor time of all living threads of the process, in s.

@@ -16,7 +16,7 @@ use super::world::{
     KNOT_M, KNOT_OVER_MEAN, LoadSource, ROOM_KG, WEIGHING_STD, World, knot_std_permille,
 };
 
-/// What is unknown.
+/// Unknowns of the bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Unknown {
     /// a, b or c.
@@ -27,7 +27,7 @@ enum Unknown {
     RotatingMass,
     Wheel,
     Wind,
-    /// The load, a share of it, after so many stops.
+    /// The load, a share of it, after this many stops.
     Load(usize),
     /// The brake's force on a leg.
     Brake(usize),
@@ -81,7 +81,7 @@ const DRAWN_LOAD_STD: f64 = 0.24 / 3.464;
 /// Standard deviation in m/s of the speed at which a run begins to count.
 const START_STD_MPS: f64 = 1.0;
 
-/// What measured speeds say so far of all that is unknown.
+/// Information of the measured speeds so far on all unknowns.
 #[derive(Default)]
 pub struct Bound {
     /// The place of everything met so far.
@@ -159,7 +159,7 @@ impl Bound {
         if world.scenario.load == LoadSource::Exact { 0 } else { self.stops }
     }
 
-    /// What a step does to the speed by each unknown.
+    /// Adds the change of the speed by each unknown over a step.
     fn move_on(&mut self, world: &World, last: &Moment, truth: &Moment, step_s: f64) {
         let resistance = &world.truth.resistance;
         let gain = mps2_per_n_per_kn(world.truth.rotating_mass_factor);

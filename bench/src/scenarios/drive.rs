@@ -192,7 +192,7 @@ impl Drive {
         self.now.speed_mps = next;
     }
 
-    /// What the driver wants.
+    /// Sets the force that the driver commands.
     fn command(&mut self, cycle_s: f64) {
         let before_mps2 = self.commanded_mps2;
         self.decide(cycle_s);
@@ -284,7 +284,7 @@ impl Drive {
         }
     }
 
-    /// What the controller measures and writes.
+    /// Writes the sample that the controller measures.
     fn measure(&mut self) {
         let headwind_mps = self.headwind_mps();
         let World { scenario, truth, force_scale, speed_scale, random, .. } = &mut self.world;

@@ -44,7 +44,7 @@ impl Mistakes {
         gust_mps: Deviations::ROUGH.gust_mps,
     };
 
-    /// Those that the estimator's default settings reckon with.
+    /// Returns the mistakes that the estimator's default settings assume.
     pub fn expected() -> Mistakes {
         let settings = TrainKalmanSettings::default();
         Mistakes {

@@ -1,4 +1,4 @@
-//! What answers were worth over a drive.
+//! Scores of answers over a drive.
 
 use dynocar_shared::{HALF_95, Uncertain};
 
@@ -22,7 +22,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// What was found, beside what is declared and the truth.
+    /// Compares an estimate with the declared value and the truth.
     pub fn of(found: Uncertain, declared: f64, truth: f64) -> Self {
         let error = |value: f64| (value - truth) / truth;
         let deviation = found.std / truth;
@@ -74,7 +74,7 @@ pub struct Score {
 }
 
 impl Score {
-    /// Takes in a cycle of so many s.
+    /// Scores a cycle of `cycle_s` seconds.
     pub fn push(&mut self, time_s: f64, cycle_s: f64, answer: Option<Answer>) {
         self.cycles += 1;
         if time_s >= SETTLED_S {
@@ -140,7 +140,7 @@ impl Scores<'_> {
         100.0 * (self.sum(of) / self.count(|it| it.usable) as f64).sqrt()
     }
 
-    /// The root of one sum over another; no number where the other is none.
+    /// Returns the root of one sum over another; NaN where the other is zero.
     pub fn ratio(&self, of: fn(&Score) -> f64, over: fn(&Score) -> f64) -> f64 {
         (self.sum(of) / self.sum(over)).sqrt()
     }

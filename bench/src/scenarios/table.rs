@@ -20,7 +20,7 @@ use crate::parallel;
 /// Time in s from which errors are compared with the bound, and how much later each next time.
 const COMPARED_FIRST_S: f64 = 60.0;
 const COMPARED_GROWTH: f64 = 1.35;
-/// What is asked for.
+/// Quantities that are asked for.
 const QUANTITIES: [Quantity; 2] = [Quantity::Resistance, Quantity::Mass];
 
 /// A scenario with the names of its traffic and of what is particular.
@@ -99,7 +99,7 @@ fn varied(traffic: Traffic) -> [(&'static str, Scenario); 10] {
     ]
 }
 
-/// What is measured.
+/// Plan of the measurement.
 pub struct Plan<'a> {
     /// The rows.
     pub scenarios: &'a [NamedScenario],

@@ -26,7 +26,7 @@ pub enum Traffic {
 pub enum LoadSource {
     /// The declared mass is the true one, and the configuration says so.
     Exact,
-    /// Every sample carries a mass wrong by so many per mille, too low or too high.
+    /// Every sample carries a mass wrong by this many per mille, too low or too high.
     Weighed(u32),
     /// Samples carry no mass; the declared one is wrong by up to 12 %.
     Unknown,
@@ -58,7 +58,7 @@ pub struct Scenario {
     pub brake: Brake,
 }
 
-/// What differs between the kinds of traffic.
+/// Differences between the kinds of traffic.
 pub struct Habits {
     /// Distance between stops in m, least and most.
     pub stop_m: (f64, f64),

@@ -59,7 +59,7 @@ impl Publisher {
             let begun = Instant::now();
             let left = self.0.with_patience(py, move |publisher| publisher.flush(time))?;
             py.check_signals()?;
-            // What comes back early waits for nobody.
+            // A result that comes back early waits for nobody.
             let is_hopeless = begun.elapsed() < time;
             if left == 0 || is_hopeless || start.elapsed() >= patience {
                 return Ok(left);

@@ -35,7 +35,7 @@ static DROPPED_ELSEWHERE: Mutex<Vec<(ThreadId, u64)>> = Mutex::new(Vec::new());
 
 /// A kind of end.
 pub(crate) trait End: Sized + 'static {
-    /// What it is called in messages.
+    /// Name in messages.
     const NAME: &'static str;
 
     /// Those that this thread opened.
@@ -58,7 +58,7 @@ impl End for SnapshotReader {
     }
 }
 
-/// What an object holds of its end.
+/// Handle of an object to its end of the channel.
 pub(crate) struct Handle<E: End> {
     process: Owner,
     owner: ThreadId,

@@ -22,7 +22,7 @@ pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
     serde_json::to_string(answer).map_err(|error| Failure::Output(OutputError::Json(error)))
 }
 
-/// What was understood of a path; what is wrong with it is the answer, too.
+/// Returns the description of a path; its errors are part of the answer.
 #[pyfunction]
 pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<JsonAndText> {
     let answer = in_background(py, None, move |_| match checking::understand(&path) {
@@ -61,7 +61,7 @@ pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(JsonAndText, Vec<
     Ok((answer, each, all))
 }
 
-/// What the daemon's pipelines learn from a dataset.
+/// Returns the estimates of the daemon's pipelines from a dataset.
 #[pyfunction]
 pub(crate) fn identify(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! What a reader gives.
+//! Results of a reader.
 
 use dynocar_client::ffi::{Code, ReadingCopy};
 use dynocar_shared::schema::{Field, sample_fields, snapshot_fields};
@@ -148,7 +148,7 @@ fn dtype(fields: impl Iterator<Item = Field>, size: usize) -> Dtype {
     dtype
 }
 
-/// What NumPy needs to read samples and snapshots as they lie in shared memory.
+/// Returns the NumPy types of samples and snapshots as they lie in shared memory.
 #[pyfunction]
 pub(crate) fn dtypes() -> (Dtype, Dtype) {
     use dynocar_shared::{ParameterSnapshot, TrainSample};

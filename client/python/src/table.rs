@@ -18,6 +18,8 @@ const RUN: &str = "run";
 pub(crate) type Columns = Vec<(String, Vec<f64>)>;
 /// A batch for a pickle: the run's number, and the bytes of its columns.
 type Kept<B> = (Option<u32>, Vec<(String, B)>);
+/// The one argument by which a table is made again.
+type KeptBatches<'py> = (Vec<Kept<Bound<'py, PyBytes>>>,);
 
 /// A column of numbers, which NumPy takes by `numpy.asarray`.
 #[pyclass(frozen, module = "dynocar._native")]
@@ -57,9 +59,7 @@ impl Table {
         Ok(Table(batches.collect::<PyResult<_>>()?))
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> (Bound<'py, PyType>, (Vec<Kept<Bound<'py, PyBytes>>>,)) {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, KeptBatches<'py>) {
         let py = slf.py();
         let kept = |batch: &RecordBatch| {
             let named = || batch.schema_ref().fields().iter().zip(batch.columns());
@@ -136,10 +136,10 @@ impl Table {
     }
 }
 
-/// So many samples are in the processor's cache while one column after the other is taken from them.
+/// Samples that stay in the processor's cache while one column after the other is taken from them.
 const SAMPLES_AT_ONCE: usize = 512;
 
-/// What a run holds: its times, these quantities of its samples, and of those beyond them.
+/// Returns the columns of a run: its times, these quantities of its samples, and of those beyond them.
 fn quantities(run: &Run, fields: &[SampleField], known: &[(Quantity, &'static str)]) -> Columns {
     let column = |name: &str| (name.to_owned(), Vec::with_capacity(run.samples.len()));
     let mut times = column("time_s");

@@ -9,7 +9,7 @@ use dynocar_transport::{ChannelError, SendRefused};
 /// Declares the codes with their numbers and texts, so that none is without a text.
 macro_rules! codes {
     ($( $(#[doc = $doc:literal])* $code:ident = $number:literal $text:literal ),* $(,)?) => {
-        /// What every function that can fail gives; `DYNOCAR_ERROR_…` in C.
+        /// Result codes of every function that can fail; `DYNOCAR_ERROR_…` in C.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(i32)]
         pub enum Code { $( $(#[doc = $doc])* $code = $number ),* }
@@ -23,7 +23,7 @@ macro_rules! codes {
                 match self { $( Code::$code => $text ),* }
             }
 
-            /// What the code means, as its documentation has it.
+            /// Returns the meaning of the code, from its documentation.
             pub const fn meaning(self) -> &'static str {
                 match self { $( Code::$code => concat!($($doc),*) ),* }
             }

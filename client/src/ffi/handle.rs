@@ -1,4 +1,4 @@
-//! What a `dynocar_publisher *` or a `dynocar_reader *` points to.
+//! Target of a `dynocar_publisher *` or a `dynocar_reader *`.
 //!
 //! The transport's ports belong to the thread that opened them. Rust holds a controller to that
 //! at compile time; here every call compares the thread, and the process where one has forked, so that

@@ -34,7 +34,7 @@ wire_struct! {
 }
 
 impl ReadingCopy {
-    /// What a caller holds who was given no snapshot: nothing that may be used.
+    /// Returns the snapshot of a caller who was given none: nothing in it may be used.
     pub const fn none() -> Self {
         ReadingCopy {
             age_ns: i64::MAX,

@@ -9,7 +9,7 @@ use super::error::{Code, guard};
 pub const EFFORT_POINTS_MAX: usize = 1024;
 
 vocabulary! {
-    /// What the rail carries; `DYNOCAR_RAIL_…` in C.
+    /// Adhesion of the rail; `DYNOCAR_RAIL_…` in C.
     Rail: u64 {
         /// Any brake force: adhesion and its standard deviation are not read.
         Unlimited = 0 "unlimited",
@@ -62,7 +62,7 @@ wire_struct! {
         pub adhesion: f64,
         /// Its standard deviation.
         pub adhesion_std: f64,
-        /// What the rail carries: a [`Rail`] by number.
+        /// Adhesion of the rail: a [`Rail`] by number.
         pub rail: u64,
     }
 }

@@ -1,5 +1,6 @@
-//! What C and Python repeat of the library is written from it, and these tests hold that it still is:
-//! `DYNOCAR_WRITE_BINDINGS=1 cargo test --release -p dynocar-client --test client bindings::` writes it anew.
+//! C and Python repeat constants of the library. They are written from it, and these tests hold that they still
+//! agree: `DYNOCAR_WRITE_BINDINGS=1 cargo test --release -p dynocar-client --test client bindings::` writes them
+//! anew.
 
 mod c;
 mod python;

@@ -86,7 +86,7 @@ fn a_reader_follows_the_daemon_to_another_pipeline() {
     send(&senders[2], 6, 1, &[Resistance], &[Resistance]);
     reader.poll();
     assert_eq!(answering(&reader, Resistance), Ok(1));
-    // What the dead one had sent and nobody had read changes nothing.
+    // Messages that the dead one had sent and nobody had read change nothing.
     send(&senders[0], 5, 3, &[Resistance, Mass], &[Resistance, Mass]);
     reader.poll();
     assert_eq!(answering(&reader, Resistance), Ok(1));

@@ -1,5 +1,5 @@
-//! What the tests of the C interface share: the libraries just built, the C compiler, a daemon
-//! played by the test, and child processes that never outlive it.
+//! Shared support of the tests of the C interface: the libraries just built, the C compiler, a daemon played by the
+//! test, and child processes that never outlive it.
 
 #![allow(dead_code, reason = "each test uses its own part")]
 
@@ -126,7 +126,7 @@ impl TestRoot {
 impl Drop for TestRoot {
     fn drop(&mut self) {
         let prefix = self.host.segment_prefix();
-        // What cannot be removed stays behind; no test depends on it.
+        // Files that cannot be removed stay behind; no test depends on them.
         for entry in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
             if entry.file_name().to_string_lossy().starts_with(&prefix) {
                 let _ = std::fs::remove_file(entry.path());

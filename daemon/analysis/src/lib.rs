@@ -1,4 +1,4 @@
-//! What is learned from recorded runs.
+//! Analysis of recorded runs.
 //!
 //! It knows no channel, clock, file, thread or logger: texts, times and seeds come in as
 //! arguments, and what does not depend on each other is said to whoever gives it threads (decision 0018). Laws, forces, simulation and estimators are [`dynocar_core`]'s, which knows nothing

@@ -7,13 +7,13 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-/// What is made of each number below a count.
+/// Returns the results of `make` for each number below a count.
 pub fn of_each_number<R: Send>(count: usize, make: impl Fn(usize) -> R + Sync) -> Vec<R> {
     in_tasks(count, 1, make)
 }
 
-/// What is made of each number below a count, `at_least` of them in one task, since each alone is less work than
-/// handing it to a thread.
+/// Returns the results of `make` for each number below a count, `at_least` of them in one task, since each alone is
+/// less work than handing it to a thread.
 pub fn in_tasks<R: Send>(
     count: usize,
     at_least: usize,
@@ -27,12 +27,12 @@ pub fn in_tasks<R: Send>(
         .collect()
 }
 
-/// What is made of each item of a list.
+/// Returns the results of `make` for each item of a list.
 pub fn of_each<T: Sync, R: Send>(items: &[T], make: impl Fn(&T) -> R + Sync) -> Vec<R> {
     of_each_number(items.len(), |number| make(&items[number]))
 }
 
-/// What is made of each item, which is used up, and its number.
+/// Returns the results of `make` for each item, which is consumed, and its number.
 pub fn of_each_owned<T: Send, R: Send>(
     items: impl IntoIterator<Item = T>,
     make: impl Fn(usize, T) -> R + Sync,

@@ -1,8 +1,8 @@
-//! What a person does about what the daemon says.
+//! Remedies for the daemon's reasons.
 
 use dynocar_shared::{Reason, RejectionReason};
 
-/// What to do about a pipeline with this reason, in a line of at most 72 characters.
+/// Returns the remedy for a pipeline with this reason, in a line of at most 72 characters.
 pub const fn of_reason(reason: Reason) -> &'static str {
     match reason {
         Reason::None | Reason::TooFewSamples | Reason::WeakExcitation => {
@@ -37,7 +37,7 @@ pub const fn of_reason(reason: Reason) -> &'static str {
     }
 }
 
-/// What to do where samples are refused for this reason; `None` where it is as it should be.
+/// Returns the remedy where samples are refused for this reason; `None` where nothing is to be done.
 pub const fn of_refusal(reason: RejectionReason) -> Option<&'static str> {
     Some(match reason {
         RejectionReason::Outlier | RejectionReason::WheelSlide => return None,

@@ -3,8 +3,8 @@
 /// Altitudes are averaged over intervals of this many m, so that a standing train does not
 /// outweigh a fast one.
 const CELL_M: f64 = 10.0;
-/// The gradient at a place is fitted over so many m to either side: wide enough for altitudes in
-/// whole metres, which then leave an error of about 1 ‰, and not wider than gradients are long.
+/// The gradient at a place is fitted over this many m to either side: wide enough for altitudes in whole metres,
+/// which then leave an error of about 1 ‰, and not wider than gradients are long.
 const HALF_WINDOW_M: f64 = 150.0;
 /// A fit over fewer m than this says nothing.
 const SPAN_MIN_M: f64 = 100.0;

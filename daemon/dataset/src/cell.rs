@@ -86,7 +86,7 @@ pub fn is_word(cell: &[u8]) -> bool {
     first.is_some_and(|byte| !byte.is_ascii_digit())
 }
 
-/// A greater number in SI units is none of a railway's; its square or sum might be infinite.
+/// Largest number in SI units that a railway has; the square or sum of a greater one might be infinite.
 const MAGNITUDE_MAX: f64 = 1e15;
 
 /// A cell's number as it is kept: in the quantity's unit, `to` which it is converted where it is in another
@@ -100,7 +100,7 @@ pub fn held(mapping: &ColumnMapping, to: Option<&Unit>, cell: f64) -> f64 {
     if value.abs() <= MAGNITUDE_MAX { value } else { f64::NAN }
 }
 
-/// What is wrong with a cell that holds no value; `is_below_names` for one right below the names.
+/// Describes the fault of a cell that holds no value; `is_below_names` for one right below the names.
 pub fn not_a_value(
     mapping: &ColumnMapping,
     cell: &[u8],

@@ -54,7 +54,7 @@ const PACKED_CLOCK: &str = "%H%M%S";
 const PACKED_DATE: &str = "%Y%m%d%H%M%S";
 
 impl TimeFormat {
-    /// The format of this name, or of this pattern; `None` where it is none, or leaves hours or part
+    /// Returns the format of this name, or of this pattern; `None` if it is not a format, or leaves hours or part
     /// of the date open.
     pub fn from_name(name: &str) -> Option<Self> {
         match name {
@@ -89,7 +89,7 @@ impl TimeFormat {
         }
     }
 
-    /// What a cell should look like.
+    /// Returns an example of a cell.
     pub fn example(&self) -> &str {
         match self {
             TimeFormat::Iso => "2026-03-18T07:13:20.2",
@@ -183,7 +183,7 @@ fn compiled(pattern: &str) -> Option<OwnedFormatItem> {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct DayClock {
     format: TimeFormat,
-    /// What stands before the fraction of the second; for [`TimeFormat::Iso`] date and clock time.
+    /// Items before the fraction of the second; for [`TimeFormat::Iso`] date and clock time.
     items: Vec<OwnedFormatItem>,
     first_day: Option<i64>,
     last_s: Option<f64>,

@@ -1,4 +1,4 @@
-//! What is to be known before results from a dataset are believed, each thing once.
+//! Diagnostics to know before results from a dataset are believed, each once.
 
 use dynocar_core::plausibility::{DetectedFault, Severity};
 use dynocar_model::track::Track;
@@ -20,7 +20,7 @@ pub struct DatasetDiagnostic {
     pub severity: Severity,
     /// The files of the runs it is about; empty when it is about the train or the line.
     pub runs: Vec<String>,
-    /// What it is, with figures and the likely input fault.
+    /// Text with figures and the likely input fault.
     pub text: String,
 }
 
@@ -37,13 +37,13 @@ impl std::fmt::Display for DatasetDiagnostic {
 }
 
 impl Dataset {
-    /// What may spoil results from these runs, the worst first.
+    /// Returns the diagnostics that may spoil results from these runs, the worst first.
     pub fn diagnostics(&self) -> Vec<DatasetDiagnostic> {
         diagnostics(&self.train, self.track.as_deref(), &self.runs)
     }
 }
 
-/// What may spoil results from runs of a train on a line, the worst first.
+/// Returns the diagnostics that may spoil results from runs of a train on a line, the worst first.
 pub fn diagnostics<'r>(
     train: &TrainModel,
     track: Option<&Track>,

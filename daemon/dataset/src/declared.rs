@@ -51,7 +51,7 @@ pub fn unusual_resistance(davis: &Davis, top_mps: f64) -> Option<String> {
     is_outside(top, USUAL_AT_TOP_N_PER_KN).then(|| times(&what, top, USUAL_AT_TOP_N_PER_KN, &units))
 }
 
-/// What cannot be true of a train and its line.
+/// Returns the impossible declarations of a train and its line.
 pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     let say = |found: &mut Vec<Diagnostic>, is_wrong: bool, code: &'static str, text: String| {

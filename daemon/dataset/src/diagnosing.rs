@@ -24,7 +24,7 @@ const LINE_TOLERANCE_M: f64 = 50.0;
 /// Median time steps in s of recordings that make sense.
 const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
 
-/// A moving train's columns that all keep their values for so many s are diagnosed.
+/// A moving train's columns that all keep their values for this many s are diagnosed.
 const STANDS_STILL_MIN_S: f64 = 10.0;
 /// ... so many times longer than any other such interval.
 const EXCEPTION: f64 = 3.0;
@@ -76,7 +76,7 @@ pub(super) fn diagnostics(
     diagnostics
 }
 
-/// What a force from power is computed with.
+/// Adds the diagnostics of a force computed from power.
 fn of_power(context: Context, run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
     if run.forces.traction.source != ForceSource::Power {
         return;
@@ -180,7 +180,7 @@ fn of_time(quality: &RunQuality, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// What a run lacks altogether.
+/// Adds the diagnostics of quantities that a run lacks altogether.
 fn of_content(
     context: Context,
     run: &Resolved,

@@ -1,4 +1,4 @@
-//! What looks like a mistake in a run, or should be known before its results are believed, in its unit.
+//! Diagnostics of a run: likely mistakes, or facts to know before its results are believed, in its unit.
 
 use dynocar_core::plausibility::{DetectedFault, InputFault, Severity};
 use dynocar_model::units::Unit;
@@ -16,7 +16,7 @@ pub struct Diagnostic {
     pub code: &'static str,
     /// How much it matters.
     pub severity: Severity,
-    /// What it is, with figures and the likely reason.
+    /// Text with figures and the likely reason.
     pub text: String,
     /// The figures, each with its name and unit.
     pub figures: Vec<(&'static str, Value)>,
@@ -36,7 +36,7 @@ impl Diagnostic {
         Diagnostic { code, severity, text: text.into(), figures: figures.into(), fault: None }
     }
 
-    /// What cannot be true of samples in this unit.
+    /// Returns the diagnostic of a fault of samples in this unit.
     pub(super) fn of_fault(detected: DetectedFault, read_as: Unit) -> Self {
         let fault = detected.fault;
         let (text, unit) = (detected.words(&read_as), read_as.name());

@@ -1,4 +1,4 @@
-//! What may be expected of a value of a document.
+//! Expectations of a value of a document.
 
 use std::ops::{Bound, RangeBounds};
 
@@ -36,7 +36,7 @@ pub struct Item<'t> {
 /// A list of N-tuples of numbers, each with its place.
 pub type Entries<'t, const N: usize> = Vec<([f64; N], Item<'t>)>;
 
-/// What is not as expected gives an error with file, line, the path to the value and what was expected.
+/// A value that is not as expected gives an error with file, line, the path to the value and the expectation.
 impl<'t> Item<'t> {
     /// A file as a whole.
     pub fn root(label: &'t str, node: &'t Node) -> Self {
@@ -53,7 +53,7 @@ impl<'t> Item<'t> {
         self.place().problem(words)
     }
 
-    /// The error of a name that is none of those which can stand here.
+    /// Returns the error of a name that may not stand here; the message lists those that may.
     pub fn unknown<T: Into<String>>(
         &self,
         what: &str,
@@ -244,7 +244,7 @@ impl<'t> Item<'t> {
         }
     }
 
-    /// What the word in quotes under a key, which must be there, names: one of these names.
+    /// Returns the item named by the word in quotes under a required key: one of these names.
     pub fn need_named<T, N: Into<String>>(
         &self,
         key: &str,

@@ -31,7 +31,7 @@ fn is_no_letter(byte: &u8) -> bool {
 ///
 /// # Errors
 ///
-/// Where bytes are none of the encoding's, with the line.
+/// If bytes are not valid in the encoding, with the line.
 pub fn decoded(bytes: Vec<u8>, encoding: &'static Encoding) -> Result<String, FileProblem> {
     if encoding == UTF_8 {
         return String::from_utf8(bytes).map_err(|error| {

@@ -1,4 +1,4 @@
-//! What can be wrong with the files that people write, and where.
+//! Errors of the files that people write, and their places.
 
 use std::fmt::Display;
 
@@ -45,14 +45,14 @@ impl Display for SourcePosition {
 pub struct DatasetError {
     /// File and line.
     pub place: SourcePosition,
-    /// What was expected there, and what came.
+    /// Expected and found values.
     pub words: String,
 }
 
-/// What is wrong with an empty file.
+/// Error of an empty file.
 pub(crate) const NO_HEADER: &str =
     "expected a header line with the columns' names, found an empty file";
-/// What is wrong with a file of names alone.
+/// Error of a file of names alone.
 pub(crate) const NO_ROWS: &str = "expected rows of values below the header, found none";
 
 /// Why a file's text cannot be had.
@@ -84,7 +84,7 @@ pub enum FileProblem {
         /// First line, from 1, with other bytes.
         line: usize,
     },
-    /// The bytes of a run's file are none of the declared encoding's.
+    /// The bytes of a run's file are not valid in the declared encoding.
     #[error(
         "not {expected}: save the file as UTF-8, or set its own encoding in [dataset], as encoding = \
          \"windows-1252\""
@@ -98,7 +98,7 @@ pub enum FileProblem {
     /// The system refuses to read it.
     #[error("cannot be read: {0}")]
     Unreadable(std::io::ErrorKind),
-    /// What is no text does not become a table of numbers; the words are those of its reader.
+    /// A file that is not text and cannot be read as a table of numbers; the words are those of its reader.
     #[error("{0}")]
     Table(String),
 }

@@ -6,7 +6,7 @@ use super::manifest::ColumnMapping;
 use super::names::unknown;
 use super::text_layout::TextLayout;
 
-/// So many lines are searched for names that stand elsewhere than declared.
+/// Number of lines that are searched for names that stand elsewhere than declared.
 const LINES_MAX: usize = 100;
 
 /// In which line the names stand instead, where that is found.

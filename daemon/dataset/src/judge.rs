@@ -1,4 +1,4 @@
-//! What validation and the laws that judge samples live say of a recorded run.
+//! Judgement of a recorded run by validation and the laws that judge samples live.
 
 use dynocar_core::plausibility::{DetectedFaults, Plausibility};
 use dynocar_model::force::ForceResolver;
@@ -53,7 +53,7 @@ impl Judge {
         self.plausibility.take(&sample, resolved.map(drop), gradient_permille);
     }
 
-    /// What cannot be true of the samples.
+    /// Returns the impossibilities of the samples.
     pub fn detected(&self) -> &DetectedFaults {
         self.plausibility.detected()
     }

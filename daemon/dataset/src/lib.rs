@@ -100,7 +100,7 @@ pub trait DatasetFiles: Sync {
     /// When it cannot be had.
     fn read(&self, path: &str) -> Result<String, FileProblem>;
 
-    /// What a run's file holds, of which the columns that the manifest maps are read.
+    /// Reads the contents of a run's file, of which the columns that the manifest maps are used.
     ///
     /// # Errors
     ///
@@ -123,7 +123,7 @@ impl DatasetFiles for [(&str, &str)] {
     }
 }
 
-/// What a dataset declares; its runs can be read one by one.
+/// Declarations of a dataset; its runs can be read one by one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DatasetHead {
     /// The content of `dataset.toml`.

@@ -7,7 +7,7 @@ use super::error::{DatasetError, SourcePosition};
 /// A cell of a row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell<'t> {
-    /// What stands in it, without quotes around it.
+    /// Text of the cell, without quotes around it.
     pub text: Cow<'t, [u8]>,
     /// The number that it is, where that is written plainly.
     pub plain: Option<f64>,
@@ -35,7 +35,7 @@ impl Row<'_> {
 /// follows the closing quote belongs to the cell, too.
 #[derive(Clone, Debug)]
 pub struct RowReader<'t> {
-    /// What is not read yet.
+    /// Text that is not read yet.
     rest: &'t [u8],
     line: usize,
     delimiter: u8,

@@ -25,7 +25,7 @@ named! {
 }
 
 named! {
-    /// What a run is for.
+    /// Role of a run.
     #[derive(serde::Serialize)]
     #[serde(rename_all = "snake_case")]
     Role ("in a dataset") {
@@ -39,7 +39,7 @@ named! {
 /// A column of the runs' files and the quantity that it holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColumnMapping {
-    /// What it holds.
+    /// Quantity of the column.
     pub quantity: Quantity,
     /// Its name in the header, without surrounding spaces.
     pub column: String,
@@ -110,7 +110,7 @@ pub struct FileEntry {
 pub struct RunEntry {
     /// Path of its file, from the dataset's folder.
     pub file: String,
-    /// What it is for.
+    /// Role of the run.
     pub role: Role,
     /// 1 while the chainage grows, -1 while it falls.
     pub direction: i8,

@@ -2,7 +2,7 @@
 
 use strsim::levenshtein;
 
-/// The words for a name that is none of those which can stand in its place.
+/// Returns the words for a name that may not stand in its place.
 pub fn unknown<T: Into<String>>(
     what: &str,
     name: &str,

@@ -1,5 +1,5 @@
-//! What people and programs write as keys and values, as a tree whose every value knows its line. TOML is read here; other
-//! languages make the same tree.
+//! Keys and values that people and programs write, as a tree whose every value knows its line. TOML is read here;
+//! other languages make the same tree.
 
 use std::cell::Cell;
 
@@ -12,18 +12,18 @@ use super::error::{DatasetError, SourcePosition};
 pub struct Node {
     /// Line, from 1; `None` for a file as a whole.
     pub line: Option<usize>,
-    /// What it is.
+    /// Content of the value.
     pub content: Content,
     /// True once somebody has asked for it.
     pub(super) is_read: Cell<bool>,
 }
 
-/// What a value is.
+/// Content of a value.
 #[derive(Debug)]
 pub enum Content {
     /// A text in quotes.
     Text(String),
-    /// What stands without quotes, as it is written: a number, a date, a word of YAML.
+    /// Unquoted text, as it is written: a number, a date, a word of YAML.
     Plain(String),
     /// Values, one after the other.
     List(Vec<Node>),
@@ -65,7 +65,7 @@ impl Node {
     pub(super) fn number(&self) -> Option<f64> {
         let Content::Plain(text) = &self.content else { return None };
         match text.trim_start_matches(['+', '-']) {
-            // As YAML writes them, TOML, and programs that write JSON which is none.
+            // As YAML, TOML, and programs that write invalid JSON write them.
             ".nan" | ".NaN" | ".NAN" => Some(f64::NAN),
             ".inf" | ".Inf" | ".INF" => Some(f64::INFINITY),
             "nan" | "NaN" | "inf" | "Infinity" => text.parse().ok(),

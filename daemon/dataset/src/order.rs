@@ -123,7 +123,7 @@ impl OrderCounts {
         missing
     }
 
-    /// True when rows are missing within a step of so many s.
+    /// Returns whether rows are missing within a step of `step_s` seconds.
     pub fn is_gap(&self, step_s: f64) -> bool {
         let steps = if self.is_regular { GAP_STEPS } else { IRREGULAR_GAP_STEPS };
         step_s > steps * self.step_s

@@ -1,4 +1,4 @@
-//! What the data of a run are like: counts, ranges and what the train did.
+//! Quality of a run's data: counts, ranges and the train's motion.
 
 use dynocar_model::terms::wheel::STILL_MPS;
 use dynocar_shared::{RejectionReason, SampleField, TrainSample};
@@ -14,7 +14,7 @@ use super::table::LineCounts;
 /// A force below this share of the greatest one counts as none.
 const COASTING_SHARE: f64 = 0.005;
 
-/// What the data of a run are like.
+/// Quality of a run's data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunQuality {
     /// Rows of the file, and lines that are no plain rows.
@@ -44,7 +44,7 @@ pub struct RunQuality {
     pub mass_kg: Option<Spread>,
     /// Distance in m by integrating the speed.
     pub distance_m: f64,
-    /// What the train did, and for how long.
+    /// Phases of the train's motion, and their durations.
     pub phases: Phases,
 }
 

@@ -10,14 +10,14 @@ use serde::Serialize;
 macro_rules! quantities {
     ($( #[doc = $doc:literal] $item:ident $name:literal $dimension:ident $(=> $field:ident)?; )*) => {
         named! {
-            /// What a column of a run may hold; in the order of the documentation.
+            /// Quantity of a column of a run; in the order of the documentation.
             #[derive(Hash, PartialOrd, Ord, Serialize)]
             #[serde(rename_all = "snake_case")]
             Quantity ("in a dataset's `[columns]`") { $( #[doc = $doc] $item $name; )* }
         }
 
         impl Quantity {
-            /// What its units measure.
+            /// Returns the dimension of its units.
             pub const fn dimension(self) -> Dimension {
                 match self { $( Quantity::$item => Dimension::$dimension ),* }
             }
@@ -39,7 +39,7 @@ quantities! {
     Speed "speed" Speed => Speed;
     /// dv/dt.
     Acceleration "acceleration" Acceleration => Acceleration;
-    /// What an accelerometer reads along the track: dv/dt + g * gradient.
+    /// Reading of an accelerometer along the track: dv/dt + g * gradient.
     SpecificForce "specific_force" Acceleration => SpecificForce;
     /// Traction force, never negative.
     TractionForce "traction_force" Force => TractionForce;

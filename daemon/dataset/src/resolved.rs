@@ -37,7 +37,7 @@ pub enum GradientSource {
     Unknown,
 }
 
-/// What is declared around a run.
+/// Declarations around a run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Context<'d> {
     pub manifest: &'d Manifest,

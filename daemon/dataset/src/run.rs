@@ -48,7 +48,7 @@ pub struct Run {
     pub file: String,
     /// Number of the run in the dataset, from 1; `run` of its samples.
     pub number: u32,
-    /// What it is for.
+    /// Role of the run.
     pub role: Role,
     /// 1 while the chainage grows, -1 while it falls.
     pub direction: i8,
@@ -72,9 +72,9 @@ pub struct Run {
     pub traction_source: ForceSource,
     /// Where the brake force comes from.
     pub brake_source: ForceSource,
-    /// What the data are like.
+    /// Quality of the data.
     pub quality: RunQuality,
-    /// What looks like a mistake, or should be known.
+    /// Diagnostics: likely mistakes, or facts to know.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -117,7 +117,7 @@ impl Run {
         self.diagnostics.retain(|it| !of_brake(it));
     }
 
-    /// What is recorded of a quantity beyond those of a sample.
+    /// Returns the record of a quantity beyond those of a sample.
     pub fn extra(&self, quantity: Quantity) -> Option<&Extra> {
         self.extras.iter().find(|(other, _)| *other == quantity).map(|(_, values)| values)
     }
@@ -235,7 +235,7 @@ pub fn recorded_unix_s(
         return entry.date_unix_s;
     }
     let text = beginning()?;
-    // What breaks off within a line may break off within a letter.
+    // A row that breaks off may break off within a letter.
     let whole = &text[..=text.rfind('\n')?];
     let table = Table::parse("", whole, (&manifest.layout, &manifest.columns)).ok()?;
     let mut times_s = table.column(Quantity::Time)?.iter().copied();
@@ -248,7 +248,7 @@ fn counts_from_midnight(manifest: &Manifest, entry: &RunEntry) -> bool {
     has_format && !is_parquet(&entry.file)
 }
 
-/// When a run was recorded whose first time is so many s, of this day.
+/// Returns the time of a run's recording, whose first time is a number of seconds, on this day.
 fn recorded(
     manifest: &Manifest,
     entry: &RunEntry,

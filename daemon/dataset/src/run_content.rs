@@ -1,6 +1,6 @@
-//! What a run's file holds: rows of text, or columns that another program has read.
+//! Contents of a run's file: rows of text, or columns that another program has read.
 
-/// What a run's file holds.
+/// Contents of a run's file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RunContent {
     /// Rows of text, laid out as the manifest says.

@@ -4,7 +4,7 @@
 /// above the median, since a centre that is itself the median differs by nothing, and
 /// low enough for one value in ten, with its neighbours, to be an outlier.
 const SPREAD_QUANTILE: f64 = 0.75;
-/// So many spreads make a spike; about eight standard deviations of white noise.
+/// Number of spreads that make a spike; about eight standard deviations of white noise.
 const SPIKE_SPREADS: f64 = 8.0;
 
 /// Marks values that stick out from the median of the `N` around them (Hampel's filter, with

@@ -1,11 +1,11 @@
 //! Forces that act before their stamps: recorders that average over the time before the stamp.
 
-/// Forces stamped late by less than so many s, or standard deviations, are not.
+/// Forces stamped late by less than this many s, or standard deviations, do not count as late.
 const LATE_MIN: (f64, f64) = (0.01, 3.0);
 /// A force is not taken across a longer step in s.
 const STEP_MAX_S: f64 = 2.5;
 
-/// True for forces that act so many s before their stamps that it counts.
+/// Returns whether forces act long enough before their stamps that it counts.
 pub fn is_stamped_late(late_s: f64, std_s: f64) -> bool {
     late_s > LATE_MIN.0 && late_s > LATE_MIN.1 * std_s
 }

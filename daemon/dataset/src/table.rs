@@ -12,7 +12,7 @@ use super::quantity::Quantity;
 use super::run_content::RunColumn;
 use super::text_layout::TextLayout;
 
-/// So many rows show how many there will be.
+/// Number of rows that show how many there will be.
 const ROWS_BEFORE_RESERVE: usize = 1000;
 
 /// The mapped columns of a run's file, each in its quantity's unit, `NaN` where missing.
@@ -23,7 +23,7 @@ pub(super) struct Table {
     line_of_row: Vec<usize>,
     /// The day of the first row, counted from 1970-01-01, where the times hold it.
     pub first_day: Option<i64>,
-    /// What was odd about the lines.
+    /// Irregular lines.
     pub lines: LineCounts,
 }
 
@@ -204,8 +204,7 @@ struct Rows<'m> {
     columns: Vec<Column<'m>>,
     line_of_row: Vec<usize>,
     lines: LineCounts,
-    /// What is wrong with the row last read. Whether it matters depends on whether the file
-    /// breaks off there.
+    /// Flaw of the row last read. Whether it matters depends on whether the file breaks off there.
     pending: Option<Flaw>,
 }
 
@@ -227,7 +226,7 @@ enum Flaw {
 }
 
 impl Rows<'_> {
-    /// Makes room for so many more rows, where there is some: it is a guess.
+    /// Makes room for `rows` more rows, where there is some: the number is a guess.
     fn reserve(&mut self, rows: usize) {
         for column in &mut self.columns {
             let _ = column.values.try_reserve(rows);
@@ -320,7 +319,7 @@ impl Rows<'_> {
             let is_below_names = line <= self.layout.lines_above() + 1;
             let problem = not_a_value(column.mapping, cell, self.layout, is_below_names);
             let error = place().problem(problem);
-            // What is left of a number where a file breaks off is such a cell.
+            // The rest of a number where a file breaks off is such a cell.
             let may_be_cut = index + 1 == found
                 && cell.iter().all(|letter| b"0123456789+-.,eE:T/ ".contains(letter));
             if !may_be_cut {

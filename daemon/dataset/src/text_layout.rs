@@ -18,9 +18,9 @@ pub const THOUSANDS: [char; 8] = ['.', ',', '\'', '’', ' ', '\u{a0}', '\u{202f
 pub struct TextLayout {
     /// Which letters the bytes are.
     pub encoding: &'static Encoding,
-    /// What separates the cells of a row.
+    /// Separator of the cells of a row.
     pub delimiter: u8,
-    /// What separates a number's fraction: a point or a comma.
+    /// Separator of a number's fraction: a point or a comma.
     pub decimal: u8,
     /// What separates groups of three digits in numbers; `None` for nothing.
     pub thousands: Option<char>,

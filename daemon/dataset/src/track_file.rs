@@ -206,7 +206,7 @@ fn with_corrections(mut track: Track, section: &Item) -> Result<Track, DatasetEr
     Ok(track)
 }
 
-/// What the declared gradient lacks, in one of its lists.
+/// Reads the error of the declared gradient, in one of its lists.
 fn gradient_error(section: &Item, name: &str) -> Result<Option<LinearProfile>, DatasetError> {
     let Some(entries) = section.entries::<2>(name, PERMILLE)? else { return Ok(None) };
     let entries = entries.into_iter().map(|([at_m, permille], _)| (at_m, permille)).collect();

@@ -1,11 +1,10 @@
 //! Every estimator that a configuration may name: the papers' own methods, and the list of all kinds.
 //!
-//! What answers live on a train is in [`dynocar_core::pipeline`]: resistance and mass by
+//! The pipelines that answer live on a train are in [`dynocar_core::pipeline`]: resistance and mass by
 //! [`train_kalman`](dynocar_core::pipeline::train_kalman), the brake by
-//! [`braking`](dynocar_core::pipeline::braking), what the model lacks by
-//! [`monitor`](dynocar_core::pipeline::monitor). Here stands what the papers ask, one folder each:
-//! their own methods, kept as the papers have them, and ours at the statistical bound of their
-//! experiments, where the mass or the resistance is exact. On a train neither is.
+//! [`braking`](dynocar_core::pipeline::braking), missing effects by [`monitor`](dynocar_core::pipeline::monitor).
+//! This crate answers the papers, one folder each: their own methods, kept as the papers have them, and ours at the
+//! statistical bound of their experiments, where the mass or the resistance is exact. On a train neither is.
 //!
 //! - [`EstimatorSettings`]: every kind with its settings, of both libraries, and how it is built
 //! - [`liu`], [`resistance`] (Liu 2018): recursive least squares on coasting or measured forces, and

@@ -41,7 +41,7 @@ pub fn model_description(interface: &Interface, step_s: f64) -> String {
     }
     xml += "  </ModelVariables>\n  <ModelStructure>\n";
     if interface.guid == ESTIMATORS.guid {
-        // What is got changes by a step alone, and at first hangs on the files alone.
+        // Outputs change by a step alone, and at first depend on the files alone.
         push_unknowns(&mut xml, interface, "Outputs", Some(""));
         let is_file = |variable: &Variable| matches!(variable.meaning, Meaning::File(_));
         let files = indices(interface, is_file).join(" ");
@@ -126,7 +126,7 @@ fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_con
     *xml += "    </ScalarVariable>\n";
 }
 
-/// What a variable starts with, unless it is calculated.
+/// Returns the start value of a variable, unless it is calculated.
 fn start(meaning: Meaning) -> Option<String> {
     match meaning {
         Meaning::File(_) => Some(String::new()),

@@ -32,7 +32,7 @@ pub enum ModelError {
         name: &'static str,
         /// The number.
         value: f64,
-        /// What was expected, in words.
+        /// Expected value, in words.
         expected: &'static str,
     },
     /// A step that the train cannot take.
@@ -62,7 +62,7 @@ pub enum ModelError {
     /// The call comes at the wrong time.
     #[error("{call} is not allowed {now}")]
     WrongOrder {
-        /// What was called.
+        /// Name of the call.
         call: &'static str,
         /// Where the instance stands, in words.
         now: &'static str,

@@ -133,7 +133,7 @@ const VARIABLES: &[Variable] = &[
     reported("monitor.suspected_effect_number", MONITOR, SnapshotField::SuspectedEffectNumber, units::NONE, "The effect that the model may lack"),
 ];
 
-/// What is declared before the files are read.
+/// Snapshot before the files are read.
 static NOTHING: ParameterSnapshot = ParameterSnapshot::empty();
 
 /// The estimators behind an instance.

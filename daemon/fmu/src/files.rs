@@ -71,7 +71,7 @@ impl Files {
     ///
     /// # Errors
     ///
-    /// What is wrong with the files.
+    /// Problem of the files.
     pub fn estimators(&self) -> Result<Estimators, ModelError> {
         let (train, track) = self.read()?;
         let pipeline = |(index, &kind): (usize, &PipelineKind)| {
@@ -87,7 +87,7 @@ impl Files {
     ///
     /// # Errors
     ///
-    /// What is wrong with the files.
+    /// Problem of the files.
     pub fn driven(&self, beginning: Beginning) -> Result<DrivenTrain, ModelError> {
         let (train, track) = self.read()?;
         Ok(DrivenTrain::new(train, track, beginning))

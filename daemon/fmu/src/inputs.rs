@@ -1,4 +1,4 @@
-//! What acts during a step: the inputs at its beginning, and their slopes where they are given.
+//! Inputs during a step: their values at its beginning, and their slopes where they are given.
 
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -31,7 +31,7 @@ impl Inputs {
         }
     }
 
-    /// What it is set to.
+    /// Returns the value of a field.
     pub fn get(&self, field: SampleField) -> f64 {
         self.sample.get(field).unwrap_or(MISSING)
     }
@@ -47,7 +47,7 @@ impl Inputs {
         self.slopes.fill(0.0);
     }
 
-    /// The sample that acts so many s after a time in s.
+    /// Returns the sample that acts `after_s` seconds after a time in s.
     #[inline]
     pub fn at(&self, time_s: f64, after_s: f64) -> TrainSample {
         let mut sample = self.sample;

@@ -1,5 +1,5 @@
-//! What stands behind an instance of an FMU: its inputs, the model that takes them, and the order in
-//! which the standard lets calls come.
+//! Model behind an instance of an FMU: its inputs, the model that takes them, and the order in which the standard
+//! lets calls come.
 
 use std::ffi::CStr;
 
@@ -211,7 +211,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// When there is none of this type, or after a fault.
+    /// If there is no such variable of this type, or after a fault.
     pub fn real(&self, reference: u32) -> Result<f64, ModelError> {
         let variable = self.got(reference, Kind::Real)?;
         Ok(match variable.meaning {
@@ -231,7 +231,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// When there is none of this type, or after a fault.
+    /// If there is no such variable of this type, or after a fault.
     pub fn integer(&self, reference: u32) -> Result<i32, ModelError> {
         let variable = self.got(reference, Kind::Integer)?;
         let number: u64 = match (variable.meaning, &self.behind) {
@@ -247,7 +247,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// When there is none of this type, or after a fault.
+    /// If there is no such variable of this type, or after a fault.
     pub fn boolean(&self, reference: u32) -> Result<bool, ModelError> {
         Ok(match (self.got(reference, Kind::Boolean)?.meaning, &self.behind) {
             (Meaning::Begins(_), _) => self.beginning.is_held_at_rest,
@@ -262,7 +262,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// When there is none of this type, or after a fault.
+    /// If there is no such variable of this type, or after a fault.
     pub fn string(&self, reference: u32) -> Result<&CStr, ModelError> {
         let variable = self.got(reference, Kind::String)?;
         let Meaning::File(file) = variable.meaning else { return Ok(c"") };

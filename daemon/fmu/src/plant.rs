@@ -110,7 +110,7 @@ pub(crate) fn least_step_s(train: &DrivenTrain) -> f64 {
     train.dead_time_s() / 1000.0
 }
 
-/// What a train does; NaN where nothing has been balanced yet.
+/// Returns a value of the train's motion; NaN where nothing has been balanced yet.
 pub(crate) fn reported(train: &DrivenTrain, what: Driven) -> f64 {
     let balance = train.balance();
     match what {

@@ -1,5 +1,5 @@
-//! What a variable of an FMU can be. Each model has a table of them: what `modelDescription.xml` says
-//! and what is set and got both come from there. A variable's value reference is its place in it.
+//! Variables of an FMU. Each model has a table of them, from which both `modelDescription.xml` and the values that
+//! are set and got come. A variable's value reference is its place in the table.
 
 use dynocar_analysis::driven::ForcePart;
 use dynocar_shared::layout::{FieldLayout, hex_digits, layout_hash};
@@ -15,9 +15,9 @@ pub struct Interface {
     pub identifier: &'static str,
     /// Its name for people.
     pub name: &'static str,
-    /// What it does, in a sentence without its point.
+    /// Purpose of the model, in a sentence without its point.
     pub about: &'static str,
-    /// What a step takes and gives, in sentences.
+    /// Inputs and outputs of a step, in sentences.
     pub step: &'static str,
     /// By which description and library of one FMU know each other.
     pub guid: &'static str,
@@ -36,7 +36,7 @@ impl Interface {
     ///
     /// # Errors
     ///
-    /// When there is none.
+    /// If there is no such variable.
     pub fn variable(
         &self,
         reference: u32,
@@ -65,7 +65,7 @@ pub enum ModelFile {
     Track,
 }
 
-/// What is reported of an estimator's snapshot.
+/// Reported field of an estimator's snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SnapshotField {
     /// A parameter's value.
@@ -109,7 +109,7 @@ pub enum Begins {
     HeldAtRest,
 }
 
-/// What the driven train does.
+/// Values of the driven train's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driven {
     /// True speed.
@@ -128,7 +128,7 @@ pub enum Driven {
     Resistance,
 }
 
-/// What a variable stands for.
+/// Meaning of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meaning {
     /// Parameter: the name of a file.
@@ -167,7 +167,7 @@ pub enum Kind {
 /// A vocabulary of the project that is an enumeration of the FMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Vocabulary {
-    /// What may be done with an estimate.
+    /// Status of the estimate.
     Status,
     /// Why.
     Reason,
@@ -237,11 +237,11 @@ impl Meaning {
 pub struct Variable {
     /// Its name, by the structured convention of the standard.
     pub name: &'static str,
-    /// What it stands for.
+    /// Meaning of the variable.
     pub meaning: Meaning,
     /// Its unit.
     pub unit: Unit,
-    /// What it is, in words.
+    /// Description in words.
     pub description: &'static str,
 }
 

@@ -20,10 +20,10 @@ const COMPARE: Duration = Duration::from_millis(400);
 /// How long viewers have to take leave.
 const LEAVE: Duration = Duration::from_secs(1);
 
-/// What is served, and where.
+/// Settings of the server: contents and address.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// What is read.
+    /// Trains and pipelines to read.
     pub wanted: Wanted,
     /// Samples a second that viewers get of each train; every one, when it is 0.
     pub samples_hz: u32,

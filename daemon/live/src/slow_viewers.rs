@@ -1,4 +1,4 @@
-//! What is reported of viewers that do not keep up.
+//! Reports about viewers that do not keep up.
 //!
 //! The protocol's library drops the oldest messages of a viewer whose queue is full, and says so in
 //! its log, at most every 30 s; it counts none.

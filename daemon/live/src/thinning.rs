@@ -8,7 +8,7 @@ pub struct Thinning {
 }
 
 impl Thinning {
-    /// Lets so many a second through; all, when it is 0.
+    /// Lets `per_second` samples a second through; all, when it is 0.
     pub fn to(per_second: u32) -> Self {
         let interval_ns = 1_000_000_000_i64.checked_div(i64::from(per_second)).unwrap_or(0);
         Thinning { interval_ns, due_ns: i64::MIN }

@@ -29,7 +29,7 @@ pub enum LiveError {
     Address {
         /// The address.
         address: String,
-        /// What the system said.
+        /// Message of the system.
         problem: String,
     },
     /// The protocol's library refuses a channel.
@@ -37,7 +37,7 @@ pub enum LiveError {
     Topic {
         /// The channel.
         topic: String,
-        /// What it said.
+        /// Message of the system.
         problem: String,
     },
 }
@@ -51,7 +51,7 @@ struct Newest {
 
 type Snapshots = Arc<Mutex<HashMap<ChannelId, Newest>>>;
 
-/// What goes to viewers.
+/// Messages for viewers.
 pub struct Viewers {
     context: Arc<Context>,
     channels: HashMap<Topic, Arc<RawChannel>>,
@@ -63,7 +63,7 @@ pub struct Viewers {
 }
 
 impl Viewers {
-    /// Viewers that get so many samples a second; all, when it is 0.
+    /// Serves viewers with `samples_hz` samples a second; all, when it is 0.
     ///
     /// # Errors
     ///
@@ -87,7 +87,7 @@ impl Viewers {
         &self.context
     }
 
-    /// What a server reports of viewers that come, subscribe and go.
+    /// Returns the listener that reports viewers that come, subscribe and go.
     pub fn listener(&self) -> Arc<dyn ServerListener> {
         Arc::new(Listener { newest: Arc::clone(&self.newest), count: Mutex::new(0) })
     }
@@ -123,7 +123,7 @@ impl Viewers {
     }
 }
 
-/// What a thread that failed left is whole: nothing is written in steps.
+/// Locks a mutex, also after a panic of another thread: the data are never written in steps.
 fn locked<T>(of: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }

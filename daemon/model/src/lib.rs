@@ -1,4 +1,4 @@
-//! What is declared of a train and its line, and the forces that follow from it, pure.
+//! Declared model of a train and its line, and the forces that follow from it, without side effects.
 //!
 //! Everything that learns, explains or simulates stands on this library: the live estimators
 //! (`dynocar_core`), the papers' methods, the reader of recorded runs, the analysis, the daemon.

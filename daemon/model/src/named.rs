@@ -30,7 +30,7 @@ macro_rules! named {
 #[cfg(test)]
 mod tests {
     named! {
-        /// What a door may be.
+        /// Position of a door.
         Door ("in a test") {
             /// Nobody gets in.
             Shut = 3 "shut";

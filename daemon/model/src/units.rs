@@ -3,7 +3,7 @@
 //! Every unit converts to its dimension's base unit: SI, except °C for temperature, since that
 //! is what a sample holds.
 
-/// What a unit measures.
+/// Dimension of a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Dimension {
     /// Base unit s.
@@ -338,7 +338,7 @@ impl Unit {
         self.name
     }
 
-    /// What the unit measures.
+    /// Returns the dimension of the unit.
     pub fn dimension(&self) -> Dimension {
         self.dimension
     }

@@ -13,7 +13,7 @@ use arrow_buffer::NullBuffer;
 use arrow_schema::{DataType, Field, Schema, TimeUnit};
 use dynocar_recording::columns::Column;
 
-/// What stands in a column, row after row.
+/// Cells of a column, row after row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cells {
     /// Numbers as words, as many for each row as a list has entries; 0 where they are missing.

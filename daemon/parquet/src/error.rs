@@ -1,4 +1,4 @@
-//! Why a Parquet file is none that can be read.
+//! Reasons why a Parquet file cannot be read.
 //!
 //! The library that reads Parquet takes some of a file's numbers for granted: where a damaged file breaks
 //! that, it panics. For us that is an error of the file like any other.
@@ -14,7 +14,7 @@ use dynocar_recording::error::{AtPath, ReadProblem};
 /// Why a Parquet file, or a folder of them, cannot be read.
 pub type TableError = AtPath<TableProblem>;
 
-/// What is wrong with a Parquet file.
+/// Errors of a Parquet file.
 #[derive(Debug, thiserror::Error)]
 pub enum TableProblem {
     /// The system does not give it.
@@ -42,9 +42,9 @@ pub enum TableProblem {
     OtherType {
         /// The column.
         column: String,
-        /// What was expected.
+        /// Expected type or value.
         expected: String,
-        /// What it holds.
+        /// Type or value in the file.
         found: String,
     },
     /// A value is missing that never is.
@@ -55,15 +55,15 @@ pub enum TableProblem {
         /// The row, counted from 1.
         row: usize,
     },
-    /// What it holds is no recording that can be read.
+    /// The contents are not a readable recording.
     #[error(transparent)]
     Recording(#[from] ReadProblem),
 }
 
 impl TableProblem {
-    /// A file that is none that can be read.
+    /// Returns the error of a file that is not readable Parquet.
     pub fn not_parquet(problem: impl std::fmt::Display) -> Self {
-        // What the library says is a sentence, some with its own title.
+        // The library's message is a sentence, some with its own title.
         let problem = problem.to_string();
         TableProblem::NotParquet(problem.trim_start_matches("Parquet argument error: ").to_owned())
     }
@@ -93,7 +93,7 @@ pub fn guarded<T>(
         }));
     });
     IS_READING.set(true);
-    // What the work has half done is dropped with the error.
+    // Half-done work is dropped with the error.
     let done = catch_unwind(AssertUnwindSafe(work));
     IS_READING.set(false);
     let done = done.unwrap_or_else(|panic| {

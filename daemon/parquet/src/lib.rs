@@ -7,7 +7,7 @@
 //! # Layout
 //!
 //! - [`cells`]: the columns of `dynocar_recording::columns` as Arrow has them
-//! - [`error`]: why a file is none that can be read, and what a damaged one does to its library
+//! - [`error`]: why a file cannot be read, and how a damaged file affects its library
 //! - [`writing`]: MCAP to Parquet
 //! - [`reading`], [`table`]: Parquet to what a recording holds, and to MCAP
 //! - [`numbers`]: a Parquet file of anybody as columns of numbers

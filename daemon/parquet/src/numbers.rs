@@ -29,8 +29,8 @@ pub struct Wanted {
     pub unit: String,
 }
 
-/// So many rows are decoded at once: enough that little is done for each batch, and few enough that a column's
-/// numbers stay in the processor's memory until they are on their way.
+/// Rows decoded at once: enough that little is done for each batch, and few enough that a column's numbers stay in
+/// the processor's memory until they are on their way.
 const BATCH_ROWS: usize = 8192;
 
 /// Hands over all columns of a file, with the numbers in the wanted ones, batch after batch: what is missing is
@@ -48,7 +48,7 @@ pub fn send_columns(
     guarded(path, || {
         let mut sender = None;
         let sent = send(path, wanted, output, &mut sender);
-        // What went wrong is said behind the columns.
+        // An error is reported behind the columns.
         let ended = sender.map_or(Ok(()), Sender::end);
         sent.map(|it| it.and(ended))
     })
@@ -69,7 +69,7 @@ fn send<W: Write>(
     };
     let places = wanted.iter().map(|it| Some((index(it)?, it)));
     let places: BTreeMap<usize, &Wanted> = places.collect::<Option<_>>().unwrap_or_default();
-    // What holds no numbers is refused without rows too.
+    // A column without numbers is refused without rows too.
     for (&index, wanted) in &places {
         numbers(&new_empty_array(fields[index].data_type()), wanted)?;
     }

@@ -32,7 +32,7 @@ pub struct Logged {
     pub row: Row,
 }
 
-/// What a recording holds.
+/// Contents of a recording.
 #[derive(Debug, Default)]
 pub struct Content {
     /// Its messages, in order.

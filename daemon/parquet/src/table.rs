@@ -1,5 +1,4 @@
-//! What the files of a recording are called, what they say of themselves, and the tables of attached files and
-//! metadata.
+//! Names of the files of a recording, their metadata, and the tables of attached files and metadata.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
@@ -24,7 +23,7 @@ pub const KIND: &str = "dynocar.table";
 pub const LAYOUT: &str = "dynocar.layout";
 /// A table of messages.
 pub struct TableKind {
-    /// What it says of itself under [`KIND`].
+    /// Name under [`KIND`].
     pub name: &'static str,
     /// Its columns.
     pub columns: &'static LazyLock<Vec<Column>>,

@@ -32,7 +32,7 @@ use crate::table::{
 /// Rows that are encoded at a time.
 const BATCH_ROWS: usize = 1 << 16;
 
-/// What was written.
+/// Summary of the written files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Written {
     /// Samples.

@@ -183,7 +183,7 @@ fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
     if is_whole { Ok(()) } else { Err(Failure::Verdict(LOST)) }
 }
 
-/// What a file has lost, unless it is whole.
+/// Returns the description of a file's losses, unless the file is whole.
 fn lost((path, ending): (&PathBuf, &Ending)) -> Option<String> {
     let Ending::Broken { read_bytes, file_bytes, reason } = ending else { return None };
     let rest = file_bytes.saturating_sub(*read_bytes);

@@ -31,7 +31,7 @@ pub enum CodecError {
         field: &'static str,
         /// Its type.
         expected: &'static str,
-        /// What came.
+        /// Wire type in the message.
         found: WireType,
     },
     /// The bytes end within a field.
@@ -96,7 +96,7 @@ pub fn encode_snapshot(snapshot: &ParameterSnapshot, out: &mut Vec<u8>) {
 ///
 /// # Errors
 ///
-/// When it is none.
+/// If the bytes are not a valid sample message.
 pub fn decode_sample(message: &[u8]) -> Result<TrainSample, CodecError> {
     let mut sample = TrainSample::empty(TrainId(0));
     sample.direction = 0;
@@ -114,7 +114,7 @@ pub fn decode_sample(message: &[u8]) -> Result<TrainSample, CodecError> {
 ///
 /// # Errors
 ///
-/// When it is none.
+/// If the bytes are not a valid snapshot message.
 pub fn decode_snapshot(message: &[u8]) -> Result<ParameterSnapshot, CodecError> {
     let mut snapshot = ParameterSnapshot::empty();
     (snapshot.status, snapshot.reason) = (0, 0);

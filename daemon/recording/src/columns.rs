@@ -1,4 +1,4 @@
-//! What a recording holds as columns of tables, made from the tables that the messages are made from.
+//! Columns of tables for the contents of a recording, made from the tables that the messages are made from.
 //!
 //! Arrays stand as they are, in lists of fixed length, so that nothing is lost; what they hold stands once
 //! more under names with units, as in the messages.
@@ -27,7 +27,7 @@ pub enum Source {
     Field(&'static Field),
     /// A parameter's value: repeats what arrays hold.
     Value(Parameter),
-    /// What [`SUFFIXES`] adds to it, by the index there: repeats what arrays hold.
+    /// Addition of [`SUFFIXES`], by the index there: repeats the contents of arrays.
     OfEstimate(Parameter, usize),
     /// How many samples were refused for a reason: repeats what an array holds.
     Rejected(RejectionReason),
@@ -48,7 +48,7 @@ pub struct Column {
     pub is_nullable: bool,
     /// The unit; empty for none.
     pub unit: &'static str,
-    /// What it is.
+    /// Meaning of the column.
     pub meaning: String,
     /// Numbers and names, where it holds numbers of a vocabulary.
     pub vocabulary: Option<&'static str>,

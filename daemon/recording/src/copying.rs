@@ -18,7 +18,7 @@ type Output = BufWriter<Box<dyn Write + Send>>;
 /// The writer of a copy.
 pub type CopyWriter = Writer<NoSeek<Output>>;
 
-/// What was copied.
+/// Summary of the copied messages.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Copied {
     /// Messages.
@@ -35,7 +35,7 @@ pub struct Copied {
 ///
 /// # Errors
 ///
-/// When one is no MCAP file, or the new one cannot be written; then there is none.
+/// If one is not an MCAP file, or the new one cannot be written; then no file is left.
 pub fn recover(from: &[PathBuf], to: &Path) -> Result<Copied, CopyError> {
     recover_on(&Disk, from, to)
 }

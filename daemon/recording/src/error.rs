@@ -1,4 +1,4 @@
-//! What is wrong with a file, and which.
+//! Errors of files, with their paths.
 
 use std::error::Error;
 use std::fmt::{Debug, Display, Formatter};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::codec::CodecError;
 use crate::schema::SAMPLE;
 
-/// What is wrong with a file or a folder.
+/// An error of a file or a folder, with its path.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct AtPath<P> {
@@ -24,7 +24,7 @@ impl<P> AtPath<P> {
     }
 }
 
-/// What is wrong with a file that is to be a recording.
+/// Errors of a file that is to be a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadProblem {
     /// The system does not give it.
@@ -62,7 +62,7 @@ pub enum ReadProblem {
         topic: String,
         /// The message's place in the file, counted from 1.
         number: u64,
-        /// What is wrong.
+        /// Error of the message.
         source: CodecError,
     },
     /// Several files are not given in the order in which they were recorded.
@@ -95,7 +95,7 @@ pub type ReadError = AtPath<ReadProblem>;
 /// Why a file or a folder cannot be written.
 pub type WriteError = AtPath<Unwritten>;
 
-/// What stopped the writing: any error, so that this is none itself.
+/// An error that stopped the writing: it wraps any error and is therefore not itself `Error`.
 #[derive(Debug)]
 pub struct Unwritten(Box<dyn Error + Send + Sync>);
 

@@ -1,4 +1,4 @@
-//! What happens around samples and snapshots, as messages of a recording.
+//! Events around samples and snapshots, as messages of a recording.
 
 use dynocar::observing::Change;
 use dynocar_shared::TrainId;
@@ -9,13 +9,13 @@ use crate::message::message;
 pub use dynocar::observing::EventKind;
 
 message! {
-    /// What happened around them.
+    /// Event around samples and snapshots.
     Event {
         /// When the recorder saw it, in ns of the host's monotonic clock.
         1 monotonic_ns: i64 = int64;
         /// The train.
         2 train_id: u64 = uint64;
-        /// What happened.
+        /// Kind of the event.
         3 kind: i32 = int32 (EventKind);
         /// The pipeline's number in the daemon's configuration, where it concerns one.
         4 pipeline_index: Option<u32> = uint32 optional;
@@ -36,7 +36,7 @@ impl Event {
         Event::of(train, &Change::new(kind, text))
     }
 
-    /// What has changed about a train, seen now.
+    /// Returns the event of a change of a train, seen now.
     pub fn of(train: TrainId, change: &Change) -> Self {
         Event {
             monotonic_ns: monotonic_now_ns(),
@@ -50,7 +50,7 @@ impl Event {
         }
     }
 
-    /// What happened.
+    /// Returns the kind of the event.
     pub fn kind(&self) -> EventKind {
         EventKind::from_number(self.kind as u32).unwrap_or(EventKind::Unknown)
     }

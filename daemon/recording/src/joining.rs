@@ -36,8 +36,8 @@ pub fn read_all<V: Visitor>(paths: &[PathBuf], visitor: &mut V) -> Result<Vec<En
     Ok(endings)
 }
 
-/// Reads one of so many files of a recording. A power cut may leave nothing of the newest but its name, and
-/// zeros: among others that is a file that breaks off at its beginning.
+/// Reads one of several files of a recording. A power cut may leave nothing of the newest but its name, and zeros:
+/// among others that is a file that breaks off at its beginning.
 ///
 /// # Errors
 ///

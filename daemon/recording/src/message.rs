@@ -11,7 +11,7 @@ pub struct MessageField {
     pub type_name: &'static str,
     /// True where it may be missing.
     pub is_optional: bool,
-    /// What it is.
+    /// Meaning of the field.
     pub meaning: &'static str,
 }
 
@@ -40,7 +40,7 @@ macro_rules! message {
         impl $name {
             /// Its name in the package.
             pub const NAME: &str = stringify!($name);
-            /// What it is.
+            /// Meaning of the field.
             pub const MEANING: &str = $what;
             /// Its fields, in order.
             pub const FIELDS: &[$crate::message::MessageField] = &[ $(

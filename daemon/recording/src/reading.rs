@@ -27,7 +27,7 @@ pub enum Ending {
         read_bytes: u64,
         /// The file's length.
         file_bytes: u64,
-        /// What stopped the reading.
+        /// Reason why the reading stopped.
         reason: String,
     },
 }
@@ -43,7 +43,7 @@ impl Ending {
     }
 }
 
-/// What a recording holds, in the order in which it was written.
+/// An item of a recording, in the order of writing.
 #[derive(Clone, Debug)]
 pub enum Item<'a> {
     /// Names and values.
@@ -63,7 +63,7 @@ pub enum Item<'a> {
     Sample(&'a TrainSample),
     /// A pipeline's snapshot.
     Snapshot(&'a ParameterSnapshot),
-    /// What happened.
+    /// An event.
     Event(&'a Event),
 }
 
@@ -85,7 +85,7 @@ pub struct ChannelInfo {
     pub topic: String,
     /// Encoding of its messages.
     pub encoding: String,
-    /// What the writer said of it.
+    /// Metadata by the writer.
     pub metadata: std::collections::BTreeMap<String, String>,
     /// Name, encoding and bytes of its schema; `None` without one.
     pub schema: Option<(String, String, Vec<u8>)>,
@@ -170,7 +170,7 @@ pub fn read<V: Visitor>(path: &Path, visitor: &mut V) -> Result<Ending, V::Error
 enum Stop<E> {
     /// The file is damaged from here on.
     Broken(McapError),
-    /// It is none that can be read, or nothing more is taken.
+    /// The file cannot be read, or nothing more is taken.
     Refused(E),
 }
 

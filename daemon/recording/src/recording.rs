@@ -11,7 +11,7 @@ use crate::event::Event;
 use crate::joining::read_all;
 use crate::reading::{Item, Raw, Visitor};
 
-/// What a recording holds, each kind in the order in which it was written.
+/// Contents of a recording, each kind in the order of writing.
 #[derive(Debug, Default)]
 pub struct Recording {
     /// Samples, in the order in which they were written.
@@ -61,7 +61,7 @@ impl Recording {
     ///
     /// # Errors
     ///
-    /// When it is none, or holds no sample.
+    /// If the file is not a recording, or holds no sample.
     pub fn load(path: &Path) -> Result<Self, ReadError> {
         Recording::load_all(&[path.into()])
     }
@@ -70,7 +70,7 @@ impl Recording {
     ///
     /// # Errors
     ///
-    /// When one is none, they are not of one recording, or none holds a sample.
+    /// If one file is not a recording, the files are not of one recording, or none holds a sample.
     ///
     /// # Panics
     ///

@@ -68,11 +68,11 @@ pub fn parameter_number(parameter: Parameter) -> u32 {
     parameter as u32
 }
 
-/// What is said of a parameter in addition to its value, of value and standard deviation.
+/// Function of value and standard deviation that gives an additional column of a parameter.
 pub type OfEstimate = fn(f64, f64) -> f64;
 
-/// What `estimate` says of a parameter in addition to its value: how much greater its number is, the word in
-/// its name, what it is, and its value.
+/// Additional columns of `estimate` for a parameter: the offset of the field number, the word in its name, its
+/// meaning, and its value.
 pub const SUFFIXES: [(u32, &str, &str, OfEstimate); 3] = [
     (100, "std", "Its standard deviation.", |_, std| std),
     (200, "low", "The lower end of its 95 % interval.", |value, std| value - HALF_95 * std),

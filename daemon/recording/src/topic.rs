@@ -54,7 +54,7 @@ pub enum Message<'a> {
     Sample(&'a TrainSample),
     /// A pipeline's snapshot.
     Snapshot(&'a ParameterSnapshot),
-    /// What happened.
+    /// An event.
     Event(&'a Event),
 }
 

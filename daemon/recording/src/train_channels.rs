@@ -1,5 +1,4 @@
-//! What a recorder and a live view read: one more reader of the trains' channels, which nobody waits
-//! for.
+//! Reader of the trains' channels for a recorder and a live view: one more reader, for which nobody waits.
 //!
 //! Samples are taken at least every few milliseconds, for a channel holds the newest 512 of them; what
 //! is passed over is counted and reported.
@@ -26,7 +25,7 @@ pub const PAUSE: Duration = Duration::from_millis(5);
 /// How often it looks who is there.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// What is to be read.
+/// Selection of trains and pipelines to read.
 #[derive(Clone, Debug)]
 pub struct Wanted {
     /// The trains.

@@ -29,7 +29,7 @@ pub fn folder_of_configuration(number: u32) -> String {
 const CHUNK_BYTES: u64 = 1 << 20;
 const LIBRARY: &str = concat!("dynocar ", env!("CARGO_PKG_VERSION"));
 
-/// What the host's monotonic clock says in wall time.
+/// Wall time of the host's monotonic clock.
 #[derive(Clone, Copy, Debug)]
 pub struct WallClock {
     offset_ns: i64,
@@ -59,7 +59,7 @@ pub struct RecordingWriter<W: Write> {
     writer: Option<Writer<NoSeek<W>>>,
     channels: HashMap<Topic, u16>,
     clock: WallClock,
-    /// What the next message is logged at, whatever the clock says.
+    /// Time at which the next message is logged, whatever the clock says.
     log_time: Option<u64>,
     message: Vec<u8>,
 }

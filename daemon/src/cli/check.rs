@@ -33,26 +33,26 @@ pub struct CheckArguments {
 /// The answer of `dynocar check --json`, whatever was checked.
 #[derive(Debug, Serialize)]
 pub struct CheckAnswer<C> {
-    /// What was checked.
+    /// Checked path.
     pub path: String,
-    /// What it is; `null` when nothing could be understood.
+    /// Kind of the file; `null` when nothing could be understood.
     pub kind: Option<FileKind>,
     /// True without errors.
     pub valid: bool,
-    /// What is wrong.
+    /// Errors.
     pub errors: Vec<String>,
     /// The first of them, as every command gives it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorAnswer>,
-    /// What may spoil results, the worst first.
+    /// Diagnostics that may spoil results, the worst first.
     #[serde(rename = "notes")]
     pub diagnostics: Vec<DatasetDiagnostic>,
-    /// What was understood.
+    /// Contents as understood.
     #[serde(flatten)]
     pub content: Option<C>,
 }
 
-/// What was understood of a daemon's configuration.
+/// Contents of a daemon's configuration.
 #[derive(Debug, Serialize)]
 struct Content<'a> {
     daemon: DaemonAnswer<'a>,
@@ -77,7 +77,7 @@ pub fn execute(arguments: &CheckArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What there is to say, for machines, where nothing could be understood.
+/// Returns the answer for machines where nothing could be understood.
 pub fn refusal(path: &Path, error: ErrorAnswer) -> CheckAnswer<()> {
     CheckAnswer {
         path: path.display().to_string(),

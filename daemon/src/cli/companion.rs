@@ -8,7 +8,7 @@ use clap::Args;
 use super::Failure;
 use crate::programs::{call, not_started};
 
-/// What follows a command whose program reads it itself.
+/// Arguments after a command whose program reads them itself.
 #[derive(Debug, Args)]
 #[command(disable_help_flag = true)]
 pub struct Passed {
@@ -30,7 +30,7 @@ impl From<Vec<OsString>> for Passed {
     }
 }
 
-/// What the user wrote after the command.
+/// Returns the arguments after the command.
 pub fn words_of_command() -> Passed {
     Passed { words: std::env::args_os().skip(2).collect() }
 }

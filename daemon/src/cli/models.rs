@@ -254,7 +254,7 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
     text + &trial(&Trials::read(models.folder()), stored.hash)
 }
 
-/// What the daemon measured of a model in its trial; empty where it did not.
+/// Describes the daemon's measurements of a model in its trial; empty without a trial.
 fn trial(trials: &Trials, hash: ModelHash) -> String {
     let Some(tried) = trials.of(hash) else { return String::new() };
     let mut text = String::new();

@@ -57,7 +57,7 @@ pub fn start_log(config: &DaemonConfig) -> Result<Log, Failure> {
     Ok(Log(queue))
 }
 
-/// What is logged: a level, or levels by the modules that log.
+/// Returns the filter of the log: a level, or levels by module.
 fn filter(log: &str) -> Result<Targets, Failure> {
     log.parse().map_err(|error| {
         Failure::Input(format!("daemon.log = {log:?}: expected a level as info or debug: {error}"))

@@ -67,7 +67,7 @@ pub fn wrap(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// A number with at most so many decimals and no zeros at its end.
+/// Returns a number with at most `decimals` decimals and no zeros at its end.
 pub fn short(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = match text.contains('.') {

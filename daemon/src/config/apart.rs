@@ -32,7 +32,7 @@ pub fn keep_slow_apart(
     Ok(())
 }
 
-/// What is expected in the place of the name of no thread.
+/// Returns the message for an unknown thread name, with the expected names.
 pub fn names_one(name: &str) -> String {
     let name = toml::Value::from(name);
     format!("the name of a [[threads]] table; these lines make one:\n\n[[threads]]\nname = {name}")

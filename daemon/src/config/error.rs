@@ -20,7 +20,7 @@ pub enum ConfigError {
     Malformed {
         /// The file.
         path: PathBuf,
-        /// What the reader says, with the line.
+        /// Message of the reader, with the line.
         message: String,
     },
     /// A value lies outside its range.
@@ -46,7 +46,7 @@ pub(super) struct Checker<'a> {
 }
 
 impl Checker<'_> {
-    /// What file names in the configuration are relative to.
+    /// Returns the folder to which file names in the configuration are relative.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new("."))
     }

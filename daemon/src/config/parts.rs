@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::shadow::rule::Rule;
 
-/// What a pipeline thread does while no sample comes.
+/// Behaviour of a pipeline thread while no sample comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IdleStrategy {
@@ -50,7 +50,7 @@ pub struct ProcessConfig {
     pub log: String,
     /// Form of the log.
     pub log_format: LogFormat,
-    /// What threads do while no sample comes, where they say nothing else.
+    /// Idle strategy of the threads that do not set their own.
     pub idle: IdleStrategy,
     /// How long an adaptive thread looks for samples before it sleeps, in µs.
     pub spin_us: u64,
@@ -126,7 +126,7 @@ pub struct ThreadConfig {
     pub name: String,
     /// Processor core that it is bound to.
     pub core: Option<usize>,
-    /// What it does while no sample comes.
+    /// Idle strategy of the thread.
     pub idle: IdleStrategy,
     /// Real-time priority (`SCHED_FIFO`), 1 to 99; the system's ordinary scheduling when absent.
     pub priority: Option<u8>,

@@ -82,7 +82,7 @@ impl Answers {
     }
 }
 
-/// What may stand in place of a pipeline that cannot answer.
+/// Returns the pipelines that may stand in place of one that cannot answer.
 fn allowed(quantity: Quantity, train: TrainId, pipelines: &[PipelineConfig]) -> String {
     let can_answer =
         |it: &&PipelineConfig| it.trains.contains(&train) && it.estimator.answers(quantity);

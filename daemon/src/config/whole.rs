@@ -16,13 +16,13 @@ use crate::models::{ModelHash, ModelText};
 pub struct TrainConfig {
     /// Its number on the channels.
     pub id: TrainId,
-    /// What is declared of it.
+    /// Declared model.
     pub model: Arc<TrainModel>,
     /// The line it runs on, when known.
     pub track: Option<Arc<Track>>,
     /// By what that model of train and line is known.
     pub model_hash: ModelHash,
-    /// What the configuration declares, as its files spell it.
+    /// Text of the declared model, as its files spell it.
     pub text: ModelText,
     /// The models to be tried next to the one in force; those of the store when absent.
     pub candidates: Option<Vec<ModelHash>>,

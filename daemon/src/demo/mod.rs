@@ -51,7 +51,7 @@ pub enum DemoError {
     Interrupted,
 }
 
-/// Plays the demo at so many times the recorded rate, and gives what was found.
+/// Plays the demo at `rate` times the recorded rate, and returns the summary.
 ///
 /// # Errors
 ///

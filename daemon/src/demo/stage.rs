@@ -16,7 +16,7 @@ pub enum StageError {
     /// The system refused.
     #[error("{what}: {source}")]
     System {
-        /// What was tried.
+        /// Attempted action.
         what: &'static str,
         /// The system's answer.
         source: std::io::Error,

@@ -1,4 +1,4 @@
-//! What the demo found, and how long a snapshot took from its sample's publishing to its own.
+//! Findings of the demo, and the time of a snapshot from its sample's publishing to its own.
 
 use dynocar_client::SnapshotReader;
 use dynocar_dataset::Dataset;
@@ -13,7 +13,7 @@ use serde::Serialize;
 pub struct DemoAnswer {
     /// Each pipeline with its status.
     pub pipelines: Vec<PipelineAnswer>,
-    /// What became of the samples, for the pipeline that fared worst.
+    /// Counts of the samples, for the pipeline that fared worst.
     pub samples: SampleAnswer,
     /// From a sample's publishing to its snapshot's.
     pub latency: LatencyAnswer,
@@ -62,9 +62,9 @@ pub struct LatencyAnswer {
     pub count: u64,
 }
 
-/// What the demo found, for people and for machines.
+/// Findings of the demo, for people and for machines.
 pub struct Summary {
-    /// What was played.
+    /// Played dataset.
     pub dataset: Dataset,
     /// Samples played.
     pub published: u64,

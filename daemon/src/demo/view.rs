@@ -26,7 +26,7 @@ pub struct View {
 }
 
 impl View {
-    /// A view of the replay of a dataset with so many samples.
+    /// Returns a view of the replay of a dataset with `total` samples.
     pub fn new(dataset: &Dataset, total: u64, rate: f64) -> Self {
         report_line(&format!(
             "{}: {} recorded runs at {rate} times their speed",

@@ -7,13 +7,13 @@ use super::moment::Moment;
 use super::text::ModelHash;
 
 named! {
-    /// What is decided of a model.
+    /// Decision on a model.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     Action ("as in the files") {
         /// It is put in force.
         Adopted "adopted";
-        /// What is in force is taken back; what was in force before it is so again.
+        /// The model in force is withdrawn; its predecessor is in force again.
         RolledBack "rolled_back";
         /// It is not wanted: it is no candidate any more.
         Rejected "rejected";
@@ -23,7 +23,7 @@ named! {
 /// A decision that was taken.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Decision {
-    /// What was decided.
+    /// Decided action.
     pub action: Action,
     /// The model that was adopted or rejected, or that a rollback put in force again; absent for what
     /// the configuration declares.
@@ -43,7 +43,7 @@ pub struct Decision {
 /// A decision that is to be taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NewDecision {
-    /// What to decide.
+    /// Chosen decision.
     pub what: Choice,
     /// Who decides: a person's name, or `rule`.
     pub by: String,
@@ -53,7 +53,7 @@ pub struct NewDecision {
     pub at: Moment,
 }
 
-/// What to decide.
+/// Choice between decisions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
     /// Put a model of the store in force.
@@ -73,7 +73,7 @@ pub fn in_force_after<'d>(decisions: impl IntoIterator<Item = &'d Decision>) -> 
             (Action::Adopted, Some(model)) => stack.push(model),
             (Action::RolledBack, model) => {
                 stack.pop();
-                // What a rollback says that it put in force, holds.
+                // The model that a rollback names as in force is in force.
                 match model {
                     None => stack.clear(),
                     Some(model) if stack.last() != Some(&model) => stack.push(model),

@@ -46,7 +46,7 @@ pub fn differences(one: &ModelText, other: &ModelText) -> Vec<Difference> {
 fn of_file(file: &'static str, texts: [Option<&String>; 2]) -> Vec<Difference> {
     let [one, other] = texts.map(|text| {
         let mut flat = BTreeMap::new();
-        // What is no TOML has no keys; the store holds none such.
+        // Text that is not TOML has no keys; the store holds none such.
         let table: Table = text.and_then(|text| text.parse().ok()).unwrap_or_default();
         flatten("", &table, &mut flat);
         flat

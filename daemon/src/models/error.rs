@@ -27,7 +27,7 @@ pub enum ModelsError {
     Malformed {
         /// The file.
         path: PathBuf,
-        /// What the reader says.
+        /// Message of the reader.
         message: String,
     },
     /// The files of a model are no longer those that were put there.

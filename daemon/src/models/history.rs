@@ -1,4 +1,4 @@
-//! What each model of a train is now, by what was decided.
+//! State of each model of a train, from the decisions.
 
 use dynocar_model::named;
 
@@ -9,7 +9,7 @@ use super::store::{Listing, Stored, TrainModels};
 use super::text::ModelHash;
 
 named! {
-    /// What a model is.
+    /// State of a model.
     State ("in words") {
         /// It is in force.
         InForce "in force";
@@ -31,7 +31,7 @@ named! {
 pub struct History {
     /// The models, the oldest first, each with what it is.
     pub models: Vec<(Stored, State)>,
-    /// What lies among them and is none.
+    /// Entries among them that are not decisions.
     pub left_out: Vec<(std::path::PathBuf, String)>,
     /// The decisions, in order.
     pub decisions: Vec<Numbered<Decision>>,

@@ -37,7 +37,7 @@ pub(super) fn text_of(path: &Path) -> Result<String, ModelsError> {
     read_text(path).map_err(|problem| ModelsError::Unreadable { path: path.into(), problem })
 }
 
-/// What a file of the store says.
+/// Reads a file of the store.
 pub(super) fn read_record<T: DeserializeOwned>(path: &Path) -> Result<T, ModelsError> {
     toml::from_str(&text_of(path)?).map_err(|error| ModelsError::Malformed {
         path: path.into(),

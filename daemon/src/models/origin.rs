@@ -1,4 +1,4 @@
-//! What learning adds to the store: where a model came from, and maintenance events.
+//! Additions of learning to the store: the origin of a model, and maintenance events.
 
 use std::collections::BTreeMap;
 
@@ -101,7 +101,7 @@ pub struct Origin {
     /// The verdict of `explain`; absent for one that somebody declared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<String>,
-    /// What the model is, in a sentence or two.
+    /// Description of the model, in a sentence or two.
     pub statement: String,
     /// SHA-256 over the list of files, as the report states it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -109,7 +109,7 @@ pub struct Origin {
     /// The errors before and after, where runs were held out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<HeldOutError>,
-    /// What it adds to its parent.
+    /// Effects that it adds to its parent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<FoundEffect>,
     /// The files of the dataset that it was learned from.
@@ -144,7 +144,7 @@ impl Origin {
             && other.effects.iter().all(|it| has(&self.effects, it))
     }
 
-    /// What the model adds, in a few words.
+    /// Describes the additions of the model, in a few words.
     pub fn adds(&self) -> String {
         let words = |effect: &FoundEffect| {
             let places = effect.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m"));
@@ -170,7 +170,7 @@ pub struct EventWindow {
     pub t_end_s: f64,
 }
 
-/// What acted in certain runs.
+/// Effect that acted in certain runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaintenanceEvent {
     /// Its kind.

@@ -26,7 +26,7 @@ pub const REPORT_FILE: &str = "report.html";
 const DECISIONS: &str = "decisions";
 /// Folder of a train's maintenance events.
 const EVENTS: &str = "events";
-/// What the trials of candidates measured, written by the daemon.
+/// File of the measurements in the trials of candidates, written by the daemon.
 pub const TRIALS_FILE: &str = "trials.json";
 
 /// A store of models.
@@ -49,9 +49,9 @@ pub struct NewModel {
     pub text: ModelText,
     /// Where it came from.
     pub origin: Origin,
-    /// What `explain` says, for machines.
+    /// Answer of `explain`, for machines.
     pub answer_json: Option<String>,
-    /// What `explain` says, as a page.
+    /// Answer of `explain`, as a page.
     pub report_html: Option<String>,
 }
 
@@ -71,7 +71,7 @@ pub struct Stored {
 pub struct Listing {
     /// The oldest first.
     pub models: Vec<Stored>,
-    /// What lies among them and is no model of the store, with the reason.
+    /// Entries among them that are not models of the store, with the reason.
     pub left_out: Vec<(PathBuf, String)>,
 }
 
@@ -147,7 +147,7 @@ impl TrainModels {
         self.put(&NewModel { text: text.clone(), origin, answer_json: None, report_html: None })
     }
 
-    /// The models, the oldest first, with what lies among them and is none.
+    /// Returns the models, the oldest first, with the entries among them that are not models.
     ///
     /// # Errors
     ///
@@ -203,7 +203,7 @@ impl TrainModels {
     ///
     /// # Errors
     ///
-    /// When it is not there, was changed, or is none that this version reads.
+    /// If it is not there, was changed, or cannot be read by this version.
     pub fn load(&self, hash: ModelHash) -> Result<(TrainModel, Option<Track>), ModelsError> {
         let folder = self.folder_of(hash);
         Ok(self.text(hash)?.parse(&folder.join(TRAIN_FILE), &folder.join(TRACK_FILE))?)
@@ -357,7 +357,7 @@ pub fn write_model(
     let beside = part_of(folder);
     let made = make_once(storage, folder, &beside, &files);
     if made.is_err() {
-        // What was made so far is of no use; that it cannot be removed changes nothing.
+        // The files made so far are of no use; a failure to remove them changes nothing.
         let _ = std::fs::remove_dir_all(&beside);
     }
     Ok(made?)

@@ -17,8 +17,8 @@ pub const TRAIN_FILE: &str = "train.toml";
 /// The file of the line in a model's folder.
 pub const TRACK_FILE: &str = "track.toml";
 
-/// What a model is known by: the first 8 bytes, the highest first, of the SHA-256 of its train file,
-/// one zero byte, and its track file.
+/// Identity of a model: the first 8 bytes, the highest first, of the SHA-256 of its train file, one zero byte, and
+/// its track file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct ModelHash(pub u64);
@@ -93,7 +93,7 @@ impl ModelText {
     ///
     /// # Errors
     ///
-    /// What the reader says, with file and line.
+    /// Message of the reader, with file and line.
     pub fn parse(
         &self,
         train: &Path,

@@ -39,10 +39,10 @@ vocabulary! {
     }
 }
 
-/// What has changed about a train.
+/// Change of a train.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Change {
-    /// What it is.
+    /// Kind of the event.
     pub kind: EventKind,
     /// The pipeline's number in the daemon's configuration, where it concerns one.
     pub pipeline: Option<u32>,

@@ -1,5 +1,5 @@
-//! What an observer of trains sees, in one vocabulary for all of them: who has come and who has gone, and what has
-//! changed about what the pipelines say. An observer is one reader of each train's snapshots, as every client is.
+//! Observation of trains, in one vocabulary for all observers: arrivals and departures, and changes in the answers
+//! of the pipelines. An observer is one reader of each train's snapshots, as every client is.
 //!
 //! - `event`: the kinds of events
 //! - `train`: one train
@@ -13,7 +13,7 @@ use dynocar_transport::{ChannelError, Host, Peer, Role};
 pub use event::{Change, EventKind};
 pub use train::ObservedTrain;
 
-/// What is to be observed.
+/// Selection of trains and pipelines to observe.
 #[derive(Clone, Debug)]
 pub struct Wanted {
     /// The run-time directory.

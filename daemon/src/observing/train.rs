@@ -10,7 +10,7 @@ use super::event::{Change, EventKind};
 use crate::operator::pipeline_name;
 use crate::operator::suspicion::Suspicion;
 
-/// What was last seen of a pipeline.
+/// Latest observed state of a pipeline.
 #[derive(Clone, Copy, Debug, Default)]
 struct SeenPipeline {
     epoch: u64,
@@ -70,7 +70,7 @@ impl ObservedTrain {
     pub fn look(&mut self, host: &Host, changes: &mut Vec<Change>) -> Result<(), ChannelError> {
         let daemon = Peer::look_up(host, self.id, Role::Daemon)?;
         note_peer(&daemon, &mut self.daemon, Role::Daemon, changes);
-        // What is wrong with one of the two keeps nobody from seeing the other.
+        // A fault of one of the two keeps nobody from seeing the other.
         let opened = self.open_reader(host, daemon);
         let controller = Peer::look_up(host, self.id, Role::Controller)?;
         note_peer(&controller, &mut self.controller, Role::Controller, changes);

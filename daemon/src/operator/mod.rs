@@ -1,16 +1,16 @@
-//! What an operator reads, wherever it stands: in the log, in `dynocar health`, on the screen of
-//! `dynocar watch` and in a recording's events.
+//! Texts for an operator, wherever they stand: in the log, in `dynocar health`, on the screen of `dynocar watch`
+//! and in a recording's events.
 //!
 //! - [`suspicion`]: the effect that the model may lack, with its force and what else it could be
 //!
-//! What to do about it is in [`dynocar_core::remedy`] and [`dynocar_shared::vocabulary::KINDS`].
+//! The remedy is in [`dynocar_core::remedy`] and [`dynocar_shared::vocabulary::KINDS`].
 
 pub mod suspicion;
 
 use dynocar_shared::snapshot::REJECTION_REASONS;
 use dynocar_shared::{PipelineKind, RejectionReason};
 
-/// What a pipeline is called where no configuration names it: its number there and its kind.
+/// Returns the name of a pipeline that no configuration names: its number there and its kind.
 pub fn pipeline_name(index: u32, kind: Option<PipelineKind>) -> String {
     format!("{index}_{}", kind.map_or("unknown", PipelineKind::name))
 }

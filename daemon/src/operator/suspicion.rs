@@ -7,7 +7,7 @@ use dynocar_shared::{HALF_95, ParameterSnapshot};
 
 use super::duration;
 
-/// What a pipeline suspects.
+/// Suspicion of a pipeline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Suspicion {
     /// The effect; `None` for one that this release does not know.
@@ -25,7 +25,7 @@ pub struct Suspicion {
 }
 
 impl Suspicion {
-    /// What a snapshot suspects; `None` for nothing.
+    /// Returns the suspicion in a snapshot; `None` if there is none.
     pub fn of(it: &ParameterSnapshot) -> Option<Self> {
         let effect = EffectKind::from_number(it.suspected_effect);
         (effect != Some(EffectKind::None)).then_some(Suspicion {

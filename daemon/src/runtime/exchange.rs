@@ -15,7 +15,7 @@ pub type Set = Vec<Pipeline>;
 
 /// No thread has settled a sample yet.
 const OPEN: u64 = u64::MAX;
-/// What was handed over is being taken back.
+/// Mark of a value that is being withdrawn.
 const WITHDRAWN: u64 = u64::MAX - 1;
 
 /// The way there and back for the pipelines of one train.

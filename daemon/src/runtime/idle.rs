@@ -1,4 +1,4 @@
-//! What a pipeline thread does while no sample comes.
+//! Idle strategies of a pipeline thread.
 
 use std::time::Duration;
 

@@ -30,7 +30,7 @@ const REMEMBERED: usize = 8;
 /// The statuses of one pipeline as the log knows them.
 #[derive(Clone, Debug)]
 pub struct StatusLog {
-    /// What was reported, and when it last held; the newest last.
+    /// Reported states, with the time at which each last held; the newest last.
     reported: Vec<(State, Instant)>,
     seen: State,
     since: Instant,
@@ -135,7 +135,7 @@ mod tests {
     const AT_BOUND: State = (2, 7);
     const INVALID: State = (4, 3);
 
-    /// What is reported of a status by tenth of a second: (time in s, status, untold changes).
+    /// Returns the reports of a status given by tenth of a second: (time in s, status, unreported changes).
     fn reported(state_at: impl Fn(u64) -> State, seconds: u64) -> Vec<(f64, State, u64)> {
         let start = Instant::now();
         let mut log = StatusLog::new(start);

@@ -1,4 +1,4 @@
-//! What a pipeline thread reports to the main thread, without either waiting.
+//! Reports of a pipeline thread to the main thread, without either waiting.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
@@ -28,7 +28,7 @@ struct Counters {
     suspect: Suspect,
 }
 
-/// What is suspected, the newest of each word.
+/// Latest suspicion, the newest of each word.
 #[derive(Debug, Default)]
 struct Suspect {
     /// The effect's number, and its rivals' bits.
@@ -56,11 +56,11 @@ pub struct TallyReading {
     pub beats: u64,
     /// Status and reason of the newest snapshot, by number.
     pub status: (u32, u32),
-    /// What cannot be true of the samples lately.
+    /// Recent impossibilities of the samples.
     pub implausible: Option<DetectedFault>,
     /// Samples refused, by number of the reason.
     pub refused: [u32; REJECTION_REASONS],
-    /// What is suspected.
+    /// Suspicion of the pipeline.
     pub suspicion: Option<Suspicion>,
     /// Where the train is, in m; no number where it does not know.
     pub position_m: f64,

@@ -1,4 +1,4 @@
-//! What the main thread does while the pipeline threads work.
+//! Work of the main thread while the pipeline threads run.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::supervision::health::Verdict;
 
 /// How often the main thread looks around.
 const ROUND: Duration = Duration::from_millis(100);
-/// Every so many rounds it looks who drives the trains.
+/// Rounds between two looks at who drives the trains.
 const ROUNDS_PER_PEER_CHECK: u32 = 4;
 
 /// A tally with the names it is logged under.
@@ -30,11 +30,11 @@ pub struct WatchedPipeline {
     pub name: String,
     /// The train.
     pub train: TrainId,
-    /// What its thread counts.
+    /// Counters of its thread.
     pub tally: Arc<Tally>,
 }
 
-/// What the log has said of one pipeline.
+/// State of the log of one pipeline.
 struct PipelineLog {
     statuses: StatusLog,
     suspects: StatusLog,

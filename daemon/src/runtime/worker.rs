@@ -14,14 +14,14 @@ use super::idle::Idler;
 use super::tally::Tally;
 use crate::config::{IdleStrategy, ThreadConfig};
 
-/// A thread that never found a sample looks so many times before it reads the clock: the clock
-/// takes as long as a look, and a sample that comes meanwhile would wait for it.
+/// A thread that never found a sample looks this many times before it reads the clock: the clock takes as long as a
+/// look, and a sample that comes meanwhile would wait for it.
 const LOOKS_PER_CLOCK: usize = 16;
 
 /// Samples that one train may take in a row before the thread's other trains have their turn.
 const TURN: usize = 64;
 
-/// What a worker needs to start; made by the main thread, taken into the thread.
+/// Inputs of a worker's start; made by the main thread, taken into the thread.
 pub struct WorkerPlan {
     /// Name, core and idle strategy.
     pub thread: ThreadConfig,
@@ -208,7 +208,7 @@ impl TrainChannel {
     /// Puts the pipelines of another model to work, if any came and the train stands.
     fn change_models(&mut self, epoch: u64, now_ns: i64) {
         let Some(exchange) = &self.exchange else { return };
-        // A speed that is no number is none at which to change.
+        // NaN speed: do not swap models.
         let stands = self.newest_speed_mps.abs() <= STANDING_MPS;
         let Some(mut set) = exchange.take(self.index, self.newest, stands) else { return };
         for (slot, new) in self.slots.iter_mut().zip(&mut set) {

@@ -1,4 +1,4 @@
-//! What the trials show now, for those who watch the daemon: the metrics.
+//! Present figures of the trials, for those who watch the daemon: the metrics.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -35,7 +35,7 @@ pub struct EventCount {
     pub count: u64,
 }
 
-/// What is pinned up.
+/// Published figures.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pinned {
     /// The models of all trains.
@@ -61,7 +61,7 @@ impl Board {
         pinned.events.extend(counts.map(|(kind, count)| EventCount { train, kind, count }));
     }
 
-    /// What is pinned up of all trains.
+    /// Returns the published figures of all trains.
     pub fn read(&self) -> Pinned {
         self.pinned.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

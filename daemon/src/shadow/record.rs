@@ -1,4 +1,4 @@
-//! What the trials of a train measured, as a file beside its models that outlives the daemon.
+//! Measurements of a train's trials, as a file beside its models that outlives the daemon.
 //!
 //! `trials.json` is replaced as a whole. A daemon that starts takes up the errors of each model, and
 //! what the trips said for a rival against the same model in force.
@@ -20,7 +20,7 @@ pub const TRIALS_FILE: &str = crate::models::store::TRIALS_FILE;
 /// Models of which errors are kept, those tried last.
 const MODELS_MAX: usize = 32;
 
-/// What a pipeline of a rival says.
+/// Estimate of a rival's pipeline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The pipeline's name.
@@ -35,7 +35,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// What a snapshot of a pipeline says.
+    /// Returns the estimate of a snapshot of a pipeline.
     pub fn of(pipeline: &str, snapshot: &ParameterSnapshot) -> Self {
         let count = snapshot.parameter_count as usize;
         let values = snapshot.parameters.iter().take(count).enumerate().map(|(index, &number)| {
@@ -68,11 +68,11 @@ pub struct Tried {
     /// Its error over that of the model in force: an interval that holds the truth at all times
     /// at once with 95 %.
     pub error_ratio: Option<[f64; 2]>,
-    /// What the trips say for it against the model in force.
+    /// Evidence of the trips for it against the model in force.
     pub evidence: Evidence,
     /// Its errors by day and place.
     pub ledger: Ledger,
-    /// What its pipelines say.
+    /// Estimates of its pipelines.
     #[serde(default)]
     pub estimates: Vec<Estimate>,
 }
@@ -97,8 +97,8 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// What an earlier daemon wrote into a train's folder; nothing where it wrote nothing, or
-    /// where that cannot be read, which the log then says.
+    /// Reads the file of an earlier daemon in a train's folder; empty where there is none, or where it cannot be
+    /// read, which is logged.
     pub fn read(folder: &Path) -> Self {
         let path = folder.join(TRIALS_FILE);
         let text = match std::fs::read_to_string(&path) {
@@ -127,7 +127,7 @@ impl Trials {
         replace(&Disk, &path, &beside, (text.as_bytes(), &Rights::Usual))
     }
 
-    /// What is known of a model.
+    /// Returns the trial of a model.
     pub fn of(&self, model: ModelHash) -> Option<&Tried> {
         self.models.iter().find(|it| it.model == model)
     }

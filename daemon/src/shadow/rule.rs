@@ -19,28 +19,28 @@ pub enum Adopt {
     WhenBetter,
 }
 
-/// What a rival must show, and what it may not be.
+/// Conditions that a rival must meet, and limits that it may not exceed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
     /// Who adopts.
     pub adopt: Adopt,
     /// Share of the open-loop error that a rival must take away to count as better.
     pub least_gain: f64,
-    /// While no rival is better, none is taken for better before so many trips on average, however many
-    /// are on trial.
+    /// While no rival is better, no rival is taken for better before this many trips on average, however many are
+    /// on trial.
     pub trips_between_mistakes: f64,
     /// Keys of a train's file as `resistance.a`, with the least and the greatest value.
     pub bounds: BTreeMap<String, [f64; 2]>,
 }
 
 impl Rule {
-    /// True where one of so many rivals has shown that it is better.
+    /// Returns whether one of `rivals` rivals has shown that it is better.
     pub fn is_better(&self, rival: &Rival, rivals: usize) -> bool {
         rival.evidence.e_value() >= self.trips_between_mistakes * rivals as f64
     }
 
-    /// What to decide when a rival is better: to take back what is in force, if the rival was
-    /// in force before it, else to adopt the rival.
+    /// Returns the choice when a rival is better: to take back the model in force, if the rival was in force before
+    /// it, else to adopt the rival.
     pub fn choice(standing: &Standing, rival: ModelHash) -> Choice {
         match standing.before {
             Some(before) if before == rival => Choice::RollBack,
@@ -48,7 +48,7 @@ impl Rule {
         }
     }
 
-    /// What of a model lies outside the bounds, in words; `None` when nothing does.
+    /// Describes the parts of a model outside the bounds; `None` when there are none.
     pub fn outside(&self, text: &ModelText) -> Option<String> {
         let table: Table = text.train.parse().ok()?;
         self.bounds.iter().find_map(|(key, [low, high])| {
@@ -72,7 +72,7 @@ fn number(table: &Table, key: &str) -> Option<f64> {
 pub struct Standing {
     /// The model in force.
     pub in_force: ModelHash,
-    /// What was in force before, to which a rollback leads; `None` for a model that nothing preceded.
+    /// Model in force before, to which a rollback leads; `None` for a model without a predecessor.
     pub before: Option<ModelHash>,
     /// On trial: what was in force before, the model taken back last, and the candidates.
     pub rivals: Vec<ModelHash>,

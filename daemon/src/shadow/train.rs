@@ -54,7 +54,7 @@ pub struct ShadowTrain {
     record: record::Trials,
     standing: Standing,
     changing: Option<Changing>,
-    /// What the log has said, to say it once.
+    /// Messages already logged, so that each is logged once.
     reported: HashSet<String>,
     newest_speed_mps: f64,
     /// When the store was last changed, as far as it was looked at.
@@ -165,7 +165,7 @@ impl ShadowTrain {
         &self.events
     }
 
-    /// What the trials show now.
+    /// Returns the present figures of the trials.
     pub fn figures(&self) -> Vec<TrialFigures> {
         let figures = |rival: &Rival, is_in_force| TrialFigures {
             train: self.id(),
@@ -202,7 +202,7 @@ impl ShadowTrain {
         }
     }
 
-    /// Puts the store's rivals on trial, and takes off what is none any more.
+    /// Puts the store's rivals on trial, and removes those that are rivals no more.
     fn admit(&mut self) {
         let (in_force, standing) = (self.in_force(), self.standing.clone());
         let wanted: Vec<ModelHash> =
@@ -286,7 +286,7 @@ impl ShadowTrain {
         }
     }
 
-    /// What speaks for a rival, in words.
+    /// Describes the evidence for a rival.
     fn reason(&self, rival: &Rival) -> String {
         let error = |it: &Rival| it.ledger.all.rmse_mps().unwrap_or(f64::NAN);
         let ratio = rival.evidence.error_ratio().map_or("unknown".into(), ratio_in_words);

@@ -1,4 +1,4 @@
-//! What a state file says: of which train, wheel set and model, and the estimates.
+//! Contents of a state file: the train, wheel set and model, and the estimates.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use super::file::checksum;
 use super::{StateError, StateProblem};
 use crate::config::TrainConfig;
 
-/// What an estimate holds for: another train, other wheels or another model is another key.
+/// Key of an estimate: another train, other wheels or another model is another key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ModelKey {
     /// The train's number on the channels.
@@ -56,7 +56,7 @@ pub struct StoredEstimate {
 /// The content of a state file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateContent {
-    /// What the estimates hold for.
+    /// Key of the estimates.
     pub key: ModelKey,
     /// One for each pipeline that ever was valid.
     pub estimates: Vec<StoredEstimate>,

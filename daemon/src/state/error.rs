@@ -9,17 +9,17 @@ use std::path::{Path, PathBuf};
 pub struct StateError {
     /// The file or directory.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// Problem of the file.
     pub problem: StateProblem,
 }
 
-/// What is wrong with a state file.
+/// Problem of a state file.
 #[derive(Debug, thiserror::Error)]
 pub enum StateProblem {
     /// The system does not give or take the file.
     #[error("{action} failed: {source}")]
     System {
-        /// What was tried.
+        /// Attempted action.
         action: &'static str,
         /// The system's answer.
         source: io::Error,

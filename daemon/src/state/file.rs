@@ -18,7 +18,7 @@ use crate::storage::{self, Disk, Rights, Storage};
 pub const SCHEMA: u32 = 1;
 /// First word of the header.
 const MAGIC: &str = "dynocar-state";
-/// A longer file is none of ours.
+/// Largest state file in bytes; a longer file is foreign.
 const BYTES_MAX: u64 = 1 << 20;
 
 /// 64-bit FNV-1a: finds torn and rotten bytes; it is no defence against forgery.

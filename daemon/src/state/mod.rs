@@ -80,8 +80,8 @@ pub fn load_all(directories: [&Path; 2], trains: &[TrainConfig]) -> Vec<Vec<Stor
     trains.iter().map(take_up).collect()
 }
 
-/// What of a train's state serves a pipeline now, its covariance widened by the time since; says
-/// in the log why a stored estimate does not serve.
+/// Returns the part of a train's state that serves a pipeline now, its covariance widened by the time since; logs
+/// why a stored estimate does not serve.
 pub fn warm_start_of(
     config: &StateConfig,
     stored: &[StoredEstimate],
@@ -105,7 +105,7 @@ pub fn warm_start_of(
     None
 }
 
-/// A clock may be set back by so many seconds without a word.
+/// A clock may be set back by this many seconds without a message.
 const CLOCK_TOLERANCE_S: f64 = 60.0;
 
 /// The state configuration with the states it leads to, if the daemon keeps any.

@@ -37,7 +37,7 @@ pub enum PlaceError {
 ///
 /// # Errors
 ///
-/// When there is none, or it cannot be used.
+/// If there is no folder, or it cannot be used.
 pub fn prepare(named: Option<&Path>) -> Result<PathBuf, PlaceError> {
     if let Some(path) = named {
         return usable(path.to_owned());

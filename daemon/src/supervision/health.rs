@@ -43,7 +43,7 @@ impl Verdict {
         }
     }
 
-    /// What a person does about it, whatever the pipelines say.
+    /// Returns the remedy, whatever the pipelines say.
     pub const fn remedy(self) -> &'static str {
         match self {
             Verdict::Ok => "nothing",
@@ -86,7 +86,7 @@ pub struct PipelineHealth {
     pub age_ms: i64,
     /// True when that is too long ago.
     pub is_stale: bool,
-    /// What it suspects.
+    /// Suspicion of the pipeline.
     pub suspicion: Option<Suspicion>,
     /// Why it refused samples, the most frequent first.
     pub refused: Vec<(RejectionReason, u32)>,
@@ -121,14 +121,14 @@ pub struct TrainHealth {
     pub train: TrainId,
     /// The worst of all that was seen.
     pub verdict: Verdict,
-    /// What the daemon says of itself.
+    /// Statement of the daemon about itself.
     pub daemon: Option<String>,
     /// Its pipelines.
     pub pipelines: Vec<PipelineHealth>,
 }
 
 impl TrainHealth {
-    /// What a person does about it, in one plain line.
+    /// Returns the remedy, in one plain line.
     pub fn remedy(&self) -> &'static str {
         match self.verdict {
             Verdict::Degraded => self.remedy_of_pipelines(),

@@ -1,4 +1,4 @@
-//! What a supervisor and an operator see of a daemon: its life, its health, its numbers.
+//! Supervision of a daemon: its life, its health, its numbers.
 //!
 //! - [`notify`]: readiness and watchdog by the protocol of `sd_notify`
 //! - [`health`]: one verdict on a train's daemon, from outside

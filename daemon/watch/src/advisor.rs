@@ -1,4 +1,4 @@
-//! What to drive next, computed now and then.
+//! Advice on the next manoeuvre, computed now and then.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use dynocar_shared::{Manoeuvre, Parameter, Quantity, Status};
 
 use crate::state::{PipelineState, TrainState};
 
-/// What is needed to advise one train.
+/// Inputs for the advice on one train.
 #[derive(Clone, Debug)]
 pub struct Advisor {
     train: Option<Arc<TrainModel>>,
@@ -31,7 +31,7 @@ impl Advisor {
         }
     }
 
-    /// What to drive next, the resistance first; then what else helps, quantity by quantity.
+    /// Returns the advice: the next manoeuvre for the resistance first, then other help, quantity by quantity.
     pub fn advise(&self, state: &TrainState) -> Vec<String> {
         let mut sentences = Vec::new();
         for &quantity in Quantity::ALL {
@@ -78,7 +78,7 @@ impl Advisor {
     }
 }
 
-/// What a pipeline itself says that it lacks, without numbers.
+/// Returns the manoeuvre that a pipeline itself says it lacks, without numbers.
 fn lacking(quantity: Quantity, pipeline: &PipelineState) -> Option<String> {
     let missing = pipeline.snapshot.missing_manoeuvres;
     let words: Vec<&str> = Manoeuvre::ALL

@@ -43,7 +43,7 @@ pub struct PipelineState {
 }
 
 impl PipelineState {
-    /// What is newest of a pipeline, with what its past is; it has its kind's name where it has none.
+    /// Returns the latest snapshot and history of a pipeline; falls back to the name of its kind if it is unnamed.
     pub fn new(name: Option<String>, history: History, reading: &Reading<'_>, now_ns: i64) -> Self {
         let snapshot = *reading.snapshot;
         let age_ns = now_ns.saturating_sub(snapshot.sample_published_ns);
@@ -100,7 +100,7 @@ pub struct TrainState {
     pub up_s: Option<f64>,
     /// Its pipelines, by their number.
     pub pipelines: Vec<PipelineState>,
-    /// What to drive next and what else helps, the most useful first.
+    /// Advice on the next manoeuvre and other help, the most useful first.
     pub advice: Vec<String>,
 }
 
@@ -134,7 +134,7 @@ impl TrainState {
 /// Points that are kept: ten minutes.
 const POINTS: usize = 600;
 
-/// What is plotted of a second.
+/// Plotted values of one second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Unexplained force in kN, retarding positive.
@@ -175,7 +175,7 @@ impl History {
         self.rate_hz
     }
 
-    /// The newest points, at most so many, the oldest first.
+    /// Returns the newest points, at most `count`, the oldest first.
     pub fn newest(&self, count: usize) -> impl Iterator<Item = &Point> + Clone {
         self.points.iter().skip(self.points.len().saturating_sub(count))
     }

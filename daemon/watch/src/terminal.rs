@@ -103,7 +103,7 @@ fn is_quit(key: KeyEvent) -> bool {
     }
 }
 
-/// What is looked at after a key.
+/// Returns the choice after a key.
 fn pressed(choice: Choice, key: KeyCode, trains: usize) -> Choice {
     let trains = trains.max(1);
     let other = match choice.view {

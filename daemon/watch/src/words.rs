@@ -9,7 +9,7 @@ use crate::state::{Daemon, PipelineState, TrainState};
 /// A quantity or one of its parameters in a table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
-    /// What it is; parameters of a quantity are indented.
+    /// Label; parameters of a quantity are indented.
     pub label: String,
     /// The value; a bound has a sign before it.
     pub number: String,

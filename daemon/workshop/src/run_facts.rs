@@ -1,4 +1,4 @@
-//! What is shown of a recorded run wherever it is listed.
+//! Facts on a recorded run, wherever it is listed.
 
 use dynocar_analysis::dataset::{ForceSource, GradientSource, PositionSource, Run};
 

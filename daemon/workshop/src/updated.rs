@@ -27,7 +27,7 @@ pub use runs::{UPDATED_MARK, UpdatedModelError};
 /// The files of an updated model: the train, the line where something is known of it, and the dataset.
 pub const UPDATED_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
 
-/// What was written.
+/// Written files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UpdatedFiles {
     /// The files of the model and its dataset.

@@ -8,7 +8,7 @@ pub struct KindRow {
     pub kind: EffectKind,
     /// Its name in a running text.
     pub title: &'static str,
-    /// What a person does where it acts, in one line without a full stop.
+    /// Recommended action where it acts, in one line without a full stop.
     pub to_do: &'static str,
     /// The quantity over which it is seen best, by its name in answers; `None` where there is none.
     pub seen_over: Option<&'static str>,
@@ -249,8 +249,8 @@ impl KindRow {
     }
 }
 
-/// What separates a kind from the first that it is confused with among others; `None` where no row of any
-/// of them says.
+/// Returns the run that separates a kind from the first of others that it is confused with; `None` where no row of
+/// any of them names one.
 pub fn separating_run(kind: EffectKind, others: &[EffectKind]) -> Option<&'static str> {
     let has = |wanted: EffectKind| kind == wanted || others.contains(&wanted);
     let rows = KINDS.iter().filter(|row| has(row.kind)).flat_map(|row| row.separated_from);

@@ -1,4 +1,4 @@
-//! What a side of the channel says of itself.
+//! Announcement of a side of the channel.
 
 use std::fmt;
 use std::path::Path;
@@ -32,7 +32,7 @@ impl fmt::Display for Role {
     }
 }
 
-/// What a peer says of itself.
+/// Announcement of a peer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Announcement {
     /// Its side of the channel.
@@ -55,7 +55,7 @@ pub struct Announcement {
 }
 
 impl Announcement {
-    /// What this process is.
+    /// Returns the announcement of this process.
     pub fn of_this_process(role: Role) -> Self {
         Announcement {
             role,

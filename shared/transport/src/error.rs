@@ -17,7 +17,7 @@ pub enum ChannelError {
     Directory {
         /// The directory or file.
         path: PathBuf,
-        /// What was tried.
+        /// Attempted action.
         action: &'static str,
         /// The system's answer.
         source: std::io::Error,
@@ -97,9 +97,9 @@ pub enum ChannelError {
     IncompatiblePeer {
         /// The train.
         train: TrainId,
-        /// What the peer says of itself.
+        /// Announcement of the peer.
         theirs: Box<Announcement>,
-        /// What we are.
+        /// Own announcement.
         ours: Box<Announcement>,
     },
     /// The peer on the other side has a shared memory of its own, as containers may.
@@ -112,7 +112,7 @@ pub enum ChannelError {
     SeparateMemory {
         /// The train.
         train: TrainId,
-        /// What the peer says of itself.
+        /// Announcement of the peer.
         theirs: Box<Announcement>,
     },
     /// The transport refused a node, a service or a port.
@@ -157,9 +157,9 @@ pub enum ChannelError {
     SharedMemoryFull {
         /// Where shared memory lies.
         path: &'static str,
-        /// What is free.
+        /// Free memory.
         free_kib: u64,
-        /// What is needed.
+        /// Needed memory.
         needed_kib: u64,
     },
     /// A message was not taken.

@@ -18,7 +18,7 @@ use crate::error::ChannelError;
 use crate::host::{Host, open_private, unusable};
 use crate::identity::{identity, identity_of};
 
-/// What is known of the other side.
+/// State of the other side, as far as it is known.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Peer {
     /// Nobody holds the role.

@@ -30,7 +30,7 @@ const LEGS: usize = 3;
 /// Fastest change of the commanded force over weight, per s.
 const SLEW_PER_S: f64 = 0.05;
 
-/// What is true at a sample.
+/// True values at a sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Instant {
     /// Time in s since the start of the run.
@@ -47,19 +47,19 @@ pub struct Instant {
     pub commanded_n: f64,
     /// Outside temperature in °C.
     pub degc: f64,
-    /// What a sensor measures that is [`SPEED_DELAY_S`] late, in m/s.
+    /// Speed in m/s by a sensor that is [`SPEED_DELAY_S`] late.
     pub late_mps: f64,
 }
 
 /// Both runs.
 pub struct Drive {
-    /// What is true at each sample.
+    /// True values at each sample.
     pub instants: Vec<Instant>,
-    /// What is recorded: the forces that act, the measured speed, the gradient.
+    /// Recorded samples: the acting forces, the measured speed, the gradient.
     pub samples: Vec<TrainSample>,
 }
 
-/// Commanded force over weight so many s after the start of a run, slewed.
+/// Returns the commanded force over weight at each second after the start of a run, slewed.
 fn commands() -> Vec<f64> {
     let mut command = 0.0;
     let mut all = Vec::new();

@@ -53,14 +53,13 @@ gradient = [[0.0, 2.0], [1200.0, -3.0], [2500.0, 4.5], [4100.0, -1.0], [5600.0, 
 
 /// One declaration with its truth.
 pub struct Declaration {
-    /// What it is called in a failure.
+    /// Name in a failure.
     pub name: &'static str,
-    /// What is written in place of what, in the train's file.
+    /// Replaced text in the train's file, and its replacement.
     pub train: (&'static str, &'static str),
-    /// What is added to the line's file.
+    /// Addition to the line's file.
     pub track: &'static str,
-    /// What the declared resistance is in N/kN; the true slope is less steep by as much, so that
-    /// the train moves as it did.
+    /// Declared resistance in N/kN; the true slope is less steep by as much, so that the train moves as it did.
     pub extra_n_per_kn: fn(&World, &Instant) -> f64,
     /// How the sample of the same motion differs.
     pub sample: fn(&mut TrainSample, &Instant),

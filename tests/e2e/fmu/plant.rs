@@ -14,7 +14,7 @@ use super::simulator::{Fmu, reference, reference_in};
 use super::{demo, unpacked};
 use crate::commands::{done, dynocar, said};
 
-/// What runs may add to a train: something of every sort.
+/// Corrections of a train by runs: one of every sort.
 const CORRECTIONS: &str = "\n[corrections]\ntraction_gain = 1.04\nambient_w0_per_k = -0.004\nbearing_delta_a_n_per_kn = 0.6\nbearing_tau_s = 400\n\
     actuator_delay_s = 0.7\nactuator_lag_s = 0.4\n";
 
@@ -100,7 +100,7 @@ fn the_train_drives_recorded_runs_as_explain_predicts_them() {
             let speed_mps = real(&fmu, "motion.speed_mps");
             greatest_mps = greatest_mps.max((speed_mps - expected[k + 1]).abs());
         }
-        // What is left is how a slope is rounded.
+        // The remaining difference is the rounding of a slope.
         assert!(greatest_mps < 1e-9, "{}: {greatest_mps} m/s", data.file);
         assert!(expected.iter().any(|&speed_mps| speed_mps > 15.0));
     }

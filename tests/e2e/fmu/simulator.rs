@@ -15,7 +15,7 @@ use dynocar_fmu::ffi::values::{
 };
 use dynocar_fmu::{ESTIMATORS, Interface};
 
-/// What an FMU said, one message each.
+/// Messages of an FMU.
 type Said = RefCell<Vec<String>>;
 
 /// A logger for formats that ask for no argument.
@@ -47,7 +47,7 @@ pub fn reference(name: &str) -> u32 {
 
 /// An instance, freed at the end.
 pub struct Fmu {
-    /// What the functions are called with.
+    /// Component with which the functions are called.
     pub component: Component,
     said: Box<Said>,
 }
@@ -90,7 +90,7 @@ impl Fmu {
         fmu
     }
 
-    /// What it said since it was asked last.
+    /// Returns the messages since the last call.
     pub fn said(&self) -> String {
         self.said.take().join("\n")
     }

@@ -1,4 +1,4 @@
-//! What `dynocar init` asks of somebody at a terminal.
+//! Questions of `dynocar init` to a user at a terminal.
 
 use std::fs::read_to_string;
 use std::process::ExitStatus;

@@ -7,7 +7,7 @@ use dynocar_tests::process::Site;
 
 pub const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 
-/// What a command printed for people.
+/// Returns the printed text for people.
 pub fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }

@@ -32,7 +32,7 @@ pub enum Neglect {
     Names,
 }
 
-/// What a disk was asked for.
+/// Requests to a disk.
 #[derive(Debug)]
 struct Asked {
     neglect: Neglect,
@@ -93,7 +93,7 @@ impl LossyDisk {
         self.asked().steps.len()
     }
 
-    /// Everything that a cut after so many steps may leave.
+    /// Returns everything that a cut after `count` steps may leave.
     pub fn left_after(&self, count: usize) -> Vec<Left> {
         let mut disk = AfterSteps::default();
         self.asked().steps[..count].iter().for_each(|step| disk.take(step));

@@ -10,7 +10,7 @@ use super::LossyDisk;
 /// The file system, with all that was asked of it noted beside.
 #[derive(Clone, Debug)]
 pub struct NotedDisk {
-    /// What a power cut would leave.
+    /// Disk after a power cut.
     pub notes: LossyDisk,
 }
 

@@ -1,11 +1,11 @@
-//! What was asked of a disk, step by step, and what a power cut leaves of it.
+//! Requests to a disk, step by step, and the remains after a power cut.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use dynocar::storage::folder_of;
 
-/// What is on the disk after a cut: content by name.
+/// Contents of the disk after a cut, by name.
 pub type Left = BTreeMap<PathBuf, Vec<u8>>;
 
 /// Changes of names that are taken in any combination; older ones are taken as done.
@@ -18,7 +18,7 @@ pub enum Step {
     Make { path: PathBuf, file: usize },
     /// At the end of a file.
     Write { file: usize, bytes: Vec<u8> },
-    /// What was written is there for good.
+    /// The written bytes are durable.
     SyncBytes { file: usize },
     /// A second name.
     Link { to: PathBuf, file: usize },

@@ -12,7 +12,7 @@ use rustix::termios::{Action, Winsize, tcflow, tcsetwinsize};
 
 use super::{Process, await_true};
 
-/// What a program is to its terminal.
+/// Relation of a program to its terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tie {
     /// It leads the terminal's session: a closed terminal sends it SIGHUP.
@@ -75,7 +75,7 @@ impl Terminal {
         Process::of(command)
     }
 
-    /// What was shown so far.
+    /// Returns the text shown so far.
     pub fn text(&mut self) -> String {
         let mut bytes = [0; 4096];
         loop {

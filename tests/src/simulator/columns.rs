@@ -5,7 +5,7 @@ use dynocar_shared::{SampleField, TrainSample};
 use super::random::Random;
 use super::run_maker::RunPlan;
 
-/// What a column holds.
+/// Contents of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColumnKind {
     /// Time.
@@ -94,7 +94,7 @@ impl ColumnKind {
 /// A column of the run files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// What it holds.
+    /// Quantity of the column.
     pub quantity: ColumnKind,
     /// Its name in the files.
     pub name: String,

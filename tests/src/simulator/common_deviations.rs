@@ -1,4 +1,4 @@
-//! What is a little wrong in all runs of a dataset alike.
+//! Deviations that are the same in all runs of a dataset.
 
 use super::deviations::Deviations;
 use super::random::{Random, Stream};
@@ -15,7 +15,7 @@ pub struct CommonDeviations {
     pub force_late_s: f64,
     /// Measured over true speed.
     pub speed_scale: f64,
-    /// What cold bearings add at the start over the basic resistance, and their time constant in s.
+    /// Addition of cold bearings at the start over the basic resistance, and their time constant in s.
     pub warming: (f64, f64),
     /// What the declared rotating-mass factor lacks.
     pub rotating_mass: f64,
@@ -66,7 +66,7 @@ impl CommonDeviations {
         }
     }
 
-    /// What the map lacks on a line of a length in m: chainage in m and ‰; empty for nothing.
+    /// Returns the error of the map on a line of a length in m: chainage in m and ‰; empty for none.
     pub fn map_error(&self, length_m: f64) -> Vec<(f64, f64)> {
         if self.waves.is_empty() { Vec::new() } else { wavy(&self.waves, length_m) }
     }

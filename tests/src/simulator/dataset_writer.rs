@@ -14,7 +14,7 @@ use super::{SimulatedDataset, SimulatedRun, gnss};
 /// A file of a dataset: its path within the folder, and its text.
 pub type FileText = (String, String);
 
-/// What `[columns]` says of a GNSS receiver's columns.
+/// Entries of `[columns]` for the columns of a GNSS receiver.
 const GNSS_COLUMNS: &str = "latitude = { column = \"lat\", unit = \"deg\" }\n\
     longitude = { column = \"lon\", unit = \"deg\" }\n\
     altitude = { column = \"alt\", unit = \"m\" }";

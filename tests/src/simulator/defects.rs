@@ -1,4 +1,4 @@
-//! What goes wrong between the sensors and the recording.
+//! Defects between the sensors and the recording.
 
 use dynocar_shared::{SampleField, TrainSample};
 

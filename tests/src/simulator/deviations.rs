@@ -1,4 +1,4 @@
-//! What is a little wrong in everything that is declared, without being an undeclared effect.
+//! Deviations of everything that is declared, without an undeclared effect.
 
 /// By how much what is declared is off: standard deviations unless said otherwise.
 ///

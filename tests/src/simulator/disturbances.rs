@@ -32,7 +32,7 @@ pub struct Disturbances {
     pub gradient: StepProfile,
     /// How far in m the true gradient lies towards +chainage of the map's.
     pub gradient_shift_m: f64,
-    /// What the map's gradient lacks in ‰ by chainage.
+    /// Error of the map's gradient in ‰ by chainage.
     pub gradient_error: Option<GradientError>,
     /// Basic resistance of this run over the train's ordinary one.
     pub resistance_factor: f64,
@@ -86,7 +86,7 @@ pub struct Disturbances {
     pub unlisted: Option<Unlisted>,
 }
 
-/// What the disturbances act on at an instant.
+/// State at an instant on which the disturbances act.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DisturbanceInput {
     /// Time in s from the run's first sample, when bearings are cold.
@@ -143,7 +143,7 @@ impl Disturbances {
         }
     }
 
-    /// What a dataset's effects are in one run of it.
+    /// Returns a dataset's effects in one run of it.
     pub fn of(
         effects: &[Effect],
         train: &TrueTrain,
@@ -183,7 +183,7 @@ impl Disturbances {
         self.gradient = StepProfile::new(&surveyed).expect("the chainages are the map's");
     }
 
-    /// What is wrong in all runs alike.
+    /// Adds the deviations that all runs share.
     fn deviate(
         &mut self,
         train: &TrueTrain,
@@ -278,13 +278,13 @@ impl Disturbances {
         }
     }
 
-    /// What no library holds, in N/kN.
+    /// Returns the force that no library holds, in N/kN.
     pub fn unlisted_n_per_kn(&self, speed_mps: f64, time_s: f64, degc: Option<f64>) -> f64 {
         let around = Around { speed_mps, time_s, degc: degc.unwrap_or(0.0) };
         self.unlisted.map_or(0.0, |unlisted| unlisted.resistance_n_per_kn(around))
     }
 
-    /// What resists at an instant by the laws of the terms; basic and curve resistance among it.
+    /// Returns the resistance at an instant by the laws of the terms, including basic and curve resistance.
     pub fn resistance(&self, seen: DisturbanceInput) -> Resistance {
         let mut resistance = Resistance::BASIC;
         let share = Some(seen.tunnel_share);

@@ -9,7 +9,7 @@ use super::random::Random;
 use super::run_maker::RunPlan;
 use super::train_maker::TrueTrain;
 
-/// What the driver is doing.
+/// Mode of the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
     /// Standing until this time in s.

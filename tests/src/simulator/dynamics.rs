@@ -7,7 +7,7 @@ use super::line_maker::SimulatedLine;
 use super::run_maker::RunPlan;
 use super::train_maker::TrueTrain;
 
-/// What the line does to a train at one place: each car feels what is under it.
+/// The line under a train at one place: each car is subject to the line under it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LineUnderTrain {
     /// Mean gradient in ‰ along the travel, weighted by mass.
@@ -20,7 +20,7 @@ pub struct LineUnderTrain {
     pub local_n_per_kn: f64,
 }
 
-/// What changes from instant to instant besides place and speed.
+/// Values that change from instant to instant besides place and speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
     /// Time in s from the run's first sample.
@@ -38,7 +38,7 @@ pub struct Instant {
 pub struct Resistance {
     /// Basic and curve resistance by the true Davis coefficients and the declared curve constant.
     pub ordinary_n: f64,
-    /// What the undeclared effects add.
+    /// Force of the undeclared effects.
     pub extra_n: f64,
     /// Weight along the slope.
     pub gradient_n: f64,
@@ -60,7 +60,7 @@ pub struct TruePhysics<'a> {
     pub line: &'a SimulatedLine,
     /// The run.
     pub plan: &'a RunPlan,
-    /// What is undeclared in it.
+    /// Undeclared effects.
     pub disturbances: &'a Disturbances,
 }
 

@@ -27,7 +27,7 @@ pub fn suitable_types(kind: EffectKind) -> &'static [TrainType] {
     }
 }
 
-/// What effects are drawn for.
+/// Train and line for which effects are drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct EffectScene<'a> {
     /// The train.

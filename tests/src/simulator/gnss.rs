@@ -1,4 +1,4 @@
-//! What a GNSS receiver makes of the truth.
+//! Simulated GNSS receiver.
 
 use dynocar_analysis::survey::geodesy::LocalPlane;
 use dynocar_shared::TrainSample;

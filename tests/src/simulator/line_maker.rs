@@ -129,7 +129,7 @@ const HIGH_SPEED: Ranges = Ranges {
     balise_gap_m: (1000.0, 2500.0),
 };
 
-/// The lengths of the lines are for runs of so many s, or shorter ones.
+/// The lengths of the lines are for runs of this many s, or shorter ones.
 const RANGES_HOLD_S: f64 = 900.0;
 /// Lateral acceleration in m/s², cant included, that a speed limit allows in a curve.
 const CURVE_ACCELERATION_MPS2: f64 = 1.9;

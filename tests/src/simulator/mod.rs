@@ -73,13 +73,13 @@ use true_run::{TrueState, drive_run};
 /// One simulated run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedRun {
-    /// What was planned.
+    /// Plan of the run.
     pub plan: RunPlan,
-    /// What was undeclared in it.
+    /// Undeclared effects of the run.
     pub disturbances: Disturbances,
-    /// What happened, every 0.05 s.
+    /// True states, every 0.05 s.
     pub states: Vec<TrueState>,
-    /// What was recorded.
+    /// Recorded samples.
     pub samples: Vec<TrainSample>,
     /// Positions by GNSS, one for each sample; empty without a receiver.
     pub positions: Vec<Option<gnss::Position>>,
@@ -88,7 +88,7 @@ pub struct SimulatedRun {
 /// A simulated dataset with its truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedDataset {
-    /// What was asked for.
+    /// Settings of the simulator.
     pub settings: SimulatorSettings,
     /// The train, declared and true.
     pub train: TrueTrain,
@@ -135,7 +135,7 @@ pub fn simulate(settings: &SimulatorSettings) -> SimulatedDataset {
 /// A train, a line and the runs that are planned, before anything is undeclared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World {
-    /// What was asked for.
+    /// Settings of the simulator.
     pub settings: SimulatorSettings,
     /// The train, declared and true.
     pub train: TrueTrain,
@@ -157,7 +157,7 @@ impl World {
         draw_world(settings)
     }
 
-    /// What an effect may be drawn for.
+    /// Returns the train and line for which an effect may be drawn.
     pub fn scene(&self) -> EffectScene<'_> {
         EffectScene { train: &self.train, line: &self.line, plans: &self.plans }
     }

@@ -194,7 +194,7 @@ fn extra_n_per_kn(
     if let Some(error) = &disturbances.gradient_error {
         gradient::err(error, (position_m, run.plan.direction), &mut all.other_n_per_kn);
     }
-    // What the declared model holds already.
+    // Corrections of the declared model.
     all.curve_n_per_kn -= sample.resistance.curve_n_per_kn;
     let [constant, linear, quadratic] = all.polynomial(davis, sample.speed_mps);
     [constant - davis.a, linear - davis.b, quadratic - davis.c]

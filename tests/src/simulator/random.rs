@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// What a stream of random numbers is for.
+/// Purpose of a stream of random numbers.
 ///
 /// Subjects draw from streams of their own, so that an effect added to a dataset leaves train,
 /// line, driver and noise as they were.
@@ -25,9 +25,9 @@ pub enum Stream {
     SensorTypes,
     /// The survey's errors.
     Survey,
-    /// What is a little wrong in all runs alike.
+    /// Deviations that all runs share.
     Deviations,
-    /// What differs from run to run without being planned.
+    /// Differences from run to run that are not planned.
     Variation(usize),
     /// The wind of a run's day.
     Day(usize),

@@ -1,4 +1,4 @@
-//! What the sensors make of the truth.
+//! Simulated sensors.
 
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
@@ -106,7 +106,7 @@ impl Instant<'_> {
         here + self.share * (next - here)
     }
 
-    /// The mean over so many true steps before; the instant's own value for none.
+    /// Returns the mean over this many true steps before; the instant's own value for 0.
     fn mean_of(&self, steps: usize, value: fn(&TrueState) -> f64) -> f64 {
         let from = self.index.saturating_sub(steps);
         match steps.min(self.index) {
@@ -131,7 +131,7 @@ pub fn measure_run(
     let period_s = settings.sample_period_s;
     let count = (end_s / period_s).floor() as usize;
     let reading = disturbances.force_reading_factor;
-    // What was averaged is the mean of the true steps since the stamp before.
+    // The average is the mean of the true steps since the stamp before.
     let averaged = match settings.force_sampling {
         ForceSampling::Averaged => (period_s / TRUE_STEP_S).round() as usize,
         _ => 0,

@@ -1,4 +1,4 @@
-//! What is asked of a simulated dataset.
+//! Settings of a simulated dataset.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -65,7 +65,7 @@ impl EffectRequest {
     }
 }
 
-/// What goes wrong on the way from the sensors to the file.
+/// Defects on the way from the sensors to the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Defects {
     /// Share of rows missing one by one.
@@ -135,21 +135,21 @@ pub struct SimulatorSettings {
     pub is_level_and_straight: bool,
     /// Whether the map holds the line's tunnels; else its list of them is empty.
     pub maps_tunnels: bool,
-    /// What is a little wrong in everything that is declared.
+    /// Deviations of everything that is declared.
     pub deviations: Deviations,
     /// Wheel-slip events that a run has on average, where traction allows.
     pub wheel_slips_per_run: f64,
-    /// What goes wrong between sensors and file.
+    /// Defects between sensors and file.
     pub defects: Defects,
     /// A GNSS receiver instead of an odometer, and no line file.
     pub gnss: Option<GnssReceiver>,
     /// True when all runs go the same way.
     pub is_one_direction: bool,
-    /// What a recorded force is of the time around its stamp.
+    /// Relation of a recorded force to the time around its stamp.
     pub force_sampling: ForceSampling,
 }
 
-/// What a recorded force is of the time around its stamp.
+/// Relation of a recorded force to the time around its stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ForceSampling {
     /// The force at the stamp.

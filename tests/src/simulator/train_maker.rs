@@ -46,7 +46,7 @@ pub struct Handling {
 pub struct TrueTrain {
     /// The kind of train.
     pub train_type: TrainType,
-    /// What is declared.
+    /// Declared train.
     pub declared: TrainModel,
     /// The true Davis coefficients, a few percent off the declared ones.
     pub resistance: Davis,

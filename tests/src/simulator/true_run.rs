@@ -16,7 +16,7 @@ pub const TRUE_STEP_S: f64 = 0.05;
 /// A run is cut off here, in multiples of the length that it aims at.
 const DURATION_FACTOR_MAX: f64 = 2.5;
 
-/// What is true at one instant.
+/// True values at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueState {
     /// Time in s from the run's first sample.

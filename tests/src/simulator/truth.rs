@@ -1,4 +1,4 @@
-//! What a perfect explainer would find.
+//! Findings of a perfect explainer.
 
 use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;

@@ -2,7 +2,7 @@
 
 use super::random::Random;
 
-/// What a law sees.
+/// Inputs of a law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Around {
     /// Speed in m/s.
@@ -25,7 +25,7 @@ pub enum Law {
     },
     /// As one over the speed, for slow trains.
     Slow {
-        /// From here on there is none.
+        /// The force ends here.
         below_mps: f64,
         /// Below this it grows no more.
         least_mps: f64,
@@ -53,7 +53,7 @@ pub enum Law {
     FastInCold {
         /// Speed at which it is 1, ten kelvin below `until_degc`.
         at_mps: f64,
-        /// From here on there is none.
+        /// The force ends here.
         until_degc: f64,
     },
     /// In proportion to the speed, from some time in each run on.

@@ -10,12 +10,12 @@ use dynocar_analysis::identify::default_estimators;
 #[derive(Debug, Parser)]
 #[command(name = "dynocar-soak", version, about)]
 pub struct Arguments {
-    /// What to do
+    /// Action
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What `dynocar-soak` does.
+/// Actions of `dynocar-soak`.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Kills, stops and restarts of all processes
@@ -81,8 +81,7 @@ pub enum Command {
 /// Months of one train.
 #[derive(Debug, Args)]
 pub struct Months {
-    /// What happens: `nothing`, `wheels_wear`, `winter`, `brake_drags_for_a_day` or a kind of effect; all when
-    /// absent
+    /// Events: `nothing`, `wheels_wear`, `winter`, `brake_drags_for_a_day` or a kind of effect; all when absent
     #[arg(long)]
     pub story: Option<String>,
     /// Days

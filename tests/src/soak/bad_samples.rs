@@ -28,7 +28,7 @@ pub struct Misled {
     pub rate: f64,
     /// The kind of estimator.
     pub kind: String,
-    /// What it said and what is true.
+    /// Statement and truth.
     pub what: String,
 }
 
@@ -70,7 +70,7 @@ impl std::ops::AddAssign for Tally {
 pub struct Watched {
     /// The kind of estimator.
     pub kind: String,
-    /// What all looks found.
+    /// Counts over all looks.
     pub tally: Tally,
     /// Whether it was misled at the end.
     pub misled_at_end: Option<Misled>,
@@ -188,7 +188,7 @@ impl Scene {
         last
     }
 
-    /// What a trusted estimate says that is not so in a run.
+    /// Returns the false statement of a trusted estimate in a run.
     fn misled(&self, snapshot: &ParameterSnapshot, run: u32) -> Option<String> {
         if snapshot.status() != Status::Estimated {
             return None;

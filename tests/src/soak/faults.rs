@@ -15,7 +15,7 @@ use rustix::process::Signal;
 use super::Programs;
 use crate::process::{Process, Site, await_true};
 
-/// What is done to the processes in one round.
+/// Faults of the processes in one round.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     KillDaemon,
@@ -83,7 +83,7 @@ struct Cast<'a> {
     silences_ns: Vec<(i64, i64)>,
 }
 
-/// What a run of rounds saw.
+/// Summary of the rounds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Summary {
     /// Polls of the clients that were checked.
@@ -250,7 +250,7 @@ impl<'a> Cast<'a> {
     }
 }
 
-/// Runs so many rounds of random faults.
+/// Runs `rounds` rounds of random faults.
 ///
 /// # Panics
 ///
@@ -277,7 +277,7 @@ pub fn run(programs: &Programs, rounds: u64, seed: u64) -> Summary {
     cast.client.end(Signal::KILL);
     cast.controller.end(Signal::KILL);
     cast.daemon.end(Signal::KILL);
-    // What the dead left, the next one clears away, and itself.
+    // The next process clears away the remains of the dead, and its own.
     let (mut last, _) = start_daemon(&cast.site, programs, &cast.config);
     last.signal(Signal::TERM);
     assert!(last.wait().success(), "{}", last.errors());

@@ -59,7 +59,7 @@ impl SegmentKind {
     }
 }
 
-/// What was overwritten.
+/// Overwritten memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Vandalism {
     /// Segments of the kind.

@@ -25,7 +25,7 @@ pub(super) const GROWTH_MAX_KIB: u64 = 2_048;
 /// Pipelines of each train.
 const KINDS: [&str; 4] = ["v_mils", "mass_kalman", "trajectory_kalman", "echo"];
 
-/// What a run showed.
+/// Report of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Samples published over all trains.
@@ -126,7 +126,7 @@ fn start_daemon(site: &Site, programs: &Programs) -> Process {
     site.start(programs.dynocar.to_str().expect("a UTF-8 path"), &arguments)
 }
 
-/// Runs for so many seconds; faults begin after the first and end before the last seconds.
+/// Runs for `seconds` seconds; faults begin after the first and end before the last seconds.
 ///
 /// # Panics
 ///

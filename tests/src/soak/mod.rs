@@ -1,4 +1,4 @@
-//! What tests run for seconds and `dynocar-soak` runs for hours: seeded faults and checks.
+//! Seeded faults and checks that tests run for seconds and `dynocar-soak` runs for hours.
 //!
 //! A failed check panics with the seed and round that reproduce it.
 //!

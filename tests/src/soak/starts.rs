@@ -16,7 +16,7 @@ const START_MS: u64 = 60;
 /// Processes that are killed in one round, on one root.
 const STARTS_PER_ROUND: u64 = 10;
 
-/// What a run of rounds saw.
+/// Summary of the rounds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Summary {
     /// Processes started and killed.

@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 
 /// The file that the writer replaces for ever, in its folder.
 const FILE: &str = "train-1.state";
-/// The writer is killed within so many µs of its first sign of life.
+/// The writer is killed within this many µs of its first sign of life.
 const KILLED_WITHIN_US: u64 = 8_000;
 
 /// A state that says which one it is: the number stands in every value.

@@ -28,7 +28,7 @@ pub const RUNS_KMH: [(f64, f64); 2] = [(72.0, 40.0), (68.0, 42.0)];
 const UNKNOWNS: usize = 3 + RUNS_KMH.len();
 /// Outliers are off by 1 to 5 km/h, up or down.
 pub const OUTLIER_KMH: (f64, f64) = (1.0, 5.0);
-/// What is wrong with the data besides noise and rounding.
+/// Defects of the data besides noise and rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     /// In words.

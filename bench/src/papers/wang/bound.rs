@@ -14,7 +14,7 @@ const UNKNOWNS: usize = 10;
 /// The unknowns and the speed at the start of a leg.
 const WITH_START: usize = UNKNOWNS + 1;
 
-/// What a drive shows of mass and resistance.
+/// Information of a drive on mass and resistance.
 #[derive(Clone, Debug)]
 pub struct Information {
     matrix: SMatrix<f64, UNKNOWNS, UNKNOWNS>,

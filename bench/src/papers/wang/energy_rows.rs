@@ -107,7 +107,7 @@ fn energy_at_time(shuttle: &Shuttle, case: &Case, time_s: f64) -> f64 {
     straight_line(&points).0.exp()
 }
 
-/// What the filter knows after the leg before.
+/// Returns the mass that the filter knows after the leg before.
 fn learned_mass_kg(shuttle: &Shuttle, seed: u64) -> f64 {
     let ride = leg(shuttle, EMPTY_MASS_KG, &mut calm);
     let mut filter = kalman(shuttle, &known_resistance(shuttle));

@@ -17,7 +17,7 @@ use crate::statistics::mean;
 /// Mass in kg and published deviation in % of each line of Table 3.
 const TABLE_3: [(f64, f64); 3] = [(110_000.0, 2.45), (117_100.0, 3.08), (114_000.0, 2.55)];
 
-/// What acts on the leg beyond the model.
+/// Forces on the leg beyond the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Condition {
     Calm,
@@ -78,7 +78,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
         let bound = bound.map(|std| 100.0 * std);
         rows.push(Row { bound, ..score.row(row(&what, legs)) });
     }
-    // What no estimator can distinguish from mass: the rows show the shift.
+    // No estimator can distinguish this from mass: the rows show the shift.
     let rotating = Shuttle { inertia_factor: 1.08, ..shuttle.clone() };
     for (shuttle, force_gain, what) in [
         (&shuttle, 1.01, "the traction table 1 % too high"),

@@ -64,8 +64,8 @@ pub struct Instant {
     pub mass_kg: f64,
 }
 
-/// What acts on the train and neither map nor model knows: resistance in N/kN beyond the model's at a speed in m/s,
-/// asked for once a period.
+/// Disturbance of the train that neither map nor model knows: resistance in N/kN beyond the model's at a speed in
+/// m/s, asked for once a period.
 pub type Disturbance<'a> = dyn FnMut(f64) -> f64 + 'a;
 
 /// Nothing beyond the model.

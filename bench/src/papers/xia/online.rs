@@ -44,7 +44,7 @@ fn table_4(chainage_m: f64) -> Davis {
     Davis { a, b, c }
 }
 
-/// What is declared of the train: Table 3's first case, wrong everywhere in Table 4.
+/// Returns the declared train: Table 3's first case, wrong everywhere in Table 4.
 fn declared() -> (Davis, Vector3<f64>) {
     (CASES[0], Vector3::new(0.8, 0.02, 0.0007))
 }

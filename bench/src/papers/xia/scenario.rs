@@ -166,7 +166,7 @@ fn line(random: &mut Chance) -> Track {
         .expect("ordered, finite entries")
 }
 
-/// What the driver does from a distance on.
+/// Phases of the driver from a distance on.
 #[derive(Clone, Copy, Debug)]
 enum Phase {
     Hold { speed_mps: f64 },

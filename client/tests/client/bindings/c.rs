@@ -1,4 +1,4 @@
-//! What the header repeats of the library, as C.
+//! Constants of the library that the header repeats, as C.
 
 use std::fmt::Write as _;
 

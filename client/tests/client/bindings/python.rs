@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::vocabularies::{self as vocabularies, Member, Vocabulary};
 
-/// What stands before the classes.
+/// Text before the classes.
 const HEAD: &str = r#""""The numbers on the channels and their names: written by client/tests/client/bindings.rs from the Rust types."""
 
 from __future__ import annotations

@@ -23,9 +23,9 @@ pub struct Vocabulary {
     pub prefix: &'static str,
     /// The class in Python.
     pub class: &'static str,
-    /// What it is, for both.
+    /// Documentation for both languages.
     pub about: &'static str,
-    /// What only C or only Python says of it.
+    /// Documentation for C only or Python only.
     pub in_c: &'static str,
     pub in_python: &'static str,
     /// True where the members are bits, by their places.
@@ -77,7 +77,7 @@ const PLAIN: Vocabulary = Vocabulary {
     members: Vec::new(),
 };
 
-/// What a call gives.
+/// Returns the vocabulary of result codes.
 pub fn code() -> Vocabulary {
     Vocabulary {
         prefix: "ERROR",
@@ -88,7 +88,7 @@ pub fn code() -> Vocabulary {
     }
 }
 
-/// What the rail carries.
+/// Returns the vocabulary of rail adhesion.
 pub fn rail() -> Vocabulary {
     Vocabulary {
         prefix: "RAIL",

@@ -1,4 +1,4 @@
-//! What a train can be asked to drive on the level, within its limits.
+//! Manoeuvres that a train can be asked to drive on the level, within its limits.
 
 use std::fmt;
 
@@ -16,7 +16,7 @@ const SPEED_MAX_MPS: f64 = 125.0;
 /// The train as it is known now: what a manoeuvre is computed with.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
-    /// What is declared, above all the limits: effort curves and their highest speed.
+    /// Declared train, above all the limits: effort curves and their highest speed.
     pub train: &'a TrainModel,
     /// The resistance as estimated.
     pub davis: Davis,

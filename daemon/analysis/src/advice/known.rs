@@ -1,10 +1,10 @@
-//! What a snapshot knows of the resistance.
+//! Knowledge of the resistance in a snapshot.
 
 use dynocar_model::train::Davis;
 use dynocar_shared::{Parameter, ParameterSnapshot};
 use nalgebra::Matrix3;
 
-/// What the pipeline answers: a, b, c and the mass.
+/// Parameters that the pipeline answers: a, b, c and the mass.
 pub const ANSWERED: [Parameter; 4] =
     [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass];
 

@@ -1,4 +1,4 @@
-//! What to drive next: the manoeuvre that narrows most of what is known worst.
+//! Advice on the next manoeuvre: the one that narrows most of the least known quantity.
 //!
 //! Everything comes from a snapshot and what is declared of the train: the present covariance, the
 //! noise behind it ([`noise`]), the manoeuvres within the train's limits ([`drive`]), and what
@@ -36,7 +36,7 @@ const COASTING_SHARE: f64 = 1.05;
 /// A manoeuvre with its effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Advice {
-    /// What it informs on.
+    /// Parameter that the manoeuvre informs on.
     pub parameter: Parameter,
     /// The manoeuvre in words.
     pub drive: String,
@@ -61,8 +61,8 @@ impl Advice {
     }
 }
 
-/// What each manoeuvre of the catalogue would leave, of a train whose mass in t has a standard deviation,
-/// 0 where it is exact.
+/// Returns the uncertainty after each manoeuvre of the catalogue, for a train whose mass in t has a standard
+/// deviation, 0 where it is exact.
 pub fn forecasts(
     snapshot: &ParameterSnapshot,
     train: &TrainModel,

@@ -1,4 +1,4 @@
-//! What snapshots of the resistance reveal of the noise behind them.
+//! Noise behind snapshots of the resistance, inferred from them.
 //!
 //! A filter of [a, b, c, v] whose force is disturbed with the density d² (d in N/kN √s) gains
 //! information on a, for given b and c, at the rate 1 / d² while the train moves, whatever the speed and
@@ -92,8 +92,8 @@ impl NoiseSeen {
         }
     }
 
-    /// The noise behind the newest snapshot of the pipeline; `None` while nothing has been learned,
-    /// or where the pipeline is none whose noise can be estimated.
+    /// Returns the noise behind the newest snapshot of the pipeline; `None` while nothing has been learned, or if
+    /// the noise of this kind of pipeline cannot be estimated.
     pub fn noise(&self, newest: &ParameterSnapshot, train: &TrainModel) -> Option<Noise> {
         let step_s = self.step_s?;
         let rate = if self.rates.len() >= LOOKS_MIN {
@@ -143,7 +143,7 @@ mod tests {
 
     const DISTURBANCE: f64 = 0.4;
 
-    /// What a filter has after a time at speeds that wander, 10 samples a second.
+    /// Returns the snapshot of a filter after a time at speeds that wander, 10 samples a second.
     fn snapshot(time_s: f64, information: &Matrix3<f64>) -> ParameterSnapshot {
         let mut snapshot = ParameterSnapshot::empty();
         snapshot.pipeline_kind = PipelineKind::TrajectoryKalman as u32;

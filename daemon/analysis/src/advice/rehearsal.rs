@@ -1,4 +1,4 @@
-//! What is known of resistance and mass after a manoeuvre, by the pipeline that learns them.
+//! Knowledge of resistance and mass after a manoeuvre, by the pipeline that learns them.
 //!
 //! `train_kalman` itself is driven: from what is known now it holds the manoeuvre's first speed for a
 //! while, under the noise that the snapshots show, so that it knows how the unexplained force behaves;
@@ -29,7 +29,7 @@ const NS_PER_S: f64 = 1e9;
 /// Values of [`ANSWERED`], in the units of a snapshot.
 pub type Answered = SVector<f64, 4>;
 
-/// What is known before a manoeuvre.
+/// Knowledge before a manoeuvre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
     /// Covariance of a, b and c.
@@ -38,7 +38,7 @@ pub struct Known {
     pub mass_std_t: f64,
 }
 
-/// What a manoeuvre would leave.
+/// Forecast of the knowledge after a manoeuvre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
     /// The manoeuvre.
@@ -51,8 +51,8 @@ pub struct Forecast {
     pub std: Answered,
 }
 
-/// What is known after a manoeuvre; `None` when what is known now is no covariance, or the train cannot
-/// drive it for a second.
+/// Returns the knowledge after a manoeuvre; `None` when the present knowledge is not a covariance, or the train
+/// cannot drive the manoeuvre for a second.
 pub fn forecast(scene: &Scene<'_>, known: &Known, noise: &Noise, drive: Drive) -> Option<Forecast> {
     let mut rehearsal = Rehearsal::new(scene, known, noise)?;
     rehearsal.speed_mps = drive.from_mps;

@@ -1,9 +1,10 @@
-//! What helps where driving does not.
+//! Remedies where driving does not help.
 
 use dynocar_core::remedy::of_reason;
 use dynocar_shared::{Manoeuvre, Reason, Status};
 
-/// What lifts a reservation that no manoeuvre lifts; `None` where there is none, or driving helps.
+/// Returns the remedy of a reservation that no manoeuvre lifts; `None` where there is no reservation, or driving
+/// helps.
 pub const fn remedy(status: Status, reason: Option<Reason>) -> Option<&'static str> {
     match reason {
         None => Some("a newer daemon gives a reason that is unknown here"),
@@ -15,7 +16,7 @@ pub const fn remedy(status: Status, reason: Option<Reason>) -> Option<&'static s
     }
 }
 
-/// What a manoeuvre is that a pipeline lacks, where no numbers can be given yet.
+/// Returns the name of a manoeuvre that a pipeline lacks, where no numbers can be given yet.
 pub const fn in_words(manoeuvre: Manoeuvre) -> &'static str {
     match manoeuvre {
         Manoeuvre::CoastSlow => "coasting at low speed",

@@ -19,9 +19,9 @@ pub enum ForcePart {
     Curve,
     /// Tunnels, by their length, as share of c and in addition to it.
     Tunnel,
-    /// What the wind adds to the air resistance.
+    /// Addition of the wind to the air resistance.
     Wind,
-    /// What the temperature adds to the basic resistance.
+    /// Addition of the temperature to the basic resistance.
     Ambient,
     /// Cold bearings.
     Bearing,
@@ -48,7 +48,7 @@ impl ForcePart {
     ];
 }
 
-/// What accelerates a train at a moment.
+/// Balance of the accelerations of a train at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
     forces: SampleForces,
@@ -72,7 +72,7 @@ impl Balance {
         Balance { is_held: true, ..self }
     }
 
-    /// What the forces make of the train in m/s²: negative even where they hold it at rest.
+    /// Returns the acceleration by the forces in m/s²: negative even where they hold the train at rest.
     #[inline]
     pub(super) fn unheld_mps2(&self) -> f64 {
         let [p0, p1, p2] = self.forces.polynomial(self.davis, self.speed_mps);

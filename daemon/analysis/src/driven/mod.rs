@@ -39,7 +39,7 @@ pub struct DrivenTrain {
     is_held_at_rest: bool,
     position_m: f64,
     speed_mps: f64,
-    /// What a sensor that is late shows of the true speed in m/s.
+    /// Response of a late sensor to the true speed in m/s.
     sensor: Option<LateSensor>,
     balance: Option<Balance>,
 }
@@ -107,7 +107,7 @@ impl DrivenTrain {
         actuator_delay_s.max(speed_delay_s)
     }
 
-    /// What accelerates the train where it was looked at last, at the end of the newest step.
+    /// Returns the balance of accelerations at the end of the newest step.
     pub fn balance(&self) -> Option<&Balance> {
         self.balance.as_ref()
     }
@@ -124,11 +124,11 @@ impl DrivenTrain {
         self.balance = Some(if is_held { balance.held() } else { balance });
     }
 
-    /// Moves for a time in s; `acting` is what acts so many s after the step's beginning.
+    /// Moves for a time in s; `acting` returns the acting forces a number of seconds after the step's beginning.
     ///
-    /// A sample's forces, mass, temperature and, without a line, gradient and curve act; a force
-    /// that is missing is none. Its position says where on the line it acts; missing, that is where
-    /// the train has come to. Its speed is not asked.
+    /// A sample's forces, mass, temperature and, without a line, gradient and curve act; a missing force counts as
+    /// zero. Its position says where on the line it acts; missing, that is where the train has come to. Its speed
+    /// is not used.
     ///
     /// # Real-time
     ///

@@ -26,7 +26,7 @@ fn level() -> TrainModel {
     TrainModel::bare("level", 100e3, Davis { a: 0.0, b: 0.0, c: 0.0 })
 }
 
-/// What acts after so many s of a trip that ends with brakes.
+/// Returns the acting forces after a time in s of a trip that ends with brakes.
 fn acting(time_s: f64) -> TrainSample {
     let mut sample = TrainSample::empty(TrainId(1));
     sample.time_ns = (time_s * 1e9).round() as i64;

@@ -12,7 +12,7 @@ use super::stop_to_stop::StopToStop;
 use crate::dataset::DatasetDiagnostic;
 
 named! {
-    /// What the data say, in a word.
+    /// Statement of the data, in a word.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     Verdict ("as in answers for machines") {
@@ -204,7 +204,7 @@ pub struct EffectAnswer {
     pub p_value: f64,
     /// Share of the open-loop error on the fit runs that goes when the effect is added last.
     pub error_reduction: f64,
-    /// What that is in kWh and metres.
+    /// Meaning in kWh and metres.
     pub meaning: Meaning,
     /// What sources of evidence say against each other about it; absent where they agree.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -240,7 +240,7 @@ pub fn in_plain_words(formula: &str) -> String {
     formula.replace(")^", ") to the power of ")
 }
 
-/// What the data say of one number at no effect.
+/// Information of the data on one number whose effect is zero.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Identifiability {
     /// The kind of effect.
@@ -257,7 +257,7 @@ pub struct Identifiability {
 }
 
 impl Identifiability {
-    /// What would show, in the unit of the parameter: half of the 95 % interval.
+    /// Returns the least detectable effect, in the unit of the parameter: half of the 95 % interval.
     pub fn hidden_up_to(&self) -> Option<f64> {
         self.std.map(|std| HALF_95 * std)
     }
@@ -268,8 +268,8 @@ impl Identifiability {
 pub struct Considered {
     /// Its kind.
     pub kind: &'static str,
-    /// What it explains beyond a, b, c and the effects found, less the cost of its parameters and
-    /// choices, in units of -2 log likelihood; absent when it could not be tested.
+    /// Log-likelihood gain beyond a, b, c and the effects found, less the cost of its parameters and choices, in
+    /// units of -2 log likelihood; absent when it could not be tested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<f64>,
     /// Why it was not chosen, or could not be tested.
@@ -297,7 +297,7 @@ pub struct DriveAnswer {
     /// The declared efficiency, with which forces were read; absent where the usual one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub declared_efficiency: Option<f64>,
-    /// What lies at a bound of what is looked for: it is not identified, and the declared drive stays.
+    /// Parameter at a bound of its range: it is not identified, and the declared drive stays.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_bound: Option<&'static str>,
 }
@@ -339,17 +339,17 @@ pub struct ExplainAnswer {
     /// The verdict without its caveats.
     #[serde(skip)]
     pub verdict_words: String,
-    /// What limits it, a sentence or two each.
+    /// Limits of the statement, a sentence or two each.
     #[serde(skip)]
     pub caveats: Vec<String>,
-    /// What may spoil the verdict, the worst first; with a fundamental one there is none.
+    /// Diagnostics that may spoil the verdict, the worst first; with a fundamental one there is no verdict.
     #[serde(rename = "notes")]
     pub diagnostics: Vec<DatasetDiagnostic>,
     /// The effects found, the strongest first.
     pub effects: Vec<EffectAnswer>,
     /// Kinds that explain the data as well as the first effect.
     pub ambiguous_with: Vec<&'static str>,
-    /// What would separate or settle them.
+    /// Experiment that would separate or settle the explanations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub experiment: Option<String>,
     /// a, b, c fitted together with the effects.
@@ -386,13 +386,13 @@ pub struct ExplainAnswer {
     /// estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_late_s: Option<WithStd>,
-    /// What stays unexplained and is taken for noise: a force of this standard deviation in N/kN
-    /// on average over a minute; absent without motion.
+    /// Unexplained rest that is taken for noise: a force of this standard deviation in N/kN on average over a
+    /// minute; absent without motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unexplained_n_per_kn: Option<f64>,
-    /// What else was considered.
+    /// Other explanations that were considered.
     pub considered: Vec<Considered>,
-    /// What the data say of the numbers of train and line that were not found.
+    /// Information of the data on the numbers of train and line that were not found.
     pub identifiability: Vec<Identifiability>,
     /// Prediction files by run.
     pub predictions: BTreeMap<String, String>,

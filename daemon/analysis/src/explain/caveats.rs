@@ -1,4 +1,4 @@
-//! What limits a verdict, in words; whether the data determine a, b and c at all.
+//! Limits of a verdict, in words; whether the data determine a, b and c at all.
 
 use super::answer::{DavisDeviations, EffectAnswer, Identifiability};
 use super::described::small;
@@ -9,7 +9,7 @@ use super::selection::{Outcome, Search};
 
 use crate::statistics::share_of;
 
-/// What limits a verdict.
+/// Returns the limits of a verdict.
 pub fn caveats(
     search: &Search,
     outcome: &Outcome,
@@ -32,7 +32,7 @@ pub fn trimmed(sentences: &[String]) -> Vec<String> {
     trimmed.filter(|it| !it.is_empty()).collect()
 }
 
-/// What is certain and small in the model beside the effects that are named; empty without either.
+/// Describes the certain and small effects beside those that are named; empty without either.
 fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
     let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();
     if small.is_empty() || effects.is_empty() {

@@ -53,7 +53,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         let kind = effect.kind();
         let swapped = outcome.instead.iter().filter(|_| effects.len() > 1);
         let instead = outcome.certain.iter().chain(swapped).find(|(stands, _)| *stands == kind);
-        // What was tried when it was taken in.
+        // The trials of the round in which it was taken in.
         let mut rounds = outcome.rounds.iter().rev();
         let taken_in = rounds.find(|round| round.iter().any(|trial| trial.kind == kind));
         let taken_in = taken_in.map_or(&[][..], |round| &round[..]);
@@ -97,7 +97,7 @@ pub fn kinds_of(competing: &[CompetingHypotheses]) -> Vec<&'static str> {
     kinds
 }
 
-/// What is known to separate the kinds that are easily confused.
+/// Returns the run that is known to separate kinds that are easily confused.
 pub fn separating_run(kind: EffectKind, competing: &[EffectKind]) -> &'static str {
     vocabulary::separating_run(kind, competing)
         .unwrap_or("Drive again with other speeds, loads, directions and weather.")

@@ -71,7 +71,7 @@ pub fn precision(known: &PlaceUncertainty) -> Option<String> {
     (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
 }
 
-/// What a list of mass factors says; a section in both directions once.
+/// Describes a list of mass factors; a section in both directions once.
 fn mass_factors(value: &ParameterValue) -> Option<String> {
     let mut factors: Vec<f64> = match value {
         ParameterValue::Sections(list) => list.iter().map(|section| section.mass_factor).collect(),

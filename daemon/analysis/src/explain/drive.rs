@@ -26,12 +26,12 @@ const PARAMETERS: [Parameter; 2] = [
 ];
 /// Below this speed in m/s a drive takes nothing.
 const RESTING_MPS: f64 = 0.05;
-/// So many samples at rest show what is fed beside the drive.
+/// Samples at rest from which the auxiliary power is known.
 const RESTING_MIN: usize = 30;
-/// What is fed beside a drive that drives differs from what is fed at rest by this share at least.
+/// Least difference, as a share, between the auxiliary power of a moving drive and that at rest.
 const DRIVING_SHARE: f64 = 0.25;
 
-/// What a line feeds beside a drive, before the runs have driven, in kW.
+/// Auxiliary power in kW before the runs have driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Auxiliaries {
     power_kw: f64,
@@ -59,8 +59,8 @@ impl Auxiliaries {
     }
 }
 
-/// What one number for a drive's efficiency, which differs between a light and a full load by some hundredths, leaves
-/// of the auxiliaries: standard deviation as a share of the drive's root mean square power.
+/// Effect of one constant efficiency on the auxiliaries, since a drive's efficiency differs between light and full
+/// load by some hundredths: standard deviation as a share of the drive's root mean square power.
 const AUXILIARIES_FORM_SHARE: f64 = 0.02;
 
 /// Root mean square of the power in kW of moving samples.
@@ -76,7 +76,7 @@ fn moving_power_kw(problem: &FitProblem) -> f64 {
 #[derive(Debug)]
 struct OpenDrive {
     declared: Drive,
-    /// What is fed at rest, where the power holds it.
+    /// Auxiliary power at rest, where the power includes it.
     resting: Option<Auxiliaries>,
     prior: DMatrix<f64>,
 }
@@ -110,7 +110,7 @@ impl Hypothesis for OpenDrive {
         Nature {
             // A drive without losses.
             none: 1.0,
-            // What is fed at rest says what may be fed while driving.
+            // The auxiliary power at rest limits the one while driving.
             prior: Some(&self.prior),
             // The kind that it would be taken for.
             ..Nature::of(EffectKind::TractionGain, parameters)
@@ -152,8 +152,8 @@ pub struct EstimatedDrive {
     pub answer: DriveAnswer,
 }
 
-/// What the fit runs of a dataset say of the drive whose power they record; `None` where no force
-/// comes from power, or too little is driven to estimate it.
+/// Returns the drive's efficiency as estimated from the fit runs of a dataset that records its power; `None` where
+/// no force comes from power, or too little is driven to estimate it.
 ///
 /// # Errors
 ///
@@ -205,13 +205,13 @@ fn reported_by(
         declared_efficiency: declared.map(|drive| drive.efficiency),
         at_bound,
     };
-    // What lies at a bound is not identified.
+    // A value at a bound is not identified.
     let drive = if at_bound.is_some() { open.declared } else { at };
     Some(EstimatedDrive { drive, answer })
 }
 
 impl DriveAnswer {
-    /// What is estimated of the drive, as a sentence to follow another.
+    /// Returns the estimate as a sentence to follow another.
     pub fn sentence(&self) -> String {
         let WithStd { value, std } = self.efficiency;
         let read = match self.declared_efficiency {

@@ -74,7 +74,7 @@ pub fn estimated(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
     Ok((counts && stamps::is_stamped_late(late.value, late.std)).then_some(late))
 }
 
-/// What is estimated of it, as a sentence to follow another.
+/// Returns the estimate as a sentence to follow another.
 pub fn sentence(late: WithStd) -> String {
     format!(
         " Forces act {:.2} ± {:.2} s before their stamps and were taken where they act.",

@@ -11,7 +11,7 @@ pub struct ErrorScale {
 
 /// A map drawn from altitudes, with a wrong vertical curve or a smoothed hill.
 pub const MAP: ErrorScale = ErrorScale { permille: 1.5, length_m: 1500.0 };
-/// What is left in a usual survey: short pieces, each a little wrong.
+/// Remaining error of a usual survey: short pieces, each a little wrong.
 pub const SURVEYED: ErrorScale = ErrorScale { permille: 0.1, length_m: 600.0 };
 /// A line whose gradient nobody surveyed: a railway's, and a street's in hills.
 pub const UNSURVEYED: [ErrorScale; 2] =

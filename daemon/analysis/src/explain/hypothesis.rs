@@ -1,4 +1,4 @@
-//! What an effect is to everything that fits, simulates or reports it.
+//! Interface of an effect to everything that fits, simulates or reports it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use super::places::{End, Site};
 /// An effect with its structure (places, windows, runs) fixed, shared by models.
 pub type SharedHypothesis = Arc<dyn Hypothesis>;
 
-/// What an estimate says outside: values and standard deviations by the names of the answer.
+/// Published form of an estimate: values and standard deviations by the names of the answer.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reported {
     /// Values.
@@ -42,7 +42,7 @@ pub struct AtBound {
     pub bound: f64,
 }
 
-/// What a report may need beside the parameters of the effect itself.
+/// Context that a report may need beside the parameters of the effect itself.
 pub struct ReportContext<'a> {
     /// Parameters of the effect.
     pub parameters: &'a [f64],
@@ -86,7 +86,7 @@ impl ReportContext<'_> {
     }
 }
 
-/// What an effect does to others that only add a resistance or a gradient.
+/// Influence of an effect on others that only add a resistance or a gradient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum OnOthers {
     /// Nothing.
@@ -108,7 +108,7 @@ pub enum Turn {
     Last,
 }
 
-/// What an effect that looks back remembers of the samples before.
+/// Memory of the samples before, for an effect that looks back.
 #[derive(Clone, Debug, Default)]
 pub struct Past {
     forces: Option<DelayLine<2>>,
@@ -126,7 +126,7 @@ impl Past {
         line
     }
 
-    /// What acted when the speed that is measured now was true, likewise.
+    /// Returns the memory of the forces that acted when the measured speed was true.
     pub fn speed(&mut self, delay_and_lag_s: [f64; 2], first: usize) -> &mut LateSpeed {
         let [delay_s, lag_s] = delay_and_lag_s;
         let late = self.speed.get_or_insert_with(|| LateSpeed::new(delay_s, lag_s).into());
@@ -143,7 +143,7 @@ pub struct On<'a> {
     pub run: &'a RunData,
     /// Number of the first of them.
     pub first: usize,
-    /// What an effect that looks back remembers; anything where the first is the run's own.
+    /// Memory of an effect that looks back; any value where the first sample is the run's own.
     pub past: &'a mut Past,
 }
 
@@ -159,14 +159,14 @@ pub enum Handling {
     Gradient,
 }
 
-/// What a structure is, whatever the values of its parameters.
+/// Properties of a structure, whatever the values of its parameters.
 #[derive(Clone, Copy)]
 pub struct Nature<'h> {
     /// The kind it belongs to.
     pub kind: EffectKind,
     /// Its parameters, in order.
     pub parameters: &'h [Parameter],
-    /// What each of them is in the file of a train, where it is a number there.
+    /// Key of each parameter in the file of a train, where it is a number there.
     pub keys: &'static [&'static Key],
     /// The value of each parameter at which there is no effect.
     pub none: f64,
@@ -181,7 +181,7 @@ pub struct Nature<'h> {
     pub shared_error: f64,
     /// When it acts among others.
     pub turn: Turn,
-    /// What it does to other effects that only add a resistance or a gradient.
+    /// Influence on other effects that only add a resistance or a gradient.
     pub on_others: OnOthers,
     /// How it is handled where no other effect hinders that.
     pub handling: Handling,
@@ -230,7 +230,7 @@ impl<'h> Nature<'h> {
 
 /// A structure that a kind proposes: everything but the values of its parameters.
 pub trait Hypothesis: Send + Sync + std::fmt::Debug {
-    /// What it is, whatever the values of its parameters.
+    /// Returns the properties of the structure, whatever the values of its parameters.
     fn nature(&self) -> Nature<'_>;
 
     /// The kind it belongs to.
@@ -334,7 +334,8 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         place.windows.is_some() || place.runs.is_some()
     }
 
-    /// Standard deviation of each parameter by what happens between samples so many s apart.
+    /// Returns the standard deviation of each parameter by the unknown course between samples `_step_s` seconds
+    /// apart.
     fn sampling_error(&self, _step_s: f64) -> f64 {
         0.0
     }
@@ -365,7 +366,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
         parameters[0] - self.none()
     }
 
-    /// What the effect is in the files of a train and a line; `None` where these cannot hold it.
+    /// Returns the entries of the effect in the files of a train and a line; `None` where these cannot hold it.
     fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
         let each = self.nature().keys.iter().zip(parameters);
         let numbers: Vec<Entry> = each.map(|(key, value)| Entry::Number(key, *value)).collect();

@@ -1,8 +1,8 @@
 //! Which numbers of train and line the data hold at all, beside those that were looked at as effects.
 //!
-//! Every kind of the library that is one number of the whole train or line is put beside the finished
-//! model, at no effect, and what the data say of it there is read from the information matrix: how
-//! surely it is none, and whether it is distinguishable from each of the others.
+//! Every kind of the library that is one number of the whole train or line is added to the finished model, at no
+//! effect, and the information matrix shows how surely it is zero, and whether it is distinguishable from each of
+//! the others.
 
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
@@ -21,7 +21,7 @@ fn whole_kinds(search: &Search, outcome: &Outcome) -> Vec<Candidate> {
     others.filter_map(|effect| effect.whole(&scan)).collect()
 }
 
-/// What the data say of each number that was not found.
+/// Returns the information of the data on each number that was not found.
 pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiability> {
     let kinds = whole_kinds(search, outcome);
     let fitted = outcome.fit.theta.len();

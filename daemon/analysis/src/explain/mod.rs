@@ -71,7 +71,7 @@ pub struct Explanation {
     pub deviations: Deviations,
     /// Open-loop errors.
     pub score: Score,
-    /// What the search found.
+    /// Result of the search.
     pub outcome: Outcome,
     /// How runs are made ready for its models.
     pub preparation: Preparation,
@@ -131,7 +131,7 @@ fn explained<E: From<RunDataError> + Send>(
         track: preparation.track(),
         progress,
     };
-    // An effect that explains wrong units is none.
+    // An effect cannot explain wrong units.
     let is_possible =
         diagnostics.iter().all(|diagnostic| diagnostic.severity < Severity::Fundamental);
     let mut outcome = if is_possible { search.run() } else { search.base() };

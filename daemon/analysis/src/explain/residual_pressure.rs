@@ -8,7 +8,7 @@ use crate::statistics::middle;
 const RELEASE_S: f64 = 6.0;
 /// A lasting pressure below this in Pa is nothing.
 const STEP_MIN_PA: f64 = 2500.0;
-/// The step must be so many times the scatter.
+/// The step must be this many times the scatter.
 const STEP_SPREADS: f64 = 4.0;
 /// Released samples needed on either side.
 const SAMPLES_MIN: usize = 20;

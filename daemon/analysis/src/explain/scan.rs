@@ -1,4 +1,4 @@
-//! What a force of a given shape would explain, without a new fit.
+//! Gain of a force of a given shape, without a new fit.
 //!
 //! At a fitted model the innovations are orthogonal to the regressors. The decrease of the cost
 //! by one more linear parameter then follows from three inner products of its whitened regressor:
@@ -188,7 +188,7 @@ impl<'a> Scan<'a> {
         self.decrease_at_one(&sum)
     }
 
-    /// What is left of a regressor's square when the model's regressors are projected out.
+    /// Returns the remaining square of a regressor when the model's regressors are projected out.
     fn free_square(&self, tuple: &Tuple) -> f64 {
         tuple.square - tuple.cross.dot(&(&self.covariance * &tuple.cross))
     }

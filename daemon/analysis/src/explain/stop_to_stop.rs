@@ -109,7 +109,7 @@ pub fn reduction([before, after]: [f64; 2]) -> f64 {
     if before > 0.0 { 1.0 - after / before } else { 0.0 }
 }
 
-/// What of the runs is predicted.
+/// Predicted part of the runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
@@ -122,7 +122,7 @@ pub enum Metric {
 /// An error without and with the effects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Judged {
-    /// What was predicted.
+    /// Predicted part of the runs.
     pub metric: Metric,
     /// Number of parts from stop to stop, or of runs.
     pub count: usize,
@@ -155,7 +155,7 @@ impl Judged {
         }
     }
 
-    /// What was predicted, in words that follow "runs".
+    /// Returns the predicted part, in words that follow "runs".
     pub fn predicted(&self) -> String {
         match (self.metric, self.count) {
             (Metric::FullRun, _) => String::new(),
@@ -241,7 +241,7 @@ mod tests {
         let error = |run| SpeedError::within(&wrong, &prediction, run).rmse_mps().unwrap();
         let errors_mps: Vec<f64> = runs.into_iter().map(error).collect();
         assert!(errors_mps[0] < 0.01 && errors_mps[1] > 0.3, "{errors_mps:?}");
-        // A run that starts in motion or ends in it is none, nor is one with a gap of the forces.
+        // A run that starts or ends in motion is not a trip between stops, nor is one with a gap of the forces.
         let mut gap: Vec<_> = with(1.0).samples().to_vec();
         for sample in &mut gap[150..180] {
             sample.traction_force_n = None;

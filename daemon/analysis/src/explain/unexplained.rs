@@ -1,4 +1,4 @@
-//! What is left when the search is done: whether noise explains it, and where it lives.
+//! Remainder when the search is done: whether noise explains it, and where it lives.
 
 use super::answer::Location;
 use super::selection::{Outcome, Refusal, Search};
@@ -11,21 +11,21 @@ const OVER_S: f64 = 60.0;
 /// (`unexplained_n_per_kn` of `dynocar-bench explain --verbose`).
 const NOISE_SHARE_MAX: f64 = 0.3;
 
-/// What the finished model leaves.
+/// Residual of the finished model.
 pub struct Unexplained {
     /// Standard deviation in N/kN of the force that is left, on average over a minute.
     pub n_per_kn: f64,
     /// The same over the declared basic resistance.
     pub share: f64,
-    /// What all but a bound speaks for, with that: trials of the last round, the strongest first, and where nothing
-    /// is found, what was found before the usual errors stood beside it.
+    /// Refused explanations that all but a bound speaks for, with the refusal: trials of the last round, the
+    /// strongest first, and where nothing is found, those found before the usual errors were included.
     pub refused: Vec<(EffectKind, Refusal)>,
     /// Where a force outside the library explains most.
     pub place: Option<Location>,
 }
 
 impl Unexplained {
-    /// What a finished search leaves; `None` without motion.
+    /// Returns the residual of a finished search; `None` without motion.
     pub fn of(search: &Search, outcome: &Outcome) -> Option<Self> {
         let (n_per_kn, share) = search.problem.noise_n_per_kn(outcome.fit.noise, OVER_S)?;
         let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
@@ -59,7 +59,7 @@ impl Unexplained {
         )
     }
 
-    /// What explains the residual but is not determined, in words; empty for nothing.
+    /// Describes the explanations of the residual that are not determined; empty if there are none.
     pub fn undetermined(&self) -> String {
         let one = |(kind, refusal): &(EffectKind, Refusal)| {
             format!(" Not determined is {}: {refusal}.", kind.name())

@@ -42,7 +42,7 @@ pub fn answer(
 ) -> ExplainAnswer {
     let (fit, std) = (&outcome.fit, &deviations.std);
     let effects = effect_answers(search, outcome, known, deviations);
-    // What has no name has no competing hypotheses either.
+    // An effect without a name has no competing hypotheses either.
     let is_unknown = fit.model.has(EffectKind::Unknown);
     let competing = if is_unknown { Vec::new() } else { competing_hypotheses(outcome) };
     let left = Unexplained::of(search, outcome);
@@ -207,7 +207,7 @@ fn verdict(
         return Verdict::Unknown;
     }
     if effects.is_empty() {
-        // What speaks for a number at a bound speaks for something, if not for that.
+        // Evidence for a number at a bound is evidence for something, if not for that number.
         let is_left = left.is_some_and(|left| !left.refused.is_empty());
         return if is_left { Verdict::Unknown } else { Verdict::None };
     }

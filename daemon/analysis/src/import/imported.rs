@@ -1,4 +1,4 @@
-//! What an import gives: a train or a line as far as the file says, and an account of every field.
+//! Result of an import: a train or a line as far as the file describes it, and an account of every field.
 
 use dynocar_model::track::Curve;
 use dynocar_model::train::Davis;
@@ -15,7 +15,7 @@ pub struct Reading {
     pub mode: Option<String>,
 }
 
-/// What became of a field.
+/// Outcome of a field.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FieldOutcome {
     /// It stands under a key.
@@ -38,7 +38,7 @@ pub enum FieldOutcome {
     Unknown {
         /// The key.
         key: &'static str,
-        /// What is missing.
+        /// Missing quantity.
         why: String,
     },
 }
@@ -131,7 +131,7 @@ pub struct ImportedTrain {
     pub traction: Option<Vec<(f64, f64)>>,
     /// Deceleration by all of the brake: (m/s, m/s²), by speed.
     pub brake_mps2: Option<Vec<(f64, f64)>>,
-    /// What became of the file's fields.
+    /// Outcome of the file's fields.
     pub account: Account,
 }
 
@@ -154,6 +154,6 @@ pub struct ImportedLine {
     pub stops: Vec<(f64, String)>,
     /// (chainage in m, permitted speed in m/s).
     pub permitted_speed: Option<Vec<(f64, f64)>>,
-    /// What became of the file's fields.
+    /// Outcome of the file's fields.
     pub account: Account,
 }

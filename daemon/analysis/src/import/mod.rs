@@ -42,7 +42,7 @@ pub struct Source<'t> {
     pub text: &'t str,
 }
 
-/// What files hold.
+/// Contents of imported files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Imported {
     /// The trains, in the order of the files.

@@ -95,7 +95,7 @@ fn steps(sections: &[Section], value: impl Fn(&Section) -> Option<f64>) -> Vec<(
     steps
 }
 
-/// What is to be said where a list begins after the line does.
+/// Returns the note on a list that begins after the line does.
 fn since(from_m: f64, first_m: f64) -> String {
     if from_m == first_m {
         return String::new();

@@ -51,7 +51,7 @@ impl<'e, I: Iterator<Item = Result<(Event<'e>, usize), DatasetError>>> Reader<'_
         self.events.next().map_or(Ok(None), |event| self.node(event?, depth))
     }
 
-    /// The value that begins with an event, within so many others; `None` where none begins.
+    /// Parses the value that begins with an event, within a number of others; `None` where no value begins.
     fn node(
         &mut self,
         (event, line): (Event<'e>, usize),

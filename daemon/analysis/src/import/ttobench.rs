@@ -1,4 +1,4 @@
-//! What the files of TTOBench have in common: values that state their unit.
+//! Common forms of TTOBench files: values that state their unit.
 
 use std::ops::RangeBounds;
 

@@ -21,7 +21,7 @@ const FOLLOWS_S: f64 = 3.0;
 const SETTLES_S: f64 = 2.0;
 /// A deceleration below this share of an earlier one is that of a brake that was eased...
 const EASED: f64 = 0.7;
-/// ... if it differs by so many standard deviations.
+/// ... if it differs by this many standard deviations.
 const EASED_STDS: f64 = 2.0;
 /// Below this speed in m/s a full brake may be let go, too.
 const SOFT_MPS: f64 = 2.0;

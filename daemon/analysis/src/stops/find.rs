@@ -32,7 +32,7 @@ const GAP_MAX: (f64, f64) = (3.0, 1.6);
 /// in the pause at this deceleration in m/s².
 const COMES_TO_STAND_MPS2: f64 = 0.5;
 
-/// What counts as a stop.
+/// Conditions of a stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FindSettings {
     /// Least share of the brake's effort that counts as applied.
@@ -47,7 +47,7 @@ impl Default for FindSettings {
     }
 }
 
-/// What showed that the brake was applied.
+/// Sign that the brake was applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FoundBy {
@@ -64,7 +64,7 @@ pub struct Stop {
     pub samples: RangeInclusive<usize>,
     /// The sample from which on the brake was applied in full; `None` where it never was.
     pub full_from: Option<usize>,
-    /// What showed that the brake was applied.
+    /// Sign that the brake was applied.
     pub found_by: FoundBy,
 }
 

@@ -21,7 +21,7 @@ const DECLARED_FRICTION: f64 = 0.3;
 /// Cylinder pressure in Pa of the declared brake.
 const PRESSURE_PA: f64 = 300e3;
 
-/// What a pipeline learned while the train passed a speed.
+/// Friction that a pipeline learned while the train passed a speed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FrictionPoint {
     /// Speed in m/s of the sample that closed the estimate.

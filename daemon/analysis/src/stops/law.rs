@@ -7,7 +7,7 @@ use super::curve::{Curve, Point};
 
 /// Step of the speeds in m/s at which the law is reported.
 const GRID_MPS: f64 = 1.0;
-/// What the assumed repeatability counts for: as much as that of so many stops more than one.
+/// Weight of the assumed repeatability: that of this many stops more than one.
 const ASSUMED_FREEDOM: f64 = 4.0;
 /// Relative standard deviation of the response of a stop that is assumed likewise.
 const ASSUMED_RESPONSE: f64 = 0.1;

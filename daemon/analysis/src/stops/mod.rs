@@ -1,5 +1,5 @@
-//! What recorded stops say of a brake whose force nobody measured: deceleration over speed, the
-//! friction behind it, and how long the next stop will be.
+//! Analysis of recorded stops with a brake whose force nobody measured: deceleration over speed, the friction
+//! behind it, and the length of the next stop.
 //!
 //! - [`find`]: where in a run the brake was applied until the train stood
 //! - [`Curve`]: speed and deceleration along one stop, from its speeds alone

@@ -23,7 +23,7 @@ pub enum Manner {
 pub struct RecordedStop {
     /// The run's file.
     pub file: String,
-    /// What the run is for.
+    /// Role of the run.
     pub role: Role,
     /// Time in s at which the brake was applied, as in the file.
     pub from_s: f64,
@@ -39,7 +39,7 @@ pub struct RecordedStop {
     pub dwell_s: Option<f64>,
     /// Mean gradient in ‰ along the travel, which is taken out of the decelerations; `None` where it is unknown.
     pub gradient_permille: Option<f64>,
-    /// What showed that the brake was applied.
+    /// Sign that the brake was applied.
     pub found_by: FoundBy,
     /// Whether the brake was applied in full.
     pub manner: Manner,

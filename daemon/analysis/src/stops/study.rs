@@ -18,13 +18,13 @@ use crate::dataset::{Dataset, GradientSource, Role, Run};
 /// How stops are found, and what is assumed of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StudySettings {
-    /// What counts as a stop.
+    /// Conditions of a stop.
     pub find: FindSettings,
     /// Relative standard deviation of a stop's deceleration that is assumed beforehand.
     pub repeatability: f64,
 }
 
-/// What the stops of a dataset say.
+/// Results of the stops of a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
     /// The stops, in the order of the runs.
@@ -35,7 +35,7 @@ pub struct Study {
     pub distances: Vec<StoppingDistance>,
     /// All stops together: from which speeds how long, how hard, and how long the train stood.
     pub day: Day,
-    /// What these stops do not determine.
+    /// Quantities that these stops do not determine.
     pub cannot_tell: Vec<String>,
 }
 

@@ -143,9 +143,9 @@ fn cell(point_m: [f64; 2]) -> (i64, i64) {
 const REACH_M: f64 = 40.0;
 /// A greater radius in m is straight.
 const RADIUS_MAX_M: f64 = 2500.0;
-/// A shorter curve in m is none.
+/// Shortest curve in m.
 const LENGTH_MIN_M: f64 = 30.0;
-/// A curve that reaches an end of an alignment goes on beyond it for so many m: under half a train.
+/// A curve that reaches an end of an alignment goes on beyond it for this many m: under half a train.
 const BEYOND_M: f64 = 110.0;
 
 /// A curve of an alignment.

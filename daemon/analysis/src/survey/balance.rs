@@ -1,4 +1,4 @@
-//! What a pass says of the forces, second by second.
+//! Balance of forces of a pass, second by second.
 //!
 //! ```text
 //! control force = mass ((1 + gamma) dv/dt + g (w0(v) + k/R) / 1000 + g gradient)

@@ -22,7 +22,7 @@ pub struct Factor {
 pub struct NotPositive {
     /// Its row, from 0.
     pub row: usize,
-    /// What was found.
+    /// Value of the pivot.
     pub pivot: f64,
 }
 

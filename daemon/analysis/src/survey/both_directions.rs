@@ -14,9 +14,9 @@ const SAME_CHAINAGE_M: f64 = 15.0;
 const DRIFT_SHARE: f64 = 0.005;
 /// The same, for each m of the line: lengths drift unevenly.
 const UNEVEN_SHARE: f64 = 0.0005;
-/// Where a line crosses itself, there and back differ by more than so many m.
+/// Where a line crosses itself, there and back differ by more than this many m.
 const CROSSING_MIN_M: f64 = 300.0;
-/// Where each goes on alone for so many m at the same end, they fork there.
+/// Where each goes on alone for this many m at the same end, they fork there.
 const FORK_M: f64 = 100.0;
 
 /// Two alignments, each in its direction of travel, beside one another.

@@ -33,7 +33,7 @@ pub struct Estimate {
     pub std: f64,
 }
 
-/// What holds for all passes of a vehicle.
+/// Values common to all passes of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelsAndLag {
     /// True over counted distance, less 1.
@@ -49,7 +49,7 @@ impl WheelsAndLag {
         lag_s: Estimate { value: 0.7, std: 0.7 },
     };
 
-    /// What several passes give together; the scale may differ by `scale_spread` between them.
+    /// Combines several passes; the scale may differ by `scale_spread` between them.
     pub fn together(passes: &[WheelsAndLag], scale_spread: f64) -> Option<WheelsAndLag> {
         let mean = |of: fn(&WheelsAndLag) -> Estimate, spread: f64| {
             let weight = |pass: &WheelsAndLag| 1.0 / (of(pass).std.powi(2) + spread * spread);
@@ -72,7 +72,7 @@ pub struct Chained {
     pub first_row: usize,
     /// Chainage in m of each row along the alignment.
     pub chainage_m: Vec<f64>,
-    /// What the pass shows of wheels and lag.
+    /// Wheels and lag of the pass.
     pub learned: WheelsAndLag,
 }
 

@@ -1,4 +1,4 @@
-//! What is the same in all passes of a vehicle: resistance, mass, passengers, time offset.
+//! Unknowns that are the same in all passes of a vehicle: resistance, mass, passengers, time offset.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -38,7 +38,7 @@ impl Common {
     }
 }
 
-/// What is declared of a vehicle, and how far it is trusted.
+/// Declared values of a vehicle, and their uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
     /// Declared mass in kg, without what is counted.
@@ -102,7 +102,7 @@ impl Prior {
         observation.mass_kg + self.mass_kg * common.mass_share() + counted
     }
 
-    /// What the modelled force changes by for each unit of the unknowns, in N.
+    /// Returns the change of the modelled force by each unit of the unknowns, in N.
     pub fn slopes(
         &self,
         observation: &Observation,

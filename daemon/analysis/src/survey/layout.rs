@@ -5,7 +5,7 @@ use super::normal::Solution;
 
 /// Distance in m between heights.
 pub const HEIGHT_STEP_M: f64 = 10.0;
-/// Heights reach beyond an alignment by half a vehicle and so many m.
+/// Heights reach beyond an alignment by half a vehicle and this many m.
 const MARGIN_M: f64 = 60.0;
 
 /// Steps between heights over which the uncertainty of a gradient is stated: 100 m.

@@ -11,12 +11,12 @@ use crate::statistics::{middle, share_of};
 
 /// Variances per m of the gradient's random walk that are tried: from a main line to a street.
 const WALKS_PER_M: [f64; 9] = [1e-9, 1e-8, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4];
-/// Passes are left out in so many groups.
+/// Number of groups in which passes are left out.
 const FOLDS: u32 = 5;
-/// A brake acts over a whole observation when its lowest pressure is so many times the one from
-/// which on it may act.
+/// A brake acts over a whole observation when its lowest pressure is this many times the one from which on it may
+/// act.
 const CLEAR: f64 = 1.5;
-/// Where no pass can be left out, blocks of so many m are.
+/// Where no pass can be left out, blocks of this many m are.
 const BLOCK_M: f64 = 100.0;
 
 /// A profile and what it was learned with.
@@ -139,7 +139,7 @@ fn left_out(evidence: &Evidence, walk_per_m: f64) -> Result<Vec<f64>, NotPositiv
 
 /// Fewer observations under pressure say nothing.
 const OBSERVATIONS_MIN: usize = 30;
-/// A gain below so many standard deviations is none.
+/// Standard deviations below which a gain is not significant.
 const SIGNIFICANT: f64 = 8.0;
 /// Margin in Pa above the pressure of a released brake.
 const MARGIN_PA: f64 = 5e3;

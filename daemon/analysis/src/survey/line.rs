@@ -157,7 +157,7 @@ fn passes(
     thinned(&along.map(|(_, pass)| pass).collect::<Vec<_>>(), ALIGNED_MAX)
 }
 
-/// So many of them at most, evenly chosen, with the first.
+/// Returns at most `most` of them, evenly chosen, with the first.
 fn thinned<T: Clone>(all: &[T], most: usize) -> Vec<T> {
     all.iter().step_by(all.len().div_ceil(most).max(1)).cloned().collect()
 }

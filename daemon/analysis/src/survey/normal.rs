@@ -13,7 +13,7 @@ pub type CommonCovariance = SMatrix<f64, COUNT, COUNT>;
 /// A value for each node and common unknown.
 pub type Columns = Vec<[f64; COUNT]>;
 
-/// What some observations, or what is known beforehand, say of the unknowns.
+/// Information of some observations, or of the prior, on the unknowns.
 pub struct Normal {
     /// Of the heights.
     pub matrix: Banded,
@@ -27,7 +27,7 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// Nothing, for so many heights with a matrix of this width.
+    /// Returns zero information for `size` heights with a matrix of this width.
     pub fn zeros(size: usize, width: usize) -> Self {
         Normal {
             matrix: Banded::zeros(size, width),
@@ -120,7 +120,7 @@ impl Normal {
     }
 }
 
-/// What solves the equations.
+/// Solution of the normal equations.
 pub struct Solution {
     /// Change of each height in m.
     pub heights_m: Vec<f64>,

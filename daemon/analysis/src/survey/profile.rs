@@ -24,7 +24,7 @@ const PASS_MASS_STD: f64 = 0.03;
 const ROUNDS: usize = 8;
 /// Degrees of freedom of the residuals' distribution.
 const TAIL: f64 = 4.0;
-/// A few passes are so many at most.
+/// Largest number of passes that counts as few.
 const FEW_PASSES: usize = 100;
 /// Observations that one thread takes at a time.
 const CHUNK: usize = 65_536;
@@ -47,11 +47,11 @@ pub struct Evidence {
     pub layout: Layout,
     /// The alignment of each pass.
     pub courses: Vec<Course>,
-    /// What the forces say, in the order of the passes.
+    /// Observations of the forces, in the order of the passes.
     pub observations: Vec<Observation>,
-    /// What GNSS says.
+    /// Altitudes of the GNSS.
     pub altitudes: Vec<Altitude>,
-    /// What is declared of the vehicle.
+    /// Declared values of the vehicle.
     pub prior: Prior,
 }
 
@@ -61,7 +61,7 @@ pub struct Profile {
     layout: Layout,
     /// Heights in m, all blocks.
     heights_m: Vec<f64>,
-    /// What is common to all passes.
+    /// Values common to all passes.
     pub common: Common,
     /// Standard deviations of the common unknowns, with the heights' noise let in.
     pub common_std: Common,
@@ -85,13 +85,13 @@ pub fn is_one_of_few(pass: usize, passes: usize) -> bool {
     (pass / 2).is_multiple_of(one_in(passes))
 }
 
-/// One in so many passes is one of the few.
+/// Returns the step with which passes are thinned to a few.
 fn one_in(passes: usize) -> usize {
     passes.div_ceil(FEW_PASSES).max(1)
 }
 
 impl Evidence {
-    /// What a few passes show.
+    /// Returns the evidence of a few passes.
     pub fn of_few_passes(&self) -> Evidence {
         let (passes, each) = (self.courses.len(), one_in(self.courses.len()));
         let is_chosen = |pass: usize| is_one_of_few(pass, passes);
@@ -249,7 +249,7 @@ impl Evidence {
         let by_pass: Vec<&[Observation]> = by_pass.collect();
         let masses = parallel::of_each(&by_pass, |observations| of_pass(observations));
         let masses: Vec<(usize, f64)> = masses.into_iter().flatten().collect();
-        // What all passes share is the vehicle's, and moves there at once.
+        // The part that all passes share is the vehicle's, and moves there at once.
         let mean = masses.iter().map(|it| it.1).sum::<f64>() / masses.len().max(1) as f64;
         state.pass_mass.fill(-mean);
         masses.into_iter().for_each(|(pass, mass)| state.pass_mass[pass] = mass - mean);

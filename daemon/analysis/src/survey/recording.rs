@@ -6,7 +6,7 @@ use crate::statistics::middle;
 /// Fixes closer in time than this many s say the same: their errors fade over seconds.
 const FIX_STEP_MIN_S: f64 = 0.95;
 
-/// What a recorder wrote, row by row in order of time; what is missing is `NaN`.
+/// Rows of a recorder in order of time; a missing value is `NaN`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawRecording {
     /// Path of its file, as the dataset names it.
@@ -48,7 +48,7 @@ pub struct Fix {
 /// A recording with its distance by the wheels and its fixes on the plane.
 #[derive(Clone, Debug)]
 pub struct Recording<'r> {
-    /// What was recorded.
+    /// Recorded rows.
     pub raw: &'r RawRecording,
     /// Distance in m by integrating the speed, from 0 at the first row.
     pub travelled_m: Vec<f64>,

@@ -6,7 +6,7 @@ use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M};
 
 /// Fixes further apart along the path than this many m leave it open in between.
 pub const GAP_MAX_M: f64 = 150.0;
-/// A path around is at most so many times as long as the straight line between its ends.
+/// A path around is at most this many times as long as the straight line between its ends.
 const DETOUR_MAX: f64 = 3.0;
 
 /// A point on the path of a part.

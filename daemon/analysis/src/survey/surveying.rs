@@ -21,16 +21,16 @@ use crate::statistics::rms;
 /// Lateral uncertainty in m of an alignment: what the wheels roll differs from it by so much times the
 /// turning.
 const LATERAL_STD_M: f64 = 1.5;
-/// Trains that start or stop at an end of the line are seen so many m beyond it.
+/// Trains that start or stop at an end of the line are seen this many m beyond it.
 const ENDS_M: f64 = 60.0;
-/// Altitudes are taken every so many m.
+/// Altitudes are taken every this many m.
 const ALTITUDE_STEP_M: f64 = 50.0;
 /// Lengths in s of blocks that are tried.
 const BLOCKS_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Residuals that alternate more than this are the speed's noise: blocks are lengthened.
 const ALTERNATING: f64 = -0.3;
 
-/// What is declared of the vehicle.
+/// Declared vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
     /// Mass and resistance.
@@ -59,7 +59,7 @@ pub enum SurveyError {
     /// No fit run follows a line.
     #[error("expected fit runs along a line, got none: {what}")]
     NoLine {
-        /// What was found instead.
+        /// Value found instead.
         what: &'static str,
     },
     /// The forces show nothing.
@@ -70,7 +70,7 @@ pub enum SurveyError {
     Balance(#[from] NotPositive),
 }
 
-/// What the balance of forces gave.
+/// Profile from the balance of forces.
 #[derive(Clone, Debug)]
 pub struct SurveyedProfile {
     /// The profile and what belongs to it.
@@ -90,11 +90,11 @@ pub struct Survey {
     pub alignments: Alignments,
     /// The trips, by recording and time.
     pub trips: Vec<Trip>,
-    /// What is no trip.
+    /// Parts that are not a trip.
     pub not_used: Vec<NotUsed>,
     /// The stops.
     pub stops: Vec<Stop>,
-    /// What GNSS shows of the wheels' scale and its own lag.
+    /// Scale of the wheels and lag of the GNSS, from the GNSS itself.
     pub wheels: WheelsAndLag,
     /// Standard deviation of the wheels' scale with the uncertainty of the alignment's length.
     pub scale_std: f64,

@@ -10,13 +10,13 @@ use crate::statistics::least_first;
 const WINDOW_M: f64 = 60.0;
 /// Share of a difference by which the expectation follows the fixes.
 const FOLLOWING: f64 = 0.1;
-/// A recording that was not beside the alignment for so many m has left it.
+/// A recording that was not near the alignment for this many m has left it.
 const LEFT_AFTER_M: f64 = 300.0;
 /// Distance in m over which a recording is looked for on an alignment.
 const SEARCH_M: f64 = 400.0;
 /// Width in m of the bins in which offsets are counted.
 const BIN_M: f64 = 20.0;
-/// A recording that runs on past the end of an alignment by so many m has left it.
+/// A recording that runs on past the end of an alignment by this many m has left it.
 const BEYOND_M: f64 = 30.0;
 
 /// A fix placed on an alignment.
@@ -133,8 +133,8 @@ fn found(
     None
 }
 
-/// What the alignment of a fix may lack of the chainage in m: for each place of the alignment beside which it
-/// is and in whose direction it moves; `None` while it stands.
+/// Returns the possible error of a fix's alignment in the chainage in m: for each place of the alignment beside
+/// which it is and in whose direction it moves; `None` while it stands.
 fn offsets(
     recording: &Recording,
     fixes: &[Fix],

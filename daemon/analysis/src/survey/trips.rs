@@ -1,4 +1,4 @@
-//! One-way trips along the line, and what of the recordings is none.
+//! One-way trips along the line, and the parts of the recordings that are not trips.
 
 use serde::Serialize;
 
@@ -9,9 +9,9 @@ use super::recording::Recording;
 use super::tracking::follow;
 use crate::parallel;
 
-/// A trip reaches beyond its first and last fix by so many m and s: it stands there.
+/// A trip reaches beyond its first and last fix by this many m and s: it stands there.
 const REACH: (f64, f64) = (30.0, 60.0);
-/// What is not used is reported from so many s on.
+/// Shortest unused part in s that is reported.
 const NOT_USED_MIN_S: f64 = 5.0;
 /// Wheels of one vehicle differ so little from pass to pass.
 const SCALE_SPREAD: f64 = 0.001;
@@ -124,7 +124,7 @@ fn with_stands(recording: &Recording, rows: std::ops::Range<usize>) -> std::ops:
     first..last + 1
 }
 
-/// What of the recordings lies outside the trips, and why.
+/// Returns the parts of the recordings outside the trips, and the reasons.
 pub fn not_used(trips: &[Trip], recordings: &[Recording]) -> Vec<NotUsed> {
     let mut found = Vec::new();
     for (number, recording) in recordings.iter().enumerate() {

@@ -64,7 +64,7 @@ impl<H, const MAX: usize> Bank<H, MAX> {
     ///
     /// # Panics
     ///
-    /// When there is none.
+    /// If the bank is empty.
     #[inline]
     pub fn likeliest(&self) -> &H {
         &self.hypotheses[self.likeliest]
@@ -132,7 +132,7 @@ impl<H, const MAX: usize> Bank<H, MAX> {
     ///
     /// # Panics
     ///
-    /// When there is none next.
+    /// If there is no next hypothesis.
     pub fn unite(&mut self, index: usize, (both, weight): (H, f64)) {
         self.drop(index + 1);
         self.hypotheses[index] = both;

@@ -22,7 +22,7 @@ pub const BIAS: usize = 1;
 /// Place where the parameters begin.
 pub const PARAMETERS: usize = 2;
 
-/// What a measurement revealed of itself when it was absorbed.
+/// Innovation of a measurement, as computed when it was absorbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
     /// Measured minus predicted over its predicted standard deviation; `None` where the
@@ -35,7 +35,7 @@ pub struct Innovation {
 /// A time step of level and bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriftStep {
-    /// What a unit of bias adds to the level.
+    /// Gain of the level from a unit of bias.
     pub gain: f64,
     /// Share of the bias that stays, above 0.
     pub keep: f64,

@@ -1,4 +1,4 @@
-//! What later measurements say of an earlier state.
+//! Smoothed estimate of an earlier state by later measurements.
 //!
 //! For each remembered moment the smoother keeps one component of the state at that moment: its
 //! mean, its variance, and its covariance with the present state. A measurement of the present
@@ -21,7 +21,7 @@ use super::{Gaussian, Innovation};
 /// A component of the state at an earlier moment, given all measurements since.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lagged<const N: usize, T> {
-    /// What the caller attached to the moment.
+    /// Tag that the caller attached to the moment.
     pub tag: T,
     /// Smoothed mean.
     pub mean: f64,
@@ -118,7 +118,7 @@ pub struct ForwardStep<const N: usize> {
     pub filtered: Gaussian<N>,
     /// The component that was measured.
     pub component: usize,
-    /// What the measurement said.
+    /// Innovation of the measurement.
     pub innovation: Innovation,
     /// Jacobian of the move from the step before to this one.
     pub jacobian: SMatrix<f64, N, N>,

@@ -9,7 +9,7 @@ use nalgebra::{SMatrix, SVector};
 use super::NotPositiveDefinite;
 use super::rank_one::{measured, moved};
 
-/// What a scalar measurement says of a belief, before it is taken in.
+/// Innovation of a scalar measurement before the measurement update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
     /// Measured minus predicted value.
@@ -122,7 +122,7 @@ impl<const N: usize> Gaussian<N> {
         self.mean[i] = value;
     }
 
-    /// What measuring component `i` says, without taking it in.
+    /// Returns the innovation of a measurement of component `i`, without updating.
     ///
     /// # Errors
     ///

@@ -18,7 +18,8 @@ pub struct SquareRootInformation<const N: usize> {
 }
 
 impl<const N: usize> SquareRootInformation<N> {
-    /// No rows yet, but the penalty `sum of weight * (theta - prior)^2`; a weight of 0 is none.
+    /// Returns the information of no rows, but the penalty `sum of weight * (theta - prior)^2`; a weight of 0 is no
+    /// penalty.
     pub fn new(weights: &SVector<f64, N>, prior: &SVector<f64, N>) -> Self {
         let roots = weights.map(|weight| weight.max(0.0).sqrt());
         let system = TriangularSystem {

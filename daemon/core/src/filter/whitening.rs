@@ -16,7 +16,7 @@ pub struct Propagation<const S: usize, const C: usize> {
     pub noise: SMatrix<f64, S, S>,
 }
 
-/// What a row sees of the hidden states.
+/// Observation of the hidden states by a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighting<const S: usize, const C: usize> {
     /// observed = direction . x + noise.
@@ -85,8 +85,8 @@ impl<const S: usize, const C: usize> Whitener<S, C> {
         self.state.column_mut(column).fill(0.0);
     }
 
-    /// What a sighting says beyond what was known, as a row with an error of unit variance; `None` when
-    /// its variance is not positive and finite.
+    /// Returns the news of an observation as a row with an error of unit variance; `None` when its variance is not
+    /// positive and finite.
     pub fn row(&self, sighting: &Sighting<S, C>) -> Option<UnitRow<C>> {
         let variance = sighting.direction.dot(&self.spread(sighting)) + sighting.variance;
         let is_sound = variance > 0.0 && variance.is_finite();

@@ -5,7 +5,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, S
 
 use super::KeptEstimate;
 
-/// What an estimator did with a sample.
+/// Result of an estimator's update with a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The sample was taken into account; the estimate stays as it was.

@@ -1,4 +1,4 @@
-//! What of an estimate outlives the daemon, and what it is worth later.
+//! Persisted estimates: the stored values, and how they become a prior.
 //!
 //! A stored estimate comes back as a prior: a pipeline that starts from it reports `unestimated` with the
 //! stored values until its own samples have confirmed them. One that was in use moments ago goes on.
@@ -169,8 +169,8 @@ impl KeptEstimate {
         &self.covariance
     }
 
-    /// What the estimate is worth after a time in s without a sample: every variance grows by
-    /// what the parameter may have changed meanwhile, `(share * value)² (1 - exp(-2 t / time))`.
+    /// Returns the estimate after a time in s without a sample: every variance grows by the possible change of the
+    /// parameter meanwhile, `(share * value)² (1 - exp(-2 t / time))`.
     ///
     /// Resistance follows the weather within hours; the mass is another one after the next stop.
     #[must_use]

@@ -51,8 +51,8 @@ pub struct Pipeline {
 
 /// Samples over which refusals are remembered.
 const REFUSALS_MEMORY: f64 = 500.0;
-/// Share of refused samples above which no estimate is trusted: where so many are plainly wrong,
-/// others are wrong without being plainly so.
+/// Share of refused samples above which no estimate is trusted: where this many are plainly wrong, others are wrong
+/// without being plainly so.
 const REFUSED_SHARE_MAX: f64 = 0.15;
 
 impl Pipeline {
@@ -195,7 +195,7 @@ impl Pipeline {
         &self.snapshot
     }
 
-    /// What cannot be true of the samples lately and spoils the estimate.
+    /// Returns the recent implausibility of the samples that spoils the estimate.
     pub fn implausible(&self) -> Option<DetectedFault> {
         let kind = self.estimator.kind();
         let mut detected = self.plausibility.detected().iter();

@@ -53,7 +53,7 @@ pub const DAVIS: [Parameter; 3] = [Parameter::DavisA, Parameter::DavisB, Paramet
 /// The Davis coefficients and the mass, in their order.
 pub const DAVIS_AND_MASS: [Parameter; 4] =
     [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass];
-/// What brings data for each of them.
+/// Manoeuvre that brings data for each of them.
 const MANOEUVRES: [Manoeuvre; 4] =
     [Manoeuvre::CoastSlow, Manoeuvre::VarySpeed, Manoeuvre::CoastFast, Manoeuvre::Accelerate];
 

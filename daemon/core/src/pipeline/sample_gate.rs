@@ -15,9 +15,9 @@ use dynocar_shared::{Reason, RejectionReason};
 use super::motion::{BRIDGED_MAX_S, MOVING_MPS};
 use crate::pipeline::Outcome;
 
-/// So many samples away from the old level make a new one.
+/// Number of samples away from the old level that make a new one.
 const AGREEING: usize = 3;
-/// A change in N/kN that is none: gradients change by as much within a sample.
+/// A change in N/kN that counts as no change: gradients change by as much within a sample.
 const TOLERANCE_N_PER_KN: f64 = 1.0;
 /// A change that counts as none, as a share of the force: sensors of force are good to a few %.
 const TOLERANCE_SHARE: f64 = 0.08;
@@ -38,14 +38,14 @@ const MEMORY: f64 = 100.0;
 /// a row that passes for a new level.
 const WITHDRAWN_SHARE_MAX: f64 = 0.05;
 
-/// What to do with a sample.
+/// Verdict on a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// Take it as it is.
     Take,
     /// Nothing yet: later samples decide, or it adds nothing new.
     Wait,
-    /// Take so many from [`SampleGate::released`], of which this one is the last.
+    /// Take this many from [`SampleGate::released`], of which this one is the last.
     Release(usize),
     /// Leave it out, and begin anew with the next.
     Refuse(RejectionReason),
@@ -157,7 +157,7 @@ impl SampleGate {
         self.withdrawn_share > WITHDRAWN_SHARE_MAX
     }
 
-    /// What is wrong with the forces, if anything.
+    /// Returns the fault of the forces, if there is one.
     pub fn input_doubt(&self) -> Option<Reason> {
         self.is_in_doubt().then_some(Reason::BadInput)
     }

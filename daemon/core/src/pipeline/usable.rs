@@ -1,5 +1,5 @@
-//! What a controller may use, with hysteresis: a controller that switches with every doubt drives worse
-//! than one that never switches.
+//! Usability with hysteresis: a controller that switches with every doubt drives worse than one that never
+//! switches.
 
 use dynocar_shared::Quantity;
 
@@ -108,7 +108,7 @@ mod tests {
 
     const MASS: u32 = Quantity::Mass.bit();
 
-    /// Changes over so many s at 10 Hz.
+    /// Returns the changes over `duration_s` seconds at 10 Hz.
     fn changes(duration_s: u32, is_good: impl Fn(u32) -> bool) -> (u32, u32) {
         changes_of(duration_s, false, is_good)
     }

@@ -1,4 +1,4 @@
-//! What the acceleration says of the forces, by least squares over windows of motion.
+//! Forces as seen by the acceleration, by least squares over windows of motion.
 //!
 //! In the mean of a window of a few seconds, (1 + gamma) dv/dt = T/m - B/m - g i - p - q v². With
 //! right units the factors of traction T, brake B and gradient i are 1; p and q are whatever the
@@ -14,11 +14,11 @@ const COLUMNS: usize = 5;
 const MEMORY: f64 = 400.0;
 /// Windows of motion that are enough to judge.
 const WINDOWS_MIN: f64 = 12.0;
-/// Accelerations in m/s² beyond this are none in whatever unit.
+/// Accelerations in m/s² beyond this are impossible in any unit.
 const BELIEVED_MAX: f64 = 1e9;
 /// Share of a column's scatter that the others must leave to it.
 const OWN_SHARE_MIN: f64 = 1e-3;
-/// A factor is known when it is so many of its standard deviations away from 0.
+/// A factor is known when it is this many of its standard deviations away from 0.
 const KNOWN_DEVIATIONS: f64 = 8.0;
 
 /// The means over a window of motion, accelerations in m/s².
@@ -82,7 +82,7 @@ impl Balance {
             -1.0,
             -mean.speed_mps * mean.speed_mps,
         ]);
-        // What is beyond any unit is no measurement.
+        // A value beyond any unit is no measurement.
         if !row.iter().chain([&mean.inertia_mps2]).all(|value| value.abs() < BELIEVED_MAX) {
             return;
         }

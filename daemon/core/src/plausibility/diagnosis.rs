@@ -41,7 +41,7 @@ fn add(found: &mut DetectedFaults, fault: InputFault, factor: f64) {
     let _ = found.try_push(DetectedFault { fault, factor });
 }
 
-/// What is surely wrong with the input, the most fundamental first.
+/// Certain faults of the input, the most fundamental first.
 pub type DetectedFaults = ArrayVec<DetectedFault, DETECTED_MAX>;
 
 /// Judges figures.

@@ -1,5 +1,4 @@
-//! What may have gone wrong with a quantity, by what factor, and which unit would explain it, in a
-//! sentence.
+//! Possible fault of a quantity, its factor, and the unit that would explain it, in a sentence.
 
 use std::fmt;
 
@@ -106,7 +105,7 @@ impl InputFault {
         }
     }
 
-    /// What the units of the quantity measure.
+    /// Returns the dimension of the quantity's units.
     pub const fn dimension(self) -> Dimension {
         match self {
             InputFault::TimeScale => Dimension::Time,
@@ -139,7 +138,7 @@ impl InputFault {
 /// An input fault with its size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DetectedFault {
-    /// What it is.
+    /// Kind of the fault.
     pub fault: InputFault,
     /// Reported over true value, as far as the samples show.
     pub factor: f64,

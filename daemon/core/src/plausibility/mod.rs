@@ -69,7 +69,7 @@ impl Plausibility {
         }
     }
 
-    /// What cannot be true of the samples lately.
+    /// Returns the recent impossibilities of the samples.
     pub fn detected(&self) -> &DetectedFaults {
         &self.detected
     }

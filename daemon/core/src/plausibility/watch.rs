@@ -11,7 +11,7 @@ use crate::filter::RunningMedian;
 
 /// Time in s over which accelerations are averaged; one step where the steps are longer.
 const WINDOW_S: f64 = 5.0;
-/// A step so many times as long as the usual one is a gap.
+/// A step this many times as long as the usual one is a gap.
 const GAP_STEPS: f64 = 4.0;
 /// A new step's share in the usual one.
 const STEP_SHARE: f64 = 0.1;
@@ -29,7 +29,7 @@ const EFFORT_FADE: f64 = 1.0 / 400.0;
 /// Windows with a mass that are enough to judge it.
 const MASSES_MIN: f64 = 5.0;
 
-/// What the samples say; every ratio is 1 in right units.
+/// Figures of the samples; every ratio is 1 in right units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Acceleration over what the forces and the gradient would give.
@@ -145,7 +145,7 @@ impl Watch {
         self.extend_window(&last, sample, step_s) || is_compared
     }
 
-    /// What the samples so far say.
+    /// Returns the figures of the samples so far.
     pub fn figures(&self) -> Figures {
         let share = |share: f64| (share > 0.0).then_some(share);
         Figures {
@@ -261,7 +261,7 @@ fn forces_n(sample: &TrainSample) -> Option<(f64, f64)> {
 const BRAKING_MIN_S: f64 = 20.0;
 /// Times of which the means forget, in s.
 const MEMORY_S: f64 = 2000.0;
-/// The pressure follows the brake when it is so many times as high while braking.
+/// The pressure follows the brake when it is this many times as high while braking.
 const CONTRAST_MIN: f64 = 3.0;
 
 /// Mean pressure with and without brake force.

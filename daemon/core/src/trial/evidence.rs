@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 const BETS: [f64; 9] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
 /// E-process value beyond which counting on adds nothing more.
 const E_VALUE_MAX: f64 = 1e100;
-/// What the confidence sequence may miss the truth by at any time: 95 %.
+/// Probability that the confidence sequence ever misses the truth: the sequence holds with 95 %.
 const MISS: f64 = 0.05;
 /// The largest weight of a trip in the confidence sequence.
 const WEIGHT_MAX: f64 = 0.5;
@@ -43,7 +43,7 @@ fn ratio_of_score(score: f64) -> f64 {
     ((1.0 - score).max(0.0) / (1.0 + score).max(f64::MIN_POSITIVE)).sqrt().min(RATIO_MAX)
 }
 
-/// What the trips so far say for a rival.
+/// Evidence of the trips so far for a rival.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Share of the error that the rival must take away to count as better.
@@ -115,8 +115,8 @@ impl Evidence {
         self.squares += (unit - mean_after).powi(2);
     }
 
-    /// What the gamblers hold together. While the rival is no better than asked for, it reaches M
-    /// after no fewer than M trips on average.
+    /// Returns the wealth of all gamblers together. While the rival is no better than required, it reaches M after
+    /// no fewer than M trips on average.
     pub fn e_value(&self) -> f64 {
         self.e_value.iter().sum::<f64>() / BETS.len() as f64
     }

@@ -10,10 +10,10 @@ use dynocar_model::validation::ValidSample;
 
 /// Samples nearer in time, in s, to the last that was kept are not: 20 a second describe a motion.
 const STEP_MIN_S: f64 = 0.05;
-/// A window holds at most so many samples.
+/// Largest number of samples in a window.
 const SAMPLES_MAX: usize = (Restart::WINDOW_S / STEP_MIN_S) as usize + 2;
 
-/// What a model leaves of one window.
+/// Prediction error of a model in one window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WindowError {
     /// Of the speed, over the window's moving samples.

@@ -12,7 +12,7 @@ use crate::pipeline::motion::MOVING_MPS;
 
 /// Moving time in s of which a trip is made that compares models; shorter ones join the next.
 const TRIP_MIN_S: f64 = 120.0;
-/// A controller that counts no trips is compared anew every so many s of motion.
+/// A controller that counts no trips is compared anew every this many s of motion.
 const TRIP_MAX_S: f64 = 1800.0;
 
 /// A model on trial.
@@ -21,7 +21,7 @@ pub struct Rival {
     pub model: u64,
     /// The configured pipelines, with this model.
     pub pipelines: Vec<Pipeline>,
-    /// What the trips say for it, against the model in force.
+    /// Evidence of the trips for it, against the model in force.
     pub evidence: Evidence,
     /// Its errors.
     pub ledger: Ledger,
@@ -65,7 +65,7 @@ impl Rival {
     }
 }
 
-/// What a model leaves of the windows of a trip.
+/// Prediction error of a model in the windows of a trip.
 #[derive(Clone, Copy, Debug, Default)]
 struct TripError {
     speed: SpeedError,

@@ -21,11 +21,11 @@ struct Candidate {
     column: usize,
     /// The greater the likelier.
     score: i32,
-    /// What it would be; the first reason is what in the name speaks for it.
+    /// Guessed column; the first reason is the word in the name that speaks for it.
     guessed: GuessedColumn,
 }
 
-/// What the columns are taken for.
+/// Assignment of columns to quantities.
 pub struct Assignment<'c> {
     columns: &'c [Column],
     /// Column and what it is taken for, or rather not: with the reason.
@@ -200,7 +200,7 @@ impl<'c> Assignment<'c> {
         self.taken_for(quantity).is_some()
     }
 
-    /// What the values are like of the column that is taken for a quantity.
+    /// Returns the facts on the values of the column assigned to a quantity.
     pub fn facts(&self, quantity: Quantity) -> Option<&'c Facts> {
         self.taken_for(quantity).map(|(index, ..)| &self.columns[*index].all)
     }
@@ -278,7 +278,7 @@ impl<'c> Assignment<'c> {
         }
     }
 
-    /// What comes near a quantity that no column is taken for, each with the reason.
+    /// Returns the columns that come near a quantity without an assigned column, each with the reason.
     pub fn near(&self, quantity: Quantity) -> Vec<String> {
         let of_it = self.refused.iter().filter(|(_, of, _)| *of == quantity);
         of_it.map(|(index, _, reason)| format!("'{}': {reason}", self.shown(*index))).collect()
@@ -302,7 +302,8 @@ impl<'c> Assignment<'c> {
         (columns, unmapped)
     }
 
-    /// What a column was not taken for, and which columns were not taken for its quantity.
+    /// Returns the quantities that a column was not assigned to, and the columns that were not assigned to its
+    /// quantity.
     fn not_taken(&self, index: usize, quantity: Quantity) -> Vec<String> {
         let others = self.candidates.iter().filter(|it| it.column == index);
         let others = others.map(|it| &it.guessed).filter(|it| it.quantity != quantity);

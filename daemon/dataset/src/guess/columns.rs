@@ -14,9 +14,9 @@ use crate::lines::{Row, RowReader, below};
 pub struct Column {
     /// Its name.
     pub name: Name,
-    /// What its values are like in each file.
+    /// Facts on its values in each file.
     pub facts: Vec<Facts>,
-    /// What its values are like in all.
+    /// Facts on its values in all files.
     pub all: Facts,
     /// Why it can be mapped to nothing, whatever it holds.
     pub unusable: Option<String>,
@@ -123,7 +123,7 @@ fn require_alike(
     )))
 }
 
-/// What the values of every column are like, and the number of rows.
+/// Reads the facts on the values of every column, and the number of rows.
 fn read_file(
     file: &Recording,
     layout: &Layout,

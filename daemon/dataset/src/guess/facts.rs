@@ -1,10 +1,10 @@
-//! What the values of a column are like.
+//! Facts on the values of a column.
 
 use crate::TimeFormat;
 use crate::cell::{Marks, parse_cell, truth};
 use crate::clock::{DayClock, Packed, day_of_cell};
 
-/// So many values of a column are kept, evenly spread, to find its middle and its top.
+/// Number of values of a column that are kept, evenly spread, to find its middle and its top.
 const KEPT_MAX: usize = 4096;
 
 /// Values spread evenly over all that came.
@@ -61,7 +61,7 @@ impl Text {
     }
 }
 
-/// What was seen of a column's values, cell by cell.
+/// Facts on a column's values, collected cell by cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
     /// Cells with a finite number.

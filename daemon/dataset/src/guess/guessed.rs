@@ -1,4 +1,4 @@
-//! What was guessed of recordings that nobody described, and set right by how the train moves.
+//! Guesses about recordings that nobody described, corrected by the motion of the train.
 
 use dynocar_core::plausibility::InputFault;
 use dynocar_model::units::Unit;
@@ -18,10 +18,10 @@ pub struct Recording<'t> {
     pub text: &'t str,
 }
 
-/// What somebody says of a column.
+/// A column's description by the user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GivenColumn {
-    /// What it holds.
+    /// Quantity of the column.
     pub quantity: Quantity,
     /// Its name in the header.
     pub column: String,
@@ -47,7 +47,7 @@ pub struct Guess {
 /// A column and what it is taken for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GuessedColumn {
-    /// What it holds.
+    /// Quantity of the column.
     pub quantity: Quantity,
     /// Its name in the header.
     pub name: Name,
@@ -59,11 +59,11 @@ pub struct GuessedColumn {
     pub scale: f64,
     /// How its cells are written, where they are times and no numbers.
     pub format: Option<TimeFormat>,
-    /// What speaks for it.
+    /// Reasons for it.
     pub reasons: Vec<String>,
-    /// What makes it doubtful; empty where header and values agree.
+    /// Doubts about it; empty where header and values agree.
     pub doubts: Vec<String>,
-    /// What it was not taken for, and what was not taken for it, each with the reason.
+    /// Rejected quantities of the column, and rejected columns of the quantity, each with the reason.
     pub rejected: Vec<String>,
     /// True where the name gives no unit, so that the values reveal it.
     pub is_unit_open: bool,
@@ -92,7 +92,7 @@ pub struct GuessedRun {
 }
 
 impl Guess {
-    /// What a quantity was guessed to be.
+    /// Returns the guessed column of a quantity.
     pub fn column(&self, quantity: Quantity) -> Option<&GuessedColumn> {
         self.columns.iter().find(|column| column.quantity == quantity)
     }

@@ -8,9 +8,9 @@ use crate::lines::{self, RowReader};
 use crate::text_layout::THOUSANDS;
 use crate::{TextLayout, TimeFormat};
 
-/// What may separate cells, in the order of preference.
+/// Possible separators of cells, in the order of preference.
 const DELIMITERS: [u8; 4] = *b";\t|,";
-/// So many rows show the layout.
+/// Number of rows that show the layout.
 const ROWS_MAX: usize = 200;
 
 /// How a file's text falls into cells.

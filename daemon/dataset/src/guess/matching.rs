@@ -9,7 +9,7 @@ use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
 use crate::names::nearest;
 
-/// What a name is worth that says the quantity and nothing else.
+/// Weight of a name that says the quantity and nothing else.
 const SAID: i32 = 100;
 /// A name below this is no sign of the quantity.
 const ENOUGH: i32 = 45;
@@ -17,13 +17,13 @@ const ENOUGH: i32 = 45;
 const SURE: i32 = 65;
 /// One cell of text among more than so many numbers is a mistake in the file.
 const TEXTS_RARE: usize = 50;
-/// Terms of so many letters are found within a longer word, too.
+/// Terms of at least this many letters are found within a longer word, too.
 const WITHIN_MIN: usize = 6;
 
 /// How a reason begins that is an unknown unit.
 pub const UNKNOWN_UNIT: &str = "there is no unit ";
 
-/// What a name says of a quantity.
+/// Match of a name with a quantity.
 struct Match {
     score: i32,
     reason: String,
@@ -41,7 +41,7 @@ pub fn consider(
         return None;
     }
     let by_name = match quantity {
-        // What stands in brackets behind the name may be the times' form.
+        // Brackets behind the name may hold the form of the times.
         Quantity::Time if !facts.formats().is_empty() => {
             by_name(name, quantity).filter(Result::is_ok).or_else(|| Some(Ok(by_cells())))
         }
@@ -60,7 +60,7 @@ pub fn consider(
 ///
 /// # Errors
 ///
-/// What speaks against it.
+/// Word that contradicts it.
 pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
     if facts.truths > 0 && quantity.dimension() != Dimension::Count {
         return Err("it holds words of truth".into());
@@ -137,7 +137,7 @@ fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
     (best.score >= ENOUGH).then_some(Ok(best))
 }
 
-/// What the words say of a quantity.
+/// Returns the match of the words with a quantity.
 fn by_words(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     let matches = terms(quantity).filter_map(|(strength, term)| {
         Some((by_term(words, strength, term)?, format!("'{term}' in the name")))
@@ -145,7 +145,7 @@ fn by_words(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     matches.max_by_key(|(score, _)| *score).or_else(|| by_likeness(words, quantity))
 }
 
-/// What a name is worth that holds a term.
+/// Returns the weight of a name that holds a term.
 fn by_term(words: &[String], strength: TermWeight, term: &str) -> Option<i32> {
     let wanted: Vec<&str> = term.split(' ').collect();
     let is_wanted = |word: &String| wanted.contains(&word.as_str());
@@ -159,7 +159,7 @@ fn by_term(words: &[String], strength: TermWeight, term: &str) -> Option<i32> {
     } else {
         return within(words, strength, &joined);
     };
-    // What was wanted instead of measured is the same quantity, and refused as that later.
+    // A requested value is the same quantity as the measured one, and refused as that later.
     let is_neutral = |word: &&String| {
         let words = &VOCABULARY.words;
         let lists =
@@ -225,7 +225,7 @@ fn by_unit_alone(name: &Name, quantity: Quantity) -> Option<Match> {
     Some(Match { score: ENOUGH + 1, reason: "its unit".into(), unit: Some(unit) })
 }
 
-/// What in a name speaks against what was measured of the train.
+/// Returns the word in a name that contradicts a measurement of the train.
 fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
     let own: Vec<&str> = terms(quantity).flat_map(|(_, term)| term.split(' ')).collect();
     let known = &VOCABULARY.words;

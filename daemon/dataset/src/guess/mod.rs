@@ -41,8 +41,8 @@ use super::{DatasetError, Quantity, SourcePosition};
 ///
 /// # Errors
 ///
-/// Where a file is none that a dataset can have, or holds no time or no speed that can be
-/// recognised; with file, line and what was expected.
+/// If a file cannot be part of a dataset, or holds no time or no speed that can be recognised; with file, line and
+/// the expected contents.
 pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, DatasetError> {
     let read = columns::Columns::read(files)?;
     let label = files.first().map_or("", |file| file.label);

@@ -6,7 +6,7 @@ use super::facts::Facts;
 use super::vocabulary::{Measure, Usual, usual};
 use crate::Quantity;
 
-/// Values so many times beyond the usual ones are none of a quantity in a unit.
+/// Values this many times beyond the usual ones are not of a quantity in a unit.
 const FAR: f64 = 20.0;
 /// Some 3000 years in s.
 const TIME_MAX_S: f64 = 1e11;
@@ -20,9 +20,9 @@ pub struct UnitChoice {
     pub unit: Unit,
     /// Factor on the cell.
     pub scale: f64,
-    /// What speaks for it.
+    /// Reason for it.
     pub reason: String,
-    /// What makes it doubtful; `None` where the header says it and the values agree.
+    /// Doubt about it; `None` where the header says it and the values agree.
     pub doubt: Option<String>,
 }
 

@@ -42,13 +42,13 @@ fn refusal(text: &str) -> String {
     guess(&[Recording { label: "a.csv", text }], &[]).unwrap_err().to_string()
 }
 
-/// What each quantity was taken to be: column, unit and factor.
+/// Returns the mapping of each quantity: column, unit and factor.
 fn mapped(guess: &Guess) -> Vec<(Quantity, &str, &str, f64)> {
     let columns = guess.columns.iter();
     columns.map(|it| (it.quantity, it.name.text.as_str(), it.unit.name(), it.scale)).collect()
 }
 
-/// What a header of one name is taken for, besides time and speed.
+/// Returns the quantity assigned to a header of one name, besides time and speed.
 fn taken_for(name: &str, values: [f64; 3]) -> Option<(Quantity, &'static str)> {
     let [one, two, three] = values;
     let text = format!("time [s],{name},speed [m/s]\n0,{one},0\n1,{two},1\n2,{three},2\n");

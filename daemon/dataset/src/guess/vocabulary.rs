@@ -1,5 +1,5 @@
-//! What recorders call the quantities, in several languages, and what is usual of their values: the
-//! tables of `vocabulary.toml`.
+//! Names that recorders give to the quantities, in several languages, and their usual values: the tables of
+//! `vocabulary.toml`.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -48,7 +48,7 @@ pub struct Words {
     pub other_things: String,
 }
 
-/// What a quantity is called and usually is.
+/// Names and usual values of a quantity.
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Entry {
@@ -73,7 +73,7 @@ pub enum Measure {
     Span,
 }
 
-/// What a train's values usually are, and the units that recorders use, the likeliest first.
+/// Usual values of a train, and the units that recorders use, the likeliest first.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Usual {
@@ -116,7 +116,7 @@ fn terms_of(quantity: Quantity) -> Vec<(TermWeight, String)> {
     terms
 }
 
-/// What a quantity is called, and what each term is worth.
+/// Returns the names of a quantity, and the weight of each term.
 pub fn terms(quantity: Quantity) -> impl Iterator<Item = (TermWeight, &'static str)> {
     TERMS[&quantity].iter().map(|(weight, term)| (*weight, term.as_str()))
 }
@@ -131,7 +131,7 @@ pub fn is_word(word: &str) -> bool {
         || all_terms().any(|it| it == word)
 }
 
-/// What is usual of a quantity; `None` where its values reveal no unit.
+/// Returns the usual values of a quantity; `None` where its values reveal no unit.
 pub fn usual(quantity: Quantity) -> Option<&'static Usual> {
     VOCABULARY.quantities.get(quantity.name())?.usual.as_ref()
 }

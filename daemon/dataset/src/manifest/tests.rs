@@ -1,4 +1,4 @@
-//! What `dataset.toml` may hold, and every refusal with its words.
+//! Contents of `dataset.toml`, and every refusal with its words.
 
 use super::*;
 use crate::cell::held;

@@ -37,7 +37,7 @@ const FORCE_RATE_MEMORY_S: f64 = 0.5;
 const MONITOR_SAMPLES: u32 = 600;
 /// Standard deviations beyond which a speed speaks against the filter.
 const OUTLIER_BEYOND: f64 = 3.0;
-/// After so many of them in a row on one side, each no spike, it is the filter that is wrong.
+/// After this many of them in a row on one side, each no spike, the filter is wrong.
 const CONSECUTIVE_OUTLIERS_MAX: i32 = 10;
 
 /// Davis coefficients by a robust Kalman filter with a disturbance state.

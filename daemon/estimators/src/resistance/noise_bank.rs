@@ -264,7 +264,7 @@ impl NoiseBank {
         &self.models.hypotheses()[0]
     }
 
-    /// Every so many rows, gives back what forgetting took off the priors.
+    /// Returns, from time to time, the part of the priors that forgetting has removed.
     fn renew_penalty(&mut self) {
         self.rows_since_renewal += 1;
         if self.forgetting < 1.0 && self.rows_since_renewal == RENEWAL_ROWS {

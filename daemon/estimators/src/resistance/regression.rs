@@ -115,7 +115,7 @@ impl Observation {
         }
     }
 
-    /// What is seen of the error.
+    /// Returns the observation of the error.
     pub fn sighting(&self) -> Sighting<STATES, COLUMNS> {
         match self {
             Observation::Block(block) => momentum_seen(block.momentum, block.momentum_variance),
@@ -138,7 +138,7 @@ const FREE: f64 = 3.0;
 pub struct WhiteRow {
     /// Regressors.
     pub features: Unknowns,
-    /// What they should add up to.
+    /// Observed sum.
     pub observed: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What an estimate is worth: bounds, excitation, status.
+//! Uncertainty of an estimate: bounds, excitation, status.
 
 use dynocar_core::filter::bounded_minimum;
 use dynocar_core::pipeline::InnovationMonitor;
@@ -60,7 +60,7 @@ impl DrivenSpeeds {
 /// and speed are taken as straight.
 const INTEGRATION_SHARE_STD: f64 = 1e-4;
 
-/// What speaks for and against a solution.
+/// Evidence for and against a solution.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
     /// The slow force that the model does not know, over all rows.
@@ -82,7 +82,7 @@ pub struct Evidence<'a> {
 /// Resistance as a snapshot reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
-    /// What a controller may do with it.
+    /// Status of the estimate for a controller.
     pub status: Status,
     /// Why.
     pub reason: Reason,

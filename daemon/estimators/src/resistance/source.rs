@@ -62,8 +62,8 @@ impl RowSource {
         })
     }
 
-    /// What has happened since the middle of the newest block; `None` before the first of a
-    /// chain, and of coasting segments, which have no level of momentum.
+    /// Returns the integrals since the middle of the newest block; `None` before the first of a chain, and of
+    /// coasting segments, which have no level of momentum.
     pub fn since_block(&self) -> Option<SinceBlock> {
         match &self.builder {
             Builder::Momentum(blocks) => blocks.since_block(),

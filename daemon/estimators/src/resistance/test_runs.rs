@@ -15,7 +15,7 @@ use crate::EstimatorSettings;
 pub const TRAIN: TrainId = TrainId(1);
 const TICK_S: f64 = 0.05;
 
-/// What is simulated; forces in N/kN.
+/// Simulated scenario; forces in N/kN.
 #[derive(Clone, Copy, Debug)]
 pub struct Scenario {
     pub davis: Davis,
@@ -147,7 +147,7 @@ impl Scenario {
         samples
     }
 
-    /// What the driver asks for next, in N/kN: coasting most of the time.
+    /// Returns the force that the driver commands next, in N/kN: coasting most of the time.
     fn handle(&self, speed_mps: f64, random: &mut ChaCha8Rng) -> f64 {
         let share = speed_mps / self.speed_max_mps;
         match random.random::<f64>() {

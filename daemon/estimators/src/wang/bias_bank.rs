@@ -1,9 +1,8 @@
 //! Kalman filters [v, 1/m, bias] side by side, one for each way in which a bias may behave.
 //!
-//! What the declared model lacks acts like an acceleration: a gradient error stays for minutes,
-//! wind grows with the speed, a gust lasts seconds. One noise for all of them is either too
-//! trusting in wind or too timid in calm. Each filter therefore assumes one behaviour, and the
-//! evidence of the innovations weighs them.
+//! Effects that the declared model lacks act like an acceleration: a gradient error stays for minutes, wind grows
+//! with the speed, a gust lasts seconds. One noise for all of them is either too trusting in wind or too timid in
+//! calm. Each filter therefore assumes one behaviour, and the evidence of the innovations weighs them.
 
 use dynocar_core::filter::bank::{Bank, Mixture};
 use dynocar_core::filter::{Gaussian, NotPositiveDefinite};
@@ -26,12 +25,12 @@ pub const MODELS: usize = 8;
 
 /// Logarithm of the least weight against the best: any behaviour can come back.
 const LOG_WEIGHT_MIN: f64 = -30.0;
-/// What turns forces into acceleration.
+/// Conversion of forces into acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dynamics {
     /// Resistance of the train on the line.
     pub resistance: LineResistance,
-    /// What forces do to it.
+    /// Inertia of the train.
     pub inertia: Inertia,
 }
 

@@ -10,7 +10,7 @@ const GROWTH_REFERENCE_MPS: f64 = 20.0;
 /// Least shape at which an error of the map is taken for such a bias.
 const SHAPE_MIN: f64 = 0.25;
 
-/// What the error of the map's gradients does in a step: see [`gradient_error_kept`].
+/// Effect of the error of the map's gradients in a step: see [`gradient_error_kept`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapError {
     /// Its standard deviation in m/s²; 0 where nobody states one.

@@ -35,12 +35,12 @@ pub const POLYNOMIALS: [usize; 3] = [PARAMETERS + 1, PARAMETERS + 4, PARAMETERS 
 /// A value for each unknown.
 pub type Row = SVector<f64, UNKNOWNS>;
 
-/// What turns a motion into rates of the integrals.
+/// Conversion of a motion into rates of the integrals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regressors {
     /// Speed polynomials.
     pub basis: SpeedBasis,
-    /// What forces do to the train.
+    /// Inertia of the train.
     pub inertia: Inertia,
     /// Radius in m that z2 refers to.
     pub reference_radius_m: f64,
@@ -123,13 +123,13 @@ pub struct Step {
     pub speed_mps: f64,
     /// Change of the force's acceleration over it in m/s².
     pub push_change_mps2: f64,
-    /// What the map's error does over it.
+    /// Effect of the map's error.
     pub map: MapError,
     /// Variance in (m/s)² of what comes to the level under any assumption.
     pub noise_variance: f64,
 }
 
-/// What a measured speed looks like to a regression.
+/// Expectation of a measured speed by a regression.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expectation {
     /// Measured minus predicted speed over its standard deviation.
@@ -187,7 +187,7 @@ impl Hypothesis {
         });
     }
 
-    /// What an equation of a measured speed with a noise variance would bring.
+    /// Returns the expectation of an equation of a measured speed with a noise variance.
     pub fn expect(&self, row: &Row, value: f64, noise_variance: f64) -> Expectation {
         let innovation = self.regression.clone().absorb(row, value, 1.0 / noise_variance);
         let normalised = innovation.normalised.unwrap_or(0.0);

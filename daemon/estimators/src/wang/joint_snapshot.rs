@@ -1,4 +1,4 @@
-//! What [`JointLeastSquares`] says in a snapshot.
+//! Contents of a snapshot by [`JointLeastSquares`].
 
 use dynocar_core::filter::drifting_level::BIAS;
 use dynocar_core::pipeline::judge::Case;

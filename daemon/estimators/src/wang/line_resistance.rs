@@ -25,7 +25,7 @@ pub struct LineResistance {
 }
 
 impl LineResistance {
-    /// What is declared of a train.
+    /// Returns the declared resistance of a train.
     pub fn declared(train: &TrainModel) -> Self {
         LineResistance {
             basic: train.resistance,

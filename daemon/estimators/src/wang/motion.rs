@@ -1,5 +1,5 @@
-//! What the estimators of mass take from a sample, what its forces do to a train of a reference mass, and which of
-//! the three resistances a piece of motion informs on.
+//! Motion for the estimators of mass: the values taken from a sample, the effect of its forces on a train of a
+//! reference mass, and which of the three resistances a piece of motion informs on.
 
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::motion::BRIDGED_MAX_S;
@@ -37,8 +37,8 @@ impl Motion {
     ///
     /// # Errors
     ///
-    /// `WheelSlide` while the speed is not the train's, `Missing` without force or gradient,
-    /// `NotFinite` for a number that is none, `OutOfRange` for one that no train has.
+    /// `WheelSlide` while the speed is not the train's, `Missing` without force or gradient, `NotFinite` for a
+    /// number that is not finite, `OutOfRange` for one that no train has.
     pub fn of(sample: &ResolvedSample) -> Result<Self, RejectionReason> {
         if sample.is_sliding {
             return Err(RejectionReason::WheelSlide);
@@ -72,9 +72,8 @@ impl Motion {
         if is_possible { Ok(motion) } else { Err(RejectionReason::OutOfRange) }
     }
 
-    /// The motion at a sample that an estimator from a least speed in m/s on takes; where there is none,
-    /// what became of the sample. A step leads neither over a standstill nor over a slide: `last` is
-    /// forgotten there.
+    /// Returns the motion at a sample that an estimator from a least speed in m/s on uses; without motion, the
+    /// outcome of the sample. A step leads neither over a standstill nor over a slide: `last` is forgotten there.
     ///
     /// # Errors
     ///

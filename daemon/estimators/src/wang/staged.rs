@@ -289,7 +289,7 @@ impl Estimator for StagedDescent {
     }
 }
 
-/// What the mass is fitted on; the paper does not say.
+/// Regression of the mass; the paper does not say which.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MassRegression {
@@ -305,7 +305,7 @@ settings! {
     /// Settings of [`super::StagedDescent`].
     #[derive(Copy)]
     StagedDescentSettings {
-        /// What the mass is fitted on.
+        /// Regression of the mass.
         mass_regression: MassRegression = MassRegression::ForceOnAcceleration;
         /// Samples of the first stages, driven at the declared mass; the mass is learned after.
         resistance_samples: u64 = 28_000 => (0 to 1000000000);

@@ -197,7 +197,7 @@ impl TrajectoryNewton {
         self.is_consistent = is_first || (shown <= limit && fit.outliers == 0);
         if self.settings.speed_noise_mps.is_none() {
             let gain = 1.0 / (self.windows as f64).min(NOISE_WINDOWS);
-            // What is wrong with one window is hardly noise of the next.
+            // An error of one window is hardly noise of the next.
             let believed = if is_first { shown } else { shown.min(limit) };
             self.speed_noise_mps = (variance + gain * (believed - variance)).sqrt().max(1e-6);
         }

@@ -38,7 +38,7 @@ struct OpenStep {
 }
 
 impl Window {
-    /// An empty window of so many steps of at least a distance in m each.
+    /// Returns an empty window of `steps` steps of at least a distance in m each.
     pub fn new(rule: StepRule, steps: usize, interval_m: f64) -> Self {
         Window {
             rule,

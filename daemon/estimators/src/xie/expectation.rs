@@ -193,9 +193,8 @@ impl Expectation for KalmanExpectation {
     }
 }
 
-/// What the M-step needs of the E-step: dQ/d share and -d²Q/d share² at the present value, the
-/// share being the coefficient over the demand. Only I_2, the moves, depends on it (Xie 2019,
-/// eq. 30-32: I_1 and I_3 vanish).
+/// Statistics of the E-step for the M-step: dQ/d share and -d²Q/d share² at the present value, the share being the
+/// coefficient over the demand. Only I_2, the moves, depends on it (Xie 2019, eq. 30-32: I_1 and I_3 vanish).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
     /// Gradient of Q.
@@ -218,7 +217,7 @@ impl Statistics {
 pub struct Entry {
     /// The known motion since the entry before.
     pub inputs: StepInputs,
-    /// What was measured.
+    /// Measured values.
     pub observed: Observation,
     /// The process noise of that step.
     pub noise: MoveNoise,

@@ -55,7 +55,7 @@ settings! {
         e_step: EStep = EStep::Particle;
         /// True for the papers' cap on the coefficient, under which values above the demand stick.
         has_printed_cap: bool = false;
-        /// What a brake pipeline reports; no meaning for adhesion.
+        /// Factor that a brake pipeline reports; no meaning for adhesion.
         reports: BrakeFactor = BrakeFactor::Friction;
     }
 }

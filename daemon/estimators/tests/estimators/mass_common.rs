@@ -166,7 +166,7 @@ pub fn snapshot(estimator: &dyn Estimator) -> ParameterSnapshot {
     snapshot
 }
 
-/// Panics when a snapshot holds a number that is none.
+/// Panics when a snapshot holds a number that is not finite.
 pub fn assert_finite(snapshot: &ParameterSnapshot) {
     let others = [
         snapshot.innovation_normalised,

@@ -19,7 +19,7 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(config(name)).expect("a shipped file")
 }
 
-/// What the shipped daemon and its controller give.
+/// Returns the topics of the shipped daemon and its controller.
 fn topics() -> Vec<Topic> {
     let shipped = DaemonConfig::load(&config("daemon.toml")).expect("the shipped configuration");
     let snapshots = shipped.pipelines.iter().enumerate();

@@ -9,7 +9,7 @@ pub fn mps2_per_n_per_kn(rotating_mass_factor: f64) -> f64 {
     TrainModel::weight_kn(1.0) / (1.0 + rotating_mass_factor)
 }
 
-/// What acts on a train at a moment, in the direction of travel.
+/// Forces on a train at a moment, in the direction of travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActingForces {
     /// Gross mass in kg.

@@ -52,7 +52,7 @@ pub struct ResolvedSample {
     pub gradient_std_permille: f64,
     /// Mean of 1/R along the train in 1/m, when curves are known.
     pub curvature_per_m: Option<f64>,
-    /// What resists beyond the declared basic resistance, part by part.
+    /// Resistances beyond the declared basic resistance, part by part.
     pub resistance: Resistance,
     /// All of it in N/kN at this speed. Negative where something pushes.
     pub extra_n_per_kn: f64,
@@ -81,7 +81,7 @@ impl ResolvedSample {
         self.inertial_mass_kg / self.mass_kg - 1.0
     }
 
-    /// What a force may depend on, where it is known.
+    /// Returns the value of a covariate, where it is known.
     #[inline]
     pub fn covariate(&self, of: Covariate) -> Option<f64> {
         match of {
@@ -97,7 +97,7 @@ impl ResolvedSample {
     /// Everything known that retards the train in proportion to its weight, in N/kN: gradient
     /// and every declared resistance beyond the basic one; `None` while no gradient is known.
     ///
-    /// What an estimator looks for is what the motion shows beyond this sum.
+    /// An estimator looks for the part of the motion beyond this sum.
     #[inline]
     pub fn known_n_per_kn(&self) -> Option<f64> {
         Some(self.gradient_permille? + self.extra_n_per_kn)
@@ -259,7 +259,7 @@ impl ForceResolver {
         if let Some(late) = &mut self.late_speed {
             put_behind(late, &mut resolved);
         }
-        // What is felt was compared with the late speed itself.
+        // The accelerometer was compared with the late speed itself.
         resolved.gradient_permille = resolved.gradient_permille.or(felt_permille);
         resolved.extra_n_per_kn =
             resolved.resistance.extra_n_per_kn(self.train.resistance, resolved.speed_mps);

@@ -60,7 +60,7 @@ fn a_long_gap_of_forces_is_left_out_and_the_speed_taken_up_after_it() {
     let mut samples = perfect_run(1000);
     for sample in &mut samples[300..400] {
         sample.brake_force_n = None;
-        // What happened meanwhile, the forces do not show.
+        // The forces do not show the time between.
         sample.speed_mps += 3.0;
     }
     for sample in &mut samples[400..] {

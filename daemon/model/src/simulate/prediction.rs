@@ -13,7 +13,7 @@ pub use crate::terms::wheel::STANDING_MPS;
 pub enum Restart {
     /// Never: from the run's first sample to its end. The metric `full_run`.
     FullRun,
-    /// Every so many seconds from the run's first sample. The metric `window60` is 60 s.
+    /// Every this many seconds from the run's first sample. The metric `window60` is 60 s.
     EverySeconds(f64),
     /// At every departure, from rest: errors from stop to stop.
     AtDepartures,
@@ -25,8 +25,8 @@ impl Restart {
     /// The metric `window60`.
     pub const WINDOW_60: Restart = Restart::EverySeconds(Restart::WINDOW_S);
 
-    /// The number of the first sample behind another at which a measured speed is taken up again; that of none where
-    /// there is none.
+    /// Returns the number of the first sample after another at which a measured speed is taken up again; the number
+    /// of samples if there is none.
     fn next_behind(self, samples: &[ResolvedSample], index: usize) -> usize {
         match self {
             Restart::FullRun => samples.len(),

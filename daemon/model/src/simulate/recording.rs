@@ -53,7 +53,7 @@ pub struct Recording {
     bridged: usize,
 }
 
-/// What the simulation does with a sample.
+/// Role of a sample in the simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SampleRole {
     /// Reached by a step from the sample before.

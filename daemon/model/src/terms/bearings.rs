@@ -7,7 +7,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
 
-/// What is added to a at a cold start, in N/kN.
+/// Addition to a at a cold start, in N/kN.
 pub const DELTA_A: Key = Key {
     table: "corrections",
     name: "bearing_delta_a_n_per_kn",
@@ -34,7 +34,7 @@ pub const PARAMETERS: [Parameter; 2] = [
 pub const TYPICAL_TAU_S: f64 = 200.0;
 /// Standard deviation of what bearings that warm up usually add at the start, as a share of a.
 pub const USUAL_STD: f64 = 0.05;
-/// Bearings are cold again after a gap of so many s between two samples.
+/// Bearings are cold again after a gap of this many s between two samples.
 pub const COLD_AGAIN_S: f64 = 1800.0;
 
 /// Since when the bearings have been warming up.
@@ -57,7 +57,7 @@ impl WarmUp {
     }
 }
 
-/// Bearings that were cold so many s ago resist.
+/// Adds the resistance of bearings that were cold `since_cold_s` seconds ago.
 #[inline]
 pub fn act(delta_a_n_per_kn: f64, tau_s: f64, since_cold_s: f64, resistance: &mut Resistance) {
     resistance.bearing_n_per_kn += delta_a_n_per_kn * (-since_cold_s / tau_s).exp();

@@ -10,7 +10,7 @@ pub const BUILD_UP_S: f64 = 10.0;
 /// The force.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("force_n", (0.0, 3e5), 20.0)];
 
-/// Share of the force so many s after the onset.
+/// Returns the share of the force `since_s` seconds after the onset.
 #[inline]
 pub fn build_up(since_s: f64) -> f64 {
     (since_s / BUILD_UP_S).clamp(0.0, 1.0)

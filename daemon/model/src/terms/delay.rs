@@ -36,7 +36,7 @@ pub const TOLERATED_S: f64 = 0.3;
 
 /// Samples kept: six seconds of the fastest controllers.
 const CAPACITY: usize = 2048;
-/// A shorter lag in s is none.
+/// Shortest lag in s.
 const LAG_MIN_S: f64 = 1e-3;
 
 /// Traction and brake force in N.

@@ -20,7 +20,7 @@ pub const SHIFT_LEAST_M: f64 = 5.0;
 pub const ERROR: &str = "gradient_error";
 /// The same for falling chainage, where it is another way; else both directions have one.
 pub const ERROR_FALLING: &str = "gradient_error_falling";
-/// What it lacks at one chainage.
+/// Error of the gradient at one chainage.
 pub const ERROR_PARAMETER: Parameter = Parameter::new("permille", (-150.0, 150.0), 0.05);
 /// A root mean square in ‰ below this is what good surveys differ by.
 pub const ERROR_LEAST_PERMILLE: f64 = 0.25;

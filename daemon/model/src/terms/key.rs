@@ -1,5 +1,5 @@
-//! What every term says of itself: where its numbers stand in the files and what may stand there, what of it is
-//! estimated, and how it is looked for while the train runs.
+//! Descriptions of every term: the keys of its numbers in the files and their ranges, its estimated parameters, and
+//! how it is looked for while the train runs.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -28,7 +28,7 @@ pub struct Key {
     pub range: [f64; 2],
     /// The range in words.
     pub allowed: &'static str,
-    /// What a finding does to a declared value.
+    /// Effect of a finding on a declared value.
     pub joined: Joined,
     /// Its place in a train.
     pub of: fn(&mut TrainModel) -> &mut f64,
@@ -56,7 +56,7 @@ impl PartialEq for Key {
 }
 
 impl Key {
-    /// What a train declares.
+    /// Returns the declared value of a train.
     pub fn declared(&self, train: &TrainModel) -> f64 {
         *(self.of)(&mut train.clone())
     }
@@ -101,11 +101,11 @@ impl Parameter {
 pub enum Least {
     /// Its parameter itself.
     Size(f64),
-    /// Its force where it acts, as so many times the monitor's share of the resistance there.
+    /// Its force where it acts, as a multiple of the monitor's share of the resistance there.
     Share(f64),
 }
 
-/// What is seen at a sample, forces in N/kN.
+/// Inputs at a sample, forces in N/kN.
 #[derive(Clone, Copy, Debug)]
 pub struct SuspectInput {
     /// Speed in m/s.

@@ -46,7 +46,7 @@ pub const CORRECTIONS: [&Key; 13] = [
     &ambient::REFERENCE,
 ];
 
-/// What the monitor looks for, one column of its regression each.
+/// Suspects of the monitor, one column of its regression each.
 pub const SUSPECTS: [Suspect; 8] = [
     tunnel::SUSPECT,
     wind::SUSPECT,
@@ -58,8 +58,8 @@ pub const SUSPECTS: [Suspect; 8] = [
     adhesion::SUSPECT,
 ];
 
-/// What is never known exactly, so that the monitor learns it in any case: only a value that is
-/// unusual is an effect.
+/// Suspects that are never known exactly, so that the monitor learns them in any case: only an unusual value is an
+/// effect.
 pub const USUAL: [Suspect; 4] =
     [masses::SUSPECT, wind::OF_THE_DAY, curve::SUSPECT, bearings::SUSPECT];
 

@@ -5,7 +5,7 @@ use crate::train::Davis;
 /// Lists the parts once, each with its value in the basic resistance alone.
 macro_rules! parts {
     ($( $(#[doc = $doc:literal])* $part:ident = $basic:literal; )*) => {
-        /// What resists at one sample, but for the Davis coefficients: each term writes its own part.
+        /// Resistances at one sample, without the Davis coefficients: each term writes its own part.
         ///
         /// ```text
         /// w(v) = factor (a + b v + c v²) + c (c_share v² + outside ((v + u)|v + u| - v²)) + dc v²
@@ -51,9 +51,9 @@ parts! {
     other_per_mps = 0.0;
     /// Factor on the basic resistance.
     factor = 1.0;
-    /// What tunnels add to c, as share of it.
+    /// Addition of tunnels to c, as share of it.
     c_share = 0.0;
-    /// What tunnels add to c, in N/kN per (m/s)².
+    /// Addition of tunnels to c, in N/kN per (m/s)².
     dc = 0.0;
     /// Headwind in m/s.
     headwind_mps = 0.0;
@@ -62,7 +62,7 @@ parts! {
 }
 
 impl Resistance {
-    /// What is there at standstill, in N/kN.
+    /// Returns the resistance at standstill, in N/kN.
     #[inline]
     fn constant_n_per_kn(&self) -> f64 {
         self.curve_n_per_kn
@@ -90,13 +90,13 @@ impl Resistance {
             + self.by_factor_n_per_kn(davis, speed_mps)
     }
 
-    /// What tunnels add, in N/kN: by their length, as share of c and in addition to it.
+    /// Returns the addition of tunnels, in N/kN: by their length, as share of c and in addition to it.
     #[inline]
     pub fn in_tunnels_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
         self.tunnel_n_per_kn + (self.c_share * davis.c + self.dc) * speed_mps * speed_mps
     }
 
-    /// What the wind adds to the air resistance, in N/kN.
+    /// Returns the addition of the wind to the air resistance, in N/kN.
     #[inline]
     pub fn by_wind_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
         let square = speed_mps * speed_mps;
@@ -104,7 +104,7 @@ impl Resistance {
         self.outside * davis.c * (ahead_mps * ahead_mps.abs() - square)
     }
 
-    /// What the factor adds to the basic resistance, in N/kN.
+    /// Returns the addition of the factor to the basic resistance, in N/kN.
     #[inline]
     pub fn by_factor_n_per_kn(&self, davis: Davis, speed_mps: f64) -> f64 {
         (self.factor - 1.0) * davis.w0_n_per_kn(speed_mps)
@@ -130,7 +130,7 @@ impl Resistance {
         ]
     }
 
-    /// What the resistance in N/kN changes by for each unit of a, b and c.
+    /// Returns the change of the resistance in N/kN by each unit of a, b and c.
     #[inline]
     pub fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {
         let square = speed_mps * speed_mps;

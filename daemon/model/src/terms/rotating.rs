@@ -15,7 +15,7 @@ pub const FACTOR: Key = Key {
 };
 /// Locomotives with small loads reach 0.25 to 0.3.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("rotating_mass_factor", (0.0, 0.5), 0.005)];
-/// What a load makes of the factor is more.
+/// Least effect; a load changes the factor by less.
 pub const LEAST: f64 = 0.01;
 /// Standard deviation of what is declared: it is taken from a table of trains alike, and seldom weighed.
 pub const USUAL_STD: f64 = 0.01;

@@ -1,8 +1,8 @@
 //! A measured speed that is late: the true one of a dead time ago, behind a first-order lag.
 //!
-//! What the wheels' sensor, its filter and its bus lose in time. Behind such a speed everything else
-//! acts as it did when the speed was true: forces, gradient and every resistance. That distinguishes it from
-//! forces that act late, for those leave the gradient on time.
+//! Delay of the wheels' sensor, its filter and its bus. With such a speed everything else acts as it did when the
+//! speed was true: forces, gradient and every resistance. That distinguishes it from forces that act late, for
+//! those leave the gradient on time.
 
 use super::delay::{DelayLine, Forces};
 use super::wheel::STANDING_MPS;
@@ -37,7 +37,7 @@ pub const LEAST_S: f64 = 0.35;
 /// of the resistance.
 const RESISTING: usize = 1 + Resistance::PARTS;
 
-/// What acted on the train when the speed that is measured now was true.
+/// Forces on the train when the speed that is measured now was true.
 #[derive(Clone, Debug)]
 pub struct LateSpeed {
     forces: DelayLine<2>,
@@ -105,7 +105,7 @@ impl LateSpeed {
         self.cylinder_pressure_pa.acting(at, now.map(|pa| [pa])).map(|[pa]| pa)
     }
 
-    /// What the accelerometer felt then in m/s²; `None` while it is not known.
+    /// Returns the specific force at that time in m/s²; `None` while it is not known.
     pub fn specific_force_mps2(&mut self, at: (i64, u32), now: Option<f64>) -> Option<f64> {
         self.specific_force_mps2.acting(at, now.map(|felt| [felt])).map(|[felt]| felt)
     }

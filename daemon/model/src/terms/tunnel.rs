@@ -23,7 +23,7 @@ pub const C_FACTOR: Key = Key {
     joined: Joined::Multiplied,
     of: |train| &mut train.corrections.tunnel_c_factor,
 };
-/// What is added to c inside, whatever c is: so it is found, for c itself may hardly be known.
+/// Addition to c inside, whatever c is: it is found in this form, since c itself may hardly be known.
 pub const DC: Key = Key {
     table: "corrections",
     name: "tunnel_dc_n_per_kn_per_mps2",
@@ -56,7 +56,7 @@ pub fn act_by_factor(c_factor: f64, share: Option<f64>, resistance: &mut Resista
     resistance.c_share += share.unwrap_or(0.0) * (c_factor - 1.0);
 }
 
-/// c is larger by so many N/kN per (m/s)² for a share of the train.
+/// Adds `dc_n_per_kn_per_mps2` to c for a share of the train.
 #[inline]
 pub fn act(dc_n_per_kn_per_mps2: f64, share: Option<f64>, resistance: &mut Resistance) {
     resistance.dc += share.unwrap_or(0.0) * dc_n_per_kn_per_mps2;

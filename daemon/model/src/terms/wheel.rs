@@ -17,7 +17,7 @@ pub const SPEED_SCALE: Key = Key {
 };
 /// Wheels are turned down by at most about a tenth of their diameter.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("speed_scale", (0.88, 1.12), 0.002)];
-/// What the wear of a wheel between two measurements makes is less.
+/// Least effect; the wear of a wheel between two measurements is less.
 pub const LEAST: f64 = 0.003;
 
 /// The true speed in m/s behind a measured one.

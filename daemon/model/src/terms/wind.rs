@@ -31,7 +31,8 @@ pub fn act(wind_plus_mps: f64, direction: f64, resistance: &mut Resistance) {
     resistance.headwind_mps += wind_plus_mps * direction;
 }
 
-/// What a little headwind adds at a speed in m/s, in N/kN for each m/s of it, with so much of the train in tunnels.
+/// Returns the addition of a small headwind at a speed in m/s, in N/kN for each m/s of it, with a share of the
+/// train in tunnels.
 #[inline]
 pub fn slope_n_per_kn(c: f64, speed_mps: f64, tunnel_share: f64) -> f64 {
     2.0 * (1.0 - tunnel_share) * c * speed_mps
@@ -50,7 +51,7 @@ pub const SUSPECT: Suspect = Suspect {
 /// The wind of one day: a headwind in one run, whichever way it goes.
 pub const OF_THE_DAY: Suspect = Suspect { unit: |seen| unit(seen, 1.0), ..SUSPECT };
 
-/// What 1 m/s along the line adds, in N/kN.
+/// Returns the addition of 1 m/s along the line, in N/kN.
 fn unit(seen: &SuspectInput, direction: f64) -> f64 {
     let blows = |wind_plus_mps: f64| {
         let mut air = Resistance::BASIC;

@@ -17,7 +17,7 @@ pub fn gradient_error_kept(distance_m: f64) -> f64 {
     (-2.0 * distance_m.abs() / GRADIENT_ERROR_FREE_M).exp()
 }
 
-/// What is known of a line besides its profile: by a survey, or from another project's files.
+/// Properties of a line besides its profile: by a survey, or from another project's files.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackSurvey {
     /// Gradient for falling chainage as (chainage in m, ‰ climbing positive as the chainage
@@ -96,11 +96,11 @@ pub struct Track {
     resistance_n_per_kn: Option<StepProfile>,
     /// How far in m the true gradient lies from the profile, towards growing chainage.
     pub gradient_shift_m: f64,
-    /// What the declared gradient lacks, when known.
+    /// Error of the declared gradient, when known.
     pub gradient_error: Option<GradientError>,
     /// The sections on which trains weigh more or less than declared.
     pub masses: Vec<MassSection>,
-    /// What a survey, or another project's file, adds.
+    /// Additions of a survey, or of another project's file.
     pub survey: TrackSurvey,
 }
 

@@ -181,7 +181,7 @@ impl LinearProfile {
     }
 }
 
-/// What a declared gradient lacks in ‰ along growing chainage.
+/// Error of a declared gradient in ‰ along growing chainage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GradientError {
     /// For both directions, or for growing chainage.
@@ -191,8 +191,8 @@ pub struct GradientError {
 }
 
 impl GradientError {
-    /// What is lacking in ‰ at a chainage, climbing positive as the chainage grows, for a train in
-    /// a direction of travel, +1 or -1.
+    /// Returns the error in ‰ at a chainage, climbing positive as the chainage grows, for a train in a direction of
+    /// travel, +1 or -1.
     #[inline]
     pub fn at(&self, position_m: f64, direction: f64) -> f64 {
         match &self.falling {

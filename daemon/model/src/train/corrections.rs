@@ -1,4 +1,4 @@
-//! What measured runs have added to the declared model.
+//! Corrections of the declared model by measured runs.
 
 /// Lists every correction once, with its value where nothing is corrected.
 macro_rules! corrections {
@@ -18,19 +18,19 @@ macro_rules! corrections {
 corrections! {
     /// Measured over true speed, by another wheel diameter than declared.
     speed_scale = 1.0;
-    /// The measured speed is so many s late.
+    /// Delay of the measured speed in s.
     speed_delay_s = 0.0;
     /// And then follows the true one with this time constant in s.
     speed_lag_s = 0.0;
     /// Reported over true traction force.
     traction_gain = 1.0;
-    /// The reported forces act so many s later.
+    /// Delay of the reported forces in s.
     actuator_delay_s = 0.0;
     /// And then build up with this time constant in s.
     actuator_lag_s = 0.0;
     /// Factor on c v² for the part of the train in tunnels.
     tunnel_c_factor = 1.0;
-    /// What is added to c for the part of the train in tunnels, in N/kN per (m/s)².
+    /// Addition to c for the part of the train in tunnels, in N/kN per (m/s)².
     tunnel_dc_n_per_kn_per_mps2 = 0.0;
     /// Headwind in m/s for the direction of growing chainage, outside tunnels.
     wind_plus_mps = 0.0;

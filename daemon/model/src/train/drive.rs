@@ -1,4 +1,4 @@
-//! What a traction drive makes of electric power, where its force is not recorded.
+//! Force of a traction drive from its electric power, where the force is not recorded.
 
 /// Share of the electric power that reaches the wheels' rims unless a train says otherwise: motors,
 /// converter and gear of drives of the last decades, under load.
@@ -51,8 +51,8 @@ impl Drive {
         is_known.then(|| self.mechanical_w(recorded_w) / speed_mps)
     }
 
-    /// What a recorded power in W at a speed in m/s says more of the traction and of the brake force in N
-    /// by this drive than by another; `None` where either determines none.
+    /// Returns the difference of the traction and the brake force in N, from a recorded power in W at a speed in
+    /// m/s, between this drive and another; `None` where either determines none.
     pub fn beyond_n(&self, other: Drive, recorded_w: f64, speed_mps: f64) -> Option<[f64; 2]> {
         let at = |drive: &Drive| drive.force_n(recorded_w, speed_mps);
         let (own_n, other_n) = at(self).zip(at(&other))?;

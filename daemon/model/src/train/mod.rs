@@ -1,4 +1,4 @@
-//! What is declared of a train.
+//! Declared model of a train.
 
 mod corrections;
 mod drive;
@@ -77,7 +77,7 @@ pub struct BrakeGear {
     pub friction: Option<f64>,
     /// Number of brake pads on the train.
     pub pads: Option<f64>,
-    /// What the friction brake makes of its pressure, where its force is not recorded.
+    /// Force of the friction brake from its pressure, where the force is not recorded.
     pub friction_brake: Option<FrictionBrake>,
     /// How its units differ and fail, where that is declared.
     pub components: Option<BrakeComponents>,
@@ -150,7 +150,7 @@ pub struct TrainModel {
     pub drive: Option<Drive>,
     /// Brake gear, as far as declared.
     pub brake_gear: BrakeGear,
-    /// What measured runs have added.
+    /// Corrections by measured runs.
     pub corrections: Corrections,
     /// Resistances of forms of their own.
     pub extra: Vec<Extra>,

@@ -25,7 +25,7 @@ const MASS_SHARES: (f64, f64) = (0.2, 5.0);
 pub const GAP_MAX_S: f64 = 2.5;
 /// A longer step ahead in s is not believed within a run.
 pub const JUMP_MAX_S: f64 = 86_400.0;
-/// After so many refusals in a row that agree with each other, the past is given up.
+/// After this many refusals in a row that agree with each other, the past is given up.
 const REFUSALS_BEFORE_RESTART: u32 = 5;
 
 /// A sample that passed, with what its predecessors say about it.
@@ -46,7 +46,7 @@ impl ValidSample<'_> {
     }
 }
 
-/// The newest gap of the sequence numbers, while it may yet turn out to be none.
+/// The newest gap of the sequence numbers, which may yet turn out not to be a gap.
 #[derive(Clone, Copy, Debug)]
 struct Gap {
     /// The last number before it.

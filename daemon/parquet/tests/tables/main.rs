@@ -1,4 +1,4 @@
-//! What the tables of a recording promise, and those of others.
+//! Tests of the tables of a recording, ours and those of other tools.
 
 mod dataset;
 mod fields;

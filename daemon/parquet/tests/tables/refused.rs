@@ -1,4 +1,4 @@
-//! What is no recording in Parquet is refused by name, with what was expected.
+//! A file that is not a recording in Parquet is refused by name, with the expected contents.
 
 use std::fs::File;
 use std::path::Path;
@@ -17,7 +17,7 @@ use proptest::prelude::*;
 
 use crate::support::{program, said, shared, table, write};
 
-/// What every command says of a path that is wrong.
+/// Returns the message of every command for a wrong path.
 fn refusal(path: &Path) -> String {
     let (shown, out) = (path.display().to_string(), path.with_extension("out"));
     let out = out.display().to_string();

@@ -13,7 +13,7 @@ use dynocar_recording::recording::Metadata;
 use dynocar_recording::writing::RecordingWriter;
 use parquet::arrow::ArrowWriter;
 
-/// What a file holds, message by message.
+/// Contents of a file, message by message.
 #[derive(Debug, Default, PartialEq)]
 pub struct Everything {
     /// Topic, number, both times, bytes.
@@ -95,7 +95,7 @@ pub fn program(arguments: &[&str]) -> Output {
     Command::new(program).args(arguments).output().expect("the program")
 }
 
-/// What it says on standard error.
+/// Returns the text on standard error.
 pub fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }

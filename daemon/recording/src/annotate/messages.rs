@@ -1,4 +1,4 @@
-//! What an explanation adds to a recording, as messages, and their schema in a file of its own.
+//! Messages that an explanation adds to a recording, and their schema in a file of its own.
 
 use std::sync::LazyLock;
 
@@ -9,7 +9,7 @@ use crate::message::{MessageField, message};
 use crate::schema::{fields_of, message};
 
 message! {
-    /// What `explain` says of a recording.
+    /// Statement of `explain` about a recording.
     Verdict {
         /// none, effect, ambiguous, unknown or insufficient_data.
         1 verdict: String = string;

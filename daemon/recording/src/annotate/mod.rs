@@ -45,7 +45,7 @@ pub struct OtherRuns {
     pub explained: usize,
 }
 
-/// What was added.
+/// Summary of the added messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Annotated {
     /// Intervals in which an effect acts.

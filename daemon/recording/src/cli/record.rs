@@ -25,13 +25,13 @@ pub struct RecordArguments {
     /// The daemon's configuration to attach; by default the one that its command line names
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Begin a new file after so many MiB
+    /// Begin a new file after this many MiB
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     rotate_mib: Option<u64>,
-    /// Begin a new file after so many minutes
+    /// Begin a new file after this many minutes
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     rotate_minutes: Option<u64>,
-    /// Remove the oldest files when all take more than so many MiB
+    /// Remove the oldest files when all take more than this many MiB
     #[arg(long, value_name = "N", requires = "rotation",
           value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     keep_mib: Option<u64>,
@@ -39,7 +39,7 @@ pub struct RecordArguments {
     sync: SyncArguments,
 }
 
-/// What a recorder or a live view reads.
+/// Arguments that select the trains and pipelines for a recorder or a live view.
 #[derive(Debug, Args)]
 pub struct WantedArguments {
     /// Only this train; may be given several times. By default every train that is there or comes
@@ -48,13 +48,13 @@ pub struct WantedArguments {
     /// The run-time directory; else the variable DYNOCAR_ROOT, else /tmp/dynocar-USER
     #[arg(long, value_name = "DIR")]
     root: Option<PathBuf>,
-    /// Take a pipeline's snapshot every so many ms, and each change of its status
+    /// Take a pipeline's snapshot every this many ms, and each change of its status
     #[arg(long, value_name = "MS", default_value_t = 100)]
     snapshots_ms: u64,
 }
 
 impl WantedArguments {
-    /// What is to be read.
+    /// Returns the selection of trains and pipelines.
     ///
     /// # Errors
     ///
@@ -69,10 +69,10 @@ impl WantedArguments {
     }
 }
 
-/// What a power cut may cost.
+/// Arguments that limit the loss by a power cut.
 #[derive(Debug, Args)]
 pub struct SyncArguments {
-    /// Bring the files to the disk every so many ms: what a power cut costs; 0 leaves it to the system
+    /// Sync the files to the disk every this many ms: the data that a power cut costs; 0 leaves it to the system
     #[arg(long, value_name = "MS", default_value_t = SYNC.as_millis() as u64,
           value_parser = clap::value_parser!(u64).range(0..=3_600_000))]
     sync_ms: u64,
@@ -211,7 +211,7 @@ pub fn execute_flight_recorder(arguments: &FlightRecorderArguments) -> Result<()
 ///
 /// # Errors
 ///
-/// When there is none.
+/// If there is no recorder in the folder.
 pub fn execute_keep(arguments: &KeepArguments) -> Result<(), Failure> {
     let shown = arguments.folder.display();
     match request_keeping(&arguments.folder, &arguments.reason) {

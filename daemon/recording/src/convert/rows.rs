@@ -29,7 +29,7 @@ pub enum RowError {
         line: u64,
         /// The column.
         column: &'static str,
-        /// What it holds.
+        /// Contents of the cell.
         cell: String,
         /// The field's type.
         expected: &'static str,

@@ -37,7 +37,7 @@ pub enum ToDatasetError {
     Content(#[from] AtPath<NoDataset>),
 }
 
-/// What is wrong with a recording that is to become a dataset.
+/// Errors of a recording that is to become a dataset.
 #[derive(Debug, thiserror::Error)]
 pub enum NoDataset {
     /// It holds several trains.
@@ -68,7 +68,7 @@ pub enum NoDataset {
     },
 }
 
-/// What was made of a recording.
+/// Summary of the dataset made from a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unpacked {
     /// Runs that were written.
@@ -190,7 +190,7 @@ fn chosen(recording: &Recording, train: Option<u64>) -> Result<u64, NoDataset> {
 /// Texts of the train and, where there is one, the line.
 type Models = (Vec<u8>, Option<Vec<u8>>);
 
-/// What was given, else what the newest attached configuration has of the train.
+/// Returns the given models, else those of the newest attached configuration of the train.
 fn models(
     path: &Path,
     recording: &Recording,

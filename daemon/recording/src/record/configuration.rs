@@ -1,4 +1,4 @@
-//! What is attached: the daemon's configuration with its files, and maintenance events as they come.
+//! Attachments: the daemon's configuration with its files, and maintenance events as they come.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -120,12 +120,12 @@ impl Maintenance {
     pub fn follow(&mut self, train: TrainId, configuration: &Configuration) {
         let Some(directory) = configuration.store() else { return };
         let models = Store::at(&directory).train(train);
-        // What was written down before the recording is none of it.
+        // Models written down before the recording do not belong to it.
         let known = newest(&models);
         self.trains.entry(train).or_insert((models, known));
     }
 
-    /// What is new since the last look; nothing more often than every few seconds.
+    /// Returns the events since the last call; at most once every few seconds.
     pub fn news(&mut self) -> Vec<Event> {
         if self.looked.is_some_and(|looked| looked.elapsed() < EVERY) {
             return Vec::new();

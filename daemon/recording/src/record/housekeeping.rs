@@ -1,4 +1,4 @@
-//! What a recorder does with its files besides writing: it brings them to the disk, keeps them and removes them.
+//! Care of a recorder's files besides writing: it syncs them to the disk, keeps them and removes them.
 //!
 //! A disk may take seconds for each of these. They are done in the order in which they were asked for, in a
 //! thread of their own while a recorder runs, so that nobody who records waits for them.
@@ -19,7 +19,7 @@ use super::keeping::{KeepError, Keeper};
 use super::ring::{Aged, Ages};
 use crate::event::Event;
 
-/// What is to be done.
+/// A task of the housekeeping.
 #[derive(Debug)]
 pub enum Task {
     /// Bring a file to the disk, into which this many items were written, files before it included.
@@ -55,7 +55,7 @@ struct Progress {
     is_settling: AtomicBool,
 }
 
-/// What came to nothing: it stops no recording.
+/// A task that failed: it does not stop a recording.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot be brought to the disk: {source}; a power cut may take what was recorded since", file.display())]
 struct SettleError {

@@ -1,4 +1,4 @@
-//! What a flight recorder keeps for good: the files around a moment, under names of their own.
+//! Files that a flight recorder keeps for good: those around a moment, under names of their own.
 //!
 //! A file is kept by giving it a second name (a hard link) in the folder of the event. So it is kept from
 //! that moment on, whatever happens to the recorder: the ring removes only the first name, and the file that
@@ -39,12 +39,12 @@ pub struct Keeping {
 /// Why something is not kept. It stops nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum KeepError {
-    /// What is kept takes all that it may.
+    /// The kept files take all the space that they may.
     #[error("nothing is kept for good: {}: takes its {most_mib} MiB already: move events away", kept.display())]
     Full {
         /// Where it lies.
         kept: PathBuf,
-        /// What it may take.
+        /// Most space that they may take.
         most_mib: u64,
     },
     /// The ring is another recorder's.
@@ -118,7 +118,7 @@ pub fn requested(ring: &Path) -> Option<String> {
 ///
 /// # Errors
 ///
-/// When the folder is none, or the request cannot be written.
+/// If the folder is not a ring, or the request cannot be written.
 pub fn request(ring: &Path, reason: &str) -> io::Result<bool> {
     let lock = File::open(ring.join(LOCK_FILE));
     match lock.map(|file| file.try_lock_shared()) {
@@ -228,7 +228,7 @@ impl Keeper {
             self.link(file, &beside)?;
             self.storage.sync_file(file).map_err(refused(file))
         });
-        // What could be kept is, even where the rest could not.
+        // The files that could be kept are kept, even if others could not.
         event.write(&self.storage, &beside)?;
         self.storage.rename_new(&beside, folder).map_err(refused(folder))?;
         let kept = self.ring.join(KEPT_FOLDER);

@@ -33,7 +33,7 @@ pub struct Reason {
     pub train: u64,
     /// The event's kind.
     pub kind: String,
-    /// What it says.
+    /// Text of the event.
     pub text: String,
 }
 

@@ -34,10 +34,10 @@ const FLUSH: Duration = Duration::from_millis(400);
 /// this, a flush, and the time that the disk takes.
 pub const SYNC: Duration = Duration::from_secs(1);
 
-/// What is to be recorded, and where to.
+/// Contents and destination of a recording.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// What is read.
+    /// Trains and pipelines to read.
     pub wanted: Wanted,
     /// The file; with rotation the beginning of the files' names.
     pub output: PathBuf,
@@ -47,7 +47,7 @@ pub struct Settings {
     pub sync: Option<Duration>,
     /// The daemon's configuration; by default the file that its command line names.
     pub configuration: Option<PathBuf>,
-    /// What is kept for good in the folder of the files, for a flight recorder.
+    /// Events kept for good in the folder of the files, for a flight recorder.
     pub keeping: Option<Keeping>,
 }
 
@@ -74,12 +74,12 @@ pub enum RecordError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What stopped it.
+        /// Error that stopped it.
         source: McapError,
     },
 }
 
-/// What the system said, where it was the system.
+/// Returns the words of the system, where the error is the system's.
 fn words(error: &McapError) -> String {
     match error {
         McapError::Io(error) => error.to_string(),
@@ -87,7 +87,7 @@ fn words(error: &McapError) -> String {
     }
 }
 
-/// What was recorded.
+/// Summary of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recorded {
     /// Samples written.
@@ -147,7 +147,7 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
     recorder.files.finish()
 }
 
-/// What is read goes into files.
+/// Writes the received messages into files.
 struct Recorder {
     files: Files,
     /// The daemon's configuration, where it was named.

@@ -15,12 +15,12 @@ pub enum ConfigurationProblem {
     /// It cannot be unpacked.
     #[error(transparent)]
     Unpacking(#[from] std::io::Error),
-    /// It is none.
+    /// The configuration is not valid.
     #[error("{folder}/daemon.toml: {problem}")]
     Malformed {
         /// The folder of the attached files.
         folder: String,
-        /// What is wrong.
+        /// Problem of the run.
         problem: String,
     },
     /// The daemon of this release refuses it.

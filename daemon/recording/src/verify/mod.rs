@@ -70,8 +70,8 @@ fn rest(it: &Verified) -> String {
 /// The pipeline that answers for a quantity, and its snapshot after the last sample.
 type Answer = (String, ParameterSnapshot);
 
-/// What two configurations, the recorded one and another of this name, answer after the last of some samples,
-/// side by side.
+/// Returns the answers of two configurations, the recorded one and another of this name, after the last of some
+/// samples, side by side.
 pub fn overlay(configs: [&DaemonConfig; 2], samples: &[TrainSample], name: &str) -> String {
     let answers = configs.map(|config| answers(config, samples));
     let mut text = format!(
@@ -99,7 +99,7 @@ pub fn overlay(configs: [&DaemonConfig; 2], samples: &[TrainSample], name: &str)
     text + "± is the half width of the 95 % interval\n"
 }
 
-/// What a configuration answers for every quantity of every train after the last of some samples.
+/// Returns the answers of a configuration for every quantity of every train after the last of some samples.
 fn answers(config: &DaemonConfig, samples: &[TrainSample]) -> BTreeMap<(u64, Quantity), Answer> {
     let mut answered = BTreeMap::new();
     for train in &config.trains {

@@ -18,13 +18,13 @@ pub struct Difference {
     pub sample: u64,
     /// The field.
     pub field: &'static str,
-    /// What was recorded, in words.
+    /// Recorded value, in words.
     pub recorded: String,
-    /// What was computed, in words.
+    /// Computed value, in words.
     pub computed: String,
 }
 
-/// What became of a pipeline's snapshots.
+/// Result of the comparison of a pipeline's snapshots.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// Every bit is the same.
@@ -39,7 +39,7 @@ pub enum Outcome {
     OtherSamples {
         /// The last sample up to which both agree; none when it is 0.
         agree_up_to: u64,
-        /// What speaks for it.
+        /// Reason for it.
         why: &'static str,
     },
     /// The configuration has no such pipeline for the train.
@@ -63,7 +63,7 @@ pub struct Verified {
     pub recorded: usize,
     /// Those that are the same to the bit, from the first on.
     pub same: usize,
-    /// What became of the rest.
+    /// Result for the rest.
     pub outcome: Outcome,
     /// True where the daemon may have started from a kept state.
     pub keeps_state: bool,
@@ -96,7 +96,7 @@ pub fn verify(recording: &Recording, configurations: &Configurations) -> Vec<Ver
     verified
 }
 
-/// What makes a pipeline afresh.
+/// Returns a new pipeline.
 fn pipeline_of<'c>(
     config: &'c DaemonConfig,
     train: u64,

@@ -16,7 +16,7 @@ fn program(arguments: &[&str]) -> Output {
     Command::new(program).args(arguments).output().expect("the program")
 }
 
-/// What the program says of a file that is wrong, which has to be named.
+/// Returns the program's message about a wrong file, which has to be named.
 fn refusal(path: &Path) -> String {
     let out = path.with_extension("out");
     let shown = path.to_str().unwrap();

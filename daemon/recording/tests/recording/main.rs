@@ -1,4 +1,4 @@
-//! What the library of recordings promises, and the recorder as a process (`process`).
+//! Tests of the library of recordings, and of the recorder as a process (`process`).
 
 mod annotate;
 mod codec;

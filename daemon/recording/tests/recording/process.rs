@@ -41,7 +41,7 @@ fn started(site: &TestSite, command: &[&str], to: &str) -> Child {
     recorder
 }
 
-/// What can be read by now.
+/// Returns the recording as far as it can be read by now.
 fn recording(site: &TestSite) -> Recording {
     let mut recording = Recording::default();
     read(&site.at("run.mcap"), &mut recording).unwrap();
@@ -57,7 +57,7 @@ fn count(site: &TestSite, kind: EventKind) -> usize {
     recording(site).events.iter().filter(|it| it.kind == kind as i32).count()
 }
 
-/// Waits until so many samples more are published, and gives the newest number.
+/// Waits until `count` samples more are published, and returns the newest number.
 fn await_more(controller: &Controller, count: u64) -> u64 {
     let newest = || controller.published().last().map_or(0, |it| it.sequence);
     let start = newest();

@@ -28,7 +28,7 @@ pub fn samples() -> Vec<TrainSample> {
     published_samples(&dataset, TrainId(1))
 }
 
-/// What the shipped daemon answers to samples: every so many samples a snapshot of each pipeline.
+/// Returns the answers of the shipped daemon to samples: a snapshot of each pipeline every `every` samples.
 pub fn snapshots(samples: &[TrainSample], every: usize) -> Vec<ParameterSnapshot> {
     let config = DaemonConfig::load(&config_folder().join("daemon.toml")).expect("daemon.toml");
     let mut answers = Vec::new();

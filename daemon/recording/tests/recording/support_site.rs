@@ -74,7 +74,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// Publishes so many samples every 2 ms.
+    /// Publishes `at_once` samples every 2 ms.
     pub fn start(site: &TestSite, at_once: usize) -> Self {
         let published = Arc::new(Mutex::new(Vec::new()));
         let stop = Arc::new(AtomicBool::new(false));
@@ -99,7 +99,7 @@ impl Controller {
         Controller { published, stop, thread: Some(thread) }
     }
 
-    /// What was published; a sample is noted down only after it was.
+    /// Returns the published samples; a sample is added only after its publication.
     pub fn published(&self) -> MutexGuard<'_, Vec<TrainSample>> {
         self.published.lock().unwrap()
     }

@@ -39,7 +39,7 @@ last minutes, one block a second, from their lowest to their highest value.
 What to drive next is computed from the present covariance on level track, within
 what the train's file declares.";
 
-/// What is looked at.
+/// Views of the screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum View {
     /// Quantities, residual, what to drive next.
@@ -49,7 +49,7 @@ pub enum View {
     Pipelines,
 }
 
-/// What was chosen by keys.
+/// Choice made by keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Choice {
     /// Place among the trains.

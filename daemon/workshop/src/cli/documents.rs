@@ -1,4 +1,4 @@
-//! What the command line says of itself: `dynocar completions` to a shell, `dynocar man` in the manual.
+//! Documents of the command line: `dynocar completions` for a shell, `dynocar man` for the manual.
 
 use std::path::PathBuf;
 

@@ -30,7 +30,8 @@ pub fn text(answer: &ExplainAnswer) -> String {
     text + &others(answer)
 }
 
-/// What else was looked for, with what speaks against it; what is no more than chance is counted.
+/// Describes the other explanations, with the evidence against them; those that are no more than chance are
+/// counted.
 fn others(answer: &ExplainAnswer) -> String {
     let is_chance = |it: &&Considered| it.evidence.is_some_and(|evidence| evidence <= 0.0);
     let chance = answer.considered.iter().filter(is_chance).count();
@@ -103,7 +104,7 @@ fn found(effect: &EffectAnswer) -> String {
     rows
 }
 
-/// What else explains the runs, what limits the answer, and which runs would settle it.
+/// Describes the alternatives that explain the runs, the limits of the answer, and the runs that would settle it.
 fn limits(answer: &ExplainAnswer) -> String {
     let others: Vec<String> =
         answer.ambiguous_with.iter().map(|kind| words::kind_name(kind).into()).collect();

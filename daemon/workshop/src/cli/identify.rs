@@ -34,7 +34,7 @@ pub struct IdentifyArguments {
     pub(super) json: Option<PathBuf>,
 }
 
-/// What is to be learned from, by which estimators.
+/// Runs to learn from, and estimators to learn with.
 #[derive(Clone, Debug, Args)]
 pub struct Question {
     /// The dataset's folder, or a recording
@@ -53,14 +53,14 @@ pub struct Question {
     pub traction_only: bool,
 }
 
-/// What was learned.
+/// Estimates of all estimators.
 #[derive(Debug, Serialize)]
 pub struct IdentifyAnswer {
     dataset: String,
     /// The unit in which the runs hold the speed.
     #[serde(skip)]
     speed_unit: Unit,
-    /// What may spoil the results, the worst first.
+    /// Diagnostics that may spoil the results, the worst first.
     #[serde(rename = "notes")]
     diagnostics: Vec<DatasetDiagnostic>,
     /// From all runs, one after the other.
@@ -135,7 +135,7 @@ pub fn answer(question: &Question) -> Result<IdentifyAnswer, Failure> {
     })
 }
 
-/// What every estimator learns from some runs, one after the other.
+/// Returns the estimates of every estimator from some runs, one after the other.
 fn learned(
     dataset: &Dataset,
     runs: &[usize],

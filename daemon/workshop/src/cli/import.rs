@@ -76,7 +76,7 @@ pub fn execute(arguments: &ImportArguments) -> Result<(), Failure> {
     for (name, _) in &written {
         require_new(&out.join(name))?;
     }
-    // What is written is what the readers take.
+    // The readers accept the written text.
     let model = train.as_ref().map(|(_, made)| parse_train(TRAIN_FILE, &made.text)).transpose()?;
     let track = line.as_ref().map(|(_, text)| parse_track(TRACK_FILE, text)).transpose()?;
     let diagnostics =
@@ -86,7 +86,7 @@ pub fn execute(arguments: &ImportArguments) -> Result<(), Failure> {
     Ok(print(&answer::text(out, train.as_ref(), line.as_ref(), &diagnostics, &names))?)
 }
 
-/// The one of several that is wanted; `None` where there is none.
+/// Returns the requested one of several; `None` where there is none.
 fn chosen<'i, T>(
     all: &'i [T],
     id: impl Fn(&T) -> &String,

@@ -20,7 +20,7 @@ use recordings::Draft;
 use summary::{DAEMON_FILE, Described};
 
 const WRITER: &str = "dynocar init";
-/// Units that the values did not reveal are set right so many times at most.
+/// Units that the values did not reveal are corrected this many times at most.
 const CORRECTIONS_MAX: usize = 4;
 
 /// Writes the first description.

@@ -59,7 +59,7 @@ fn above_zero(text: &str, most: f64, expected: &str) -> Result<f64, String> {
 #[derive(Debug, Serialize)]
 struct StopsAnswer {
     dataset: String,
-    /// What may spoil the results, the worst first.
+    /// Diagnostics that may spoil the results, the worst first.
     #[serde(rename = "notes")]
     diagnostics: Vec<DatasetDiagnostic>,
     #[serde(flatten)]
@@ -222,7 +222,7 @@ fn text(answer: &StopsAnswer) -> String {
     text + "\n± is the half width of the 95 % interval\n"
 }
 
-/// What the others hold: the driver's deceleration at some speeds, and why it is no law.
+/// Describes the other stops: the driver's deceleration at some speeds, and why it is no law.
 fn modulated(stops: &[RecordedStop]) -> String {
     let others: Vec<&RecordedStop> = stops.iter().filter(|it| it.no_law.is_some()).collect();
     let fastest = others.iter().map(|it| it.from_mps).fold(0.0, f64::max);

@@ -11,7 +11,7 @@ const THREADS_MAX: usize = 1024;
 /// On how many cores to work.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct Threads {
-    /// Work on so many cores, else on all; the answer is the same
+    /// Work on this many cores, else on all; the answer is the same
     #[arg(long = "threads", value_name = "N", value_parser = count)]
     pub(super) count: Option<usize>,
 }

@@ -19,7 +19,7 @@ const ROTATING_MASS_DEFAULT: f64 = 0.06;
 /// Resistance in N/kN over the speed in m/s, of a train of which nothing is known.
 const DAVIS_DEFAULT: [f64; 3] = [1.5, 0.015, 0.0015];
 
-/// What somebody says of the train.
+/// The user's description of the train.
 #[derive(Clone, Debug, Default, PartialEq, Args)]
 pub struct TrainArguments {
     /// The train's name
@@ -48,7 +48,7 @@ pub struct TrainArguments {
     c: Option<f64>,
 }
 
-/// What may be asked of somebody who has not said it: the key, and the question with its unit.
+/// Questions about keys that the user has not given: the key, and the question with its unit.
 pub const QUESTIONS: [(&str, &str); 8] = [
     ("name", "Name of the train"),
     ("mass_t", "Gross mass with its load, t"),
@@ -60,7 +60,7 @@ pub const QUESTIONS: [(&str, &str); 8] = [
     ("c", "c, N/kN per (m/s)²"),
 ];
 
-/// What is known of the train from files.
+/// Values of the train from files.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     /// Keys of `[train]` and `[resistance]`, each with its value and where that is from.
@@ -101,7 +101,7 @@ impl TrainArguments {
         self.said().into_iter().any(|(said, value)| said == key && value.is_some())
     }
 
-    /// What is said, by its key, in the order of the file.
+    /// Returns the user's values, by key, in the order of the file.
     fn said(&self) -> [(&'static str, Option<Value>); 8] {
         let number = |it: Option<f64>| it.map(Value::Float);
         [
@@ -132,7 +132,7 @@ impl TrainArguments {
     ///
     /// # Errors
     ///
-    /// What is said is of no train.
+    /// The values are not those of a train.
     pub fn default_of(&self, key: &str) -> Result<String, Failure> {
         let defaults = self.text("", &Found::default())?.defaults;
         let value = defaults.iter().find_map(|it| it.split_once(" = ").filter(|it| it.0 == key));
@@ -143,7 +143,7 @@ impl TrainArguments {
     ///
     /// # Errors
     ///
-    /// What no train has, in words.
+    /// Describes the values that no train has.
     pub fn with_answer(&self, key: &str, answer: &str) -> Result<Self, String> {
         let mut answered = self.clone();
         match key {

@@ -1,4 +1,4 @@
-//! What an explanation comes to in the store: a candidate, events, or nothing that is not there already.
+//! Conclusion of an explanation for the store: a candidate, events, or nothing that is not there already.
 
 use std::path::Path;
 
@@ -22,7 +22,7 @@ use dynocar::models::{
     MaintenanceEvent, ModelHash, ModelText, Moment, NewModel, Origin, TrainModels,
 };
 
-/// What an explanation came to.
+/// Conclusion of an explanation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explained {
     /// The verdict.
@@ -35,7 +35,7 @@ pub struct Explained {
     pub same_as: Option<ModelHash>,
     /// Numbers of the maintenance events that are new.
     pub events: Vec<u64>,
-    /// What is open and was not before.
+    /// New open question.
     pub question: Option<OpenQuestion>,
 }
 
@@ -49,7 +49,7 @@ pub struct Conclusion<'a> {
     pub text: &'a ModelText,
     /// The runs.
     pub pool: &'a Pool,
-    /// What was made of them.
+    /// Explanation of the runs.
     pub explanation: &'a Explanation,
     /// The command, as the origin of a model names it.
     pub command: &'a str,
@@ -121,7 +121,7 @@ impl Conclusion<'_> {
         let is_held = |kind: &str| !grown.not_expressed.iter().any(|it| it == kind);
         let effects: Vec<_> =
             answer.effects.iter().filter(|it| is_held(it.kind)).map(found_effect).collect();
-        // What is certain and takes little from the error improves no prediction.
+        // An effect that is certain and takes little from the error improves no prediction.
         let matters = |it: &EffectAnswer| is_held(it.kind) && it.p_value < p_value(SCORE_MIN);
         let is_important = answer.effects.iter().any(matters);
         let Some(error) = improvement(answer).filter(|_| is_important) else {

@@ -30,7 +30,7 @@ pub enum LearnError {
     /// A recording cannot be unpacked, whatever it holds.
     #[error(transparent)]
     Unpack(#[from] UnpackError),
-    /// What is remembered cannot be written.
+    /// The memory cannot be written.
     #[error(transparent)]
     Memory(#[from] StateError),
     /// A folder cannot be made.

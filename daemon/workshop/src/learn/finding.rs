@@ -1,5 +1,5 @@
-//! What an explanation means for the store: effects of the train or the line make a candidate, effects of
-//! certain runs are events, and what the data do not determine is an open question.
+//! Meaning of an explanation for the store: effects of the train or the line make a candidate, effects of certain
+//! runs are events, and undetermined effects are an open question.
 
 use std::collections::BTreeMap;
 
@@ -181,7 +181,7 @@ pub fn sentence(event: &MaintenanceEvent) -> String {
     if sizes.is_empty() { text } else { format!("{text}: {}", sizes.join(", ")) }
 }
 
-/// What the runs do not determine; `None` where they determine enough.
+/// Returns the open question of the runs; `None` where they determine enough.
 pub fn question(
     answer: &ExplainAnswer,
     train: TrainId,

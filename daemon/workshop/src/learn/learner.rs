@@ -26,7 +26,7 @@ const OWN_FOLDER: &str = "learn";
 /// Held by the learner that works on a store.
 const LOCK_FILE: &str = "learner.lock";
 
-/// What a learner works on.
+/// Settings of a learner.
 #[derive(Clone, Debug)]
 pub struct LearnerSettings {
     /// The store of models.
@@ -50,7 +50,7 @@ pub struct Learner {
     _lock: File,
 }
 
-/// What a round came to.
+/// Result of a round.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Round {
     /// By train.
@@ -59,7 +59,7 @@ pub struct Round {
     pub is_stopped: bool,
 }
 
-/// What a round came to for a train.
+/// Result of a round for a train.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainRound {
     /// The train.
@@ -68,11 +68,11 @@ pub struct TrainRound {
     pub in_force: ModelHash,
     /// The runs that there are.
     pub runs: usize,
-    /// What they came to.
+    /// Outcome of the runs.
     pub outcome: Outcome,
 }
 
-/// What the runs of a train came to.
+/// Outcome of the runs of a train.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// The same runs and model as the last time.
@@ -109,12 +109,12 @@ impl Learner {
         Ok(Learner { settings, own, memory, _lock: lock })
     }
 
-    /// What it works on.
+    /// Returns the settings.
     pub fn settings(&self) -> &LearnerSettings {
         &self.settings
     }
 
-    /// What it remembers.
+    /// Returns the memory.
     pub fn memory(&self) -> &Memory {
         &self.memory
     }
@@ -271,7 +271,7 @@ fn since_adopted(models: &TrainModels) -> Result<Option<Moment>, LearnError> {
     Ok(changes.next_back().map(|(_, decision)| decision.at))
 }
 
-/// What is explained, as a hash: the model and the runs.
+/// Returns a hash of the explained input: the model and the runs.
 fn digest(in_force: ModelHash, choices: &[Vec<FoundRun>]) -> String {
     let runs: String = choices.iter().flatten().map(|run| format!("{}\n", run.key())).collect();
     hex(format!("{in_force}\n{runs}").as_bytes())

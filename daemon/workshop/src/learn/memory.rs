@@ -1,5 +1,5 @@
-//! What the learner remembers from round to round. It saves work and repetition, and nothing depends on
-//! it: a memory that is lost is begun anew, and candidates and events are in the store.
+//! Memory of the learner from round to round. It saves work and repetition, and nothing depends on it: a lost
+//! memory is begun anew, and candidates and events are in the store.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ pub struct KnownFile {
     pub sha256: String,
 }
 
-/// What recorded runs do not determine, with what would.
+/// Question that recorded runs do not settle, with the experiment that would.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OpenQuestion {
     /// The train.
@@ -44,7 +44,7 @@ pub struct OpenQuestion {
     pub kinds: Vec<String>,
     /// The verdict in a sentence.
     pub statement: String,
-    /// What would settle it.
+    /// Experiment that would settle it.
     pub experiment: Option<String>,
 }
 
@@ -68,7 +68,7 @@ pub struct Memory {
     /// Digest of what was explained last, by train.
     #[serde(default)]
     pub explained: BTreeMap<String, String>,
-    /// What was reported as open.
+    /// Reported open questions.
     #[serde(default)]
     pub open: Vec<OpenQuestion>,
 }

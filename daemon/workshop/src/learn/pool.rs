@@ -81,7 +81,7 @@ pub fn choices(runs: &[FoundRun], bounds: &Bounds) -> Vec<Vec<FoundRun>> {
     choices
 }
 
-/// At most so many places of a list, evenly spread over it.
+/// Returns at most `most` places of a list, evenly spread over it.
 fn spread(length: usize, most: usize) -> BTreeSet<usize> {
     let count = length.min(most);
     (0..count).map(|k| (2 * k + 1) * length / (2 * count)).collect()

@@ -92,7 +92,7 @@ pub fn unpacked_in(folder: &Path, now: Moment, horizon: Duration) -> Vec<(PathBu
         let source = std::fs::read_to_string(folder.join(SOURCE_FILE)).ok();
         match source.and_then(|text| toml::from_str(&text).ok()) {
             Some(source) => found.push((folder, source)),
-            // What a learner left that died; nobody else works here.
+            // Left by a learner that died; nobody else works here.
             None => remove(&folder),
         }
     }
@@ -112,7 +112,7 @@ pub fn unpacked_in(folder: &Path, now: Moment, horizon: Duration) -> Vec<(PathBu
 }
 
 fn remove(folder: &Path) {
-    // What cannot be removed is looked at again in the next round.
+    // Folders that cannot be removed are looked at again in the next round.
     let _ = std::fs::remove_dir_all(folder);
 }
 

@@ -61,7 +61,7 @@ pub struct Places<'a> {
     pub trains: &'a [TrainId],
 }
 
-/// What lies in the folder of runs.
+/// Entry in the folder of runs.
 #[derive(Debug, Default)]
 struct Lying {
     datasets: Vec<PathBuf>,

@@ -54,7 +54,7 @@ impl TimeOfDay {
     }
 }
 
-/// What a train's snapshots suspect.
+/// Suspicions of a train's snapshots.
 pub struct Suspicions {
     observed: ObservedTrain,
     /// The newest effect that was suspected.

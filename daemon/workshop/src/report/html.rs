@@ -20,12 +20,12 @@ pub fn legend(entries: &[(&str, &str)]) -> String {
     format!("<ul class=\"legend\" aria-label=\"Key\">{items}</ul>\n")
 }
 
-/// What is there, but for those who ask only.
+/// Returns an element that is folded until the reader opens it.
 pub fn details(summary: &str, body: &str) -> String {
     format!("<details>\n<summary>{summary}</summary>\n{body}</details>\n")
 }
 
-/// A probability that may be tiny, with so many decimals.
+/// Returns a probability that may be tiny, with `decimals` decimals.
 pub fn chance(p_value: f64, decimals: usize) -> String {
     if p_value < 1e-6 { "&lt; 10⁻⁶".into() } else { format!("{p_value:.decimals$e}") }
 }

@@ -99,7 +99,7 @@ fn badge(verdict: Verdict) -> (&'static str, &'static str) {
     }
 }
 
-/// What may spoil the verdict, above it; empty when all is well.
+/// Returns the diagnostics that may spoil the verdict, to stand above it; empty when all is well.
 fn diagnostics(subject: &Subject) -> String {
     let diagnostics = &subject.explanation.answer.diagnostics;
     if diagnostics.is_empty() {

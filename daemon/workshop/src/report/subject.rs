@@ -1,4 +1,4 @@
-//! What a page is about.
+//! Subject of a page.
 
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::Explanation;
@@ -9,7 +9,7 @@ use dynocar_analysis::explain::report::errors::RunErrors;
 pub struct Subject<'a> {
     /// The dataset.
     pub dataset: &'a Dataset,
-    /// What was made of it.
+    /// Explanation of the dataset.
     pub explanation: &'a Explanation,
     /// The same as numbers and words for the page.
     pub data: ReportData,
@@ -26,7 +26,7 @@ impl<'a> Subject<'a> {
         !self.explanation.answer.effects.is_empty()
     }
 
-    /// What the model without effects is called in a key.
+    /// Returns the name of the model without effects in a key.
     pub fn before(&self) -> &'static str {
         if self.has_effect() { "before" } else { "declared model, a, b, c refitted" }
     }

@@ -18,12 +18,12 @@ pub struct SurveyAnswer {
     pub line: SurveyedLine,
     /// The trips, in the order of the written dataset.
     pub trips: Vec<TripAnswer>,
-    /// What is no trip.
+    /// Parts that are not a trip.
     pub not_used: Vec<NotUsed>,
-    /// What was learned jointly with the line; absent on a known line.
+    /// Values learned jointly with the line; absent on a known line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learned: Option<LearnedAnswer>,
-    /// What these recordings do not determine.
+    /// Quantities that these recordings do not determine.
     pub cannot_tell: Vec<String>,
 }
 
@@ -64,7 +64,7 @@ pub struct TripAnswer {
     pub left_out_residual_n: Option<f64>,
 }
 
-/// What was learned of the vehicle and its recorder.
+/// Values learned of the vehicle and its recorder.
 #[derive(Debug, Serialize)]
 pub struct LearnedAnswer {
     /// Nominal or empty mass in t, without rotating parts.
@@ -146,7 +146,8 @@ impl SurveyedLine {
 }
 
 impl LearnedAnswer {
-    /// What was learned, for people: in few words where a terminal shows it, its unit, in all words, and the value.
+    /// Returns the learned values for people: in few words where a terminal shows them, the unit, in all words, and
+    /// the value.
     pub fn rows(&self) -> Vec<(&'static str, &'static str, &'static str, Estimate)> {
         let [a, b, c] = self.resistance.map(Some);
         let rows = [
@@ -194,7 +195,7 @@ impl LearnedAnswer {
     }
 }
 
-/// What recordings of this kind leave open.
+/// Returns the quantities that recordings of this kind leave open.
 fn cannot_tell(survey: &Survey) -> Vec<String> {
     let Some(profile) = &survey.profile else { return Vec::new() };
     let mut open = vec![

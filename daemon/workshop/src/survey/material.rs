@@ -1,4 +1,4 @@
-//! What the files of a survey are made of, and why nothing comes of it.
+//! Material of a survey's files, and the reason where there is none.
 
 use std::path::{Path, PathBuf};
 
@@ -8,15 +8,15 @@ use dynocar_analysis::survey::{Survey, SurveyError, Vehicle};
 use dynocar::dataset::LoadError;
 use dynocar::output::OutputError;
 
-/// What the files are made of.
+/// Material of the files.
 pub struct Material<'m> {
     /// Where the raw dataset lies.
     pub source: &'m Path,
     /// The raw dataset.
     pub dataset: &'m Dataset,
-    /// What was declared of the vehicle.
+    /// Declared vehicle.
     pub vehicle: &'m Vehicle,
-    /// What was found.
+    /// Findings of the survey.
     pub survey: &'m Survey,
     /// The line's file that was given, if any.
     pub line: Option<&'m Path>,
@@ -36,7 +36,7 @@ pub enum SurveyFailure {
     SurveyedLine {
         /// The file.
         path: PathBuf,
-        /// What was expected and what came.
+        /// Expected and found contents.
         problem: String,
     },
     /// A file cannot be written, or would cost data.

@@ -35,7 +35,7 @@ const SAME_STOP_M: f64 = 25.0;
 pub struct Surveyed {
     /// The raw recordings.
     pub raw: Dataset,
-    /// What was found.
+    /// Findings of the survey.
     pub survey: Survey,
     /// The same for machines.
     pub answer: SurveyAnswer,

@@ -1,4 +1,4 @@
-//! What a survey reads.
+//! Inputs of a survey.
 
 use std::path::Path;
 
@@ -83,7 +83,7 @@ fn recording(dataset: &Dataset, run: &Run) -> RawRecording {
     }
 }
 
-/// What is declared of the vehicle.
+/// Returns the declared vehicle.
 pub fn vehicle(dataset: &Dataset) -> Vehicle {
     let train = &dataset.train;
     let has_passengers = dataset.runs.iter().any(|run| run.extra(Quantity::Passengers).is_some());

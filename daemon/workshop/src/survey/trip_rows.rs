@@ -22,7 +22,7 @@ pub fn late_s(survey: &Survey) -> f64 {
 enum Source {
     /// A field of the samples.
     Field(SampleField),
-    /// What was recorded beside them.
+    /// Quantity recorded beside them.
     Extra,
     /// Made of several, see `run_csv`.
     Made,
@@ -31,7 +31,7 @@ enum Source {
 /// A column of the trips' files.
 #[derive(Clone, Copy)]
 pub struct Column {
-    /// What it holds.
+    /// Quantity of the column.
     pub quantity: Quantity,
     /// Its unit.
     pub unit: &'static str,

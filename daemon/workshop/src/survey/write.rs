@@ -19,9 +19,9 @@ use dynocar::output::{require_replaceable, write_in_folder};
 
 /// Length of the beginning by which a file of a survey is known.
 const MARK_LENGTH: usize = 20;
-/// What a survey's TOML files begin with.
+/// First line of a survey's TOML files.
 const MARK: &str = "# By `dynocar survey`";
-/// A profile reaches beyond its alignment by so many m.
+/// A profile reaches beyond its alignment by this many m.
 const BEYOND_M: f64 = 60.0;
 
 /// The file of a trip, from its number from 0.
@@ -53,7 +53,7 @@ pub fn write(material: &Material, folder: &Path) -> Result<Vec<PathBuf>, SurveyF
         files.push((trip_file(number), run_csv(material, trip)));
     }
     for (name, text) in &files {
-        // What is there and begins otherwise is no survey's: the raw recordings, most likely.
+        // A file that begins otherwise was not written by a survey: the raw recordings, most likely.
         let mark = text.get(..MARK_LENGTH.min(text.len())).unwrap_or_default();
         require_replaceable(&folder.join(name), mark)?;
     }

@@ -98,7 +98,7 @@ pub enum UpdatedModelError {
     Declared {
         /// The file.
         label: String,
-        /// What is wrong.
+        /// Problem of the run.
         problem: String,
     },
     /// A file cannot be written.

@@ -26,7 +26,7 @@ use crate::identity::SHARED_MEMORY;
 
 /// Pipeline threads that a page has room for; as many as can receive a train's samples.
 const THREADS_MAX: usize = TrainSample::RECEIVERS_MAX;
-/// A greater number is none that a controller has counted up to.
+/// Largest number that a controller can have counted up to.
 const NUMBER_MAX: u64 = u64::MAX / 2;
 
 const BYTES: usize = 4096;
@@ -123,7 +123,7 @@ impl SampleCount {
         number(&self.page().published.0.sent)
     }
 
-    /// The daemon serves the train with so many threads and pipelines.
+    /// Announces that the daemon serves the train with `threads` threads and `pipelines` pipelines.
     pub fn serve(&self, threads: usize, pipelines: usize) {
         let served = &self.page().served.0;
         served.threads.store(threads as u64, Release);
@@ -165,13 +165,13 @@ impl SampleCount {
 
 impl Drop for SampleCount {
     fn drop(&mut self) {
-        // SAFETY: mapped by `map` with this length; nobody holds a reference any more.
-        // What cannot be unmapped stays until the process ends.
+        // SAFETY: mapped by `map` with this length; nobody holds a reference any more. A mapping that cannot be
+        // removed stays until the process ends.
         let _ = unsafe { munmap(self.page.as_ptr().cast(), BYTES) };
     }
 }
 
-/// What nobody of ours has written reads as a count that has not begun.
+/// Returns the count at a place; memory that was never written reads as a count that has not begun.
 fn number(place: &AtomicU64) -> u64 {
     let number = place.load(Acquire);
     if number <= NUMBER_MAX { number } else { 0 }

@@ -16,7 +16,7 @@ use super::wire::{Payload, Wire};
 use crate::channel::process::Owned;
 use crate::error::{ChannelError, SendRefused};
 
-/// What a sender asks of its port.
+/// Interface of a sender to its port.
 trait Send<T>: Debug {
     fn send(&self, message: &T) -> Result<(), SendRefused>;
     fn serve_newcomers(&self);
@@ -34,7 +34,7 @@ impl<T: Payload> Send<T> for Publisher<ipc::Service, Wire<T>, ()> {
     }
 }
 
-/// What a receiver asks of its port.
+/// Interface of a receiver to its port.
 trait Receive<T>: Debug {
     fn next(&self) -> Option<T>;
 }

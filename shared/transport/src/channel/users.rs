@@ -28,7 +28,7 @@ pub const COUNT_SUFFIX: &str = ".count";
 /// The modes of a service's description and of a segment that are not complete: the transport's.
 const DESCRIPTION_IN_MAKING: u32 = 0o600;
 const SEGMENT_IN_MAKING: u32 = 0o200;
-/// What a few ports take with their services and connections, with a margin.
+/// Memory that a few ports take with their services and connections, with a margin.
 const FREE_BYTES_MIN: u64 = 4 << 20;
 /// The last one to leave tidies up within microseconds; a newcomer waits for it.
 const TRIES: u32 = 250;

@@ -24,7 +24,7 @@ const STOP_MASS_T: f64 = 0.38;
 const CORRELATION: f64 = 0.9;
 /// Share of the error that is left when the gradient of a line declared level is found.
 const LEVEL_SHARE_MAX: f64 = 0.25;
-/// What independent analyses of the day leave open, for each quantity.
+/// Range of the inertial mass that independent analyses of the day leave open.
 const INERTIAL_MASS_T: [f64; 2] = [19.4, 20.1];
 const PASSENGER_KG: [f64; 2] = [60.0, 82.0];
 const BRAKE_N_PER_PA: [f64; 2] = [0.23, 0.28];
@@ -74,7 +74,7 @@ fn held(masses: &Masses) -> Result<String, String> {
     if scatter_t <= STOP_MASS_T && correlation >= CORRELATION { Ok(words) } else { Err(words) }
 }
 
-/// What trips say that took no part in their line.
+/// Errors of trips that took no part in their line.
 #[derive(Default)]
 struct LeftOut {
     errors_mps: Vec<f64>,
@@ -85,7 +85,7 @@ struct LeftOut {
     another_day: Vec<OtherDay>,
     /// Their force from power, by pair.
     power: Vec<ByPower>,
-    /// What is found when the first of these lines is declared level.
+    /// Answer when the first of these lines is declared level.
     level: Option<ExplainAnswer>,
 }
 

@@ -14,8 +14,8 @@ use dynocar_workshop::survey::survey_folder;
 /// By how much in m/s the error of mapped recordings, over all pairs of trips, may be greater than when
 /// they were surveyed with the others.
 const WORSE_MAX_MPS: f64 = 0.01;
-/// What a straight regression of the recorded force on power, without any balance of forces, leaves
-/// open of the efficiency.
+/// Range of the efficiency that a straight regression of the recorded force on power, without any balance of
+/// forces, leaves open.
 const EFFICIENCY: [f64; 2] = [0.90, 0.96];
 /// Largest distance of force by power from force recorded, as a share of the recorded one: half as
 /// much again as such a regression leaves (8 %).
@@ -28,7 +28,7 @@ pub struct OtherDay {
     together_mps: f64,
 }
 
-/// What the power of six trips shows, and how it fares on the two left out.
+/// Estimates from the power of six trips, and their errors on the two left out.
 #[derive(Clone, Copy, Debug)]
 pub struct ByPower {
     efficiency: WithStd,

@@ -1,5 +1,5 @@
-//! What `dynocar explain` says of the practice runs, against their truth files: verdict and kind,
-//! parameters, place, and the share of the error that a fit of the true effect takes away.
+//! Answers of `dynocar explain` on the practice runs, against their truth files: verdict and kind, parameters,
+//! place, and the share of the error that a fit of the true effect removes.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What the residual monitor suspects while the practice runs are driven, one after the other.
+//! Suspicions of the residual monitor while the practice runs are driven, one after the other.
 
 use std::path::Path;
 use std::sync::Arc;

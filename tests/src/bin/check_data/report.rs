@@ -1,4 +1,4 @@
-//! What passed and what failed.
+//! Passed and failed checks.
 
 use std::process::ExitCode;
 

@@ -11,7 +11,7 @@ use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,
 };
 
-/// A standstill of so many s is a stop.
+/// A standstill of this many s is a stop.
 const STOP_S: f64 = 5.0;
 /// A section that moves for less than this in s shows little.
 const MOVING_MIN_S: f64 = 20.0;

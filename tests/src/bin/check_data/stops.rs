@@ -1,4 +1,4 @@
-//! What a measured emergency stop says.
+//! Results of a measured emergency stop.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What the truth file of a practice dataset states.
+//! Contents of the truth file of a practice dataset.
 
 use std::path::Path;
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::train::Account;
 
-/// What an hour of the day showed.
+/// Counts of an hour of the day.
 #[derive(Clone, Debug, Default)]
 pub struct Hour {
     /// Resident memory of the daemon in KiB at its most.

@@ -63,7 +63,7 @@ struct Day<'a> {
     pipelines: usize,
     trains: Vec<DayTrain>,
     client: Option<Process>,
-    /// What daemons that have ended made of their samples.
+    /// Counts of daemons that have ended.
     ended: Account,
     latencies_ns: Vec<u64>,
     /// Resident memory of this daemon in KiB by quarter.
@@ -71,7 +71,7 @@ struct Day<'a> {
     starts: u64,
 }
 
-/// Runs so many hours; every third of them has a daemon of its own, of which the first is killed.
+/// Runs `hours` hours; every third of them has a daemon of its own, of which the first is killed.
 ///
 /// # Panics
 ///

@@ -5,7 +5,7 @@ use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::process::Command;
 
-/// What the program under test has loaded before the C library.
+/// Code that the program under test loads before the C library.
 const SOURCE: &str = include_str!("strange_host.c");
 
 /// The strange host of one program; everybody else's clock and disk are as they are.
@@ -50,12 +50,12 @@ impl StrangeHost {
         self.variables.each_ref().map(|(name, value)| (*name, value.as_str()))
     }
 
-    /// Sets the wall clock ahead by so many seconds of the true one, or back.
+    /// Sets the wall clock ahead by this many seconds of the true one, or back.
     pub fn set_clock_ahead(&self, seconds: i64) {
         self.set(0, seconds);
     }
 
-    /// Leaves so many bytes free in the folder; `None` for as many as there are.
+    /// Leaves this many bytes free in the folder; `None` for no limit.
     pub fn set_free(&self, bytes: Option<i64>) {
         self.set(1, bytes.unwrap_or(-1));
     }

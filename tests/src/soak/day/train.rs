@@ -18,7 +18,7 @@ const RUNS: usize = 4;
 const TURN_NS: i64 = 60_000_000_000;
 /// How long it sleeps between two looks whether the daemon has followed.
 const PAUSE: Duration = Duration::from_micros(50);
-/// What acts undeclared on the trains, in turn.
+/// Undeclared effects on the trains, in turn.
 const EFFECTS: [EffectKind; 4] = [
     EffectKind::None,
     EffectKind::DraggingBrake,
@@ -83,8 +83,8 @@ impl DayTrain {
         }
     }
 
-    /// Publishes up to so many samples, none from a time in ns of the day on; false when there is
-    /// none before.
+    /// Publishes up to `count` samples, none from a time in ns of the day on; returns false when there is none
+    /// before.
     ///
     /// # Panics
     ///
@@ -155,7 +155,7 @@ impl DayTrain {
         self.offset_ns -= by_ns;
     }
 
-    /// Waits until another daemon than before answers with so many pipelines.
+    /// Waits until another daemon than before answers with `pipelines` pipelines.
     ///
     /// # Panics
     ///
@@ -176,7 +176,7 @@ impl DayTrain {
         self.before_daemon = self.sequence;
     }
 
-    /// What the pipelines of this daemon made of the samples that were published since it came.
+    /// Returns the counts of the pipelines of this daemon for the samples that were published since it came.
     ///
     /// # Panics
     ///

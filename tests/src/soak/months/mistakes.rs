@@ -24,7 +24,7 @@ const DRIVEN: usize = 150;
 /// Trips of a year.
 const TRIPS_A_YEAR: usize = 10_000;
 
-/// What came of it.
+/// Counts of mistakes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mistakes {
     /// Years of all trains together.

@@ -1,4 +1,4 @@
-//! What is undeclared on which day.
+//! Undeclared effects by day.
 
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -7,7 +7,7 @@ use crate::simulator::effects::RunWindow;
 use crate::simulator::random::{Random, Stream};
 use crate::simulator::{Effect, World};
 
-/// What happens to a train over some months.
+/// Story of a train over some months.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Story {
     /// Nothing; two models that are no better are on trial.
@@ -34,7 +34,7 @@ pub struct Span {
 /// How a life is lived.
 #[derive(Clone, Copy, Debug)]
 pub struct LifeSettings {
-    /// What happens.
+    /// Story of the train.
     pub story: Story,
     /// When.
     pub span: Span,
@@ -50,7 +50,7 @@ pub struct LifeSettings {
     pub trips_between_mistakes: f64,
 }
 
-/// What wheels lose until they are turned, as a share of the diameter.
+/// Wear of wheels until they are turned, as a share of the diameter.
 const WEAR: f64 = 0.015;
 
 impl Story {
@@ -93,7 +93,7 @@ impl Story {
         matches!(self, Story::WheelsWear | Story::Winter | Story::BrakeDrags)
     }
 
-    /// What is undeclared on a day in a world.
+    /// Returns the undeclared effects on a day in a world.
     pub fn effects(self, world: &World, span: Span, day: usize) -> Vec<Effect> {
         if day < span.onset || (self.ends() && day >= span.end) {
             return Vec::new();

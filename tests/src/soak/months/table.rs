@@ -1,4 +1,4 @@
-//! What came of months.
+//! Results of the months.
 
 use dynocar::models::ModelHash;
 
@@ -15,13 +15,13 @@ pub struct Adoption {
     pub after: ModelHash,
     /// Whether it takes back the one before.
     pub is_rollback: bool,
-    /// What the model in force after adds to its parent.
+    /// Additions of the model in force after to its parent.
     pub adds: String,
     /// Whether it predicted the following days better than the one before; `None` where nothing shows it.
     pub is_right: Option<bool>,
 }
 
-/// What came of one life.
+/// Outcome of one life.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// How it was lived.

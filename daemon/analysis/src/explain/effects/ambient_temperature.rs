@@ -9,7 +9,7 @@ use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 use crate::statistics::span;
 
-/// Mean temperatures of the runs must differ by so many K.
+/// Least difference in K between the mean temperatures of the runs.
 const SPREAD_MIN_K: f64 = 4.0;
 
 #[derive(Debug)]

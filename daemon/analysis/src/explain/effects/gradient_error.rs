@@ -30,7 +30,7 @@ const NODES_A_LENGTH: f64 = 3.0;
 /// Nodes at least, and at most.
 const NODES_MIN: f64 = 4.0;
 const NODES_MAX: f64 = 160.0;
-/// What is tied to the line shows in so many runs.
+/// Least number of runs in which an effect tied to the line shows.
 const RUNS_MIN: usize = 2;
 
 #[derive(Debug)]

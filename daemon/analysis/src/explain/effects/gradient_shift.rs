@@ -66,7 +66,7 @@ impl Hypothesis for Shift {
     fn nature(&self) -> Nature<'_> {
         Nature {
             least: Some(gradient::SHIFT_LEAST_M),
-            // About so many shifts are as different as independent ones.
+            // About this many shifts are as different as independent ones.
             choice_cost: 2.0 * 20f64.ln(),
             on_others: OnOthers::Changes,
             ..Nature::of(EffectKind::GradientShift, &gradient::SHIFT_PARAMETERS)

@@ -62,6 +62,6 @@ pub const LIBRARY: &[Effect] = &[
     Effect::new(LowAdhesion, low_adhesion::propose, Whole::None),
     Effect::new(Unknown, unknown::propose_bands, Whole::None),
 ];
-/// What is in no library, by its form: tried where the library leaves a force.
+/// Unnamed effects, by their form: tried where the library leaves a force.
 pub const UNKNOWN: &Effect = &Effect::new(Unknown, unknown::propose_forms, Whole::None);
 pub use unknown::{a_form_explains_more, leaves_a_force};

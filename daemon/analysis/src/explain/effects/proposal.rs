@@ -1,4 +1,4 @@
-//! What a kind of effect makes of the data at hand.
+//! Proposals of a kind of effect for the data at hand.
 
 use std::sync::Arc;
 
@@ -51,12 +51,12 @@ impl Candidate {
     }
 }
 
-/// What a kind makes of the data: structures worth a fit, or why the data do not allow to test it.
+/// Proposals of a kind: structures worth a fit, or the reason why the data do not allow a test.
 pub type Proposal = Result<Vec<Candidate>, String>;
 
 /// The kind as one number of the whole train or line, with no place or run chosen.
 pub enum Whole {
-    /// It is none.
+    /// The kind has no such form.
     None,
     /// Its first structure is.
     First,
@@ -83,8 +83,8 @@ impl Effect {
         (self.propose)(scan)
     }
 
-    /// The kind as one number of the whole train or line, with no place or run chosen; `None` where it
-    /// is none, and where the data do not allow to test it.
+    /// Returns the kind as one number of the whole train or line, with no place or run chosen; `None` if it has no
+    /// such number, or where the data do not allow to test it.
     pub fn whole(&self, scan: &Scan) -> Option<Candidate> {
         match self.whole {
             Whole::None => None,

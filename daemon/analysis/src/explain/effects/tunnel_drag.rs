@@ -1,8 +1,8 @@
 //! Air resistance in tunnels: c v² is larger for the part of the train inside.
 //!
-//! A map without a tunnel is no proof that there is none: beside the mapped tunnels, places are
-//! looked for where c v² is larger. Trains that pass a place at different speeds distinguish that from a
-//! constant resistance there.
+//! A map without a tunnel does not prove that there is no tunnel: beside the mapped tunnels, places are looked for
+//! where c v² is larger. Trains that pass a place at different speeds distinguish that from a constant resistance
+//! there.
 
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
-//! What is a little wrong in every train's figures: scales of the reported forces, how late they act, the
-//! curve constant; and the map's own small error where its shape is known. No effects, but what others are looked for
-//! and a finished model is fitted beside.
+//! Usual errors of declared figures: scales of the reported forces, how late they act, the curve constant; and the
+//! map's own small error where its shape is known. They are no effects: other effects are sought, and a finished
+//! model is fitted, with them included.
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Parameter, bearings, curve, delay, rotating, traction};
@@ -18,7 +18,7 @@ enum Figure {
     Traction,
     /// By a share of the brake force.
     Brake,
-    /// By so many seconds between a report and its force.
+    /// Seconds between a report and its force.
     Lateness,
     /// By a share of the curve resistance.
     Curves,
@@ -38,7 +38,7 @@ const FIGURES: [(Figure, f64); 6] = [
     (Figure::Warming, bearings::USUAL_STD),
     (Figure::RotatingMass, rotating::USUAL_STD),
 ];
-/// What is looked for, in standard deviations, and the step of differences.
+/// Bounds of the search, in standard deviations, and the step of differences.
 const BEYOND: f64 = 10.0;
 const STEP: f64 = 0.1;
 

@@ -10,7 +10,7 @@ use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{CERTAIN_STDS, RunData, SampleForces};
 use crate::explain::scan::Scan;
 
-/// A headwind that both directions share is at most so many times what they do not share, or may come by
+/// A headwind that both directions share is at most this many times the part that they do not share, or may come by
 /// the scatter of the winds.
 const AHEAD_MAX: f64 = 3.0;
 

@@ -1,4 +1,4 @@
-//! What accelerations come to behind the whitening filter, without whitening them.
+//! Inner products of accelerations behind the whitening filter, without whitening them.
 //!
 //! The filter is linear: what 1 m/s² at a bin adds to the product with whitened series is a number of the bin, and all
 //! of them come from one pass of the adjoint filter backwards over the run. A square depends, behind the last bin where
@@ -24,7 +24,7 @@ pub struct Adjoint {
     steps: Vec<Step>,
 }
 
-/// So many columns are summed beside each other.
+/// Number of columns summed side by side.
 const WIDE: usize = 4;
 /// Products before those with the regressors.
 const OWN_PRODUCTS: usize = 1 + DEVIATIONS;
@@ -48,18 +48,18 @@ struct Step {
     carry_s: f64,
     /// Share of a difference that is left to the next bin.
     left: f64,
-    /// What the fading acceleration takes of a difference.
+    /// Gain of the fading acceleration from a difference.
     gain: f64,
     per_deviation: f64,
     /// Weight of a squared difference.
     weight: f64,
-    /// What is still to come of the square behind this bin, by the squares and the product of what is left of the
-    /// difference and of the fading acceleration.
+    /// Remaining part of the square behind this bin, by the squares and the product of the remaining difference and
+    /// of the fading acceleration.
     behind: [f64; 3],
 }
 
-/// What a step makes of the difference and the fading acceleration of the bin before: all that a square needs, in the
-/// order in which the next step waits for it.
+/// Difference and fading acceleration after a step from the bin before: all that a square needs, in the order in
+/// which the next step waits for it.
 #[derive(Clone, Copy, Debug)]
 struct Walked {
     /// Half of the time in s from the bin before; 0 where a segment starts.
@@ -257,7 +257,7 @@ mod tests {
         ((0..BINS).map(step).collect(), (0..BINS).map(|k| 2.0 * k as f64 + 0.1).collect())
     }
 
-    /// What the filter itself makes of accelerations in m/s².
+    /// Returns accelerations in m/s² as whitened by the filter itself.
     fn whitened(filter: &[whitener::Step], times_s: &[f64], mps2: &[f64]) -> Vec<f64> {
         let (mut speed_mps, mut level_mps, mut fading) = (0.0, 0.0, 0.0);
         let innovation = |k: usize| {

@@ -6,7 +6,7 @@ use crate::statistics::middle;
 
 /// Samples to each side that a value is compared with.
 const HALF_WINDOW: usize = 3;
-/// So many times the usual deviation from the median around is an outlier.
+/// Multiple of the usual deviation from the surrounding median that makes an outlier.
 const OUTLIER_SPREADS: f64 = 8.0;
 
 /// Samples further apart than this many s do not show what is an outlier.

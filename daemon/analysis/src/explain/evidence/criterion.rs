@@ -1,4 +1,4 @@
-//! What decides whether something is more than chance, and whether two explanations are one.
+//! Criteria that decide whether something is more than chance, and whether two explanations are one.
 
 /// Strength that an effect must have. Simulated data without any effect stay far below it
 /// ([`NULL_SCORE`]); recorded data, whose noise is not quite what the model of it says, come nearer.
@@ -28,10 +28,10 @@ pub struct NullScore {
     pub power: f64,
 }
 
-/// What decides whether an effect is accepted: its evidence times the square of the share that it takes
-/// from the open-loop error, of runs that were fitted and of runs left out. Either alone is easily had:
-/// thousands of samples make anything significant, and a flexible form takes away some of any error. The
-/// smaller the share, the more evidence it needs; what helps no run left out has none.
+/// Returns the acceptance score of an effect: its evidence times the square of its error reduction, of runs that
+/// were fitted and of runs left out. Either alone is easily had: thousands of samples make anything significant,
+/// and a flexible form takes away some of any error. The smaller the share, the more evidence it needs; an effect
+/// that helps no run left out scores nothing.
 pub fn acceptance_score(evidence: f64, reduction: f64) -> f64 {
     evidence.max(0.0) * reduction.max(0.0).powi(2)
 }

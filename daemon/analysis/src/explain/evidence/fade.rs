@@ -1,4 +1,4 @@
-//! What is left of something that fades, step by step.
+//! Remainder of a quantity that fades, step by step.
 
 /// Steps in s that differ by no more are equal: what is left of rounded times.
 pub(super) const SAME_STEP_S: f64 = 1e-9;

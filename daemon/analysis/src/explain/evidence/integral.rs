@@ -66,7 +66,7 @@ pub fn integrate_bins<const N: usize>(
 pub struct Response {
     /// Without a, b and c.
     pub rest: Vec<f64>,
-    /// What each unit of a, b and c adds.
+    /// Addition by each unit of a, b and c.
     pub davis: [Vec<f64>; 3],
 }
 

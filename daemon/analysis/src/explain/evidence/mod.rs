@@ -1,4 +1,4 @@
-//! What the runs say about a model: observations, their noise, and the joint fit.
+//! Evidence of the runs on a model: observations, their noise, and the joint fit.
 //!
 //! The measured speed is compared with the integral of the modelled acceleration, never
 //! differentiated. Samples are averaged in bins of about two seconds, within which outliers have

@@ -64,7 +64,7 @@ impl UpdatedModel {
             .collect()
     }
 
-    /// What its effects do to those among them that only add something, at most.
+    /// Returns the greatest change that its effects make to those among them that only add something.
     pub fn on_others(&self) -> OnOthers {
         self.effects.iter().map(|it| it.nature().on_others).max().unwrap_or(OnOthers::Nothing)
     }
@@ -88,7 +88,7 @@ impl UpdatedModel {
         Pass::of(effects.filter(|(number, _)| acts(*number)).map(|(_, own)| own))
     }
 
-    /// What the bins change by for a step of each of some parameters of effects, over the step: `moves` are
+    /// Returns the change of the bins by a step of each of some parameters of effects, over the step: `moves` are
     /// numbers of parameters with their steps.
     pub fn differences(
         &self,
@@ -181,7 +181,7 @@ impl UpdatedModel {
         self.integrate((run, theta), |_| true, accelerations, forces, [bins]);
     }
 
-    /// What some of the effects make of the bins for every a, b and c.
+    /// Returns the response of the bins to some of the effects for every a, b and c.
     pub fn response(
         &self,
         at: (&RunData, &[f64]),

@@ -21,9 +21,9 @@ pub struct Noise {
     pub fading_var: f64,
     /// Its time constant in s.
     pub fading_s: f64,
-    /// What differs from run to run.
+    /// Differences from run to run.
     pub scatter: RunScatter,
-    /// What it is taken for at most.
+    /// Upper limit of these differences.
     pub scatter_most: RunScatter,
 }
 
@@ -95,6 +95,6 @@ pub struct RunScatter {
 }
 
 impl RunScatter {
-    /// What well-kept force sensors and ordinary weather give.
+    /// Differences of well-kept force sensors and ordinary weather.
     pub const USUAL: RunScatter = RunScatter { force: 0.003, resistance: 0.012, wind_mps: 0.01 };
 }

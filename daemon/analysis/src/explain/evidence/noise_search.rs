@@ -6,17 +6,17 @@ use super::whitener::Whitener;
 use crate::parallel;
 use crate::statistics::least_first;
 
-/// What is tried for the noise at changes of the control force, in s.
+/// Candidates of the noise at changes of the control force, in s.
 const JUMPS_S: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0];
 /// Runs that one thread takes at a time: less work is not worth handing out.
 pub const RUNS_A_TASK: usize = 8;
-/// So many runs at most show where a search starts.
+/// Largest number of runs with which a search starts.
 const COARSE_RUNS_MAX: usize = 32;
 /// How far around a start in logarithms a search begins, and around what some of the runs show.
 const FAR: f64 = 1.2;
 const NEAR: f64 = 0.1;
 
-/// One in so many of these runs, evenly chosen, stands for all where a search starts.
+/// Returns the step with which these runs are thinned, evenly, where a search starts.
 pub fn coarse_step(runs: usize) -> usize {
     runs.div_ceil(COARSE_RUNS_MAX).max(1)
 }

@@ -70,7 +70,7 @@ impl<'m> Pass<'m> {
     }
 }
 
-/// What acts at the samples looked at last, with what the effects remember of those before.
+/// Forces at the newest samples, with the memory that the effects keep of those before.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Acting {
     pub samples: Vec<SampleForces>,

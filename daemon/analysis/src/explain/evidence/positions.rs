@@ -1,4 +1,4 @@
-//! What positions show of the speed: its scale, which is a wheel's diameter, and how late it is.
+//! Information of positions on the speed: its scale, which is a wheel's diameter, and how late it is.
 //!
 //! Behind a speed that is late by some time, the distance by position is ahead of the distance by integrated
 //! speed by as much as the train drives in that time: more, the faster it is. An odometer that is late
@@ -98,9 +98,9 @@ const PART_MIN_S: f64 = 20.0;
 const RANGE_MIN_MPS: f64 = 5.0;
 /// Fewer parts do not show how they differ.
 const PARTS_MIN: usize = 5;
-/// Stamps and filters of a position are common to all runs: below this in s nothing is told.
+/// Stamps and filters of a position are common to all runs: a delay below this in s is not reported.
 const COMMON_S: f64 = 0.05;
-/// So many standard deviations make it more than chance.
+/// Number of standard deviations that is more than chance.
 const AHEAD_STDS: f64 = 2.0;
 
 /// Seconds by which the speed is late by the positions of a recording, one for each part from stand to

@@ -30,13 +30,13 @@ pub struct RunData {
     pub direction: f64,
     /// The cleaned run.
     pub recording: Recording,
-    /// What the declared model says of each sample.
+    /// Declared forces at each sample.
     pub declared: DeclaredForces,
     /// Cleaned speed in m/s, lightly smoothed, at which resistances are evaluated.
     pub smooth_mps: Vec<f64>,
     /// Least and greatest position in m; `None` without one.
     pub span_m: Option<[f64; 2]>,
-    /// What a force may depend on, by the number of the covariate, at each sample; `NaN` where unknown.
+    /// Values of each covariate at each sample, by the number of the covariate; `NaN` where unknown.
     covariates: Vec<Vec<f64>>,
     /// Direction of travel at each sample, as `direction` of the run.
     pub directions: Vec<f64>,

@@ -1,5 +1,5 @@
-//! What differs from run to run without being an effect: the reading of the force sensors, the
-//! resistance and the wind of the day, and the instant that a force is stamped with.
+//! Differences from run to run that are no effect: the reading of the force sensors, the resistance and the wind of
+//! the day, and the instant with which a force is stamped.
 //!
 //! Each run has a factor of its own on the control force and on the basic resistance, near 1, and a
 //! headwind of its own, with standard deviations that are estimated from the runs, and a small delay.
@@ -31,7 +31,7 @@ pub type Columns = [Vec<f64>; DEVIATIONS];
 /// recorder.
 const DELAY_S: f64 = 0.02;
 
-/// What is known beforehand of the scatter between runs counts as so many of them.
+/// Weight of the prior of the scatter between runs, as a number of runs.
 pub const PRIOR_RUNS: f64 = 4.0;
 /// The same of loads and winds, where they stand beside a finished model: the runs show these themselves.
 const PRIOR_RUNS_BESIDE: f64 = 0.5;
@@ -40,7 +40,7 @@ impl RunScatter {
     /// Beyond these a factor is an effect and no scatter.
     pub(super) const MOST: RunScatter =
         RunScatter { force: 0.008, resistance: 0.03, wind_mps: 0.01 };
-    /// What loads as they are weighed and winds of ordinary days do at most.
+    /// Upper limit of the scatter by weighed loads and winds of ordinary days.
     pub(super) const MOST_BESIDE: RunScatter =
         RunScatter { force: 0.05, resistance: 0.05, wind_mps: 2.5 };
 
@@ -110,7 +110,7 @@ pub fn of_day(Davis { a, b, c }: Davis, own: &RunFactors) -> Davis {
     Davis { a: factor * a, b: factor * b + by_wind, c: factor * c }
 }
 
-/// What all columns say of each bin, in their order.
+/// Returns all columns of each bin, in order.
 fn rows([c0, c1, c2, c3]: &Columns) -> impl Iterator<Item = [f64; DEVIATIONS]> {
     c0.iter().zip(c1).zip(c2).zip(c3).map(|(((c0, c1), c2), c3)| [*c0, *c1, *c2, *c3])
 }
@@ -190,7 +190,7 @@ impl WeightedFilter {
         self.covariance * products
     }
 
-    /// What the factors explain of the square of a series, given its weighted products with their columns.
+    /// Returns the explained part of the square of a series, given its weighted products with the columns.
     pub fn explained(&self, products: [f64; DEVIATIONS]) -> f64 {
         let products = RunFactors::from(products);
         products.dot(&(self.covariance * products))

@@ -1,4 +1,4 @@
-//! What accelerates the train at one sample.
+//! Accelerating forces at one sample.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use dynocar_model::force::balance::{ActingForces, mps2_per_n_per_kn};
 use dynocar_model::terms::Resistance;
 use dynocar_model::train::Davis;
 
-/// What accelerates the train at one sample; effects change these fields.
+/// Accelerating forces at one sample; effects change these fields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleForces {
     /// Declared gross mass in kg.
@@ -22,7 +22,7 @@ pub struct SampleForces {
     pub rotating_mass_factor: f64,
     /// Gradient in ‰ along the travel.
     pub gradient_permille: f64,
-    /// What resists, part by part, but for a, b and c.
+    /// Resistances, part by part, without a, b and c.
     pub resistance: Resistance,
     /// Further resistance in N.
     pub extra_n: f64,
@@ -57,13 +57,13 @@ impl SampleForces {
         acting.acceleration_mps2()
     }
 
-    /// What the acceleration changes by for each ‰ of gradient along the travel.
+    /// Returns the change of the acceleration by each ‰ of gradient along the travel.
     #[inline]
     pub(super) fn gradient_slope(&self) -> f64 {
         -mps2_per_n_per_kn(self.rotating_mass_factor)
     }
 
-    /// What the acceleration changes by for each unit of a, b and c.
+    /// Returns the change of the acceleration by each unit of a, b and c.
     #[inline]
     pub(super) fn davis_slopes(&self, speed_mps: f64) -> [f64; 3] {
         let unit = mps2_per_n_per_kn(self.rotating_mass_factor);
@@ -71,13 +71,13 @@ impl SampleForces {
     }
 }
 
-/// What acts at the samples of a run as declared: three times smaller than the forces themselves, for all
-/// fits read it again and again.
+/// Declared forces at the samples of a run: three times smaller than the forces themselves, since all fits read
+/// them again and again.
 #[derive(Clone, Debug)]
 pub struct DeclaredForces {
     rotating_mass_factor: f64,
     samples: Vec<DeclaredSample>,
-    /// What resists, once where samples that follow each other have it alike.
+    /// Resistances, once where consecutive samples have the same.
     resistances: Vec<Resistance>,
 }
 
@@ -109,7 +109,7 @@ impl DeclaredForces {
         DeclaredForces { rotating_mass_factor, samples, resistances }
     }
 
-    /// What acts at some samples, in their order.
+    /// Returns the forces at some samples, in order.
     #[inline]
     pub fn at(&self, samples: Range<usize>) -> impl ExactSizeIterator<Item = SampleForces> + '_ {
         self.samples[samples].iter().map(|sample| SampleForces {
@@ -124,12 +124,12 @@ impl DeclaredForces {
         })
     }
 
-    /// What acts at all of them.
+    /// Returns the forces at all samples.
     pub fn all(&self) -> impl ExactSizeIterator<Item = SampleForces> + '_ {
         self.at(0..self.samples.len())
     }
 
-    /// What acts at one of them; `None` behind the last.
+    /// Returns the forces at one sample; `None` behind the last.
     pub fn get(&self, index: usize) -> Option<SampleForces> {
         (index < self.samples.len()).then(|| self.at(index..index + 1).next())?
     }

@@ -49,7 +49,7 @@ pub(super) struct Step {
     pub fade: f64,
     /// By how much it moves the level, per unit.
     pub carry_s: f64,
-    /// What the level and the fading acceleration take of a difference.
+    /// Gains of the level and the fading acceleration from a difference.
     pub gain: Vector2<f64>,
     /// Innovation by difference.
     pub per_deviation: f64,
@@ -111,7 +111,7 @@ impl Walk {
         Walk { noise, belief, before: None, by_step, last: None, follows: false }
     }
 
-    /// The step to the next bin and the variance of the innovation there, 1 where there is none.
+    /// Returns the step to the next bin and the variance of the innovation there, 1 if there is no next bin.
     #[inline]
     fn step(&mut self, bin: &Bin) -> (Step, f64) {
         let Noise { fading_var, fading_s, .. } = self.noise;

@@ -12,9 +12,9 @@ use crate::statistics::{least_first, span};
 
 /// Shortest interval in m that is looked for.
 const SHORTEST_M: f64 = 150.0;
-/// Ends are refined to so many m.
+/// Final resolution of the ends in m.
 const FINEST_M: f64 = 10.0;
-/// What is tied to a place shows in so many runs, where there are so many; less is an event.
+/// Least number of runs in which an effect tied to a place shows, where there are that many; less is an event.
 const PLACE_RUNS_MIN: usize = 2;
 /// A further interval must add this share of what the others explain.
 const FURTHER_SHARE: f64 = 0.05;
@@ -187,9 +187,9 @@ fn apart(one: [f64; 2], others: &[[f64; 2]]) -> bool {
 }
 
 impl Places<'_, '_> {
-    /// What an error of the gradient map makes of the factor. It slows the train in one direction
-    /// and helps it in the other, so that passes in both directions cancel it; a set of runs in
-    /// one direction shows it in full, the same in every run.
+    /// Returns the error of the factor by an error of the gradient map. It slows the train in one direction and
+    /// helps it in the other, so that passes in both directions cancel it; a set of runs in one direction shows it
+    /// in full, the same in every run.
     fn map_error(&self, found: &Found) -> f64 {
         let (mut square, mut leaning, mut resistance, mut full) = (0.0, 0.0, 0.0, 0.0);
         for (index, run) in self.scan.problem.runs.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What was found of a force, and in which runs it acts.
+//! A found force, and the runs in which it acts.
 
 use super::site::{Intervals, Site};
 use crate::explain::evidence::EQUAL;

@@ -17,10 +17,10 @@ use crate::statistics::least_first;
 const FAR: f64 = 14.0;
 /// Points on either side of an end at which its posterior is evaluated.
 const POINTS: usize = 10;
-/// What the cost may rise by, for every end, when ends are put where they are likeliest to be near.
+/// Greatest rise of the cost, for every end, when ends are moved to where they are likeliest.
 const RISE: f64 = 1.0;
 
-/// What is known of an end.
+/// Posterior of an end.
 struct Belief {
     median: f64,
     /// 95 % of the posterior.

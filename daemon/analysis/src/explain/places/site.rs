@@ -6,7 +6,7 @@ use crate::explain::evidence::RunData;
 /// An interval is not shorter than this in m.
 const SHORTEST_M: f64 = 100.0;
 
-/// What an end is a value of.
+/// Axis of which an end is a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Chainage in m.
@@ -29,7 +29,7 @@ pub enum Reach {
 /// One end of an interval or window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct End {
-    /// What it is a value of.
+    /// Axis of the value.
     pub axis: Axis,
     /// The interval or window, by its index in the list.
     pub part: usize,

@@ -1,4 +1,4 @@
-//! What else was considered, and why it lost.
+//! Other explanations that were considered, and why they lost.
 
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 

@@ -1,4 +1,4 @@
-//! What the residual is plotted against.
+//! Covariates against which the residual is plotted.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
@@ -6,7 +6,7 @@ use dynocar_shared::vocabulary::{EffectKind, KindRow};
 use super::windows::Window;
 use crate::explain::evidence::RunData;
 
-/// What a residual may depend on.
+/// Covariate on which a residual may depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Covariate {
     /// Chainage of the train's centre.

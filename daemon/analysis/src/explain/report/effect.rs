@@ -42,7 +42,7 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
                 if name == "speed_scale" {
                     sizes.push(speed_error(*value, half));
                 } else if half > 0.0 {
-                    // What is a convention has no uncertainty.
+                    // A convention has no uncertainty.
                     let ends = [(value - half).max(words::least(name)), value + half];
                     let [low, high] = ends.map(|it| number(it, Some(half)));
                     let value = number(*value, Some(half));
@@ -127,7 +127,7 @@ pub fn sureness(p_value: f64) -> String {
     format!("chance of as much where nothing acts: {odds}")
 }
 
-/// What a person should do about an effect; `None` for one without a name.
+/// Returns the recommended action for an effect; `None` for one without a name.
 pub fn to_do(effect: &EffectAnswer) -> Option<&'static str> {
     if effect.contradiction.is_some() {
         return Some("find out which of the two is wrong before anything is replaced");
@@ -139,7 +139,7 @@ pub fn to_do(effect: &EffectAnswer) -> Option<&'static str> {
 /// Share of the traction's energy below which the work of an effect is not worth a word.
 const WORK_SHARE_MIN: f64 = 0.002;
 
-/// What an effect means in kWh and metres, in words without a full stop; empty where nothing is known of it.
+/// Describes the meaning of an effect in kWh and metres, without a full stop; empty where nothing is known of it.
 pub fn meaning(meaning: &Meaning) -> String {
     let percent =
         |share: f64| format!("{} % of the traction's energy", number(100.0 * share, Some(1.0)));

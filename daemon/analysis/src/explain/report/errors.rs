@@ -14,7 +14,7 @@ use crate::explain::stop_to_stop::StopToStop;
 /// Length in s of the blocks of a single run.
 const BLOCK_S: f64 = 60.0;
 
-/// What was drawn with replacement for the intervals.
+/// Units that were resampled with replacement for the intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resampling {
     /// Whole runs.

@@ -33,7 +33,7 @@ pub struct FoundPlace {
     pub sections: Vec<MarkedInterval>,
 }
 
-/// What was found along the line.
+/// Effects along the line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AlongLine {
     /// The residual force over the chainage in km, for each direction of travel (+1, −1) that was
@@ -46,7 +46,7 @@ pub struct AlongLine {
 }
 
 impl AlongLine {
-    /// What an explanation with these windows says of the line.
+    /// Returns the effects of an explanation along the line, with these windows.
     pub fn of(explanation: &Explanation, windows: &[Window]) -> Self {
         let runs = &explanation.problem.runs;
         let covariance = covariance(explanation);

@@ -1,4 +1,4 @@
-//! What a report of an explanation shows, as numbers and words: no page, no drawing.
+//! Contents of the report of an explanation, as numbers and words: no page, no drawing.
 //!
 //! # Layout, in the order of the page
 //!
@@ -13,8 +13,7 @@
 //! - [`parameters`]: what was fitted, with uncertainty
 //! - [`candidates`]: what else was considered
 //!
-//! What a run's data are like is in the dataset itself
-//! ([`RunQuality`](crate::dataset::RunQuality)) and in
+//! The quality of a run's data is in the dataset itself ([`RunQuality`](crate::dataset::RunQuality)) and in
 //! [`RunData`](super::evidence::RunData).
 
 pub mod candidates;
@@ -62,7 +61,7 @@ pub struct ReportData {
 }
 
 impl ReportData {
-    /// What a report of this explanation of a dataset shows.
+    /// Returns the contents of the report of this explanation of a dataset.
     pub fn of(dataset: &Dataset, explanation: &Explanation) -> Self {
         let errors = Errors::of(explanation);
         let windows = windows::windows(explanation);

@@ -32,8 +32,8 @@ pub struct PanelBin {
     pub before_n_per_kn: (f64, f64),
     /// The same with the effects.
     pub after_n_per_kn: (f64, f64),
-    /// What the effects (with a, b, c refitted) account for in N/kN, and 1.96 standard deviations
-    /// by the uncertainty of the fitted parameters.
+    /// Contribution of the effects (with a, b, c refitted) in N/kN, and 1.96 standard deviations by the uncertainty
+    /// of the fitted parameters.
     pub effect_n_per_kn: (f64, f64),
 }
 

@@ -1,4 +1,4 @@
-//! What was fitted, with its uncertainty: parameters, and where effects act.
+//! Fitted values with their uncertainty: parameters, and where effects act.
 
 use super::{Estimate, words};
 use crate::dataset::Dataset;
@@ -9,11 +9,11 @@ use crate::explain::selection::deviations;
 /// A parameter of the model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterRow {
-    /// What it belongs to: the basic resistance or a kind of effect.
+    /// Group: the basic resistance or a kind of effect.
     pub group: String,
     /// Its name in files and answers.
     pub name: String,
-    /// What it means.
+    /// Meaning of the parameter.
     pub meaning: String,
     /// Its unit; empty for a pure number.
     pub unit: &'static str,
@@ -120,7 +120,7 @@ fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) 
     }
 }
 
-/// What the declared model says of an effect's parameter.
+/// Returns the declared value of an effect's parameter.
 fn declared(dataset: &Dataset, name: &str) -> Option<f64> {
     match name {
         "k_n_per_kn_m" => Some(dataset.train.curve_constant_n_per_kn_m),
@@ -136,7 +136,7 @@ fn declared(dataset: &Dataset, name: &str) -> Option<f64> {
 pub struct PlaceRow {
     /// The kind of effect, in words.
     pub group: String,
-    /// What ends here.
+    /// Element that ends here.
     pub end: String,
     /// Its unit.
     pub unit: &'static str,

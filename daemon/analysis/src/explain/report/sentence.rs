@@ -44,7 +44,7 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
     }
 }
 
-/// What the effects take away from the error that judges them.
+/// Describes the error reduction of the effects.
 fn gained(errors: &Errors) -> String {
     let Some((role, judged)) = errors.judged() else { return String::new() };
     let runs = if role == Role::Holdout { "the runs held out" } else { "the fit runs" };

@@ -72,7 +72,7 @@ pub fn windows(explanation: &Explanation) -> Vec<Window> {
     windows
 }
 
-/// What a difference of speeds within a window is as a resistance in N/kN.
+/// Returns a difference of speeds within a window as a resistance in N/kN.
 fn force_n_per_kn(run: &RunData, first: usize, end: usize, differences: &[f64]) -> f64 {
     let own = &run.bins[first..end];
     let middle = &run.samples()[own[own.len() / 2].middle()];

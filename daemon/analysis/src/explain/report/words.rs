@@ -10,7 +10,7 @@ pub fn kind_name(name: &str) -> &str {
     }
 }
 
-/// What a parameter means, its symbol or name left out, and its unit.
+/// Returns the meaning of a parameter, without its symbol or name, and its unit.
 pub fn parameter(name: &str) -> (&str, &'static str) {
     match name {
         "c_factor" => ("factor on c v²", ""),

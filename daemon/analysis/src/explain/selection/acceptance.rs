@@ -65,8 +65,8 @@ pub(super) fn is_accepted(fit: &Fit, index: usize, evidence: f64, reduction: f64
         || is_certain(fit, index, evidence, reduction, false)
 }
 
-/// What decided for an effect of a fitted model: its acceptance score, or the least that accepts where it was
-/// accepted because it is certain, here or beside the usual errors.
+/// Returns the score that decided for an effect of a fitted model: its acceptance score, or the least that accepts
+/// where it was accepted because it is certain, here or beside the usual errors.
 pub fn deciding_score(
     fit: &Fit,
     index: usize,
@@ -127,7 +127,7 @@ pub(super) fn is_certain(
     // At most 2.3 where nothing acts; beside the usual errors 2.3 for a brake, 2.8 for a tunnel, 0.3 for a form.
     let takes_enough = evidence * reduction > EQUAL;
     let is_sure = if is_by_run {
-        // What else sets runs apart may follow what is measured: at most 9.6 where nothing acts.
+        // Other differences between runs may follow the measurement: at most 9.6 where nothing acts.
         evidence > OUTSIDE_COST
     } else if is_chosen_among_many {
         evidence > CERTAIN && takes_enough

@@ -1,4 +1,4 @@
-//! What is certain beside the usual errors of everything declared.
+//! Effects that are certain beside the usual errors of everything declared.
 //!
 //! Gradients of a map, scales of forces, their lateness, loads and winds of single runs err in every dataset. What
 //! is left of an effect beside all of them is certain or is not, however much of the error they make: they are part
@@ -30,8 +30,9 @@ pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
 }
 
-/// What acts on the train by one law wherever it is. Errors of the record and of the map, places that pieces of the
-/// map's error look like, and loads, winds and slippery rails, which differ from run to run, are not.
+/// Returns whether a kind acts on the train by one law wherever it is. Errors of the record and of the map, places
+/// that pieces of the map's error look like, and loads, winds and slippery rails, which differ from run to run, do
+/// not.
 fn is_sought(kind: EffectKind) -> bool {
     use EffectKind::{
         ActuatorDelay, GradientError, GradientShift, LocalResistance, LowAdhesion, MassChange,
@@ -57,7 +58,7 @@ const AS_LOADS_ARE: &str =
     "its runs stand out from the others no more than the largest of as many loads do";
 
 impl Search<'_> {
-    /// What was found with the usual errors beside it.
+    /// Searches for effects with the usual errors in the model.
     pub fn beside_usual_errors(&self, outcome: &mut Outcome) -> Arc<Beside> {
         let fit = &outcome.fit;
         if let Some((from, beside)) = &outcome.beside
@@ -104,7 +105,7 @@ impl Search<'_> {
             Asked { is_asked: &|kind| is_sought(kind) && !fallen.contains(&kind), rivals_of: None },
         );
         let may_be = |trial: &&Trial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
-        // What a wrong wheel or gradient leaves looks like an unmapped tunnel.
+        // The remainder of a wrong wheel or gradient looks like an unmapped tunnel.
         let are_places_moved = outcome.fit.model.effects.iter().any(moves_places);
         let is_unmapped =
             |trial: &Trial| is_unmapped_tunnel(&trial.fit.model.effects[trial.last()]);
@@ -181,9 +182,9 @@ impl Search<'_> {
     }
 }
 
-/// Moves the effects that were found to where they fit best beside the usual errors, and a, b and c to where
-/// they fit best beside the effects alone: what predicts runs knows of no usual errors. How surely the
-/// parameters are known then, from samples so many s apart.
+/// Moves the effects that were found to where they fit best with the usual errors in the model, and a, b and c to
+/// where they fit best with the effects alone: the prediction of runs knows no usual errors. Returns the standard
+/// deviations of the parameters, from samples `step_s` seconds apart.
 pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -> Deviations {
     let joint = search.beside_usual_errors(outcome);
     outcome.likeliest = outcome.fit.clone();

@@ -22,7 +22,7 @@ fn moves_without_each_run(fit: &Fit, count: usize) -> Vec<DVector<f64>> {
     fit.runs.iter().filter_map(moved).collect()
 }
 
-/// What a matrix says of the first so many parameters.
+/// Returns the leading `count` rows and columns of a matrix.
 fn first(matrix: &DMatrix<f64>, count: usize) -> DMatrix<f64> {
     matrix.view((0, 0), (count, count)).into_owned()
 }
@@ -35,7 +35,7 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
     if fit.runs.len() < RUNS_MIN {
         return vec![fit.theta.clone(); fit.runs.len()];
     }
-    // What the runs and the prior pull, and beside it, as weakly as nothing, no effect.
+    // The pull of the runs and the prior, and with it, as weak as possible, a pull towards zero.
     let (mut information, mut pull) = (fit.information(), fit.score());
     let mut bounds = vec![Some((f64::NEG_INFINITY, f64::INFINITY)); count];
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
@@ -50,7 +50,7 @@ pub fn without_each_run(problem: &FitProblem, fit: &Fit) -> Vec<Vec<f64>> {
             let width = spec.upper - spec.lower;
             let at_bound = |bound: f64| (fit.theta[i] - bound).abs() < spec.step;
             if at_bound(spec.lower) || at_bound(spec.upper) {
-                // What is pushed against a bound by all stays there.
+                // A parameter that all runs push against a bound stays there.
                 information[(i, i)] += (HELD_SHARE * width).powi(-2);
                 continue;
             }
@@ -84,7 +84,7 @@ fn students_factor(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |student| student.inverse_cdf(0.975) / HALF_95)
 }
 
-/// By how much a standard deviation that only the scatter between so many runs gives is enlarged.
+/// Returns the factor by which a standard deviation that only the scatter between `runs` runs gives is enlarged.
 pub fn few_runs_factor(runs: usize) -> f64 {
     students_factor((runs as f64 - 1.0).max(2.0))
 }
@@ -116,8 +116,8 @@ pub fn scatter_factor(fit: &Fit, parameter: usize) -> f64 {
     deviations(fit).std[parameter] / variance.sqrt()
 }
 
-/// The same of the first so many parameters beside the last so many: errors that all runs share, of which
-/// the scatter between the runs shows nothing.
+/// Returns the deviations of the first `count` parameters together with the last `shared`: errors that all runs
+/// share, of which the scatter between the runs shows nothing.
 pub fn deviations_beside(fit: &Fit, count: usize, shared: usize) -> Deviations {
     let information = fit.free_information();
     let variance_of = |parameters: usize| {
@@ -138,7 +138,7 @@ pub fn deviations_beside(fit: &Fit, count: usize, shared: usize) -> Deviations {
     Deviations { std, covariance, c }
 }
 
-/// Those of the first so many parameters with all others held.
+/// Returns the deviations of the first `count` parameters with all others held.
 fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
     let Some(factor) = Cholesky::new(first(&fit.free_information(), count)) else {
         let (std, covariance) = (vec![f64::NAN; count], DMatrix::zeros(count, count));
@@ -168,7 +168,7 @@ fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
             let form = FORM_SHARE * (fit.theta[i] - effect.none());
             std[i] = std[i].hypot(form);
         }
-        // What all passages share of a map's error lies on the size, or on every gradient.
+        // The part of a map's error that all passages share lies on the size, or on every gradient.
         let last = if effect.is_gradient() { range.end } else { range.start + 1 };
         for std in &mut std[range.start..last] {
             *std = std.hypot(effect.nature().shared_error);

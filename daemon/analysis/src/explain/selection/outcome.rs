@@ -1,4 +1,4 @@
-//! What the search tries and finds.
+//! Trials and results of the search.
 
 use std::sync::Arc;
 
@@ -44,7 +44,7 @@ impl Trial {
         (self.fit.model.effects[last].clone(), self.fit.effect_parameters(last).to_vec())
     }
 
-    /// What decides.
+    /// Returns the score that decides.
     pub fn acceptance_score(&self) -> f64 {
         acceptance_score(self.evidence, self.reduction)
     }
@@ -99,7 +99,7 @@ impl Beside {
     }
 }
 
-/// What the search found.
+/// Result of the search.
 #[derive(Clone)]
 pub struct Outcome {
     /// The declared model with a, b, c refitted.

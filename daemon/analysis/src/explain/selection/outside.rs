@@ -12,8 +12,8 @@ use crate::explain::evidence::{EQUAL, Fit, SCORE_MIN};
 use crate::explain::scan::Scan;
 use crate::explain::score::FitErrors;
 
-/// Noise that averages over so many s to more than this share of the basic resistance may hold a
-/// force: two to three times what it is where nothing is left.
+/// Noise that averages over this many s to more than this share of the basic resistance may hold a force: two to
+/// three times its size where nothing is left.
 const NOISE_OVER_S: f64 = 60.0;
 const HOLDS_A_FORCE: f64 = 0.05;
 /// A form as it is laid out explains at least this share of what it will with its numbers sought and

@@ -1,4 +1,4 @@
-//! What an effect costs, and what its evidence is worth.
+//! Price of an effect, and the worth of its evidence.
 
 use nalgebra::{Cholesky, DMatrix};
 

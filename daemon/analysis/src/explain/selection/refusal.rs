@@ -14,7 +14,7 @@ pub enum Refusal {
     Immaterial,
     /// A parameter lies at the bound of what is looked for: these data do not hold it.
     AtBound(AtBound),
-    /// What was fitted is not what the kind says.
+    /// The fitted values contradict the kind.
     Contradiction(&'static str),
     /// For its evidence it takes too little from the error, this share of it.
     Weak(f64),

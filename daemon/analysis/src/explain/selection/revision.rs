@@ -1,4 +1,4 @@
-//! What was accepted on trial again, beside what came after it.
+//! Retrial of accepted effects beside those that came after them.
 
 use super::acceptance::{is_accepted, may_be};
 use super::outcome::{Outcome, Round, round_of};

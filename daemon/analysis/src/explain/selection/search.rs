@@ -13,8 +13,8 @@ use crate::explain::effects::Effect;
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, RunData, UpdatedModel};
 use crate::explain::scan::Scan;
 
-/// Told how far the work is, by any thread: share done, and what is being done. It may unwind to end the
-/// work, which holds nothing that would have to be put right.
+/// Receives the progress, from any thread: share done, and the present work. It may unwind to end the work, which
+/// holds nothing that would have to be put right.
 pub type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
 
 /// How many steps of a round are done, by all threads together.
@@ -32,7 +32,7 @@ pub fn round_share(round: usize, done: f64) -> f64 {
 }
 
 impl<'s> Steps<'s> {
-    /// Of a round after so many effects, which takes this number of steps at most.
+    /// Returns the progress of a round after `round` effects, which takes `count` steps at most.
     pub fn of(progress: Progress<'s>, round: usize, count: usize) -> Self {
         Steps { progress, round, count, done: AtomicUsize::new(0) }
     }
@@ -63,7 +63,7 @@ pub struct Search<'a> {
     pub train: &'a TrainModel,
     /// The declared line.
     pub track: Option<&'a Arc<Track>>,
-    /// Told how far the search is.
+    /// Receives the progress of the search.
     pub progress: Progress<'a>,
 }
 
@@ -97,7 +97,8 @@ impl Search<'_> {
             while self.take_certain_beside(&mut outcome) || self.drop_fallen(&mut outcome) {
                 self.take_what_scores(&mut outcome);
             }
-            // What was certain and small has joined since; what it leaves too little to take may be certain itself.
+            // Certain and small effects have joined since; an effect that they leave too little to take may be
+            // certain itself.
             let before = outcome.kinds();
             self.prune(&mut outcome);
             if outcome.kinds() == before || !self.take_certain_beside(&mut outcome) {
@@ -134,7 +135,7 @@ impl Search<'_> {
                 self.swap(outcome, round.clone());
                 self.prune(outcome);
             }
-            // What others take the place of, and leave themselves, is better than none of them.
+            // An effect that others replaced, and which then left themselves, is better than no effect.
             if outcome.kinds() == before && Self::total(&next) < Self::total(&outcome.fit) - EQUAL {
                 outcome.fit = next;
                 outcome.instead = tried;

@@ -1,4 +1,4 @@
-//! What is certain and small: an error of what is declared that every railway has, which is part of the model
+//! Certain and small effects: errors of declared figures that every railway has, which are part of the model
 //! without being named.
 //!
 //! Forces a tenth of a second late, wheels and force sensors a few thousandths off: thousands of samples make

@@ -1,4 +1,4 @@
-//! What is tried in a round: every kind beside the model, fitted, and the best once more under their own noise.
+//! Trials of a round: every kind beside the model, fitted, and the best once more under their own noise.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -28,8 +28,8 @@ const FINALIST_ERROR_REDUCTION: f64 = 0.02;
 const MANY_OBSERVATIONS: usize = 5_000;
 /// How often a finalist looks again at most.
 const ATTEMPTS: usize = 3;
-/// What would not pay its price with so many times the decrease that its start promises is not fitted;
-/// what would not be certain with so many times its evidence is not judged.
+/// Factor of promise: a trial that would not pay its price with this multiple of the decrease that its start
+/// promises is not fitted; one that would not be certain with this multiple of its evidence is not judged.
 pub(super) const PROMISE_TIMES: f64 = 2.0;
 
 /// Which kinds are tried.
@@ -44,8 +44,8 @@ pub(super) struct Asked<'a> {
 /// The best candidate of a kind, if any, by this kind or its forms; or why the data do not allow to test it.
 type Tried = (&'static Effect, Result<Option<Trial>, String>);
 
-/// Whether a trial would be more than chance with so many times the evidence: what errors that all runs share hold
-/// most of does not become so by another place or noise.
+/// Returns whether a trial would be more than chance with this multiple of the evidence: an error that all runs
+/// share does not become evident by another place or noise.
 fn may_be_evident(trial: &Trial) -> bool {
     let price = penalty(&trial.fit, trial.last());
     trial.evidence > FINALIST_MIN || PROMISE_TIMES * (trial.evidence + price) > price
@@ -88,7 +88,7 @@ impl Search<'_> {
         if !trials.iter().any(|(trial, _)| trial.reduction > FINALIST_ERROR_REDUCTION) {
             measure(&mut trials, |gain| gain > FINALIST_MIN && gain <= 0.0);
         }
-        // What takes nothing from the error comes last, and is no measure for the others.
+        // A trial that takes nothing from the error comes last, and is no measure for the others.
         let helps = |trial: &Trial| trial.reduction > FINALIST_ERROR_REDUCTION;
         greatest_first(&mut trials, |(trial, _)| trial.bic_gain);
         greatest_first(&mut trials, |(trial, _)| f64::from(helps(trial)));

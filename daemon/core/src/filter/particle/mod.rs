@@ -13,8 +13,8 @@ mod resampling;
 
 /// A Markov model of a state of `D` components, observed at every step.
 ///
-/// What depends on the step alone is prepared once for all particles: the methods give functions
-/// of a particle.
+/// Values that depend on the step alone are prepared once for all particles: the methods return functions of a
+/// particle.
 pub trait ParticleModel<const D: usize> {
     /// Draws a state of the first step.
     fn draw_initial(&self, random: &mut Random) -> [f64; D];

@@ -1,4 +1,4 @@
-//! What the estimators of a braking coefficient have in common.
+//! Common parts of the estimators of a braking coefficient.
 
 use dynocar_model::terms::adhesion;
 use dynocar_shared::Uncertain;
@@ -9,7 +9,7 @@ use crate::pipeline::settings::{SettingError, require};
 use crate::settings;
 
 settings! {
-    /// What every braking pipeline knows beforehand of motion, measurement and braking.
+    /// Prior of every braking pipeline on motion, measurement and braking.
     ///
     /// The defaults of the noise are those of the papers' simulation: a position measured within
     /// 0.1 m, and process noise uniform within 0.1 m and 0.1 km/h over steps of 0.2 s.
@@ -82,7 +82,7 @@ impl BrakingSettings {
     }
 }
 
-/// What is measured at one moment of braking.
+/// Measurements at one moment of braking.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
     /// Distance in m since the brakes came on.
@@ -95,7 +95,7 @@ pub struct Observation {
     pub demand: f64,
 }
 
-/// What an engine did with an observation.
+/// Result of an engine's update with an observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
     /// It entered the window; the estimate stays as it was.

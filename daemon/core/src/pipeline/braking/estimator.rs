@@ -36,7 +36,7 @@ pub struct BrakingEstimator<E> {
     now_ns: i64,
     resets: u64,
     speeds: SpeedRange,
-    /// What the positions show of their noise.
+    /// Noise of the positions, inferred from them.
     positions: PositionNoise,
 }
 
@@ -185,8 +185,8 @@ impl<E: Engine> BrakingEstimator<E> {
             is_known: true,
             lacking: Status::Unestimated,
             contradiction: is_too_large.then_some(Reason::InnovationsTooLarge),
-            // Only friction times ratio acts on the train, and the other factor is held as declared:
-            // who reckons with both has the force that acts.
+            // Only friction times ratio acts on the train, and the other factor is held as declared: a reader who
+            // uses both has the force that acts.
             caveat: match self.quantity {
                 BrakingCoefficient::Adhesion => Reason::None,
                 BrakingCoefficient::Friction | BrakingCoefficient::Ratio => Reason::NotIdentifiable,

@@ -21,7 +21,7 @@ pub enum BrakingCoefficient {
 /// Traction per weight below which nothing pulls: a lagging actuator never quite lets go.
 const PULLING_MIN_PER_WEIGHT: f64 = 1e-4;
 
-/// What became of a sample.
+/// Outcome of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Intake {
     /// The train does not brake.
@@ -38,7 +38,7 @@ pub enum Intake {
     Step(StepInputs, Observation),
 }
 
-/// What the model knows at one sample.
+/// Modelled values at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Known {
     gain_mps2: f64,
@@ -163,7 +163,7 @@ impl BrakingIntake {
         Intake::Step(inputs, observation(sample, along_m - braking.origin_m, &known))
     }
 
-    /// What the model knows at a sample; `Ok(None)` while the train does not brake.
+    /// Returns the modelled values at a sample; `Ok(None)` while the train does not brake.
     fn known(&self, sample: &ResolvedSample) -> Result<Option<Known>, Reason> {
         let weight_n = 1000.0 * sample.weight_kn;
         let inertial_mass_kg = sample.inertial_mass_kg;

@@ -70,7 +70,7 @@ impl SpeedTable {
 pub enum Law {
     /// The same at all speeds: the scale is the coefficient itself.
     Constant,
-    /// What the brake would need: the scale is the share of the demand that is achieved.
+    /// The demand of the brake: the scale is the achieved share of it.
     Demand,
     /// An adhesion law of Xie 2019, section 3.1.
     Rail(RailCondition),

@@ -27,7 +27,7 @@ pub const LAWS: usize = 3;
 struct Hypothesis {
     model: TrackerModel,
     state: Gaussian<STATES>,
-    /// What the possible changes of hypothesis make of it: scratch of a step.
+    /// Mixture by the possible changes of hypothesis: scratch of a step.
     mixed: Gaussian<STATES>,
     normalised: f64,
 }

@@ -13,7 +13,7 @@ use crate::filter::fixed_lag::FixedLagSmoother;
 use crate::filter::{Gaussian, NotPositiveDefinite};
 use crate::pipeline::motion::OutlierRow;
 
-/// What is believed of the scale beforehand.
+/// Prior of the scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PriorScale {
     /// The scale itself.
@@ -111,7 +111,7 @@ impl TrackerModel {
     }
 }
 
-/// What belongs to a remembered moment.
+/// State at a remembered moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Moment {
     /// Time in s since the start.
@@ -120,12 +120,12 @@ struct Moment {
     demand: f64,
 }
 
-/// An innovation beyond so many standard deviations is refused.
+/// An innovation beyond this many standard deviations is refused.
 const OUTLIER_GATE: f64 = 5.0;
 /// Forgetting factors of the mean innovations that show a change: one for a sudden one, one
 /// for a small one.
 const CHANGE_FORGETTING: [f64; 2] = [0.8, 0.95];
-/// A mean innovation beyond so many of its standard deviations is a change.
+/// A mean innovation beyond this many of its standard deviations is a change.
 const CHANGE_GATE: f64 = 5.0;
 
 /// Forgotten means of white numbers of unit variance, scaled to unit variance.

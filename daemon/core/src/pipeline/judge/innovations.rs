@@ -110,7 +110,7 @@ impl InnovationMonitor {
         are_too_large(self.mean_square) && self.mean_square > 1.0 + chance
     }
 
-    /// What they say against the model, if anything.
+    /// Returns the contradiction of the model by the innovations, if there is one.
     pub fn contradiction(&self) -> Option<Reason> {
         let is_no_chance = self.correlation() * self.weight.sqrt() > CHANCE_DEVIATIONS;
         if self.are_too_large() {

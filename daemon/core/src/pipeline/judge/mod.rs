@@ -19,9 +19,9 @@ mod innovations;
 /// All that is known of an estimate when it is judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
-    /// What takes the place of any judgement, as a numerical failure.
+    /// Fault that takes precedence over any judgement, such as a numerical failure.
     pub fault: Option<(Status, Reason)>,
-    /// What is wrong with the samples lately.
+    /// Recent fault of the samples.
     pub input: Option<Reason>,
     /// True when enough samples were used.
     pub is_ready: bool,
@@ -29,9 +29,9 @@ pub struct Case {
     pub is_known: bool,
     /// The status while one of these is lacking.
     pub lacking: Status,
-    /// What contradicts an estimate that is known.
+    /// Contradiction of a known estimate.
     pub contradiction: Option<Reason>,
-    /// What is to be said of one that nothing contradicts.
+    /// Caveat of an estimate that nothing contradicts.
     pub caveat: Reason,
 }
 
@@ -60,7 +60,7 @@ const MEMORY: f64 = 500.0;
 /// Share of refused samples above which the input is called bad.
 const BAD_SHARE: f64 = 0.3;
 
-/// What a sample that lacks a force or the gradient lacks.
+/// Returns the reason for a sample that lacks a force or the gradient.
 pub fn missing(sample: &ResolvedSample) -> Reason {
     match sample.gradient_permille {
         None => Reason::GradientUnknown,
@@ -109,7 +109,7 @@ impl InputHealth {
         self.used
     }
 
-    /// What is wrong with the input, if anything.
+    /// Returns the fault of the input, if there is one.
     pub fn input_doubt(&self) -> Option<Reason> {
         let is_starved = self.used == 0 && self.want.is_some();
         (is_starved || self.refused_share > BAD_SHARE)

@@ -39,7 +39,7 @@ struct Block {
 struct Chain {
     start_ns: i64,
     last: UnitSample,
-    /// What each column gathered since the mean of the block before.
+    /// Integral of each column since the mean of the block before.
     integral: Columns,
     block: Block,
     /// Variance of the impulse in the block before; `None` in the first block.
@@ -70,8 +70,7 @@ impl MomentumBlocks {
         self.chain.as_ref().map(|chain| chain.start_ns)
     }
 
-    /// What has happened since the middle of the newest block; `None` before the first of a
-    /// chain.
+    /// Returns the integrals since the middle of the newest block; `None` before the first of a chain.
     pub fn since_block(&self) -> Option<SinceBlock> {
         let chain = self.chain.as_ref().filter(|chain| chain.variance_before.is_some())?;
         Some(SinceBlock { impulse: chain.integral, inertia: chain.last.inertia })

@@ -64,7 +64,7 @@ pub fn gap_s(last_ns: &mut Option<i64>, time_ns: i64) -> Option<f64> {
     (gap_s > 0.0).then_some(gap_s)
 }
 
-/// What has happened since the middle of the newest block.
+/// Integrals since the middle of the newest block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SinceBlock {
     /// The integral of the driving force, then what each unknown takes off it.
@@ -276,13 +276,13 @@ pub struct SpeedWatch {
 impl SpeedWatch {
     /// A watch that never calls a deviation below `spike_mps` a spike.
     pub fn new(spike_mps: f64) -> Self {
-        // What is never called a spike is taken to be three standard deviations at the start.
+        // A level that was never called a spike is taken to be three standard deviations at the start.
         let noise = SpeedNoise::unknown(spike_mps / 3.0);
         SpeedWatch { noise, outliers: OutlierRow::default(), spike_mps }
     }
 
-    /// Judges a sample by the one before it and the resistance as far as it is known; `Some` for a
-    /// spike, true in it when so many came in a row that the samples before must have been wrong.
+    /// Judges a sample by the one before it and the resistance as far as it is known; `Some` for a spike, true in
+    /// it when several came in a row, so that the samples before must have been wrong.
     ///
     /// The force may have changed anywhere in the step, and a tenth of every force is doubted.
     pub fn judge(&mut self, before: &UnitSample, now: &UnitSample, known: &Davis) -> Option<bool> {

@@ -1,5 +1,5 @@
-//! What one unit of each column would retard the train at a sample, and its impulse by blocks; what
-//! was left unexplained at each place of the line in earlier passes is one of them.
+//! Retardation of the train by one unit of each column at a sample, and its impulse by blocks; the unexplained
+//! force of earlier passes at each place of the line is one of the columns.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::SuspectInput;
@@ -132,7 +132,7 @@ struct Cell {
     count: f64,
 }
 
-/// What earlier passes of a place left unexplained, in N/kN; 0 where there was none.
+/// Unexplained force of earlier passes at a place, in N/kN; 0 where there was no pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Earlier {
     /// As a resistance: the same in both directions.
@@ -162,7 +162,7 @@ impl PlaceMemory {
         self.pass = self.pass.wrapping_add(1);
     }
 
-    /// What the passes before this one left at a place, for travel in a direction.
+    /// Returns the unexplained force of the passes before this one at a place, for travel in a direction.
     pub fn earlier(&self, position_m: f64, direction: f64) -> Earlier {
         let (slot, index) = slot(position_m);
         let cell = &self.cells[slot];

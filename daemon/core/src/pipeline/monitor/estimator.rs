@@ -157,7 +157,7 @@ impl ResidualMonitor {
         }
     }
 
-    /// What the base model holds may be another from now on.
+    /// Widens a parameter of the base model, which may differ from now on.
     fn reopen(&mut self, parameter: usize) {
         self.retire(parameter, true);
         self.verdict.clear(parameter);

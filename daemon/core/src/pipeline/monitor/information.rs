@@ -53,7 +53,7 @@ pub struct BaseSolution {
     prior_variance: BaseVector,
 }
 
-/// What is believed: the base model, and a suspect jointly with it.
+/// Estimates of the base model, and of a suspect jointly with it.
 #[derive(Clone, Debug)]
 pub struct Believed<'a> {
     /// All parameters.
@@ -70,7 +70,7 @@ pub struct Alternative {
     pub value: f64,
     /// Precision of it.
     pub precision: f64,
-    /// What the freedom of its size costs.
+    /// Cost of the freedom of its size.
     pub cost: f64,
 }
 
@@ -146,7 +146,7 @@ impl BaseSolution {
         Alternative::of(self.own[index], self.rest[index], prior_std)
     }
 
-    /// What is believed with a suspect, of a prior standard deviation, or without one.
+    /// Returns the estimates with a suspect, of a prior standard deviation, or without one.
     pub fn believed(&self, suspect: Option<(usize, f64)>) -> Believed<'_> {
         let mut values = Parameters::zeros();
         let mut reduced = self.reduced;

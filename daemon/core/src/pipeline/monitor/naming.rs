@@ -20,7 +20,7 @@ const ENDED: f64 = 16.0;
 const LET_GO_MAX: f64 = 1.5;
 /// Share of them that is remembered from block to block: four hours.
 const LET_GO_KEPT: f64 = 1.0 - 1.0 / 2880.0;
-/// What acts at a place that was never passed looks like a brake that drags.
+/// Kinds that, at a place that was never passed, look like a brake that drags.
 const PLACES: u32 = EffectKind::LocalResistance.bit()
     | EffectKind::GradientError.bit()
     | EffectKind::GradientShift.bit();
@@ -51,7 +51,7 @@ impl Named {
     }
 }
 
-/// What speaks for the candidates after a block.
+/// Evidence for the candidates after a block.
 #[derive(Clone, Copy, Debug)]
 pub struct Standing<'a> {
     /// Evidence for each being there now.
@@ -77,7 +77,7 @@ pub struct Naming {
     named: Option<Named>,
     /// Who leads, and for how many blocks.
     leading: (Option<usize>, u32),
-    /// What speaks for the cause of the named effect having ended.
+    /// Returns the evidence that the cause of the named effect has ended.
     ending: f64,
     /// Brakes lately that were suspected and let go while the train drove.
     let_go: f64,
@@ -176,7 +176,7 @@ impl Naming {
         let effect = effect_of(candidate);
         let mut bits = alternatives(candidate, least, standing);
         let is_a_brake = effect == EffectKind::DraggingBrake && !standing.is_pressure_raised;
-        // What a brake explains, an unknown place explains as well.
+        // An unknown place explains everything that a brake explains.
         let is_as_a_brake = is_a_brake || bits & EffectKind::DraggingBrake.bit() != 0;
         if is_as_a_brake && standing.is_new_place {
             bits |= PLACES;
@@ -218,7 +218,7 @@ impl Naming {
         })
     }
 
-    /// What speaks for something that the model as believed does not explain, when it is enough.
+    /// Returns the evidence for a force that the model does not explain, if it is enough.
     fn unexplained(&self, standing: &Standing) -> Option<f64> {
         let innovations = standing.cut_innovations;
         let count = innovations.effective_count();
@@ -241,7 +241,7 @@ fn bits_of(is_so: impl Fn(usize) -> bool) -> u32 {
 fn alternatives(chosen: usize, least: f64, standing: &Standing) -> u32 {
     let Standing { net, rank, .. } = *standing;
     let effect = effect_of(chosen);
-    // What is there in part in the base model may be sure, and yet not what it looks like.
+    // An error that is there in part in the base model may be certain, and yet not of this kind.
     let is_likely = |other: usize| net[other] > least || rank[other] > 0.0;
     let is_close = |other: usize| is_likely(other) && rank[other] > rank[chosen] - TAKES_OVER_BY;
     let bits = bits_of(is_close) & !effect.bit();

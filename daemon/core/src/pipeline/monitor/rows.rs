@@ -13,7 +13,7 @@ use crate::pipeline::momentum::{
 };
 
 const COLUMNS: usize = 1 + PARAMETERS;
-/// Innovations beyond so many standard deviations count for less (Huber).
+/// Innovations beyond this many standard deviations count for less (Huber).
 const HUBER: f64 = 4.0;
 
 /// One value for each parameter.
@@ -24,13 +24,13 @@ pub type Parameters = SVector<f64, PARAMETERS>;
 pub struct Row {
     /// Regressors.
     pub features: Parameters,
-    /// What they should add up to.
+    /// Observed sum.
     pub observed: f64,
     /// Weight by Huber's function.
     pub weight: f64,
 }
 
-/// What one unit of each parameter takes off the momentum over a block; of onsets that are open.
+/// Returns the design row: momentum removed over a block per unit of each parameter, including open onsets.
 pub fn units(block: &MomentumBlock, covariates: &Covariates, onsets: &Onsets) -> Parameters {
     let mut units = Parameters::zeros();
     units.fixed_rows_mut::<UNKNOWNS>(0).copy_from(&block.impulse.fixed_rows::<UNKNOWNS>(1));
@@ -44,7 +44,7 @@ pub fn units(block: &MomentumBlock, covariates: &Covariates, onsets: &Onsets) ->
 /// Makes rows of blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows {
-    /// What does not depend on the speed: small forces and the map.
+    /// Part of the error that does not depend on the speed: small forces and the map.
     floor_n_per_kn: f64,
     share: f64,
     gust_mps: f64,

@@ -1,7 +1,7 @@
 //! The effects that the monitor looks for.
 //!
-//! What is never known exactly is among the base model's own parameters: the forces' scales and delay, the
-//! load, the wind of the day, the curve constant, how cold bearings are. Of these an unusual value is an
+//! Figures that are never known exactly are among the base model's own parameters: the forces' scales and delay,
+//! the load, the wind of the day, the curve constant, how cold bearings are. Of these an unusual value is an
 //! effect. All other suspects have a column each in addition to it; the wheels' diameter shows by positions,
 //! without any force.
 
@@ -21,7 +21,7 @@ pub const DAY_WIND: usize = UNKNOWNS + 1;
 pub const CURVE: usize = UNKNOWNS + 2;
 /// Place of what cold bearings add at the start of a run, as a share of a.
 pub const WARMING: usize = UNKNOWNS + 3;
-/// What counts only where it is unusual, the delay apart.
+/// Parameters that count only where their value is unusual, the delay apart.
 pub const UNUSUAL: [usize; 5] = [TRACTION_SCALE, LOAD, DAY_WIND, CURVE, WARMING];
 /// Suspects with a column of their own in addition to the base model.
 pub const SUSPECTS: usize = TERMS.len() + BANDS.len();
@@ -57,7 +57,8 @@ pub fn covariate(index: usize) -> &'static Suspect {
     if index < USUAL.len() { &USUAL[index] } else { &BANK[index - USUAL.len()] }
 }
 
-/// The suspect behind a parameter; a, b, c and the brake's scale are none, and stand for the traction's.
+/// Returns the suspect behind a parameter; a, b, c and the brake's scale are not suspects, and stand for the
+/// traction's.
 pub fn suspect_of(parameter: usize) -> &'static Suspect {
     match parameter {
         FIRST_ONSET.. => &brake::SUSPECT,

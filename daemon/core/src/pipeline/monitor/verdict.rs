@@ -1,4 +1,4 @@
-//! What speaks for each candidate.
+//! Evidence for each candidate.
 
 use dynocar_model::terms::{Least, delay};
 
@@ -15,7 +15,7 @@ use crate::pipeline::momentum::{FORCE_DELAY, UNKNOWNS};
 
 /// Blocks that a suspect which began at some moment must have acted.
 const AGE_MIN: u32 = 5;
-/// What a raised pressure of released brakes speaks for a dragging one.
+/// Evidence of a raised pressure of released brakes for a dragging brake.
 const PRESSURE_EVIDENCE: f64 = 10.0;
 /// Share of the least size worth naming up to which an effect counts as none: surveys, maps and
 /// calibrations are never exact, and what is small and lasts gathers evidence without end.
@@ -29,7 +29,7 @@ const KEPT_PER_BLOCK: f64 = 0.9;
 /// Rows for which unit variance counts against the rows seen.
 const PRIOR_ROWS: f64 = 20.0;
 
-/// What the verdict is formed from.
+/// Evidence from which the verdict is formed.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
     /// All rows.
@@ -42,7 +42,7 @@ pub struct Evidence<'a> {
     pub is_pressure_raised: bool,
     /// True where no earlier pass shows what the location does.
     pub is_new_place: bool,
-    /// What speaks for an unusual error of the speed's scale.
+    /// Evidence for an unusual error of the speed's scale.
     pub wheel: f64,
     /// Time in s between samples, which limits what can be said of a delay.
     pub period_s: f64,
@@ -149,7 +149,7 @@ impl Verdict {
         let mut found = [None; CANDIDATES];
         let mut best: f64 = 0.0;
         for parameter in BASE..PARAMETERS {
-            // What began with the train's start is no likelier than what began a little later.
+            // A change that began with the train's start is no likelier than one that began a little later.
             let is_old = self.age(parameter, evidence).is_some_and(|age| age >= AGE_MIN);
             let prior_std = suspect_of(parameter).prior_std;
             let alternative = evidence.base.alternative(parameter, prior_std);
@@ -180,8 +180,8 @@ impl Verdict {
         self.name(evidence);
     }
 
-    /// What speaks for a parameter of the base model being unusual, and its cost: against any usual
-    /// value, and as the best account of the rows.
+    /// Returns the evidence that a parameter of the base model is unusual, and its cost: against any usual value,
+    /// and as the best account of the rows.
     fn unusual(&self, parameter: usize, evidence: &Evidence) -> Option<[(f64, f64); 2]> {
         let usual_std = evidence.base.usual_std(parameter);
         let (it, given_base) = evidence.base.unusual(parameter, suspect_of(parameter).prior_std);
@@ -202,7 +202,7 @@ impl Verdict {
         }
     }
 
-    /// What speaks for a law of the speed given the suspect that is named: what the name leaves.
+    /// Returns the evidence for a law of the speed given the named suspect.
     fn left_by_name(&self, evidence: &Evidence) -> f64 {
         let Some(named) = self.naming.parameter() else { return 0.0 };
         let bands = (FIRST_BAND..FIRST_ONSET).filter(|&band| band != named);
@@ -267,8 +267,8 @@ fn is_there(parameter: usize, it: &Alternative, least: f64) -> bool {
     is_possible && it.value.abs() >= least
 }
 
-/// What speaks for forces that act late, and its cost: the base model's own delay, beyond what a
-/// logger that writes means over a step is off by.
+/// Returns the evidence for forces that act late, and its cost: the delay of the base model, beyond the error of a
+/// logger that writes means over a step.
 fn late(evidence: &Evidence) -> (f64, f64) {
     let (late_s, variance) = evidence.base.parameter(FORCE_DELAY);
     let beyond_s = late_s - delay::TOLERATED_S.max(evidence.period_s);

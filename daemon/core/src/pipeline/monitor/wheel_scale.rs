@@ -41,7 +41,7 @@ struct Going {
     last: (i64, f64),
     /// Chainage less distance where the row began.
     origin_m: f64,
-    /// Mean offset since the last point, over so many samples.
+    /// Mean offset since the last point, over a number of samples.
     mean_m: f64,
     samples: f64,
     strangers: u32,

@@ -1,4 +1,4 @@
-//! What every estimator takes from the samples of a moving train.
+//! Motion of the train that every estimator takes from the samples.
 //!
 //! - [`STANDING_MPS`], [`MOVING_MPS`], [`BRIDGED_MAX_S`]: when a train stands, moves, and is lost sight of
 //! - [`Trust`], [`OutlierRow`]: how far a measured speed is believed
@@ -52,10 +52,10 @@ pub fn kink_variance(second_difference_mps2: f64, step_s: f64) -> f64 {
 const OUTLIER: f64 = 8.0;
 /// A normalised innovation beyond which a speed counts less (Huber 1964).
 const HUBER: f64 = 3.0;
-/// After so many outliers in a row the measured speed is believed and what contradicts it is not.
+/// After this many outliers in a row the measured speed is believed and the contradicting estimate is not.
 const ROW_BELIEVED: u32 = 5;
 
-/// What a filter makes of a measured speed.
+/// Trust of a filter in a measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trust {
     /// Its innovation over the predicted standard deviation.

@@ -8,8 +8,7 @@ use super::BRIDGED_MAX_S;
 const MEMORY: f64 = 500.0;
 /// Differences before anything is said.
 const COUNT_MIN: f64 = 50.0;
-/// A difference counts up to so many standard deviations of what is known: a jump of the position is
-/// no noise.
+/// A difference counts up to this many standard deviations of the known error: a jump of the position is not noise.
 const CLIP_DEVIATIONS: f64 = 5.0;
 
 /// Variance of a position's white noise.

@@ -4,8 +4,8 @@
 const GUESS_FREEDOM: f64 = 2.0;
 /// The degrees of freedom that the variance looks back over.
 const MEMORY: f64 = 3000.0;
-/// A scatter counts up to so many standard deviations above what the known variance lets expect:
-/// a spike too small for the gate would else widen every interval.
+/// A scatter counts up to this many standard deviations above the expectation of the known variance: a spike too
+/// small for the gate would else widen every interval.
 const CLIP_DEVIATIONS: f64 = 4.0;
 /// Degrees of freedom before a scatter is clipped.
 const FREEDOM_BEFORE_CLIP: f64 = 20.0;

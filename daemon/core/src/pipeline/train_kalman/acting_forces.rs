@@ -21,7 +21,7 @@ pub struct ActingForces {
     origin_ns: i64,
 }
 
-/// What acts over a step, each of traction and brake.
+/// Forces over a step, each of traction and brake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Acting {
     /// How long in s it was reported before.
@@ -67,8 +67,8 @@ impl ActingForces {
         self.reports[self.newest] = Report { time_s, forces, impulses };
     }
 
-    /// What acts over the step of so many s that ends with the newest report, if forces act by so
-    /// much in s behind their report, or by as much as is kept of them.
+    /// Returns the forces over the step of `step_s` that ends with the newest report, if they act by `delay_s`
+    /// behind their report, or by as much as is stored of them.
     ///
     /// # Real-time
     ///
@@ -87,7 +87,7 @@ impl ActingForces {
         }
     }
 
-    /// The report so many before the newest.
+    /// Returns the report `count` before the newest.
     fn back(&self, count: usize) -> &Report {
         &self.reports[(self.newest + CAPACITY - count) % CAPACITY]
     }

@@ -19,7 +19,7 @@ const WIND_LEAST: f64 = 1e-12;
 /// Behaviours of a smaller share are left out of what is published.
 const SHARE_MIN: f64 = 1e-4;
 
-/// What a measured speed said.
+/// Likelihood of a measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// How far it is believed by the likeliest filter.
@@ -130,7 +130,7 @@ impl MotionBank {
                 outliers.correct(&mut filter.belief, SPEED, speed_mps, noise_variance)?;
             let log_prior = filter.behaviour.log_prior;
             let evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
-            // What is forgotten is the evidence, not what is known beforehand.
+            // Forgetting applies to the evidence, not to the prior.
             *weight = log_prior + forgetting * (*weight - log_prior) + evidence;
             if index == likeliest {
                 measured = Some(Measured {
@@ -148,8 +148,8 @@ impl MotionBank {
         measured.ok_or(NotPositiveDefinite)
     }
 
-    /// What all behaviours say together, each by its share; the wind is part of the disturbance, with what
-    /// 1 m/s of it adds in N/kN by an air resistance c (scaled).
+    /// Returns the mixture of all behaviours, each by its share; the wind is part of the disturbance, with the
+    /// addition of 1 m/s of it in N/kN by an air resistance c (scaled).
     ///
     /// # Real-time
     ///
@@ -188,7 +188,7 @@ impl MotionBank {
 
     /// True while every filter is sound.
     pub fn is_sound(&self) -> bool {
-        // What is unsound elsewhere comes to the variances with the next step.
+        // Other unsound values reach the variances with the next step.
         let is_sound = |belief: &Gaussian<STATES>| {
             belief.mean.sum().is_finite()
                 && (0..STATES).all(|i| belief.covariance[(i, i)] >= 0.0)

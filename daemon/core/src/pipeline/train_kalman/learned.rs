@@ -1,5 +1,4 @@
-//! What is believed before the first sample, and all that samples teach and a braking that cannot be explained
-//! must not.
+//! State before the first sample, and everything that samples teach and an unexplained braking must not teach.
 
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
@@ -24,7 +23,7 @@ pub struct Learned {
     pub bank: MotionBank,
     /// Noise of the measured speed.
     pub noise: SpeedNoise,
-    /// What forces that jump between two samples contribute.
+    /// Contribution of forces that jump between two samples.
     pub jumps: JumpShare,
     /// Innovations so far.
     pub monitor: InnovationMonitor,
@@ -47,7 +46,7 @@ const WEIGHT_FIRST: f64 = 3.0;
 const WEIGHT_MAX: f64 = 300.0;
 /// Share of an innovation's variance from which it says something of jumps.
 const SEEN_SHARE: f64 = 0.1;
-/// What a single innovation may say, and the shares that there can be.
+/// Limits of the logarithm of a single innovation's variance, and of the shares.
 const SEEN: (f64, f64) = (-4.0, 12.0);
 const SHARES: (f64, f64) = (1e-3, 12.0);
 
@@ -125,13 +124,13 @@ impl Resistance {
         self.mean[2]
     }
 
-    /// What a headwind of 1 m/s adds at a speed in m/s, in N/kN.
+    /// Returns the addition of a headwind of 1 m/s at a speed in m/s, in N/kN.
     pub fn by_wind(&self, speed_mps: f64) -> f64 {
         let square = |mps: f64| regressors(mps)[2];
         0.5 * self.mean[2] * (square(speed_mps + 1.0) - square(speed_mps - 1.0))
     }
 
-    /// What the square of a wind of 1 m/s adds, in N/kN.
+    /// Returns the addition of the square of a wind of 1 m/s, in N/kN.
     pub fn by_wind_square(&self) -> f64 {
         self.mean[2] * regressors(1.0)[2]
     }

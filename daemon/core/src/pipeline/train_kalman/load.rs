@@ -1,4 +1,4 @@
-//! What is known of the load, and when it may have become another one.
+//! Estimate of the load, and the times at which it may have changed.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
@@ -7,7 +7,7 @@ use crate::pipeline::motion::{StopWatch, is_same_mass};
 
 use super::TrainKalmanSettings;
 
-/// What a sample changes in what is known of the load: the declared mass over the true one.
+/// Change of the load's estimate by a sample: the declared mass over the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
     /// It is as far as known as a new weighing or a declaration allows: a mean and a variance.
@@ -88,7 +88,7 @@ impl LoadWatch {
         change
     }
 
-    /// What may have boarded; a weighing that did not change leaves as much open as it is off itself.
+    /// Returns the possible change by boarding; an unchanged weighing leaves as much open as its own error.
     fn opened(&self) -> Option<Change> {
         let change = self.load_change_std.powi(2);
         let most = self.prior().1;
@@ -112,7 +112,7 @@ mod tests {
         }
     }
 
-    /// What a train that stands from 10 to 40 s changes, with the mass that its samples carry.
+    /// Returns the changes by a train that stands from 10 to 40 s, with the mass that its samples carry.
     fn changes(
         settings: &TrainKalmanSettings,
         mass_kg: impl Fn(i64) -> Option<f64>,

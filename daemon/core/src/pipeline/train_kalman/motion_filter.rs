@@ -48,7 +48,7 @@ pub fn wind_over(time_s: f64, std_mps: f64) -> (f64, f64) {
     (keep, std_mps * std_mps * (1.0 - keep * keep))
 }
 
-/// What every behaviour takes from a step between two samples.
+/// Step between two samples, as every behaviour uses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// Duration in s.
@@ -79,10 +79,10 @@ pub struct Step {
     pub map_std_permille: f64,
     /// Variance in (N/kN)² that comes to each coefficient of the resistance.
     pub drift_variance: f64,
-    /// What 1 m/s of wind along the line adds in N/kN. It goes by the declared air resistance: with the
-    /// one learned so far the product of two unknowns would seem better known than it is.
+    /// Addition of 1 m/s of wind along the line in N/kN. It uses the declared air resistance: with the one learned
+    /// so far the product of two unknowns would seem better known than it is.
     pub by_wind: f64,
-    /// What its square adds in N/kN, headwind or tailwind.
+    /// Addition of its square in N/kN, headwind or tailwind.
     pub by_wind_square: f64,
     /// Share of the wind that is left, and the variance in (m/s)² of what comes to it.
     pub wind: (f64, f64),
@@ -95,7 +95,7 @@ pub struct Step {
 pub struct MotionFilter {
     /// The behaviour.
     pub behaviour: Behaviour,
-    /// What is believed.
+    /// State estimate.
     pub belief: Gaussian<STATES>,
     /// Variance in (m/s)² of the speed that the newest step brought by forces that jumped.
     pub jump_variance: f64,

@@ -1,5 +1,5 @@
-//! What the estimate is worth, with what no amount of samples of one train on one line makes better known, and
-//! how it stands in a snapshot.
+//! Uncertainty of the estimate, including the part that no number of samples of one train on one line reduces, and
+//! its form in a snapshot.
 
 use dynocar_model::track::GRADIENT_ERROR_FREE_M;
 use dynocar_shared::{ParameterSnapshot, Quantity};
@@ -237,7 +237,7 @@ impl Systematic {
         }
         *covariance += by_scale;
         let (of_line, of_stops) = self.map_variances();
-        // What the map does where the train is slow fades towards the highest speed.
+        // The effect of the map where the train is slow fades towards the highest speed.
         let mut slow = Vector4::zeros();
         let [one, linear, _] = regressors(self.top_mps.max(1.0));
         (slow[0], slow[1]) = (one, -one / linear);

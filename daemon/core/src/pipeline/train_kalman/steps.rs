@@ -18,7 +18,7 @@ const KNOWN_RATE_MEMORY_S: f64 = 1.0;
 /// Time in s over which what a brake exerts beside its report becomes something else.
 const BRAKE_ERROR_TIME_S: f64 = 3.0;
 
-/// What is remembered of samples to make steps of them.
+/// Memory of the samples from which steps are made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steps {
     settings: TrainKalmanSettings,

@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use super::{TrainKalman, TrainKalmanSettings};
 use crate::pipeline::{Estimator, KeptEstimate};
 
-/// A train of 100 t declared and 110 t true that drives about for so many s; what is said of it.
+/// Drives a train of 100 t declared and 110 t true for a time, and returns the answer.
 fn driven(estimator: &mut TrainKalman, from_s: u32, duration_s: u32) -> ParameterSnapshot {
     braked(estimator, from_s, duration_s, 1.0)
 }

@@ -38,7 +38,7 @@ pub struct TrajectoryFitter {
 }
 
 impl TrajectoryFitter {
-    /// A fitter that allocates nothing for so many segments and samples in all.
+    /// Returns a fitter that allocates nothing for `segments` segments and `samples` samples in all.
     pub fn with_capacity(segments: usize, samples: usize) -> Self {
         TrajectoryFitter {
             buffers: Buffers {

@@ -43,7 +43,7 @@ pub struct Hypothesis {
 /// The normal density of unit variance at its mean, 1 / √(2π).
 const NORMAL_DENSITY: f64 = 0.398_942_280_401_432_7;
 
-/// What a measured speed said under a hypothesis.
+/// Innovation of a measured speed under a hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
     /// Measured minus predicted speed in m/s.

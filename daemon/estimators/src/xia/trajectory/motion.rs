@@ -8,7 +8,7 @@ use dynocar_shared::{ParameterSnapshot, RejectionReason};
 
 use super::step::{Step, StepRule};
 
-/// What a sample adds to a trajectory.
+/// Addition of a sample to a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
     /// The trajectory begins anew at this sample's speed: the forces up to here are not known.
@@ -64,7 +64,7 @@ struct Anchor {
 }
 
 impl MotionTracker {
-    /// What a sample adds.
+    /// Adds a sample.
     ///
     /// # Real-time
     ///

@@ -8,7 +8,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-/// What is expected of the noise.
+/// Model of the noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseModel {
     /// Standard deviation of the measured speed in m/s before any data.
@@ -32,9 +32,9 @@ const SPEED: usize = 0;
 /// Index of ln q.
 const DISTURBANCE: usize = 1;
 
-/// Innovations beyond so many standard deviations say nothing precise.
+/// Innovations beyond this many standard deviations say nothing precise.
 const CLIP_DEVIATIONS: f64 = 4.0;
-/// So many innovations in a row beyond the clip are no outliers: the noise has grown.
+/// After this many innovations in a row beyond the clip they are no outliers: the noise has grown.
 const UPDATED_AFTER: u32 = 3;
 /// Samples that the newest mean square looks back over.
 const NEWEST: f64 = 32.0;
@@ -84,7 +84,7 @@ impl LearnedNoise {
         }
     }
 
-    /// What the mean of q exceeds the learned q by, in (m/s)²/s; 0 when q is given.
+    /// Returns the excess of the mean of q over the learned q, in (m/s)²/s; 0 when q is given.
     ///
     /// With the information I on ln q, q is about as well known as the variance of 2 I normal
     /// numbers from their squares, and the mean of such a variance is I / (I - 1) times the

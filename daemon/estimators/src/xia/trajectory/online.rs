@@ -48,7 +48,7 @@ impl OnlineSettings {
     }
 }
 
-/// What is known of a single step's errors, whatever the hypothesis.
+/// Uncertainty of a single step's errors, whatever the hypothesis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepDoubt {
     /// Variance in (m/s)² of what the step misses because forces may jump within it.

@@ -1,4 +1,4 @@
-//! What an estimate of (a, b, c) is worth: status, reason, excitation.
+//! Quality of an estimate of (a, b, c): status, reason, excitation.
 //!
 //! In cruise a and b cannot be distinguished (correlations beyond ±0.9999), while w0 over the
 //! driven speeds is known well. The status therefore rests on w0 over the driven speeds; which
@@ -58,9 +58,9 @@ pub struct Estimate<'a> {
     pub is_at_bound: bool,
     /// Why there is no estimate, when something else than the samples is to blame.
     pub fault: Option<(Status, Reason)>,
-    /// What is wrong with the samples.
+    /// Fault of the samples.
     pub input: Option<Reason>,
-    /// What else contradicts the estimate.
+    /// Other contradiction of the estimate.
     pub doubt: Option<Reason>,
 }
 
@@ -149,7 +149,7 @@ pub struct LongRunVariance {
 }
 
 impl LongRunVariance {
-    /// A mean that looks back over so many blocks; infinity for all of them.
+    /// Returns a mean that looks back over `memory_blocks` blocks; infinity for all of them.
     pub fn new(memory_blocks: f64) -> Self {
         LongRunVariance {
             memory: memory_blocks,

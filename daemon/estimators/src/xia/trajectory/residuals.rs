@@ -24,8 +24,8 @@ pub struct Weighting {
     pub speed_noise_mps: f64,
     /// q / R in 1/s: density of the disturbance over the variance of the measured speed.
     pub disturbance_ratio: f64,
-    /// Residuals beyond so many standard deviations count linearly (Huber 1964); infinity
-    /// makes every residual count by its square.
+    /// Residuals beyond this many standard deviations count linearly (Huber 1964); infinity makes every residual
+    /// count by its square.
     pub outlier_threshold: f64,
 }
 
@@ -45,7 +45,7 @@ pub struct InitialSpeeds {
 }
 
 impl InitialSpeeds {
-    /// Room for so many segments.
+    /// Returns room for `segments` segments.
     pub fn with_capacity(segments: usize) -> Self {
         InitialSpeeds { current: Vec::with_capacity(segments), tried: Vec::with_capacity(segments) }
     }

@@ -171,7 +171,7 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 }
 
-/// What is known of the coefficients before the fit.
+/// Prior of the coefficients before the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DavisPrior {
     /// Expected coefficients.
@@ -193,7 +193,7 @@ impl DavisPrior {
 /// How to fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitSettings {
-    /// What the steps' sizes count.
+    /// Rule for the sizes of the steps.
     pub rule: StepRule,
     /// Lowest and highest a, b and c.
     pub bounds: ParameterBox<3>,
@@ -205,7 +205,7 @@ pub struct FitSettings {
     /// errors), over the variance of the measured speed, q / R in 1/s; 0 for exact forces: output
     /// error, as in Xia 2023.
     pub disturbance_ratio: f64,
-    /// Residuals beyond so many standard deviations count linearly; infinity for never.
+    /// Residuals beyond this many standard deviations count linearly; infinity for never.
     pub outlier_threshold: f64,
     /// Decrease of the cost, half the sum of squared standard deviations, that is worth another
     /// iteration: ε leaves the coefficients within √(2 ε) standard deviations.

@@ -15,7 +15,7 @@
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
-/// What a step's size counts, and with it the rule that leads over the step.
+/// Measure of a step's size, and with it the rule that leads over the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepRule {
     /// Size in m; eq. 7 of Xia 2023.

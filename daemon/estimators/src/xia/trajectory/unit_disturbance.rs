@@ -1,4 +1,4 @@
-//! What a disturbance of unit density leaves in a filter's estimate.
+//! Response of a filter's estimate to a disturbance of unit density.
 //!
 //! With the gains that a filter has used, the covariance of its estimate is linear in the
 //! densities of the noise. The part of the disturbance is followed here for a density of

@@ -25,7 +25,7 @@ const GRAVITY: f64 = 9.81;
 /// Gradients in ‰, each 250 m long.
 const GRADIENTS: [f64; 12] = [-2.0, -3.0, 10.4, 3.0, -8.0, 3.0, -2.0, 8.2, -20.0, 0.0, 5.0, -3.0];
 
-/// What the speed sensor does.
+/// Behaviour of the speed sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sensor {
     /// The speed itself.
@@ -53,7 +53,7 @@ impl Forces {
     pub const ALL: [Forces; 4] = [Forces::Jumping, Forces::Held, Forces::Past, Forces::Ramped];
 }
 
-/// What the train does.
+/// Phase of the train's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     Standing,

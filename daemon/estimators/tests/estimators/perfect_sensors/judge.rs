@@ -11,7 +11,7 @@ use super::drive::{DAVIS, FRICTION, MASS_KG, Phase, train};
 const STDS_MAX: f64 = 4.0;
 const SHARE_MAX: f64 = 0.05;
 
-/// What a run found.
+/// Estimates of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     pub looks: u64,

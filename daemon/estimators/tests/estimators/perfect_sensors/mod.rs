@@ -1,5 +1,5 @@
-//! What estimators trust on the samples of a simulator as a first user writes one: without noise,
-//! with it, or rounded, seen from any moment on, at any step.
+//! Trust of the estimators in the samples of a simulator as a first user writes one: without noise, with it, or
+//! rounded, seen from any moment on, at any step.
 
 mod drive;
 mod judge;

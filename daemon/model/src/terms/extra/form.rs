@@ -47,7 +47,7 @@ impl Form {
         }
     }
 
-    /// What its numbers must be; `None` when they are.
+    /// Returns the constraint that the numbers violate; `None` if they are valid.
     pub fn refusal(self, [one, other]: [f64; 2]) -> Option<&'static str> {
         let (is_right, expected) = match self {
             Form::Power => (one > 0.0 && (0.0..=5.0).contains(&other), {

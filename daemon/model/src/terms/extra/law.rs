@@ -6,7 +6,7 @@ use crate::named;
 /// A function without unit of one covariate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factor {
-    /// What it depends on.
+    /// Covariate of the law.
     pub of: Covariate,
     /// How.
     pub form: Form,

@@ -22,7 +22,7 @@ pub const TABLES: &str = "extra";
 pub const FORCE: &str = "n_per_kn";
 /// The list of tables within that holds the factors.
 pub const FACTORS: &str = "factor";
-/// The force where all factors are 1 lies within so many N/kN.
+/// The force where all factors are 1 lies within this many N/kN.
 pub const FORCE_MAX_N_PER_KN: f64 = 100.0;
 /// Factors at most.
 pub const FACTORS_MAX: usize = 2;

@@ -1,4 +1,4 @@
-//! What was understood, machine-readable. Units are SI and part of the keys.
+//! Contents as understood, machine-readable. Units are SI and part of the keys.
 #![allow(non_camel_case_types, reason = "the types of an object's values are called as their keys")]
 
 use std::path::Path;
@@ -129,7 +129,7 @@ fn of_train(train: &TrainModel) -> impl Serialize {
     }
 }
 
-/// What is `null` is not known.
+/// Returns the track for machines; `null` is not known.
 fn of_track(track: &Track) -> impl Serialize {
     let gradient = track.gradient();
     let lacks = track.gradient_error.as_ref();

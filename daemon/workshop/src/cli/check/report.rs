@@ -1,4 +1,4 @@
-//! What was understood, in words and columns.
+//! Contents as understood, in words and columns.
 
 use dynocar_analysis::dataset::{Manifest, PositionReference, Quantity};
 use dynocar_model::track::{LinearProfile, Track};
@@ -89,7 +89,7 @@ fn train(train: &TrainModel) -> String {
     text
 }
 
-/// What measured runs have added to the declared model, as far as it changes something.
+/// Describes the additions of measured runs to the declared model, as far as they change something.
 fn corrections(known: &Corrections) -> Vec<String> {
     let none = Corrections::NONE;
     let signed = |value: f64, decimals| {
@@ -224,7 +224,7 @@ fn intervals(is_known: bool, lengths_m: impl ExactSizeIterator<Item = f64>, more
     }
 }
 
-/// What was found of the line besides its survey.
+/// Describes the findings on the line besides its survey.
 fn found(track: &Track) -> String {
     let mut text = String::new();
     if track.gradient_shift_m != 0.0 {

@@ -75,7 +75,7 @@ fn motion_table(manifest: &Manifest, runs: &[Read]) -> TextTable {
 
 /// The head of a column and its cell for a run.
 type Count = (&'static str, fn(&RunQuality) -> String);
-/// What is counted of a run, each in a column.
+/// Counts of a run, each in a column.
 const COUNTS: [Count; 10] = [
     ("rows", |it| it.lines.rows.to_string()),
     ("step s", |it| {
@@ -129,7 +129,7 @@ fn sources(runs: &[Read]) -> String {
     text
 }
 
-/// What holds for runs, each with their numbers.
+/// Properties with the numbers of the runs that share them.
 type Groups<T> = Vec<(T, Vec<String>)>;
 
 /// Puts a run's number to what holds for it.
@@ -140,7 +140,7 @@ fn put<T: PartialEq>(groups: &mut Groups<T>, what: T, number: String) {
     }
 }
 
-/// What to know, each diagnostic once with its runs, first what cannot be true; nothing when all is well.
+/// Describes each diagnostic once with its runs, impossible data first; empty when all is well.
 fn diagnostics(manifest: &Manifest, runs: &[Read], of_dataset: &[DatasetDiagnostic]) -> String {
     let number = |file: &String| {
         let run = runs.iter().flatten().find(|run| run.file == *file);

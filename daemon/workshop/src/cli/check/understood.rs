@@ -1,4 +1,4 @@
-//! What was understood of a path.
+//! Understanding of a path.
 
 use std::sync::Arc;
 
@@ -10,9 +10,9 @@ use dynocar_model::train::TrainModel;
 use dynocar::config::DaemonConfig;
 use dynocar::dataset::FileKind;
 
-/// What was understood: what a file of this kind holds, and all that belongs to it.
+/// Understanding of a path: the contents of a file of this kind, and all that belongs to it.
 pub struct Understood {
-    /// What it was read from.
+    /// Kind of the file.
     pub(super) kind: FileKind,
     /// A dataset's file, with what became of each of its runs.
     pub dataset: Option<(Manifest, Vec<Result<Run, DatasetError>>)>,
@@ -35,13 +35,13 @@ impl Understood {
         self.dataset.as_ref().map_or(&[], |(_, runs)| runs)
     }
 
-    /// What may spoil results, the worst first.
+    /// Returns the diagnostics that may spoil results, the worst first.
     pub(super) fn diagnostics(&self) -> Vec<DatasetDiagnostic> {
         let Some(train) = &self.train else { return Vec::new() };
         diagnostics(train, self.track.as_deref(), self.runs().iter().flatten())
     }
 
-    /// What is wrong with single runs.
+    /// Returns the errors of single runs.
     pub fn errors(&self) -> impl Iterator<Item = &DatasetError> {
         self.runs().iter().filter_map(|run| run.as_ref().err())
     }

@@ -1,4 +1,4 @@
-//! What an estimator learned, machine-readable.
+//! Estimates of an estimator, machine-readable.
 
 use std::collections::BTreeMap;
 
@@ -14,10 +14,10 @@ const MASS: &str = "mass_t";
 const LOAD_STD: f64 = 0.1;
 /// A mass that is further from the declared one is no load.
 const DEVIATIONS_MAX: f64 = 3.0;
-/// At so many speeds, or a few more, the resistance is shown.
+/// Number of speeds, or a few more, at which the resistance is shown.
 const SHOWN_MAX: f64 = 7.0;
 
-/// What one estimator learned.
+/// Estimates of one estimator.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct EstimatorAnswer {
     pub name: &'static str,
@@ -45,7 +45,7 @@ pub(super) struct ResistancePoint {
     pub std: f64,
 }
 
-/// What became of the samples.
+/// Counts of the samples.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct SampleCounts {
     pub used: u64,
@@ -54,7 +54,7 @@ pub(super) struct SampleCounts {
 }
 
 impl EstimatorAnswer {
-    /// What a snapshot says.
+    /// Returns the answer of a snapshot.
     pub(super) fn of(kind: PipelineKind, snapshot: &ParameterSnapshot, speed_unit: Unit) -> Self {
         let parameters = || Parameter::ALL.iter().filter(|&&it| snapshot.index_of(it).is_some());
         EstimatorAnswer {

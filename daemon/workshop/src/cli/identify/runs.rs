@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::answer::EstimatorAnswer;
 use crate::cli::text::{TextTable, short};
 
-/// What the estimators learned from one run alone.
+/// Estimates from one run alone.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct RunAnswer {
     number: u32,
@@ -51,7 +51,7 @@ impl RunAnswer {
         &mut self.estimators
     }
 
-    /// What was learned from a run.
+    /// Returns the estimates from a run.
     pub(super) fn of(run: &Run, estimators: Vec<EstimatorAnswer>) -> Self {
         RunAnswer {
             number: run.number,

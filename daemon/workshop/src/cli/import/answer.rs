@@ -1,4 +1,4 @@
-//! What was imported: the texts of `train.toml` and `track.toml`, and what became of every field.
+//! Result of an import: the texts of `train.toml` and `track.toml`, and the outcome of every field.
 
 use std::path::Path;
 
@@ -87,7 +87,7 @@ pub fn track(line: &ImportedLine) -> String {
     text.into_text()
 }
 
-/// What was taken, what was not, what is left to do.
+/// Describes the imported fields, the refused fields, and the missing ones.
 pub fn text(
     folder: &Path,
     train: Option<&(&ImportedTrain, TrainText)>,

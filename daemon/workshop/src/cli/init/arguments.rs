@@ -60,7 +60,7 @@ fn encoding(name: &str) -> Result<&'static Encoding, String> {
     by_name(name).ok_or_else(|| expected.into())
 }
 
-/// What somebody says of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
+/// Parses the user's description of a column: `QUANTITY=COLUMN` or `QUANTITY=COLUMN:UNIT`.
 fn given_column(text: &str) -> Result<GivenColumn, String> {
     let expected = "expected QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, as speed=v_ist:km/h";
     let (name, rest) = text.split_once('=').ok_or(expected)?;

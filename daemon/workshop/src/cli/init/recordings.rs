@@ -45,7 +45,7 @@ pub fn texts(
         };
         return Ok((files.into_iter().map(text).collect::<Result<_, _>>()?, encoding));
     }
-    // What holds plain letters only is written in any of them.
+    // A file of plain letters only is valid in any of them.
     let is_plain = |bytes: &[u8]| bytes.is_ascii();
     let special = files.iter().find(|(_, _, bytes)| !is_plain(bytes));
     let (first, encoding) =

@@ -1,4 +1,4 @@
-//! What `dynocar init` says on the terminal: what is written, every guess, what is doubtful, what to do next.
+//! Terminal output of `dynocar init`: the written files, every guess, the doubtful ones, the next steps.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::cli::text::{TextTable, diagnostics, entry};
 use crate::cli::train_text::TrainText;
 use crate::report::provenance::for_shell;
 
-/// What was written, understood and is left to do.
+/// Describes the written files, the understanding of the recordings, and the next steps.
 pub fn text(folder: &Path, train: &TrainText, described: Option<&Described>) -> String {
     let mut text = String::new();
     if let Some(described) = described {
@@ -116,13 +116,13 @@ fn next(folder: &Path, described: Option<&Described>) -> String {
 /// Name of the daemon's configuration.
 pub const DAEMON_FILE: &str = "daemon.toml";
 
-/// What was understood of the recordings.
+/// Understanding of the recordings.
 pub struct Described {
     /// Which column was taken for what.
     pub guess: Guess,
     /// The runs' files, as the dataset names them.
     pub files: Vec<String>,
-    /// What cannot be true of the runs as they were understood, the worst first.
+    /// Impossibilities of the runs as they were understood, the worst first.
     pub diagnostics: Vec<DatasetDiagnostic>,
     /// `dataset.toml`.
     pub text: String,

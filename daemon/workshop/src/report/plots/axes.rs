@@ -1,4 +1,4 @@
-//! What all plots share: canvas, axes, titles, text.
+//! Common parts of all plots: canvas, axes, titles, text.
 
 use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};

@@ -73,7 +73,7 @@ fn resistance(train: &TrainModel, top_mps: f64) -> Vec<(f64, f64)> {
     (0..=POINTS).map(at).collect()
 }
 
-/// What is shown, for those who do not see it.
+/// Returns the description of the plot for readers who do not see it.
 fn label(train: &TrainModel, top_mps: f64) -> String {
     let most = |name: &str, curve: &Option<EffortCurve>| match curve {
         Some(curve) => format!("; {name} up to {:.1} kN", curve.force_max_n() / 1e3),

@@ -162,7 +162,7 @@ fn points(
     Ok(())
 }
 
-/// What the plot shows, for those who do not see it.
+/// Returns the description of the plot for readers who do not see it.
 fn label(panel: &Panel, has_effect: bool) -> String {
     let largest = |value: fn(&PanelBin) -> f64| {
         panel.bins.iter().map(|bin| value(bin).abs()).fold(0.0, f64::max)

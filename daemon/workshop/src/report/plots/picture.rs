@@ -31,7 +31,7 @@ pub(super) type DrawError = DrawingAreaErrorKind<io::Error>;
 #[derive(Debug, thiserror::Error)]
 #[error("the plot of {plot} cannot be drawn: {source}")]
 pub struct PlotError {
-    /// What it shows.
+    /// Contents of the plot.
     plot: String,
     /// Why.
     source: DrawError,
@@ -141,7 +141,7 @@ pub(super) fn picture(
     };
     let frames = painted.map_err(|source| PlotError { plot: label.into(), source })?;
     let body = drawing.find('>').map_or("", |end| &drawing[end + 1..]);
-    // What is opaque need not say so.
+    // An opaque colour need not say so.
     let body = body.replace(" opacity=\"1\"", "");
     let frames = if frames.is_empty() {
         String::new()

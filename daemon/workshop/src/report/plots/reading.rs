@@ -1,4 +1,4 @@
-//! What a pointer reads from a chart: the data behind the picture, no finer than the picture.
+//! Pointer readings of a chart: the data behind the picture, no finer than the picture.
 
 use serde_json::{Value, json};
 
@@ -10,7 +10,7 @@ const COLUMNS: f64 = 1000.0;
 /// A quantity over a chart's horizontal axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// What it is, for people.
+    /// Name for people.
     pub name: String,
     /// Its unit; empty for a pure number.
     pub unit: &'static str,
@@ -20,10 +20,10 @@ pub struct Series {
     pub halves: Vec<f64>,
 }
 
-/// What a pointer reads from one chart.
+/// Pointer readings of one chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
-    /// What the horizontal axis shows.
+    /// Name of the horizontal axis.
     pub name: String,
     /// Its unit; empty for a pure number.
     pub unit: &'static str,

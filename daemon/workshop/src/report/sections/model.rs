@@ -1,4 +1,4 @@
-//! What was fitted, where the effects act, and what else was considered.
+//! Fitted values, the places of the effects, and the other explanations that were considered.
 
 use dynocar_analysis::explain::evidence::SCORE_MIN;
 use dynocar_analysis::explain::identifiability::not_held;

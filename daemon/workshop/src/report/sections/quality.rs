@@ -1,4 +1,4 @@
-//! What the data are like, and how to get the same again.
+//! Quality of the data, and the command that repeats the result.
 
 use std::collections::BTreeMap;
 
@@ -87,7 +87,7 @@ fn gaps(order: &OrderCounts) -> String {
     }
 }
 
-/// What was rejected, by reason, and what is missing, by quantity, run by run.
+/// Returns the table of rejections by reason and missing values by quantity, run by run.
 fn counts_table(used: &[UsedRun]) -> String {
     let mut rows: BTreeMap<(u8, String), BTreeMap<u32, usize>> = BTreeMap::new();
     let mut add = |group: u8, what: &str, run: &Run, count: usize| {

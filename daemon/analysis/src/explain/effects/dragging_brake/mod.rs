@@ -18,7 +18,7 @@ use crate::explain::places::{Axis, End, Reach};
 use crate::explain::residual_pressure;
 use crate::explain::scan::{Scan, Tuple};
 
-/// So many brakes, and in most runs, do not happen to stick equally long after a departure.
+/// Number of brakes that, in most runs, do not stick equally long after a departure by chance.
 const CLOCKED_RUNS_MIN: usize = 3;
 
 #[derive(Clone, Debug)]

@@ -5,17 +5,17 @@ use dynocar_model::terms::brake::{BUILD_UP_S, build_up};
 use crate::explain::answer::RunWindow;
 use crate::explain::scan::{Scan, Tuple};
 
-/// Onsets are first looked for at least this far apart in s, and at so many places of a run.
+/// Onsets are first looked for at least this far apart in s, and at this many places of a run.
 pub(super) const GRID_MIN_S: f64 = 12.0;
 const GRID_PLACES: f64 = 120.0;
-/// Then each to so many s.
+/// Final resolution of each onset in s.
 const FINEST_S: f64 = 2.0;
 /// Motion in s that must follow an onset.
 pub(super) const TAIL_MIN_S: f64 = 40.0;
-/// What a run's taking part must explain beyond the choice of its onset: brakes release in nine
-/// runs of ten, and twice the logarithm of ten is this.
+/// Least gain that a run must add beyond the choice of its onset: brakes release in nine runs of ten, and twice the
+/// logarithm of ten is this.
 const RUN_COST: f64 = 4.6;
-/// Onsets are changed so many times more often than there are runs, at most.
+/// Onsets are changed at most this many times as often as there are runs.
 const CHANGES_BESIDE_RUNS: usize = 4;
 
 /// The onsets of one run, by time, with their tuples.
@@ -46,7 +46,7 @@ impl Onsets {
         Onsets { grid_s, times_s, tuples }
     }
 
-    /// What the taking part of the run must explain.
+    /// Returns the least gain that the run must add.
     fn cost(&self) -> f64 {
         2.0 * (self.times_s.len().max(2) as f64).ln() + RUN_COST
     }

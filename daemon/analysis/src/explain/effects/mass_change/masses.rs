@@ -19,7 +19,7 @@ pub struct Masses {
     /// Of every part, where its ends could be; empty where nothing was chosen.
     edges: Vec<Vec<f64>>,
     parameters: Vec<Parameter>,
-    /// What is known of the factors before the data; `None` where the parts were chosen one by one.
+    /// Prior information on the factors; `None` where the parts were chosen one by one.
     information: Option<DMatrix<f64>>,
     choice_cost: f64,
 }

@@ -32,8 +32,8 @@ pub fn propose(scan: &Scan) -> Proposal {
     Ok(candidates)
 }
 
-/// What a mass factor slightly above 1 does: traction and brake force move more mass, while all
-/// that goes with the weight stays.
+/// Response to a mass factor slightly above 1: traction and brake force move more mass, while all forces that scale
+/// with the weight stay.
 fn shape(run: &RunData, index: usize) -> f64 {
     let sample = &run.samples()[index];
     -sample.control_force_n().unwrap_or(0.0) / sample.inertial_mass_kg

@@ -22,7 +22,7 @@ pub struct Part {
     pub along: Along,
 }
 
-/// What a part lies along.
+/// Axis along which a part lies.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Along {
     /// The line; without a direction the same in both.

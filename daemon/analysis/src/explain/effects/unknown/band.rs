@@ -48,7 +48,7 @@ struct Cells {
     low: f64,
     width: f64,
     count: usize,
-    /// What an extra force in each explains.
+    /// Scan statistics of an extra force in each band.
     tuples: Vec<Tuple>,
     /// Motion in s in each.
     seconds: Vec<f64>,

@@ -1,4 +1,4 @@
-//! What an unexplained residual may depend on, and what an extra force there looks like.
+//! Axes on which an unexplained residual may depend, and the shapes of an extra force there.
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::Parameter;
@@ -11,7 +11,7 @@ const RESISTANCE: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (-50.0, 50.
 const GRADIENT: [Parameter; 1] = [Parameter::new("gradient_error_permille", (-30.0, 30.0), 0.01)];
 const SHARE: [Parameter; 1] = [Parameter::new("force_error_share", (-0.6, 0.6), 0.002)];
 
-/// What the bands lie along.
+/// Axis along which the bands lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BandAxis {
     Of(Covariate),
@@ -55,7 +55,7 @@ impl BandAxis {
         matches!(self, BandAxis::Of(Covariate::TractionForce | Covariate::BrakeForce))
     }
 
-    /// What an extra force there is measured by.
+    /// Returns the parameters that measure an extra force there.
     pub fn parameters(self) -> &'static [Parameter] {
         match self {
             BandAxis::Of(Covariate::Chainage) => &GRADIENT,

@@ -40,14 +40,14 @@ pub struct FormForce {
     choice_cost: f64,
 }
 
-/// Price of a form that was chosen from so many.
+/// Returns the price of a form that was chosen from `chosen_from` forms.
 pub fn choice_cost(chosen_from: f64) -> f64 {
     OUTSIDE_COST + 2.0 * chosen_from.ln()
 }
 
 impl FormForce {
-    /// A force of this form to start from, chosen from so many; `ranges` are those of the
-    /// covariates. Exponents that are held are not fitted.
+    /// Returns a force of this form to start from, chosen from several; `ranges` are those of the covariates.
+    /// Exponents that are held are not fitted.
     pub fn candidate(
         extra: &Extra,
         holds_exponents: bool,

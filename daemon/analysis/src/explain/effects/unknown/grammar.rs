@@ -23,7 +23,7 @@ const REFINED_ALIKE: usize = 2;
 /// Exponents of the speed in a product that are tried as they are: one number less is to be estimated.
 const WHOLE_EXPONENTS: [f64; 2] = [1.0, 2.0];
 
-/// What the form that explains most does beyond its price, before its numbers are fitted.
+/// Returns the greatest gain of a form beyond its price, before its numbers are fitted.
 pub fn greatest_bic_gain(scan: &Scan) -> f64 {
     let all = all_tried(&Ground::of(scan));
     let first = all.first().map_or(f64::NEG_INFINITY, |best| best.worth);

@@ -5,11 +5,11 @@ use dynocar_model::terms::extra::{Covariate, Factor, Form};
 use crate::explain::evidence::RunData;
 use crate::explain::scan::Scan;
 
-/// So many bins show too little, or a share of them where there are few.
+/// Number of bins that shows too little, or a share of them where there are few.
 const FEW_BINS: usize = 8;
 const FEW_SHARE: f64 = 0.03;
 
-/// What is known of a covariate over all bins of the fit runs.
+/// Values of a covariate over all bins of the fit runs.
 pub struct Known {
     /// Which.
     pub of: Covariate,
@@ -72,7 +72,7 @@ impl Known {
         pairs
             .filter_map(|(from, to)| match (from, to) {
                 (0, 4) => None,
-                // What lasts to the end of these data may last in others.
+                // A form that lasts to the end of these data may last in others.
                 (from, 4) => Some(self.factor(Form::From, [edges[from], 0.0])),
                 (0, to) => Some(self.factor(Form::UpTo, [edges[to], 0.0])),
                 (from, to) => Some(self.factor(Form::Between, [edges[from], edges[to]])),
@@ -119,7 +119,7 @@ impl Known {
         }
     }
 
-    /// What the force of a form of the speed may be multiplied by.
+    /// Returns the factors that may multiply the force of a form of the speed.
     pub fn given_speed(&self) -> Vec<Factor> {
         let mut factors = self.parts();
         if self.of != Covariate::Chainage {

@@ -1,4 +1,4 @@
-//! What a force of a form explains, and the numbers with which it explains most.
+//! Gain of a force of a form, and the numbers that maximise it.
 
 use dynocar_model::terms::extra::{Covariate, Factor};
 
@@ -24,7 +24,7 @@ pub struct Tried {
     pub holds_exponents: bool,
 }
 
-/// What shapes are tried on.
+/// Data on which shapes are tried.
 pub struct Ground<'s> {
     scan: &'s Scan<'s>,
     /// The covariates that vary.
@@ -36,7 +36,7 @@ pub struct Ground<'s> {
 }
 
 impl<'s> Ground<'s> {
-    /// What a scan offers.
+    /// Returns the data of a scan.
     pub fn of(scan: &'s Scan) -> Self {
         let known = Covariate::ALL.iter().filter_map(|&of| Known::of(scan, of)).collect();
         let number_cost = (scan.fit.observations().max(2) as f64).ln();
@@ -62,7 +62,7 @@ impl<'s> Ground<'s> {
         self.covariate(factor.of).into_iter().flat_map(|it| &it.values).map(of_run).collect()
     }
 
-    /// What a force of these factors explains.
+    /// Returns the gain of a force of these factors.
     pub fn tried(&self, factors: Vec<Factor>, holds_exponents: bool) -> Tried {
         let values: Vec<_> = factors.iter().map(|factor| self.values(factor)).collect();
         let values: Vec<&[Vec<f64>]> = values.iter().map(Vec::as_slice).collect();

@@ -17,7 +17,7 @@ use super::plan::{At, Plan};
 use super::{Column, Fit, FitProblem, RunNormal, declared_response};
 use crate::parallel;
 
-/// What a model leaves of one run at given parameters.
+/// Residual of one run at given parameters.
 pub(super) struct Left {
     whitened: Whitened,
     /// Differences of the bins, not whitened.
@@ -30,7 +30,7 @@ impl FitProblem {
         self.runs.iter().map(|_| RunMemory::default()).collect()
     }
 
-    /// What a model leaves of each run at given parameters.
+    /// Returns the residual of each run at given parameters.
     pub(super) fn left(
         &self,
         plan: &Plan,

@@ -26,8 +26,8 @@ use memory::RunMemory;
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
 /// directions apart which the runs do not excite.
 const PRIOR_SHARE: [f64; 3] = [0.4, 0.8, 0.4];
-/// A declared coefficient is wrong by at most so many of these; what asks for more, or for less
-/// resistance than none, is a force that the basic resistance does not have.
+/// A declared coefficient is wrong by at most this many standard deviations; data that ask for more, or for a
+/// resistance below zero, show a force that the basic resistance does not have.
 const DECLARED_DEVIATIONS_MAX: f64 = 4.0;
 /// A coefficient below none by no more than this share of one is an error of estimation.
 const BELOW_NONE_MAX: f64 = 0.25;
@@ -43,7 +43,7 @@ pub struct FitProblem {
     prior_deviation: [f64; 3],
     /// Columns of the runs' own factors.
     scatter_columns: Vec<Columns>,
-    /// What is declared makes of each run.
+    /// Response of the declared model, for each run.
     declared_responses: Vec<Response>,
     /// Measured distance over distance by integrated speed, with its standard deviation.
     pub distance_ratio: Option<(f64, f64)>,
@@ -115,7 +115,7 @@ pub struct Fit {
     pub filters: Vec<WeightedFilter>,
     /// The runs' own factors less 1 and delays, with their covariance.
     factors: Vec<(RunFactors, FactorMatrix)>,
-    /// What is known of each run for the model.
+    /// Computed values of each run for the model.
     memories: Arc<[RunMemory]>,
     /// Errors in m/s of what it predicts, once they are asked for.
     open_loop_mps: OnceLock<[[f64; 3]; 2]>,
@@ -176,7 +176,7 @@ impl Fit {
         self.noise.scatter_most == RunScatter::MOST_BESIDE
     }
 
-    /// What differs from run to run, of one.
+    /// Returns the factors of one run.
     pub fn own_factors(&self, index: usize) -> &RunFactors {
         &self.factors[index].0
     }

@@ -52,7 +52,7 @@ impl<'m> Plan<'m> {
         own.map(|(number, (effect, range))| (number, effect, range.clone()))
     }
 
-    /// What acts together on a run.
+    /// Returns the effects that act together on a run.
     pub fn acting(
         &self,
         run: &RunData,
@@ -91,12 +91,12 @@ impl<'m> Plan<'m> {
     }
 }
 
-/// What a run and the model that it is fitted with are to an evaluation.
+/// A run, the model fitted to it, and the parameters of an evaluation.
 #[derive(Clone, Copy)]
 pub(super) struct At<'a> {
     pub plan: &'a Plan<'a>,
     pub run: &'a RunData,
-    /// What is declared makes of the run.
+    /// Response of the declared model.
     pub declared: &'a Response,
     pub theta: &'a [f64],
 }

@@ -1,4 +1,4 @@
-//! What is known of the parameters before the runs, and what positions say of the speeds.
+//! Prior of the parameters, and the information of positions on the speeds.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -38,7 +38,7 @@ impl FitProblem {
         (information, score, cost)
     }
 
-    /// What positions say of the scale of the speeds and of how late they are.
+    /// Adds the information of positions on the scale of the speeds and on how late they are.
     fn take_positions(
         &self,
         model: &UpdatedModel,

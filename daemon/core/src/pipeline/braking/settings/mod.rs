@@ -67,7 +67,7 @@ settings! {
         /// Standard deviation that it gains in 1 s, over the demand; when absent, what serves best in
         /// the papers' scenarios.
         relative_walk: Option<f64> = None => (above 0);
-        /// What a brake pipeline reports; no meaning for adhesion.
+        /// Factor that a brake pipeline reports; no meaning for adhesion.
         reports: BrakeFactor = BrakeFactor::Friction;
     }
 }

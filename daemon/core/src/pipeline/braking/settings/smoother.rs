@@ -41,7 +41,7 @@ settings! {
         /// How the achieved share of the declared brake force wanders; see [`WalkSettings`] and
         /// `SmootherSettings::walk` for what holds when absent.
         walk: Option<WalkSettings> = None;
-        /// What a brake pipeline reports; no meaning for adhesion.
+        /// Factor that a brake pipeline reports; no meaning for adhesion.
         reports: BrakeFactor = BrakeFactor::Friction;
         /// A known curve of disc friction, [speed in m/s, friction]; only its scale is estimated.
         friction_law: Option<Vec<(f64, f64)>> = None;

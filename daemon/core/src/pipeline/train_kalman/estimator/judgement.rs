@@ -1,4 +1,4 @@
-//! What may be said of the estimate.
+//! Judgement of the estimate: status and reasons.
 
 use dynocar_shared::{MassSource, Quantity, Reason, Status};
 
@@ -19,7 +19,7 @@ impl TrainKalman {
     pub(super) fn long_run(&self) -> f64 {
         let monitor = &self.learned.monitor;
         let variance = long_run_variance(monitor.mean_square(), monitor.correlation());
-        // Whatever follows what, so many innovations add up to no more.
+        // Whatever the order, this many innovations add up to no more.
         variance.min(monitor.effective_count() * monitor.mean_square())
     }
 
@@ -55,7 +55,7 @@ impl TrainKalman {
         }
     }
 
-    /// What is wrong with the samples lately.
+    /// Returns the recent fault of the samples.
     pub(super) fn input_doubt(&self) -> Option<Reason> {
         self.health.input_doubt().or(self.gate.input_doubt())
     }

@@ -20,7 +20,7 @@ use panels::{Content, Panel};
 const LETTER_PX: f64 = 7.0;
 const GAP_PX: f64 = 10.0;
 
-/// What is drawn in every panel.
+/// Contents of every panel.
 struct Ground<'a> {
     track: Option<&'a Track>,
     found: &'a AlongLine,

@@ -69,7 +69,7 @@ impl Panel {
             Content::Places(_) => Reading::new("Chainage", "km", false, Vec::new()),
             Content::Means(direction, bins) => {
                 let mut reading = reading("Chainage", "km", bins, has_effect);
-                // What is not drawn is not read.
+                // Points that are not drawn are not read.
                 reading.series.truncate(1 + usize::from(has_effect));
                 let direction_label = direction_label(*direction);
                 reading.series.iter_mut().for_each(|it| it.name += &format!(", {direction_label}"));
@@ -83,7 +83,7 @@ impl Panel {
         }
     }
 
-    /// What it shows, for those who do not see it.
+    /// Returns the description of the panel for readers who do not see it.
     pub fn described(&self) -> String {
         match &self.content {
             Content::Places(sections) => format!("{} {}", self.name, described(sections)),

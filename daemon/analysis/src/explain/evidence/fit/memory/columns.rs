@@ -1,4 +1,4 @@
-//! What a unit of each parameter changes of one run.
+//! Derivatives of one run's response by each parameter.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -121,7 +121,7 @@ impl RunMemory {
         }
     }
 
-    /// What a unit of each parameter of some effects changes of what acts together, by another look at the samples.
+    /// Returns the derivatives by each parameter of effects that act together, by another pass over the samples.
     fn differences(
         at: At,
         steps: &[f64],

@@ -1,4 +1,4 @@
-//! What a model makes of one run, and by its parameters; what has not changed is not computed again.
+//! Response of a model to one run, and its derivatives; unchanged parts are not computed again.
 //!
 //! Of what acts together on a run, one effect in which the forces are affine takes two looks at the samples for
 //! all parameters; where there are more, a slope serves as far as the step that it was taken over.
@@ -20,10 +20,10 @@ use crate::explain::hypothesis::{Handling, SharedHypothesis};
 const USUAL_MPS: f64 = 20.0;
 const NEAR_SHARE: f64 = 0.05;
 
-/// What is known at some parameters, shared by models.
+/// Values at some parameters, shared by models.
 type Known<T> = Arc<(Vec<f64>, T)>;
 
-/// What is known of one run, for one model.
+/// Computed values of one run, for one model.
 #[derive(Clone, Default)]
 pub(super) struct RunMemory {
     together: Together,
@@ -50,7 +50,7 @@ struct Scratch {
     slopes: Vec<Vec<f64>>,
 }
 
-/// What the effects make that act together.
+/// Response of the effects that act together.
 #[derive(Clone, Default)]
 enum Together {
     #[default]
@@ -64,7 +64,7 @@ enum Together {
 }
 
 impl RunMemory {
-    /// What is known serves a model with more effects, as far as these change nothing of it.
+    /// Returns the computed values for a model with more effects, as far as these change nothing of them.
     pub fn of_grown(
         memories: &[RunMemory],
         runs: &[RunData],
@@ -108,7 +108,7 @@ impl RunMemory {
         }
     }
 
-    /// Reckons what the effects make that act together, where that has changed.
+    /// Computes the response of the effects that act together, where it has changed.
     fn act_together(&mut self, at: At) {
         let At { plan, run, theta, .. } = at;
         if matches!(self.together, Together::Unknown) {
@@ -189,7 +189,7 @@ fn with_scratch<T>(work: impl FnOnce(&mut Scratch) -> T) -> T {
     SCRATCH.with_borrow_mut(work)
 }
 
-/// What the effects make that act together.
+/// Response of the effects that act together.
 fn reckon(At { plan, run, theta, .. }: At) -> Response {
     let (acts, mut response) = (plan.acts_together(run), Response::default());
     with_scratch(|it| plan.model.response((run, theta), acts, &mut it.forces, &mut response));
