@@ -56,7 +56,7 @@ fn gradient_permille(place_m: f64) -> f64 {
     [0.0, 30.0, -12.0, 60.0, -45.0, 8.0, -30.0][(place_m / 150.0) as usize % 7]
 }
 
-/// What the tram writes over so many s.
+/// Returns the samples of the tram over a duration.
 pub fn samples(seed: u64, duration_s: u32) -> Vec<TrainSample> {
     let mut random = Random::new(seed, Stream::Train);
     let step_s = 0.1 / f64::from(RATE_HZ);

@@ -3,12 +3,12 @@
 
 use std::ops::Range;
 
-/// What the controller writes of the brake.
+/// Report of the brake by the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reported {
     /// The force that electric and friction brake are told to exert.
     Force,
-    /// What the driver demands, before any limit of jerk.
+    /// The driver's demand, before any limit of jerk.
     Demand,
     /// The force as told, and the pressure that is in the cylinders.
     Pressure,
@@ -25,7 +25,7 @@ pub struct Brake {
     pub strength: f64,
     /// Speeds in m/s between which friction takes over; infinite where it brakes alone.
     pub hand_over_mps: (f64, f64),
-    /// What is written of it.
+    /// Its report.
     pub reported: Reported,
     /// Greatest change of acceleration in m/s³.
     pub jerk_mps3: f64,
@@ -85,7 +85,7 @@ impl Brake {
 /// Pressure in Pa of a cylinder for each m/s² of deceleration.
 const PRESSURE_PA_PER_MPS2: f64 = 3e5;
 
-/// What of a brake acts.
+/// Friction force that acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Friction {
     /// Deceleration in m/s² by the pressure in the cylinders.

@@ -8,7 +8,7 @@ use dynocar_client::{Peer, Role, SamplePublisher};
 
 use crate::support::{Link, PlayedDaemon, Program, TRAIN, TestRoot, build_c, client_directory};
 
-/// What a controller that forks prints, by the first word of each line, with the samples that came.
+/// Runs a controller that forks; returns its lines by their first word, and the received samples.
 fn drive(mode: &str, daemon: &PlayedDaemon) -> (HashMap<String, Vec<String>>, u64) {
     let folder = TestRoot::new();
     let program = folder.path().join("forked");

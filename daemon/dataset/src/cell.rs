@@ -9,7 +9,7 @@ use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
 use super::text_layout::{THOUSANDS, TextLayout};
 
-/// What programs write for a missing number, in small letters.
+/// Words of programs for a missing number, in small letters.
 const MISSING: &str = "n/a na #n/a #na <na> nan null (null) none nil nat - -- --- . ? * missing #n/v #nv #null! #value! \
                        #wert! #num! #zahl! #div/0! #ref! #bezug! #name? 1.#qnan -1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf \
                        1.#snan bad invalid no_data nodata undefined undef";

@@ -1,5 +1,5 @@
-//! What recorders and tools do to the times of whole rows: seconds without a fraction, an hour of summer time, rows in
-//! another order; and times that begin anew.
+//! Faults in the times of whole rows by recorders and tools: seconds without a fraction, an hour of summer time,
+//! rows in another order; and times that begin anew.
 
 use super::order::quantile;
 
@@ -18,7 +18,7 @@ const PART_ROWS: usize = 50;
 /// Epochs of times in s beyond this are none of a clock that counts from 1970.
 const FAR_S: f64 = 9.2e9;
 
-/// What was done to the times of a run, each with the row.
+/// Repairs of the times of a run, each with the row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ClockFaults {
     /// Where the clock was put forward or back, and by how many s.

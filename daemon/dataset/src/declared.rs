@@ -20,7 +20,7 @@ const RESISTANCE_N_PER_KN: (f64, f64) = (0.05, 200.0);
 const USUAL_AT_REST_N_PER_KN: (f64, f64) = (0.2, 15.0);
 const USUAL_AT_TOP_N_PER_KN: (f64, f64) = (0.5, 60.0);
 
-/// What is unusual of a resistance in N/kN up to a greatest speed in m/s, with the likely unit; `None` for one that
+/// Describes an unusual resistance in N/kN up to a greatest speed in m/s, with the likely unit; `None` for one that
 /// trains have.
 pub fn unusual_resistance(davis: &Davis, top_mps: f64) -> Option<String> {
     let is_outside =

@@ -7,6 +7,7 @@ use toml::Value;
 
 use super::diagnostic::{Diagnostic, read_as};
 use super::forces::{Force, ForceSource};
+use super::implausible_columns::implausible_columns;
 use super::motion::PositionSource;
 use super::order::quantile;
 use super::quality::RunQuality;
@@ -72,7 +73,7 @@ pub(super) fn diagnostics(
                     specific_force or altitude in the columns";
         diagnostics.push(Diagnostic::new("gradient_unknown", Info, text, []));
     }
-    of_plausibility(run, &mut diagnostics);
+    diagnostics.extend(implausible_columns(run));
     diagnostics
 }
 
@@ -114,7 +115,7 @@ fn of_power(context: Context, run: &Resolved, diagnostics: &mut Vec<Diagnostic>)
     diagnostics.push(Diagnostic::new("force_by_power", severity, text, figures));
 }
 
-/// What `init` doubted and nobody has confirmed.
+/// Adds the doubts of `init` that nobody has confirmed.
 fn of_doubts(context: Context, diagnostics: &mut Vec<Diagnostic>) {
     for mapping in context.manifest.columns.iter().filter(|mapping| mapping.is_doubtful) {
         let (quantity, shown) = (mapping.quantity, mapping.shown());
@@ -126,7 +127,7 @@ fn of_doubts(context: Context, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// What was done to the times, and what could not be.
+/// Adds the repairs of the times, and the faults that cannot be repaired.
 fn of_clock(run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
     let faults = &run.clock_faults;
     for &(row, jump_s) in &faults.jumps {
@@ -374,39 +375,5 @@ fn of_force(
         let text =
             format!("no {quantity} is mapped: without it the balance of forces is not known");
         diagnostics.push(Diagnostic::new("force_not_recorded", Info, text, [of(quantity)]));
-    }
-}
-
-/// The bounds beyond which [`dynocar_model::validation::Validator`] refuses a sample.
-const PLAUSIBLE: [(Quantity, f64, f64); 7] = [
-    (Quantity::Acceleration, -20.0, 20.0),
-    (Quantity::SpecificForce, -20.0, 20.0),
-    (Quantity::BrakeCylinderPressure, -5e4, 2e6),
-    (Quantity::AmbientTemperature, -80.0, 80.0),
-    (Quantity::Gradient, -150.0, 150.0),
-    (Quantity::Latitude, -90.0, 90.0),
-    (Quantity::Longitude, -180.0, 180.0),
-];
-
-fn of_plausibility(run: &Resolved, diagnostics: &mut Vec<Diagnostic>) {
-    for (quantity, low, high) in PLAUSIBLE {
-        let Some(column) = run.table.column(quantity) else { continue };
-        let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
-        let count = column.iter().filter(is_outside).count();
-        if count > 0 {
-            let unit = quantity.unit().name();
-            let text = format!(
-                "{quantity} lies outside {low} to {high} {unit} in {count} rows, and those samples \
-                 are refused: is the unit right?"
-            );
-            let figures = [
-                of(quantity),
-                of_count(count),
-                ("low", low.into()),
-                ("high", high.into()),
-                ("unit", unit.into()),
-            ];
-            diagnostics.push(Diagnostic::new("implausible", Warning, text, figures));
-        }
     }
 }

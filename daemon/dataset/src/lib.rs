@@ -36,8 +36,10 @@ pub mod document;
 pub mod encoding;
 pub mod error;
 mod forces;
+mod friction_brake;
 pub mod guess;
 mod header;
+mod implausible_columns;
 mod judge;
 mod lines;
 pub mod manifest;
@@ -155,7 +157,7 @@ impl Dataset {
         self.runs.iter().map(|run| run.quality.order.step_s).fold(0.0, f64::max)
     }
 
-    /// What it declares, without runs.
+    /// Returns the declarations, without runs.
     pub fn without_runs(&self) -> Dataset {
         Dataset {
             name: self.name.clone(),

@@ -10,7 +10,7 @@ use super::error::DatasetError;
 /// More lines above the names than any recorder writes.
 const SKIP_ROWS_MAX: f64 = 10_000.0;
 
-/// What may separate groups of three digits.
+/// Possible separators of groups of three digits.
 pub const THOUSANDS: [char; 8] = ['.', ',', '\'', '’', ' ', '\u{a0}', '\u{202f}', '\u{2009}'];
 
 /// How the text of the runs' files falls into cells.
@@ -22,7 +22,7 @@ pub struct TextLayout {
     pub delimiter: u8,
     /// Separator of a number's fraction: a point or a comma.
     pub decimal: u8,
-    /// What separates groups of three digits in numbers; `None` for nothing.
+    /// Separator of groups of three digits in numbers; `None` without one.
     pub thousands: Option<char>,
     /// Lines above that with the columns' names.
     pub skip_rows: usize,

@@ -3,30 +3,24 @@
 use std::ops::RangeInclusive;
 
 use dynocar_model::terms::{Key, curve, extra, rotating, tunnel};
-use dynocar_model::train::{
-    BrakeComponents, BrakeGear, Corrections, Davis, Drive, EffortCurve, FrictionBrake, TrainModel,
-};
+use dynocar_model::train::{BrakeGear, Corrections, Davis, Drive, EffortCurve, TrainModel};
 
 use super::corrections::{read_corrections, read_extra};
 use super::document::{Item, above_zero};
 use super::error::DatasetError;
+use super::friction_brake::{UNIT_STDS, components, friction_brake};
 use super::node::Node;
 
 /// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
 pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
 /// Mass of a passenger in kg unless a train says otherwise.
 pub const PASSENGER_MASS_DEFAULT_KG: f64 = 70.0;
-/// A friction brake is released up to this pressure in Pa unless a train says otherwise.
-pub const RELEASE_PRESSURE_DEFAULT_PA: f64 = 20e3;
 #[rustfmt::skip]
 const BRAKE_KEYS: [&str; 18] = [
     "max_force_kn", "effort", "cylinder_diameter_mm", "disc_radius_mm", "wheel_radius_mm", "efficiency",
     "ratio", "friction", "pads", "force_per_pressure_n_per_pa", "release_pressure_pa", "units",
     "failure_probability", UNIT_STDS[0], UNIT_STDS[1], UNIT_STDS[2], UNIT_STDS[3], UNIT_STDS[4],
 ];
-/// Relative standard deviations of what a brake's units differ in.
-const UNIT_STDS: [&str; 5] =
-    ["friction_std", "pressure_std", "efficiency_std", "common_std", "mass_std"];
 /// Which masses a train and a run of it may have.
 pub(super) const MASS: &str = "a mass in t above 0, at most 100000";
 
@@ -129,40 +123,6 @@ fn drive(section: &Item) -> Result<Option<Drive>, DatasetError> {
         auxiliary_power_w: auxiliary_kw.map_or(usual.auxiliary_power_w, |kw| 1e3 * kw),
         speed_min_mps: speed_min.unwrap_or(usual.speed_min_mps),
     }))
-}
-
-/// The friction brake that is known by its pressure.
-fn friction_brake(section: &Item) -> Result<Option<FrictionBrake>, DatasetError> {
-    let gain = section.optional("force_per_pressure_n_per_pa", "N/Pa from 0 to 1000", 0.0..=1e3)?;
-    let release =
-        section.optional("release_pressure_pa", "a pressure in Pa from 0 to 1e6", 0.0..=1e6)?;
-    Ok(gain.map(|force_per_pressure_n_per_pa| FrictionBrake {
-        force_per_pressure_n_per_pa,
-        release_pressure_pa: release.unwrap_or(RELEASE_PRESSURE_DEFAULT_PA),
-    }))
-}
-
-/// How the brake's units differ and fail.
-fn components(section: &Item) -> Result<Option<BrakeComponents>, DatasetError> {
-    if !["units", "failure_probability"].iter().chain(&UNIT_STDS).any(|key| section.has(key)) {
-        return Ok(None);
-    }
-    let units = section.required("units", "a number of units from 1 to 10000", 1.0..=1e4)? as u32;
-    let failure = "a probability from 0 to 0.5";
-    let failure = section.optional("failure_probability", failure, 0.0..=0.5)?;
-    let mut stds = [0.0; UNIT_STDS.len()];
-    for (std, key) in stds.iter_mut().zip(UNIT_STDS) {
-        let given =
-            section.optional(key, "a relative standard deviation from 0 to 0.5", 0.0..=0.5)?;
-        *std = given.unwrap_or(0.0);
-    }
-    let [friction_std, pressure_std, efficiency_std, common_std, mass_std] = stds;
-    let failure_probability = failure.unwrap_or(0.0);
-    #[rustfmt::skip]
-    let found = BrakeComponents {
-        units, friction_std, pressure_std, efficiency_std, common_std, mass_std, failure_probability,
-    };
-    Ok(Some(found))
 }
 
 fn brake(section: &Item) -> Result<(Option<EffortCurve>, BrakeGear), DatasetError> {

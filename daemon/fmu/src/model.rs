@@ -383,12 +383,10 @@ impl Model {
         let phases = [Phase::Instantiated, Phase::Initializing, Phase::Stepping];
         self.require(&phases, "to set a variable")?;
         let variable = self.interface.variable(reference, expected)?;
-        match variable.meaning {
-            Meaning::Estimate(..) | Meaning::Driven(_) => {
-                Err(ModelError::NotAnInput(variable.name))
-            }
-            _ => Ok(variable),
+        if matches!(variable.meaning, Meaning::Estimate(..) | Meaning::Driven(_)) {
+            return Err(ModelError::NotAnInput(variable.name));
         }
+        Ok(variable)
     }
 }
 

@@ -56,7 +56,7 @@ enum Command {
     Identify(Passed),
     /// Estimate deceleration and stopping distance from recorded stops, without forces.
     Stops(Passed),
-    /// Estimate the brake's parameters for train protection (ETCS) from recorded stops, and stopping distances.
+    /// Estimate a brake's ETCS parameters and stopping distances from recorded stops.
     Brakes(Passed),
     /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
     Survey(Passed),

@@ -1,4 +1,4 @@
-//! What a thread asks of the system: memory that stays, a core of its own, a place in the queue, files, and
+//! Requests of a thread to the system: resident memory, a core of its own, a place in the queue, files, and
 //! programs that do not outlive it.
 
 use std::io::ErrorKind;

@@ -91,7 +91,7 @@ fn wait_for_any(listener: &TcpListener, connections: &[Connection]) {
 struct Connection {
     stream: TcpStream,
     request: Vec<u8>,
-    /// What is not sent yet; empty until the request is whole.
+    /// Answer that is not sent yet; empty until the request is whole.
     answer: Vec<u8>,
     deadline: Instant,
 }

@@ -53,7 +53,7 @@ pub fn run(watcher: &mut Watcher, ending: &Ending) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What is written on a terminal that knows no other letters.
+/// Returns the text for a terminal that knows no other letters.
 fn in_ascii(text: &str) -> String {
     let letters =
         text.replace('±', "+-").replace('…', "...").replace('‰', "o/oo").replace('²', "2");

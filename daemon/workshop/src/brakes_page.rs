@@ -16,7 +16,7 @@ const SIZE: (f64, f64) = (980.0, 380.0);
 /// Room in it for numbers at the left and below.
 const MARGIN: f64 = 50.0;
 
-/// What is reported.
+/// Reported results.
 #[derive(Debug, Serialize)]
 pub struct BrakesAnswer {
     /// Names of the datasets.
@@ -29,7 +29,7 @@ pub struct BrakesAnswer {
     pub parameters: Parameters,
     /// The level of Kdry_rst in the file.
     pub ebcl: Option<u32>,
-    /// What holds of them, and what does not.
+    /// Statements about them and their limits.
     pub said: Vec<String>,
 }
 

@@ -95,7 +95,7 @@ impl Stop<'_> {
         resisting_n / self.inertial_kg()
     }
 
-    /// What there is of a full brake force a time in s after the dead time.
+    /// Returns the built-up part of a full brake force a time in s after the dead time.
     fn built_up_n(&self, full_n: f64, applied_s: f64) -> f64 {
         let response = &self.response;
         if applied_s == f64::INFINITY {

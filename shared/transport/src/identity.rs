@@ -1,4 +1,4 @@
-//! What a file, a directory or the shared memory is, whatever it is called.
+//! Identity of a file, a directory or the shared memory, whatever its name.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;

@@ -17,7 +17,7 @@ pub struct CommonDeviations {
     pub speed_scale: f64,
     /// Addition of cold bearings at the start over the basic resistance, and their time constant in s.
     pub warming: (f64, f64),
-    /// What the declared rotating-mass factor lacks.
+    /// Error of the declared rotating-mass factor.
     pub rotating_mass: f64,
     /// Length in m over which the line rounds each step of its gradient.
     pub vertical_curve_m: f64,

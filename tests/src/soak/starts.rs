@@ -41,7 +41,7 @@ pub fn run(programs: &Programs, rounds: u64, seed: u64) -> Summary {
     summary
 }
 
-/// What a round starts.
+/// Part that a round starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     Daemon,

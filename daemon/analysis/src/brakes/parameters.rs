@@ -22,11 +22,11 @@ pub struct Correction {
     pub ebcl: u32,
     /// Share of stops that are weaker.
     pub probability: f64,
-    /// What the measured stops reach; `None` where there are too few for the level.
+    /// Factor that the measured stops reach; `None` where there are too few for the level.
     pub measured: Option<f64>,
     /// Its 95 % interval by the order of the stops; an end is `None` beyond the weakest and strongest.
     pub measured_95: [Option<f64>; 2],
-    /// What the declared components reach, conditioned on the stops; `None` without components.
+    /// Factor that the declared components reach, conditioned on the stops; `None` without components.
     pub modelled: Option<f64>,
 }
 

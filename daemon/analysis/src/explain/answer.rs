@@ -206,7 +206,7 @@ pub struct EffectAnswer {
     pub error_reduction: f64,
     /// Meaning in kWh and metres.
     pub meaning: Meaning,
-    /// What sources of evidence say against each other about it; absent where they agree.
+    /// Contradiction between the sources of evidence about it; absent where they agree.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contradiction: Option<String>,
     /// For an effect outside the library, forms that explain less of the data, the best first.

@@ -83,8 +83,8 @@ fn mass_factors(value: &ParameterValue) -> Option<String> {
     Some(format!("mass_factor = {}", listed.join(", ")))
 }
 
-/// What is certain and small: its kind with its numbers in the model, or in the trial that took it in where nothing
-/// is named.
+/// Describes a certain and small effect: its kind with its numbers in the model, or in the trial that took it in
+/// where nothing is named.
 pub(super) fn small(outcome: &Outcome, trial: &Trial) -> String {
     let effect = &trial.fit.model.effects[trial.last()];
     let tried = trial.fit.effect_parameters(trial.last());

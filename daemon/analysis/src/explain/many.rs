@@ -183,7 +183,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         Ok(())
     }
 
-    /// What the fit runs that are not held say of some models, by group.
+    /// Returns the normal equations of the fit runs that are not held, by group.
     fn normals<const N: usize>(
         &self,
         problem: &FitProblem,

@@ -4,7 +4,7 @@ use crate::cell::{Marks, is_word, ungrouped};
 use crate::lines::{Row, RowReader};
 use crate::text_layout::THOUSANDS;
 
-/// What the cells of files say of their marks.
+/// Evidence of the cells of files on their marks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Evidence {
     /// Cells in which a comma, and a point, can be nothing but a decimal mark.

@@ -16,7 +16,7 @@ pub struct Aged {
     pub age: Duration,
 }
 
-/// What is known of a file that has ended.
+/// Facts on a file that has ended.
 #[derive(Clone, Copy, Debug)]
 struct Ended {
     /// The date that it bears.

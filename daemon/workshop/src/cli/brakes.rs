@@ -20,7 +20,7 @@ use dynocar::cli::Failure;
 use dynocar::dataset;
 use dynocar::output::{give, report_line, require_files, write_file, write_json};
 
-/// Estimate the brake's parameters for train protection (ETCS) from recorded stops, and stopping distances.
+/// Estimate a brake's ETCS parameters and stopping distances from recorded stops.
 ///
 /// An estimate from data, and no safety case.
 #[derive(Debug, Args)]

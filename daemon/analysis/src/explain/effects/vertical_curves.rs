@@ -44,7 +44,7 @@ pub fn vertical_curves(track: Arc<Track>, train_length_m: f64) -> Candidate {
 }
 
 impl Rounded {
-    /// What a share of 1 adds in ‰ along the travel at a chainage in m.
+    /// Returns the addition of a share of 1 in ‰ along the travel at a chainage in m.
     fn added_permille(&self, centre_m: f64, direction: f64) -> f64 {
         let at = |offset_m: f64| {
             let place_m = centre_m + offset_m;

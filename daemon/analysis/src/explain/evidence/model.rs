@@ -7,7 +7,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::integral::Response;
 use super::integral::{Integral, integrate_bins};
-use super::pass::{Acting, Pass, blocks};
+use super::pass::{Acting, Pass, PassInput, blocks};
 use super::run_data::RunData;
 use super::run_scatter::{RunFactors, of_day};
 use super::sample_forces::SampleForces;
@@ -121,11 +121,16 @@ impl UpdatedModel {
                     elsewhere[i] = theta[i] + step;
                     moved.samples.clone_from(&before.samples);
                     let past = number * pass.order.len();
-                    pass.act((run, &elsewhere, first), turn..pass.order.len(), moved, past);
+                    pass.act(
+                        PassInput { run, theta: &elsewhere, first },
+                        turn..pass.order.len(),
+                        moved,
+                        past,
+                    );
                     push(&moved.samples, self.speed_scale(&elsewhere, &acts), mps2);
                     elsewhere[i] = theta[i];
                 }
-                pass.act((run, theta, first), turn..turn + 1, before, 0);
+                pass.act(PassInput { run, theta, first }, turn..turn + 1, before, 0);
             }
             push(&before.samples, self.speed_scale(theta, &acts), &mut base_mps2);
         }

@@ -49,14 +49,14 @@ impl<'m> Pass<'m> {
     ) {
         let first = samples.start;
         acting.declared(run, samples);
-        self.act((run, theta, first), 0..self.order.len(), acting, 0);
+        self.act(PassInput { run, theta, first }, 0..self.order.len(), acting, 0);
     }
 
     /// Some of them act on what acted before, at the samples from one on. What they remember stands from number
     /// `past` on.
     pub fn act(
         &self,
-        (run, theta, first): (&RunData, &[f64], usize),
+        PassInput { run, theta, first }: PassInput<'_>,
         turns: Range<usize>,
         acting: &mut Acting,
         past: usize,
@@ -68,6 +68,15 @@ impl<'m> Pass<'m> {
             effect.apply(&theta[range.clone()], On { run, first, past }, samples);
         }
     }
+}
+
+/// Samples on which effects act, and the parameters with which they do.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PassInput<'a> {
+    pub run: &'a RunData,
+    pub theta: &'a [f64],
+    /// Number of the first sample.
+    pub first: usize,
 }
 
 /// Forces at the newest samples, with the memory that the effects keep of those before.

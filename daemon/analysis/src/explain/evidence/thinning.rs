@@ -35,7 +35,7 @@ pub(super) fn thinned(recording: &Recording) -> Vec<ResolvedSample> {
     means
 }
 
-/// What the samples of a mean have in common.
+/// Returns the traits that the samples of a mean share.
 fn traits(sample: &ResolvedSample) -> (u32, bool, [bool; 5], [bool; 8]) {
     let speeds = [0.0, STANDING_MPS, MOVING_MPS].map(|least| sample.speed_mps > least);
     let known = [

@@ -1,4 +1,4 @@
-//! What each source of evidence alone says of the scale of the speeds, and whether they agree.
+//! Scale of the speeds by each source of evidence alone, and whether they agree.
 
 use dynocar_shared::HALF_95;
 use nalgebra::Cholesky;
@@ -53,7 +53,7 @@ impl ScaleSources {
     }
 }
 
-/// What is left of an estimate without one of its sources; `None` where that is nothing.
+/// Returns an estimate without one of its sources; `None` where nothing is left.
 fn without(both: WithStd, source: WithStd) -> Option<WithStd> {
     let [all, own] = [both.std, source.std].map(|std| std.powi(-2));
     let left = all - own;

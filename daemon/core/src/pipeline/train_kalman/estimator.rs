@@ -56,14 +56,14 @@ pub struct TrainKalman {
     health: InputHealth,
     moved_s: f64,
     moved_min_s: f64,
-    /// What was kept from earlier, until the first sample.
+    /// Estimate kept from earlier, until the first sample.
     kept: Option<Kept>,
     report: Report,
     is_fresh_reset: bool,
     resets: u64,
 }
 
-/// What counts of a kept estimate with the first sample.
+/// Part of a kept estimate that counts with the first sample.
 #[derive(Clone, Copy, Debug)]
 struct Kept {
     /// Mass in kg with its relative variance, and with that before any time had passed.

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// What a file of time, speed and these columns holds, one value a row for each.
+/// Returns the guess for a file of time, speed and these columns, one value a row for each.
 fn guess_of(names: &[&str], row: impl Fn(f64) -> Vec<f64>) -> Result<Guess, String> {
     let rows = (0..40).map(|second| {
         let time = f64::from(second);
@@ -149,7 +149,7 @@ fn the_position_is_that_which_the_speed_spans_and_its_direction_that_of_most_ste
     assert_eq!(guess.runs[0].direction, -1);
 }
 
-/// What the practice file of [`file`] is guessed to be with another first column, and the samples that it gives.
+/// Returns the guess for the practice file of [`file`] with another first column, and its times.
 fn times_of(cells: impl Fn(f64) -> String) -> (Guess, Vec<i64>) {
     let rows = (0..900).map(|row| {
         let time = 0.2 * f64::from(row);

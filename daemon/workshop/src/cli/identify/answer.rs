@@ -99,7 +99,7 @@ impl EstimatorAnswer {
         }
     }
 
-    /// What is to be said of an estimated mass that no load explains.
+    /// Returns the note on an estimated mass that no load explains.
     pub(super) fn contradiction(&self, declared_kg: f64) -> Option<DatasetDiagnostic> {
         let (mass_t, declared_t) = (*self.values.get(MASS)?, declared_kg / 1000.0);
         let std_t = self.std.get(MASS)?.hypot(LOAD_STD * declared_t);

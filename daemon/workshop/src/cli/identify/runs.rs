@@ -46,7 +46,7 @@ pub(super) struct EstimatorSpread {
 }
 
 impl RunAnswer {
-    /// What each estimator learned from it.
+    /// Returns the answer of each estimator.
     pub(super) fn estimators(&mut self) -> &mut Vec<EstimatorAnswer> {
         &mut self.estimators
     }

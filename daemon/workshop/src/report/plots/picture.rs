@@ -1,4 +1,4 @@
-//! What plots stand on: canvas, colours, the sizes of pages, figures.
+//! Ground of all plots: canvas, colours, the sizes of pages, figures.
 //!
 //! Each plot is drawn at twice its nominal size, so that the whole pixels of the backend are fine
 //! enough, and scaled by the page. The colours are those of the light page; the page's style
@@ -16,7 +16,7 @@ use serde_json::json;
 use super::reading::{self, Reading};
 use crate::report::html::escape;
 
-/// What the model without effects is called beside its data.
+/// Returns the name of the model without effects beside its data.
 pub(super) fn before_name(has_effect: bool) -> &'static str {
     if has_effect { "before" } else { "model" }
 }

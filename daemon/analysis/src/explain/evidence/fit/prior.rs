@@ -34,7 +34,7 @@ impl FitProblem {
             let mut part = score.rows_mut(start, count);
             part -= pull;
         }
-        self.take_positions(model, theta, (&mut information, &mut score, &mut cost));
+        self.take_positions(model, theta, (&mut information, &mut score), &mut cost);
         (information, score, cost)
     }
 
@@ -43,8 +43,10 @@ impl FitProblem {
         &self,
         model: &UpdatedModel,
         theta: &[f64],
-        (information, score, cost): (&mut DMatrix<f64>, &mut DVector<f64>, &mut f64),
+        normal: (&mut DMatrix<f64>, &mut DVector<f64>),
+        cost: &mut f64,
     ) {
+        let (information, score) = normal;
         if let Some((ratio, deviation)) = self.distance_ratio {
             let mut scale = 1.0;
             let mut at = None;
