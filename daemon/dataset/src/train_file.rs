@@ -197,6 +197,8 @@ pub fn growing<'t>(
 
 #[cfg(test)]
 mod tests {
+    use dynocar_model::train::{BrakeComponents, FrictionBrake};
+
     use super::*;
 
     const FULL: &str = r#"
