@@ -228,7 +228,7 @@ enum {
     /* The train's file: nothing else is known of the load yet */
     DYNOCAR_MASS_SOURCE_DECLARED = 1,
     DYNOCAR_MASS_SOURCE_WEIGHED = 2, /* The controller's samples, which carry it */
-    DYNOCAR_MASS_SOURCE_LEARNED = 3 /* What forces do to the train */
+    DYNOCAR_MASS_SOURCE_LEARNED = 3 /* Effect of forces on the train */
 };
 
 /* A number that a pipeline estimates, with the unit of its value. A sample's mass is in kg. */
@@ -361,7 +361,7 @@ typedef struct dynocar_train_sample {
     double brake_cylinder_pressure_pa;
     /* dv/dt in m/s^2, as measured */
     double acceleration_mps2;
-    /* What an accelerometer reads along the track in m/s^2: dv/dt + g * gradient */
+    /* Reading of an accelerometer along the track in m/s^2: dv/dt + g * gradient */
     double specific_force_mps2;
     /* The train's gross mass in kg, without the rotating part */
     double mass_kg;
@@ -642,7 +642,7 @@ typedef struct dynocar_stop {
     double adhesion;
     /* Its standard deviation */
     double adhesion_std;
-    /* What the rail carries: a Rail */
+    /* Adhesion of the rail: a Rail */
     uint64_t rail;
 } dynocar_stop;
 

@@ -149,7 +149,7 @@ class MassSource(_Vocabulary):
     NONE = 0  # The pipeline estimates no mass
     DECLARED = 1  # The train's file: nothing else is known of the load yet
     WEIGHED = 2  # The controller's samples, which carry it
-    LEARNED = 3  # What forces do to the train
+    LEARNED = 3  # Effect of forces on the train
 
 
 class Parameter(_Vocabulary):
