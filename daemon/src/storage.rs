@@ -273,7 +273,7 @@ fn write_next_to(
     content: &[u8],
     rights: &Rights,
 ) -> Result<(), StorageError> {
-    // What a writer that died left behind. It may be the same file as that under the other name, on
+    // Left by a writer that died. It may be the same file as that under the other name, on
     // a file system that lost half of a renaming: it is removed, not written over.
     match storage.remove(beside) {
         Err(error) if error.kind() != ErrorKind::NotFound => {

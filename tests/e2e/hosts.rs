@@ -129,7 +129,7 @@ fn two_installations_of_one_path_that_share_memory_count_nothing_of_each_other()
         let totals =
             log.lines().find(|line| line.contains("stopped")).unwrap_or_else(|| panic!("{log}"));
         assert!(totals.contains(" rejected=0") && !totals.contains("used=0"), "{log}");
-        // What a killed controller was handing over is lost.
+        // The sample that a killed controller was handing over is lost.
         assert!(totals.contains(" lost=0 ") || totals.contains(" lost=1 "), "{log}");
     }
 }

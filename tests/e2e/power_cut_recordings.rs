@@ -34,7 +34,7 @@ fn sample(sequence: u64) -> TrainSample {
     TrainSample { sequence, ..TrainSample::empty(TrainId(1)) }
 }
 
-/// Statement at a moment, after so many steps of the disk.
+/// Statement at a moment, after a number of steps of the disk.
 #[derive(Clone, Debug)]
 struct Mark {
     steps: usize,

@@ -43,7 +43,8 @@ fn tuple_parameter(line: &str) -> Option<usize> {
     let names = pattern.rsplit_once('(')?.1;
     let is_name = |name: &str| name.chars().all(|it| it.is_ascii_lowercase() || it == '_');
     let names: Vec<&str> = names.split(", ").map(|it| it.trim_start_matches("mut ")).collect();
-    let is_parameter = !line.contains("let ") && names.iter().all(|name| is_name(name));
+    let is_code = !line.contains("let ") && !line.trim_start().starts_with("//");
+    let is_parameter = is_code && names.iter().all(|name| is_name(name));
     is_parameter.then_some(names.len())
 }
 

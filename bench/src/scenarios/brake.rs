@@ -6,11 +6,11 @@ use std::ops::Range;
 /// Report of the brake by the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reported {
-    /// The force that electric and friction brake are told to exert.
+    /// The force demanded of electric and friction brake.
     Force,
     /// The driver's demand, before any limit of jerk.
     Demand,
-    /// The force as told, and the pressure that is in the cylinders.
+    /// The demanded force, and the pressure that is in the cylinders.
     Pressure,
     /// The electric force alone.
     ElectricForce,
@@ -19,9 +19,9 @@ pub enum Reported {
 /// A brake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brake {
-    /// Time constant in s with which friction follows what it is told.
+    /// Time constant in s with which friction follows its demand.
     pub lag_s: f64,
-    /// Friction force over what is told.
+    /// Friction force over its demand.
     pub strength: f64,
     /// Speeds in m/s between which friction takes over; infinite where it brakes alone.
     pub hand_over_mps: (f64, f64),
@@ -32,7 +32,7 @@ pub struct Brake {
 }
 
 impl Brake {
-    /// Friction never acts: the force is what is told, but for the mistakes of every train.
+    /// Friction never acts: the force is the demand, but for the mistakes of every train.
     pub const AS_TOLD: Brake = Brake {
         lag_s: 0.0,
         strength: 1.0,
@@ -93,7 +93,7 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// Acceleration in m/s² of what is told, after a step in s at a speed in m/s.
+    /// Acceleration in m/s² of the demand, after a step in s at a speed in m/s.
     pub fn acts_mps2(&mut self, brake: &Brake, told_mps2: f64, speed_mps: f64, step_s: f64) -> f64 {
         let braked_mps2 = (-told_mps2).max(0.0);
         let share = brake.friction_share(speed_mps);

@@ -72,7 +72,7 @@ pub struct Habits {
     pub line_m: f64,
     /// Steepest gradient in ‰.
     pub steep_permille: f64,
-    /// Deceleration in m/s² that the brake of a standing train is told to exert.
+    /// Deceleration in m/s² demanded of the brake of a standing train.
     pub holding_mps2: f64,
 }
 

@@ -27,7 +27,7 @@ const USUAL_STEP_S: (f64, f64) = (0.0005, 60.0);
 
 /// A moving train's columns that all keep their values for this many s are diagnosed.
 const STANDS_STILL_MIN_S: f64 = 10.0;
-/// ... so many times longer than any other such interval.
+/// ... this many times longer than any other such interval.
 const EXCEPTION: f64 = 3.0;
 /// The speed in m/s from which a train surely moves.
 const MOVING_MPS: f64 = 1.0;

@@ -1,6 +1,6 @@
 //! The command line: `dynocar record`, `recover`, `convert` and `replay --verify` become this program.
 //!
-//! What a failure is to the command line: wrong input, or work that could not be done.
+//! Failures of the command line: wrong input, or work that could not be done.
 
 mod annotate;
 mod record;

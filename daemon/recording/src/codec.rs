@@ -1,6 +1,6 @@
 //! Samples and snapshots as protobuf messages, and back, to the bit.
 //!
-//! What is 0 in every bit is left out, as protobuf has it; a negative zero is written. A sample's
+//! A value with all bits 0 is left out, as protobuf has it; a negative zero is written. A sample's
 //! value whose bit in `valid` is not set is no value, and is left out too. The names under `estimate`
 //! and `rejected` repeat what the arrays hold, and are passed over when a message is read.
 

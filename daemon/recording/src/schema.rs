@@ -1,7 +1,7 @@
 //! The protobuf messages of a recording, made from the layouts of sample and snapshot.
 //!
 //! A field's number is its place in the layout, counted from 1.
-//! What is measured is `optional`: missing is missing. Numbers of a vocabulary are protobuf
+//! Measured values are `optional`: missing is missing. Numbers of a vocabulary are protobuf
 //! enumerations. What arrays hold stands once more under names with units in `estimate` and
 //! `rejected`.
 

@@ -127,7 +127,7 @@ pub fn ends_with_this(command: &mut Command) -> &mut Command {
 /// Lets this process open as many files as its hard limit allows; each connection of a reader takes some.
 pub fn raise_open_files() {
     let limit = getrlimit(Resource::Nofile);
-    // What is refused is named once the limit is reached.
+    // A refusal is named once the limit is reached.
     let _ = setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, ..limit });
 }
 

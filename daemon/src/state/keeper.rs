@@ -94,7 +94,7 @@ impl Keeper {
         self.write(0, file::replace);
         for train in self.trains.iter().filter(|it| !it.is_changed[0]) {
             let id = dynocar_shared::TrainId(train.content.key.train);
-            // What was never left cannot be removed.
+            // A copy that was never left cannot be removed.
             let _ = std::fs::remove_file(path_of(&self.directories[1], id));
         }
     }

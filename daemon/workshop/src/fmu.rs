@@ -75,7 +75,7 @@ pub fn read_library(path: &Path) -> Result<Vec<u8>, FmuError> {
     if is_ours { Ok(library) } else { Err(FmuError::OtherLibrary(path.into())) }
 }
 
-/// The FMU of a model whose hosts take steps of so many s by default: the same bytes for the same library and files.
+/// Returns the FMU of a model with a default step in s: the same bytes for the same library and files.
 ///
 /// # Errors
 ///

@@ -168,7 +168,7 @@ pub(crate) fn unusable<'a>(
 
 /// Refuses a directory that others use: closing it to them would harm the system.
 fn require_own(root: &Path) -> Result<(), ChannelError> {
-    // What is not there, or cannot be looked at, is made or refused next.
+    // A directory that is not there, or cannot be looked at, is made or refused next.
     let Ok(attributes) = std::fs::metadata(root) else { return Ok(()) };
     let is_private = attributes.mode() & 0o077 == 0;
     let is_used = || std::fs::read_dir(root).is_ok_and(|mut it| it.next().is_some());

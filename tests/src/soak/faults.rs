@@ -1,6 +1,6 @@
 //! Kills, stops and restarts of daemon, controller and client at random moments.
 //!
-//! What holds after every round: the client reads fresh snapshots of the daemon that lives, without
+//! Invariants after every round: the client reads fresh snapshots of the daemon that lives, without
 //! anything reopened; no epoch came twice or ran backwards; while the daemon was dead or stopped,
 //! nothing older than its time passed for fresh. When all are gone, so are their segments.
 

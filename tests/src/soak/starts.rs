@@ -1,6 +1,6 @@
 //! `kill -9` of daemon, controller and client at random moments of their start, and of their work.
 //!
-//! What holds after every round: once nobody is left, the root is served by the next daemon, and a
+//! Invariants after every round: once nobody is left, the root is served by the next daemon, and a
 //! sample comes through; or by the one that is there, where another process was killed.
 
 use std::time::Duration;
@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::Programs;
 use crate::process::{Process, Site};
 
-/// A process is killed within so many ms of its start.
+/// A process is killed within this many ms of its start.
 const START_MS: u64 = 60;
 /// Processes that are killed in one round, on one root.
 const STARTS_PER_ROUND: u64 = 10;

@@ -39,7 +39,7 @@ struct Tilt {
     train: [f64; 2],
 }
 
-/// The share that all stops but `probability` of them reach, from so many draws with a seed.
+/// Returns the share that all stops but `probability` of them reach, from a number of draws with a seed.
 pub fn weakest(brake: &BrakeComponents, probability: f64, draws: usize, seed: u64) -> Weakest {
     sampled(brake, probability, Tilt::towards(brake, probability), (draws, seed))
 }

@@ -1,7 +1,7 @@
 //! Many runs: the search looks at some of them, evenly chosen and thinned to a second; then all of them say how large
 //! it is what was found, and how well it predicts.
 //!
-//! Whatever the number of runs, so many are held in memory. All others are read one after the other and reduced to
+//! Whatever the number of runs, a fixed number is held in memory. All others are read one after the other and reduced to
 //! their normal equations at the finished model, which add up, or to their errors. What acts in some runs only is known
 //! of those that the search looked at: then these alone say how large it is.
 
@@ -16,16 +16,16 @@ use super::selection::{Beside, Outcome, Search};
 use crate::dataset::{Dataset, Role, Run};
 use crate::parallel;
 
-/// So many fit runs are all looked at, as they were recorded.
+/// Largest number of fit runs that are all searched, as they were recorded.
 pub const FIT_RUNS_MAX: usize = 32;
-/// Of more, a quarter is looked at, but so many at least and at most.
+/// Least and greatest number of searched fit runs where there are more, of which a quarter is searched.
 const FIT_RUNS_HELD: [usize; 2] = [12, 32];
-/// So many holdout runs are held for what may act in them.
+/// Number of holdout runs that are held for effects in single runs.
 const HOLDOUT_RUNS_HELD: usize = 6;
 /// The golden ratio less 1: its multiples, less their whole parts, lie evenly, and in step with no order of the runs.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// How many of so many fit runs are held.
+/// Returns the number of fit runs that are held.
 fn fit_runs_held(fit: usize) -> usize {
     let [least, most] = FIT_RUNS_HELD;
     (fit / 4).clamp(least, most)
@@ -68,7 +68,7 @@ impl Held {
             let (from, end) = (first(number), first(number + 1));
             let share = (GOLDEN * number as f64).fract();
             let within = (share * (end - from) as f64) as usize;
-            // What acts in the newest run may be about to last.
+            // An effect in the newest run may be about to last.
             let is_last = number + 1 == count;
             let is_held = *seen == if is_last { end - 1 } else { from + within };
             *seen += 1;

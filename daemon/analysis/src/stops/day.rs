@@ -7,7 +7,7 @@ use crate::statistics::span;
 
 /// Stops are counted together whose speeds lie in the same step of this size in m/s.
 const STEP_MPS: f64 = 5.0;
-/// Decelerations are summed up at every so many m/s.
+/// Step in m/s at which decelerations are summed up.
 const SPEEDS_MPS: f64 = 2.0;
 
 /// The middle of some values and what 80 % of them lie within.

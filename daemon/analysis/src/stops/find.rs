@@ -26,7 +26,7 @@ const STEP_MPS: f64 = 0.3;
 const EASED_S: f64 = 15.0;
 /// ... or, slower than this in m/s, creeping, of this time in s.
 const CREEPING: (f64, f64) = (2.5, 40.0);
-/// A longer time in s between two samples, or so many usual ones, ends a stop.
+/// A longer time in s between two samples, or this many usual ones, ends a stop.
 const GAP_MAX: (f64, f64) = (3.0, 1.6);
 /// A recorder that pauses while a slow train stands may leave out the standstill: the train could come to it
 /// in the pause at this deceleration in m/s².

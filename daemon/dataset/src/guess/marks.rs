@@ -80,7 +80,7 @@ impl Evidence {
         let other = if decimal == b',' { '.' } else { ',' };
         let mut counts = self.thousands;
         let index = THOUSANDS.iter().position(|mark| *mark == other).unwrap_or(0);
-        // What the decimal mark is not stands between groups, where the decimal mark is sure.
+        // The other mark stands between groups, where the decimal mark is sure.
         if self.commas + self.points > 0 {
             counts[index] += if other == '.' { self.either_point } else { self.either_comma };
         }

@@ -15,7 +15,7 @@ const SAID: i32 = 100;
 const ENOUGH: i32 = 45;
 /// A name below this is a doubtful sign.
 const SURE: i32 = 65;
-/// One cell of text among more than so many numbers is a mistake in the file.
+/// One cell of text among more than this many numbers is a mistake in the file.
 const TEXTS_RARE: usize = 50;
 /// Terms of at least this many letters are found within a longer word, too.
 const WITHIN_MIN: usize = 6;

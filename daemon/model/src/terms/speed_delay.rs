@@ -69,7 +69,7 @@ impl LateSpeed {
     }
 
     /// The forces in N behind a speed in m/s of a time in ns of a motion segment; `None` while none are known.
-    /// What brakes a train that stands moves nothing, and no lag remembers it.
+    /// A brake on a train that stands moves nothing, and no lag remembers it.
     pub fn forces(
         &mut self,
         at: (i64, u32),

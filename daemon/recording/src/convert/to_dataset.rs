@@ -129,7 +129,7 @@ pub fn unpack(
             write(folder, name, content)?;
         }
         unpacked.samples = recording.samples.len();
-        // What is wrong with it is said by whoever reads it.
+        // Its reader reports its faults.
         if dataset::load(folder).map_or(true, |it| are_of(&it, &recording.samples)) {
             return Ok(unpacked);
         }

@@ -4,7 +4,7 @@
 //! A pipeline is a function of its samples from the daemon's start on. A snapshot's `sequence` counts
 //! them, so that it says whether the recording holds them all.
 //!
-//! What another configuration would have estimated from the same samples.
+//! Estimates of another configuration from the same samples.
 
 mod configurations;
 mod pipelines;

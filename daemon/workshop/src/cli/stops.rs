@@ -37,7 +37,7 @@ pub struct StopsArguments {
     pub(super) json: Option<PathBuf>,
 }
 
-/// So many modulated stops are shown one by one.
+/// Largest number of modulated stops that are shown one by one.
 const SINGLE_MAX: usize = 12;
 /// Speeds in m/s at which the deceleration of a modulated stop is shown.
 const SHOWN_MPS: [f64; 6] = [25.0, 20.0, 15.0, 10.0, 5.0, 3.0];

@@ -44,7 +44,7 @@ pub fn is_finished(path: &Path) -> bool {
 }
 
 /// Unpacks what a recording holds of a train, unless that was done before; `sha256` is that of its content.
-/// What cannot be used is reported once.
+/// A recording that cannot be used is reported once.
 ///
 /// # Errors
 ///

@@ -1,6 +1,6 @@
 //! Entering the transport, and the services of its channels.
 //!
-//! What the transport gives, behind trait objects.
+//! The transport's ports, behind trait objects.
 //!
 //! The transport's generic code, some thousand functions, is so compiled in this crate once, and not in every crate
 //! that opens or drops a port.

@@ -96,7 +96,7 @@ impl Users {
         if self.host.transport_directory().exists()
             && let Ok(config) = self.host.transport_config()
         {
-            // What cannot be listed is nobody's.
+            // Files that cannot be listed belong to nobody.
             let _ = Node::<ipc::Service>::list(&config, |node| {
                 has_any |= matches!(node, NodeState::Alive(_));
                 CallbackProgression::Continue

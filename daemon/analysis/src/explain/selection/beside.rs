@@ -197,7 +197,7 @@ pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -
     deviations_given(outcome, step_s)
 }
 
-/// How surely the parameters of a model are known that was moved beside the usual errors last, from samples so many s
+/// Standard deviations of the parameters of a model that was moved with the usual errors last, from samples some s
 /// apart.
 pub fn deviations_given(outcome: &Outcome, step_s: f64) -> Deviations {
     let count = outcome.fit.theta.len();

@@ -11,7 +11,7 @@ const HELD_SHARE: f64 = 1e-4;
 /// Less runs than these say nothing of each other.
 const RUNS_MIN: usize = 2;
 
-/// By how much the first so many parameters move when each run is left out, to second order, with all
+/// Moves of the first `count` parameters when each run is left out, to second order, with all
 /// others held; of a run without which they are not determined nothing.
 fn moves_without_each_run(fit: &Fit, count: usize) -> Vec<DVector<f64>> {
     let information = fit.information();

@@ -83,7 +83,7 @@ impl Beside {
         size.abs() < HALF_95 * std
     }
 
-    /// Whether a change of mass in single runs is what loads are anyway: the largest of so many deviations is
+    /// Whether a change of mass in single runs is the usual scatter of loads: the largest of several deviations is
     /// about √(2 ln n) of their standard deviation, which the other runs show.
     pub(super) fn is_as_loads_are(&self, index: usize) -> bool {
         let fit = &self.fit;

@@ -66,7 +66,7 @@ pub struct RunNormal {
 }
 
 impl RunNormal {
-    /// Of no run, for so many parameters.
+    /// Returns the sums of no run, for a number of parameters.
     pub fn none(count: usize) -> Self {
         RunNormal {
             information: DMatrix::zeros(count, count),
