@@ -65,7 +65,7 @@ fn sources_in(folder: &str, sources: &mut Vec<Source>) {
     for entry in std::fs::read_dir(root.join(folder)).expect("a source folder") {
         let path = entry.expect("a folder entry").path();
         let name = path.strip_prefix(&root).expect("of the workspace").display().to_string();
-        if path.is_dir() {
+        if path.is_dir() && !name.ends_with("/tests") {
             sources_in(&name, sources);
         } else if name.ends_with(".py") || name.ends_with(".rs") && !name.ends_with("tests.rs") {
             let text = std::fs::read_to_string(&path).expect("a source file");

@@ -7,28 +7,12 @@ use dynocar_model::units::Unit;
 use super::clock::TimeFormat;
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
-use super::text_layout::{THOUSANDS, TextLayout};
+use super::text_layout::{Marks, THOUSANDS, TextLayout};
 
 /// Words of programs for a missing number, in small letters.
 const MISSING: &str = "n/a na #n/a #na <na> nan null (null) none nil nat - -- --- . ? * missing #n/v #nv #null! #value! \
                        #wert! #num! #zahl! #div/0! #ref! #bezug! #name? 1.#qnan -1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf \
                        1.#snan bad invalid no_data nodata undefined undef";
-
-/// Marks of a number: before its fraction, and between groups of three digits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Marks {
-    /// Before the fraction.
-    pub decimal: u8,
-    /// Between groups of three digits; `None` where nothing is.
-    pub thousands: Option<char>,
-}
-
-impl Marks {
-    /// A point and nothing, or a comma and nothing.
-    pub const fn plain(decimal: u8) -> Self {
-        Marks { decimal, thousands: None }
-    }
-}
 
 /// The number in a trimmed cell, `NaN` for an empty one and a word for what is missing; `None` when it is something
 /// else.

@@ -58,13 +58,13 @@ mod table;
 pub mod text_layout;
 pub mod track_file;
 pub mod train_file;
+mod unusual_resistance;
 
 #[cfg(test)]
 mod tests;
 
 pub use clock::TimeFormat;
 pub use dataset_diagnostic::DatasetDiagnostic;
-pub use declared::unusual_resistance;
 pub use diagnostic::Diagnostic;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
@@ -81,6 +81,7 @@ pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
+pub use unusual_resistance::unusual_resistance;
 
 use std::sync::Arc;
 

@@ -2,13 +2,28 @@
 
 use encoding_rs::{Encoding, UTF_8};
 
-use super::cell::Marks;
 use super::document::Item;
 use super::encoding;
 use super::error::DatasetError;
 
 /// More lines above the names than any recorder writes.
 const SKIP_ROWS_MAX: f64 = 10_000.0;
+
+/// Marks of a number: before its fraction, and between groups of three digits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Marks {
+    /// Before the fraction.
+    pub decimal: u8,
+    /// Between groups of three digits; `None` where nothing is.
+    pub thousands: Option<char>,
+}
+
+impl Marks {
+    /// A point and nothing, or a comma and nothing.
+    pub const fn plain(decimal: u8) -> Self {
+        Marks { decimal, thousands: None }
+    }
+}
 
 /// Possible separators of groups of three digits.
 pub const THOUSANDS: [char; 8] = ['.', ',', '\'', '’', ' ', '\u{a0}', '\u{202f}', '\u{2009}'];

@@ -5,9 +5,10 @@ use super::layout::{Layout, layout};
 use super::marks::Evidence;
 use super::name::Name;
 use crate::TextLayout;
-use crate::cell::{Marks, is_word, parse_cell, truth};
+use crate::cell::{is_word, parse_cell, truth};
 use crate::error::{DatasetError, NO_HEADER, SourcePosition};
 use crate::lines::{Row, RowReader, below};
+use crate::text_layout::Marks;
 
 /// A column of the first file's header.
 #[derive(Clone, Debug)]

@@ -1,8 +1,9 @@
 //! Facts on the values of a column.
 
 use crate::TimeFormat;
-use crate::cell::{Marks, parse_cell, truth};
+use crate::cell::{parse_cell, truth};
 use crate::clock::{DayClock, Packed, day_of_cell};
+use crate::text_layout::Marks;
 
 /// Number of values of a column that are kept, evenly spread, to find its middle and its top.
 const KEPT_MAX: usize = 4096;

@@ -2,9 +2,10 @@
 use dynocar_model::units::is_unit;
 
 use super::name::Name;
-use crate::cell::{Marks, parse_cell, ungrouped};
+use crate::cell::{parse_cell, ungrouped};
 use crate::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
 use crate::lines::{self, RowReader};
+use crate::text_layout::Marks;
 use crate::text_layout::THOUSANDS;
 use crate::{TextLayout, TimeFormat};
 

@@ -1,7 +1,8 @@
 //! Which marks stand in numbers: before their fraction, and between groups of three digits.
 
-use crate::cell::{Marks, is_word, ungrouped};
+use crate::cell::{is_word, ungrouped};
 use crate::lines::{Row, RowReader};
+use crate::text_layout::Marks;
 use crate::text_layout::THOUSANDS;
 
 /// Evidence of the cells of files on their marks.
