@@ -123,7 +123,8 @@ fn a_unit_that_no_name_gives_is_set_right_by_how_the_train_moves() {
     site.write("slow.csv", &slow);
     let printed = done(&site, &["init", "made", "--csv", "slow.csv"]);
     let text = read_to_string(site.path().join("made/dataset.toml")).unwrap();
-    assert!(text.contains("speed = { column = \"v\", unit = \"km/h\" }"), "{text}");
+    let mapping = "speed = { column = \"v\", unit = \"km/h\", doubtful = true }";
+    assert!(text.contains(mapping), "{text}");
     assert!(
         printed.contains("doubtful: speed: the name gives no unit; km/h, since in m/s"),
         "{printed}"

@@ -63,7 +63,7 @@ pub fn copy<V: Visitor<Error = CopyError>, E: From<CopyError>>(
 ) -> Result<Copied, E> {
     let failed = |error| CopyError::from(WriteError::of::<McapError>(to)(error));
     let file = storage.create(to).map_err(|error| failed(error.into()))?;
-    let options = WriteOptions::new().profile("dynocar").disable_seeking(true);
+    let options = WriteOptions::new().profile("dynocar").disable_seeking(true).compression(None);
     let writer = options.create(NoSeek::new(BufWriter::new(file))).map_err(failed)?;
     let mut copier = Copier {
         writer,

@@ -122,6 +122,11 @@ impl Visitor for () {
     }
 }
 
+/// Largest ratio of a chunk's bytes to those of its compressed file.
+const EXPANSION_MAX: u64 = 64;
+/// Largest size in bytes of a chunk that is larger than its file.
+const EXPANDED_BYTES: u64 = 256 << 20;
+
 /// Reads a file, and gives what it holds as far as it is whole.
 ///
 /// # Errors
@@ -132,8 +137,9 @@ pub fn read<V: Visitor>(path: &Path, visitor: &mut V) -> Result<Ending, V::Error
     let not_mcap = || ReadError::of(path)(ReadProblem::NotMcap).into();
     let mut file = File::open(path).map_err(&unreadable)?;
     let file_bytes = file.metadata().map_err(&unreadable)?.len();
-    // A damaged length asks for no more memory than the file has bytes.
-    let limit = usize::try_from(file_bytes).unwrap_or(usize::MAX);
+    // A damaged length asks for little more memory than a compressed file of this size may need.
+    let expanded = file_bytes.saturating_mul(EXPANSION_MAX).min(EXPANDED_BYTES);
+    let limit = usize::try_from(file_bytes.max(expanded)).unwrap_or(usize::MAX);
     let options = LinearReaderOptions::default()
         .with_prevalidate_chunk_crcs(true)
         .with_record_length_limit(limit);

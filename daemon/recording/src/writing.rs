@@ -94,6 +94,8 @@ impl<W: Write> RecordingWriter<W> {
             .profile("dynocar")
             .library(LIBRARY)
             .disable_seeking(true)
+            // Uncompressed, so that a file that was cut can be read up to its last byte.
+            .compression(None)
             .chunk_size(Some(CHUNK_BYTES))
             .create(NoSeek::new(output))?;
         Ok(RecordingWriter {

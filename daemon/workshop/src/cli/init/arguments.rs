@@ -72,7 +72,9 @@ fn given_column(text: &str) -> Result<GivenColumn, String> {
         let (column, said) = (rest[..at].trim().to_owned(), rest[at + 1..].trim());
         let unit = Unit::find(quantity.dimension(), said);
         let is_time = quantity == Quantity::Time && unit.is_none();
-        let format = TimeFormat::from_name(said).filter(|_| is_time);
+        // A pattern that begins with a letter begins with the end of the column's name.
+        let is_pattern = !said.contains('%') || !said.starts_with(char::is_alphabetic);
+        let format = TimeFormat::from_name(said).filter(|_| is_time && is_pattern);
         let is_said = unit.is_some() || format.is_some();
         is_said.then_some(GivenColumn { quantity, column, unit, format })
     };
