@@ -87,7 +87,7 @@ fn lines_list_a_daemon_that_comes_goes_and_is_back_and_a_signal_ends_them() {
     assert!(line.contains("resistance") && line.contains("suspect none"), "{line}");
     first.kill();
     let line = await_words("the daemon is gone; what it said last is shown");
-    assert!(line.contains("unavailable (daemon_silent)"), "{line}");
+    assert!(line.contains("resistance unavailable (daemon_silent)"), "{line}");
     let _second = daemon(&site);
     watch.await_line("the new daemon", |line| {
         line.contains("train 1: daemon") && !line.contains("daemon_silent")
