@@ -153,7 +153,7 @@ fn a_standing_train_starts_by_traction_and_what_is_not_connected_is_none() {
     assert!(first_mps > 0.0 && second_mps > first_mps, "{first_mps}, {second_mps}");
     set(&fmu, "traction_force_n", MISSING);
     set(&fmu, "brake_force_n", 900e3);
-    assert!((13..40).map(stepped).all(|speed_mps| speed_mps >= 0.0));
+    assert!((12..40).map(stepped).all(|speed_mps| speed_mps >= 0.0));
     assert_eq!(real(&fmu, "motion.speed_mps"), 0.0, "a brake stops it and does not push it back");
     let rolling = Fmu::of(&PLANT, demo().to_str().unwrap());
     let held = reference_in(&PLANT, "held_at_rest");

@@ -6,12 +6,16 @@
 
 use dynocar_model::simulate::Recording;
 
-use super::positions::{DISTANCE_MIN_M, Distances, END_ERROR_M, between_corrections, distances};
+use super::positions::{
+    CORRECTION_MIN_M, DISTANCE_MIN_M, Distances, END_ERROR_M, between_corrections, distances,
+};
 
 /// Corrections closer together than this in m on average are the noise of positions that are no odometer's.
 const APART_MIN_M: f64 = 100.0;
 /// An odometer that errs by more than this share is none.
 const RATE_MAX: f64 = 0.1;
+/// Number of standard deviations of all corrections together that is more than chance.
+const CHANCE_STDS: f64 = 2.0;
 
 /// By how many m along the chainage each position of a recording is moved to take the drift out; `None` where
 /// too few corrections show it.
@@ -22,7 +26,10 @@ pub(super) fn drift_m(recording: &Recording) -> Option<Vec<f64>> {
     let counted_m: f64 = counted.iter().map(|step: &Distances| step.by_position_m).sum();
     let corrected_m: f64 = fixes.iter().map(|step: &Distances| step.missed_m()).sum();
     let rate = corrected_m / counted_m;
-    if counted_m < DISTANCE_MIN_M.max(APART_MIN_M * fixes.len() as f64) || rate.abs() > RATE_MAX {
+    if counted_m < DISTANCE_MIN_M.max(APART_MIN_M * fixes.len() as f64)
+        || rate.abs() > RATE_MAX
+        || corrected_m.abs() < CHANCE_STDS * chance_m(between, rate)
+    {
         return None;
     }
     let mut moved_m = vec![0.0; recording.samples().len()];
@@ -47,6 +54,23 @@ pub(super) fn drift_m(recording: &Recording) -> Option<Vec<f64>> {
         }
     }
     Some(moved_m)
+}
+
+/// Returns the standard deviation in m of the sum of all corrections, by how they scatter about those of a rate and
+/// by what is too small to be seen; a correction that is far from what the others say counts as one at its limit.
+fn chance_m(between: &[Distances], rate: f64) -> f64 {
+    let (mut fixes, mut square_m2, mut counted_m) = (0.0_f64, 0.0, 0.0);
+    for step in between {
+        if step.is_corrected() {
+            fixes += 1.0;
+            square_m2 += (step.missed_m() - rate * counted_m).abs().min(END_ERROR_M).powi(2);
+            counted_m = 0.0;
+        } else {
+            counted_m += step.by_position_m;
+        }
+    }
+    let each_m = (square_m2 / (fixes - 1.0).max(1.0)).sqrt();
+    fixes.sqrt() * each_m.max(CORRECTION_MIN_M)
 }
 
 #[cfg(test)]
@@ -106,6 +130,20 @@ mod tests {
         let all = recorded(1.015, &BALISES_M, (4001.0, 80.0));
         assert!(error_m(&all, [0.0, 4000.0]) < 3.0);
         assert!(error_m(&all, [5004.0, 1e4]) < 3.0);
+    }
+
+    #[test]
+    fn corrections_to_both_sides_are_those_of_balises_and_move_nothing() {
+        let (_, recording) = recorded(1.0, &[], (-1.0, 0.0));
+        let off_m = [0.0, 1.4, 0.1, -1.2, 1.5, -0.3, 1.1, -0.9];
+        let mut samples = recording.samples().to_vec();
+        for sample in &mut samples {
+            let position_m = sample.position_m.expect("a position");
+            let passed = BALISES_M.iter().filter(|at_m| **at_m < position_m).count();
+            sample.position_m =
+                Some(position_m + passed.checked_sub(1).map_or(0.0, |it| off_m[it]));
+        }
+        assert_eq!(drift_m(&Recording::new(samples).unwrap()), None);
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub(super) fn distance_ratio(recording: &Recording) -> Option<(f64, f64)> {
 /// Usual error of a position in m where a run begins and ends, and at a balise.
 pub(super) const END_ERROR_M: f64 = 10.0;
 /// A position that leaves the integrated speed by more than this in m was corrected.
-const CORRECTION_MIN_M: f64 = 1.0;
+pub(super) const CORRECTION_MIN_M: f64 = 1.0;
 /// A shorter way in m shows nothing of the wheels.
 pub(super) const DISTANCE_MIN_M: f64 = 1500.0;
 

@@ -1,9 +1,11 @@
 //! A run made ready for fitting: resolved, cleaned and binned.
 
+use std::sync::Arc;
+
 use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::simulate::{Recording, SimulateError};
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::train::TrainModel;
+use dynocar_model::train::{Corrections, TrainModel};
 use dynocar_model::validation::Validator;
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -157,15 +159,27 @@ pub fn prepare(dataset: &Dataset) -> Result<Vec<RunData>, RunDataError> {
 /// The first run without usable samples.
 pub fn prepare_at(dataset: &Dataset, density: Density) -> Result<Vec<RunData>, RunDataError> {
     let train = &dataset.train;
-    let mut reader = Reader {
+    let reader = |train: Arc<TrainModel>, track| Reader {
         validator: Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg),
-        resolver: ForceResolver::new(train.clone(), dataset.track.clone()),
+        resolver: ForceResolver::new(train, track),
     };
-    dataset.runs.iter().map(|run| prepare_run(train, (run, density), &mut reader)).collect()
+    // An odometer counts by the speed as it was reported, whatever a train's file says of it.
+    let reported = TrainModel { corrections: Corrections::default(), ..TrainModel::clone(train) };
+    let mut readers = Readers {
+        as_reported: reader(reported.into(), None),
+        as_known: reader(train.clone(), dataset.track.clone()),
+    };
+    dataset.runs.iter().map(|run| prepare_run(train, (run, density), &mut readers)).collect()
+}
+
+/// Readers of all runs, one after the other.
+struct Readers {
+    /// Without the train's corrections and the line.
+    as_reported: Reader,
+    as_known: Reader,
 }
 
 /// Takes samples one after the other, as a daemon does.
-#[derive(Clone)]
 struct Reader {
     validator: Validator,
     resolver: ForceResolver,
@@ -201,22 +215,20 @@ fn move_positions(rows: &mut [TrainSample], samples: &[ResolvedSample], moved_m:
 fn prepare_run(
     train: &TrainModel,
     (run, density): (&Run, Density),
-    reader: &mut Reader,
+    readers: &mut Readers,
 ) -> Result<RunData, RunDataError> {
     let numbered = run.samples.iter().map(|it| TrainSample { run: run.number, ..*it });
     let mut rows: Vec<TrainSample> = numbered.collect();
     let unusable = |source| RunDataError::Simulate { file: run.file.clone(), source };
-    let before = reader.clone();
-    let (samples, mut replaced) = reader.read(&rows);
-    let mut recording = Recording::new(samples).map_err(unusable)?;
     let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
-    if let Some(moved_m) = drift_m(&recording).filter(|_| is_position_recorded) {
-        move_positions(&mut rows, recording.samples(), &moved_m);
-        *reader = before;
-        let (samples, replaced_again) = reader.read(&rows);
-        replaced = replaced_again;
-        recording = Recording::new(samples).map_err(unusable)?;
+    if is_position_recorded {
+        let reported = Recording::new(readers.as_reported.read(&rows).0).map_err(unusable)?;
+        if let Some(moved_m) = drift_m(&reported) {
+            move_positions(&mut rows, reported.samples(), &moved_m);
+        }
     }
+    let (samples, replaced) = readers.as_known.read(&rows);
+    let mut recording = Recording::new(samples).map_err(unusable)?;
     let rejected = rows.len() - recording.samples().len();
     let first_ns = recording.samples().first().map_or(0, |sample| sample.time_ns);
     let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };

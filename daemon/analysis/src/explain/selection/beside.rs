@@ -126,7 +126,8 @@ impl Search<'_> {
         let (effects, ranges) = (&beside.model.effects, beside.model.ranges());
         let usual = (fit.model.effects.len()..effects.len()).map(|number| {
             let (own, values) = (effects[number].clone(), &beside.theta[ranges[number].clone()]);
-            if own.is_gradient() {
+            // A single number keeps its prior: at none it has no shape, and would be determined by nothing.
+            if own.is_gradient() && values.len() > 1 {
                 map_error_as_fitted(own, values).parts()
             } else {
                 (own, values.to_vec())
