@@ -79,7 +79,7 @@ pub struct Explanation {
 
 /// Explains what the declared model of a dataset leaves.
 ///
-/// Holdout runs are read once, to score the finished model. Of [many](many) fit runs the search looks at some.
+/// Holdout runs are read once, to score the finished model. Of [`many`] fit runs the search looks at some.
 ///
 /// # Errors
 ///

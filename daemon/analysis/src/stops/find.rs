@@ -90,7 +90,7 @@ pub fn usable(samples: &[TrainSample]) -> Vec<TrainSample> {
     usable
 }
 
-/// The stops of a run of [`usable`] samples, in order.
+/// The stops of a run of usable samples, in order.
 pub fn find(
     samples: &[TrainSample],
     brake: Option<&EffortCurve>,
