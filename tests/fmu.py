@@ -59,6 +59,10 @@ for group, estimator in ESTIMATORS.items():
         full, found = f"{group}.{name}", last[f"{group}.{name}"]
         if name == "status" or name == "reason":
             assert members[name.capitalize()][int(found)] == answer[name], full
+        elif name.endswith("_number"):
+            assert int(found) == int(last[full.removesuffix("_number")]), full
+        elif name == "usable":
+            assert found in (0, 1), full  # `identify` does not print it
         elif name == "rejected":
             assert found == sum(answer["samples"]["rejected"].values()), full
         elif name == "unexplained_force_n":
