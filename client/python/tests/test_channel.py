@@ -153,7 +153,7 @@ def assert_is_silent_at_last(reader: dynocar.SnapshotReader) -> None:
     snapshot = reader.resistance()
     shown = (snapshot.status.name, snapshot.why, snapshot.is_usable)
     assert shown == ("INVALID", "daemon_silent", False)
-    words = "resistance_kalman invalid (daemon_silent), not usable"
+    words = "resistance_kalman invalid (daemon_silent), not usable (unavailable)"
     assert str(snapshot).splitlines()[0] == words
 
 
