@@ -217,6 +217,7 @@ def open_in_a_thread_that_ends(root: str) -> None:
 def test_a_forked_child_is_refused_and_takes_nothing_of_its_parents(played: PlayedDaemon) -> None:
     publisher = dynocar.SamplePublisher(TRAIN, played.root)
     reader = dynocar.SnapshotReader(TRAIN, played.root)
+    played.order("answer")
     drive(publisher, reader)
     child = os.fork()
     if child == 0:
