@@ -185,6 +185,47 @@ fn separate_shared_memories_are_named_with_what_containers_need() {
 }
 
 #[test]
+fn shared_memory_that_cannot_be_used_is_named_by_everybody() {
+    let site = Site::new();
+    let config = site.write_config(1, "", ECHO);
+    let root = site.path().join("root");
+    let everybody = format!(
+        "timeout -s TERM 5 {DYNOCAR} run --config {}; echo status $?; {DYNOCAR} health; echo status $?; \
+         {PEER} controller 1 1000; {PEER} client 1 1000",
+        config.display()
+    );
+    for (mount, words) in [
+        (
+            "mount -t tmpfs -o ro none /dev/shm",
+            "shared memory cannot be used: Read-only file system",
+        ),
+        ("mount -t tmpfs none /dev", "shared memory cannot be used: No such file or directory"),
+        (
+            "mount -t tmpfs -o nr_inodes=3 none /dev/shm",
+            "shared memory cannot be used: No space left",
+        ),
+        ("mount -t tmpfs -o size=1m none /dev/shm", "shared memory is full: 1024 KiB free"),
+        (
+            "mount -t tmpfs -o size=8m none /dev/shm; head -c 6m /dev/zero >/dev/shm/neighbour",
+            "shared memory is full: 2048 KiB free",
+        ),
+    ] {
+        let mut command = match in_namespace(&format!("{{ {mount}; {everybody}; }} 2>&1")) {
+            Ok(command) => command,
+            Err(reason) => return println!("not tried: {reason}"),
+        };
+        let output =
+            command.env("DYNOCAR_ROOT", &root).env("RUST_BACKTRACE", "0").output().unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        // The peers give the value, whose words are those of the type.
+        let named = ["SharedMemoryUnusable", "SharedMemoryFull"].map(|it| said.matches(it).count());
+        assert_eq!((said.matches(words).count(), named.iter().sum::<usize>()), (1, 2), "{said}");
+        assert!(said.contains("status 1") && said.contains("status 6"), "{said}");
+        assert!(!said.contains("DYNOCAR_ROOT"), "{said}");
+    }
+}
+
+#[test]
 fn a_root_of_another_user_says_how_to_ask_and_one_of_the_system_keeps_its_mode() {
     let site = Site::new();
     let root = site.path().join("of-another");

@@ -191,6 +191,12 @@ fn metrics_are_answered_beside_slow_peers_with_head_slash_and_query() {
     let head = ask("HEAD /metrics");
     assert!(head.starts_with("HTTP/1.1 200 OK") && head.ends_with("\r\n\r\n"), "{head}");
     assert!(ask("GET /other").starts_with("HTTP/1.1 404"));
+    // Ten times as many as there are places for, which would take a second each time.
+    let dawdlers: Vec<_> = (0..320).map(|_| connect()).collect();
+    let asked = Instant::now();
+    assert!(ask("GET /metrics").starts_with("HTTP/1.1 200 OK"));
+    assert!(asked.elapsed() < Duration::from_secs(6), "{:?}", asked.elapsed());
+    drop(dawdlers);
 }
 
 /// Processes that a process started, whoever looks after them now.

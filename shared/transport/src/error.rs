@@ -162,6 +162,17 @@ pub enum ChannelError {
         /// Needed memory.
         needed_kib: u64,
     },
+    /// Shared memory is not there, or takes no file of this process.
+    #[error(
+        "{path}: shared memory cannot be used: {source}; it has to be a tmpfs with free inodes that this user \
+         may write into: mount -t tmpfs -o mode=1777 tmpfs {path}"
+    )]
+    SharedMemoryUnusable {
+        /// Where shared memory lies.
+        path: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+    },
     /// A message was not taken.
     #[error(transparent)]
     Send(#[from] SendRefused),
