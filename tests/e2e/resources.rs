@@ -162,6 +162,21 @@ fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
 }
 
 #[test]
+fn a_limit_of_open_files_is_named_wherever_it_ends_a_start() {
+    let site = Site::new();
+    let config = site.write_config(1, "", ECHO);
+    for limit in [7, 10, 16, 20, 24, 28, 32] {
+        let script =
+            format!("ulimit -n {limit} && exec {DYNOCAR} run --config {}", config.display());
+        let daemon = site.start("sh", &["-c", &script]);
+        // With the greater of these the daemon serves, without keeping a state.
+        daemon.await_error(&format!("the limit of {limit} is reached"));
+        let said = daemon.errors();
+        assert!(said.contains("ulimit -n") && !said.contains("refused"), "{said}");
+    }
+}
+
+#[test]
 fn metrics_are_answered_beside_slow_peers_with_head_slash_and_query() {
     let site = Site::new();
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
