@@ -164,7 +164,7 @@ fn a_ring_loses_nothing_and_an_event_ends_whatever_the_wall_clock_does() {
     let said = recorder.errors();
     assert!(said.contains(" 0 samples lost"), "{said}");
     assert_eq!(names(&ring.files())[0], all[0], "nothing of the ring has gone");
-    // What was published while there was no recorder is missing, and nothing else.
+    // Samples that were published while there was no recorder are missing, no others.
     let recorded = sequences(&site, &ring.files());
     let gaps = recorded.windows(2).filter(|it| it[1] != it[0] + 1).count();
     assert!(gaps <= 1 && *recorded.last().unwrap() == last, "{gaps} gaps, {:?}", recorded.last());

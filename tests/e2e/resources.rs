@@ -1,4 +1,4 @@
-//! What a process shares with others: readers of its log, open files, peers of its port, its children.
+//! Resources that a process shares with others: readers of its log, open files, a port, its children.
 
 use std::io::{BufRead, PipeReader, PipeWriter, Read, Write};
 use std::process::Stdio;

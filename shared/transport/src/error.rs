@@ -184,7 +184,7 @@ pub enum ChannelError {
 const FILES_PER_PORT: u64 = 8;
 
 impl ChannelError {
-    /// What the transport refused; its reasons do not tell a lack of open files from others.
+    /// Returns a refusal by the transport, whose reasons do not tell a lack of open files from others.
     pub(crate) fn transport(what: String, reason: String) -> Self {
         let open = match std::fs::read_dir("/proc/self/fd") {
             Ok(files) => files.count() as u64,
