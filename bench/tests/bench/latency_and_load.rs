@@ -129,7 +129,10 @@ fn a_benchmark_that_is_ended_or_killed_takes_its_peers_along() {
     ] {
         for signal in [Signal::TERM, Signal::INT, Signal::KILL] {
             let site = Site::new();
-            let mut bench = site.start(env!("CARGO_BIN_EXE_dynocar-bench"), arguments);
+            // Files that a killed one leaves go with the site.
+            let variables = [("TMPDIR", site.path().to_str().unwrap())];
+            let program = env!("CARGO_BIN_EXE_dynocar-bench");
+            let mut bench = site.start_with(program, arguments, &variables);
             let mut children = Vec::new();
             await_true(
                 || {
