@@ -106,19 +106,20 @@ pub struct Unpacked {
 }
 
 impl Unpacked {
-    /// Unpacks a recording; what the program diagnoses is reported.
+    /// Unpacks what a recording holds of a train, its only one where none is named; what the program diagnoses is
+    /// reported.
     ///
     /// # Errors
     ///
     /// See [`UnpackError`].
-    pub fn of(recording: &Path) -> Result<Self, UnpackError> {
+    pub fn of(recording: &Path, train: Option<TrainId>) -> Result<Self, UnpackError> {
         let path = recording.to_path_buf();
         let folder = TempDir::with_prefix("dynocar-").map_err(|error| UnpackError::Failed {
             path: path.clone(),
             problem: error.to_string(),
         })?;
         let unpacked = Unpacked { recording: path, folder: folder.into() };
-        unpack(recording, &unpacked.folder(), None)?;
+        unpack(recording, &unpacked.folder(), train)?;
         Ok(unpacked)
     }
 
