@@ -188,9 +188,7 @@ fn described(folder: &Path) -> String {
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn open<'p>(
-    source: impl Into<Source<'p>>,
-) -> Result<(DatasetFolder, DatasetHead), LoadError> {
+pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(DatasetFolder, DatasetHead), LoadError> {
     let source = source.into();
     let folder = DatasetFolder::at(source)?;
     let head = DatasetHead::open(&folder).map_err(|error| other_kind(source.path, error))?;

@@ -33,6 +33,7 @@ mod shipped;
 mod stops;
 mod survey_command;
 mod two_programs;
+mod two_trains;
 
 // Findings of `explain`, and their limits.
 mod declared_terms;

@@ -6,9 +6,9 @@ use dynocar::cli::Failure;
 use dynocar::cli::check::refusal;
 use dynocar::dataset::{Source, SourceArguments};
 use dynocar::output::OutputError;
+use dynocar_shared::TrainId;
 use dynocar_workshop::cli::check as checking;
 use dynocar_workshop::cli::identify as identifying;
-use dynocar_shared::TrainId;
 use pyo3::prelude::*;
 use serde::Serialize;
 
@@ -31,11 +31,7 @@ fn of(path: &Path, train: Option<u64>) -> Source<'_> {
 
 /// Returns the description of a path; its errors are part of the answer.
 #[pyfunction]
-pub(crate) fn check(
-    py: Python<'_>,
-    path: PathBuf,
-    train: Option<u64>,
-) -> PyResult<JsonAndText> {
+pub(crate) fn check(py: Python<'_>, path: PathBuf, train: Option<u64>) -> PyResult<JsonAndText> {
     let answer = in_background(py, None, move |_| match checking::understand(of(&path, train)) {
         Ok(understood) => Ok((json(&understood.answer(&path))?, understood.text())),
         Err(failure) => match failure.answer() {

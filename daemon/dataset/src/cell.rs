@@ -56,7 +56,8 @@ pub fn is_missing(text: &str) -> bool {
     let is_of_marks = folded.len() > 1 && folded.chars().all(is_mark);
     // Spreadsheets name an error in their user's language.
     let is_error = folded.starts_with('#') && folded.ends_with(['!', '?']);
-    let is_no_number = ["1.#", "nan("].iter().any(|it| folded.trim_start_matches('-').starts_with(it));
+    let is_no_number =
+        ["1.#", "nan("].iter().any(|it| folded.trim_start_matches('-').starts_with(it));
     is_of_marks || is_error || is_no_number || MISSING.split(' ').any(|word| word == folded)
 }
 

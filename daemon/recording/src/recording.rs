@@ -9,9 +9,10 @@ pub use mcap::records::Metadata;
 use crate::error::{ReadError, ReadProblem};
 use crate::event::Event;
 use crate::joining::read_all;
+use crate::order::Logged;
 use crate::reading::{Item, Raw, Visitor};
 
-/// Contents of a recording, each kind in the order of writing.
+/// Contents of a recording, each kind in its order.
 #[derive(Debug, Default)]
 pub struct Recording {
     /// Samples, in the order in which they were written.
@@ -76,8 +77,9 @@ impl Recording {
     ///
     /// Without a file.
     pub fn load_all(paths: &[PathBuf]) -> Result<Self, ReadError> {
-        let mut recording = Recording::default();
-        let endings = read_all(paths, &mut recording)?;
+        let mut logged = Logged::default();
+        let endings = read_all(paths, &mut logged)?;
+        let mut recording = logged.in_order();
         let broken: Vec<String> =
             endings.iter().zip(paths).filter_map(|(ending, path)| ending.words(path)).collect();
         recording.broken = (!broken.is_empty()).then(|| broken.join("; "));

@@ -79,8 +79,7 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         }
     };
     let host = Host::from_environment().map_err(Failure::work)?;
-    let mut replayer =
-        Replayer::open(&host, train, arguments.rate).map_err(Failure::work)?;
+    let mut replayer = Replayer::open(&host, train, arguments.rate).map_err(Failure::work)?;
     let wait = Duration::try_from_secs_f64(arguments.wait).map_err(|_| {
         Failure::Input(format!("--wait {}: expected a time in s from 0", arguments.wait))
     })?;

@@ -30,6 +30,7 @@ mod vocabulary;
 mod tests;
 
 pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, Recording, Unmapped};
+pub use layout::{Layout, layout};
 pub use name::Name;
 
 use dynocar_model::units::Unit;
