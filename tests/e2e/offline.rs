@@ -16,6 +16,8 @@ mod careless;
 mod check;
 mod explain_again;
 mod fmu;
+mod foreign_files;
+mod foreign_parts;
 mod identify;
 mod import;
 mod init;

@@ -140,8 +140,8 @@ impl TrainsColumn {
         }
         let (words, name, first) = (self.words(), &self.name, &self.trains[0]);
         Err(SourcePosition::whole(label).problem(format!(
-            "{words}; choose one in dataset.toml: [train] {KEY} = {{ column = {name:?}, value = {first:?} }}, or \
-             \"{ALL}\" where they are one"
+            "{words}; choose one: `dynocar init --train`, or [train] {KEY} = {{ column = {name:?}, value = {first:?} \
+             }} in dataset.toml; {KEY} = \"{ALL}\" where they are one"
         )))
     }
 }
