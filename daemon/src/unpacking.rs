@@ -39,10 +39,17 @@ pub fn program_for<'w>(words: impl IntoIterator<Item = &'w OsStr>) -> &'static s
 ///
 /// # Errors
 ///
-/// In words, without the file's name.
-pub fn columns_of(file: &Path, mappings: &[ColumnMapping]) -> Result<Vec<RunColumn>, String> {
+/// In words, without the file's name; where rows of several trains are in turn, unless nothing is `unsaid` of them.
+pub fn columns_of(
+    file: &Path,
+    mappings: &[ColumnMapping],
+    unsaid: bool,
+) -> Result<Vec<RunColumn>, String> {
     let mut command = call(PARQUET);
     command.arg("columns").arg(file);
+    if unsaid {
+        command.arg("--of-one-train");
+    }
     for it in mappings {
         for name in it.names() {
             command.arg("--column").arg(name).arg(it.unit.name());

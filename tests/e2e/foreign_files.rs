@@ -39,7 +39,7 @@ pub fn plain(row: u32, column: usize) -> String {
     values(row)[column].to_string()
 }
 
-/// What `init` says of files, and the dataset that it makes of them.
+/// Describes files by `init`; gives the dataset, and the words of the command.
 pub fn described(
     files: &[(&str, &[u8])],
     more: &[&str],
@@ -309,4 +309,41 @@ fn an_hour_of_summer_time_is_taken_out_and_said_with_its_line() {
             assert!(said.contains(words) && said.contains("summer time"), "{command}: {said}");
         }
     }
+}
+
+#[test]
+fn rows_in_any_order_are_sorted_and_an_index_without_a_name_is_a_time() {
+    let text = table(&NAMES, ",", plain);
+    let (names, rows) = text.split_once('\n').expect("names");
+    let falling = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[1] = (5000.0 - cells[1].parse::<f64>().expect("a number")).to_string();
+        cells.join(",")
+    };
+    let lines: Vec<String> = rows.lines().map(falling).collect();
+    // Steps through all rows, as 7 is prime to their number; then back; then as parts of a table come.
+    let orders: [Vec<usize>; 3] = [
+        (0..600).map(|row| row * 7 % 600).collect(),
+        (0..600).rev().collect(),
+        (0..600).map(|row| (row / 150 * 150 + 300) % 600 + row % 150).collect(),
+    ];
+    for order in orders {
+        let rows: Vec<&str> = order.iter().map(|&row| lines[row].as_str()).collect();
+        let text = format!("{names}\n{}\n", rows.join("\n"));
+        let (_site, read, _) = described(&[("a.csv", text.as_bytes())], &[]);
+        let dataset = read.unwrap_or_else(|error| panic!("{error}"));
+        let run = &dataset.runs[0];
+        assert_eq!((run.direction, run.samples.len()), (-1, 600));
+        assert!(
+            run.samples.is_sorted_by(|one, next| one.time_ns < next.time_ns),
+            "{:?}",
+            &order[..3]
+        );
+        assert_eq!(run.samples[300].traction_force_n, 0.0);
+        assert!(run.diagnostics.iter().any(|it| it.to_string().contains("order")));
+    }
+    let nameless = text.replacen("time_s", "", 1);
+    assert_as_plain("index", &[("a.csv", nameless.as_bytes())], &["--column", "time=:s"], 1e-9);
+    let message = described(&[("a.csv", nameless.as_bytes())], &[]).1.unwrap_err();
+    assert!(message.contains("no column was recognised as time; the columns: ''"), "{message}");
 }

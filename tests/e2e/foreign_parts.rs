@@ -43,6 +43,15 @@ fn the_rows_of_one_train_are_chosen_of_a_file_of_several() {
     let message = described(&[("a.csv", text.as_bytes())], &[]).1.unwrap_err();
     assert!(message.contains("of 2 trains, by column 'vehicle_id'"), "{message}");
     assert_as_plain("in turn", &[("a.csv", text.as_bytes())], &["--train", "ice1"], 1e-9);
+    // The second is there once the first has gone.
+    let names: Vec<&str> = NAMES.into_iter().chain(["vehicle_id"]).collect();
+    let cell = |row: u32, column: usize| match column {
+        6 => (if row < 250 { "ice1" } else { "re2" }).to_owned(),
+        1 if row >= 250 => (values(row)[1] - 900.0).to_string(),
+        column => plain(row, column),
+    };
+    let message = described(&[("a.csv", table(&names, ",", cell).as_bytes())], &[]).1.unwrap_err();
+    assert!(message.contains("of 2 trains, by column 'vehicle_id'"), "{message}");
     // One train whose number changes on the way, and one with a mark, are one.
     for cell_of in [
         &(|row: u32| if row < 300 { "101" } else { "102" }) as &dyn Fn(u32) -> &'static str,

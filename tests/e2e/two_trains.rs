@@ -121,7 +121,11 @@ fn explain_grows_the_model_of_the_train_that_is_named() {
 fn a_replay_plays_the_train_that_is_named() {
     let site = Site::new();
     let path = record(&site);
-    let config = site.write_config(2, "", "[[pipelines]]\nkind = \"echo\"\nthread = \"all\"\n");
+    let config = site.write_config(
+        2,
+        "",
+        "[[threads]]\nname = \"all\"\n[[pipelines]]\nkind = \"echo\"\nthread = \"all\"\n",
+    );
     let _daemon = site.start(DYNOCAR, &["run", "--config", &config.display().to_string()]);
     let (code, _, errors) = run(&site, &["replay", &path, "--rate", "max", "--train", "2"]);
     assert_eq!(code, Some(0), "{errors}");

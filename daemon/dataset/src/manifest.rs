@@ -13,7 +13,7 @@ use super::node::Node;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
 use super::train_file::MASS;
-use super::trains::TrainRows;
+use super::train_rows::TrainRows;
 
 named! {
     /// Which point of the train the recorded position is of.
@@ -285,7 +285,9 @@ fn columns_of(section: &Item, quantity: Quantity) -> Result<Vec<String>, Dataset
     };
     let item = section.need(KEY, expected)?;
     if !(quantity.adds_up() && item.is_list()) {
-        return Ok(vec![section.need_quoted(KEY, expected)?.trim().into()]);
+        // Tables of pandas have an index without a name.
+        section.need(KEY, expected)?;
+        return Ok(vec![section.quoted(KEY)?.unwrap_or_default().trim().into()]);
     }
     let names =
         item.list(expected, 1)?.into_iter().map(|name| Ok(name.text(expected)?.trim().into()));

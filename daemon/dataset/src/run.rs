@@ -19,7 +19,8 @@ use super::resolved::{Context, GradientSource, Resolved};
 use super::run_content::RunContent;
 use super::stamps;
 use super::table::Table;
-use super::trains::{TrainRows, TrainsColumn, only};
+use super::train_rows::TrainRows;
+use super::trains::{TrainsColumn, only};
 
 const DAY_S: i64 = 86_400;
 

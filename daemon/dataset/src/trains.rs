@@ -3,12 +3,12 @@
 use std::borrow::Cow;
 
 use super::cell::truth;
-use super::document::Item;
 use super::error::{DatasetError, SourcePosition};
 use super::lines::{Row, RowReader, below};
 use super::quantity::Quantity;
 use super::table::Table;
 use super::text_layout::TextLayout;
+use super::train_rows::{ALL, KEY};
 
 /// Names of columns that say whose the row is, in small letters and digits.
 const NAMES: &str = "vehicle vehicleid vehid veh vehiclename vehicleno vehiclenumber train trainid trainno trainnr \
@@ -16,59 +16,49 @@ const NAMES: &str = "vehicle vehicleid vehid veh vehiclename vehicleno vehiclenu
                      locomotiveid locomotivenumber fahrzeug fahrzeugid fahrzeugnr fahrzeugnummer zug zugid zugnr \
                      zugnummer triebzug triebzugnr lok lokid loknr loknummer rame numerorame numerotrain tren treno \
                      idtren idtreno поезд номерпоезда";
+/// A position that changes by this many m and twice what the speed says is another train's.
+const JUMP_MIN_M: f64 = 100.0;
 /// Trains that a message names at most.
 const SHOWN_MAX: usize = 8;
-
-/// The key in `[train]`.
-const KEY: &str = "rows";
-/// Its value where all rows are of one train, whatever a column says.
-const ALL: &str = "all";
-
-/// The rows of the runs' files that are the train's.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum TrainRows {
-    /// All, unless a column says that they are of several trains.
-    #[default]
-    Unsaid,
-    /// All.
-    All,
-    /// Those with a value in a column.
-    Of {
-        /// The column's name.
-        column: String,
-        /// The cell of this train.
-        value: String,
-    },
-}
-
-impl TrainRows {
-    /// Reads the key of `[train]`.
-    pub(super) fn of(train: &Item) -> Result<Self, DatasetError> {
-        if !train.has(KEY) {
-            return Ok(TrainRows::Unsaid);
-        }
-        let expected = "\"all\", or { column = \"…\", value = \"…\" } of the rows of this train";
-        if !train.need(KEY, expected)?.is_map() {
-            return match train.need_quoted(KEY, expected)? {
-                ALL => Ok(TrainRows::All),
-                other => Err(train.key_out_of_range(KEY, &format!("{other:?}"), expected)),
-            };
-        }
-        let section = train.need_table(KEY)?;
-        section.allow(&["column", "value"])?;
-        let text = |key, expected| Ok(section.need_quoted(key, expected)?.trim().to_owned());
-        Ok(TrainRows::Of {
-            column: text("column", "the name of a column")?,
-            value: text("value", "the cell of this train's rows, quoted")?,
-        })
-    }
-}
 
 /// True for a column's name that says whose the rows are.
 pub fn names_trains(name: &str) -> bool {
     let letters = name.chars().filter(|letter| letter.is_alphanumeric());
     let folded: String = letters.flat_map(char::to_lowercase).collect();
     NAMES.split(' ').any(|known| known == folded)
+}
+
+/// The cells of a column that names trains, one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct TrainCells {
+    trains: Vec<String>,
+    changes: Vec<usize>,
+    before: Option<usize>,
+}
+
+impl TrainCells {
+    /// Takes the next cell; `line` counts from 1. An empty one says nothing.
+    pub fn push(&mut self, cell: &str, line: usize) {
+        if cell.is_empty() {
+            return;
+        }
+        let known = self.trains.iter().position(|it| it == cell);
+        let place = known.unwrap_or_else(|| {
+            self.trains.push(cell.to_owned());
+            self.trains.len() - 1
+        });
+        if self.before.replace(place).is_some_and(|it| it != place) {
+            self.changes.push(line);
+        }
+    }
+
+    /// The trains by the column of this name; `None` where the cells name no several.
+    pub fn column(self, name: String) -> Option<TrainsColumn> {
+        let TrainCells { trains, changes, .. } = self;
+        let is_mark = |it: &String| truth(it.as_bytes()).is_some() || ["0", "1"].contains(&&it[..]);
+        let is_several = trains.len() > 1 && !trains.iter().all(is_mark);
+        is_several.then_some(TrainsColumn { name, trains, changes })
+    }
 }
 
 /// The trains in a text by a column that names them.
@@ -86,26 +76,11 @@ impl TrainsColumn {
     /// The trains that a text's rows are of; `None` where no column names several.
     pub fn of(text: &str, layout: &TextLayout) -> Option<Self> {
         let (name, index) = column(text, layout, names_trains)?;
-        let (mut trains, mut changes): (Vec<String>, Vec<usize>) = Default::default();
-        let mut before = None;
+        let mut cells = TrainCells::default();
         rows(text, layout, |row, line| {
-            let cell = row.trimmed(index);
-            if cell.is_empty() {
-                return;
-            }
-            let text = String::from_utf8_lossy(cell);
-            let known = trains.iter().position(|it| *it == text);
-            let place = known.unwrap_or_else(|| {
-                trains.push(text.into_owned());
-                trains.len() - 1
-            });
-            if before.replace(place).is_some_and(|it| it != place) {
-                changes.push(line);
-            }
+            cells.push(&String::from_utf8_lossy(row.trimmed(index)), line);
         });
-        let is_mark =
-            trains.iter().all(|it| truth(it.as_bytes()).is_some() || ["0", "1"].contains(&&it[..]));
-        (trains.len() > 1 && !is_mark).then_some(TrainsColumn { name, trains, changes })
+        cells.column(name)
     }
 
     /// True where a train comes again after another: no train changes its number so.
@@ -113,11 +88,19 @@ impl TrainsColumn {
         self.changes.len() >= self.trains.len()
     }
 
-    /// True where the time does not go on from one train to another.
+    /// True where from one train to another the time does not go on, or the position jumps under way.
     fn begins_anew(&self, table: &Table) -> bool {
-        let Some(times_s) = table.column(Quantity::Time) else { return false };
+        let column = |quantity| table.column(quantity).unwrap_or_default();
+        let (times_s, speeds) = (column(Quantity::Time), column(Quantity::Speed));
+        let positions_m = column(Quantity::Position);
         let is_change = |row: usize| self.changes.binary_search(&table.line(row)).is_ok();
-        (1..times_s.len()).any(|row| times_s[row] <= times_s[row - 1] && is_change(row))
+        (1..times_s.len()).filter(|&row| is_change(row)).any(|row| {
+            let step_s = times_s[row] - times_s[row - 1];
+            let moved_m = speeds.get(row - 1).map_or(0.0, |speed_mps| speed_mps * step_s);
+            let jump_m =
+                positions_m.get(row).map_or(0.0, |at_m| (at_m - positions_m[row - 1]).abs());
+            step_s <= 0.0 || moved_m > 0.0 && jump_m > JUMP_MIN_M + 2.0 * moved_m
+        })
     }
 
     /// Says that the rows are of several trains.

@@ -224,6 +224,11 @@ impl Facts {
         self.growing > 0 && self.growing * 10 >= changing * 3 && self.growing * 50 >= self.pairs
     }
 
+    /// True where nearly every number is less than the one before: of times, the newest stands first.
+    pub fn falls(&self) -> bool {
+        self.falling * 50 >= self.pairs * 49 && self.falling > 1
+    }
+
     /// The format in which the numbers are packed times.
     pub fn packed(&self) -> Option<TimeFormat> {
         self.packed?.format()

@@ -14,7 +14,7 @@ use super::rows::{WHEEL_SLIDE, to_rows};
 use crate::error::{AtPath, ReadError};
 use crate::recording::Recording;
 
-/// A controller whose numbers begin anew more often than once in so many samples is none: they are several.
+/// Samples for each time that the numbers begin anew, at least: below it they are of several controllers.
 const RESTARTS_RARE: usize = 20;
 
 /// Files of the train and the line for a recording to which none are attached.
@@ -58,7 +58,9 @@ pub enum NoDataset {
         trains: String,
     },
     /// Nobody names the train.
-    #[error("the file of train {train} is not attached: give it by --train-file")]
+    #[error(
+        "the file of train {train} is not attached: give it to `dynocar convert` by --train-file"
+    )]
     NoTrainFile {
         /// The train.
         train: u64,

@@ -97,7 +97,9 @@ fn describe(
         draft.extend(runs.map(|(path, it)| (&path[..], Some(it.label), it.text)));
         let (head, runs) = Draft { folder, files: draft }.read()?;
         let knows_mass = arguments.train.knows_mass();
-        if corrections == CORRECTIONS_MAX || guess.correct(&runs, knows_mass).is_none() {
+        let is_right = corrections == CORRECTIONS_MAX
+            || !guess.turn_runs(&runs) && guess.correct(&runs, knows_mass).is_none();
+        if is_right {
             let diagnostics = diagnostics(&head.train, head.track.as_deref(), &runs);
             return Ok(Described { guess, files, diagnostics, text });
         }

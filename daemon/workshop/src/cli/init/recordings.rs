@@ -8,7 +8,8 @@ use dynocar::text_file::{read_beginning, read_bytes};
 use dynocar::unpacking::columns_of;
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
 use dynocar_analysis::dataset::guess::layout;
-use dynocar_analysis::dataset::trains::{TrainRows, TrainsColumn, only};
+use dynocar_analysis::dataset::train_rows::TrainRows;
+use dynocar_analysis::dataset::trains::{TrainsColumn, only};
 use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, SourcePosition,
 };
@@ -82,7 +83,7 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
         let label = path.display().to_string();
         let refused =
             |words: String| Failure::At(SourcePosition::whole(&label), format!("{label}: {words}"));
-        let names = columns_of(path, &[]).map_err(&refused)?;
+        let names = columns_of(path, &[], true).map_err(&refused)?;
         let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
         for name in names.into_iter().map(|it| it.name) {
             // A column of texts or lists is none that can be mapped.
@@ -97,7 +98,7 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
 /// A column's numbers, times in s.
 fn numbers_of(path: &Path, name: &str) -> Result<Vec<f64>, String> {
     let mapping = ColumnMapping::of_time(name);
-    let columns = columns_of(path, &[mapping])?;
+    let columns = columns_of(path, &[mapping], false)?;
     columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
 }
 
@@ -126,7 +127,7 @@ pub struct OfTrain {
 ///
 /// # Errors
 ///
-/// When they hold several and none is named, or none of this name.
+/// Files of several trains of which none is named, and a name that is none of theirs, are an input failure.
 pub fn of_train(files: &[NamedText], named: Option<&str>) -> Result<Option<OfTrain>, Failure> {
     let layouts = files.iter().map(|(label, text)| layout(label, text));
     // What has no layout is refused later.

@@ -5,7 +5,7 @@ use std::path::Path;
 use dynocar::models::Moment;
 use dynocar_analysis::dataset::guess::{Guess, GuessedColumn, GuessedRun};
 use dynocar_analysis::dataset::manifest::DOUBTFUL;
-use dynocar_analysis::dataset::trains::TrainRows;
+use dynocar_analysis::dataset::train_rows::TrainRows;
 use dynocar_analysis::dataset::{Quantity, TextLayout};
 use encoding_rs::UTF_8;
 use toml::Value;
