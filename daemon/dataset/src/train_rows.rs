@@ -4,9 +4,9 @@ use super::document::Item;
 use super::error::DatasetError;
 
 /// The key in `[train]`.
-pub(super) const KEY: &str = "rows";
+const KEY: &str = "rows";
 /// Its value where all rows are of one train, whatever a column says.
-pub(super) const ALL: &str = "all";
+const ALL: &str = "all";
 
 /// The rows of the runs' files that are the train's.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -8,7 +8,6 @@ use super::lines::{Row, RowReader, below};
 use super::quantity::Quantity;
 use super::table::Table;
 use super::text_layout::TextLayout;
-use super::train_rows::{ALL, KEY};
 
 /// Names of columns that say whose the row is, in small letters and digits.
 const NAMES: &str = "vehicle vehicleid vehid veh vehiclename vehicleno vehiclenumber train trainid trainno trainnr \
@@ -123,8 +122,8 @@ impl TrainsColumn {
         }
         let (words, name, first) = (self.words(), &self.name, &self.trains[0]);
         Err(SourcePosition::whole(label).problem(format!(
-            "{words}; choose one: `dynocar init --train`, or [train] {KEY} = {{ column = {name:?}, value = {first:?} \
-             }} in dataset.toml; {KEY} = \"{ALL}\" where they are one"
+            "{words}; choose one: --train of `dynocar init`, or in dataset.toml [train] rows = {{ column = {name:?}, \
+             value = {first:?} }}, or rows = \"all\" where they are one"
         )))
     }
 }
@@ -142,7 +141,7 @@ pub fn only<'t>(
 ) -> Result<Cow<'t, str>, DatasetError> {
     let at_names = || SourcePosition::line(label, layout.skip_rows + 1);
     let (_, index) = column(text, layout, |other| other == name)
-        .ok_or_else(|| at_names().problem(format!("no column '{name}' for [train] {KEY}")))?;
+        .ok_or_else(|| at_names().problem(format!("no column '{name}' for [train] rows")))?;
     let mut others = Vec::new();
     let mut count = 0;
     rows(text, layout, |row, line| {

@@ -4,53 +4,22 @@ use std::collections::HashMap;
 
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 
-use crate::error::ReadError;
-use crate::reading::{Item, Raw, Visitor};
-use crate::recording::Recording;
-
-/// A recording that is read, with the times at which its messages were logged.
-#[derive(Debug, Default)]
-pub struct Logged {
-    recording: Recording,
-    log_time: u64,
-    samples: Vec<u64>,
-    snapshots: Vec<u64>,
+/// Puts samples into order by the times at which they were logged, each once.
+pub fn samples_in_order(samples: &mut Vec<TrainSample>, logged: &[u64]) {
+    put_in_order(samples, logged, |it| Place {
+        of: (it.train_id, 0),
+        published_ns: it.published_ns,
+        number: (0, it.sequence),
+    });
 }
 
-impl Visitor for Logged {
-    type Error = ReadError;
-
-    fn item(&mut self, item: Item<'_>) -> Result<(), ReadError> {
-        match item {
-            Item::Sample(_) => self.samples.push(self.log_time),
-            Item::Snapshot(_) => self.snapshots.push(self.log_time),
-            _ => {}
-        }
-        self.recording.item(item)
-    }
-
-    fn raw(&mut self, raw: &Raw<'_>) -> Result<(), ReadError> {
-        self.log_time = raw.header.log_time;
-        self.recording.raw(raw)
-    }
-}
-
-impl Logged {
-    /// Returns the recording in order, each message once.
-    pub fn in_order(self) -> Recording {
-        let Logged { mut recording, samples, snapshots, .. } = self;
-        put_in_order(&mut recording.samples, &samples, |it: &TrainSample| Place {
-            of: (it.train_id, 0),
-            published_ns: it.published_ns,
-            number: (0, it.sequence),
-        });
-        put_in_order(&mut recording.snapshots, &snapshots, |it: &ParameterSnapshot| Place {
-            of: (it.train_id, it.pipeline_index),
-            published_ns: it.published_ns,
-            number: (it.epoch, it.sequence),
-        });
-        recording
-    }
+/// The same of snapshots.
+pub fn snapshots_in_order(snapshots: &mut Vec<ParameterSnapshot>, logged: &[u64]) {
+    put_in_order(snapshots, logged, |it| Place {
+        of: (it.train_id, it.pipeline_index),
+        published_ns: it.published_ns,
+        number: (it.epoch, it.sequence),
+    });
 }
 
 /// Place of a message among those of its controller or pipeline.

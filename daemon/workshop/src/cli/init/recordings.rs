@@ -130,7 +130,7 @@ pub struct OfTrain {
 /// Files of several trains of which none is named, and a name that is none of theirs, are an input failure.
 pub fn of_train(files: &[NamedText], named: Option<&str>) -> Result<Option<OfTrain>, Failure> {
     let layouts = files.iter().map(|(label, text)| layout(label, text));
-    // What has no layout is refused later.
+    // A file without a layout is refused later.
     let Ok(layouts) = layouts.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
     let trains = files.iter().zip(&layouts).map(|((_, text), it)| TrainsColumn::of(text, &it.text));
     let trains: Vec<Option<TrainsColumn>> = trains.collect();
