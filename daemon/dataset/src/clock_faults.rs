@@ -48,8 +48,11 @@ pub(super) fn mend(
     if times_s.len() < 10 {
         return (faults, None);
     }
+    // Where the newest row stands first, every step is one back.
+    let is_reversed = times_s.is_sorted_by(|one, next| one >= next);
+    let sign = if is_reversed { -1.0 } else { 1.0 };
     let mut steps: Vec<f64> =
-        times_s.windows(2).map(|it| it[1] - it[0]).filter(|step| *step > 0.0).collect();
+        times_s.windows(2).map(|it| sign * (it[1] - it[0])).filter(|step| *step > 0.0).collect();
     let Some(step_s) = quantile(&mut steps, 0.5) else { return (faults, None) };
     faults.shared = spread(times_s, step_s, is_repeated);
     let step_s = step_s / faults.shared.unwrap_or(1) as f64;

@@ -90,6 +90,9 @@ pub struct Facts {
     steps: Spread,
 }
 
+/// Steps that show that the newest row stands first.
+const FALLING_MIN: usize = 20;
+
 impl Facts {
     /// Nothing seen yet.
     pub fn new() -> Self {
@@ -226,7 +229,7 @@ impl Facts {
 
     /// True where nearly every number is less than the one before: of times, the newest stands first.
     pub fn falls(&self) -> bool {
-        self.falling * 50 >= self.pairs * 49 && self.falling > 1
+        self.falling * 50 >= self.pairs * 49 && self.falling >= FALLING_MIN
     }
 
     /// The format in which the numbers are packed times.
