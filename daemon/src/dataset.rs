@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use dynocar_dataset::encoding::decoded;
+use dynocar_dataset::train_rows::TrainRows;
 use dynocar_dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest,
     RunContent, is_parquet, parse_track, parse_train, top_keys,
@@ -10,11 +11,48 @@ use dynocar_dataset::{
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_model::units::Unit;
+use dynocar_shared::TrainId;
 
 pub use crate::text_file::read_text;
 use crate::text_file::{read_bytes, require_regular};
 pub use crate::unpacking::is_recording;
 use crate::unpacking::{UnpackError, Unpacked, columns_of};
+
+/// A path that leads to a dataset, and the train that is meant where a recording holds several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Source<'p> {
+    /// The dataset's folder, its `dataset.toml`, or a recording.
+    pub path: &'p Path,
+    /// The train of a recording; `None` for its only one.
+    pub train: Option<TrainId>,
+}
+
+impl<'p, P: AsRef<Path> + ?Sized> From<&'p P> for Source<'p> {
+    fn from(path: &'p P) -> Self {
+        Source { path: path.as_ref(), train: None }
+    }
+}
+
+/// The dataset of a command.
+#[derive(Clone, Debug, clap::Args)]
+pub struct SourceArguments {
+    /// The dataset's folder, or a recording
+    pub dataset: PathBuf,
+    /// Only this train of a recording that holds several
+    #[arg(long, value_name = "ID")]
+    pub train: Option<u64>,
+}
+
+impl SourceArguments {
+    /// The path with the train.
+    pub fn source(&self) -> Source<'_> {
+        Source { path: &self.dataset, train: self.train.map(TrainId) }
+    }
+}
+
+/// Error of a choice that is made of text alone.
+const ROWS_OF_PARQUET: &str =
+    "[train] rows: expected CSV, found Parquet: write one file for each train";
 
 /// Why a path leads to no dataset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -41,6 +79,12 @@ pub enum LoadError {
         /// Kind of file that was found.
         found: &'static str,
     },
+    /// A train is chosen where there is one alone.
+    #[error("{}: a dataset is of one train: --train chooses one of a recording", path.display())]
+    NoRecording {
+        /// The dataset.
+        path: PathBuf,
+    },
     /// A recording cannot be unpacked.
     #[error(transparent)]
     Recording(#[from] UnpackError),
@@ -65,12 +109,16 @@ impl DatasetFolder {
     /// # Errors
     ///
     /// When there is nothing, or a folder that is no dataset.
-    pub fn at(path: &Path) -> Result<Self, LoadError> {
+    pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
+        let Source { path, train } = source.into();
         if is_recording(path) {
-            let unpacked = Unpacked::of(path)?;
+            let unpacked = Unpacked::of(path, train)?;
             let folder = unpacked.folder();
             let manifest = folder.join(MANIFEST_FILE);
             return Ok(DatasetFolder { folder, manifest, recording: Some(unpacked) });
+        }
+        if train.is_some() && path.exists() {
+            return Err(LoadError::NoRecording { path: path.into() });
         }
         if path.is_dir() {
             let manifest = path.join(MANIFEST_FILE);
@@ -109,7 +157,12 @@ impl DatasetFiles for DatasetFolder {
         let file = self.path_of(path);
         if is_parquet(path) {
             require_regular(&file)?;
-            let columns = columns_of(&file, &manifest.columns);
+            let unsaid = match &manifest.train_rows {
+                TrainRows::Unsaid => true,
+                TrainRows::All => false,
+                TrainRows::Of { .. } => return Err(FileProblem::Table(ROWS_OF_PARQUET.into())),
+            };
+            let columns = columns_of(&file, &manifest.columns, unsaid);
             return columns.map(RunContent::Columns).map_err(FileProblem::Table);
         }
         let encoding = manifest.layout.encoding;
@@ -145,9 +198,10 @@ fn described(folder: &Path) -> String {
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn open(path: &Path) -> Result<(DatasetFolder, DatasetHead), LoadError> {
-    let folder = DatasetFolder::at(path)?;
-    let head = DatasetHead::open(&folder).map_err(|error| other_kind(path, error))?;
+pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(DatasetFolder, DatasetHead), LoadError> {
+    let source = source.into();
+    let folder = DatasetFolder::at(source)?;
+    let head = DatasetHead::open(&folder).map_err(|error| other_kind(source.path, error))?;
     Ok((folder, head))
 }
 
@@ -201,8 +255,8 @@ pub fn kind_of(keys: &[String]) -> Option<FileKind> {
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn load(path: &Path) -> Result<Dataset, LoadError> {
-    load_with_speed_unit(path).map(|(dataset, _)| dataset)
+pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
+    load_with_speed_unit(source).map(|(dataset, _)| dataset)
 }
 
 /// Reads a dataset with all its runs, and the unit in which they hold the speed.
@@ -210,8 +264,10 @@ pub fn load(path: &Path) -> Result<Dataset, LoadError> {
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn load_with_speed_unit(path: &Path) -> Result<(Dataset, Unit), LoadError> {
-    let folder = DatasetFolder::at(path)?;
+pub fn load_with_speed_unit<'p>(
+    source: impl Into<Source<'p>>,
+) -> Result<(Dataset, Unit), LoadError> {
+    let folder = DatasetFolder::at(source)?;
     let read = || {
         let head = DatasetHead::open(&folder)?;
         let unit = head.manifest.speed_unit();

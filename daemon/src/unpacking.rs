@@ -39,10 +39,17 @@ pub fn program_for<'w>(words: impl IntoIterator<Item = &'w OsStr>) -> &'static s
 ///
 /// # Errors
 ///
-/// In words, without the file's name.
-pub fn columns_of(file: &Path, mappings: &[ColumnMapping]) -> Result<Vec<RunColumn>, String> {
+/// In words, without the file's name; where rows of several trains are in turn, unless nothing is `unsaid` of them.
+pub fn columns_of(
+    file: &Path,
+    mappings: &[ColumnMapping],
+    unsaid: bool,
+) -> Result<Vec<RunColumn>, String> {
     let mut command = call(PARQUET);
     command.arg("columns").arg(file);
+    if unsaid {
+        command.arg("--of-one-train");
+    }
     for it in mappings {
         for name in it.names() {
             command.arg("--column").arg(name).arg(it.unit.name());
@@ -106,19 +113,20 @@ pub struct Unpacked {
 }
 
 impl Unpacked {
-    /// Unpacks a recording; what the program diagnoses is reported.
+    /// Unpacks what a recording holds of a train, its only one where none is named; what the program diagnoses is
+    /// reported.
     ///
     /// # Errors
     ///
     /// See [`UnpackError`].
-    pub fn of(recording: &Path) -> Result<Self, UnpackError> {
+    pub fn of(recording: &Path, train: Option<TrainId>) -> Result<Self, UnpackError> {
         let path = recording.to_path_buf();
         let folder = TempDir::with_prefix("dynocar-").map_err(|error| UnpackError::Failed {
             path: path.clone(),
             problem: error.to_string(),
         })?;
         let unpacked = Unpacked { recording: path, folder: folder.into() };
-        unpack(recording, &unpacked.folder(), None)?;
+        unpack(recording, &unpacked.folder(), train)?;
         Ok(unpacked)
     }
 

@@ -16,6 +16,8 @@ mod careless;
 mod check;
 mod explain_again;
 mod fmu;
+mod foreign_files;
+mod foreign_parts;
 mod identify;
 mod import;
 mod init;
@@ -33,6 +35,7 @@ mod shipped;
 mod stops;
 mod survey_command;
 mod two_programs;
+mod two_trains;
 
 // Findings of `explain`, and their limits.
 mod declared_terms;

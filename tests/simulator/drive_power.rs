@@ -105,3 +105,21 @@ fn a_train_known_by_its_power_is_a_null_and_its_effects_are_found() {
     eprintln!("{right} of {} right", EXPLAINED.count());
     assert!(right >= RIGHT_MIN, "{right}");
 }
+
+#[test]
+fn power_at_the_wheels_is_an_efficiency_of_one_and_others_are_estimated_as_they_are() {
+    for (seed, efficiency) in (61_200..).zip([1.0, 0.985, 0.93, 0.97, 1.0, 0.6, 1.0]) {
+        let truth = TrueDrive { efficiency, auxiliary_power_w: None, noise: 0.0 };
+        let dataset = dataset(seed, &truth, EffectRequest::none());
+        let found = drive::estimated(&dataset).unwrap().unwrap().answer.efficiency;
+        eprintln!(
+            "seed {seed}: {efficiency} estimated as {:.4} ± {:.4}",
+            found.value,
+            1.96 * found.std
+        );
+        assert!((found.value - efficiency).abs() < ERROR_MAX, "seed {seed}: {found:?}");
+        let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
+        let kinds: Vec<&str> = answer.effects.iter().map(|it| it.kind).collect();
+        assert_eq!(kinds, [""; 0], "seed {seed}: {}", answer.statement);
+    }
+}

@@ -301,20 +301,21 @@ def _as(kind: type[Checked] | type[Identified], answer: tuple[str, str]) -> Any:
     return kind(json.loads(text), words)
 
 
-def check(path: PathLike) -> Checked:
-    """Says what is understood of a dataset, a train, a line or a daemon's configuration.
+def check(path: PathLike, *, train: int | None = None) -> Checked:
+    """Says what is understood of a dataset, a train, a line or a daemon's configuration; ``train`` chooses
+    one of a recording that holds several, here and below.
 
     What is wrong with it is reported by ``valid`` and ``errors`` and raises nothing.
     """
-    return _as(Checked, _native.check(path))  # type: ignore[no-any-return]
+    return _as(Checked, _native.check(path, train))  # type: ignore[no-any-return]
 
 
-def read_dataset(path: PathLike) -> Dataset:
+def read_dataset(path: PathLike, *, train: int | None = None) -> Dataset:
     """Reads a dataset with all its runs: its folder or its ``dataset.toml``.
 
     Raises ``InputError`` for the first mistake.
     """
-    (text, words), each, every = _native.read(path)
+    (text, words), each, every = _native.read(path, train)
     answer = json.loads(text)
     fields = {**answer["dataset"], **{key: answer.get(key) for key in ("notes", "train", "track")}}
     dataset = Dataset({**fields, "table": Table(every)}, words)
@@ -326,6 +327,7 @@ def read_dataset(path: PathLike) -> Dataset:
 def identify(
     path: PathLike,
     *,
+    train: int | None = None,
     estimator: str | Iterable[str] | None = None,
     all: bool = False,
     per_run: bool = False,
@@ -339,12 +341,16 @@ def identify(
     friction brake's force.
     """
     names = [estimator] if isinstance(estimator, str) else list(estimator or ())
-    answer = _native.identify(path, names, all, per_run, traction_only)
+    answer = _native.identify(path, train, names, all, per_run, traction_only)
     return _as(Identified, answer)  # type: ignore[no-any-return]
 
 
 def explain(
-    path: PathLike, *, traction_only: bool = False, progress: Progress | None = None
+    path: PathLike,
+    *,
+    train: int | None = None,
+    traction_only: bool = False,
+    progress: Progress | None = None,
 ) -> Explanation:
     """Finds what the declared model of a dataset leaves, traces it to an effect and scores the model with
     it.
@@ -355,7 +361,7 @@ def explain(
     is_shown = progress is None and sys.stderr is not None and sys.stderr.isatty()
     try:
         shown = _tell if is_shown else progress
-        return Explanation(_native.explain(path, traction_only, shown))
+        return Explanation(_native.explain(path, train, traction_only, shown))
     finally:
         if is_shown:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use dynocar::cli::Failure;
+use dynocar::dataset::Source;
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::score::predicted;
 use dynocar_model::simulate::Restart;
+use dynocar_shared::TrainId;
 use dynocar_workshop::cli::explain as command;
 use dynocar_workshop::cli::explained_runs::ExplainedRuns;
 use dynocar_workshop::report::images::images;
@@ -21,7 +23,6 @@ use crate::table::Table;
 /// An explained dataset.
 #[pyclass(frozen, module = "dynocar._native")]
 pub(crate) struct Explained {
-    path: PathBuf,
     traction_only: bool,
     runs: ExplainedRuns,
     explanation: Explanation,
@@ -32,15 +33,16 @@ pub(crate) struct Explained {
 pub(crate) fn explain(
     py: Python<'_>,
     path: PathBuf,
+    train: Option<u64>,
     traction_only: bool,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Explained> {
-    let of = path.clone();
     let explained = in_background(py, progress.as_ref(), move |progress| {
-        command::answer(&of, traction_only, progress)
+        let source = Source { path: &path, train: train.map(TrainId) };
+        command::answer(source, traction_only, progress)
     })?;
     let (runs, explanation) = explained.map_err(|failure| of_failure(py, &failure))?;
-    Ok(Explained { path, traction_only, runs, explanation })
+    Ok(Explained { traction_only, runs, explanation })
 }
 
 #[pymethods]
@@ -55,12 +57,14 @@ impl Explained {
 
     /// The report, one page of HTML.
     fn page(&self, py: Python<'_>) -> PyResult<String> {
-        let mut arguments = vec!["explain".to_owned(), self.path.display().to_string()];
+        let Source { path, train } = self.runs.source();
+        let mut arguments = vec!["explain".to_owned(), path.display().to_string()];
+        arguments.extend(train.iter().flat_map(|it| ["--train".to_owned(), it.0.to_string()]));
         arguments.extend(self.traction_only.then(|| "--traction-only".to_owned()));
         arguments.extend(["--report", "report.html"].map(str::to_owned));
         let page = py.detach(|| {
             let command = command_line(arguments);
-            command::page(&self.path, &self.runs.dataset, &self.explanation, command)
+            command::page(self.runs.source(), &self.runs.dataset, &self.explanation, command)
         });
         page.map_err(|failure| of_failure(py, &failure))
     }
@@ -95,7 +99,7 @@ impl Explained {
         py: Python<'_>,
         folder: PathBuf,
     ) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
-        let written = py.detach(|| command::grow(&folder, &self.path, &self.explanation));
+        let written = py.detach(|| command::grow(&folder, self.runs.source(), &self.explanation));
         let grown = written.map_err(|failure| of_failure(py, &failure))?;
         Ok((grown.files, grown.not_expressed))
     }

@@ -1,10 +1,12 @@
 //! `check`, `read` and `identify` over recorded runs: the answers of the commands, as JSON and in words.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
 use dynocar::cli::check::refusal;
+use dynocar::dataset::{Source, SourceArguments};
 use dynocar::output::OutputError;
+use dynocar_shared::TrainId;
 use dynocar_workshop::cli::check as checking;
 use dynocar_workshop::cli::identify as identifying;
 use pyo3::prelude::*;
@@ -22,10 +24,15 @@ pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
     serde_json::to_string(answer).map_err(|error| Failure::Output(OutputError::Json(error)))
 }
 
+/// A path and the train that is meant.
+fn of(path: &Path, train: Option<u64>) -> Source<'_> {
+    Source { path, train: train.map(TrainId) }
+}
+
 /// Returns the description of a path; its errors are part of the answer.
 #[pyfunction]
-pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<JsonAndText> {
-    let answer = in_background(py, None, move |_| match checking::understand(&path) {
+pub(crate) fn check(py: Python<'_>, path: PathBuf, train: Option<u64>) -> PyResult<JsonAndText> {
+    let answer = in_background(py, None, move |_| match checking::understand(of(&path, train)) {
         Ok(understood) => Ok((json(&understood.answer(&path))?, understood.text())),
         Err(failure) => match failure.answer() {
             Some(error) => {
@@ -40,9 +47,13 @@ pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<JsonAndText> {
 
 /// A dataset: what `check` says of it, and the tables of its runs and of all of them.
 #[pyfunction]
-pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(JsonAndText, Vec<Table>, Table)> {
+pub(crate) fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    train: Option<u64>,
+) -> PyResult<(JsonAndText, Vec<Table>, Table)> {
     let read = in_background(py, None, move |_| {
-        let understood = checking::understand(&path)?;
+        let understood = checking::understand(of(&path, train))?;
         let wrong: Option<Failure> = understood.errors().next().map(|it| it.clone().into());
         let answer = (json(&understood.answer(&path))?, understood.text());
         match (understood, wrong) {
@@ -66,14 +77,15 @@ pub(crate) fn read(py: Python<'_>, path: PathBuf) -> PyResult<(JsonAndText, Vec<
 pub(crate) fn identify(
     py: Python<'_>,
     path: PathBuf,
+    train: Option<u64>,
     names: Vec<String>,
     all: bool,
     per_run: bool,
     traction_only: bool,
 ) -> PyResult<JsonAndText> {
     let answer = in_background(py, None, move |_| {
-        let (dataset, estimator) = (path, names);
-        let question = identifying::Question { dataset, estimator, all, per_run, traction_only };
+        let (source, estimator) = (SourceArguments { dataset: path, train }, names);
+        let question = identifying::Question { source, estimator, all, per_run, traction_only };
         let answer = identifying::answer(&question)?;
         Ok((json(&answer)?, identifying::text(&answer)))
     })?;

@@ -189,6 +189,23 @@ def words_of(*arguments: object) -> str:
     return done.stderr.strip().removeprefix("dynocar: ")
 
 
+def test_a_train_of_a_recording_is_chosen(recordings: Path, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    done = dynocar_command("convert", recordings, "-o", path)
+    assert done.returncode == 0, done.stderr
+    assert dynocar.check(path, train=1).valid
+    assert len(dynocar.read_dataset(path, train=1).runs) == 4
+    chosen = dynocar.identify(path, estimator="ls", train=1)
+    only = dynocar.identify(path, estimator="ls")
+    assert chosen.estimators[0].values.a == only.estimators[0].values.a
+    words = "expected samples of train 7, found trains 1"
+    assert words in dynocar.check(path, train=7).errors[0]
+    asked: list[Any] = [dynocar.read_dataset, dynocar.identify, dynocar.explain]
+    for ask in asked:
+        with pytest.raises(dynocar.InputError, match=words):
+            ask(path, train=7)
+
+
 def test_errors_are_in_the_words_of_the_commands(recordings: Path, tmp_path: Path) -> None:
     folder = tmp_path / "wrong"
     subprocess.run(["cp", "-r", recordings, folder], check=True)

@@ -10,9 +10,9 @@ use super::quantity::Quantity;
 use super::text_layout::{Marks, THOUSANDS, TextLayout};
 
 /// Words of programs for a missing number, in small letters.
-const MISSING: &str = "n/a na #n/a #na <na> nan null (null) none nil nat - -- --- . ? * missing #n/v #nv #null! #value! \
-                       #wert! #num! #zahl! #div/0! #ref! #bezug! #name? 1.#qnan -1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf \
-                       1.#snan bad invalid no_data nodata undefined undef";
+const MISSING: &str = "n/a na n.a. n/d nd n.d. n.v. k.a. #n/a #na #n/v #nv #n/d <na> <null> nan null (null) none nil nat - . ? \
+                       * missing bad bad_input i/o_timeout error err fault fehler invalid inv ungültig no_data nodata \
+                       undefined undef unknown unavailable overflow underflow void empty leer";
 
 /// The number in a trimmed cell, `NaN` for an empty one and a word for what is missing; `None` when it is something
 /// else.
@@ -49,9 +49,16 @@ pub fn ungrouped(text: &str, mark: char, decimal: char) -> Option<String> {
     is_grouped.then(|| whole.replace(mark, "") + &rest)
 }
 
-fn is_missing(text: &str) -> bool {
+/// True for a word, or marks, that say that a number is missing.
+pub fn is_missing(text: &str) -> bool {
     let folded = text.to_lowercase().replace(' ', "_");
-    MISSING.split(' ').any(|word| word == folded)
+    let is_mark = |letter: char| "-_.*?/#".contains(letter);
+    let is_of_marks = folded.len() > 1 && folded.chars().all(is_mark);
+    // Spreadsheets name an error in their user's language.
+    let is_error = folded.starts_with('#') && folded.ends_with(['!', '?']);
+    let is_no_number =
+        ["1.#", "nan("].iter().any(|it| folded.trim_start_matches('-').starts_with(it));
+    is_of_marks || is_error || is_no_number || MISSING.split(' ').any(|word| word == folded)
 }
 
 /// 1 for a word that says yes, 0 for one that says no.

@@ -48,14 +48,17 @@ pub(super) fn mend(
     if times_s.len() < 10 {
         return (faults, None);
     }
+    // Where the newest row stands first, every step is one back.
+    let is_reversed = times_s.is_sorted_by(|one, next| one >= next);
+    let sign = if is_reversed { -1.0 } else { 1.0 };
     let mut steps: Vec<f64> =
-        times_s.windows(2).map(|it| it[1] - it[0]).filter(|step| *step > 0.0).collect();
+        times_s.windows(2).map(|it| sign * (it[1] - it[0])).filter(|step| *step > 0.0).collect();
     let Some(step_s) = quantile(&mut steps, 0.5) else { return (faults, None) };
     faults.shared = spread(times_s, step_s, is_repeated);
     let step_s = step_s / faults.shared.unwrap_or(1) as f64;
     faults.jumps = set_back(times_s, speed_mps, step_s);
     let order = match faults.shared {
-        None => sorted(times_s, &mut faults),
+        None => sorted(times_s, speed_mps, &mut faults),
         Some(_) => None,
     };
     (faults, order)
@@ -113,7 +116,7 @@ fn spread(times_s: &mut [f64], step_s: f64, is_repeated: impl Fn(usize) -> bool)
 }
 
 /// The rows in the order of time, where parts that do not overlap, or single rows, stand in another.
-fn sorted(times_s: &[f64], faults: &mut ClockFaults) -> Option<Vec<usize>> {
+fn sorted(times_s: &[f64], speed_mps: &[f64], faults: &mut ClockFaults) -> Option<Vec<usize>> {
     let falls: Vec<usize> =
         (1..times_s.len()).filter(|&row| times_s[row] < times_s[row - 1]).collect();
     let first = *falls.first()?;
@@ -130,9 +133,11 @@ fn sorted(times_s: &[f64], faults: &mut ClockFaults) -> Option<Vec<usize>> {
     let twice = steps.iter().filter(|step| **step < 0.25 * step_s).count();
     let is_of_parts = count / (falls.len() + 1) >= PART_ROWS;
     let overlap = is_of_parts && {
-        // A part's rows stand together in the order of time, too.
+        // A part's rows stand together in the order of time, too, or the parts are rows of one motion in turn.
         let breaks = order.windows(2).filter(|it| it[1] != it[0] + 1).count();
+        let by_time = order.iter().map(|&row| speed_mps[row]);
         breaks > 2 * falls.len() + count / 100
+            && roughness(by_time) >= 0.8 * roughness(speed_mps.iter().copied())
     };
     if overlap || twice as f64 > DISORDER_SHARE * count as f64 {
         faults.anew = Some((first, times_s[first - 1] - times_s[first]));
@@ -140,6 +145,14 @@ fn sorted(times_s: &[f64], faults: &mut ClockFaults) -> Option<Vec<usize>> {
     }
     faults.sorted = true;
     Some(order)
+}
+
+/// How far the speed goes up and down from row to row, in m/s.
+fn roughness(speed_mps: impl Iterator<Item = f64>) -> f64 {
+    let mut before = None;
+    let steps =
+        speed_mps.filter(|it| !it.is_nan()).filter_map(|it| Some((it - before.replace(it)?).abs()));
+    steps.sum()
 }
 
 #[cfg(test)]
@@ -224,6 +237,21 @@ mod tests {
             let (_, faults, order) = mended(&anew, &vec![20.0; anew.len()]);
             assert_eq!((faults.anew.unwrap().0, order), (300, None));
         }
+    }
+
+    #[test]
+    fn rows_of_one_motion_in_turn_are_sorted_and_two_motions_are_not() {
+        let time_of = |part: usize, row: usize| 0.2 * (7 * row + part) as f64;
+        let places = (0..7).flat_map(|part| (0..100).map(move |row| (part, row)));
+        let times: Vec<f64> = places.clone().map(|(part, row)| time_of(part, row)).collect();
+        let speed = |time: f64| 10.0 + 5.0 * (0.1 * time).sin();
+        let of_one: Vec<f64> = times.iter().map(|&time| speed(time)).collect();
+        let (_, faults, order) = mended(&times, &of_one);
+        assert!(faults.sorted && faults.anew.is_none() && order.is_some(), "{faults:?}");
+        let of_seven: Vec<f64> =
+            places.map(|(part, row)| speed(time_of(part, row)) + 0.4 * part as f64).collect();
+        let (_, faults, order) = mended(&times, &of_seven);
+        assert!(faults.anew.is_some() && order.is_none(), "{faults:?}");
     }
 
     #[test]

@@ -13,6 +13,7 @@ use super::node::Node;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
 use super::train_file::MASS;
+use super::train_rows::TrainRows;
 
 named! {
     /// Which point of the train the recorded position is of.
@@ -137,6 +138,8 @@ pub struct Manifest {
     pub layout: TextLayout,
     /// The train's file.
     pub train_file: FileEntry,
+    /// Which rows of the runs' files are the train's.
+    pub train_rows: TrainRows,
     /// The line's file; `None` when the line is not known.
     pub track_file: Option<FileEntry>,
     /// The mapped columns, in the order of [`Quantity::ALL`].
@@ -159,6 +162,7 @@ impl Manifest {
         let own = ["name", "description", "position_reference"];
         dataset.allow(&[&own[..], &TextLayout::KEYS[..]].concat())?;
         let columns = columns(&root.need_table("columns")?)?;
+        let train = root.need_table("train")?;
         let reference = dataset.named_under(
             "position_reference",
             ("reference", "centre or head"),
@@ -170,9 +174,10 @@ impl Manifest {
             description: dataset.quoted("description")?.map(Into::into),
             position_reference: reference.unwrap_or(PositionReference::Centre),
             layout: TextLayout::of(&dataset)?,
-            train_file: file_of(&root.need_table("train")?, "the path of a train.toml")?,
+            train_file: file_of(&train, &["file", "rows"], "the path of a train.toml")?,
+            train_rows: TrainRows::of(&train)?,
             track_file: match root.table("track")? {
-                Some(section) => Some(file_of(&section, "the path of a track.toml")?),
+                Some(section) => Some(file_of(&section, &["file"], "the path of a track.toml")?),
                 None => None,
             },
             runs: runs(&root, &columns)?,
@@ -192,8 +197,8 @@ impl Manifest {
     }
 }
 
-fn file_of(section: &Item, expected: &str) -> Result<FileEntry, DatasetError> {
-    section.allow(&["file"])?;
+fn file_of(section: &Item, keys: &[&str], expected: &str) -> Result<FileEntry, DatasetError> {
+    section.allow(keys)?;
     let path = section.need_quoted("file", expected)?.into();
     Ok(FileEntry { path, place: section.place_of("file") })
 }
@@ -280,7 +285,9 @@ fn columns_of(section: &Item, quantity: Quantity) -> Result<Vec<String>, Dataset
     };
     let item = section.need(KEY, expected)?;
     if !(quantity.adds_up() && item.is_list()) {
-        return Ok(vec![section.need_quoted(KEY, expected)?.trim().into()]);
+        // Tables of pandas have an index without a name.
+        section.need(KEY, expected)?;
+        return Ok(vec![section.quoted(KEY)?.unwrap_or_default().trim().into()]);
     }
     let names =
         item.list(expected, 1)?.into_iter().map(|name| Ok(name.text(expected)?.trim().into()));

@@ -19,6 +19,8 @@ use super::resolved::{Context, GradientSource, Resolved};
 use super::run_content::RunContent;
 use super::stamps;
 use super::table::Table;
+use super::train_rows::TrainRows;
+use super::trains::{TrainsColumn, only};
 
 const DAY_S: i64 = 86_400;
 
@@ -170,9 +172,9 @@ pub(super) fn read(
     label: &str,
     content: RunContent,
 ) -> Result<Run, DatasetError> {
-    let Manifest { layout, columns: mappings, .. } = context.manifest;
+    let mappings = &context.manifest.columns;
     let table = match content {
-        RunContent::Text(text) => Table::parse(label, &text, (layout, mappings))?,
+        RunContent::Text(text) => of_train(context.manifest, label, &text)?,
         RunContent::Columns(columns) => Table::of_columns(label, columns, mappings)?,
     };
     let rows = table.lines.rows;
@@ -222,6 +224,22 @@ pub(super) fn read(
         quality,
         diagnostics,
     })
+}
+
+/// Reads the rows of the train.
+fn of_train(manifest: &Manifest, label: &str, text: &str) -> Result<Table, DatasetError> {
+    let Manifest { layout, columns, train_rows, .. } = manifest;
+    let own = match train_rows {
+        TrainRows::Of { column, value } => only(label, text, layout, (column, value))?,
+        TrainRows::All | TrainRows::Unsaid => text.into(),
+    };
+    let table = Table::parse(label, &own, (layout, columns))?;
+    if *train_rows == TrainRows::Unsaid
+        && let Some(trains) = TrainsColumn::of(text, layout)
+    {
+        trains.refuse(label, &table)?;
+    }
+    Ok(table)
 }
 
 /// When a run was recorded, in s since 1970 UTC, by the beginning of its file or as declared; `None` where

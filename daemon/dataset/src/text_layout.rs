@@ -11,7 +11,7 @@ const SKIP_ROWS_MAX: f64 = 10_000.0;
 
 /// Marks of a number: before its fraction, and between groups of three digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Marks {
+pub(crate) struct Marks {
     /// Before the fraction.
     pub decimal: u8,
     /// Between groups of three digits; `None` where nothing is.

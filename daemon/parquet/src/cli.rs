@@ -17,6 +17,7 @@ use dynocar_recording::convert::{from_dataset, unpack};
 use super::reading::write_mcap;
 use crate::numbers::{Wanted, send_columns};
 use crate::reading::{Content, read};
+use crate::trains::require_one_train;
 use crate::writing::{Written, write_folder};
 
 /// Recordings as Parquet and back.
@@ -47,6 +48,9 @@ struct ColumnsArguments {
     /// A column whose cells are wanted, and the unit of its numbers
     #[arg(long = "column", num_args = 2, value_names = ["NAME", "UNIT"], allow_hyphen_values = true)]
     columns: Vec<String>,
+    /// Refuse rows of several trains in turn
+    #[arg(long)]
+    of_one_train: bool,
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.
@@ -133,6 +137,10 @@ fn verify(arguments: &VerifyArguments) -> Result<(), Failure> {
 fn hand_over(arguments: &ColumnsArguments) -> Result<(), Failure> {
     let wanted = |pair: &[String]| Wanted { column: pair[0].clone(), unit: pair[1].clone() };
     let wanted: Vec<Wanted> = arguments.columns.chunks(2).map(wanted).collect();
+    if arguments.of_one_train {
+        require_one_train(&arguments.file)
+            .map_err(|error| Failure::Input(error.problem.to_string()))?;
+    }
     // As a file it takes whole blocks at once.
     let output = std::io::stdout().as_fd().try_clone_to_owned();
     let output = output.map_err(OutputError::StandardOutput)?;

@@ -82,6 +82,15 @@ pub enum ReadProblem {
         /// The attached file.
         name: String,
     },
+    /// One file holds several recordings.
+    #[error(
+        "{name} is attached to it several times, each another: another tool has merged recordings of several \
+         daemons; convert each of them by itself"
+    )]
+    Merged {
+        /// The attached file.
+        name: String,
+    },
     /// There is no sample.
     #[error("no samples: expected a channel of {SAMPLE} messages, found {found}")]
     NoSamples {

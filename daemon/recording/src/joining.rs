@@ -17,13 +17,13 @@ use crate::reading::{Ending, Item, Raw, Visitor, read};
 ///
 /// As [`read_among`], and when they are not the files of one recording in its order.
 pub fn read_all<V: Visitor>(paths: &[PathBuf], visitor: &mut V) -> Result<Vec<Ending>, V::Error> {
-    let (attached, seen) = (HashMap::new(), Vec::new());
+    let (attached, files_of, seen) = (HashMap::new(), HashMap::new(), Vec::new());
     let path = PathBuf::new();
-    let mut joined = Joined { visitor, attached, seen, path, before: None, begins: None };
+    let mut joined = Joined { visitor, attached, files_of, seen, path, begins: None };
     let mut endings = Vec::new();
     let mut newest: Option<(&PathBuf, u64)> = None;
     for path in paths {
-        joined.before = Some(std::mem::replace(&mut joined.path, path.clone()));
+        joined.path.clone_from(path);
         joined.begins = None;
         endings.push(read_among(paths.len(), path, &mut joined)?);
         let Some(begins) = joined.begins else { continue };
@@ -70,9 +70,9 @@ struct Joined<'v, V> {
     visitor: &'v mut V,
     attached: HashMap<String, Vec<u8>>,
     seen: Vec<Metadata>,
+    /// The file in which each was attached first.
+    files_of: HashMap<String, PathBuf>,
     path: PathBuf,
-    /// The file before it.
-    before: Option<PathBuf>,
     /// When the file's first message was recorded.
     begins: Option<u64>,
 }
@@ -85,12 +85,18 @@ impl<V: Visitor> Visitor for Joined<'_, V> {
             Item::Attachment { name, content, .. } => match self.attached.get(name) {
                 Some(known) if known == content => return Ok(()),
                 Some(_) => {
-                    let before = self.before.take().unwrap_or_default();
-                    let problem = ReadProblem::OtherRecording { before, name: name.clone() };
+                    let name = name.clone();
+                    let problem = match self.files_of.get(&name) {
+                        Some(before) if *before != self.path => {
+                            ReadProblem::OtherRecording { before: before.clone(), name }
+                        }
+                        _ => ReadProblem::Merged { name },
+                    };
                     return Err(ReadError::of(&self.path)(problem).into());
                 }
                 None => {
                     self.attached.insert(name.clone(), content.to_vec());
+                    self.files_of.insert(name.clone(), self.path.clone());
                 }
             },
             Item::Metadata(it) if self.seen.contains(it) => return Ok(()),

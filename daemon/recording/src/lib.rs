@@ -16,7 +16,7 @@
 //! - [`train_channels`]: what a recorder and a live view read of the trains' channels
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`joining`]: the files of a recording that rotated, read as one
-//! - [`recording`]: a recording in memory
+//! - [`recording`], `order`: a recording in memory, in the order in which it was recorded
 //! - [`record`]: the recorder
 //! - [`copying`]: copies of recordings, ours or not: a broken file made whole
 //! - [`error`]: what is wrong with a file, and which
@@ -35,6 +35,7 @@ pub mod error;
 pub mod event;
 pub mod joining;
 pub mod message;
+mod order;
 pub mod page;
 pub mod reading;
 pub mod record;

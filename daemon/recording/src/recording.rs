@@ -9,9 +9,10 @@ pub use mcap::records::Metadata;
 use crate::error::{ReadError, ReadProblem};
 use crate::event::Event;
 use crate::joining::read_all;
+use crate::order::{samples_in_order, snapshots_in_order};
 use crate::reading::{Item, Raw, Visitor};
 
-/// Contents of a recording, each kind in the order of writing.
+/// Contents of a recording, each kind in its order.
 #[derive(Debug, Default)]
 pub struct Recording {
     /// Samples, in the order in which they were written.
@@ -76,8 +77,9 @@ impl Recording {
     ///
     /// Without a file.
     pub fn load_all(paths: &[PathBuf]) -> Result<Self, ReadError> {
-        let mut recording = Recording::default();
-        let endings = read_all(paths, &mut recording)?;
+        let mut logged = Logged::default();
+        let endings = read_all(paths, &mut logged)?;
+        let mut recording = logged.in_order();
         let broken: Vec<String> =
             endings.iter().zip(paths).filter_map(|(ending, path)| ending.words(path)).collect();
         recording.broken = (!broken.is_empty()).then(|| broken.join("; "));
@@ -94,6 +96,43 @@ impl Recording {
     /// The trains that there are samples of, in order.
     pub fn trains(&self) -> Vec<u64> {
         trains_of(self.samples.iter().map(|it| it.train_id))
+    }
+}
+
+/// A recording that is read, with the times at which its messages were logged.
+#[derive(Debug, Default)]
+struct Logged {
+    recording: Recording,
+    log_time: u64,
+    samples: Vec<u64>,
+    snapshots: Vec<u64>,
+}
+
+impl Visitor for Logged {
+    type Error = ReadError;
+
+    fn item(&mut self, item: Item<'_>) -> Result<(), ReadError> {
+        match item {
+            Item::Sample(_) => self.samples.push(self.log_time),
+            Item::Snapshot(_) => self.snapshots.push(self.log_time),
+            _ => {}
+        }
+        self.recording.item(item)
+    }
+
+    fn raw(&mut self, raw: &Raw<'_>) -> Result<(), ReadError> {
+        self.log_time = raw.header.log_time;
+        self.recording.raw(raw)
+    }
+}
+
+impl Logged {
+    /// Returns the recording in order, each message once.
+    fn in_order(self) -> Recording {
+        let Logged { mut recording, samples, snapshots, .. } = self;
+        samples_in_order(&mut recording.samples, &samples);
+        snapshots_in_order(&mut recording.snapshots, &snapshots);
+        recording
     }
 }
 

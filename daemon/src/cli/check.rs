@@ -22,6 +22,9 @@ pub use daemon::{DaemonAnswer, answer, read, report};
 pub struct CheckArguments {
     /// A dataset's folder or its dataset.toml, a recording, a train.toml, a track.toml or a daemon.toml.
     pub path: PathBuf,
+    /// Only this train of a recording that holds several.
+    #[arg(long, value_name = "ID")]
+    pub train: Option<u64>,
     /// Also write the result as JSON; '-' for standard output.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,

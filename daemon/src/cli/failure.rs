@@ -106,7 +106,8 @@ impl From<LoadError> for Failure {
             LoadError::Recording(UnpackError::Content { path, .. })
             | LoadError::NoSuchPath { path }
             | LoadError::NotADataset { path, .. }
-            | LoadError::NoManifest { path, .. } => {
+            | LoadError::NoManifest { path, .. }
+            | LoadError::NoRecording { path } => {
                 Failure::At(SourcePosition::whole(&path.display().to_string()), message)
             }
         }

@@ -2,21 +2,21 @@
 
 use std::ffi::OsString;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use dynocar_dataset::Run;
+use dynocar_dataset::{Dataset, Run};
 use dynocar_shared::{PipelineKind, TrainId};
 use dynocar_transport::Host;
 
 use super::Failure;
 use super::companion::{self, Passed};
-use crate::dataset;
+use crate::dataset::{self, LoadError, Source};
 use crate::output::report_line;
 use crate::redrawn::{Redrawn, bar, can_draw};
 use crate::replay::{Rate, ReplayReport, Replayer};
-use crate::unpacking::program_for;
+use crate::unpacking::{UnpackError, program_for};
 
 /// How often progress is shown.
 const SHOW_EVERY: Duration = Duration::from_millis(100);
@@ -41,9 +41,9 @@ pub struct ReplayArguments {
     /// How many times as fast as recorded; max: as fast as the pipelines follow
     #[arg(long, default_value = "1", value_name = "1|K|max")]
     rate: Rate,
-    /// The train's number on the channels
-    #[arg(long, default_value_t = 1, value_name = "ID")]
-    train: u64,
+    /// The train's number on the channels; of a recording that holds several, this one is played
+    #[arg(long, value_name = "ID")]
+    train: Option<u64>,
     /// Wait so long for a daemon to announce itself before the first sample
     #[arg(long, default_value_t = 3.0, value_name = "SECONDS")]
     wait: f64,
@@ -66,7 +66,8 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         let words = "expected one dataset or recording: several files are for --verify";
         return Err(Failure::Input(words.into()));
     };
-    let dataset = dataset::load(dataset)?;
+    let train = TrainId(arguments.train.unwrap_or(1));
+    let dataset = load(dataset, arguments.train.map(TrainId))?;
     let runs = match arguments.run {
         None => &dataset.runs[..],
         Some(number) if (1..=dataset.runs.len()).contains(&number) => {
@@ -78,15 +79,14 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
         }
     };
     let host = Host::from_environment().map_err(Failure::work)?;
-    let mut replayer =
-        Replayer::open(&host, TrainId(arguments.train), arguments.rate).map_err(Failure::work)?;
+    let mut replayer = Replayer::open(&host, train, arguments.rate).map_err(Failure::work)?;
     let wait = Duration::try_from_secs_f64(arguments.wait).map_err(|_| {
         Failure::Input(format!("--wait {}: expected a time in s from 0", arguments.wait))
     })?;
     if !replayer.await_daemon(wait) {
         report_line(&format!(
             "dynocar: no daemon serves train {} after {} s; publishing all the same",
-            arguments.train, arguments.wait
+            train.0, arguments.wait
         ));
     }
     for run in runs {
@@ -98,7 +98,7 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
     if report.snapshots.is_empty() {
         return Err(Failure::Work(format!(
             "nobody took the samples: no daemon serves train {}",
-            arguments.train
+            train.0
         )));
     }
     if report.was_used() {
@@ -108,6 +108,15 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
     Err(Failure::Work(format!(
         "no pipeline used half of the {offered} samples; the rest was refused or lost as said above"
     )))
+}
+
+/// Reads what is played. The only train of a recording may be played as another.
+fn load(path: &Path, train: Option<TrainId>) -> Result<Dataset, LoadError> {
+    let train = train.filter(|_| dataset::is_recording(path));
+    match dataset::load(Source { path, train }) {
+        Err(LoadError::Recording(UnpackError::Content { .. })) => dataset::load(path),
+        loaded => loaded,
+    }
 }
 
 /// How far a run is played, on a terminal.

@@ -17,7 +17,7 @@ use dynocar_model::terms::extra::{self, Extra, Factor};
 use dynocar_model::terms::{Entry, Key};
 use toml::{Table, Value};
 
-use dynocar::dataset::open;
+use dynocar::dataset::{Source, open};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::write_in_folder;
 
@@ -43,11 +43,12 @@ pub struct UpdatedFiles {
 /// # Errors
 ///
 /// When the declared files cannot be read or the grown ones not written.
-pub fn write_updated(
-    dataset: &Path,
+pub fn write_updated<'s>(
+    dataset: impl Into<Source<'s>>,
     explanation: &Explanation,
     folder: &Path,
 ) -> Result<UpdatedFiles, UpdatedModelError> {
+    let dataset = dataset.into();
     let (source, head) = open(dataset)?;
     let read = |path: &str| {
         source.read(path).map_err(|problem: FileProblem| UpdatedModelError::Declared {
@@ -68,7 +69,7 @@ pub fn write_updated(
     runs::name_model(&mut manifest, grown.track.is_some());
     let texts = grown.texts(explanation, labels, MANIFEST_FILE);
     let dataset =
-        updated_text(explanation, MANIFEST_FILE, &dataset.display().to_string(), &manifest);
+        updated_text(explanation, MANIFEST_FILE, &dataset.path.display().to_string(), &manifest);
     if texts.track.is_none() {
         runs::forget(&folder.join(TRACK_FILE))?;
     }

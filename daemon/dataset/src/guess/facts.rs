@@ -90,6 +90,9 @@ pub struct Facts {
     steps: Spread,
 }
 
+/// Steps that show that the newest row stands first.
+const FALLING_MIN: usize = 20;
+
 impl Facts {
     /// Nothing seen yet.
     pub fn new() -> Self {
@@ -222,6 +225,11 @@ impl Facts {
         let changing = self.growing + self.falling;
         // Several rows may share a whole second; rows in disorder fall as often as they grow.
         self.growing > 0 && self.growing * 10 >= changing * 3 && self.growing * 50 >= self.pairs
+    }
+
+    /// True where nearly every number is less than the one before: of times, the newest stands first.
+    pub fn falls(&self) -> bool {
+        self.falling * 50 >= self.pairs * 49 && self.falling >= FALLING_MIN
     }
 
     /// The format in which the numbers are packed times.

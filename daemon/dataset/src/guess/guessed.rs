@@ -2,12 +2,13 @@
 
 use dynocar_core::plausibility::InputFault;
 use dynocar_model::units::Unit;
+use dynocar_shared::SampleField;
 
 use super::facts::Facts;
 use super::name::{Name, named_unit};
 use super::plausible::{UnitChoice, choose_unit};
 use crate::diagnostic::concerned;
-use crate::{GradientSource, Quantity, Run, TextLayout, TimeFormat};
+use crate::{GradientSource, PositionSource, Quantity, Run, TextLayout, TimeFormat};
 
 /// A recording's file.
 #[derive(Clone, Copy, Debug)]
@@ -202,6 +203,26 @@ impl Guess {
             return Some(words);
         }
         None
+    }
+}
+
+impl Guess {
+    /// Turns the runs that go the other way by most steps from one time to the next, where the files have the rows in
+    /// another order; true where any was turned.
+    pub fn turn_runs<'r>(&mut self, runs: impl IntoIterator<Item = &'r Run>) -> bool {
+        let mut is_turned = false;
+        for (guessed, run) in self.runs.iter_mut().zip(runs) {
+            let positions: Vec<f64> =
+                run.samples.iter().filter_map(|it| it.get(SampleField::Position)).collect();
+            let signs = positions.windows(2).map(|it| (it[1] - it[0]).partial_cmp(&0.0));
+            let balance: i64 = signs.map(|it| it.map_or(0, |it| it as i64)).sum();
+            let direction = if balance < 0 { -1 } else { 1 };
+            if run.position_source == PositionSource::Column && guessed.direction != direction {
+                guessed.direction = direction;
+                is_turned = true;
+            }
+        }
+        is_turned
     }
 }
 

@@ -2,7 +2,7 @@
 use dynocar_model::units::is_unit;
 
 use super::name::Name;
-use crate::cell::{parse_cell, ungrouped};
+use crate::cell::{is_missing, parse_cell, ungrouped};
 use crate::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
 use crate::lines::{self, RowReader};
 use crate::text_layout::Marks;
@@ -127,10 +127,10 @@ impl Row {
         2 * self.values() > self.filled().count()
     }
 
-    /// True for words: names, units. The unit of a share is 1.
+    /// True for words: names, units. The unit of a share is 1; what is missing among values may be a name.
     fn is_of_words(&self) -> bool {
         let mut own = self.filled().filter(|cell| *cell != "1").peekable();
-        own.peek().is_some() && !own.any(is_value)
+        own.peek().is_some() && !own.any(|cell| is_value(cell) && !is_missing(cell))
     }
 
     /// True where at least half of the cells are units and none is a value. Letters alone are as well the

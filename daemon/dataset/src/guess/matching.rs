@@ -52,6 +52,11 @@ pub fn consider(
         let doubt = (score < SURE).then(|| format!("little speaks for it but {reason}"));
         let mut guessed = GuessedColumn::new((name, facts), quantity, reason, (None, unit));
         guessed.doubts.splice(0..0, doubt);
+        if quantity == Quantity::Time && !facts.grows() {
+            guessed
+                .doubts
+                .push("its values fall from row to row: the newest row stands first".into());
+        }
         (score, guessed)
     }))
 }
@@ -91,7 +96,9 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
         false => Ok(()),
     };
     match quantity {
-        Quantity::Time if !facts.grows() => Err("its values do not grow from row to row".into()),
+        Quantity::Time if !facts.grows() && !facts.falls() => {
+            Err("its values do not grow from row to row".into())
+        }
         Quantity::WheelSlide | Quantity::DoorOpen => refuse_beyond(0.0, 1.0),
         Quantity::Latitude => refuse_beyond(-90.0, 90.0),
         Quantity::Longitude => refuse_beyond(-180.0, 180.0),

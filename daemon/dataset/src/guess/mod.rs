@@ -30,6 +30,7 @@ mod vocabulary;
 mod tests;
 
 pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, Recording, Unmapped};
+pub use layout::{Layout, layout};
 pub use name::Name;
 
 use dynocar_model::units::Unit;
@@ -60,7 +61,10 @@ pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, Datase
     }
     for quantity in [Quantity::Time, Quantity::Speed] {
         if !assignment.has(quantity) {
-            let near = match assignment.near(quantity).join("; ") {
+            let mut near = assignment.near(quantity);
+            // Columns of one name are refused for one reason.
+            near.dedup();
+            let near = match near.join("; ") {
                 none if none.is_empty() => none,
                 near => format!(" ({near})"),
             };

@@ -103,12 +103,14 @@ fn by_values(
     // Stable: of units that fit alike, the likelier comes first.
     fits.sort_by(|one, other| one.0.total_cmp(&other.0));
     let (distance, unit) = fits.first().copied().unwrap_or((0.0, quantity.unit()));
-    let others: Vec<&str> = fits[1.min(fits.len())..]
+    let mut others: Vec<&str> = fits[1.min(fits.len())..]
         .iter()
         .filter(|(distance, _)| *distance <= 3.0_f64.ln())
         .map(|(_, unit)| unit.name())
         .collect();
     let name = unit.name();
+    // Simulators write angles, which look like shares.
+    others.extend((quantity == Quantity::Gradient && name == "%").then_some("deg"));
     let doubt = match (distance == 0.0, others.is_empty()) {
         (false, _) => format!("the name gives no unit, and {words} are usual in none; {name}?"),
         (true, true) => format!("the name gives no unit; {words} are {name} for a train"),

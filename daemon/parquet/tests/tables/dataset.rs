@@ -3,15 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use arrow_array::types::Int32Type;
 use arrow_array::{
-    ArrayRef, BooleanArray, Decimal128Array, DurationMillisecondArray, Float32Array, Float64Array,
-    Int16Array, StringArray, Time32MillisecondArray, TimestampMicrosecondArray, UInt64Array,
+    ArrayRef, BooleanArray, Decimal128Array, DictionaryArray, DurationMillisecondArray,
+    Float32Array, Float64Array, Int16Array, RecordBatch, StringArray, Time32MillisecondArray,
+    TimestampMicrosecondArray, UInt64Array,
 };
 use dynocar::columns_stream;
 use dynocar::programs::ErrorDocument;
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, FileProblem, Manifest, is_parquet};
 use dynocar_dataset::{RunColumn, RunContent};
 use dynocar_parquet::numbers::{Wanted, send_columns};
+
+use parquet::arrow::ArrowWriter;
+use parquet::basic::Compression;
+use parquet::file::properties::WriterProperties;
 
 use crate::support::{program, shared, table};
 
@@ -150,5 +156,67 @@ fn columns_that_hold_no_numbers_are_named_with_what_they_hold() {
         assert_eq!(output.status.code(), Some(2));
         let answer: ErrorDocument = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!((answer.error.message.as_str(), answer.error.exit_status), (expected, 2));
+    }
+}
+
+#[test]
+fn every_compression_of_other_tools_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let values: Vec<f64> = (0..5000).map(|row| f64::from(row % 97) * 0.1).collect();
+    for compression in [
+        Compression::UNCOMPRESSED,
+        Compression::SNAPPY,
+        Compression::GZIP(Default::default()),
+        Compression::BROTLI(Default::default()),
+        Compression::LZ4,
+        Compression::LZ4_RAW,
+        Compression::ZSTD(Default::default()),
+    ] {
+        let path = folder.path().join("own.parquet");
+        let array = shared(Float64Array::from(values.clone()));
+        let batch = RecordBatch::try_from_iter([("v", array)]).unwrap();
+        let set = WriterProperties::builder().set_compression(compression).build();
+        let file = std::fs::File::create(&path).unwrap();
+        let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(set)).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+        let found = read(&path, &[("v", "m/s")]);
+        assert!(found[0].values.as_ref() == Some(&values), "{compression:?}");
+    }
+}
+
+#[test]
+fn rows_of_several_trains_in_turn_are_refused_with_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("own.parquet");
+    let shown = path.display().to_string();
+    let turns = |names: [&'static str; 2]| (0..60).map(move |row| names[row / 2 % 2]);
+    let texts = |names| shared(StringArray::from_iter_values(turns(names)));
+    let coded: DictionaryArray<Int32Type> = turns(["a", "b"]).collect();
+    let numbers = Int16Array::from_iter_values((0..60).map(|row| 7 + row % 3));
+    let changed =
+        StringArray::from_iter_values((0..60).map(|row| if row < 30 { "1" } else { "2" }));
+    for (name, column, expected) in [
+        (
+            "vehicle_id",
+            texts(["ice1", "re2"]),
+            Some("of 2 trains, by column 'vehicle_id': 'ice1', 're2'"),
+        ),
+        ("Train", shared(coded), Some("of 2 trains, by column 'Train': 'a', 'b'")),
+        ("unit no", shared(numbers), Some("of 3 trains, by column 'unit no': '7', '8', '9'")),
+        ("note", texts(["x", "y"]), None),
+        ("vehicle_id", texts(["ice1", "ice1"]), None),
+        ("train number", shared(changed), None),
+    ] {
+        let v = shared(Float64Array::from_iter_values((0..60).map(f64::from)));
+        table(&path, vec![("v", v), (name, column)]);
+        let output = program(&["columns", &shown, "--of-one-train", "--column", "v", "m/s"]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        match expected {
+            Some(words) => {
+                assert!(output.status.code() == Some(2) && said.contains(words), "{said}")
+            }
+            None => assert!(output.status.success(), "{name}: {said}"),
+        }
     }
 }

@@ -59,10 +59,15 @@ pub struct Annotated {
 /// # Errors
 ///
 /// See [`AnnotateError`]; then there is no new file.
-pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<Annotated, AnnotateError> {
+pub fn annotate(
+    from: &Path,
+    train: Option<u64>,
+    timeline: &Timeline,
+    to: &Path,
+) -> Result<Annotated, AnnotateError> {
     let mut added = Annotated::default();
     copy(&Disk, &[from.into()], to, &mut Moments::default(), |writer, moments| {
-        let (train, runs) = runs_of(moments, timeline).map_err(AtPath::of(from))?;
+        let (train, runs) = runs_of(moments, train, timeline).map_err(AtPath::of(from))?;
         let annotations = Annotations::new(writer, train);
         let written = annotations.and_then(|it| it.write(timeline, &runs));
         added = written.map_err(WriteError::of(to)).map_err(CopyError::from)?;
@@ -72,9 +77,14 @@ pub fn annotate(from: &Path, timeline: &Timeline, to: &Path) -> Result<Annotated
 }
 
 /// The train and its runs.
-fn runs_of(moments: &Moments, timeline: &Timeline) -> Result<(u64, Vec<RunMoments>), OtherRuns> {
+fn runs_of(
+    moments: &Moments,
+    train: Option<u64>,
+    timeline: &Timeline,
+) -> Result<(u64, Vec<RunMoments>), OtherRuns> {
     let explained = timeline.runs.last().map_or(0, |it| it.number as usize);
-    let trains = moments.trains();
+    let mut trains = moments.trains();
+    trains.retain(|it| train.is_none_or(|train| *it == train));
     let [train] = trains[..] else {
         return Err(OtherRuns { trains: trains.len(), runs: 0, explained });
     };

@@ -23,6 +23,9 @@ pub struct AnnotateArguments {
     /// The new recording
     #[arg(short, long, value_name = "FILE.mcap")]
     output: PathBuf,
+    /// The train that was explained, where the recording holds several
+    #[arg(long, value_name = "ID")]
+    train: Option<u64>,
 }
 
 /// Writes the copy.
@@ -31,7 +34,7 @@ pub struct AnnotateArguments {
 ///
 /// A recording that cannot be read, or is another, is an input failure.
 pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
-    let AnnotateArguments { from, timeline, output } = arguments;
+    let AnnotateArguments { from, timeline, output, train } = arguments;
     require_new(output)?;
     let wrong = |error: serde_json::Error| {
         Failure::Input(format!("{}: no explanation in time: {error}", timeline.display()))
@@ -42,9 +45,9 @@ pub fn execute(arguments: &AnnotateArguments) -> Result<(), Failure> {
         let folder = tempfile::TempDir::with_prefix("dynocar-").map_err(Failure::work)?;
         let recording = folder.path().join("dataset.mcap");
         from_dataset(from, &recording)?;
-        annotate(&recording, &read, output)?
+        annotate(&recording, *train, &read, output)?
     } else {
-        annotate(from, &read, output)?
+        annotate(from, *train, &read, output)?
     };
     report_line(&format!(
         "annotated recording: {}: {} intervals in which an effect acts, {} messages in all",

@@ -14,6 +14,9 @@ use super::rows::{WHEEL_SLIDE, to_rows};
 use crate::error::{AtPath, ReadError};
 use crate::recording::Recording;
 
+/// Samples for each time that the numbers begin anew, at least: below it they are of several controllers.
+const RESTARTS_RARE: usize = 20;
+
 /// Files of the train and the line for a recording to which none are attached.
 #[derive(Clone, Debug, Default)]
 pub struct ModelFiles {
@@ -55,8 +58,19 @@ pub enum NoDataset {
         trains: String,
     },
     /// Nobody names the train.
-    #[error("the file of train {train} is not attached: give it by --train-file")]
+    #[error(
+        "the file of train {train} is not attached: give it to `dynocar convert` by --train-file"
+    )]
     NoTrainFile {
+        /// The train.
+        train: u64,
+    },
+    /// Another tool has merged what several controllers published under one number.
+    #[error(
+        "the numbers of train {train}'s samples go back and forth: another tool has merged recordings of \
+         several controllers; convert each of them by itself"
+    )]
+    SeveralControllers {
         /// The train.
         train: u64,
     },
@@ -144,6 +158,10 @@ pub fn unpack(
     }
     let samples: Vec<TrainSample> =
         recording.samples.into_iter().filter(|it| it.train_id == train).collect();
+    let restarts = samples.windows(2).filter(|it| it[1].sequence <= it[0].sequence).count();
+    if restarts * RESTARTS_RARE > samples.len() {
+        return Err(AtPath::<NoDataset>::of(path)(NoDataset::SeveralControllers { train }).into());
+    }
     let runs: Vec<&[TrainSample]> = samples
         .chunk_by(|one, next| (one.run, one.direction) == (next.run, next.direction))
         .collect();

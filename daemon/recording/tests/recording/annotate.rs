@@ -84,7 +84,7 @@ fn an_explanation_lies_next_to_the_data_at_the_moments_that_it_speaks_of() {
     let runs: Vec<&[TrainSample]> = samples.chunk_by(|one, next| one.run == next.run).collect();
     assert_eq!(runs.len(), 2);
 
-    let added = annotate(&plain, &timeline(&runs), &annotated).unwrap();
+    let added = annotate(&plain, None, &timeline(&runs), &annotated).unwrap();
     assert_eq!((added.effects, added.messages), (1, 1 + 1 + 2 + samples.len()));
 
     let (before, after) = (Recording::load(&plain).unwrap(), Recording::load(&annotated).unwrap());
@@ -123,7 +123,7 @@ fn an_explanation_of_other_runs_is_refused_and_nothing_is_left_behind() {
     write(&plain, &samples, &[]);
     let runs: Vec<&[TrainSample]> = samples.chunk_by(|one, next| one.run == next.run).collect();
     let other = timeline(&[runs[0], runs[1], runs[1]]);
-    let refused = annotate(&plain, &other, &annotated).unwrap_err();
+    let refused = annotate(&plain, None, &other, &annotated).unwrap_err();
     let AnnotateError::OtherRuns(refused) = refused else { panic!("{refused}") };
     assert_eq!(refused.problem, OtherRuns { trains: 1, runs: 2, explained: 3 }, "{refused}");
     assert!(!annotated.exists());

@@ -5,6 +5,7 @@ mod codec;
 mod fields;
 mod files;
 mod keeping;
+mod orders;
 mod process;
 mod rewritten;
 mod rotation;

@@ -117,8 +117,7 @@ fn studied(
     paths: &[PathBuf],
     arguments: &BrakesArguments,
 ) -> Result<(Vec<Dataset>, Study), Failure> {
-    let datasets: Vec<Dataset> =
-        paths.iter().map(|it| dataset::load(it)).collect::<Result<_, _>>()?;
+    let datasets: Vec<Dataset> = paths.iter().map(dataset::load).collect::<Result<_, _>>()?;
     let find = FindSettings { share_min: arguments.applied, ..FindSettings::default() };
     let settings = StudySettings { find, repeatability: arguments.repeatability };
     let mut study = Study::of_all(&datasets, &settings, &[]);

@@ -14,10 +14,11 @@ use std::sync::Arc;
 
 use dynocar::cli::check::{self as daemon_check, CheckArguments, or_refused};
 use dynocar_analysis::dataset::{SourcePosition, parse_track, parse_train, top_keys};
+use dynocar_shared::TrainId;
 use serde::Serialize;
 
 use dynocar::cli::Failure;
-use dynocar::dataset::{self, FileKind, LoadError, kind_of, labelled_text};
+use dynocar::dataset::{self, FileKind, LoadError, Source, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
 
 /// Runs `dynocar check`.
@@ -28,13 +29,14 @@ use dynocar::output::{give, require_file, require_folder};
 /// been reported by then.
 pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let (path, json) = (&arguments.path, arguments.json.as_deref());
+    let source = Source { path, train: arguments.train.map(TrainId) };
     if let Some(file) = json {
         require_file(file, "{")?;
     }
     if let Some(folder) = &arguments.draw {
         require_folder(folder)?;
     }
-    let understood = or_refused(path, json, understand(path))?;
+    let understood = or_refused(path, json, understand(source))?;
     give(json, &understood.answer(path), || understood.text())?;
     if let Some(folder) = &arguments.draw {
         draw::draw(&understood, folder)?;
@@ -60,9 +62,10 @@ impl Understood {
 /// # Errors
 ///
 /// When the path leads to nothing known, or a file that everything rests on is wrong.
-pub fn understand(path: &Path) -> Result<Understood, Failure> {
-    if !path.is_file() || dataset::is_recording(path) {
-        return read_dataset(path);
+pub fn understand(source: Source) -> Result<Understood, Failure> {
+    let path = source.path;
+    if source.train.is_some() || !path.is_file() || dataset::is_recording(path) {
+        return read_dataset(source);
     }
     let (label, text) = labelled_text(path)?;
     let refuse = |message| Err(Failure::At(SourcePosition::whole(&label), message));
@@ -75,7 +78,7 @@ pub fn understand(path: &Path) -> Result<Understood, Failure> {
     };
     let mut understood = Understood::of(kind);
     match kind {
-        FileKind::Dataset => return read_dataset(path),
+        FileKind::Dataset => return read_dataset(source),
         FileKind::Train => understood.train = Some(Arc::new(parse_train(&label, &text)?)),
         FileKind::Track => understood.track = Some(Arc::new(parse_track(&label, &text)?)),
         FileKind::Daemon => understood.daemon = Some(daemon_check::read(path)?),
@@ -96,10 +99,10 @@ fn found(keys: &[String]) -> String {
     format!("not a file that can be checked: it holds {}{more}", names.join(", "))
 }
 
-fn read_dataset(path: &Path) -> Result<Understood, Failure> {
-    let (folder, head) = dataset::open(path).map_err(|error| match error {
+fn read_dataset(source: Source) -> Result<Understood, Failure> {
+    let (folder, head) = dataset::open(source).map_err(|error| match error {
         LoadError::NotADataset { .. } => {
-            let place = SourcePosition::whole(&path.display().to_string());
+            let place = SourcePosition::whole(&source.path.display().to_string());
             Failure::At(place, format!("{error}; {EXPECTED}"))
         }
         other => other.into(),

@@ -22,6 +22,7 @@ use crate::report;
 use crate::report::provenance::{Provenance, for_shell, own_command_line};
 use crate::updated::{UPDATED_FILES, UPDATED_MARK, UpdatedFiles, UpdatedModelError, write_updated};
 use dynocar::cli::Failure;
+use dynocar::dataset::{Source, SourceArguments};
 use dynocar::output::{
     OutputError, give, report_line, require_files, require_folder, require_new,
     require_replaceable, write_file, write_in_folder,
@@ -35,8 +36,8 @@ const IMPOSSIBLE: &str = "no updated model is written: the data cannot be true";
 /// Find which effect the model lacks, add it, and report the error before and after.
 #[derive(Debug, Args)]
 pub struct ExplainArguments {
-    /// The dataset's folder, or a recording
-    dataset: PathBuf,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Use the forces under traction only: for recordings without the friction brake's force
     #[arg(long)]
     traction_only: bool,
@@ -69,8 +70,8 @@ pub struct ExplainArguments {
 /// A wrong dataset or name of a result is an input failure.
 pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     require_names(arguments)?;
-    let path = &arguments.dataset;
-    let mut runs = ExplainedRuns::at(path, arguments.traction_only)?;
+    let source = arguments.source.source();
+    let mut runs = ExplainedRuns::at(source, arguments.traction_only)?;
     if let Some(folder) = &arguments.predictions {
         for name in prediction_names(&runs.dataset).values() {
             require_replaceable(&folder.join(name), PREDICTIONS_HEADER)?;
@@ -91,7 +92,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     let dataset = runs.dataset;
     if let Some(folder) = &arguments.grown {
         if explanation.answer.impossibilities().next().is_none() {
-            report_updated(&grow(folder, path, &explanation)?);
+            report_updated(&grow(folder, source, &explanation)?);
             let again = if arguments.traction_only { " --traction-only" } else { "" };
             let folder = for_shell(&folder.display().to_string());
             report_line(&format!("what is left with it: dynocar explain {folder}{again}"));
@@ -100,7 +101,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
         }
     }
     if let Some(file) = &arguments.report {
-        let page = page(path, &dataset, &explanation, own_command_line())?;
+        let page = page(source, &dataset, &explanation, own_command_line())?;
         write_file(file, &page)?;
         report_line(&format!("report: {}", file.display()));
     }
@@ -109,7 +110,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
     }
     if let Some(file) = &arguments.annotate {
         let timeline = Timeline::of(&dataset, &explanation);
-        annotate(path, &timeline, file)?;
+        annotate(source, &timeline, file)?;
     }
     Ok(give(arguments.json.as_deref(), &explanation.answer, || text(&explanation.answer))?)
 }
@@ -120,11 +121,11 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
 ///
 /// A wrong dataset is an input failure.
 pub fn answer(
-    path: &Path,
+    source: Source,
     traction_only: bool,
     progress: Progress,
 ) -> Result<(ExplainedRuns, Explanation), Failure> {
-    let mut runs = ExplainedRuns::at(path, traction_only)?;
+    let mut runs = ExplainedRuns::at(source, traction_only)?;
     let explanation = runs.explain(progress)?;
     Ok((runs, explanation))
 }
@@ -153,14 +154,14 @@ fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
 /// When the data cannot be true, or a file cannot be written or would take the place of another.
 pub fn grow(
     folder: &Path,
-    path: &Path,
+    source: Source,
     explanation: &Explanation,
 ) -> Result<UpdatedFiles, Failure> {
     require_growable(folder)?;
     if explanation.answer.impossibilities().next().is_some() {
         return Err(Failure::Work(IMPOSSIBLE.into()));
     }
-    write_updated(path, explanation, folder).map_err(|error| match error {
+    write_updated(source, explanation, folder).map_err(|error| match error {
         UpdatedModelError::Output(error) => error.into(),
         error => Failure::work(error),
     })
@@ -199,12 +200,12 @@ fn progress_bar() -> ProgressBar {
 ///
 /// When a file of the dataset cannot be read any more, or a plot cannot be drawn.
 pub fn page(
-    path: &Path,
+    source: Source,
     dataset: &Dataset,
     explanation: &Explanation,
     command: String,
 ) -> Result<String, Failure> {
-    let provenance = Provenance::of(path, command)?;
+    let provenance = Provenance::of(source, command)?;
     report::page(dataset, explanation, &provenance).map_err(Failure::work)
 }
 

@@ -1,7 +1,7 @@
 //! The runs of a dataset that is explained: in memory where they are few, else those that the search looks at.
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use dynocar_analysis::dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, Manifest, Run, SourcePosition,
@@ -13,13 +13,15 @@ use dynocar_analysis::explain::{Explanation, explain, explain_many};
 use dynocar_analysis::parallel;
 
 use dynocar::cli::Failure;
-use dynocar::dataset::{DatasetFolder, LoadError, open};
+use dynocar::dataset::{DatasetFolder, LoadError, Source, open};
+use dynocar_shared::TrainId;
 
 /// The runs of a dataset.
 pub struct ExplainedRuns {
     /// All of them; of many, what is known of each but its samples.
     pub dataset: Dataset,
     path: PathBuf,
+    train: Option<TrainId>,
     traction_only: bool,
     many: Option<ManyRuns>,
 }
@@ -51,8 +53,8 @@ impl ExplainedRuns {
     /// # Errors
     ///
     /// The first mistake, with file, line and choices.
-    pub fn at(path: &Path, traction_only: bool) -> Result<Self, Failure> {
-        let (folder, head) = open(path)?;
+    pub fn at(source: Source, traction_only: bool) -> Result<Self, Failure> {
+        let (folder, head) = open(source)?;
         let held = Held::of(head.manifest.runs.iter().map(|run| run.role));
         let read = |index| {
             let mut run = read(&folder, &head, traction_only, index)?;
@@ -73,13 +75,18 @@ impl ExplainedRuns {
             runs,
         };
         let chosen = dataset(chosen.into_iter().flatten().collect());
-        let path = path.to_path_buf();
+        let (path, train) = (source.path.to_path_buf(), source.train);
         let Some(held) = held else {
-            return Ok(ExplainedRuns { dataset: chosen, path, traction_only, many: None });
+            return Ok(ExplainedRuns { dataset: chosen, path, train, traction_only, many: None });
         };
         let dataset = dataset(known);
         let many = Some(ManyRuns { folder, head, held, chosen });
-        Ok(ExplainedRuns { dataset, path, traction_only, many })
+        Ok(ExplainedRuns { dataset, path, train, traction_only, many })
+    }
+
+    /// Where they lie.
+    pub fn source(&self) -> Source<'_> {
+        Source { path: &self.path, train: self.train }
     }
 
     /// Explains them.
@@ -127,7 +134,7 @@ impl ExplainedRuns {
     fn unusable(&self, error: RunDataError) -> Failure {
         let RunDataError::Simulate { file, source } = error;
         let label =
-            DatasetFolder::at(&self.path).map_or(file.clone(), |folder| folder.label(&file));
+            DatasetFolder::at(self.source()).map_or(file.clone(), |folder| folder.label(&file));
         let diagnostics: String =
             self.dataset.diagnostics().iter().map(|diagnostic| format!("; {diagnostic}")).collect();
         Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{diagnostics}"))

@@ -18,7 +18,7 @@ use self::answer::EstimatorAnswer;
 use self::runs::{EstimatorSpread, RunAnswer};
 use super::text::diagnostics;
 use dynocar::cli::Failure;
-use dynocar::dataset;
+use dynocar::dataset::{self, SourceArguments};
 use dynocar::output::{give, require_files};
 use dynocar_analysis::identify::{
     default_estimators, identify, recommended_estimators, samples_of_runs,
@@ -37,8 +37,9 @@ pub struct IdentifyArguments {
 /// Runs to learn from, and estimators to learn with.
 #[derive(Clone, Debug, Args)]
 pub struct Question {
-    /// The dataset's folder, or a recording
-    pub dataset: PathBuf,
+    /// The runs
+    #[command(flatten)]
+    pub source: SourceArguments,
     /// This estimator, as v_mils; may be given several times [default: the recommended ones]
     #[arg(long, value_name = "NAME")]
     pub estimator: Vec<String>,
@@ -102,7 +103,7 @@ pub fn answer(question: &Question) -> Result<IdentifyAnswer, Failure> {
         (false, []) => None,
         (false, names) => Some(named_estimators(names)?),
     };
-    let (mut dataset, speed_unit) = dataset::load_with_speed_unit(&question.dataset)?;
+    let (mut dataset, speed_unit) = dataset::load_with_speed_unit(question.source.source())?;
     let is_chosen = named.is_some();
     let estimators = named.unwrap_or_else(|| recommended_estimators(&dataset));
     if question.traction_only {

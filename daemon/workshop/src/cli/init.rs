@@ -63,9 +63,19 @@ fn describe(
 ) -> Result<Described, Failure> {
     let (texts, encoding) = recordings::texts(&arguments.csv, arguments.encoding)?;
     let files = recordings::from_folder(arguments.folder(), &arguments.csv)?;
+    let chosen = recordings::of_train(&texts, arguments.train_cell.as_deref())?;
     let recordings: Vec<Recording> =
         texts.iter().map(|(label, text)| Recording { label, text }).collect();
-    let mut guess = guess(&recordings, &arguments.column)?;
+    let own = recordings.iter().enumerate();
+    let own: Vec<Recording> = own
+        .map(|(at, it)| Recording {
+            text: chosen.as_ref().map_or(it.text, |it| &it.texts[at]),
+            ..*it
+        })
+        .collect();
+    let rows = chosen.as_ref().map(|it| &it.rows);
+    let mut guess = guess(&own, &arguments.column)
+        .map_err(|error| recordings::with_encoding(error, encoding, arguments.encoding))?;
     guess.layout.encoding = encoding;
     let track = match has_track {
         true => Some(labelled_text(&arguments.folder().join(TRACK_FILE))?.1),
@@ -80,14 +90,16 @@ fn describe(
     let folder = arguments.folder();
     let mut corrections = 0;
     loop {
-        let text = texts::dataset(&guess, &name, &files, has_track);
+        let text = texts::dataset(&guess, (&name, rows), &files, has_track);
         let mut draft = vec![(MANIFEST_FILE, None, &text[..]), (TRAIN_FILE, None, &train.text)];
         draft.extend(track.as_deref().map(|track| (TRACK_FILE, None, track)));
         let runs = files.iter().zip(&recordings);
         draft.extend(runs.map(|(path, it)| (&path[..], Some(it.label), it.text)));
         let (head, runs) = Draft { folder, files: draft }.read()?;
         let knows_mass = arguments.train.knows_mass();
-        if corrections == CORRECTIONS_MAX || guess.correct(&runs, knows_mass).is_none() {
+        let is_right = corrections == CORRECTIONS_MAX
+            || !guess.turn_runs(&runs) && guess.correct(&runs, knows_mass).is_none();
+        if is_right {
             let diagnostics = diagnostics(&head.train, head.track.as_deref(), &runs);
             return Ok(Described { guess, files, diagnostics, text });
         }

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::text::{TextTable, diagnostics};
 use dynocar::cli::Failure;
-use dynocar::dataset;
+use dynocar::dataset::{self, SourceArguments};
 use dynocar::output::{give, require_files};
 use dynocar_shared::HALF_95;
 
@@ -21,8 +21,8 @@ use dynocar_shared::HALF_95;
 /// It needs the speed alone, and uses the command of the brake where it is recorded.
 #[derive(Debug, Args)]
 pub struct StopsArguments {
-    /// The dataset's folder
-    dataset: PathBuf,
+    #[command(flatten)]
+    source: SourceArguments,
     /// Predict the next stop from this speed in m/s; may be given several times
     #[arg(long, value_name = "MPS", value_parser = positive)]
     from: Vec<f64>,
@@ -73,14 +73,14 @@ struct StopsAnswer {
 /// A wrong dataset is an input failure; so is one without a stop.
 pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
     require_files(&[(&arguments.json, "{")])?;
-    let dataset = dataset::load(&arguments.dataset)?;
+    let dataset = dataset::load(arguments.source.source())?;
     let find = FindSettings { share_min: arguments.applied, ..FindSettings::default() };
     let settings = StudySettings { find, repeatability: arguments.repeatability };
     let study = Study::of(&dataset, &settings, &arguments.from);
     if study.stops.is_empty() {
         return Err(Failure::Input(format!(
             "{}: no run holds a stop: a train that reached {} m/s or more and then stands",
-            arguments.dataset.display(),
+            arguments.source.dataset.display(),
             find.from_mps
         )));
     }

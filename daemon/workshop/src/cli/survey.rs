@@ -9,14 +9,18 @@ use crate::survey::answer::{LearnedAnswer, SurveyAnswer};
 use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 use dynocar::cli::Failure;
+use dynocar::dataset::Source;
 use dynocar::output::{give, report_line, require_files, require_folder, write_file};
-use dynocar_shared::HALF_95;
+use dynocar_shared::{HALF_95, TrainId};
 
 /// Survey a line from recordings with GNSS: trips, chainage, stops, gradient.
 #[derive(Debug, Args)]
 pub struct SurveyArguments {
     /// The folder of the raw recordings, or its dataset.toml under any name
     dataset: PathBuf,
+    /// Only this train of a recording that holds several
+    #[arg(long, value_name = "ID")]
+    train: Option<u64>,
     /// Write the dataset of trips into this folder
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
@@ -41,7 +45,8 @@ pub struct SurveyArguments {
 pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
     require_files(&[(&arguments.json, "{"), (&arguments.report, PAGE_MARK)])?;
     require_folder(&arguments.out)?;
-    let (source, line) = (&arguments.dataset, arguments.line.as_deref());
+    let source = Source { path: &arguments.dataset, train: arguments.train.map(TrainId) };
+    let line = arguments.line.as_deref();
     let work = || survey_folder(source, line, &arguments.out);
     let made = arguments.threads.work(work)??;
     report_line(&format!("dataset: {} files in {}", made.files.len(), arguments.out.display()));

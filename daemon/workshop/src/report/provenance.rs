@@ -1,12 +1,11 @@
 //! Where a report comes from: command, versions, content of the dataset.
 
-use std::path::Path;
 use std::time::SystemTime;
 
 use dynocar_analysis::dataset::MANIFEST_FILE;
 use sha2::{Digest, Sha256};
 
-use dynocar::dataset::{self, LoadError};
+use dynocar::dataset::{self, LoadError, Source};
 use dynocar::models::moment::Moment;
 
 /// A file and what is in it.
@@ -43,8 +42,8 @@ impl Provenance {
     /// # Errors
     ///
     /// When a file of the dataset cannot be read.
-    pub fn of(path: &Path, command: String) -> Result<Self, LoadError> {
-        Ok(Provenance::of_files(digests(path)?, command, SystemTime::now()))
+    pub fn of<'p>(source: impl Into<Source<'p>>, command: String) -> Result<Self, LoadError> {
+        Ok(Provenance::of_files(digests(source.into())?, command, SystemTime::now()))
     }
 
     /// Of a report on these files made at an instant.
@@ -68,8 +67,8 @@ impl Provenance {
     }
 }
 
-fn digests(path: &Path) -> Result<Vec<FileDigest>, LoadError> {
-    let (folder, head) = dataset::open(path)?;
+fn digests(source: Source) -> Result<Vec<FileDigest>, LoadError> {
+    let (folder, head) = dataset::open(source)?;
     let manifest = &head.manifest;
     let mut paths = vec![MANIFEST_FILE.to_string(), manifest.train_file.path.clone()];
     paths.extend(manifest.track_file.as_ref().map(|file| file.path.clone()));

@@ -17,7 +17,7 @@ pub mod write;
 
 use std::path::{Path, PathBuf};
 
-use dynocar::dataset::load;
+use dynocar::dataset::{Source, load};
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::stops::Stop;
 use dynocar_analysis::survey::{Survey, survey};
@@ -49,11 +49,12 @@ pub struct Surveyed {
 /// # Errors
 ///
 /// When the recordings or the line cannot be read, hold no line, or a file cannot be written.
-pub fn survey_folder(
-    source: &Path,
+pub fn survey_folder<'s>(
+    source: impl Into<Source<'s>>,
     line: Option<&Path>,
     out: &Path,
 ) -> Result<Surveyed, SurveyFailure> {
+    let source = source.into();
     let raw = load(source)?;
     let known = line.map(read::known_line).transpose()?;
     let (recordings, vehicle) = (read::recordings(&raw), read::vehicle(&raw));

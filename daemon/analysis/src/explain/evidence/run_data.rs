@@ -211,6 +211,16 @@ fn move_positions(rows: &mut [TrainSample], samples: &[ResolvedSample], moved_m:
     }
 }
 
+/// Drops the rows before the first gradient and after the last, where some have one: of an altitude, none is known
+/// before the train stands on ground that was driven over.
+fn drop_unknown_ends(rows: &mut Vec<TrainSample>) {
+    let has_gradient = |it: &TrainSample| it.get(SampleField::Gradient).is_some();
+    if let Some(last) = rows.iter().rposition(has_gradient) {
+        rows.truncate(last + 1);
+        rows.drain(..rows.iter().position(has_gradient).unwrap_or(0));
+    }
+}
+
 /// A run made ready, with an odometer's drift taken out before anything is looked up at its positions.
 fn prepare_run(
     train: &TrainModel,
@@ -219,6 +229,7 @@ fn prepare_run(
 ) -> Result<RunData, RunDataError> {
     let numbered = run.samples.iter().map(|it| TrainSample { run: run.number, ..*it });
     let mut rows: Vec<TrainSample> = numbered.collect();
+    drop_unknown_ends(&mut rows);
     let unusable = |source| RunDataError::Simulate { file: run.file.clone(), source };
     let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
     if is_position_recorded {

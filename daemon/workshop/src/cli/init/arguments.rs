@@ -35,6 +35,9 @@ pub struct InitArguments {
     /// Which letters the files' bytes are, as windows-1251 or gbk [default: UTF-8, else guessed]
     #[arg(long, value_name = "NAME", requires = "csv", value_parser = encoding)]
     pub encoding: Option<&'static Encoding>,
+    /// Take the rows of one train of files that hold several, by its cell in the column that names them
+    #[arg(long = "train", value_name = "CELL", requires = "csv")]
+    pub train_cell: Option<String>,
     /// Say what a column holds, as speed=v_ist:km/h or time=Zeit:%d.%m.%Y %H:%M:%S; may be given several times
     #[arg(long, value_name = "QUANTITY=COLUMN[:UNIT]", value_parser = given_column)]
     pub column: Vec<GivenColumn>,

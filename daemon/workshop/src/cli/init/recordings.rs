@@ -1,13 +1,17 @@
 //! Recordings that nobody described: their letters, their names as a dataset has them, and the dataset that they would be.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
 use dynocar::text_file::{read_beginning, read_bytes};
 use dynocar::unpacking::columns_of;
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
+use dynocar_analysis::dataset::guess::layout;
+use dynocar_analysis::dataset::train_rows::TrainRows;
+use dynocar_analysis::dataset::trains::{TrainsColumn, only};
 use dynocar_analysis::dataset::{
-    ColumnMapping, DatasetFiles, DatasetHead, FileProblem, Run, SourcePosition,
+    ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, SourcePosition,
 };
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
@@ -79,7 +83,7 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
         let label = path.display().to_string();
         let refused =
             |words: String| Failure::At(SourcePosition::whole(&label), format!("{label}: {words}"));
-        let names = columns_of(path, &[]).map_err(&refused)?;
+        let names = columns_of(path, &[], true).map_err(&refused)?;
         let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
         for name in names.into_iter().map(|it| it.name) {
             // A column of texts or lists is none that can be mapped.
@@ -94,7 +98,7 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
 /// A column's numbers, times in s.
 fn numbers_of(path: &Path, name: &str) -> Result<Vec<f64>, String> {
     let mapping = ColumnMapping::of_time(name);
-    let columns = columns_of(path, &[mapping])?;
+    let columns = columns_of(path, &[mapping], false)?;
     columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
 }
 
@@ -109,6 +113,65 @@ fn as_csv(columns: &[(String, Vec<f64>)]) -> String {
         text += &(columns.iter().map(cell).collect::<Vec<_>>().join(",") + "\n");
     }
     text
+}
+
+/// The rows of one train in files of several.
+pub struct OfTrain {
+    /// Which they are.
+    pub rows: TrainRows,
+    /// The files with them alone.
+    pub texts: Vec<String>,
+}
+
+/// The rows of the train that is named, or of all where the files hold one.
+///
+/// # Errors
+///
+/// Files of several trains of which none is named, and a name that is none of theirs, are an input failure.
+pub fn of_train(files: &[NamedText], named: Option<&str>) -> Result<Option<OfTrain>, Failure> {
+    let layouts = files.iter().map(|(label, text)| layout(label, text));
+    // A file without a layout is refused later.
+    let Ok(layouts) = layouts.collect::<Result<Vec<_>, _>>() else { return Ok(None) };
+    let trains = files.iter().zip(&layouts).map(|((_, text), it)| TrainsColumn::of(text, &it.text));
+    let trains: Vec<Option<TrainsColumn>> = trains.collect();
+    let Some(value) = named else {
+        let mut several = files.iter().zip(&trains);
+        let several = several.find_map(|((label, _), it)| Some((label, it.as_ref()?)));
+        return match several.filter(|(_, it)| it.is_interleaved()) {
+            None => Ok(None),
+            Some((label, it)) => Err(Failure::At(
+                SourcePosition::whole(label),
+                format!("{label}: {}; choose one by --train", it.words()),
+            )),
+        };
+    };
+    let Some(column) = trains.into_iter().flatten().next().map(|it| it.name) else {
+        let words = "--train: expected files whose rows a column distinguishes by their train";
+        return Err(Failure::Input(words.into()));
+    };
+    let own = files.iter().zip(&layouts).map(|((label, text), it)| {
+        only(label, text, &it.text, (&column, value)).map(Cow::into_owned)
+    });
+    let texts = own.collect::<Result<_, _>>()?;
+    Ok(Some(OfTrain { rows: TrainRows::Of { column, value: value.into() }, texts }))
+}
+
+/// An error of names that may be read in other letters than they were written in: where their encoding was assumed, it says so.
+pub fn with_encoding(
+    error: DatasetError,
+    encoding: &'static Encoding,
+    given: Option<&'static Encoding>,
+) -> Failure {
+    if given.is_some() || encoding == UTF_8 {
+        return error.into();
+    }
+    let name = encoding.name().to_lowercase();
+    Failure::At(
+        error.place.clone(),
+        format!(
+            "{error}; the letters are taken for {name}, since the file is no UTF-8: --encoding says another"
+        ),
+    )
 }
 
 /// The paths of existing files from a folder that need not be there yet.

@@ -5,6 +5,7 @@ use std::path::Path;
 use dynocar::models::Moment;
 use dynocar_analysis::dataset::guess::{Guess, GuessedColumn, GuessedRun};
 use dynocar_analysis::dataset::manifest::DOUBTFUL;
+use dynocar_analysis::dataset::train_rows::TrainRows;
 use dynocar_analysis::dataset::{Quantity, TextLayout};
 use encoding_rs::UTF_8;
 use toml::Value;
@@ -20,7 +21,12 @@ pub fn name_of(folder: &Path) -> String {
 }
 
 /// The text of `dataset.toml`; `files` are the runs' paths from its folder.
-pub fn dataset(guess: &Guess, name: &str, files: &[String], has_track: bool) -> String {
+pub fn dataset(
+    guess: &Guess,
+    (name, rows): (&str, Option<&TrainRows>),
+    files: &[String],
+    has_track: bool,
+) -> String {
     let head = comment(
         "",
         "Recorded runs of one train. Written by dynocar init: every line under [columns] is a guess \
@@ -37,10 +43,11 @@ pub fn dataset(guess: &Guess, name: &str, files: &[String], has_track: bool) -> 
     };
     let mut text = format!(
         "{head}[dataset]\nname = {}\n{}# position_reference = \"head\"    # where the recorded \
-         position is the head's, not the centre's\n\n[train]\nfile = {}\n\n{track}{}\n\n[columns]\n",
+         position is the head's, not the centre's\n\n[train]\nfile = {}\n{}\n{track}{}\n\n[columns]\n",
         quoted(name),
         layout_text(&guess.layout),
         quoted(TRAIN_FILE),
+        rows_text(rows),
         quoted(TRACK_FILE)
     );
     text.extend(guess.columns.iter().map(column_text));
@@ -68,6 +75,12 @@ pub fn dataset(guess: &Guess, name: &str, files: &[String], has_track: bool) -> 
         text += &date_text(guess, run);
     }
     text
+}
+
+/// Which rows are the train's.
+fn rows_text(rows: Option<&TrainRows>) -> String {
+    let Some(TrainRows::Of { column, value }) = rows else { return String::new() };
+    format!("rows = {{ column = {}, value = {} }}\n", quoted(column), quoted(value))
 }
 
 /// How the files' text falls into cells.
@@ -195,7 +208,7 @@ mod tests {
         let files = [Recording { label: "a.csv", text }];
         let guess = guess(&files, &[]).unwrap_or_else(|error| panic!("{error}"));
         let files = ["da\"y\\1.csv".to_string()];
-        let text = dataset(&guess, "x\n[y]", &files, true);
+        let text = dataset(&guess, ("x\n[y]", None), &files, true);
         let manifest = Manifest::parse("dataset.toml", &text).unwrap_or_else(|it| panic!("{it}"));
         let columns: Vec<&str> = manifest.columns.iter().map(|it| it.column.as_str()).collect();
         assert_eq!(columns, ["t \"s\" [s]", "v\t\\x [km/h]"]);
@@ -211,7 +224,7 @@ mod tests {
         for count in 1..4 {
             let guess = guess(&vec![recording; count], &[]).unwrap();
             let files: Vec<String> = (0..count).map(|index| format!("{index}.csv")).collect();
-            let text = dataset(&guess, "x", &files, false);
+            let text = dataset(&guess, ("x", None), &files, false);
             let manifest = Manifest::parse("dataset.toml", &text).unwrap();
             let roles: Vec<Role> = manifest.runs.iter().map(|run| run.role).collect();
             assert_eq!(roles.contains(&Role::Holdout), count > 1);

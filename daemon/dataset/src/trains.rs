@@ -1,0 +1,195 @@
+//! Files that hold the rows of several trains: noticed, and those of one chosen.
+
+use std::borrow::Cow;
+
+use super::cell::truth;
+use super::error::{DatasetError, SourcePosition};
+use super::lines::{Row, RowReader, below};
+use super::quantity::Quantity;
+use super::table::Table;
+use super::text_layout::TextLayout;
+
+/// Names of columns that say whose the row is, in small letters and digits.
+const NAMES: &str = "vehicle vehicleid vehid veh vehiclename vehicleno vehiclenumber train trainid trainno trainnr \
+                     trainnumber trainname trainset unit unitid unitno unitnumber loco locoid locono locomotive \
+                     locomotiveid locomotivenumber fahrzeug fahrzeugid fahrzeugnr fahrzeugnummer zug zugid zugnr \
+                     zugnummer triebzug triebzugnr lok lokid loknr loknummer rame numerorame numerotrain tren treno \
+                     idtren idtreno поезд номерпоезда";
+/// A position that changes by this many m and twice what the speed says is another train's.
+const JUMP_MIN_M: f64 = 100.0;
+/// Trains that a message names at most.
+const SHOWN_MAX: usize = 8;
+
+/// True for a column's name that says whose the rows are.
+pub fn names_trains(name: &str) -> bool {
+    let letters = name.chars().filter(|letter| letter.is_alphanumeric());
+    let folded: String = letters.flat_map(char::to_lowercase).collect();
+    NAMES.split(' ').any(|known| known == folded)
+}
+
+/// The cells of a column that names trains, one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct TrainCells {
+    trains: Vec<String>,
+    changes: Vec<usize>,
+    before: Option<usize>,
+}
+
+impl TrainCells {
+    /// Takes the next cell; `line` counts from 1. An empty one says nothing.
+    pub fn push(&mut self, cell: &str, line: usize) {
+        if cell.is_empty() {
+            return;
+        }
+        let known = self.trains.iter().position(|it| it == cell);
+        let place = known.unwrap_or_else(|| {
+            self.trains.push(cell.to_owned());
+            self.trains.len() - 1
+        });
+        if self.before.replace(place).is_some_and(|it| it != place) {
+            self.changes.push(line);
+        }
+    }
+
+    /// The trains by the column of this name; `None` where the cells name no several.
+    pub fn column(self, name: String) -> Option<TrainsColumn> {
+        let TrainCells { trains, changes, .. } = self;
+        let is_mark = |it: &String| truth(it.as_bytes()).is_some() || ["0", "1"].contains(&&it[..]);
+        let is_several = trains.len() > 1 && !trains.iter().all(is_mark);
+        is_several.then_some(TrainsColumn { name, trains, changes })
+    }
+}
+
+/// The trains in a text by a column that names them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainsColumn {
+    /// The column's name.
+    pub name: String,
+    /// The trains, as they come.
+    pub trains: Vec<String>,
+    /// The lines, from 1, where another train follows.
+    changes: Vec<usize>,
+}
+
+impl TrainsColumn {
+    /// The trains that a text's rows are of; `None` where no column names several.
+    pub fn of(text: &str, layout: &TextLayout) -> Option<Self> {
+        let (name, index) = column(text, layout, names_trains)?;
+        let mut cells = TrainCells::default();
+        rows(text, layout, |row, line| {
+            cells.push(&String::from_utf8_lossy(row.trimmed(index)), line);
+        });
+        cells.column(name)
+    }
+
+    /// True where a train comes again after another: no train changes its number so.
+    pub fn is_interleaved(&self) -> bool {
+        self.changes.len() >= self.trains.len()
+    }
+
+    /// True where from one train to another the time does not go on, or the position jumps under way.
+    fn begins_anew(&self, table: &Table) -> bool {
+        let column = |quantity| table.column(quantity).unwrap_or_default();
+        let (times_s, speeds) = (column(Quantity::Time), column(Quantity::Speed));
+        let positions_m = column(Quantity::Position);
+        let is_change = |row: usize| self.changes.binary_search(&table.line(row)).is_ok();
+        (1..times_s.len()).filter(|&row| is_change(row)).any(|row| {
+            let step_s = times_s[row] - times_s[row - 1];
+            let moved_m = speeds.get(row - 1).map_or(0.0, |speed_mps| speed_mps * step_s);
+            let jump_m =
+                positions_m.get(row).map_or(0.0, |at_m| (at_m - positions_m[row - 1]).abs());
+            step_s <= 0.0 || moved_m > 0.0 && jump_m > JUMP_MIN_M + 2.0 * moved_m
+        })
+    }
+
+    /// Says that the rows are of several trains.
+    pub fn words(&self) -> String {
+        let shown: Vec<String> =
+            self.trains.iter().take(SHOWN_MAX).map(|it| format!("'{it}'")).collect();
+        let more = if self.trains.len() > SHOWN_MAX { ", …" } else { "" };
+        format!(
+            "the rows are of {} trains, by column '{}': {}{more}",
+            self.trains.len(),
+            self.name,
+            shown.join(", ")
+        )
+    }
+
+    /// The error of a table of several trains' rows.
+    pub(super) fn refuse(&self, label: &str, table: &Table) -> Result<(), DatasetError> {
+        if !self.is_interleaved() && !self.begins_anew(table) {
+            return Ok(());
+        }
+        let (words, name, first) = (self.words(), &self.name, &self.trains[0]);
+        Err(SourcePosition::whole(label).problem(format!(
+            "{words}; choose one: --train of `dynocar init`, or in dataset.toml [train] rows = {{ column = {name:?}, \
+             value = {first:?} }}, or rows = \"all\" where they are one"
+        )))
+    }
+}
+
+/// A text with the rows of one train alone; lines of others are empty.
+///
+/// # Errors
+///
+/// When no such column or no row of the train is there.
+pub fn only<'t>(
+    label: &str,
+    text: &'t str,
+    layout: &TextLayout,
+    (name, value): (&str, &str),
+) -> Result<Cow<'t, str>, DatasetError> {
+    let at_names = || SourcePosition::line(label, layout.skip_rows + 1);
+    let (_, index) = column(text, layout, |other| other == name)
+        .ok_or_else(|| at_names().problem(format!("no column '{name}' for [train] rows")))?;
+    let mut others = Vec::new();
+    let mut count = 0;
+    rows(text, layout, |row, line| {
+        let is_own = row.trimmed(index) == value.as_bytes();
+        count += usize::from(is_own);
+        if !is_own {
+            others.push(line);
+        }
+    });
+    if count == 0 {
+        let found = TrainsColumn::of(text, layout).filter(|it| it.name == name);
+        let found = found.map_or(String::new(), |it| format!("; {}", it.words()));
+        return Err(SourcePosition::whole(label)
+            .problem(format!("no row of train '{value}' in column '{name}'{found}")));
+    }
+    let mut others = others.into_iter().peekable();
+    let kept = text.split_inclusive('\n').zip(1..).map(|(whole, line)| {
+        let is_other = others.next_if_eq(&line).is_some();
+        if is_other { "\n" } else { whole }
+    });
+    Ok(Cow::Owned(kept.collect()))
+}
+
+/// Name and place of the first column whose name passes.
+fn column(
+    text: &str,
+    layout: &TextLayout,
+    passes: impl Fn(&str) -> bool,
+) -> Option<(String, usize)> {
+    let text = below("", text, layout.skip_rows).ok()?;
+    let mut names = Row::default();
+    RowReader::new(text, layout.delimiter, layout.decimal).read(&mut names);
+    let mut names = names.cells.iter().map(|cell| String::from_utf8_lossy(&cell.text));
+    let (index, name) = names.by_ref().enumerate().find(|(_, name)| passes(name.trim()))?;
+    Some((name.trim().to_owned(), index))
+}
+
+/// Gives every row of values with its line, from 1.
+fn rows(text: &str, layout: &TextLayout, mut take: impl FnMut(&Row, usize)) {
+    let Ok(text) = below("", text, layout.skip_rows) else { return };
+    let mut reader = RowReader::new(text, layout.delimiter, layout.decimal);
+    let mut row = Row::default();
+    let mut above = 1 + usize::from(layout.units_row);
+    while reader.read(&mut row) {
+        if above > 0 {
+            above -= 1;
+        } else {
+            take(&row, layout.skip_rows + row.line);
+        }
+    }
+}
