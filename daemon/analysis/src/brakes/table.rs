@@ -212,6 +212,9 @@ pub fn parse(text: &str) -> Result<Vec<(String, Vec<TableRow>)>, String> {
             None => tables.push((name.into(), vec![row])),
         }
     }
+    if tables.is_empty() {
+        return Err("line 2: expected a row of 4 cells, got nothing".into());
+    }
     Ok(tables)
 }
 

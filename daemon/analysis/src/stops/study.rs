@@ -202,7 +202,7 @@ fn cannot_tell(datasets: &[Dataset], found: &[RecordedStop], law: Option<&Law>) 
     let ends = runs.filter_map(|run| run.samples.iter().rev().find(|it| it.speed_mps.is_finite()));
     let moving = ends.filter(|it| it.speed_mps > STANDING_MPS).count();
     if moving > 0 {
-        said.push(format!("how {moving} runs would have stopped: they end while the train moves"));
+        said.push(format!("how runs go on that end while the train moves: {moving}"));
     }
     let without = found.iter().filter(|it| it.no_law.is_some()).count();
     if without > 0 {
