@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use super::parameters::Parameters;
+use super::parameters::{Correction, Parameters};
 use super::steps::Steps;
 use crate::dataset::DatasetError;
 use crate::dataset::document::Item;
@@ -60,115 +60,17 @@ impl EtcsBrake {
     /// The parameters, and what each rests on. The form asks for all of them, and for factors at the boundaries of the
     /// emergency steps: what is not known is replaced, and marked as a guess.
     pub fn of(found: &Parameters, choice: &Choice) -> (Self, Vec<Basis>) {
-        let mut bases = Vec::new();
-        let mut rests =
-            |key, is_guess, rests_on: String| bases.push(Basis { key, rests_on, is_guess });
         let emergency = &found.emergency;
         let over = |value: f64| Steps::constant(value).between(&emergency.boundaries);
-        let full = format!("{} stops by all of the brake", found.stops);
-        match found.is_commanded {
-            true => rests(
-                "gamma_emergency",
-                false,
-                format!("{full}; their record does not tell emergency from full service"),
-            ),
-            false => rests(
-                "gamma_emergency",
-                true,
-                format!(
-                    "{} stops whose speed kept falling: no record of the brake shows that it was applied in full",
-                    found.stops
-                ),
-            ),
-        }
-        let usual =
-            format!("the median of {} stops by less than all of the brake", found.usual_stops);
-        let (instead, instead_words) = match &found.normal_service {
-            Some(steps) => (steps, &usual[..]),
-            None => (emergency, "the emergency steps"),
-        };
-        match &found.service {
-            Some(_) => rests("gamma_service", false, "the stops of --service".into()),
-            None => rests(
-                "gamma_service",
-                true,
-                format!("{instead_words}: no full service stops are given (--service)"),
-            ),
-        }
-        let service = found.service.as_ref().unwrap_or(instead);
-        match &found.normal_service {
-            Some(_) => rests("gamma_normal_service", false, usual.clone()),
-            None => rests(
-                "gamma_normal_service",
-                true,
-                "gamma_service: fewer than 3 stops by less than all of the brake".into(),
-            ),
-        }
-        let reached = choice.ebcl.and_then(|ebcl| found.k_dry.iter().find(|it| it.ebcl == ebcl));
-        let k_dry = reached.and_then(|it| Some((it, it.k_dry()?)));
-        match k_dry {
-            Some((it, _)) if it.measured.is_some() => {
-                rests("k_dry", false, format!("level {} of {full}", it.ebcl))
-            }
-            Some((it, _)) => {
-                rests("k_dry", false, format!("level {} of the declared components", it.ebcl))
-            }
-            None => rests(
-                "k_dry",
-                true,
-                format!(
-                    "1, for {} stops support no level, and no [brake] units are declared",
-                    found.stops
-                ),
-            ),
-        }
-        match (&found.k_wet, choice.k_wet) {
-            (Some(_), _) => rests("k_wet", false, "the stops of --wet".into()),
-            (None, Some(_)) => rests("k_wet", false, "declared by --k-wet".into()),
-            (None, None) => rests(
-                "k_wet",
-                true,
-                "1, not known: no wet stops (--wet), and none declared (--k-wet)".into(),
-            ),
-        }
-        rests("k_n_pos", true, "0: not estimated".into());
-        rests("k_n_neg", true, "0: not estimated".into());
-        match &found.cut_off {
-            Some(it) => rests(
-                "t_traction_cut_off",
-                false,
-                format!(
-                    "the latest of {} stops ({:.2} to {:.2} s after the brake's first sign)",
-                    it.stops, it.least_s, it.greatest_s
-                ),
-            ),
-            None => rests(
-                "t_traction_cut_off",
-                true,
-                "0: no stop shows a traction force that was there at the brake's command and went"
-                    .into(),
-            ),
-        }
-        let t_bs = found.service_build_up_s;
-        for key in ["t_bs1", "t_bs2"] {
-            match t_bs {
-                Some(_) => rests(key, false, "the stops of --service".into()),
-                None => rests(key, true, "t_be".into()),
-            }
-        }
-        match found.is_commanded {
-            true => rests("t_be", false, full.clone()),
-            false => rests(
-                "t_be",
-                true,
-                "the fall of the speed: the brake's command is not recorded".into(),
-            ),
-        }
+        let normal = found.normal_service.as_ref();
+        let service = found.service.as_ref().or(normal).unwrap_or(emergency);
+        let k_dry = reached(found, choice).and_then(Correction::k_dry);
+        let t_bs = found.service_build_up_s.unwrap_or(found.build_up_s);
         let etcs = EtcsBrake {
             gamma_emergency: emergency.clone(),
             gamma_service: service.clone(),
-            gamma_normal_service: found.normal_service.as_ref().unwrap_or(service).clone(),
-            k_dry: over(k_dry.map_or(1.0, |it| it.1)),
+            gamma_normal_service: normal.unwrap_or(service).clone(),
+            k_dry: over(k_dry.unwrap_or(1.0)),
             k_wet: match &found.k_wet {
                 Some(wet) => wet.between(&emergency.boundaries),
                 None => over(choice.k_wet.unwrap_or(1.0)),
@@ -176,12 +78,109 @@ impl EtcsBrake {
             k_n_pos: Steps::constant(0.0),
             k_n_neg: Steps::constant(0.0),
             t_traction_cut_off: found.cut_off.map_or(0.0, |it| it.greatest_s),
-            t_bs1: t_bs.unwrap_or(found.build_up_s),
-            t_bs2: t_bs.unwrap_or(found.build_up_s),
+            t_bs1: t_bs,
+            t_bs2: t_bs,
             t_be: found.build_up_s,
         };
-        (etcs, bases)
+        let bases = [decelerations(found), factors(found, choice), times(found)];
+        (etcs, bases.into_iter().flatten().collect())
     }
+}
+
+/// The level that is chosen.
+fn reached<'f>(found: &'f Parameters, choice: &Choice) -> Option<&'f Correction> {
+    found.k_dry.iter().find(|it| Some(it.ebcl) == choice.ebcl)
+}
+
+fn known(key: &'static str, rests_on: impl Into<String>) -> Basis {
+    Basis { key, rests_on: rests_on.into(), is_guess: false }
+}
+
+fn guess(key: &'static str, rests_on: impl Into<String>) -> Basis {
+    Basis { key, rests_on: rests_on.into(), is_guess: true }
+}
+
+fn decelerations(found: &Parameters) -> Vec<Basis> {
+    let stops = found.stops;
+    let usual = format!("the median of {} stops by less than all of the brake", found.usual_stops);
+    let (normal, instead) = match &found.normal_service {
+        Some(_) => (known("gamma_normal_service", usual.clone()), usual),
+        None => {
+            let words = "gamma_service: fewer than 3 stops by less than all of the brake";
+            (guess("gamma_normal_service", words), "the emergency steps".into())
+        }
+    };
+    let emergency = match found.is_commanded {
+        true => known(
+            "gamma_emergency",
+            format!(
+                "{stops} stops by all of the brake; their record does not tell emergency from full service"
+            ),
+        ),
+        false => guess(
+            "gamma_emergency",
+            format!(
+                "{stops} stops whose speed kept falling: no record of the brake shows that it was applied in full"
+            ),
+        ),
+    };
+    let service = match &found.service {
+        Some(_) => known("gamma_service", "the stops of --service"),
+        None => {
+            let words = format!("{instead}: no full service stops are given (--service)");
+            guess("gamma_service", words)
+        }
+    };
+    vec![emergency, service, normal]
+}
+
+fn factors(found: &Parameters, choice: &Choice) -> Vec<Basis> {
+    let stops = found.stops;
+    let k_dry = match reached(found, choice).filter(|it| it.k_dry().is_some()) {
+        Some(it) if it.measured.is_some() => {
+            known("k_dry", format!("level {} of {stops} stops by all of the brake", it.ebcl))
+        }
+        Some(it) => known("k_dry", format!("level {} of the declared components", it.ebcl)),
+        None => guess(
+            "k_dry",
+            format!("1, for {stops} stops support no level, and no [brake] units are declared"),
+        ),
+    };
+    let k_wet = match (&found.k_wet, choice.k_wet) {
+        (Some(_), _) => known("k_wet", "the stops of --wet"),
+        (None, Some(_)) => known("k_wet", "declared by --k-wet"),
+        (None, None) => {
+            guess("k_wet", "1, not known: no wet stops (--wet), and none declared (--k-wet)")
+        }
+    };
+    let [pos, neg] = ["k_n_pos", "k_n_neg"].map(|key| guess(key, "0: not estimated"));
+    vec![k_dry, k_wet, pos, neg]
+}
+
+fn times(found: &Parameters) -> Vec<Basis> {
+    let key = "t_traction_cut_off";
+    let cut_off = match &found.cut_off {
+        Some(it) => known(
+            key,
+            format!(
+                "the latest of {} stops ({:.2} to {:.2} s after the brake's first sign)",
+                it.stops, it.least_s, it.greatest_s
+            ),
+        ),
+        None => guess(
+            key,
+            "0: no stop shows a traction force that was there at the brake's command and went",
+        ),
+    };
+    let [first, second] = ["t_bs1", "t_bs2"].map(|key| match found.service_build_up_s {
+        Some(_) => known(key, "the stops of --service"),
+        None => guess(key, "t_be"),
+    });
+    let t_be = match found.is_commanded {
+        true => known("t_be", format!("{} stops by all of the brake", found.stops)),
+        false => guess("t_be", "the fall of the speed: the brake's command is not recorded"),
+    };
+    vec![cut_off, first, second, t_be]
 }
 
 /// Reads `etcs_brake_params`.
