@@ -90,6 +90,7 @@ terminal terminal_help "dynocar --help" "$programs/dynocar" --help
 terminal terminal_check "dynocar check config/demo" "$programs/dynocar" check config/demo
 terminal terminal_identify "dynocar identify config/demo" "$programs/dynocar" identify config/demo
 terminal terminal_stops "dynocar stops metro --from 15" "$programs/dynocar" stops "$place/low_adhesion-9001" --from 15
+terminal terminal_brakes "dynocar brakes metro" "$programs/dynocar" brakes "$place/low_adhesion-9001"
 "$programs/dynocar" check config/demo/track.toml --draw "$place/drawn"
 cp "$place/drawn/line.svg" docs/images/line.svg
 

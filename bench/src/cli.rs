@@ -6,6 +6,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use dynocar::cli::parse;
 use dynocar::output::report_line;
 
+use crate::brakes::BrakesArguments;
 use crate::drive::DriveArguments;
 use crate::estimators::EstimatorsArguments;
 use crate::explain::ExplainArguments;
@@ -28,6 +29,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Brakes(BrakesArguments),
     Drive(DriveArguments),
     Estimators(EstimatorsArguments),
     Explain(ExplainArguments),
@@ -53,6 +55,7 @@ pub fn main() -> ExitCode {
         Err(status) => return status,
     };
     let result = match &arguments.command {
+        Command::Brakes(arguments) => arguments.run(),
         Command::Drive(arguments) => arguments.run(),
         Command::Estimators(arguments) => arguments.run(),
         Command::Explain(arguments) => arguments.run(),

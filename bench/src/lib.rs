@@ -17,6 +17,7 @@
 //! - `statistics`: means and quantiles over seeded runs
 //! - `chance`: random numbers
 
+mod brakes;
 mod chance;
 pub mod cli;
 mod drive;

@@ -147,3 +147,63 @@ fn stops_that_show_no_brake_are_named_with_what_remains() {
     assert_eq!(output.status.code(), Some(2));
     assert!(words(&output).contains("a speed above the one before"), "{}", words(&output));
 }
+
+#[test]
+fn every_value_of_the_form_says_what_it_rests_on_and_guesses_say_so() {
+    let site = site(1.0, false, TRAIN);
+    let recorded = std::fs::read_to_string(site.path().join("run.csv")).unwrap();
+    let (mut text, mut commanded_s) = (String::from("t,v,b,s,f\n"), None);
+    for row in recorded.lines().skip(1) {
+        let cells: Vec<f64> = row.split(',').map(|it| it.parse().unwrap()).collect();
+        let is_commanded = cells[2] > 0.0;
+        commanded_s = if is_commanded { commanded_s.or(Some(cells[0])) } else { None };
+        let is_driven = commanded_s.is_none_or(|since_s| cells[0] < since_s + 0.79);
+        writeln!(text, "{row},{}", if is_driven { 20 } else { 0 }).unwrap();
+    }
+    site.write("run.csv", &text);
+    let manifest = std::fs::read_to_string(site.path().join("dataset.toml")).unwrap();
+    let force = "[columns]\ntraction_force = { column = \"f\", unit = \"kN\" }\n";
+    site.write("dataset.toml", &manifest.replace("[columns]\n", force));
+    let folder = site.path().display().to_string();
+    let etcs = site.path().join("etcs.json").display().to_string();
+    let output = dynocar(&["brakes", &folder, "--etcs", &etcs, "--json", "-"]);
+    assert!(output.status.success(), "{}", words(&output));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let basis = |key: &str| {
+        let all = answer["rests_on"].as_array().unwrap();
+        let found = all.iter().find(|it| it["key"] == key).unwrap();
+        (found["is_guess"].as_bool().unwrap(), found["rests_on"].as_str().unwrap().to_owned())
+    };
+    // The form is whole, its factors lie at the boundaries of the emergency steps, and what is not known says so.
+    let written: Value = serde_json::from_str(&std::fs::read_to_string(&etcs).unwrap()).unwrap();
+    for key in written.as_object().unwrap().keys() {
+        assert!(!basis(key).1.is_empty(), "{key}");
+    }
+    for key in ["k_dry", "k_wet"] {
+        assert_eq!(written[key]["boundaries"], written["gamma_emergency"]["boundaries"], "{key}");
+    }
+    assert_eq!(written["gamma_service"], written["gamma_emergency"]);
+    for (key, is_guess, expected) in [
+        ("gamma_emergency", false, "12 stops by all of the brake"),
+        ("gamma_service", true, "the emergency steps"),
+        ("gamma_normal_service", true, "gamma_service"),
+        ("k_dry", false, "level 1"),
+        ("k_wet", true, "not known"),
+        ("t_traction_cut_off", false, "12 stops"),
+        ("t_bs1", true, "t_be"),
+    ] {
+        let (guess, words) = basis(key);
+        assert!(guess == is_guess && words.contains(expected), "{key}: {guess} {words}");
+    }
+    let cut_off_s = written["t_traction_cut_off"].as_f64().unwrap();
+    assert!((0.75..1.05).contains(&cut_off_s), "{cut_off_s}");
+    let said = String::from_utf8(dynocar(&["brakes", &folder]).stdout).unwrap();
+    for expected in [
+        "k_wet (a guess)",
+        "the gradient is unknown in 12",
+        "T_traction_cut_off: ",
+        "end while the train moves",
+    ] {
+        assert!(said.contains(expected), "{expected}: {said}");
+    }
+}

@@ -51,6 +51,7 @@ from ._recorded import (
     read_dataset,
 )
 from ._records import Record
+from ._stopping import Stop, StoppingEstimate
 from ._vocabulary import (
     Code,
     DaemonState,
@@ -108,6 +109,8 @@ __all__ = [
     "Snapshot",
     "SnapshotReader",
     "Status",
+    "Stop",
+    "StoppingEstimate",
     "UseState",
     "Table",
     "WorkError",

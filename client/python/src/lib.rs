@@ -6,6 +6,7 @@
 //! - [`errors`]: failures as the exceptions of `dynocar/_errors.py`
 //! - [`ends`]: ends of channels, each kept in the thread that opened it
 //! - [`channel`]: publisher and reader, [`snapshot`]: what a reader gives
+//! - [`stopping`]: braking distance and time with a bound
 //! - [`about`]: clock, versions, who serves a train, vocabularies
 //! - [`background`]: long work that Ctrl-C ends
 //! - [`recorded`]: `check`, `read`, `identify`, [`explained`]: `explain`
@@ -19,6 +20,7 @@ mod errors;
 mod explained;
 mod recorded;
 mod snapshot;
+mod stopping;
 mod table;
 
 use pyo3::prelude::*;
@@ -37,6 +39,8 @@ mod _native {
     use crate::recorded::{check, identify, read};
     #[pymodule_export]
     use crate::snapshot::{ParameterSnapshot, Reading, dtypes};
+    #[pymodule_export]
+    use crate::stopping::stopping_estimate;
     #[pymodule_export]
     use crate::table::{Column, Table};
 }

@@ -1,6 +1,7 @@
 //! Results of a reader.
 
 use dynocar_client::ffi::{Code, ReadingCopy};
+use dynocar_shared::RailAdhesion;
 use dynocar_shared::schema::{Field, sample_fields, snapshot_fields};
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
@@ -87,7 +88,18 @@ impl ParameterSnapshot {
     }
 
     fn __dir__(&self) -> Vec<&'static str> {
-        snapshot_fields().map(|it| it.layout.name).chain(["resistance_at"]).collect()
+        snapshot_fields()
+            .map(|it| it.layout.name)
+            .chain(["learned_rail", "resistance_at"])
+            .collect()
+    }
+
+    /// Scale of the wet rail's law, and its standard deviation; `None` without adhesion.
+    fn learned_rail(&self) -> Option<(f64, f64)> {
+        match RailAdhesion::learned(&self.0)? {
+            RailAdhesion::Law(_, scale) => Some((scale.value, scale.std)),
+            _ => None,
+        }
     }
 
     /// The bytes as they lie in shared memory, which `numpy.frombuffer` reads by `SNAPSHOT_DTYPE`.

@@ -129,6 +129,24 @@ def assert_is_the_played_answer(snapshot: dynocar.Snapshot) -> None:
     assert snapshot.missing_manoeuvres == Manoeuvre.COAST_SLOW | Manoeuvre.ACCELERATE
 
 
+def test_a_stop_is_computed_as_in_rust_and_c() -> None:
+    stop = dynocar.Stop(from_speed_mps=20.0, mass_kg=1e5, brake_scale_std=0.05, dead_time_s=1.0)
+    found = stop.estimate([(0.0, 1e5), (40.0, 1e5)], 0.95)
+    # 20 m/s at 1 m/s² after 1 s; at the edge with 1.645 standard deviations less brake.
+    assert found.distance_m == pytest.approx(220.0, rel=1e-6)
+    assert found.time_s == pytest.approx(21.0, rel=1e-6)
+    assert found.distance_bound_m == pytest.approx(20.0 + 200.0 / (1.0 - 0.05 * 1.6448536), rel=1e-6)
+    slope = dynocar.Stop(from_speed_mps=20.0, mass_kg=1e5, gradient_permille=-200.0)
+    for wrong, effort, code in (
+        (slope, [(0.0, 1e5)], Code.DOES_NOT_STOP),
+        (stop, [], Code.BAD_NUMBER),
+        (stop, [(0.0, float("nan"))], Code.BAD_NUMBER),
+    ):
+        with pytest.raises(dynocar.ChannelError) as error:
+            wrong.estimate(effort, 0.95)
+        assert error.value.code == code
+
+
 def assert_it_prints_itself(snapshot: dynocar.Snapshot) -> None:
     # The halves of the intervals: 1.96 of the roots of 0.25, 0.25/3, 0.25/5 and 0.25/7.
     assert str(snapshot).splitlines() == [

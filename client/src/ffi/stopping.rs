@@ -100,6 +100,28 @@ wire_struct! {
 }
 
 impl StopRequest {
+    /// Distance and time of the stop with a bound; see [`Stop::estimate`].
+    ///
+    /// # Errors
+    ///
+    /// [`Code::BadNumber`] or [`Code::DoesNotStop`].
+    pub fn estimate(&self, effort: &[EffortPoint], confidence: f64) -> Result<Stopping, Code> {
+        if !(1..=EFFORT_POINTS_MAX).contains(&effort.len()) {
+            return Err(Code::BadNumber);
+        }
+        let stop = self.stop(effort).ok_or(Code::BadNumber)?;
+        let found = stop.estimate(confidence).map_err(|error| match error {
+            StoppingError::BadInput { .. } => Code::BadNumber,
+            StoppingError::DoesNotStop { .. } => Code::DoesNotStop,
+        })?;
+        Ok(Stopping {
+            distance_m: found.distance_m,
+            time_s: found.time_s,
+            distance_bound_m: found.distance_bound_m,
+            time_bound_s: found.time_bound_s,
+        })
+    }
+
     fn stop<'a>(&self, effort: &'a [EffortPoint]) -> Option<Stop<'a>> {
         let adhesion = Uncertain::new(self.adhesion, self.adhesion_std);
         let rail = Rail::from_number(self.rail)?;
@@ -160,17 +182,7 @@ pub unsafe extern "C" fn dynocar_stopping_estimate(
         // SAFETY: the caller promised `effort_count` points; the layouts are the same.
         let effort =
             unsafe { std::slice::from_raw_parts(effort.cast::<EffortPoint>(), effort_count) };
-        let stop = request.stop(effort).ok_or(Code::BadNumber)?;
-        let found = stop.estimate(confidence).map_err(|error| match error {
-            StoppingError::BadInput { .. } => Code::BadNumber,
-            StoppingError::DoesNotStop { .. } => Code::DoesNotStop,
-        })?;
-        *place = Stopping {
-            distance_m: found.distance_m,
-            time_s: found.time_s,
-            distance_bound_m: found.distance_bound_m,
-            time_bound_s: found.time_bound_s,
-        };
+        *place = request.estimate(effort, confidence)?;
         Ok(())
     })
 }

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
-use dynocar_analysis::brakes::{Correction, Parameters};
+use dynocar_analysis::brakes::{Basis, Correction, EtcsBrake, Parameters};
 use dynocar_analysis::stops::Law;
 use serde::Serialize;
 
 use crate::report::html::Column::{Numbers, Words};
-use crate::report::html::{self, escape, table};
+use crate::report::html::{self, Columns, escape, table};
 use crate::report::page::document;
 use crate::report::provenance::Provenance;
 
@@ -27,10 +27,46 @@ pub struct BrakesAnswer {
     pub law: Law,
     /// The parameters.
     pub parameters: Parameters,
+    /// The same as OSRD's `etcs_brake_params`.
+    pub etcs: EtcsBrake,
+    /// What each of its values rests on.
+    pub rests_on: Vec<Basis>,
     /// The level of Kdry_rst in the file.
     pub ebcl: Option<u32>,
     /// Statements about them and their limits.
     pub said: Vec<String>,
+}
+
+/// Columns of Kdry_rst.
+pub const K_DRY: Columns<Correction> = &[
+    ("EBCL", |it| it.ebcl.to_string()),
+    ("one stop in", |it| format!("{:.0e}", 1.0 / it.probability)),
+    ("measured", |it| share(it.measured)),
+    ("95 % from", |it| share(it.measured_95[0])),
+    ("to", |it| share(it.measured_95[1])),
+    ("components", |it| share(it.modelled)),
+    ("Kdry_rst", |it| share(it.k_dry())),
+];
+
+/// Columns of what values rest on.
+const RESTS_ON: Columns<Basis> = &[
+    ("value", |it| it.key.into()),
+    ("", |it| if it.is_guess { "a guess" } else { "" }.into()),
+    ("rests on", |it| it.rests_on.clone()),
+];
+
+fn share(share: Option<f64>) -> String {
+    share.map_or("-".into(), |it| format!("{it:.3}"))
+}
+
+fn as_html<T>(caption: &str, columns: Columns<T>, column: html::Column, rows: &[T]) -> String {
+    let cells: Vec<_> = columns.iter().map(|it| move |row: &T| escape(&it.1(row))).collect();
+    let columns: Vec<html::TableColumn<'_, T>> = columns
+        .iter()
+        .zip(&cells)
+        .map(|(it, cell)| (it.0, column, cell as &dyn Fn(&T) -> String))
+        .collect();
+    table(caption, &columns, rows)
 }
 
 /// The page: decelerations over speed, steps, corrections, and what they are not.
@@ -56,21 +92,10 @@ pub fn html(answer: &BrakesAnswer, made: &Provenance) -> String {
         &rows,
     );
     section("steps", "Steps below the curve", &body);
-    let share = |it: Option<f64>| it.map_or("–".into(), |it| format!("{it:.3}"));
-    let body = table(
-        "Kdry_rst by level of confidence",
-        &[
-            ("EBCL", Numbers, &|it: &Correction| it.ebcl.to_string()),
-            ("one stop in", Numbers, &|it: &Correction| format!("{:.0e}", 1.0 / it.probability)),
-            ("measured", Numbers, &|it: &Correction| share(it.measured)),
-            ("95 % from", Numbers, &|it: &Correction| share(it.measured_95[0])),
-            ("to", Numbers, &|it: &Correction| share(it.measured_95[1])),
-            ("components", Numbers, &|it: &Correction| share(it.modelled)),
-            ("Kdry_rst", Numbers, &|it: &Correction| share(it.k_dry())),
-        ],
-        &answer.parameters.k_dry,
-    );
+    let body = as_html("Kdry_rst by level of confidence", K_DRY, Numbers, &answer.parameters.k_dry);
     section("corrections", "How far stops fall short of the mean", &body);
+    let body = as_html("Values of the file for OSRD", RESTS_ON, Words, &answer.rests_on);
+    section("rests", "What each value rests on", &body);
     let body = table(
         "What holds, and what does not",
         &[("", Words, &|it: &String| escape(it))],

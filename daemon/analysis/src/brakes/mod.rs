@@ -8,7 +8,7 @@ mod steps;
 mod table;
 
 pub use components::{Weakest, weakest, weakest_plain};
-pub use etcs::{EtcsBrake, read};
+pub use etcs::{Basis, Choice, EtcsBrake, read};
 pub use parameters::{Correction, LEVELS, Parameters, corrections, lower_bound, usual, wet_share};
 pub use steps::{STEPS_MAX, Steps};
 pub use table::{HEAD, TableLaw, TableRow, parse, write};

@@ -6,7 +6,7 @@ use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, StudentsT};
 
 use super::components::weakest;
 use super::steps::Steps;
-use crate::stops::{Day, Law};
+use crate::stops::{CutOff, Day, Law, Manner, RecordedStop};
 
 /// Levels of confidence that a balise may ask for (EBCL): all stops but one in 10 to the level reach it.
 pub const LEVELS: u32 = 10;
@@ -41,16 +41,26 @@ impl Correction {
 /// The parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parameters {
+    /// How many stops the emergency steps are of.
+    pub stops: usize,
+    /// Whether a record of the brake shows that it was applied in full in them.
+    pub is_commanded: bool,
     /// A_brake_emergency in m/s²: by all of the brake.
     pub emergency: Steps,
     /// A_brake_service in m/s²; `None` without full service stops.
     pub service: Option<Steps>,
     /// A_brake_normal_service in m/s²: what drivers use; `None` without their stops.
     pub normal_service: Option<Steps>,
+    /// How many stops that is of.
+    pub usual_stops: usize,
     /// The lower bound of the mean deceleration, that the emergency steps lie below: speed in m/s and m/s².
     pub bound: Vec<[f64; 2]>,
     /// T_brake_build_up in s: dead time and increase.
     pub build_up_s: f64,
+    /// The same of the service brake; `None` without full service stops.
+    pub service_build_up_s: Option<f64>,
+    /// T_traction_cut_off; `None` where no stop shows it.
+    pub cut_off: Option<CutOff>,
     /// Kdry_rst by level.
     pub k_dry: Vec<Correction>,
     /// Kwet_rst over speed; `None` without wet stops.
@@ -69,12 +79,15 @@ pub fn lower_bound(law: &Law, confidence: f64) -> Vec<[f64; 2]> {
     points.collect()
 }
 
-/// The decelerations that half of the drivers' stops exceed.
-pub fn usual(day: &Day) -> Option<Steps> {
+/// The decelerations that half of the stops by less than all of the brake exceed, and how many these are.
+pub fn usual(stops: &[RecordedStop]) -> (Option<Steps>, usize) {
+    let is_usual = |it: &&RecordedStop| it.manner == Manner::Modulated && !it.has_slid;
+    let usual: Vec<RecordedStop> = stops.iter().filter(is_usual).cloned().collect();
+    let day = Day::of(&usual);
     let enough = day.decelerations.iter().filter(|it| it.stops >= 3);
     let curve: Vec<[f64; 2]> =
         enough.map(|it| [it.speed_mps, it.deceleration_mps2.median]).collect();
-    Steps::below(&curve)
+    (Steps::below(&curve), usual.len())
 }
 
 /// Deceleration on a wet rail over that on a dry one.

@@ -25,6 +25,18 @@ impl Steps {
         self.values[self.boundaries.partition_point(|it| *it <= speed_mps)]
     }
 
+    /// The lowest values between other boundaries.
+    pub fn between(&self, boundaries: &[f64]) -> Self {
+        let starts = std::iter::once(0.0).chain(boundaries.iter().copied());
+        let ends = boundaries.iter().copied().chain([f64::INFINITY]);
+        let lowest = starts.zip(ends).map(|(start_mps, end_mps)| {
+            let from = self.boundaries.partition_point(|it| *it <= start_mps);
+            let to = self.boundaries.partition_point(|it| *it < end_mps);
+            self.values[from..=to].iter().copied().fold(f64::INFINITY, f64::min)
+        });
+        Steps { values: lowest.collect(), boundaries: boundaries.to_vec() }
+    }
+
     /// Distance in m to standstill from a speed in m/s by these decelerations.
     pub fn distance_m(&self, from_mps: f64) -> f64 {
         let mut low_mps = 0.0;
@@ -109,5 +121,8 @@ mod tests {
         assert!((1.0..1.06).contains(&later), "{later}");
         assert_eq!(Steps::below(&[[10.0, 0.8], [20.0, 0.8]]), Some(Steps::constant(0.8)));
         assert_eq!(Steps::below(&[[10.0, 0.0]]), None);
+        let two = Steps { boundaries: vec![10.0], values: vec![0.9, 0.7] };
+        assert_eq!(two.between(&[10.0]), two);
+        assert_eq!(two.between(&[5.0, 15.0]).values, [0.9, 0.7, 0.7]);
     }
 }

@@ -19,7 +19,8 @@ const KNOTS: [f64; 6] = [0.0, 0.08, 0.2, 0.4, 0.7, 1.0];
 pub const HEAD: &str = "brake_curve,speed_kph,grade_1_in_x,stopping_distance_m";
 /// Traction's cut-off, build-up and rotating mass, then a deceleration at each knot.
 const FREE: usize = 3 + KNOTS.len();
-/// Relative error of a row beyond which it counts more than by its square, so that no row is sacrificed.
+/// Relative error of a row beyond which it counts more than by its square, so that no row is
+/// sacrificed.
 const ROW_ERROR: f64 = 0.01;
 /// Dead times and build-ups in s from which the search starts.
 const STARTS_S: [(f64, f64); 4] = [(0.5, 1.0), (0.5, 6.0), (1.0, 20.0), (0.5, 60.0)];
@@ -61,6 +62,8 @@ pub struct TableLaw {
 struct Fit<'r> {
     rows: &'r [TableRow],
     knots_mps: [f64; KNOTS.len()],
+    /// The worst row's error over [`ROW_ERROR`], which is pressed down; infinite before there is one.
+    worst: f64,
 }
 
 type Point = SVector<f64, FREE>;
@@ -87,7 +90,8 @@ impl Fit<'_> {
 
     fn residual(&self, point: &Point, row: &TableRow) -> Option<f64> {
         let error = (self.distance_m(point, row)? / row.distance_m).ln() / ROW_ERROR;
-        Some(error * (1.0 + error * error).sqrt())
+        let pressed = 1.0 + 10.0 * (error / self.worst).powi(8);
+        Some(error * (1.0 + error * error).sqrt() * pressed)
     }
 }
 
@@ -116,7 +120,8 @@ impl TableLaw {
     /// The brake behind some rows; `None` for rows that no brake gives.
     pub fn of(name: &str, rows: &[TableRow]) -> Option<Self> {
         let fastest_mps = rows.iter().map(|row| row.from_mps).fold(0.0, f64::max);
-        let mut fit = Fit { rows, knots_mps: KNOTS.map(|share| share * fastest_mps) };
+        let knots_mps = KNOTS.map(|share| share * fastest_mps);
+        let mut fit = Fit { rows, knots_mps, worst: f64::INFINITY };
         let bounds = ParameterBox {
             low: Point::from_fn(|k, _| if k < 3 { 0.0 } else { 0.05 }),
             high: Point::from_fn(|k, _| [60.0, 200.0, 0.3].get(k).copied().unwrap_or(5.0)),
@@ -134,7 +139,11 @@ impl TableLaw {
             .iter()
             .filter_map(|it| minimise(&mut fit, &start(*it), &bounds, &settings))
             .min_by(|one, other| one.linearisation.cost.total_cmp(&other.linearisation.cost))?;
-        let point = &found.point;
+        let off = |row| Some((fit.distance_m(&found.point, row)? / row.distance_m).ln().abs());
+        let worst = rows.iter().filter_map(off).fold(0.0, f64::max).max(ROW_ERROR);
+        fit.worst = worst / ROW_ERROR;
+        let pressed = minimise(&mut fit, &found.point, &bounds, &settings)?;
+        let point = &pressed.point;
         let errors = rows.iter().map(|row| {
             let distance_m = fit.distance_m(point, row)?;
             Some((distance_m / row.distance_m - 1.0).abs())
@@ -202,6 +211,9 @@ pub fn parse(text: &str) -> Result<Vec<(String, Vec<TableRow>)>, String> {
             Some((_, rows)) => rows.push(row),
             None => tables.push((name.into(), vec![row])),
         }
+    }
+    if tables.is_empty() {
+        return Err("line 2: expected a row of 4 cells, got nothing".into());
     }
     Ok(tables)
 }

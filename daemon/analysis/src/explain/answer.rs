@@ -7,9 +7,8 @@ use dynocar_model::named;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
-use super::over_time::Course;
-use super::stop_to_stop::Judged;
-use super::stop_to_stop::StopToStop;
+use super::course::Course;
+use super::stop_to_stop::{Judged, StopToStop};
 use crate::dataset::DatasetDiagnostic;
 
 named! {
@@ -317,8 +316,7 @@ pub struct BaseAnswer {
     pub c: f64,
     /// Their standard deviations.
     pub std: DavisDeviations,
-    /// Share of their variance before the data that the data take away: 1 where they say all, 0
-    /// where they say nothing.
+    /// Share of their variance before the data that the data take away: from 0 (nothing) to 1 (all).
     pub told_by_data: DavisDeviations,
 }
 
@@ -390,8 +388,7 @@ pub struct ExplainAnswer {
     /// estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_late_s: Option<WithStd>,
-    /// Unexplained rest that is taken for noise: a force of this standard deviation in N/kN on average over a
-    /// minute; absent without motion.
+    /// Standard deviation in N/kN of the unexplained force, averaged over a minute; absent without motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unexplained_n_per_kn: Option<f64>,
     /// Other explanations that were considered.

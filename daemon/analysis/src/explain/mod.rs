@@ -14,7 +14,7 @@
 //! - [`gradient_prior`]: how maps err
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`many`]: some of many runs, and what all of them say
-//! - [`over_time`]: what is not the same in all runs
+//! - [`course`], [`over_time`]: what is not the same in all runs
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
 //!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
@@ -25,6 +25,7 @@ pub mod answer;
 mod bootstrap;
 mod caveats;
 pub mod competing;
+pub mod course;
 pub mod described;
 pub mod drive;
 pub mod effects;

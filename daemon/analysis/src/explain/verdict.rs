@@ -14,11 +14,11 @@ use super::caveats::told_by_data;
 use super::caveats::{caveats, trimmed};
 use super::competing::runners_up;
 use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, separating_run};
+use super::course::Course;
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
 use super::identifiability::identifiability;
-use super::over_time::Course;
 use super::score::{self, Score};
 use super::selection::{
     Deviations, Outcome, ScaleSources, Search, deciding_score, discounted, few_runs_factor, penalty,

@@ -6,10 +6,12 @@
 //! - [`Law`]: deceleration over speed of all stops, and how much stops differ
 //! - [`StoppingDistance`]: how long the next stop is, with a bound
 //! - [`friction`]: the pipelines of Jin 2020 and Xie 2019 over a stop, fed with a brake of unknown force
+//! - [`CutOff`]: when the traction of a braked train was gone
 //! - [`Day`]: all stops together, whatever the driver wanted
 //! - [`Study`]: all of it over a dataset
 
 mod curve;
+mod cut_off;
 mod day;
 mod find;
 mod friction;
@@ -18,6 +20,7 @@ mod recorded;
 mod study;
 
 pub use curve::{Curve, Point};
+pub use cut_off::CutOff;
 pub use day::{Day, DecelerationSpread, FromSpeed, Spread};
 pub use find::{FindSettings, FoundBy, Stop, find};
 pub use friction::{FrictionPoint, friction};

@@ -43,6 +43,10 @@ pub struct RecordedStop {
     pub found_by: FoundBy,
     /// Whether the brake was applied in full.
     pub manner: Manner,
+    /// Whether the wheels slid, so that their speed is not the train's.
+    pub has_slid: bool,
+    /// Time in s from the brake's first sign until traction was gone; `None` where the record does not show it.
+    pub cut_off_s: Option<f64>,
     /// Why it shows no law of the brake; `None` for a stop that does.
     pub no_law: Option<String>,
     /// Deceleration at whole m/s, from fast to slow.

@@ -8,12 +8,13 @@ use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
 
 use super::curve::{Curve, Point};
+use super::cut_off::cut_off_s;
 use super::day::Day;
 use super::find::{FindSettings, FoundBy, began_ns, find, usable};
 use super::friction::friction;
 use super::law::{Gradient, Law, StoppingDistance};
 use super::recorded::{Manner, RecordedStop};
-use crate::dataset::{Dataset, GradientSource, Role, Run};
+use crate::dataset::{Dataset, Role, Run};
 
 /// How stops are found, and what is assumed of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,11 +92,14 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
     let studied = stops.into_iter().filter_map(|stop| {
         let end = *stop.samples.end();
         let full = stop.full_from.and_then(|from| Curve::of(&all[from..=end]));
-        let slid = all[stop.samples.clone()].iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0);
-        let no_law = match slid {
+        let has_slid = all[stop.samples.clone()].iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0);
+        let no_law = match has_slid {
             true => Some("the wheels slid: their speed is not the train's".into()),
             false => why_no_law(full.as_ref(), stop.found_by, settings.find.share_min),
         };
+        let cut_off_s = (stop.found_by == FoundBy::Brake)
+            .then(|| cut_off_s(&all[..=end], *stop.samples.start(), run.traction_source))
+            .flatten();
         let (from, mut curve) = match (full, stop.full_from, &no_law) {
             (Some(curve), Some(from), None) => (from, curve),
             _ => (*stop.samples.start(), Curve::of(&all[stop.samples])?),
@@ -122,6 +126,8 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
             gradient_permille,
             found_by: stop.found_by,
             manner: if is_full { Manner::Full } else { Manner::Modulated },
+            has_slid,
+            cut_off_s,
             no_law,
             decelerations: decelerations(&curve),
             predicted: None,
@@ -184,13 +190,19 @@ fn decelerations(curve: &Curve) -> Vec<Point> {
 
 fn cannot_tell(datasets: &[Dataset], found: &[RecordedStop], law: Option<&Law>) -> Vec<String> {
     let mut said = Vec::new();
-    let mut runs = datasets.iter().flat_map(|dataset| &dataset.runs);
-    if runs.any(|run| run.gradient_source == GradientSource::Unknown) {
-        said.push(
-            "the gradient is unknown: 1 permille along a whole stop is 0.01 m/s² of its \
-             deceleration, and of its friction"
-                .into(),
-        );
+    let blind = found.iter().filter(|it| it.gradient_permille.is_none()).count();
+    if blind > 0 {
+        said.push(format!(
+            "the gradient is unknown in {blind} of {} stops, which count as level: 1 permille along a whole stop is \
+             0.01 m/s² of its deceleration, and of its friction",
+            found.len()
+        ));
+    }
+    let runs = datasets.iter().flat_map(|dataset| &dataset.runs);
+    let ends = runs.filter_map(|run| run.samples.iter().rev().find(|it| it.speed_mps.is_finite()));
+    let moving = ends.filter(|it| it.speed_mps > STANDING_MPS).count();
+    if moving > 0 {
+        said.push(format!("how runs go on that end while the train moves: {moving}"));
     }
     let without = found.iter().filter(|it| it.no_law.is_some()).count();
     if without > 0 {

@@ -4,17 +4,18 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_analysis::brakes::{
-    Correction, EtcsBrake, HEAD, Parameters, Steps, TableLaw, corrections, lower_bound, parse,
-    usual, wet_share, write,
+    Choice, Correction, EtcsBrake, HEAD, Parameters, Steps, TableLaw, corrections, lower_bound,
+    parse, usual, wet_share, write,
 };
-use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::parallel::of_each;
-use dynocar_analysis::stops::{FindSettings, Gradient, Law, Study, StudySettings};
+use dynocar_analysis::stops::{CutOff, FoundBy, Gradient, Law, Manner, Study};
 
-use super::stops::{share, table};
+use super::stops::{StudyArguments, no_stop, share, table};
 use super::text::{TextTable, entry};
-use crate::brakes_page::{self, BrakesAnswer};
+use crate::brakes_page::{self, BrakesAnswer, K_DRY};
 use crate::report::PAGE_MARK;
+use crate::report::html::Columns;
 use crate::report::provenance::{Provenance, own_command_line};
 use dynocar::cli::Failure;
 use dynocar::dataset;
@@ -55,12 +56,8 @@ pub struct BrakesArguments {
     /// Read a table of stopping distances instead, and report the brake behind it
     #[arg(long, value_name = "FILE", conflicts_with = "datasets")]
     table: Option<PathBuf>,
-    /// How well stops repeat, as relative standard deviation, until enough of them show it
-    #[arg(long, value_name = "SHARE", default_value = "0.03", value_parser = share)]
-    repeatability: f64,
-    /// Least share of the declared brake effort that counts as all of the brake
-    #[arg(long, value_name = "SHARE", default_value = "0.85", value_parser = share)]
-    applied: f64,
+    #[command(flatten)]
+    study: StudyArguments,
     /// Write a report for people: one HTML page that needs nothing else
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
@@ -82,6 +79,9 @@ pub fn execute(arguments: &BrakesArguments) -> Result<(), Failure> {
         return tables(file, arguments.json.as_deref());
     }
     let (datasets, study) = studied(&arguments.datasets, arguments)?;
+    if study.stops.is_empty() {
+        return Err(no_stop(&arguments.datasets[0]));
+    }
     let Some(law) = &study.law else { return Err(without_law(&study)) };
     let answer = answer(arguments, &datasets, &study, law)?;
     if let Some(file) = &arguments.etcs {
@@ -94,8 +94,7 @@ pub fn execute(arguments: &BrakesArguments) -> Result<(), Failure> {
                 law.stops
             )));
         }
-        let etcs = EtcsBrake::of(&answer.parameters, answer.ebcl, arguments.k_wet);
-        write_json(file, &etcs)?;
+        write_json(file, &answer.etcs)?;
         report_line(&format!("etcs_brake_params: {}", file.display()));
     }
     if let Some(file) = &arguments.distances {
@@ -118,9 +117,7 @@ fn studied(
     arguments: &BrakesArguments,
 ) -> Result<(Vec<Dataset>, Study), Failure> {
     let datasets: Vec<Dataset> = paths.iter().map(dataset::load).collect::<Result<_, _>>()?;
-    let find = FindSettings { share_min: arguments.applied, ..FindSettings::default() };
-    let settings = StudySettings { find, repeatability: arguments.repeatability };
-    let mut study = Study::of_all(&datasets, &settings, &[]);
+    let mut study = Study::of_all(&datasets, &arguments.study.settings(), &[]);
     if let (true, Some(law)) = (arguments.without_resistance, &mut study.law) {
         let train = &datasets[0].train;
         law.take_out(|speed_mps| {
@@ -161,23 +158,34 @@ fn answer(
     };
     let (service, wet) = (other(&arguments.service, "service")?, other(&arguments.wet, "wet")?);
     let train = &datasets[0].train;
+    let of_law = study.stops.iter().filter(|it| it.manner == Manner::Full && it.role == Role::Fit);
+    let (normal_service, usual_stops) = usual(&study.stops);
+    let build_up_s = |law: &Law| law.response.dead_time_s + law.response.build_up_s;
     let parameters = Parameters {
+        stops: law.stops,
+        is_commanded: of_law.clone().all(|it| it.found_by == FoundBy::Brake),
         emergency: steps(law).ok_or_else(weak)?,
         service: service.as_ref().and_then(steps),
-        normal_service: usual(&study.day),
+        normal_service,
+        usual_stops,
         bound: lower_bound(law, arguments.confidence),
-        build_up_s: law.response.dead_time_s + law.response.build_up_s,
+        build_up_s: build_up_s(law),
+        service_build_up_s: service.as_ref().map(build_up_s),
+        cut_off: CutOff::of(of_law.filter_map(|it| it.cut_off_s)),
         k_dry: corrections(law, train.brake_gear.components.as_ref()),
         k_wet: wet.as_ref().and_then(|wet| wet_share(law, wet)),
     };
     let supported = parameters.k_dry.iter().rev().find(|it| it.k_dry().is_some());
     let ebcl = arguments.ebcl.or(supported.map(|it| it.ebcl));
+    let (etcs, rests_on) = EtcsBrake::of(&parameters, &Choice { ebcl, k_wet: arguments.k_wet });
     let said = said(arguments, study, law, &parameters);
     Ok(BrakesAnswer {
         datasets: datasets.iter().map(|it| it.name.clone()).collect(),
         stops: [law.stops, study.stops.len()],
         law: law.clone(),
         parameters,
+        etcs,
+        rests_on,
         ebcl,
         said,
     })
@@ -217,17 +225,18 @@ fn said(
         is_modelled,
         "beyond that only a model of components speaks (declare [brake] units and how they differ and fail)",
     );
-    unless(
-        parameters.k_wet.is_some(),
-        "Kwet_rst is not said: no wet stops (--wet); OSRD needs it (--k-wet)",
-    );
-    unless(
-        parameters.service.is_some(),
-        "no full service stops (--service): their place takes the normal service",
-    );
     let is_shown = law.response.dead_time_s + law.response.build_up_s > 0.0;
     unless(is_shown, "T_brake_build_up is not shown");
-    said.push("T_traction_cut_off is not shown: written as 0".into());
+    let is_weaker = |steps: &Option<Steps>| {
+        let fastest = law.fastest_mps();
+        steps
+            .as_ref()
+            .is_none_or(|it| it.distance_m(fastest) >= parameters.emergency.distance_m(fastest))
+    };
+    unless(
+        is_weaker(&parameters.normal_service) && is_weaker(&parameters.service),
+        "a service brake stops sooner than the emergency brake: other rails, loads, or not all of the brake?",
+    );
     said.extend(study.cannot_tell.iter().cloned());
     said
 }
@@ -237,20 +246,6 @@ fn steps_text(name: &str, steps: &Steps) -> String {
     let parts =
         starts.zip(&steps.values).map(|(from, value)| format!("{value:.3} from {from:.1} m/s"));
     entry("  ", &format!("{name}: {}", parts.collect::<Vec<_>>().join(", ")))
-}
-
-const K_DRY: super::stops::Columns<Correction> = &[
-    ("EBCL", |it| it.ebcl.to_string()),
-    ("one stop in", |it| format!("{:.0e}", 1.0 / it.probability)),
-    ("measured", |it| share_text(it.measured)),
-    ("95 % from", |it| share_text(it.measured_95[0])),
-    ("to", |it| share_text(it.measured_95[1])),
-    ("components", |it| share_text(it.modelled)),
-    ("Kdry_rst", |it| share_text(it.k_dry())),
-];
-
-fn share_text(share: Option<f64>) -> String {
-    share.map_or("-".into(), |it| format!("{it:.3}"))
 }
 
 fn text(answer: &BrakesAnswer, gamma: f64) -> String {
@@ -272,17 +267,27 @@ fn text(answer: &BrakesAnswer, gamma: f64) -> String {
         text += &steps.as_ref().map_or(String::new(), |it| steps_text(name, it));
     }
     text += &format!(
-        "  T_brake_build_up: {:.2} s ({:.2} s, then increase over {:.2} s)\n\nhow far stops fall short of \
+        "  T_brake_build_up: {:.2} s ({:.2} s, then increase over {:.2} s)\n{}\nhow far stops fall short of \
          the mean\n{}",
         parameters.build_up_s,
         law.response.dead_time_s,
         law.response.build_up_s,
+        parameters.cut_off.map_or(String::new(), |it| format!(
+            "  T_traction_cut_off: {:.2} s (of {} stops, {:.2} to {:.2} s)\n",
+            it.greatest_s, it.stops, it.least_s, it.greatest_s
+        )),
         table(K_DRY, &[], parameters.k_dry.iter())
     );
     text += &format!(
         "\nstopping distance in m (and what 95 % of stops keep)\n{}\n",
         distances(law, gamma)
     );
+    text += "what each value of the file (--etcs) rests on\n";
+    for it in &answer.rests_on {
+        let guess = if it.is_guess { " (a guess)" } else { "" };
+        text += &entry("  ", &format!("{}{guess}: {}", it.key, it.rests_on));
+    }
+    text += "\n";
     for line in &answer.said {
         text += &entry("  ", line);
     }
@@ -327,7 +332,7 @@ fn distances(law: &Law, rotating_mass_factor: f64) -> TextTable {
     table
 }
 
-const TABLES: super::stops::Columns<TableLaw> = &[
+const TABLES: Columns<TableLaw> = &[
     ("brake", |it| it.name.clone()),
     ("rows", |it| it.rows.to_string()),
     ("cut off s", |it| format!("{:.2}", it.traction_cut_off_s)),

@@ -1,6 +1,6 @@
 //! `dynocar stops`: what recorded stops say of a brake whose force nobody measured.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_analysis::dataset::DatasetDiagnostic;
@@ -11,6 +11,7 @@ use dynocar_analysis::stops::{
 use serde::Serialize;
 
 use super::text::{TextTable, diagnostics};
+use crate::report::html::Columns;
 use dynocar::cli::Failure;
 use dynocar::dataset::{self, SourceArguments};
 use dynocar::output::{give, require_files};
@@ -26,15 +27,38 @@ pub struct StopsArguments {
     /// Predict the next stop from this speed in m/s; may be given several times
     #[arg(long, value_name = "MPS", value_parser = positive)]
     from: Vec<f64>,
-    /// How well stops repeat, as relative standard deviation, until enough of them show it
-    #[arg(long, value_name = "SHARE", default_value = "0.03", value_parser = share)]
-    repeatability: f64,
-    /// Least share of the declared brake effort that counts as applied
-    #[arg(long, value_name = "SHARE", default_value = "0.85", value_parser = share)]
-    applied: f64,
+    #[command(flatten)]
+    study: StudyArguments,
     /// Write the result for machines; - for standard output
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
+}
+
+/// How stops are studied.
+#[derive(Debug, Args)]
+pub(super) struct StudyArguments {
+    /// How well stops repeat, as relative standard deviation, until enough of them show it
+    #[arg(long, value_name = "SHARE", default_value = "0.03", value_parser = share)]
+    repeatability: f64,
+    /// Least share of the declared brake effort that counts as all of the brake
+    #[arg(long, value_name = "SHARE", default_value = "0.85", value_parser = share)]
+    applied: f64,
+}
+
+impl StudyArguments {
+    pub(super) fn settings(&self) -> StudySettings {
+        let find = FindSettings { share_min: self.applied, ..FindSettings::default() };
+        StudySettings { find, repeatability: self.repeatability }
+    }
+}
+
+/// Words for datasets without a stop.
+pub(super) fn no_stop(dataset: &Path) -> Failure {
+    Failure::Input(format!(
+        "{}: no run holds a stop: a train that reached {} m/s or more and then stands",
+        dataset.display(),
+        FindSettings::default().from_mps
+    ))
 }
 
 /// Largest number of modulated stops that are shown one by one.
@@ -74,15 +98,9 @@ struct StopsAnswer {
 pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
     require_files(&[(&arguments.json, "{")])?;
     let dataset = dataset::load(arguments.source.source())?;
-    let find = FindSettings { share_min: arguments.applied, ..FindSettings::default() };
-    let settings = StudySettings { find, repeatability: arguments.repeatability };
-    let study = Study::of(&dataset, &settings, &arguments.from);
+    let study = Study::of(&dataset, &arguments.study.settings(), &arguments.from);
     if study.stops.is_empty() {
-        return Err(Failure::Input(format!(
-            "{}: no run holds a stop: a train that reached {} m/s or more and then stands",
-            arguments.source.dataset.display(),
-            find.from_mps
-        )));
+        return Err(no_stop(&arguments.source.dataset));
     }
     for speed_mps in &arguments.from {
         let why = match &study.law {
@@ -101,9 +119,6 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
         StopsAnswer { dataset: dataset.name.clone(), diagnostics: dataset.diagnostics(), study };
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer))?)
 }
-
-/// Head and cells of a table's columns.
-pub(super) type Columns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
 
 /// A table of some rows; `left` are the columns of words.
 pub(super) fn table<'t, T: 't>(

@@ -62,6 +62,9 @@ pub enum Column {
 /// A column of a table: its head in plain text, how its cells are set, and the HTML of a row's cell.
 pub type TableColumn<'c, T> = (&'c str, Column, &'c dyn Fn(&T) -> String);
 
+/// Head and cells of columns that are shown as text and as HTML.
+pub type Columns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
+
 /// A table, which scrolls within itself where the page is narrower; the caption is plain text.
 pub fn table<T>(caption: &str, columns: &[TableColumn<'_, T>], rows: &[T]) -> String {
     marked_table(caption, columns, rows, |_| false)
