@@ -167,10 +167,11 @@ impl MotionFilter {
         for i in 0..COEFFICIENTS {
             self.belief.disturb(RESISTANCE + i, step.drift_variance);
         }
-        let (keep, renewed) = step.wind;
-        self.belief.fade(WIND, keep, renewed);
-        let (keep, renewed) = step.brake_error;
-        self.belief.fade(BRAKE_ERROR, keep, renewed);
+        for (index, (keep, renewed)) in [(WIND, step.wind), (BRAKE_ERROR, step.brake_error)] {
+            if keep < 1.0 {
+                self.belief.fade(index, keep, renewed);
+            }
+        }
         self.belief.disturb(BRAKE_SCALE, step.brake_drift_variance);
     }
 

@@ -24,6 +24,21 @@ const BRAKE_ERROR_TIME_S: f64 = 600.0;
 /// Random walk of the brake force's scale over an hour of motion.
 const BRAKE_DRIFT_PER_SQRT_H: f64 = 0.03;
 
+/// Standard deviation in N/kN of a brake force below which it is taken for exact.
+const BRAKE_STD_LEAST: f64 = 1e-3;
+/// Time in s over which a wind is taken for the same: a step of the filters for each sample would cost time.
+const WIND_STEP_S: f64 = 1.0;
+
+/// Error of a brake force over a step.
+struct BrakeError {
+    /// Standard deviation in N/kN.
+    std: f64,
+    /// Share of its square by how late the brake is.
+    lateness: f64,
+    /// Share of the error that is left of the step before.
+    kept: f64,
+}
+
 /// Memory of the samples from which steps are made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steps {
@@ -38,6 +53,10 @@ pub struct Steps {
     followed: f64,
     /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the other.
     brake_angle: f64,
+    /// How often the brake's error was renewed since it was used last.
+    renewals: f64,
+    /// Time in s since the wind was moved on.
+    wind_s: f64,
     seen_ns: Option<i64>,
 }
 
@@ -53,6 +72,8 @@ impl Steps {
             known_rate: 0.0,
             followed: 0.0,
             brake_angle: 0.0,
+            renewals: 0.0,
+            wind_s: 0.0,
             seen_ns: None,
         }
     }
@@ -66,9 +87,17 @@ impl Steps {
         self.followed = now.brake + left * (self.followed - now.brake);
     }
 
-    /// Returns how many N/kN a reported brake force may be off for being late, and for being weak or strong.
-    fn brake_stds(&self, brake: f64, learned: &BrakeErrors) -> [f64; 2] {
-        [learned.late.std * (brake - self.followed), learned.scale.std * brake]
+    /// Returns how far a reported brake force may be off; its error goes on while no brake acts.
+    fn brake_error(&mut self, brake: f64, learned: &BrakeErrors) -> BrakeError {
+        let late = learned.late.std * (brake - self.followed);
+        let scale = learned.scale.std * brake;
+        let square = late * late + scale * scale;
+        if square < BRAKE_STD_LEAST * BRAKE_STD_LEAST {
+            return BrakeError { std: 0.0, lateness: 0.0, kept: 1.0 };
+        }
+        let before = std::mem::replace(&mut self.brake_angle, late.atan2(scale));
+        let renewals = std::mem::take(&mut self.renewals) + (self.brake_angle - before).abs();
+        BrakeError { std: square.sqrt(), lateness: late * late / square, kept: (-renewals).exp() }
     }
 
     /// Standard deviation in ‰ of the gradient beyond what behaviours take into account: as surveyed, or as the settings have it.
@@ -98,7 +127,7 @@ impl Steps {
         (delay_s, learned): (f64, &Learned),
         air: &Resistance,
     ) -> Step {
-        let settings = &self.settings;
+        let settings = self.settings;
         let duration_s = to.seconds_since(from);
         let faded = self.force_rate * (-duration_s / FORCE_RATE_MEMORY_S).exp();
         let change = to.traction - from.traction;
@@ -119,13 +148,14 @@ impl Steps {
         let known = half_s * (from.known + to.known);
         // By the forces: the speed's noise changes it all the time.
         let changed_mps = (acting.impulses[0] - acting.impulses[1] - known).abs() / to.inertia;
-        let [late, scale] = self.brake_stds(to.brake, &learned.brake);
-        let brake_std = late.hypot(scale);
-        let before = std::mem::replace(&mut self.brake_angle, late.atan2(scale));
-        let renewals = changed_mps / BRAKE_ERROR_MPS
-            + duration_s / BRAKE_ERROR_TIME_S
-            + (self.brake_angle - before).abs();
-        let brake_kept = (-renewals).exp();
+        self.renewals += changed_mps / BRAKE_ERROR_MPS + duration_s / BRAKE_ERROR_TIME_S;
+        let brake = self.brake_error(to.brake, &learned.brake);
+        self.wind_s += duration_s;
+        let wind = if self.wind_s < WIND_STEP_S {
+            (1.0, 0.0)
+        } else {
+            wind_over(std::mem::take(&mut self.wind_s), settings.wind_std_mps)
+        };
         Step {
             duration_s,
             travelled_m: half_s * (from.speed_mps + to.speed_mps),
@@ -135,8 +165,8 @@ impl Steps {
             brake: acting.impulses[1],
             known,
             traction_change: acting.changes[0],
-            brake_std: duration_s * brake_std,
-            brake_lateness: if brake_std > 0.0 { (late / brake_std).powi(2) } else { 0.0 },
+            brake_std: duration_s * brake.std,
+            brake_lateness: brake.lateness,
             jump_share: learned.jumps.share,
             impulse_variance: by_place + by_gusts,
             force_rate: self.force_rate,
@@ -144,9 +174,9 @@ impl Steps {
             drift_variance: settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0,
             by_wind: sample.direction * by_wind,
             by_wind_square: air.by_wind_square(),
-            wind: wind_over(duration_s, settings.wind_std_mps),
+            wind,
             brake_drift_variance: BRAKE_DRIFT_PER_SQRT_H.powi(2) * duration_s / 3600.0,
-            brake_error: (brake_kept, 1.0 - brake_kept * brake_kept),
+            brake_error: (brake.kept, 1.0 - brake.kept * brake.kept),
         }
     }
 }
