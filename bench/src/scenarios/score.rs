@@ -17,7 +17,7 @@ const WORSE_BY: f64 = 0.01;
 pub struct Answer {
     /// Error over the truth.
     pub error: f64,
-    pub(super) deviation: f64, // TRACE
+    deviation: f64,
     declared_error: f64,
 }
 

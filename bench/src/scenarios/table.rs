@@ -176,13 +176,6 @@ fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
         let snapshot = pipeline.process(&moment.sample);
         let answers = QUANTITIES.map(|quantity| answer(snapshot, quantity, &moment));
         let is_moving = moment.speed_mps >= COUNTS_MPS;
-        if let Ok(every) = std::env::var("TRACE") { // TRACE
-            if cycle % every.parse::<u64>().unwrap() == 0 {
-                let f = |a: Option<Answer>| a.map_or("-".into(), |a| format!("{:.3}/{:.3}", a.error, a.deviation));
-                let w = drive.world();
-                println!("{time_s:.1} x {:.0} v {:.2} {} push {:.2} br {:.1} kN res {} mass {} why {:?} {:?} abc {:?} true {:?} m {:?} g {:?}", moment.place_m, moment.speed_mps, if moment.is_standing {"S"} else {"M"}, moment.push_mps2, moment.sample.get(dynocar_shared::SampleField::BrakeForce).unwrap_or(0.0)/1e3, f(answers[0]), f(answers[1]), snapshot.status(), snapshot.reason(), [Parameter::DavisA,Parameter::DavisB,Parameter::DavisC].map(|p| snapshot.value(p).map(|v| ((v*1e4).round()/1e4, snapshot.std(p).map(|v| (v*1e4).round()/1e4)))), w.truth.resistance, moment.mass_kg, w.gradient_permille(moment.place_m).map(|g| g * moment.direction));
-            }
-        }
         // A mass is one at a standstill, too.
         let counts = [is_moving, is_moving || moment.is_standing];
         for ((score, answer), counts) in scores.iter_mut().zip(answers).zip(counts) {

@@ -71,3 +71,33 @@ impl BrakeErrors {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Standard deviation after 200 errors of a size in first standard deviations, each known to a variance of 0.1.
+    fn learned(size: f64) -> f64 {
+        let mut scale = BrakeErrors::new(0.3).scale;
+        for _ in 0..200 {
+            scale.learn((size * 0.3 / scale.std * 0.9, 0.1), 1.0);
+        }
+        scale.std / 0.3
+    }
+
+    #[test]
+    fn the_standard_deviation_follows_the_errors_within_its_bounds() {
+        for size in [0.2, 0.5, 1.0, 2.0] {
+            assert!((learned(size) / size - 0.95).abs() < 0.06, "{size}: {}", learned(size));
+        }
+        assert!((learned(0.0) - LEAST_SHARE).abs() < 1e-9);
+        assert!((learned(9.0) - 1.0 / 0.3).abs() < 1e-9, "not above the whole force");
+    }
+
+    #[test]
+    fn an_error_of_which_nothing_is_known_teaches_nothing() {
+        let mut scale = BrakeErrors::new(0.3).scale;
+        scale.learn((0.0, 1.0), 1.0);
+        assert_eq!(scale, BrakeErrors::new(0.3).scale);
+    }
+}

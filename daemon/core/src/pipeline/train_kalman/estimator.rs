@@ -126,8 +126,7 @@ impl TrainKalman {
 
     fn advance(&mut self, from: UnitSample, now: UnitSample, sample: &ResolvedSample) -> Outcome {
         let delay_s = self.learned.bank.likeliest().belief.mean[FORCE_DELAY];
-        let step =
-            self.steps.to((&from, &now), sample, (delay_s, &self.learned), &self.first);
+        let step = self.steps.to((&from, &now), sample, (delay_s, &self.learned), &self.first);
         let before_mps = self.learned.bank.likeliest().belief.mean[SPEED];
         self.learned.bank.predict(&step);
         let moved_mps = (self.learned.bank.likeliest().belief.mean[SPEED] - before_mps).abs();

@@ -4,11 +4,11 @@ use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::TrainKalmanSettings;
-use super::brake_errors::BrakeErrors;
 use super::bank::{Measured, MotionBank};
+use super::brake_errors::BrakeErrors;
 use super::motion_filter::{
-    BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State, StateCovariance,
-    TRACTION_SCALE, WIND,
+    BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State,
+    StateCovariance, TRACTION_SCALE, WIND,
 };
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::{regressors, scaled, unscaling};

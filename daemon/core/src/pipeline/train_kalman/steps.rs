@@ -191,6 +191,7 @@ mod tests {
     fn place_variance(rate_hz: i64, position_noise_m: f64) -> f64 {
         let settings = TrainKalmanSettings { wind_std_mps: 0.0, ..Default::default() };
         let resistance = Resistance::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
+        let learned = Learned::new(&settings, &resistance);
         let mut steps = Steps::new(&settings, 100.0);
         let sample = |k: i64| {
             let time_s = k as f64 / rate_hz as f64;
@@ -212,7 +213,7 @@ mod tests {
             let (from, to) = (sample(k - 1), sample(k));
             steps.see(&to);
             steps
-                .to((&from, &to), &ResolvedSample::coasting(), (0.0, 1.0), &resistance)
+                .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
                 .impulse_variance
         };
         (1..20 * rate_hz).map(of_step).sum()
@@ -223,6 +224,7 @@ mod tests {
         let settings = TrainKalmanSettings { wind_std_mps: 2.0, ..Default::default() };
         let variance = |c: f64, speed_mps: f64| {
             let resistance = Resistance::declared(&Davis { a: 1.5, b: 0.02, c }, 0.4);
+            let learned = Learned::new(&settings, &resistance);
             let sample = |time_ns: i64| UnitSample {
                 time_ns,
                 segment: 1,
@@ -238,7 +240,7 @@ mod tests {
             steps.see(&from);
             steps.see(&to);
             steps
-                .to((&from, &to), &ResolvedSample::coasting(), (0.0, 1.0), &resistance)
+                .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
                 .impulse_variance
         };
         // Gusts of 1 m/s for 10 s each: 2 c v, over 0.1 s of independent ones.
