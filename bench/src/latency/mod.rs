@@ -143,7 +143,9 @@ fn run_rounds(
             if ending.is_due() {
                 // Ctrl-C ends the processes of the trial, too.
                 let whole = round - 1;
-                expect(whole > 0, || "ended before the first round was over".into())?;
+                if whole == 0 {
+                    return Err("ended before the first round was over".into());
+                }
                 report_line(&format!("ended: figures of {whole} of {rounds} rounds"));
                 cases.iter_mut().for_each(|(_, trials)| trials.truncate(whole));
                 return Ok(());
