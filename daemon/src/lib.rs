@@ -19,6 +19,7 @@
 //! - [`run`]: the daemon, every stage on one screen
 //! - [`runtime`]: its threads
 //! - [`shadow`]: models on trial, and the change from one to another
+//! - [`stamp`]: moments whose age no wall clock changes
 //! - [`state`]: estimates that outlive the daemon
 //! - [`storage`]: files that are replaced as a whole
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
@@ -44,6 +45,7 @@ pub mod replay;
 pub mod run;
 pub mod runtime;
 pub mod shadow;
+pub mod stamp;
 pub mod state;
 pub mod storage;
 pub mod supervision;

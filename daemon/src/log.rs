@@ -13,8 +13,8 @@ use tracing_subscriber::fmt::MakeWriter;
 
 use crate::output::report_line;
 
-/// Lines that wait; what a daemon says in some minutes.
-const LINES_MAX: usize = 1024;
+/// Lines that wait in every queue; what a daemon says in some minutes.
+const LINES_MIN: usize = 1024;
 /// Stack of the thread that writes: it may be locked into memory.
 const STACK_BYTES: usize = 64 * 1024;
 /// How long an ending program waits for its last lines to be taken.
@@ -34,13 +34,13 @@ struct Counts {
 }
 
 impl Queue {
-    /// Starts the thread that writes.
+    /// Starts the thread that writes; `burst` is the most lines that are said at once.
     ///
     /// # Errors
     ///
     /// When the system gives no thread.
-    pub fn start() -> io::Result<Self> {
-        let (lines, queued) = sync_channel(LINES_MAX);
+    pub fn start(burst: usize) -> io::Result<Self> {
+        let (lines, queued) = sync_channel(LINES_MIN + burst);
         let counts = Arc::new(Counts::default());
         let of_thread = Arc::clone(&counts);
         let builder = std::thread::Builder::new().name("log".into()).stack_size(STACK_BYTES);
@@ -66,13 +66,13 @@ fn write_all(queued: &Receiver<Vec<u8>>, counts: &Counts) {
     for line in queued {
         // A log that cannot be written is reported nowhere, and ends no daemon.
         let _ = io::stderr().lock().write_all(&line);
-        counts.waiting.fetch_sub(1, Ordering::Release);
         let dropped = counts.dropped.swap(0, Ordering::Relaxed);
         if dropped > 0 {
             report_line(&format!(
                 "dynocar: {dropped} lines of the log were dropped: nobody took them from standard error"
             ));
         }
+        counts.waiting.fetch_sub(1, Ordering::Release);
     }
 }
 

@@ -32,6 +32,7 @@ use crate::runtime::watch::{Watch, WatchedPipeline};
 use crate::runtime::worker::{ChannelPlan, Worker, WorkerPlan};
 use crate::shadow::train::Placed;
 use crate::shadow::{self, Board, ShadowTrain};
+use crate::stamp::Stamp;
 use crate::state;
 use crate::state::keeper::Keeper;
 use crate::supervision::listener;
@@ -186,12 +187,7 @@ fn plan_workers(
             }
             let mut pipeline = build_pipeline(settings, index as u32, train)?;
             let kept = state.and_then(|it| {
-                state::warm_start_of(
-                    it.config,
-                    &it.stored[train_index],
-                    settings,
-                    state::unix_now_s(),
-                )
+                state::warm_start_of(it.config, &it.stored[train_index], settings, &Stamp::now())
             });
             if let Some(kept) = kept {
                 pipeline.warm_start(&kept);

@@ -1,9 +1,8 @@
-//! Hosts as they are: roots of any length and spelling, cleaners, logs that stand still, limits.
+//! Hosts as they are: roots of any length and spelling, cleaners, containers, other users.
 //!
 //! Whatever mounts does so in a mount namespace of its own.
 
 use std::fs::File;
-use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -15,7 +14,6 @@ use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
-const SOAK: &str = env!("CARGO_BIN_EXE_dynocar-soak");
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 const TRAIN: TrainId = TrainId(1);
 
@@ -26,7 +24,7 @@ fn daemon_at(site: &Site, root: &Path) -> Process {
 }
 
 /// Publishes some samples under a root and waits until the daemon there has counted every one.
-fn drive(host: &Host, daemon: &Process) {
+pub(super) fn drive(host: &Host, daemon: &Process) {
     const SAMPLES: u64 = 50;
     let mut publisher = SamplePublisher::open(host, TRAIN).unwrap();
     let mut reader = SnapshotReader::open(host, TRAIN).unwrap();
@@ -50,7 +48,7 @@ fn drive(host: &Host, daemon: &Process) {
 }
 
 /// A shell script in a mount namespace of its own; the reason, where this user may make none.
-fn in_namespace(script: &str) -> Result<Command, String> {
+pub(super) fn in_namespace(script: &str) -> Result<Command, String> {
     let probe =
         Command::new("unshare").args(["-m", "mount", "-t", "tmpfs", "none", "/mnt"]).output();
     let probe = probe.map_err(|error| format!("unshare: {error}"))?;
@@ -168,67 +166,6 @@ fn a_daemon_whose_announcement_was_removed_ends_in_words() {
 }
 
 #[test]
-fn a_log_that_nobody_takes_holds_neither_work_nor_end_up() {
-    let site = Site::new();
-    let config = site.write_config(1, "log = \"trace\"", ECHO);
-    let socket = site.path().join("notify");
-    let supervisor = std::os::unix::net::UnixDatagram::bind(&socket).unwrap();
-    supervisor.set_nonblocking(true).unwrap();
-    let (mut reader, mut writer) = std::io::pipe().unwrap();
-    // A neighbour has filled the pipe.
-    let flags = rustix::fs::fcntl_getfl(&writer).unwrap();
-    rustix::fs::fcntl_setfl(&writer, flags | rustix::fs::OFlags::NONBLOCK).unwrap();
-    while writer.write(&[b'.'; 1024]).is_ok() {}
-    rustix::fs::fcntl_setfl(&writer, flags).unwrap();
-    let mut command = site.command(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
-    command
-        .env("NOTIFY_SOCKET", &socket)
-        .env("WATCHDOG_USEC", "1000000")
-        .env_remove("WATCHDOG_PID");
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(writer);
-    let mut daemon = command.spawn().unwrap();
-    let mut fed = 0;
-    let mut await_food = |portions| {
-        let wanted = fed + portions;
-        await_true(
-            || {
-                let mut message = [0; 4096];
-                while let Ok(length) = supervisor.recv(&mut message) {
-                    let message = String::from_utf8_lossy(&message[..length]).into_owned();
-                    fed += usize::from(message.contains("WATCHDOG=1"));
-                }
-                fed >= wanted
-            },
-            || "the watchdog to be fed".into(),
-        );
-    };
-    await_food(2);
-    // Each of these is worth a line of the log.
-    for _ in 0..3 {
-        drop(SamplePublisher::open(&site.host(), TRAIN).unwrap());
-        await_food(2);
-    }
-    rustix::process::kill_process(
-        rustix::process::Pid::from_raw(daemon.id() as i32).unwrap(),
-        Signal::TERM,
-    )
-    .unwrap();
-    let mut status = None;
-    await_true(
-        || {
-            status = daemon.try_wait().unwrap();
-            status.is_some()
-        },
-        || "the daemon's end".into(),
-    );
-    drop(command);
-    assert!(status.unwrap().success());
-    let mut log = String::new();
-    reader.read_to_string(&mut log).unwrap();
-    assert!(log.starts_with("...."), "what was in the pipe before");
-}
-
-#[test]
 fn separate_shared_memories_are_named_with_what_containers_need() {
     let site = Site::new();
     let daemon = daemon_at(&site, site.host().root());
@@ -248,107 +185,43 @@ fn separate_shared_memories_are_named_with_what_containers_need() {
 }
 
 #[test]
-fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
+fn shared_memory_that_cannot_be_used_is_named_by_everybody() {
     let site = Site::new();
     let config = site.write_config(1, "", ECHO);
-    let run = |limits: &str| {
-        let script = format!("{limits} && exec {DYNOCAR} run --config {}", config.display());
-        site.start("sh", &["-c", &script])
-    };
-    let read = |readers: &mut Vec<SnapshotReader>| {
-        readers.iter_mut().for_each(|it| {
-            it.poll();
-        });
-        readers.iter().filter(|it| it.readings(0).next().is_some()).count()
-    };
-    let host = site.host();
-    let mut raised = run("ulimit -Sn 40");
-    raised.await_error("serving");
-    let open = |_| SnapshotReader::open(&host, TRAIN).unwrap();
-    let mut readers: Vec<SnapshotReader> = (0..11).map(open).collect();
-    await_true(|| read(&mut readers) == 11, || format!("eleven readers: {}", raised.errors()));
-    assert!(raised.end(Signal::TERM).success());
-    drop(readers);
-    let mut scarce = run("ulimit -n 40");
-    await_true(
-        || scarce.errors().contains("serving") || scarce.try_wait().is_some(),
-        || "a start, or its refusal".into(),
+    let root = site.path().join("root");
+    let everybody = format!(
+        "timeout -s TERM 5 {DYNOCAR} run --config {}; echo status $?; {DYNOCAR} health; echo status $?; \
+         {PEER} controller 1 1000; {PEER} client 1 1000",
+        config.display()
     );
-    let mut readers: Vec<SnapshotReader> = (0..11).map(open).collect();
-    await_true(
-        || {
-            read(&mut readers);
-            scarce.errors().contains("ulimit -n")
-        },
-        || format!("the cause: {}", scarce.errors()),
-    );
-    std::thread::sleep(std::time::Duration::from_secs(2));
-    assert_eq!(scarce.errors().matches("ulimit -n").count(), 1, "{}", scarce.errors());
-}
-
-#[test]
-fn metrics_are_answered_beside_slow_peers_with_head_slash_and_query() {
-    let site = Site::new();
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let lines = format!("[metrics]\nlisten = \"{port}\"");
-    let config = site.write_config(1, "", &format!("{ECHO}{lines}\n"));
-    let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
-    daemon.await_error("serving");
-    let connect = || std::net::TcpStream::connect(port).unwrap();
-    let ask = |request: &str| {
-        let mut stream = connect();
-        stream.write_all(format!("{request} HTTP/1.1\r\nHost: x\r\n\r\n").as_bytes()).unwrap();
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer).unwrap();
-        answer
-    };
-    await_true(|| ask("GET /metrics").contains("dynocar_"), || "the first snapshot".into());
-    // Whoever is slow is not waited for: its own answer comes after those of the quick.
-    let mut slow = connect();
-    slow.write_all(b"GET /metrics HTTP/1.1\r\n").unwrap();
-    let quick = ask("GET /metrics/?x=1");
-    slow.write_all(b"\r\n").unwrap();
-    let mut answer = String::new();
-    slow.read_to_string(&mut answer).unwrap();
-    for answer in [&quick, &answer] {
-        assert!(answer.starts_with("HTTP/1.1 200 OK") && answer.contains("dynocar_"), "{answer}");
-    }
-    let head = ask("HEAD /metrics");
-    assert!(head.starts_with("HTTP/1.1 200 OK") && head.ends_with("\r\n\r\n"), "{head}");
-    assert!(ask("GET /other").starts_with("HTTP/1.1 404"));
-}
-
-/// Processes that a process started, whoever looks after them now.
-fn children_of(process: u32) -> Vec<String> {
-    let tasks = format!("/proc/{process}/task/{process}/children");
-    let children = std::fs::read_to_string(tasks).unwrap_or_default();
-    children.split_whitespace().map(str::to_owned).collect()
-}
-
-#[test]
-fn whoever_starts_processes_takes_them_along_however_it_ends() {
-    let is_running = |process: &String| {
-        let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
-        stat.rsplit(") ").next().is_some_and(|it| !it.is_empty() && !it.starts_with('Z'))
-    };
-    for (program, arguments, signal) in [
-        (DYNOCAR, &["demo", "--rate", "20"][..], Signal::KILL),
-        (DYNOCAR, &["demo", "--rate", "20"], Signal::TERM),
-        (SOAK, &["faults", "--rounds", "100"], Signal::TERM),
-        (SOAK, &["faults", "--rounds", "100"], Signal::KILL),
+    for (mount, words) in [
+        (
+            "mount -t tmpfs -o ro none /dev/shm",
+            "shared memory cannot be used: Read-only file system",
+        ),
+        ("mount -t tmpfs none /dev", "shared memory cannot be used: No such file or directory"),
+        (
+            "mount -t tmpfs -o nr_inodes=3 none /dev/shm",
+            "shared memory cannot be used: No space left",
+        ),
+        ("mount -t tmpfs -o size=1m none /dev/shm", "shared memory is full: 1024 KiB free"),
+        (
+            "mount -t tmpfs -o size=8m none /dev/shm; head -c 6m /dev/zero >/dev/shm/neighbour",
+            "shared memory is full: 2048 KiB free",
+        ),
     ] {
-        let site = Site::new();
-        let mut process = site.start(program, arguments);
-        let mut children = Vec::new();
-        await_true(
-            || {
-                children = children_of(process.id());
-                children.len() >= 2
-            },
-            || format!("the children of {program} {arguments:?}: {}", process.errors()),
-        );
-        process.end(signal);
-        await_true(|| !children.iter().any(is_running), || format!("the end of {children:?}"));
+        let mut command = match in_namespace(&format!("{{ {mount}; {everybody}; }} 2>&1")) {
+            Ok(command) => command,
+            Err(reason) => return println!("not tried: {reason}"),
+        };
+        let output =
+            command.env("DYNOCAR_ROOT", &root).env("RUST_BACKTRACE", "0").output().unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        // The peers give the value, whose words are those of the type.
+        let named = ["SharedMemoryUnusable", "SharedMemoryFull"].map(|it| said.matches(it).count());
+        assert_eq!((said.matches(words).count(), named.iter().sum::<usize>()), (1, 2), "{said}");
+        assert!(said.contains("status 1") && said.contains("status 6"), "{said}");
+        assert!(!said.contains("DYNOCAR_ROOT"), "{said}");
     }
 }
 

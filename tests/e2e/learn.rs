@@ -3,14 +3,15 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
-use dynocar::models::{ModelText, Store, TrainModels};
+use dynocar::models::{ModelText, Moment, Store, TrainModels};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 use dynocar_tests::process::{Process, Site};
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
+use dynocar_tests::soak::day::strange_host::StrangeHost;
 use dynocar_transport::channel::Transport;
 use dynocar_transport::peer::RoleLock;
 use dynocar_transport::{Role, monotonic_now_ns};
@@ -266,6 +267,38 @@ fn a_new_suspicion_starts_a_round_and_a_signal_ends_the_learner() {
     assert!(learner.errors().contains("suspected: tunnel_drag"), "{}", learner.errors());
     assert!(learner.end(Signal::TERM).success(), "{}", learner.errors());
     assert!(std::fs::read_to_string(&page).unwrap().contains("tunnel drag"));
+}
+
+#[test]
+fn the_time_of_the_day_comes_for_a_learner_whose_clock_is_set_forth_and_back() {
+    const DAY_S: u64 = 86_400;
+    let work = Workplace::of(&[]);
+    let strange = StrangeHost::new(work.site.path(), work.site.path());
+    let now_s = Moment::of(SystemTime::now()).unix_s;
+    // In 5 to 6 hours.
+    let at_s = now_s / 3600 * 3600 + 6 * 3600;
+    let at = format!("{:02}:00", at_s / 3600 % 24);
+    let page = work.path("history.html");
+    let mut arguments = work.arguments();
+    arguments.extend(["--at", &at, "--report", page.to_str().unwrap()].map(str::to_owned));
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let mut learner = work.site.start_with(DYNOCAR, &words, &strange.variables());
+    // Every round writes the page.
+    let await_round = || {
+        await_long(|| page.exists(), || format!("round: {}", learner.errors()));
+        await_long(|| std::fs::remove_file(&page).is_ok(), || "page".into());
+    };
+    await_round();
+    // Over that time, then a day back and over the same time of another day.
+    strange.set_clock_ahead(at_s as i64 + 100 - now_s as i64);
+    await_round();
+    let yesterday_s = at_s - DAY_S;
+    strange.set_clock_ahead(yesterday_s as i64 - 100 - now_s as i64);
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(!page.exists(), "no time of the day has come");
+    strange.set_clock_ahead(yesterday_s as i64 + 100 - now_s as i64);
+    await_round();
+    assert!(learner.end(Signal::TERM).success(), "{}", learner.errors());
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod accounting;
 mod adoption;
+mod clocks;
 mod daemon;
 mod ending;
 mod faults;
@@ -13,6 +14,7 @@ mod implausible;
 mod operator;
 mod properties;
 mod replay;
+mod resources;
 mod restart;
 mod state;
 mod supervision;

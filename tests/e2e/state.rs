@@ -29,13 +29,13 @@ fn demo_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo")
 }
 
-struct Cast {
-    site: Site,
+pub(super) struct Cast {
+    pub(super) site: Site,
     dataset: Dataset,
 }
 
 impl Cast {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let site = Site::new();
         for file in ["train.toml", "track.toml"] {
             let text = std::fs::read_to_string(demo_folder().join(file)).expect("a demo file");
@@ -45,7 +45,8 @@ impl Cast {
         Cast { site, dataset: dataset::load(&demo_folder()).expect("the demo's runs") }
     }
 
-    fn daemon(&self, train_lines: &str, settings: &str) -> Process {
+    pub(super) fn daemon(&self, lines: [&str; 2], variables: &[(&str, &str)]) -> Process {
+        let [train_lines, settings] = lines;
         let text = format!(
             "[state]\ndirectory = \"state\"\ninterval_s = 1\n\
              [[trains]]\nid = 1\nfile = \"train.toml\"\ntrack = \"track.toml\"\n{train_lines}\n\
@@ -54,23 +55,28 @@ impl Cast {
              [[pipelines]]\nkind = \"mass_kalman\"\nthread = \"all\"\n"
         );
         let config = self.site.write("daemon.toml", &text);
-        let daemon = self.site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
+        self.start(&config, variables)
+    }
+
+    fn start(&self, config: &Path, variables: &[(&str, &str)]) -> Process {
+        let run = ["run", "--config", config.to_str().unwrap()];
+        let daemon = self.site.start_with(DYNOCAR, &run, variables);
         daemon.await_error("serving");
         daemon
     }
 
-    fn replay(&self) {
+    pub(super) fn replay(&self) {
         let mut replayer = Replayer::open(&self.site.host(), TRAIN, Rate::Max).unwrap();
         assert!(replayer.await_daemon(Duration::from_secs(10)));
         self.dataset.runs.iter().for_each(|run| replayer.play(&run.samples, |_| {}));
         replayer.finish();
     }
 
-    fn state_file(&self) -> PathBuf {
+    pub(super) fn state_file(&self) -> PathBuf {
         self.site.path().join("state/train-1.state")
     }
 
-    fn content(&self) -> StateContent {
+    pub(super) fn content(&self) -> StateContent {
         let path = self.state_file();
         let text = file::read(&path).unwrap().expect("a state");
         StateContent::from_text(&path, &text).unwrap()
@@ -99,7 +105,7 @@ fn stop(mut daemon: Process) -> String {
 #[test]
 fn a_state_is_taken_up_by_the_next_daemon_and_refused_when_foreign_corrupt_or_old() {
     let cast = Cast::new();
-    let daemon = cast.daemon("", "");
+    let daemon = cast.daemon([""; 2], &[]);
     cast.replay();
     await_true(|| cast.state_file().exists(), || "the state".into());
     stop(daemon);
@@ -107,7 +113,7 @@ fn a_state_is_taken_up_by_the_next_daemon_and_refused_when_foreign_corrupt_or_ol
     let kept = content.estimates.iter().find(|it| it.pipeline == "v_mils").expect("v_mils");
 
     // Taken up: the stored values, wider, and no more trusted than before any sample.
-    let daemon = cast.daemon("", "");
+    let daemon = cast.daemon([""; 2], &[]);
     let first = cast.first_snapshot(PipelineKind::VMils);
     assert_eq!(first.status(), Status::Unestimated);
     for (parameter, &value) in kept.estimate.parameters().iter().zip(kept.estimate.values()) {
@@ -120,23 +126,26 @@ fn a_state_is_taken_up_by_the_next_daemon_and_refused_when_foreign_corrupt_or_ol
     assert_eq!(cast.content(), content, "an estimate without news keeps its age");
 
     let whole = std::fs::read(cast.state_file()).unwrap();
-    let mut aged = content.clone();
-    aged.estimates.iter_mut().for_each(|it| it.estimated_unix_s -= 3600.0 * 24.0 * 30.0);
-    let mut future = content.clone();
-    future.estimates.iter_mut().for_each(|it| it.estimated_unix_s += 7200.0);
-    let bytes = |content: &StateContent| file::bytes_of(&content.to_text().unwrap());
+    let of_another_start = |later_s| {
+        let mut content = content.clone();
+        for it in &mut content.estimates {
+            it.estimated = it.estimated.clone().after_s(later_s);
+            it.estimated.since_boot.as_mut().unwrap().boot_id = "another".into();
+        }
+        file::bytes_of(&content.to_text().unwrap())
+    };
     let cases = [
         ("wheel_set = \"new\"", "", whole.clone(), "its wheel set is \"\", expected \"new\""),
         ("", "lambda = 0.5", whole.clone(), "its kind or settings were others"),
         ("", "", whole[..whole.len() - 9].to_vec(), "torn: expected"),
         ("", "", [&whole[..whole.len() - 2], b"9\n"].concat(), "corrupt: checksum"),
-        ("", "", bytes(&aged), "720.0 h old, expected at most 168 h"),
-        ("", "", bytes(&future), "2.0 h in the future by this clock"),
+        ("", "", of_another_start(-720.0 * 3600.0), "720.0 h old, expected at most 168 h"),
+        ("", "", of_another_start(7200.0), "2.0 h in the future by this clock"),
         ("", "", b"nonsense".to_vec(), "not a state file"),
     ];
     for (train_lines, settings, bytes, expected) in cases {
         std::fs::write(cast.state_file(), bytes).unwrap();
-        let daemon = cast.daemon(train_lines, settings);
+        let daemon = cast.daemon([train_lines, settings], &[]);
         let first = cast.first_snapshot(PipelineKind::VMils);
         let log = stop(daemon);
         assert!(log.contains(expected) && log.contains("cold start"), "{expected} in\n{log}");
@@ -148,7 +157,7 @@ fn a_state_is_taken_up_by_the_next_daemon_and_refused_when_foreign_corrupt_or_ol
 fn a_state_that_cannot_be_written_or_read_does_not_stop_the_daemon() {
     let cast = Cast::new();
     std::fs::create_dir(cast.state_file()).unwrap();
-    let daemon = cast.daemon("", "");
+    let daemon = cast.daemon([""; 2], &[]);
     cast.replay();
     daemon.await_error("state not kept, tried again later");
     let log = stop(daemon);
@@ -233,14 +242,6 @@ fn shipped(cast: &Cast, lines: &str) -> PathBuf {
     cast.site.write("shipped.toml", &(lines.to_owned() + &text))
 }
 
-/// A daemon of a user whose states lie here.
-fn daemon_of_user(cast: &Cast, config: &Path, states: &str) -> Process {
-    let arguments = ["run", "--config", config.to_str().unwrap()];
-    let daemon = cast.site.start_with(DYNOCAR, &arguments, &[("XDG_STATE_HOME", states)]);
-    daemon.await_error("serving");
-    daemon
-}
-
 #[test]
 fn killed_after_learning_the_next_daemon_of_the_shipped_configuration_starts_warm() {
     use std::os::unix::fs::PermissionsExt;
@@ -248,7 +249,8 @@ fn killed_after_learning_the_next_daemon_of_the_shipped_configuration_starts_war
     let states = cast.site.path().join("home/states");
     let states_text = states.to_str().unwrap();
     // Only sooner than by default, so that the test need not wait for half a minute.
-    let daemon = daemon_of_user(&cast, &shipped(&cast, "state.interval_s = 1\n"), states_text);
+    let daemon =
+        cast.start(&shipped(&cast, "state.interval_s = 1\n"), &[("XDG_STATE_HOME", states_text)]);
     cast.replay();
     let file = states.join("dynocar/train-1.state");
     let kept = || std::fs::read_to_string(&file).unwrap_or_default();
@@ -258,7 +260,7 @@ fn killed_after_learning_the_next_daemon_of_the_shipped_configuration_starts_war
     let mode = std::fs::metadata(states.join("dynocar")).unwrap().permissions().mode();
     assert_eq!(mode & 0o777, 0o700);
 
-    let daemon = daemon_of_user(&cast, &shipped(&cast, ""), states_text);
+    let daemon = cast.start(&shipped(&cast, ""), &[("XDG_STATE_HOME", states_text)]);
     let first = cast.first_snapshot(PipelineKind::TrainKalman);
     let log = stop(daemon);
     let is_warm = |line: &str| line.contains("warm start") && line.contains("train_kalman");
@@ -269,20 +271,20 @@ fn killed_after_learning_the_next_daemon_of_the_shipped_configuration_starts_war
 #[test]
 fn a_state_directory_that_cannot_be_used_is_a_warning_and_one_that_is_not_wanted_is_not_made() {
     let cast = Cast::new();
-    let log = stop(daemon_of_user(&cast, &shipped(&cast, ""), "/proc/nowhere"));
+    let log = stop(cast.start(&shipped(&cast, ""), &[("XDG_STATE_HOME", "/proc/nowhere")]));
     assert!(
         log.contains("no state is kept, a restart learns anew: /proc/nowhere/dynocar"),
         "{log}"
     );
     let states = cast.site.path().join("unwanted");
     let config = shipped(&cast, "state.keep = false\n");
-    let log = stop(daemon_of_user(&cast, &config, states.to_str().unwrap()));
+    let log = stop(cast.start(&config, &[("XDG_STATE_HOME", states.to_str().unwrap())]));
     assert!(!states.exists() && !log.contains("no state is kept"), "{log}");
     let open = cast.site.path().join("open/dynocar");
     std::fs::create_dir_all(&open).unwrap();
     std::fs::set_permissions(&open, std::os::unix::fs::PermissionsExt::from_mode(0o777)).unwrap();
     let open = open.parent().unwrap().to_str().unwrap();
-    let log = stop(daemon_of_user(&cast, &shipped(&cast, ""), open));
+    let log = stop(cast.start(&shipped(&cast, ""), &[("XDG_STATE_HOME", open)]));
     assert!(log.contains("chmod 700 it"), "{log}");
 }
 
@@ -344,11 +346,7 @@ fn a_killed_daemon_s_successor_answers_a_driving_controller_with_its_first_sampl
     let text = "[state]\ndirectory = \"state\"\ninterval_s = 3600\n[[trains]]\nid = 1\nfile = \"train.toml\"\n\
                 [[threads]]\nname = \"all\"\n[[pipelines]]\nkind = \"train_kalman\"\nthread = \"all\"\n";
     let config = cast.site.write("daemon.toml", text);
-    let start = || {
-        let daemon = cast.site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
-        daemon.await_error("serving");
-        daemon
-    };
+    let start = || cast.start(&config, &[]);
     let mut daemon = start();
     let mut publisher = SamplePublisher::open(&cast.site.host(), TRAIN).unwrap();
     let mut reader = SnapshotReader::open(&cast.site.host(), TRAIN).unwrap();

@@ -58,7 +58,9 @@ fn report_shared(cores: &[usize]) {
     for (&core, before) in cores.iter().zip(before) {
         let Some((busy_before, all_before)) = before else { continue };
         let Some((busy, all)) = times_of(core) else { continue };
-        let percent = 100 * (busy - busy_before) / (all - all_before).max(1);
+        // The time of waiting for a disk may fall.
+        let percent =
+            100 * busy.saturating_sub(busy_before) / all.saturating_sub(all_before).max(1);
         if percent > TAKEN_PERCENT {
             report_line(&format!(
                 "dynocar-bench: core {core} is not its own: others take {percent} % of it, and figures will be \

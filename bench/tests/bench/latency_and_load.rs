@@ -1,7 +1,11 @@
 //! The measuring commands run and give sound results; their times decide nothing.
 
 use std::process::{Command, Output};
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use dynocar::runtime::system::pin_to_core;
+use dynocar_tests::process::{Site, await_true};
+use rustix::process::Signal;
 use serde_json::Value;
 
 fn bench(arguments: &[&str]) -> Output {
@@ -100,4 +104,71 @@ fn an_argument_out_of_range_is_refused_with_its_range() {
         assert_eq!(output.status.code(), Some(2), "{message}");
         assert!(message.contains(expected), "expected {expected:?} in {message:?}");
     }
+}
+
+/// Processes that the threads of a process started.
+fn children_of(process: u32) -> Vec<String> {
+    let tasks = std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
+    let children = tasks.map(|it| std::fs::read_to_string(it.path().join("children")));
+    children
+        .flatten()
+        .flat_map(|it| it.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+        .collect()
+}
+
+#[test]
+fn a_benchmark_that_is_ended_or_killed_takes_its_peers_along() {
+    let is_running = |process: &String| {
+        let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+        stat.rsplit(") ").next().is_some_and(|it| !it.is_empty() && !it.starts_with('Z'))
+    };
+    for arguments in [
+        &["load", "--quick", "--trains", "1", "--duration", "600"][..],
+        &["latency", "--quick", "--seconds", "600", "--case", "floor"],
+        &["latency", "--quick", "--seconds", "600", "--case", "dynocar"],
+    ] {
+        for signal in [Signal::TERM, Signal::INT, Signal::KILL] {
+            let site = Site::new();
+            // Files that a killed one leaves go with the site.
+            let variables = [("TMPDIR", site.path().to_str().unwrap())];
+            let program = env!("CARGO_BIN_EXE_dynocar-bench");
+            let mut bench = site.start_with(program, arguments, &variables);
+            let mut children = Vec::new();
+            await_true(
+                || {
+                    children = children_of(bench.id());
+                    !children.is_empty()
+                },
+                || format!("a peer of {arguments:?}: {}", bench.errors()),
+            );
+            bench.end(signal);
+            await_true(|| !children.iter().any(is_running), || format!("the end of {children:?}"));
+        }
+    }
+}
+
+#[test]
+fn a_core_that_others_use_is_named_before_a_measurement() {
+    let is_over = AtomicBool::new(false);
+    let output = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            pin_to_core(0).unwrap();
+            while !is_over.load(Ordering::Relaxed) {
+                std::hint::spin_loop();
+            }
+        });
+        let quick = ["load", "--quick", "--trains", "1", "--duration", "0.1"];
+        let output = bench(&[&quick[..], &["--controller-core", "0"]].concat());
+        is_over.store(true, Ordering::Relaxed);
+        output
+    });
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let words = said
+        .lines()
+        .find(|it| it.contains("core 0 is not its own"))
+        .unwrap_or_else(|| panic!("{said}"));
+    let percent = words.split("others take ").nth(1).and_then(|it| it.split(' ').next()).unwrap();
+    assert!((15..=100).contains(&percent.parse::<u64>().unwrap()), "{words}");
+    assert!(words.contains("end them, or name another core"), "{words}");
 }

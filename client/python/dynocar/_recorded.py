@@ -194,7 +194,7 @@ class FoundEffect(Record):
     """An effect that the declared model lacks."""
 
     _kinds = {"where": Place, "meaning": Meaning}
-    _optional = ("runners_up",)
+    _optional = ("runners_up", "contradiction", "over_time")
 
     kind: str
     where: Place
@@ -203,6 +203,8 @@ class FoundEffect(Record):
     p_value: float  # chance that the search finds as much where nothing acts
     error_reduction: float  # share of the open-loop error on the fit runs
     meaning: Meaning
+    contradiction: str | None  # what positions and motion say against each other
+    over_time: list[Record] | None  # numbers that change over the runs, in parts of them
     runners_up: list[Record] | None
 
 

@@ -91,7 +91,8 @@ impl From<&ChannelError> for Code {
             ChannelError::IncompatiblePeer { .. } => Code::IncompatibleDaemon,
             ChannelError::Transport { .. }
             | ChannelError::Stranger { .. }
-            | ChannelError::SharedMemoryFull { .. } => Code::Transport,
+            | ChannelError::SharedMemoryFull { .. }
+            | ChannelError::SharedMemoryUnusable { .. } => Code::Transport,
             ChannelError::NoPlaceLeft { .. } => Code::NoPlaceLeft,
             ChannelError::Send(_) => Code::SendRefused,
         }

@@ -43,7 +43,9 @@ pub fn execute(arguments: &RunArguments) -> Result<(), Failure> {
 ///
 /// A filter that cannot be read is an input failure.
 pub fn start_log(config: &DaemonConfig) -> Result<Log, Failure> {
-    let queue = Queue::start().map_err(Failure::work)?;
+    // Each pipeline of each train says its status at the start and its counts at the end.
+    let burst = 2 * config.trains.len() * config.pipelines.len();
+    let queue = Queue::start(burst).map_err(Failure::work)?;
     let log = tracing_subscriber::fmt::layer()
         .with_writer(queue.clone())
         .with_ansi(false)

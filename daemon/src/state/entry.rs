@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::file::checksum;
 use super::{StateError, StateProblem};
 use crate::config::TrainConfig;
+use crate::stamp::{SinceBoot, Stamp};
 
 /// Key of an estimate: another train, other wheels or another model is another key.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,8 +48,8 @@ pub struct StoredEstimate {
     pub pipeline: String,
     /// See [`settings_hash`].
     pub settings: u64,
-    /// When the estimate was last validated, seconds since 1970.
-    pub estimated_unix_s: f64,
+    /// When the estimate was last validated.
+    pub estimated: Stamp,
     /// The estimate.
     pub estimate: KeptEstimate,
 }
@@ -88,6 +89,8 @@ struct RawEstimate {
     #[serde(default)]
     usable_quantities: u32,
     speeds_mps: Option<(f64, f64)>,
+    /// Absent where the system does not tell its starts apart.
+    estimated_since_boot: Option<SinceBoot>,
 }
 
 impl StateContent {
@@ -100,13 +103,14 @@ impl StateContent {
         let estimates = self.estimates.iter().map(|it| RawEstimate {
             pipeline: it.pipeline.clone(),
             settings: format!("{:016x}", it.settings),
-            estimated_unix_s: it.estimated_unix_s,
+            estimated_unix_s: it.estimated.unix_s,
             parameters: it.estimate.parameters().iter().map(Parameter::to_string).collect(),
             values: it.estimate.values().to_vec(),
             covariance: it.estimate.covariance().to_vec(),
             sample_time_ns: it.estimate.use_before.sample_time_ns,
             usable_quantities: it.estimate.use_before.usable_quantities,
             speeds_mps: it.estimate.use_before.speeds_mps,
+            estimated_since_boot: it.estimated.since_boot.clone(),
         });
         toml::to_string(&RawState {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -148,14 +152,17 @@ impl StateContent {
                 speeds_mps: it.speeds_mps.filter(|it| (it.0 + it.1).is_finite()),
                 elapsed_s: 0.0,
             };
-            if !it.estimated_unix_s.is_finite() {
+            let since_boot = it.estimated_since_boot;
+            if !(it.estimated_unix_s.is_finite()
+                && since_boot.as_ref().is_none_or(|it| it.elapsed_s.is_finite()))
+            {
                 return Err(malformed(format!("estimates.{}: no finite time", it.pipeline)));
             }
             Ok(StoredEstimate {
                 train: key.train,
                 settings: hash(&it.settings)?,
                 pipeline: it.pipeline,
-                estimated_unix_s: it.estimated_unix_s,
+                estimated: Stamp { unix_s: it.estimated_unix_s, since_boot },
                 estimate,
             })
         };
@@ -198,7 +205,10 @@ mod tests {
                 train: 7,
                 pipeline: "v_mils".into(),
                 settings: 42,
-                estimated_unix_s: 1.75e9 + 0.125,
+                estimated: Stamp {
+                    unix_s: 1.75e9 + 0.125,
+                    since_boot: Some(SinceBoot { boot_id: "a".into(), elapsed_s: 3.0 }),
+                },
                 estimate: estimate.unwrap(),
             }],
         }

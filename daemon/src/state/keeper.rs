@@ -12,8 +12,9 @@ use dynocar_transport::{ChannelError, Host, monotonic_now_ns};
 use tracing::{info, warn};
 
 use super::entry::{ModelKey, StateContent, StoredEstimate, settings_hash};
-use super::{StateError, StateProblem, file, path_of, unix_now_s};
+use super::{StateError, StateProblem, file, path_of};
 use crate::config::DaemonConfig;
+use crate::stamp::Stamp;
 
 /// How often the keeper looks whether to stop.
 const ROUND: Duration = Duration::from_millis(50);
@@ -100,7 +101,7 @@ impl Keeper {
     }
 
     fn gather(&mut self) {
-        let (now_s, now_ns) = (unix_now_s(), monotonic_now_ns());
+        let (now, now_ns) = (Stamp::now(), monotonic_now_ns());
         for train in &mut self.trains {
             train.reader.poll();
             for reading in train.reader.readings(now_ns) {
@@ -111,8 +112,7 @@ impl Keeper {
                     train.content.estimates.clear();
                 }
                 if let Some((name, settings)) = self.pipelines.get(index) {
-                    let is_news =
-                        keep(&mut train.content, name, *settings, reading.snapshot, now_s);
+                    let is_news = keep(&mut train.content, name, *settings, reading.snapshot, &now);
                     train.is_changed = train.is_changed.map(|is_changed| is_changed || is_news);
                 }
             }
@@ -143,14 +143,14 @@ fn keep(
     pipeline: &str,
     settings: u64,
     snapshot: &ParameterSnapshot,
-    now_s: f64,
+    now: &Stamp,
 ) -> bool {
     let Ok(estimate) = KeptEstimate::of(snapshot) else { return false };
     let stored = StoredEstimate {
         train: content.key.train,
         pipeline: pipeline.to_owned(),
         settings,
-        estimated_unix_s: now_s,
+        estimated: now.clone(),
         estimate,
     };
     match content.estimates.iter_mut().find(|it| it.pipeline == pipeline) {
@@ -190,10 +190,11 @@ mod tests {
     fn only_validated_estimates_replace_what_is_kept() {
         let key = ModelKey { train: 1, wheel_set: String::new(), model: 2 };
         let mut content = StateContent { key, estimates: Vec::new() };
-        let mut offer = |status, mass_t, now_s| {
-            let news = keep(&mut content, "mass", 5, &snapshot(status, mass_t), now_s);
+        let mut offer = |status, mass_t, unix_s| {
+            let now = Stamp { unix_s, since_boot: None };
+            let news = keep(&mut content, "mass", 5, &snapshot(status, mass_t), &now);
             let kept = content.estimates.first();
-            (news, kept.map(|it| (it.estimate.values()[0], it.estimated_unix_s)))
+            (news, kept.map(|it| (it.estimate.values()[0], it.estimated.unix_s)))
         };
         assert_eq!(offer(Status::Unestimated, 100.0, 1.0), (false, None));
         assert_eq!(offer(Status::Estimated, 200.0, 2.0), (true, Some((200.0, 2.0))));

@@ -22,7 +22,6 @@ pub mod keeper;
 pub mod place;
 
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use dynocar_core::pipeline::KeptEstimate;
 use dynocar_shared::TrainId;
@@ -30,14 +29,10 @@ use dynocar_transport::Host;
 use tracing::{info, warn};
 
 use crate::config::{DaemonConfig, PipelineConfig, StateConfig, TrainConfig};
+use crate::stamp::Stamp;
 pub use error::{StateError, StateProblem};
 
 use entry::{ModelKey, StateContent, StoredEstimate};
-
-/// Seconds since 1970 by the system's clock, which is only used to judge how old a state is.
-pub fn unix_now_s() -> f64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
-}
 
 /// Where a train's state lies.
 pub fn path_of(directory: &Path, train: TrainId) -> PathBuf {
@@ -69,7 +64,7 @@ pub fn load_all(directories: [&Path; 2], trains: &[TrainConfig]) -> Vec<Vec<Stor
             });
             for it in found {
                 match newest.iter_mut().find(|known| known.pipeline == it.pipeline) {
-                    Some(known) if known.estimated_unix_s >= it.estimated_unix_s => {}
+                    Some(known) if known.estimated.seconds_to(&it.estimated) <= 0.0 => {}
                     Some(known) => *known = it,
                     None => newest.push(it),
                 }
@@ -86,10 +81,10 @@ pub fn warm_start_of(
     config: &StateConfig,
     stored: &[StoredEstimate],
     pipeline: &PipelineConfig,
-    now_s: f64,
+    now: &Stamp,
 ) -> Option<KeptEstimate> {
     let found = stored.iter().find(|it| it.pipeline == pipeline.name)?;
-    let (name, elapsed_s) = (pipeline.name.as_str(), now_s - found.estimated_unix_s);
+    let (name, elapsed_s) = (pipeline.name.as_str(), found.estimated.seconds_to(now));
     let hours = elapsed_s / 3600.0;
     let refusal = if found.settings != entry::settings_hash(&pipeline.estimator) {
         "its kind or settings were others".to_owned()

@@ -22,7 +22,7 @@ const REQUEST_BYTES_MAX: usize = 4096;
 const PATIENCE: Duration = Duration::from_secs(1);
 /// How often the thread looks whether to stop.
 const ROUND: Duration = Duration::from_millis(50);
-/// Connections at a time; who comes beyond them waits to be accepted.
+/// Connections that stay; whoever comes beyond them takes the place of the oldest.
 const CONNECTIONS_MAX: usize = 32;
 
 /// Opens the listener.
@@ -51,7 +51,7 @@ pub fn serve(
         readers.iter_mut().for_each(|reader| {
             reader.poll();
         });
-        while connections.len() < CONNECTIONS_MAX {
+        for _ in 0..CONNECTIONS_MAX {
             match listener.accept() {
                 Ok((stream, _)) => connections.extend(Connection::new(stream)),
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
@@ -67,6 +67,7 @@ pub fn serve(
             it.advance(&mut || metrics::text(readers, names, &board.read()))
                 .is_ok_and(|is_done| !is_done)
         });
+        connections.drain(..connections.len().saturating_sub(CONNECTIONS_MAX));
     }
 }
 
@@ -79,9 +80,7 @@ fn wait_for_any(listener: &TcpListener, connections: &[Connection]) {
             PollFd::new(&it.stream, if answers { PollFlags::IN } else { PollFlags::OUT })
         })
         .collect();
-    if connections.len() < CONNECTIONS_MAX {
-        polled.push(PollFd::new(listener, PollFlags::IN));
-    }
+    polled.push(PollFd::new(listener, PollFlags::IN));
     let round = Timespec { tv_sec: 0, tv_nsec: ROUND.subsec_nanos().into() };
     // A failed wait is a short one.
     let _ = poll(&mut polled, Some(&round));

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use dynocar_shared::TrainId;
+use rustix::io::Errno;
+use rustix::process::{Resource, getrlimit};
 
 use crate::announcement::{Announcement, Role};
 
@@ -162,12 +164,41 @@ pub enum ChannelError {
         /// Needed memory.
         needed_kib: u64,
     },
+    /// Shared memory is not there, or takes no file of this process.
+    #[error(
+        "{path}: shared memory cannot be used: {source}; it has to be a tmpfs with free inodes that this user \
+         may write into: mount -t tmpfs -o mode=1777 tmpfs {path}"
+    )]
+    SharedMemoryUnusable {
+        /// Where shared memory lies.
+        path: &'static str,
+        /// The system's answer.
+        source: std::io::Error,
+    },
     /// A message was not taken.
     #[error(transparent)]
     Send(#[from] SendRefused),
 }
 
+/// Files that the transport opens at once to make a service or a port.
+const FILES_PER_PORT: u64 = 8;
+
 impl ChannelError {
+    /// Returns a refusal by the transport, whose reasons do not tell a lack of open files from others.
+    pub(crate) fn transport(what: String, reason: String) -> Self {
+        let open = match std::fs::read_dir("/proc/self/fd") {
+            Ok(files) => files.count() as u64,
+            Err(error) if error.raw_os_error() == Some(Errno::MFILE.raw_os_error()) => u64::MAX,
+            Err(_) => 0,
+        };
+        match getrlimit(Resource::Nofile).current {
+            Some(limit) if open.saturating_add(FILES_PER_PORT) > limit => {
+                ChannelError::OpenFiles { limit: Some(limit) }
+            }
+            _ => ChannelError::Transport { what, reason },
+        }
+    }
+
     /// Why nothing passes between an incompatible peer and this process.
     pub fn of_peer(train: TrainId, theirs: Announcement, our_role: Role) -> Self {
         let (theirs, ours) = (Box::new(theirs), Box::new(Announcement::of_this_process(our_role)));

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use dynocar::stamp::Stamp;
 use dynocar::state::entry::{ModelKey, StateContent, StoredEstimate};
 use dynocar::state::file;
 use dynocar_core::pipeline::KeptEstimate;
@@ -22,7 +23,7 @@ fn numbered(number: u64) -> StateContent {
         train: 1,
         pipeline: format!("pipeline_{pipeline}"),
         settings: pipeline,
-        estimated_unix_s: number as f64,
+        estimated: Stamp { unix_s: number as f64, since_boot: None },
         estimate: KeptEstimate::new(&[Parameter::Mass], &[number as f64], &[1.0])
             .expect("a sound estimate"),
     };
@@ -51,7 +52,7 @@ pub fn write_for_ever(folder: &Path) {
 fn read_number(path: &Path) -> Result<Option<u64>, String> {
     let Some(text) = file::read(path).map_err(|error| error.to_string())? else { return Ok(None) };
     let content = StateContent::from_text(path, &text).map_err(|error| error.to_string())?;
-    let number = content.estimates[0].estimated_unix_s as u64;
+    let number = content.estimates[0].estimated.unix_s as u64;
     if content == numbered(number) {
         Ok(Some(number))
     } else {

@@ -7,6 +7,7 @@ use dynocar_model::named;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
+use super::over_time::Course;
 use super::stop_to_stop::Judged;
 use super::stop_to_stop::StopToStop;
 use crate::dataset::DatasetDiagnostic;
@@ -209,6 +210,9 @@ pub struct EffectAnswer {
     /// Contradiction between the sources of evidence about it; absent where they agree.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contradiction: Option<String>,
+    /// Its numbers that are not the same in all runs; empty where all are.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub over_time: Vec<Course>,
     /// For an effect outside the library, forms that explain less of the data, the best first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub runners_up: Vec<RunnerUp>,

@@ -6,6 +6,7 @@ use super::evidence::{Fit, FitProblem};
 use super::identifiability::not_held;
 use super::score::Score;
 use super::selection::{Outcome, Search};
+use super::verdict::Known;
 
 use crate::statistics::share_of;
 
@@ -14,14 +15,18 @@ pub fn caveats(
     search: &Search,
     outcome: &Outcome,
     effects: &[EffectAnswer],
+    known: &Known,
     score: &Score,
-    std: &[f64],
     identifiability: &[Identifiability],
 ) -> Vec<String> {
     let contradictions = effects.iter().filter_map(|effect| effect.contradiction.clone());
     let mut caveats: Vec<String> = contradictions.map(|it| format!(" {it}")).collect();
+    let courses = known.courses.iter().flat_map(|(kind, all)| {
+        all.iter().map(|course| format!(" {}", course.sentence(kind.name())))
+    });
+    caveats.extend(courses);
     caveats.extend([worse_held_out(effects, score), small_beside(outcome, effects)]);
-    caveats.push(undetermined(search.problem, &outcome.fit, std));
+    caveats.push(undetermined(search.problem, &outcome.fit, &known.deviations.std));
     caveats.extend(not_held(identifiability));
     caveats
 }

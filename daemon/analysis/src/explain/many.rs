@@ -11,6 +11,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::{Drive, TrainModel};
 
 use super::evidence::{Density, Fit, FitProblem, RunData, RunDataError, RunNormal, prepare_at};
+use super::over_time::Span;
 use super::score::RunScore;
 use super::selection::{Beside, Outcome, Search};
 use crate::dataset::{Dataset, Role, Run};
@@ -80,6 +81,19 @@ impl Held {
     /// Whether a run is held, by its place from 0.
     pub fn holds(&self, index: usize) -> bool {
         self.groups[index].is_held
+    }
+
+    /// First and last file of each group of fit runs.
+    fn spans(&self, runs: &[Run]) -> Vec<Span> {
+        let mut spans: Vec<Span> = Vec::new();
+        let fit = self.groups.iter().zip(runs).filter(|(group, _)| group.role == Role::Fit);
+        for (group, run) in fit {
+            match spans.get_mut(group.number) {
+                Some(span) => span[1].clone_from(&run.file),
+                None => spans.push([run.file.clone(), run.file.clone()]),
+            }
+        }
+        spans
     }
 
     /// The places of the runs of a role that are not held, by group.
@@ -223,6 +237,11 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
             Ok(score(&run))
         });
         scores.into_iter().collect()
+    }
+
+    /// First and last file of the runs in each row of normal equations.
+    pub(super) fn spans(&self) -> Vec<Span> {
+        self.held.spans(&self.dataset.runs)
     }
 
     /// How many runs say what, as a sentence to follow another.

@@ -14,6 +14,7 @@
 //! - [`gradient_prior`]: how maps err
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`many`]: some of many runs, and what all of them say
+//! - [`over_time`]: what is not the same in all runs
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
 //!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
@@ -34,6 +35,7 @@ pub mod hypothesis;
 pub mod identifiability;
 pub mod many;
 pub mod meaning;
+pub mod over_time;
 pub mod places;
 pub mod report;
 pub mod residual_pressure;
@@ -153,7 +155,15 @@ fn explained<E: From<RunDataError> + Send>(
         }
     };
     let score = Score::of(&problem, scores, &outcome.base, &outcome.fit);
-    let mut answer = verdict::answer(&search, &outcome, &deviations, &known, &score, diagnostics);
+    let spans = match &many {
+        Some(many) => many.spans(),
+        None => problem.runs.iter().map(|run| [run.file.clone(), run.file.clone()]).collect(),
+    };
+    let beside = outcome.beside();
+    let finished = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
+    let courses = over_time::courses(&problem, finished, &spans, &deviations.std);
+    let known = verdict::Known { deviations: &deviations, places: &known, courses: &courses };
+    let mut answer = verdict::answer(&search, &outcome, &known, &score, diagnostics);
     if let Some(estimated) = estimated_drive {
         answer.add_caveat(&estimated.answer.sentence());
         answer.drive = Some(estimated.answer);

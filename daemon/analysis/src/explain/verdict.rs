@@ -18,6 +18,7 @@ use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
 use super::identifiability::identifiability;
+use super::over_time::Course;
 use super::score::{self, Score};
 use super::selection::{
     Deviations, Outcome, ScaleSources, Search, deciding_score, discounted, few_runs_factor, penalty,
@@ -31,17 +32,34 @@ const MOVING_MIN_S: f64 = 180.0;
 /// Share of the decrease that the library must explain when something unknown is left too.
 const LIBRARY_SHARE_MIN: f64 = 0.5;
 
-/// The answer to a finished search; `known` says how surely the place of each effect is.
+/// How surely the numbers of a finished search are known.
+pub struct Known<'a> {
+    /// The numbers.
+    pub deviations: &'a Deviations,
+    /// The place of each effect.
+    pub places: &'a [Option<PlaceUncertainty>],
+    /// The numbers that change over the runs.
+    pub courses: &'a [(EffectKind, Vec<Course>)],
+}
+
+impl Known<'_> {
+    /// The courses of an effect.
+    fn courses(&self, kind: EffectKind) -> Vec<Course> {
+        let own = self.courses.iter().filter(|it| it.0 == kind);
+        own.flat_map(|it| it.1.clone()).collect()
+    }
+}
+
+/// The answer to a finished search.
 pub fn answer(
     search: &Search,
     outcome: &Outcome,
-    deviations: &Deviations,
-    known: &[Option<PlaceUncertainty>],
+    known: &Known,
     score: &Score,
     diagnostics: Vec<DatasetDiagnostic>,
 ) -> ExplainAnswer {
-    let (fit, std) = (&outcome.fit, &deviations.std);
-    let effects = effect_answers(search, outcome, known, deviations);
+    let (fit, std) = (&outcome.fit, &known.deviations.std);
+    let effects = effect_answers(search, outcome, known);
     // An effect without a name has no competing hypotheses either.
     let is_unknown = fit.model.has(EffectKind::Unknown);
     let competing = if is_unknown { Vec::new() } else { competing_hypotheses(outcome) };
@@ -57,7 +75,7 @@ pub fn answer(
     let (verdict_words, experiment) =
         words.unwrap_or_else(|| statement(search, outcome, verdict, &effects, &competing, left));
     let caveats = match is_told {
-        true => caveats(search, outcome, &effects, score, std, &identifiability),
+        true => caveats(search, outcome, &effects, known, score, &identifiability),
         false => Vec::new(),
     };
     ExplainAnswer {
@@ -133,12 +151,8 @@ fn moving_s(search: &Search) -> f64 {
     search.problem.runs.iter().fold(0.0, |sum, run| sum + run.moving_s())
 }
 
-fn effect_answers(
-    search: &Search,
-    outcome: &Outcome,
-    known: &[Option<PlaceUncertainty>],
-    Deviations { std, covariance, c }: &Deviations,
-) -> Vec<EffectAnswer> {
+fn effect_answers(search: &Search, outcome: &Outcome, known: &Known) -> Vec<EffectAnswer> {
+    let Deviations { std, covariance, c } = known.deviations;
     let fit = &outcome.fit;
     let apart = ScaleSources::of(search.problem, outcome).filter(ScaleSources::are_apart);
     let mut answers: Vec<(f64, EffectAnswer)> = fit
@@ -171,7 +185,7 @@ fn effect_answers(
             });
             let answer = EffectAnswer {
                 kind: effect.kind().name(),
-                place: Location { uncertainty_95: known[index].clone(), ..effect.place() },
+                place: Location { uncertainty_95: known.places[index].clone(), ..effect.place() },
                 parameters: reported.values,
                 std: reported.deviations,
                 p_value: p_value(score),
@@ -180,6 +194,7 @@ fn effect_answers(
                 contradiction: apart
                     .filter(|_| effect.nature().changes_speed_scale)
                     .map(|sources| sources.sentence()),
+                over_time: known.courses(effect.kind()),
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
                 } else {

@@ -151,7 +151,7 @@ impl Housekeeper {
             output: output.into(),
             rotation,
             keeper,
-            ages: Ages::of_what_is_there(output),
+            ages: Ages::of_what_is_there(output, rotation.age),
             progress: Arc::clone(&progress),
             named: PathBuf::new(),
             is_failure_reported: false,

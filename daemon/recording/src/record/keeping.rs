@@ -11,10 +11,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
 use dynocar::output::{report_line, write_file};
+use dynocar::stamp::Stamp;
 use dynocar::storage::{SharedStorage, StorageError};
 use dynocar_shared::Status;
 
-use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes, unix_s};
+use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes};
 use super::ring::Aged;
 use crate::event::{Event, EventKind};
 
@@ -151,11 +152,10 @@ impl Keeper {
         forget_unfinished(&ring.join(KEPT_FOLDER));
         let open = kept_event::newest(&ring.join(KEPT_FOLDER));
         // By its account, but never later than if it had begun now.
-        let left = open
-            .as_ref()
-            .map_or(0, |it| it.1.until_unix_s.saturating_sub(unix_s(SystemTime::now())));
-        let until = Instant::now() + Duration::from_secs(left).min(keeping.after);
-        let open = open.filter(|_| left > 0);
+        let left_s = open.as_ref().map_or(0.0, |it| Stamp::now().seconds_to(&it.1.until()));
+        let left = Duration::try_from_secs_f64(left_s).unwrap_or_default().min(keeping.after);
+        let until = Instant::now() + left;
+        let open = open.filter(|_| !left.is_zero());
         Ok(Keeper {
             storage,
             ring: ring.into(),
@@ -174,8 +174,7 @@ impl Keeper {
     ///
     /// When a file cannot be kept.
     pub fn keep(&mut self, event: &Event, files: &[Aged]) -> Result<(), KeepError> {
-        let now = SystemTime::now();
-        let reason = Reason::of(event, now);
+        let reason = Reason::of(event, SystemTime::now());
         let open = self.take_open();
         let is_new = open.is_none();
         let (folder, mut event) =
@@ -187,8 +186,7 @@ impl Keeper {
             event.reasons.push(reason);
         }
         self.until = Instant::now() + self.keeping.after;
-        let until_unix_s = unix_s(now + self.keeping.after);
-        let is_longer = std::mem::replace(&mut event.until_unix_s, until_unix_s) != until_unix_s;
+        let is_longer = event.end_at(Stamp::now().after_s(self.keeping.after.as_secs_f64()));
         let kept = match is_new {
             true => self.make(&folder, &event, &self.near(files)),
             false if is_news || is_longer => Ok(event.write(&self.storage, &folder)?),

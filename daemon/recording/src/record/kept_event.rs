@@ -4,9 +4,10 @@ use std::collections::HashMap;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
 
 use dynocar::models::moment::Moment;
+use dynocar::stamp::{SinceBoot, Stamp};
 use dynocar::storage::{Rights, SharedStorage, StorageError, replace};
 use serde::{Deserialize, Serialize};
 
@@ -16,12 +17,15 @@ use crate::event::{Event, EventKind};
 const EVENT_FILE: &str = "stretch.toml";
 
 /// Why and until when an event is kept.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KeptEvent {
-    /// Files that are begun before belong to it, in s since 1970.
-    pub until_unix_s: u64,
+    /// Files that are begun before belong to it, in whole s since 1970.
+    until_unix_s: u64,
     /// Why.
+    #[serde(default)]
     pub reasons: Vec<Reason>,
+    /// The same moment by the clock that nobody sets.
+    until_since_boot: Option<SinceBoot>,
 }
 
 /// One reason to keep.
@@ -38,6 +42,20 @@ pub struct Reason {
 }
 
 impl KeptEvent {
+    /// Sets its end; true when that is a second later than before.
+    pub fn end_at(&mut self, until: Stamp) -> bool {
+        let is_longer = self.until().seconds_to(&until) >= 1.0;
+        self.until_unix_s = until.unix_s as u64;
+        self.until_since_boot = until.since_boot;
+        is_longer
+    }
+
+    /// Returns its end.
+    pub fn until(&self) -> Stamp {
+        let since_boot = self.until_since_boot.clone();
+        Stamp { unix_s: self.until_unix_s as f64, since_boot }
+    }
+
     /// Brings the account to the disk, with all names in the folder.
     ///
     /// # Errors
@@ -69,11 +87,6 @@ impl Reason {
     }
 }
 
-/// Whole s since 1970.
-pub fn unix_s(at: SystemTime) -> u64 {
-    at.duration_since(UNIX_EPOCH).map_or(0, |it| it.as_secs())
-}
-
 /// The name under which an event or an account comes into being: a ring has one keeper.
 pub fn beside(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -93,14 +106,16 @@ pub fn forget_unfinished(kept: &Path) {
     }
 }
 
-/// The event with the latest end, by what its folder says.
+/// The event that ends last, by what its folder says.
 pub fn newest(kept: &Path) -> Option<(PathBuf, KeptEvent)> {
+    let now = Stamp::now();
     let folders = fs::read_dir(kept).ok()?.flatten().map(|it| it.path());
     let known = folders.filter_map(|folder| {
         let text = fs::read_to_string(folder.join(EVENT_FILE)).ok()?;
         Some((folder, toml::from_str::<KeptEvent>(&text).ok()?))
     });
-    known.max_by_key(|it| it.1.until_unix_s)
+    let left_s = |it: &(PathBuf, KeptEvent)| now.seconds_to(&it.1.until());
+    known.max_by(|one, other| left_s(one).total_cmp(&left_s(other)))
 }
 
 /// Bytes of all files that are kept, each once.

@@ -1,7 +1,8 @@
 //! The files of a recording that rotates: their names, and how long ago they ended, whatever happens to the clock on the wall.
 //!
-//! A file that this recorder ended has the age that the monotonic clock gives it. Of those that were there
-//! before only their dates are known; they grow older by the monotonic clock from then on.
+//! A file that this recorder ended has the age that the monotonic clock gives it. Those that were there before
+//! follow one another as closely as their dates say, but no file takes longer than a part of the ring may; they
+//! grow older while a recorder runs.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -16,12 +17,9 @@ pub struct Aged {
     pub age: Duration,
 }
 
-/// Facts on a file that has ended.
+/// How old an ended file was at a moment.
 #[derive(Clone, Copy, Debug)]
 struct Ended {
-    /// The date that it bears.
-    date: SystemTime,
-    /// How old it was at a moment.
     age: Duration,
     at: Instant,
 }
@@ -32,20 +30,19 @@ pub struct Ages {
     ended: HashMap<PathBuf, Ended>,
 }
 
-fn date_of(path: &Path) -> Option<SystemTime> {
-    std::fs::metadata(path).and_then(|it| it.modified()).ok()
-}
-
 impl Ages {
-    /// The files that a recorder finds when it begins: as old as their dates say, or new where those lie
-    /// ahead.
-    pub fn of_what_is_there(output: &Path) -> Self {
-        let (now, at) = (SystemTime::now(), Instant::now());
-        let ended = |(_, path): (u64, PathBuf)| {
-            let date = date_of(&path)?;
-            Some((path, Ended { date, age: now.duration_since(date).unwrap_or_default(), at }))
-        };
-        Ages { ended: numbered(output).into_iter().filter_map(ended).collect() }
+    /// The files that a recorder finds when it begins; none took longer than `part`, where that is known.
+    pub fn of_what_is_there(output: &Path, part: Option<Duration>) -> Self {
+        let (at, mut age) = (Instant::now(), Duration::ZERO);
+        let (mut ended, mut later) = (HashMap::new(), None::<SystemTime>);
+        for (_, path) in numbered(output).into_iter().rev() {
+            let Ok(date) = std::fs::metadata(&path).and_then(|it| it.modified()) else { continue };
+            let gap = later.and_then(|it| it.duration_since(date).ok()).unwrap_or_default();
+            age += gap.min(part.unwrap_or(gap));
+            later = Some(date);
+            ended.insert(path, Ended { age, at });
+        }
+        Ages { ended }
     }
 
     /// A file was begun: those before it have ended.
@@ -54,21 +51,16 @@ impl Ages {
         let files = numbered(output);
         self.ended.retain(|path, _| files.iter().any(|it| it.1 == *path));
         for (_, path) in files.into_iter().filter(|it| it.1 != begun) {
-            if let Some(date) = date_of(&path) {
-                self.ended.entry(path).or_insert(Ended { date, age: Duration::ZERO, at });
-            }
+            self.ended.entry(path).or_insert(Ended { age: Duration::ZERO, at });
         }
     }
 
-    /// All files, the oldest first: none is younger than one after it. Who dates a file back makes it older.
+    /// All files, the oldest first: none is younger than one after it.
     pub fn of_files(&self, output: &Path) -> Vec<Aged> {
         let mut least = Duration::ZERO;
         let files = numbered(output).into_iter().rev().map(|(_, path)| {
-            let age = self.ended.get(&path).map_or(Duration::ZERO, |it| {
-                let back = date_of(&path).and_then(|date| it.date.duration_since(date).ok());
-                it.age + it.at.elapsed() + back.unwrap_or_default()
-            });
-            least = least.max(age);
+            let age = self.ended.get(&path).map(|it| it.age + it.at.elapsed());
+            least = least.max(age.unwrap_or_default());
             Aged { path, age: least }
         });
         let mut files: Vec<Aged> = files.collect();

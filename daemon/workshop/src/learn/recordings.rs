@@ -3,7 +3,6 @@
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use dynocar_shared::TrainId;
 use serde::{Deserialize, Serialize};
@@ -83,9 +82,9 @@ pub fn take_up(
         .map_err(failed("unpacking a recording into the folder"))
 }
 
-/// The folders of the unpacked recordings in one, the oldest first. What is older than the horizon goes, and the
-/// oldest go until the rest takes no more than it may.
-pub fn unpacked_in(folder: &Path, now: Moment, horizon: Duration) -> Vec<(PathBuf, Source)> {
+/// The folders of the unpacked recordings in one, the oldest first; the oldest go until the rest takes no more than
+/// it may.
+pub fn unpacked_in(folder: &Path) -> Vec<(PathBuf, Source)> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let mut found: Vec<(PathBuf, Source)> = Vec::new();
     for folder in entries.map(|entry| entry.path()) {
@@ -97,11 +96,10 @@ pub fn unpacked_in(folder: &Path, now: Moment, horizon: Duration) -> Vec<(PathBu
         }
     }
     found.sort_by_key(|(folder, source)| (source.recorded, folder.clone()));
-    let oldest = Moment { unix_s: now.unix_s.saturating_sub(horizon.as_secs()) };
     let (mut kept, mut bytes) = (Vec::new(), 0);
     for (folder, source) in found.into_iter().rev() {
         bytes += bytes_in(&folder);
-        if source.recorded < oldest || bytes > BYTES_MAX {
+        if bytes > BYTES_MAX {
             remove(&folder);
         } else {
             kept.push((folder, source));

@@ -94,7 +94,7 @@ pub fn runs_of(
         let name = folder.strip_prefix(places.runs).unwrap_or(folder).display().to_string();
         runs.extend(runs_in(folder, &name, None, memory));
     }
-    for (folder, source) in recordings::unpacked_in(&unpacked, now, horizon) {
+    for (folder, source) in recordings::unpacked_in(&unpacked) {
         runs.extend(runs_in(&folder, &source.name, Some(source.recorded), memory));
     }
     let newest = runs.iter().map(|run| run.recorded).max().unwrap_or(now).min(now);

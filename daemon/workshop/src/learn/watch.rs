@@ -54,6 +54,21 @@ impl TimeOfDay {
     }
 }
 
+/// Tells when a time of the day has come.
+struct Daily {
+    at: TimeOfDay,
+    looked: SystemTime,
+}
+
+impl Daily {
+    /// True once a day. A clock that is set forward over the time of the day reaches it, and one that is set
+    /// back reaches it again.
+    fn is_due(&mut self, now: SystemTime) -> bool {
+        let looked = std::mem::replace(&mut self.looked, now);
+        self.at.after(looked) <= now
+    }
+}
+
 /// Suspicions of a train's snapshots.
 pub struct Suspicions {
     observed: ObservedTrain,
@@ -97,7 +112,7 @@ pub fn watch<E>(
 ) -> Result<(), E> {
     let is_stopped = || stop.load(Ordering::Relaxed);
     let mut is_due = true;
-    let mut next = at.map(|at| at.after(SystemTime::now()));
+    let mut daily = at.map(|at| Daily { at, looked: SystemTime::now() });
     let mut looked = Instant::now();
     let (mut suspected, mut learned) = (None::<Instant>, Instant::now());
     while !is_stopped() {
@@ -110,10 +125,7 @@ pub fn watch<E>(
         }
         let is_fresh = suspected.is_some_and(|at| at.elapsed() < AFTERMATH);
         is_due |= is_fresh && learned.elapsed() >= AGAIN;
-        if next.is_some_and(|next| SystemTime::now() >= next) {
-            next = at.map(|at| at.after(SystemTime::now()));
-            is_due = true;
-        }
+        is_due |= daily.as_mut().is_some_and(|it| it.is_due(SystemTime::now()));
         if is_due {
             is_due = false;
             let round = learner.round(SystemTime::now(), &is_stopped);
@@ -142,5 +154,10 @@ mod tests {
         for wrong in ["", "3:30", "24:00", "03:60", "+3:30", "03:30:00"] {
             assert!(wrong.parse::<TimeOfDay>().is_err(), "{wrong}");
         }
+        let mut daily = Daily { at, looked: day(12_000) };
+        let looks = [12_599, 12_600, 12_601, 90_000, 40 * DAY_S, 41 * DAY_S, 0, 12_599, 12_601];
+        let due = looks.map(|it| daily.is_due(day(it)));
+        // Weeks ahead count once, and the way back reaches no time of the day.
+        assert_eq!(due, [false, true, false, false, true, true, false, false, true]);
     }
 }

@@ -47,10 +47,8 @@ impl<T: Payload> Receive<T> for Subscriber<ipc::Service, Wire<T>, ()> {
 
 fn refused<T: Payload>(train: TrainId, port: &str, reason: impl Debug) -> ChannelError {
     let channel = T::CHANNEL.name();
-    ChannelError::Transport {
-        what: format!("{port} of train {train}'s {channel}"),
-        reason: format!("{reason:?}"),
-    }
+    let what = format!("{port} of train {train}'s {channel}");
+    ChannelError::transport(what, format!("{reason:?}"))
 }
 
 /// The sending end of a channel.

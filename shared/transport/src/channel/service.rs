@@ -40,8 +40,7 @@ impl Entrance {
         train: TrainId,
     ) -> Result<PortFactory<ipc::Service, Wire<T>, ()>, ChannelError> {
         let text = service_name::<T>(train);
-        let refused =
-            |reason: String| ChannelError::Transport { what: format!("service {text}"), reason };
+        let refused = |reason: String| ChannelError::transport(format!("service {text}"), reason);
         let name = ServiceName::new(&text).map_err(|error| refused(format!("{error:?}")))?;
         let start = Instant::now();
         loop {

@@ -30,7 +30,7 @@ impl Transport {
     /// When the run-time directory or the shared memory cannot be used.
     pub fn open(host: &Host, name: &str) -> Result<Self, ChannelError> {
         set_log_level_from_env_or(iceoryx2::prelude::LogLevel::Fatal);
-        let refused = |reason: String| ChannelError::Transport { what: "node".into(), reason };
+        let refused = |reason: String| ChannelError::transport("node".into(), reason);
         let users = Users::enter(host)?;
         users.require_free_memory()?;
         let name = NodeName::new(name).map_err(|error| refused(format!("{error:?}")))?;

@@ -14,7 +14,8 @@ use std::time::Duration;
 
 use iceoryx2::node::NodeState;
 use iceoryx2::prelude::{CallbackProgression, Node, ipc};
-use rustix::fs::FallocateFlags;
+use rustix::fs::{Access, FallocateFlags, access};
+use rustix::io::Errno;
 
 use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
@@ -30,6 +31,7 @@ const DESCRIPTION_IN_MAKING: u32 = 0o600;
 const SEGMENT_IN_MAKING: u32 = 0o200;
 /// Memory that a few ports take with their services and connections, with a margin.
 const FREE_BYTES_MIN: u64 = 4 << 20;
+const FREE_FILES_MIN: u64 = 32;
 /// The last one to leave tidies up within microseconds; a newcomer waits for it.
 const TRIES: u32 = 250;
 const PAUSE: Duration = Duration::from_millis(4);
@@ -128,15 +130,24 @@ impl Users {
         }
     }
 
-    /// Refuses to go on when there is plainly too little memory. The transport makes its segments
+    /// Refuses to go on when shared memory cannot be written, or there is plainly too little of it. The transport makes its segments
     /// without reserving them, and whoever touches a page that is not to be had dies of SIGBUS.
     ///
     /// # Errors
     ///
-    /// [`ChannelError::SharedMemoryFull`].
+    /// [`ChannelError::SharedMemoryFull`], [`ChannelError::SharedMemoryUnusable`].
     pub fn require_free_memory(&self) -> Result<(), ChannelError> {
+        let unusable = |error: Errno| ChannelError::SharedMemoryUnusable {
+            path: SHARED_MEMORY,
+            source: error.into(),
+        };
+        access(SHARED_MEMORY, Access::WRITE_OK | Access::EXEC_OK).map_err(unusable)?;
         // A system that does not know has no limit that we know of.
         let Ok(memory) = rustix::fs::statvfs(SHARED_MEMORY) else { return Ok(()) };
+        // No files at all is how a system without a limit of them answers.
+        if memory.f_files > 0 && memory.f_favail < FREE_FILES_MIN {
+            return Err(unusable(Errno::NOSPC));
+        }
         let free = memory.f_bavail.saturating_mul(memory.f_frsize);
         if free >= FREE_BYTES_MIN { Ok(()) } else { Err(full(free, FREE_BYTES_MIN)) }
     }
@@ -156,7 +167,7 @@ impl Users {
                 continue;
             }
             let reserved = rustix::fs::fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length);
-            if reserved == Err(rustix::io::Errno::NOSPC) {
+            if reserved == Err(Errno::NOSPC) {
                 return Err(full(0, length));
             }
         }

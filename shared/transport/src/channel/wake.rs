@@ -31,10 +31,8 @@ const LISTENERS_MAX: usize = 64;
 const NOTIFIERS_MAX: usize = 256;
 
 fn wake_service(transport: &Transport) -> Result<PortFactory<ipc::Service>, ChannelError> {
-    let refused = |reason: String| ChannelError::Transport {
-        what: format!("service {WAKE_SERVICE}"),
-        reason,
-    };
+    let refused =
+        |reason: String| ChannelError::transport(format!("service {WAKE_SERVICE}"), reason);
     let name = ServiceName::new(WAKE_SERVICE).map_err(|error| refused(format!("{error:?}")))?;
     let _making = transport.users().begin_making()?;
     transport
@@ -67,9 +65,10 @@ impl Sleeper {
         trains: &[TrainId],
         epoch: u64,
     ) -> Result<Self, ChannelError> {
-        let listener = wake_service(transport)?.listener_builder().create().map_err(|error| {
-            ChannelError::Transport { what: "listener".into(), reason: format!("{error:?}") }
-        })?;
+        let listener = wake_service(transport)?
+            .listener_builder()
+            .create()
+            .map_err(|error| ChannelError::transport("listener".into(), format!("{error:?}")))?;
         let senders = trains
             .iter()
             .map(|&train| transport.sender::<SleeperState>(train))
@@ -126,9 +125,10 @@ impl Waker {
     ///
     /// When the transport refuses a port.
     pub fn open(transport: &Transport, train: TrainId) -> Result<Self, ChannelError> {
-        let notifier = wake_service(transport)?.notifier_builder().create().map_err(|error| {
-            ChannelError::Transport { what: "notifier".into(), reason: format!("{error:?}") }
-        })?;
+        let notifier = wake_service(transport)?
+            .notifier_builder()
+            .create()
+            .map_err(|error| ChannelError::transport("notifier".into(), format!("{error:?}")))?;
         let receiver = transport.receiver::<SleeperState>(train)?;
         let newcomer_until_ns = monotonic_now_ns() + NEWCOMER_NS;
         let known = [None; SLEEPERS_MAX];

@@ -1,6 +1,6 @@
 /* A host whose wall clock is wrong and whose disk fills, for a program that is started with this
  * before the C library. How wrong and how full stands in the file that STRANGE_HOST names: seconds
- * that the wall clock is ahead, then bytes that files below STRANGE_FOLDER may still take, -1 for
+ * that the wall clock is ahead, for the dates of those files too, then bytes that files below STRANGE_FOLDER may still take, -1 for
  * as many as they like. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
@@ -65,5 +66,12 @@ ssize_t write(int file, const void *bytes, size_t count) {
         count = (int64_t)count < left ? count : (size_t)left;
         strange->free_bytes -= (int64_t)count;
     }
-    return syscall(SYS_write, file, bytes, count);
+    ssize_t written = syscall(SYS_write, file, bytes, count);
+    if (written > 0 && strange && strange->ahead_s && is_below_folder(file)) {
+        /* A file bears the date of the host's clock. */
+        struct timespec dates[2] = {{.tv_nsec = UTIME_OMIT}, {0}};
+        clock_gettime(CLOCK_REALTIME, &dates[1]);
+        futimens(file, dates);
+    }
+    return written;
 }

@@ -273,6 +273,7 @@ mod tests {
             error_reduction: 0.8,
             meaning: Meaning::default(),
             contradiction: None,
+            over_time: Vec::new(),
             runners_up: Vec::new(),
         };
         assert_eq!(
