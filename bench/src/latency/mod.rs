@@ -18,10 +18,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dynocar::config::IdleStrategy;
+use dynocar::ending::Ending;
 use dynocar::output::report_line;
 
 use self::case::Case;
-use self::report::Measured;
+use self::report::{Measured, Rounds};
 use crate::chance::Chance;
 use crate::open_loop::traffic::TrafficPlan;
 use crate::open_loop::trial::{Extent, run};
@@ -109,14 +110,11 @@ impl LatencyArguments {
             prioritise(cores.priority);
             costs::measure(choose(20.0, 400.0) as usize)
         })?;
-        let mut random = Chance::new(self.place.seed);
         let rounds = self.rounds.unwrap_or(choose(1.0, 15.0) as usize);
-        for round in 1..=rounds {
-            report_line(&format!("round {round} of {rounds}"));
-            for index in random.order(cases.len()) {
-                let trial = in_thread(|| run(&cases[index].0.setting, &extent))?;
-                cases[index].1.push(trial);
-            }
+        let ending = Ending::begin()?;
+        run_rounds(&mut cases, rounds, &extent, &ending)?;
+        if ending.is_due() {
+            return Ok(Measured { cases, costs, at_rest: Vec::new(), extent });
         }
         let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event].map(|idle| {
             // Many seconds pass before the first sample of such a rate.
@@ -128,4 +126,32 @@ impl LatencyArguments {
         let at_rest = at_rest.into_iter().collect::<Result<_, Failure>>()?;
         Ok(Measured { cases, costs, at_rest, extent })
     }
+}
+
+/// Adds a trial of every round to each case; once the program is to end, of the rounds that were whole.
+fn run_rounds(
+    cases: &mut [Rounds],
+    rounds: usize,
+    extent: &Extent,
+    ending: &Ending,
+) -> Result<(), Failure> {
+    let mut random = Chance::new(extent.seed);
+    for round in 1..=rounds {
+        report_line(&format!("round {round} of {rounds}"));
+        for index in random.order(cases.len()) {
+            let trial = in_thread(|| run(&cases[index].0.setting, extent));
+            if ending.is_due() {
+                // Ctrl-C ends the processes of the trial, too.
+                let whole = round - 1;
+                if whole == 0 {
+                    return Err("ended before the first round was over".into());
+                }
+                report_line(&format!("ended: figures of {whole} of {rounds} rounds"));
+                cases.iter_mut().for_each(|(_, trials)| trials.truncate(whole));
+                return Ok(());
+            }
+            cases[index].1.push(trial?);
+        }
+    }
+    Ok(())
 }

@@ -12,7 +12,7 @@ use crate::rig::quantiles::{self, cells};
 use crate::statistics::median;
 
 /// A case with its trial of every round.
-type Rounds = (Case, Vec<Trial>);
+pub type Rounds = (Case, Vec<Trial>);
 
 /// Measured latencies.
 #[derive(Clone, Debug)]

@@ -245,7 +245,9 @@ impl Drive {
                 }
             }
             Phase::Braking => {
-                self.commanded_mps2 = -needed.min(1.3 * brake);
+                // Past the stop the train is brought to a stand, also downhill.
+                let least = if to_stop_m < 0.0 { brake } else { 0.0 };
+                self.commanded_mps2 = -needed.clamp(least, 1.3 * brake);
                 let is_exact = self.world.scenario.brake == Brake::AS_TOLD;
                 if self.now.speed_mps < 0.1 || (is_exact && to_stop_m < 0.3) {
                     self.arrive();

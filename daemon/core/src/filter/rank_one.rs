@@ -28,8 +28,12 @@ pub(super) fn measured<const N: usize>(
     if noise_variance * inverse_variance < SHARE_LEFT_MIN {
         *covariance = wide(*covariance, *row, *spread, inverse_variance, noise_variance);
     } else {
-        // Products before the factor: the result is exactly symmetric.
-        *covariance -= (spread * spread.transpose()) * inverse_variance;
+        // Products before the factor: the result is exactly symmetric. One loop: a matrix of products costs its memory.
+        for j in 0..N {
+            for i in 0..N {
+                covariance[(i, j)] -= (spread[i] * spread[j]) * inverse_variance;
+            }
+        }
     }
 }
 

@@ -30,8 +30,14 @@ const ACCELERATION_MAX_MPS2: f64 = 2.0;
 const NOISE_QUANTILE: f64 = 0.2;
 /// Tolerance over that quantile: 6 standard deviations of the change of a white noise.
 const NOISE_TOLERANCE: f64 = 24.0;
+/// Least quantile in N/kN.
+const CHANGE_MIN: f64 = TOLERANCE_N_PER_KN / NOISE_TOLERANCE;
 /// Logarithmic step of the quantile at each sample.
 const NOISE_STEP: f64 = 0.1;
+/// Changes that a new gate waits for before it says what is noise, and what fails.
+const FIRST_CHANGES: usize = 20;
+/// Place of the quantile among the bends of the first changes.
+const FIRST_QUANTILE: usize = 4;
 /// Samples that the share of withdrawn ones looks back over.
 const MEMORY: f64 = 100.0;
 /// Share of withdrawn samples beyond which none is taken: where one in 20 fails, one in 8000 begins
@@ -101,6 +107,10 @@ pub struct SampleGate {
     skipped_s: f64,
     /// Quantile of the changes between samples in N/kN.
     change_n_per_kn: f64,
+    /// The newest change, and the least bends of the first ones in N/kN, sorted, and how many there were.
+    newest_change: f64,
+    least_bends_n_per_kn: [f64; FIRST_QUANTILE],
+    first_changes: usize,
     withdrawn_share: f64,
 }
 
@@ -114,7 +124,10 @@ impl Default for SampleGate {
             held_count: 0,
             is_above: false,
             skipped_s: 0.0,
-            change_n_per_kn: TOLERANCE_N_PER_KN / NOISE_TOLERANCE,
+            change_n_per_kn: CHANGE_MIN,
+            newest_change: 0.0,
+            least_bends_n_per_kn: [f64::INFINITY; FIRST_QUANTILE],
+            first_changes: 0,
             withdrawn_share: 0.0,
         }
     }
@@ -142,8 +155,7 @@ impl SampleGate {
             return self.pass_over(sample.step_s);
         }
         self.newest = Some(now);
-        let change = (now.driving_n_per_kn - newest.driving_n_per_kn).abs();
-        self.learn_noise(change);
+        self.learn_noise(now.driving_n_per_kn - newest.driving_n_per_kn);
         self.compare(sample, &now, &level, &newest)
     }
 
@@ -154,7 +166,7 @@ impl SampleGate {
 
     /// True while too many samples are withdrawn for any to be taken.
     pub fn is_in_doubt(&self) -> bool {
-        self.withdrawn_share > WITHDRAWN_SHARE_MAX
+        self.first_changes == FIRST_CHANGES && self.withdrawn_share > WITHDRAWN_SHARE_MAX
     }
 
     /// Returns the fault of the forces, if there is one.
@@ -290,11 +302,33 @@ impl SampleGate {
     }
 
     /// Follows the quantile of the changes (Robbins, Monro 1951).
-    fn learn_noise(&mut self, change_n_per_kn: f64) {
-        let is_above = change_n_per_kn > self.change_n_per_kn;
+    fn learn_noise(&mut self, change: f64) {
+        let last = std::mem::replace(&mut self.newest_change, change);
+        if self.first_changes < FIRST_CHANGES {
+            return self.begin_noise(change, last);
+        }
+        let is_above = change.abs() > self.change_n_per_kn;
         let step = if is_above { NOISE_QUANTILE } else { NOISE_QUANTILE - 1.0 };
-        let low = TOLERANCE_N_PER_KN / NOISE_TOLERANCE;
-        self.change_n_per_kn = (self.change_n_per_kn * (NOISE_STEP * step).exp()).max(low);
+        self.change_n_per_kn = (self.change_n_per_kn * (NOISE_STEP * step).exp()).max(CHANGE_MIN);
+    }
+
+    /// Begins at the quantile of the first bends, which neither ramps nor single failures raise: from exact forces on the
+    /// quantile would climb for seconds, and noise would be called a fault until then.
+    fn begin_noise(&mut self, change: f64, last: f64) {
+        self.first_changes += 1;
+        if self.first_changes > 1 {
+            // The bend of a white noise has three times the variance of a change.
+            let mut bend = (change - last).abs() / 3_f64.sqrt();
+            for least in &mut self.least_bends_n_per_kn {
+                if bend < *least {
+                    std::mem::swap(&mut bend, least);
+                }
+            }
+        }
+        if self.first_changes == FIRST_CHANGES {
+            self.change_n_per_kn = self.least_bends_n_per_kn[FIRST_QUANTILE - 1].max(CHANGE_MIN);
+            self.withdrawn_share = 0.0;
+        }
     }
 }
 

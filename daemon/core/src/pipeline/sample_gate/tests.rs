@@ -68,6 +68,24 @@ fn noisy_forces_are_taken_once_their_noise_is_known() {
 }
 
 #[test]
+fn a_new_gate_takes_noise_for_no_fault() {
+    for noise_n_per_kn in [1.0, 3.0, 10.0, 30.0] {
+        for seed in 0..20 {
+            let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+            let forces: Vec<f64> =
+                (0..200).map(|_| 40.0 + noise_n_per_kn * (random.random::<f64>() - 0.5)).collect();
+            let mut gate = SampleGate::default();
+            let mut is_doubted = false;
+            for sample in samples(&forces) {
+                gate.judge(&sample);
+                is_doubted |= gate.is_in_doubt();
+            }
+            assert!(!is_doubted, "noise of {noise_n_per_kn} N/kN, seed {seed}");
+        }
+    }
+}
+
+#[test]
 fn forces_that_stand_alone_are_bridged() {
     let mut forces = vec![40.0; 30];
     forces[10] = 0.0;

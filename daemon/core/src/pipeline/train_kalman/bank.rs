@@ -19,6 +19,22 @@ const WIND_LEAST: f64 = 1e-12;
 /// Behaviours of a smaller share are left out of what is published.
 const SHARE_MIN: f64 = 1e-4;
 
+/// Standard deviation in N/kN of the brake force by its lateness from which speeds say nothing else: a brake whose response
+/// is unknown teaches neither train nor line.
+const LATE_UNKNOWN: f64 = 3.0;
+
+/// Leaves all states but the speed and the brake's error, with their covariance, as they were before a measurement; how
+/// they depend on these two stays as measured (Schmidt 1966).
+fn consider(belief: &mut Gaussian<STATES>, before: &Gaussian<STATES>) {
+    let is_measured = |i: usize| i == SPEED || i == BRAKE_ERROR;
+    for i in (0..STATES).filter(|&i| !is_measured(i)) {
+        belief.mean[i] = before.mean[i];
+        for j in (0..STATES).filter(|&j| !is_measured(j)) {
+            belief.covariance[(i, j)] = before.covariance[(i, j)];
+        }
+    }
+}
+
 /// Likelihood of a measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
@@ -122,14 +138,21 @@ impl MotionBank {
     ) -> Result<Measured, NotPositiveDefinite> {
         let forgetting = (-step.duration_s / EVIDENCE_MEMORY_S).exp();
         let likeliest = self.rivals.likeliest_index();
+        let late_std = step.brake_std * step.brake_lateness.sqrt();
+        let is_late = late_std > LATE_UNKNOWN * step.duration_s;
         let mut measured = None;
         for (index, (rival, weight)) in self.rivals.weighed_mut().enumerate() {
             let Rival { filter, outliers } = rival;
             let noise_variance = noise_variance + filter.transient_variance(step);
+            let before = is_late.then_some(filter.belief);
             let (innovation, trust) =
                 outliers.correct(&mut filter.belief, SPEED, speed_mps, noise_variance)?;
             let log_prior = filter.behaviour.log_prior;
-            let evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
+            let mut evidence = -trust.surprise() - 0.5 * innovation.variance.ln();
+            if let Some(before) = before {
+                consider(&mut filter.belief, &before);
+                evidence = 0.0;
+            }
             // Forgetting applies to the evidence, not to the prior.
             *weight = log_prior + forgetting * (*weight - log_prior) + evidence;
             if index == likeliest {

@@ -12,6 +12,7 @@ use dynocar_shared::{
 
 use super::TrainKalmanSettings;
 use super::bank::Measured;
+use super::brake_errors::BrakeErrors;
 use super::learned::{JumpShare, Learned, Resistance};
 use super::load::{Change, LoadWatch};
 use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
@@ -124,9 +125,8 @@ impl TrainKalman {
     }
 
     fn advance(&mut self, from: UnitSample, now: UnitSample, sample: &ResolvedSample) -> Outcome {
-        let learned =
-            (self.learned.bank.likeliest().belief.mean[FORCE_DELAY], self.learned.jumps.share);
-        let step = self.steps.to((&from, &now), sample, learned, &self.first);
+        let delay_s = self.learned.bank.likeliest().belief.mean[FORCE_DELAY];
+        let step = self.steps.to((&from, &now), sample, (delay_s, &self.learned), &self.first);
         let before_mps = self.learned.bank.likeliest().belief.mean[SPEED];
         self.learned.bank.predict(&step);
         let moved_mps = (self.learned.bank.likeliest().belief.mean[SPEED] - before_mps).abs();
@@ -146,6 +146,7 @@ impl TrainKalman {
         } else {
             self.learned.monitor.break_here();
         }
+        self.learned.brake.learn(&step, &self.learned.bank.likeliest().belief);
         self.speeds.push(now.speed_mps);
         self.systematic.see(step.travelled_m, sample.position_m, now.speed_mps);
         self.moved_s += step.duration_s;
@@ -176,6 +177,7 @@ impl TrainKalman {
         self.learned.bank.each(|it| it.replace(LOAD, load, variance));
         self.learned.noise.reset();
         self.learned.jumps = JumpShare::default();
+        self.learned.brake = BrakeErrors::new(self.settings.brake_scale_std);
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
         self.report = Report::new(&self.learned.bank.published(0.0, 0.0));
@@ -237,9 +239,11 @@ impl TrainKalman {
             Some(Change::Anew(load, variance)) => {
                 self.learned.bank.each(|it| it.replace(LOAD, load, variance))
             }
-            Some(Change::Opened(variance, most)) => self.learned.bank.each(|it| {
-                let now = it.covariance[(LOAD, LOAD)];
-                it.disturb(LOAD, variance.min((most - now).max(0.0)));
+            Some(Change::Opened { by, mean, variance }) => self.learned.bank.each(|it| {
+                // Any load's mean square distance from the one believed so far.
+                let now = it.mean[LOAD];
+                let most = variance + (now - mean).powi(2) - it.covariance[(LOAD, LOAD)];
+                it.disturb(LOAD, (by * now * now).min(most.max(0.0)));
             }),
             None => {}
         }

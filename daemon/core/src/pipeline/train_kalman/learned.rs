@@ -5,9 +5,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::TrainKalmanSettings;
 use super::bank::{Measured, MotionBank};
+use super::brake_errors::BrakeErrors;
 use super::motion_filter::{
-    BRAKE_ERROR, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State, StateCovariance,
-    TRACTION_SCALE, WIND,
+    BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State,
+    StateCovariance, TRACTION_SCALE, WIND,
 };
 use crate::pipeline::InnovationMonitor;
 use crate::pipeline::momentum::{regressors, scaled, unscaling};
@@ -25,6 +26,8 @@ pub struct Learned {
     pub noise: SpeedNoise,
     /// Contribution of forces that jump between two samples.
     pub jumps: JumpShare,
+    /// How far brakes are off.
+    pub brake: BrakeErrors,
     /// Innovations so far.
     pub monitor: InnovationMonitor,
 }
@@ -36,6 +39,7 @@ impl Learned {
             bank: first.bank(settings),
             noise: SpeedNoise::guessed(settings.speed_noise_mps),
             jumps: JumpShare::default(),
+            brake: BrakeErrors::new(settings.brake_scale_std),
             monitor: InnovationMonitor::new(INNOVATION_MEMORY),
         }
     }
@@ -147,6 +151,7 @@ impl Resistance {
             .copy_from(&self.covariance);
         all[(TRACTION_SCALE, TRACTION_SCALE)] = settings.force_scale_std.powi(2);
         all[(BRAKE_ERROR, BRAKE_ERROR)] = 1.0;
+        all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.brake_scale_std.powi(2);
         all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
         all[(WIND, WIND)] = settings.wind_std_mps.powi(2);
         MotionBank::new(&mean, &all)

@@ -12,8 +12,9 @@ use super::TrainKalmanSettings;
 pub enum Change {
     /// It is as far as known as a new weighing or a declaration allows: a mean and a variance.
     Anew(f64, f64),
-    /// It may have become another one by this variance, up to a greatest one.
-    Opened(f64, f64),
+    /// It may have become another one by this variance as a share of its square, up to that of any load of this mean and
+    /// variance.
+    Opened { by: f64, mean: f64, variance: f64 },
 }
 
 /// Follows stops and the masses that samples carry.
@@ -91,9 +92,9 @@ impl LoadWatch {
     /// Returns the possible change by boarding; an unchanged weighing leaves as much open as its own error.
     fn opened(&self) -> Option<Change> {
         let change = self.load_change_std.powi(2);
-        let most = self.prior().1;
-        let by = if self.is_weighed { change.min(2.0 * most) } else { change };
-        (most > 0.0).then_some(Change::Opened(by, most))
+        let (mean, variance) = self.prior();
+        let by = if self.is_weighed { change.min(2.0 * variance) } else { change };
+        (variance > 0.0).then_some(Change::Opened { by, mean, variance })
     }
 }
 
@@ -135,8 +136,9 @@ mod tests {
     fn a_load_is_opened_at_a_stop_and_anew_where_it_was_weighed_again() {
         let settings = TrainKalmanSettings::default();
         let (weighed, declared) = (Change::Anew(1.0, 0.03 * 0.03), Change::Anew(1.0, 0.15 * 0.15));
-        let opened = Change::Opened(0.1 * 0.1, 0.15 * 0.15);
-        let weighed_again = Change::Opened(2.0 * 0.03 * 0.03, 0.03 * 0.03);
+        let open = |by, variance| Change::Opened { by, mean: 1.0, variance };
+        let opened = open(0.1 * 0.1, 0.15 * 0.15);
+        let weighed_again = open(2.0 * 0.03 * 0.03, 0.03 * 0.03);
         let same = |one: &[Change], other: &[Change]| {
             assert_eq!(one.len(), other.len(), "{one:?}");
             for pair in one.iter().zip(other) {
@@ -145,8 +147,11 @@ mod tests {
                         assert_eq!(one, other, "{pair:?}");
                         (a, b)
                     }
-                    (Change::Opened(a, most), Change::Opened(b, same)) => {
-                        assert!((most / same - 1.0).abs() < 1e-12, "{pair:?}");
+                    (
+                        Change::Opened { by: a, variance, .. },
+                        Change::Opened { by: b, variance: same, .. },
+                    ) => {
+                        assert!((variance / same - 1.0).abs() < 1e-12, "{pair:?}");
                         (a, b)
                     }
                     _ => panic!("{pair:?}"),
@@ -183,7 +188,7 @@ mod tests {
                 let speed_mps = if (10..40).contains(&second) { 0.0 } else { 15.0 };
                 let time_ns = second * SECOND_NS;
                 let sample = ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() };
-                matches!(load.see(&sample), Some(Change::Opened(..)))
+                matches!(load.see(&sample), Some(Change::Opened { .. }))
             })
             .collect();
         assert_eq!(opened_at, [15]);

@@ -19,6 +19,7 @@ pub use learned::declared_a_std;
 
 mod acting_forces;
 mod bank;
+mod brake_errors;
 mod estimator;
 mod learned;
 mod load;

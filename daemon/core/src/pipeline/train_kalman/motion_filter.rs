@@ -24,8 +24,10 @@ pub const BRAKE_ERROR: usize = 7;
 pub const FORCE_DELAY: usize = 8;
 /// Index of the wind along the line in m/s, a headwind where the chainage grows.
 pub const WIND: usize = 9;
+/// Index of the error of the brake force's scale from braking to braking.
+pub const BRAKE_SCALE: usize = 10;
 /// Number of states.
-pub const STATES: usize = 10;
+pub const STATES: usize = 11;
 
 /// A state.
 pub type State = SVector<f64, STATES>;
@@ -69,13 +71,15 @@ pub struct Step {
     pub traction_change: f64,
     /// Standard deviation of the brake's impulse in N/kN s by how late and how strong it may be.
     pub brake_std: f64,
+    /// Share of its square by how late it is.
+    pub brake_lateness: f64,
     /// Variance in (N/kN s)² of the impulse by gusts, and by where on the line a known force acts.
     pub impulse_variance: f64,
     /// Share of [`jump_variance`] that the forces of this train bring.
     pub jump_share: f64,
     /// Fastest change of force lately in N/kN per s.
     pub force_rate: f64,
-    /// Standard deviation in ‰ of the map's gradient, where one is stated.
+    /// Standard deviation in ‰ of the map's gradient beyond the usual, where one is stated.
     pub map_std_permille: f64,
     /// Variance in (N/kN)² that comes to each coefficient of the resistance.
     pub drift_variance: f64,
@@ -86,6 +90,8 @@ pub struct Step {
     pub by_wind_square: f64,
     /// Share of the wind that is left, and the variance in (m/s)² of what comes to it.
     pub wind: (f64, f64),
+    /// Variance that comes to the scale of the brake force.
+    pub brake_drift_variance: f64,
     /// Share of the brake's error that is left, and the variance of what comes to it.
     pub brake_error: (f64, f64),
 }
@@ -115,8 +121,9 @@ impl MotionFilter {
         let force = by_traction * traction - step.brake;
         let change = by_traction * step.traction_change;
         // Not times the load: a product of two unknowns would seem better known than it is.
-        let unexplained =
-            step.duration_s * state[DISTURBANCE] + step.brake_std * state[BRAKE_ERROR];
+        let unexplained = step.duration_s * state[DISTURBANCE]
+            + step.brake_std * state[BRAKE_ERROR]
+            + step.brake * state[BRAKE_SCALE];
         let impulse = load * force - step.known - unexplained;
         let resistance = |powers: &[f64; COEFFICIENTS]| -> f64 {
             (0..COEFFICIENTS).map(|i| powers[i] * state[RESISTANCE + i]).sum()
@@ -144,6 +151,7 @@ impl MotionFilter {
         gradient[WIND] = -seconds * (step.by_wind + 2.0 * step.by_wind_square * state[WIND]);
         gradient[TRACTION_SCALE] = per_inertia * load * traction;
         gradient[BRAKE_ERROR] = -per_inertia * step.brake_std;
+        gradient[BRAKE_SCALE] = -per_inertia * step.brake;
         gradient[FORCE_DELAY] = -per_inertia * load * change;
 
         let jump = step.jump_share * jump_variance(load * change, step.duration_s);
@@ -159,10 +167,12 @@ impl MotionFilter {
         for i in 0..COEFFICIENTS {
             self.belief.disturb(RESISTANCE + i, step.drift_variance);
         }
-        let (keep, renewed) = step.wind;
-        self.belief.fade(WIND, keep, renewed);
-        let (keep, renewed) = step.brake_error;
-        self.belief.fade(BRAKE_ERROR, keep, renewed);
+        for (index, (keep, renewed)) in [(WIND, step.wind), (BRAKE_ERROR, step.brake_error)] {
+            if keep < 1.0 {
+                self.belief.fade(index, keep, renewed);
+            }
+        }
+        self.belief.disturb(BRAKE_SCALE, step.brake_drift_variance);
     }
 
     /// Variance in (m/s)² of the speed while a force changes that acts by d later than the step has it: its
@@ -202,6 +212,9 @@ const TABLE: [(f64, f64, bool, f64); BEHAVIOURS] = [
     (1.0, 12.0, false, 0.05),
     (1.0, 120.0, false, 0.05),
 ];
+
+/// Standard deviation in ‰ of a map that [`TABLE`] takes into account.
+pub const USUAL_MAP_PERMILLE: f64 = 0.1;
 
 /// All behaviours that compete.
 pub fn behaviours() -> [Behaviour; BEHAVIOURS] {
@@ -246,6 +259,7 @@ mod tests {
             known: 0.9,
             traction_change: 4.0,
             brake_std: 0.7,
+            brake_lateness: 0.0,
             impulse_variance: 0.0,
             jump_share: 0.0,
             force_rate: 0.0,
@@ -254,12 +268,13 @@ mod tests {
             by_wind: 0.07,
             by_wind_square: 0.002,
             wind: (1.0, 0.0),
+            brake_drift_variance: 0.0,
             brake_error: (1.0, 0.0),
         }
     }
 
     fn filter() -> MotionFilter {
-        let mean = State::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2]);
+        let mean = State::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1]);
         let belief = Gaussian { mean, covariance: StateCovariance::zeros() };
         MotionFilter { behaviour: behaviours()[0], belief, jump_variance: 0.0 }
     }

@@ -5,8 +5,9 @@ use dynocar_model::terms::wind;
 
 use super::TrainKalmanSettings;
 use super::acting_forces::ActingForces;
-use super::learned::Resistance;
-use super::motion_filter::{Step, wind_over};
+use super::brake_errors::BrakeErrors;
+use super::learned::{Learned, Resistance};
+use super::motion_filter::{Step, USUAL_MAP_PERMILLE, wind_over};
 use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
@@ -15,8 +16,28 @@ const FORCE_RATE_MEMORY_S: f64 = 0.5;
 /// gradient jump to and fro, the more often the more samples there are.
 const KNOWN_RATE_MEMORY_S: f64 = 1.0;
 
-/// Time in s over which what a brake exerts beside its report becomes something else.
-const BRAKE_ERROR_TIME_S: f64 = 3.0;
+/// Change of speed in m/s, and time in s, over which what a brake exerts beside its report becomes something else: friction
+/// goes with speed, is blended by speed, and heats up in a long descent.
+const BRAKE_ERROR_MPS: f64 = 3.0;
+const BRAKE_ERROR_TIME_S: f64 = 600.0;
+
+/// Random walk of the brake force's scale over an hour of motion.
+const BRAKE_DRIFT_PER_SQRT_H: f64 = 0.03;
+
+/// Standard deviation in N/kN of a brake force below which it is taken for exact.
+const BRAKE_STD_LEAST: f64 = 1e-3;
+/// Time in s over which a wind is taken for the same: a step of the filters for each sample would cost time.
+const WIND_STEP_S: f64 = 1.0;
+
+/// Error of a brake force over a step.
+struct BrakeError {
+    /// Standard deviation in N/kN.
+    std: f64,
+    /// Share of its square by how late the brake is.
+    lateness: f64,
+    /// Share of the error that is left of the step before.
+    kept: f64,
+}
 
 /// Memory of the samples from which steps are made.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,6 +51,12 @@ pub struct Steps {
     known_rate: f64,
     /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
     followed: f64,
+    /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the other.
+    brake_angle: f64,
+    /// How often the brake's error was renewed since it was used last.
+    renewals: f64,
+    /// Time in s since the wind was moved on.
+    wind_s: f64,
     seen_ns: Option<i64>,
 }
 
@@ -44,6 +71,9 @@ impl Steps {
             force_rate: 0.0,
             known_rate: 0.0,
             followed: 0.0,
+            brake_angle: 0.0,
+            renewals: 0.0,
+            wind_s: 0.0,
             seen_ns: None,
         }
     }
@@ -57,10 +87,26 @@ impl Steps {
         self.followed = now.brake + left * (self.followed - now.brake);
     }
 
-    /// Standard deviation in N/kN of a brake force that is reported, if it is that late and that strong.
-    fn brake_std(&self, brake: f64) -> f64 {
-        let late = (brake - self.followed).abs();
-        late.max(self.settings.brake_scale_std * brake)
+    /// Returns how far a reported brake force may be off; its error goes on while no brake acts.
+    fn brake_error(&mut self, brake: f64, learned: &BrakeErrors) -> BrakeError {
+        let late = learned.late.std * (brake - self.followed);
+        let scale = learned.scale.std * brake;
+        let square = late * late + scale * scale;
+        if square < BRAKE_STD_LEAST * BRAKE_STD_LEAST {
+            return BrakeError { std: 0.0, lateness: 0.0, kept: 1.0 };
+        }
+        let before = std::mem::replace(&mut self.brake_angle, late.atan2(scale));
+        let renewals = std::mem::take(&mut self.renewals) + (self.brake_angle - before).abs();
+        BrakeError { std: square.sqrt(), lateness: late * late / square, kept: (-renewals).exp() }
+    }
+
+    /// Standard deviation in ‰ of the gradient beyond what behaviours take into account: as surveyed, or as the settings have it.
+    fn map_std_permille(&self, sample: &ResolvedSample) -> f64 {
+        if sample.gradient_std_permille > 0.0 {
+            return sample.gradient_std_permille;
+        }
+        let square = self.settings.gradient_std_permille.powi(2) - USUAL_MAP_PERMILLE.powi(2);
+        square.max(0.0).sqrt()
     }
 
     /// A motion begins.
@@ -78,10 +124,10 @@ impl Steps {
         &mut self,
         (from, to): (&UnitSample, &UnitSample),
         sample: &ResolvedSample,
-        (delay_s, jump_share): (f64, f64),
+        (delay_s, learned): (f64, &Learned),
         air: &Resistance,
     ) -> Step {
-        let settings = &self.settings;
+        let settings = self.settings;
         let duration_s = to.seconds_since(from);
         let faded = self.force_rate * (-duration_s / FORCE_RATE_MEMORY_S).exp();
         let change = to.traction - from.traction;
@@ -92,7 +138,6 @@ impl Steps {
         let speed_mps = to.speed_mps.max(settings.speed_min_mps);
         let steps = (self.train_length_m / (speed_mps * duration_s)).max(1.0);
         let place_s = settings.position_std_m / speed_mps;
-        let brake_kept = (-duration_s / BRAKE_ERROR_TIME_S).exp();
         let by_place = steps * (place_s * self.known_rate * duration_s).powi(2);
         // Over a time in which the speed's noise averages out gusts follow each other like noise.
         let by_wind = air.by_wind(to.speed_mps);
@@ -100,6 +145,17 @@ impl Steps {
         let by_gusts = 2.0 * wind::GUST_TIME_S * gust_n_per_kn.powi(2) * duration_s;
         let acting = self.acting.over(duration_s, delay_s);
         let half_s = 0.5 * duration_s;
+        let known = half_s * (from.known + to.known);
+        // By the forces: the speed's noise changes it all the time.
+        let changed_mps = (acting.impulses[0] - acting.impulses[1] - known).abs() / to.inertia;
+        self.renewals += changed_mps / BRAKE_ERROR_MPS + duration_s / BRAKE_ERROR_TIME_S;
+        let brake = self.brake_error(to.brake, &learned.brake);
+        self.wind_s += duration_s;
+        let wind = if self.wind_s < WIND_STEP_S {
+            (1.0, 0.0)
+        } else {
+            wind_over(std::mem::take(&mut self.wind_s), settings.wind_std_mps)
+        };
         Step {
             duration_s,
             travelled_m: half_s * (from.speed_mps + to.speed_mps),
@@ -107,18 +163,20 @@ impl Steps {
             delay_s: acting.delay_s,
             traction: acting.impulses[0],
             brake: acting.impulses[1],
-            known: half_s * (from.known + to.known),
+            known,
             traction_change: acting.changes[0],
-            brake_std: duration_s * self.brake_std(to.brake),
-            jump_share,
+            brake_std: duration_s * brake.std,
+            brake_lateness: brake.lateness,
+            jump_share: learned.jumps.share,
             impulse_variance: by_place + by_gusts,
             force_rate: self.force_rate,
-            map_std_permille: sample.gradient_std_permille,
+            map_std_permille: self.map_std_permille(sample),
             drift_variance: settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0,
             by_wind: sample.direction * by_wind,
             by_wind_square: air.by_wind_square(),
-            wind: wind_over(duration_s, settings.wind_std_mps),
-            brake_error: (brake_kept, 1.0 - brake_kept * brake_kept),
+            wind,
+            brake_drift_variance: BRAKE_DRIFT_PER_SQRT_H.powi(2) * duration_s / 3600.0,
+            brake_error: (brake.kept, 1.0 - brake.kept * brake.kept),
         }
     }
 }
@@ -133,6 +191,7 @@ mod tests {
     fn place_variance(rate_hz: i64, position_noise_m: f64) -> f64 {
         let settings = TrainKalmanSettings { wind_std_mps: 0.0, ..Default::default() };
         let resistance = Resistance::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
+        let learned = Learned::new(&settings, &resistance);
         let mut steps = Steps::new(&settings, 100.0);
         let sample = |k: i64| {
             let time_s = k as f64 / rate_hz as f64;
@@ -154,7 +213,7 @@ mod tests {
             let (from, to) = (sample(k - 1), sample(k));
             steps.see(&to);
             steps
-                .to((&from, &to), &ResolvedSample::coasting(), (0.0, 1.0), &resistance)
+                .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
                 .impulse_variance
         };
         (1..20 * rate_hz).map(of_step).sum()
@@ -165,6 +224,7 @@ mod tests {
         let settings = TrainKalmanSettings { wind_std_mps: 2.0, ..Default::default() };
         let variance = |c: f64, speed_mps: f64| {
             let resistance = Resistance::declared(&Davis { a: 1.5, b: 0.02, c }, 0.4);
+            let learned = Learned::new(&settings, &resistance);
             let sample = |time_ns: i64| UnitSample {
                 time_ns,
                 segment: 1,
@@ -180,7 +240,7 @@ mod tests {
             steps.see(&from);
             steps.see(&to);
             steps
-                .to((&from, &to), &ResolvedSample::coasting(), (0.0, 1.0), &resistance)
+                .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
                 .impulse_variance
         };
         // Gusts of 1 m/s for 10 s each: 2 c v, over 0.1 s of independent ones.
