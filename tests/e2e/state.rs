@@ -134,11 +134,14 @@ fn a_state_is_taken_up_by_the_next_daemon_and_refused_when_foreign_corrupt_or_ol
         }
         file::bytes_of(&content.to_text().unwrap())
     };
+    let mut corrupt = whole.clone();
+    let digit = corrupt.len() - 2;
+    corrupt[digit] = if corrupt[digit] == b'9' { b'8' } else { b'9' };
     let cases = [
         ("wheel_set = \"new\"", "", whole.clone(), "its wheel set is \"\", expected \"new\""),
         ("", "lambda = 0.5", whole.clone(), "its kind or settings were others"),
         ("", "", whole[..whole.len() - 9].to_vec(), "torn: expected"),
-        ("", "", [&whole[..whole.len() - 2], b"9\n"].concat(), "corrupt: checksum"),
+        ("", "", corrupt, "corrupt: checksum"),
         ("", "", of_another_start(-720.0 * 3600.0), "720.0 h old, expected at most 168 h"),
         ("", "", of_another_start(7200.0), "2.0 h in the future by this clock"),
         ("", "", b"nonsense".to_vec(), "not a state file"),

@@ -120,7 +120,7 @@ impl LatencyArguments {
             // Many seconds pass before the first sample of such a rate.
             let traffic = TrafficPlan { rate_hz: 1e-3, ..extent.traffic };
             let resting = Extent { traffic, seconds: choose(0.3, 5.0), ..extent };
-            let trial = in_thread(|| run(&Case::all_fast(idle).setting, &resting))?;
+            let trial = in_thread(|| run(&Case::all_fast(idle).setting, &resting, &ending.flag))?;
             Ok((idle.to_string(), trial.cpu_percent))
         });
         let at_rest = at_rest.into_iter().collect::<Result<_, Failure>>()?;
@@ -139,7 +139,7 @@ fn run_rounds(
     for round in 1..=rounds {
         report_line(&format!("round {round} of {rounds}"));
         for index in random.order(cases.len()) {
-            let trial = in_thread(|| run(&cases[index].0.setting, extent));
+            let trial = in_thread(|| run(&cases[index].0.setting, extent, &ending.flag));
             if ending.is_due() {
                 // Ctrl-C ends the processes of the trial, too.
                 let whole = round - 1;

@@ -1,5 +1,7 @@
 //! Several trains with some pipelines, against one daemon.
 
+use std::sync::atomic::AtomicBool;
+
 use dynocar::config::IdleStrategy;
 use dynocar_shared::PipelineKind;
 
@@ -27,6 +29,6 @@ impl Load {
     pub fn run(&self) -> Result<Trial, Failure> {
         let answerer = Answerer::Daemon(self.pipelines.clone(), None);
         let setting = Setting { answerer, idle: self.idle, companions: &[], candidates: 0 };
-        in_thread(|| run(&setting, &self.extent))
+        in_thread(|| run(&setting, &self.extent, &AtomicBool::new(false)))
     }
 }

@@ -1,5 +1,6 @@
 //! A train's controller in the open loop: sends what is due, and counts the answers.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar_shared::TrainSample;
@@ -181,7 +182,8 @@ impl Controller {
     }
 }
 
-/// Publishes what is due and polls the trains in turn until a time in ns; gives how late the latest sample left, in ns.
+/// Publishes what is due and polls the trains in turn until a time in ns, or until it is over before; gives how late
+/// the latest sample left, in ns.
 ///
 /// # Errors
 ///
@@ -190,6 +192,7 @@ pub fn drive(
     trains: &mut [Controller],
     outcomes: &mut [Outcome],
     until_ns: i64,
+    is_over: &AtomicBool,
 ) -> Result<i64, Failure> {
     let (mut lag_ns, mut turn) = (0, 0);
     loop {
@@ -197,7 +200,7 @@ pub fn drive(
         for train in trains.iter_mut() {
             lag_ns = lag_ns.max(train.publish_due(now_ns)?);
         }
-        if now_ns >= until_ns {
+        if now_ns >= until_ns || is_over.load(Ordering::Relaxed) {
             return Ok(lag_ns);
         }
         turn = (turn + 1) % trains.len();

@@ -1,6 +1,7 @@
 //! One trial: several trains at one rate against one answerer, with processes of its own.
 
 use std::process::Stdio;
+use std::sync::atomic::AtomicBool;
 
 use dynocar::config::IdleStrategy;
 use dynocar::programs::{LIVE, RECORDING, call};
@@ -123,7 +124,7 @@ impl Trial {
 /// Name of the daemon's thread with the fast pipelines.
 const FAST: &str = "fast";
 
-/// Runs one trial; binds the calling thread.
+/// Runs one trial, until it is over at the latest; binds the calling thread.
 ///
 /// ZeroMQ has threads of its own in both processes; they are started before the binding and after
 /// the priority, so that they have the same and may run on either core. A busy case of it would
@@ -132,7 +133,7 @@ const FAST: &str = "fast";
 /// # Errors
 ///
 /// When a process or a transport fails.
-pub fn run(setting: &Setting, extent: &Extent) -> Result<Trial, Failure> {
+pub fn run(setting: &Setting, extent: &Extent, is_over: &AtomicBool) -> Result<Trial, Failure> {
     let Extent { trains, traffic, cores, seed, .. } = *extent;
     let site = site();
     let mut peer = setting.start(&site, extent)?;
@@ -151,7 +152,7 @@ pub fn run(setting: &Setting, extent: &Extent) -> Result<Trial, Failure> {
     for controller in &mut controllers {
         controller.await_ready(&mut peer)?;
     }
-    let trial = measure(&mut controllers, setting.polled(), &mut peer, extent)?;
+    let trial = measure(&mut controllers, setting.polled(), &mut peer, (extent, is_over))?;
     drop(controllers);
     stop(peer)?;
     Ok(trial)
@@ -162,7 +163,7 @@ fn measure(
     controllers: &mut [Controller],
     polled: usize,
     peer: &mut Process,
-    extent: &Extent,
+    (extent, is_over): (&Extent, &AtomicBool),
 ) -> Result<Trial, Failure> {
     let (rate_hz, trains) = (extent.traffic.rate_hz, controllers.len() as f64);
     let outcomes = || -> Vec<Outcome> { (0..polled).map(|_| Outcome::empty()).collect() };
@@ -178,13 +179,14 @@ fn measure(
     let after = |start_ns: i64, seconds: f64| start_ns + (1e9 * seconds) as i64;
     let (mut uncounted, mut counted) = (outcomes(), outcomes());
     let start_ns = begin(controllers, extent.warm_up_s);
-    drive(controllers, &mut uncounted, after(start_ns, extent.warm_up_s))?;
+    drive(controllers, &mut uncounted, after(start_ns, extent.warm_up_s), is_over)?;
     settle(controllers, &mut uncounted)?;
     require(peer)?;
     let usage = || (usage::of(peer.id(), FAST), monotonic_now_ns());
     let (early, early_ns) = usage();
     let start_ns = begin(controllers, extent.seconds);
-    let publisher_lag_ns = drive(controllers, &mut counted, after(start_ns, extent.seconds))?;
+    let publisher_lag_ns =
+        drive(controllers, &mut counted, after(start_ns, extent.seconds), is_over)?;
     let (late, late_ns) = usage();
     settle(controllers, &mut counted)?;
     controllers.iter().for_each(|it| it.account(&mut counted));

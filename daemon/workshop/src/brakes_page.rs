@@ -29,7 +29,7 @@ pub struct BrakesAnswer {
     pub parameters: Parameters,
     /// The same as OSRD's `etcs_brake_params`.
     pub etcs: EtcsBrake,
-    /// What each of its values rests on.
+    /// Source of each of its values.
     pub rests_on: Vec<Basis>,
     /// The level of Kdry_rst in the file.
     pub ebcl: Option<u32>,

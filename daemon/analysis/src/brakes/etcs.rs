@@ -36,7 +36,7 @@ pub struct EtcsBrake {
     pub t_be: f64,
 }
 
-/// What a value of the form rests on.
+/// Source of a value of the form.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Basis {
     /// The value's key in the form.
@@ -47,7 +47,7 @@ pub struct Basis {
     pub is_guess: bool,
 }
 
-/// What is declared beside the stops.
+/// Declared figures beside the stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Choice {
     /// Level of confidence of Kdry_rst; `None` where none is supported.

@@ -1,14 +1,34 @@
 //! Limits of a verdict, in words; whether the data determine a, b and c at all.
 
-use super::answer::{DavisDeviations, EffectAnswer, Identifiability};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::answer::{DavisDeviations, EffectAnswer, Identifiability, PlaceUncertainty};
+use super::course::Course;
 use super::described::small;
 use super::evidence::{Fit, FitProblem};
 use super::identifiability::not_held;
 use super::score::Score;
-use super::selection::{Outcome, Search};
-use super::verdict::Known;
+use super::selection::{Deviations, Outcome, Search};
 
 use crate::statistics::share_of;
+
+/// How surely the numbers of a finished search are known.
+pub struct Known<'a> {
+    /// The numbers.
+    pub deviations: &'a Deviations,
+    /// The place of each effect.
+    pub places: &'a [Option<PlaceUncertainty>],
+    /// The numbers that change over the runs.
+    pub courses: &'a [(EffectKind, Vec<Course>)],
+}
+
+impl Known<'_> {
+    /// The courses of an effect.
+    pub fn courses(&self, kind: EffectKind) -> Vec<Course> {
+        let own = self.courses.iter().filter(|it| it.0 == kind);
+        own.flat_map(|it| it.1.clone()).collect()
+    }
+}
 
 /// Returns the limits of a verdict.
 pub fn caveats(

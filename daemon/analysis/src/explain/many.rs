@@ -20,7 +20,7 @@ use crate::parallel;
 /// Largest number of fit runs that are all searched, as they were recorded.
 pub const FIT_RUNS_MAX: usize = 32;
 /// Least and greatest number of searched fit runs where there are more, of which a quarter is searched.
-const FIT_RUNS_HELD: [usize; 2] = [12, 32];
+const FIT_RUNS_HELD: [usize; 2] = [12, 24];
 /// Number of holdout runs that are held for effects in single runs.
 const HOLDOUT_RUNS_HELD: usize = 6;
 /// The golden ratio less 1: its multiples, less their whole parts, lie evenly, and in step with no order of the runs.

@@ -8,13 +8,11 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location, Meaning,
-    PlaceUncertainty, Verdict,
+    Verdict,
 };
-use super::caveats::told_by_data;
-use super::caveats::{caveats, trimmed};
+use super::caveats::{Known, caveats, told_by_data, trimmed};
 use super::competing::runners_up;
 use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, separating_run};
-use super::course::Course;
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
@@ -31,24 +29,6 @@ use crate::statistics::greatest_first;
 const MOVING_MIN_S: f64 = 180.0;
 /// Share of the decrease that the library must explain when something unknown is left too.
 const LIBRARY_SHARE_MIN: f64 = 0.5;
-
-/// How surely the numbers of a finished search are known.
-pub struct Known<'a> {
-    /// The numbers.
-    pub deviations: &'a Deviations,
-    /// The place of each effect.
-    pub places: &'a [Option<PlaceUncertainty>],
-    /// The numbers that change over the runs.
-    pub courses: &'a [(EffectKind, Vec<Course>)],
-}
-
-impl Known<'_> {
-    /// The courses of an effect.
-    fn courses(&self, kind: EffectKind) -> Vec<Course> {
-        let own = self.courses.iter().filter(|it| it.0 == kind);
-        own.flat_map(|it| it.1.clone()).collect()
-    }
-}
 
 /// The answer to a finished search.
 pub fn answer(

@@ -42,7 +42,7 @@ impl LearnedStd {
     }
 }
 
-/// What is learned of brakes.
+/// Learned behaviour of brakes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakeErrors {
     /// Of what the slowest brake would lack.
