@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use dynocar_analysis::dataset::Role;
-use dynocar_analysis::explain::answer::Verdict;
+use dynocar_analysis::explain::answer::{EffectAnswer, Verdict};
 use dynocar_analysis::explain::report::{effect, words};
 use dynocar_core::plausibility::Severity;
 use sha2::{Digest, Sha256};
@@ -129,12 +129,20 @@ fn verdict(subject: &Subject) -> String {
          <p class=\"sentence\">{}</p>\n",
         escape(&subject.data.sentence)
     );
-    for to_do in answer.effects.iter().filter_map(effect::to_do) {
-        let _ = writeln!(
-            html,
-            "<p class=\"experiment\"><strong>To do:</strong> {}.</p>",
-            escape(&to_do.replace('`', ""))
-        );
+    let to_do = |effect: &EffectAnswer| {
+        let words = effect::to_do(effect)?.replace('`', "");
+        Some(format!("<p class=\"experiment\"><strong>To do:</strong> {}.</p>\n", escape(&words)))
+    };
+    match &answer.effects[..] {
+        several @ [_, _, ..] if answer.verdict == Verdict::Effect => {
+            html += "<ol class=\"effects\">\n";
+            for effect in several {
+                let (words, to_do) = (escape(&effect::described(effect)), to_do(effect));
+                let _ = writeln!(html, "<li><p>{words}</p>\n{}</li>", to_do.unwrap_or_default());
+            }
+            html += "</ol>\n";
+        }
+        others => html.extend(others.iter().filter_map(to_do)),
     }
     for caveat in &answer.caveats {
         let _ = writeln!(html, "<p class=\"note\">{}</p>", escape(caveat));

@@ -23,7 +23,11 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
             let means = answer.effects.first().map(|it| meaning(&it.meaning)).unwrap_or_default();
             let is_one = answer.effects.len() == 1 && !means.is_empty();
             let means = if is_one { format!(" It means {means}.") } else { String::new() };
-            format!("Found: {found}.{means} {}", gained(errors))
+            match answer.effects.len() {
+                // A list beside the sentence describes them.
+                count @ 2.. => format!("Found: {count} effects. {}", gained(errors, "With them")),
+                _ => format!("Found: {found}.{means} {}", gained(errors, "With it")),
+            }
         }
         Verdict::Ambiguous => {
             let competing: Vec<String> =
@@ -33,19 +37,19 @@ pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
                 "Something undeclared acts, but these runs do not show what: it may be {found}; \
                  {} {is_or_are} them as well. {}",
                 joined(&competing),
-                gained(errors)
+                gained(errors, "With it")
             )
         }
         Verdict::Unknown if answer.effects.is_empty() => answer.statement.clone(),
         Verdict::Unknown => format!(
             "Something undeclared acts that no effect of the library explains: {found}. {}",
-            gained(errors)
+            gained(errors, "With it")
         ),
     }
 }
 
 /// Describes the error reduction of the effects.
-fn gained(errors: &Errors) -> String {
+fn gained(errors: &Errors, with: &str) -> String {
     let Some((role, judged)) = errors.judged() else { return String::new() };
     let runs = if role == Role::Holdout { "the runs held out" } else { "the fit runs" };
     let runs = format!("{runs}{}", judged.predicted());
@@ -59,10 +63,10 @@ fn gained(errors: &Errors) -> String {
     if judged.reduction > 0.0 {
         let share = percent(judged.reduction);
         format!(
-            "With it, the error of the predicted speed on {runs} falls {values}, by {share}{interval}."
+            "{with}, the error of the predicted speed on {runs} falls {values}, by {share}{interval}."
         )
     } else {
-        format!("With it, the error of the predicted speed on {runs} does not fall ({values}).")
+        format!("{with}, the error of the predicted speed on {runs} does not fall ({values}).")
     }
 }
 
