@@ -7,7 +7,7 @@ use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::monitor::{MonitorSettings, ResidualMonitor};
 use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_shared::{ParameterSnapshot, TrainSample};
+use dynocar_shared::{ParameterSnapshot, SampleField, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
 use dynocar_tests::simulator::{
     Defects, Deviations, Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings,
@@ -92,6 +92,29 @@ fn ordinary_days_with_everything_a_little_wrong_raise_hardly_an_alarm_on_any_typ
         }
     }
     assert!(alarms.len() <= 2, "{alarms:?}");
+}
+
+#[test]
+fn a_train_that_declares_its_tare_and_its_full_load_is_told_of_no_changed_mass() {
+    for (seed, train_type) in (120..).zip(TrainType::ALL) {
+        let mut data = dataset(seed, Some(train_type), EffectRequest::none());
+        // Every load that it drives with lies between the tare and 1.4 times that.
+        let tare_kg = data.declared_train().mass_kg / 1.2;
+        data.train.declared.mass_kg = tare_kg;
+        for sample in data.runs.iter_mut().flat_map(|run| &mut run.samples) {
+            sample.set(SampleField::Mass, tare_kg);
+        }
+        let named = [None, Some(1.4)].map(|full| {
+            data.train.declared.full_mass_kg = full.map(|full: f64| full * tare_kg);
+            let mut named = 0;
+            watch(&data, |_, _, snapshot| {
+                named += usize::from(suspect(snapshot) == EffectKind::MassChange);
+            });
+            named
+        });
+        assert!(named[0] > 100, "{}: {named:?}", train_type.name());
+        assert_eq!(named[1], 0, "{}", train_type.name());
+    }
 }
 
 #[test]

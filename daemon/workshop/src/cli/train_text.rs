@@ -18,6 +18,9 @@ const CAR_LENGTH_M: f64 = 25.0;
 const ROTATING_MASS_DEFAULT: f64 = 0.06;
 /// Resistance in N/kN over the speed in m/s, of a train of which nothing is known.
 const DAVIS_DEFAULT: [f64; 3] = [1.5, 0.015, 0.0015];
+/// Key of the full load, for a train whose load changes.
+const FULL: &str =
+    "# mass_full_t = 300.0           # t, where the load changes; mass_t is the tare then\n";
 
 /// The user's description of the train.
 #[derive(Clone, Debug, Default, PartialEq, Args)]
@@ -28,6 +31,9 @@ pub struct TrainArguments {
     /// Gross mass in t
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     mass_t: Option<f64>,
+    /// Gross mass with its full load in t, where the load changes; --mass-t is the tare then
+    #[arg(long, value_name = "T", allow_negative_numbers = true, requires = "mass_t")]
+    mass_full_t: Option<f64>,
     /// Length in m
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     length_m: Option<f64>,
@@ -208,6 +214,12 @@ impl TrainArguments {
                 "" => format!("{assignment}\n"),
                 comment => format!("{assignment:<31} # {comment}\n"),
             };
+            if key == "mass_t" {
+                text += &self.mass_full_t.map_or(FULL.into(), |full_t| {
+                    let assignment = format!("mass_full_t = {}", Value::Float(full_t));
+                    format!("{assignment:<31} # t, with its full load; mass_t is the tare\n")
+                });
+            }
         }
         text += CURVES;
         text += &found.traction.as_deref().map_or(TRACTION.into(), |it| effort(EFFORT, it));
@@ -288,12 +300,14 @@ mod tests {
         let given = TrainArguments {
             name: Some("a \"quoted\"\nname".into()),
             mass_t: Some(114.5),
+            mass_full_t: Some(150.0),
             b: Some(-0.01),
             ..TrainArguments::default()
         };
         let made = given.text("x", &Found::default()).unwrap();
         let train = parse_train("train.toml", &made.text).unwrap();
         assert_eq!((train.mass_kg, train.resistance.b), (114_500.0, -0.01));
+        assert_eq!(train.full_mass_kg, Some(150_000.0));
         assert_eq!(train.name, "a \"quoted\"\nname");
         assert_eq!((train.length_m, train.cars), (57.25, 2));
         let marked = made.text.lines().filter(|line| line.contains("# DEFAULT")).count();
