@@ -45,7 +45,7 @@ pub struct BrakesArguments {
     #[arg(long, value_name = "SHARE", value_parser = share)]
     k_wet: Option<f64>,
     /// Confidence that the mean deceleration lies above the steps
-    #[arg(long, value_name = "SHARE", default_value = "0.95", value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value = "0.95", value_parser = confidence)]
     confidence: f64,
     /// Take the declared resistance out of the decelerations
     #[arg(long)]
@@ -110,6 +110,12 @@ pub fn execute(arguments: &BrakesArguments) -> Result<(), Failure> {
     }
     let gamma = datasets[0].train.rotating_mass_factor;
     Ok(give(arguments.json.as_deref(), &answer, || text(&answer, gamma))?)
+}
+
+/// A confidence below certainty, which no number of stops gives.
+fn confidence(text: &str) -> Result<f64, String> {
+    let share = share(text)?;
+    (share < 1.0).then_some(share).ok_or_else(|| "expected a share above 0 and below 1".into())
 }
 
 fn studied(
@@ -207,11 +213,12 @@ fn said(
             if arguments.without_resistance { "taken out as declared" } else { "in them" }
         ),
         format!(
-            "the mean deceleration lies above the steps with {:.0} % confidence; {} stops show Kdry_rst \
-             to one in {} and no further",
+            "the mean deceleration lies above the steps with {:.0} % confidence; {}",
             100.0 * arguments.confidence,
-            law.stops,
-            law.stops
+            match law.stops {
+                1 => "one stop shows Kdry_rst for no confidence level".into(),
+                stops => format!("{stops} stops show Kdry_rst to one in {stops} and no further"),
+            }
         ),
     ];
     said.push(format!("nothing is said of speeds above {:.1} m/s", law.fastest_mps()));
