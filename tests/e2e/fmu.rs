@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar::dataset;
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::identify::{identify, published_samples};
+use dynocar_analysis::identify::{published_samples, snapshot_after};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_fmu::estimators::PIPELINES;
 use dynocar_fmu::ffi::Status;
@@ -75,12 +75,12 @@ fn expected(snapshot: &ParameterSnapshot, reported: SnapshotField, speed_mps: f6
     }
 }
 
-/// Compares every output with what `identify` makes of the first samples.
+/// Compares every output with the pipelines after the first samples.
 fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
     let samples = &published_samples(dataset, TrainId(1))[..count];
     let speed_mps = samples[count - 1].speed_mps;
     let identified = |kind: PipelineKind| {
-        identify(dataset, samples, &EstimatorSettings::default_of(kind).unwrap()).unwrap()
+        snapshot_after(dataset, samples, &EstimatorSettings::default_of(kind).unwrap()).unwrap()
     };
     let snapshots = PIPELINES.map(identified);
     for (reference, variable) in ESTIMATORS.variables.iter().enumerate() {
@@ -115,7 +115,7 @@ fn take_row(fmu: &Fmu, header: &[&str], (row, next): (&str, Option<&&str>)) {
 }
 
 #[test]
-fn every_output_has_the_bits_of_identify_at_every_moment_looked_at() {
+fn every_output_has_the_bits_of_the_pipelines_at_every_moment_looked_at() {
     let site = Site::new();
     let folder = demo_with_brake_gear(&site);
     let folder_name = folder.to_str().unwrap();

@@ -8,7 +8,7 @@ use dynocar::config::is_slow;
 use dynocar::dataset;
 use dynocar::replay::{Rate, Replayer};
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::identify::{default_estimators, identify, published_samples};
+use dynocar_analysis::identify::{default_estimators, published_samples, snapshot_after};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::golden::{self, Golden, TOLERANCE, without_stamps};
 use dynocar_tests::process::Site;
@@ -102,7 +102,8 @@ fn rate_and_other_pipelines_change_no_bit() {
     let samples = published_samples(&dataset, TRAIN);
     let estimators = default_estimators();
     let v_mils = estimators.iter().find(|it| it.kind() == PipelineKind::VMils).expect("v_mils");
-    let offline = without_stamps(&identify(&dataset, &samples, v_mils).expect("default settings"));
+    let offline =
+        without_stamps(&snapshot_after(&dataset, &samples, v_mils).expect("default settings"));
     let all: Vec<PipelineKind> = estimators.iter().map(|it| it.kind()).collect();
     let few = [PipelineKind::MassKalman, PipelineKind::VMils];
     let cases: [(Rate, &[PipelineKind]); 3] =

@@ -173,6 +173,20 @@ fn each_run_is_learned_from_alone_and_their_difference_shows() {
 }
 
 #[test]
+fn runs_that_end_at_a_stop_say_the_mass_that_arrived() {
+    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
+    let arguments = ["identify", "--estimator", "train_kalman", "--json", "-"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dynocar-workshop-under-test"));
+    let output = command.args(arguments).arg(&demo).output().unwrap();
+    let answer: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let said = &answer["estimators"][0];
+    assert_eq!(said["reason"], "none", "{said}");
+    let share =
+        said["std"]["mass_t"].as_f64().unwrap() / said["values"]["mass_t"].as_f64().unwrap();
+    assert!(share < 0.02, "{share}");
+}
+
+#[test]
 fn the_table_of_runs_comes_only_when_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let text = |output: &Output| String::from_utf8(output.stdout.clone()).unwrap();

@@ -7,7 +7,7 @@ use dynocar_core::pipeline::quantities::candidates;
 use dynocar_core::pipeline::{Pipeline, SettingError};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{
-    ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
+    ParameterSnapshot, PipelineKind, Quantity, Reason, SampleField, TrainId, TrainSample,
 };
 
 use crate::dataset::{Dataset, Run};
@@ -33,7 +33,24 @@ pub fn samples_of_runs<'a>(
     samples
 }
 
-/// Runs one estimator with its settings over the samples; gives the last snapshot.
+/// Speed in m/s below which a train may be about to stop.
+const STOPPING_MPS: f64 = 2.0;
+
+/// Runs one estimator with its settings over the samples; gives the last snapshot, as a controller reads it.
+///
+/// # Errors
+///
+/// When a setting is out of range.
+pub fn snapshot_after(
+    dataset: &Dataset,
+    samples: &[TrainSample],
+    settings: &EstimatorSettings,
+) -> Result<ParameterSnapshot, SettingError> {
+    process(dataset, samples, settings, |_, _| {})
+}
+
+/// Runs one estimator with its settings over the samples; gives what recorded runs say: at their last stop another load
+/// may board, but their mass is the one that arrived.
 ///
 /// # Errors
 ///
@@ -43,11 +60,42 @@ pub fn identify(
     samples: &[TrainSample],
     settings: &EstimatorSettings,
 ) -> Result<ParameterSnapshot, SettingError> {
+    let is_open =
+        |snapshot: &ParameterSnapshot| snapshot.reason() == Some(Reason::LoadMayHaveChanged);
+    let mut arrived: Option<ParameterSnapshot> = None;
+    let last = process(dataset, samples, settings, |before, sample| {
+        match (is_open(before), sample.speed_mps < STOPPING_MPS) {
+            (false, true) => arrived = Some(*before),
+            // What drove since was not weighed.
+            (true, false) => arrived = None,
+            _ => {}
+        }
+    })?;
+    let arrived = arrived.filter(|_| is_open(&last)).unwrap_or(last);
+    Ok(ParameterSnapshot {
+        sample_sequence: last.sample_sequence,
+        samples_used: last.samples_used,
+        samples_rejected: last.samples_rejected,
+        samples_lost: last.samples_lost,
+        rejected_by_reason: last.rejected_by_reason,
+        updates: last.updates,
+        ..arrived
+    })
+}
+
+/// Calls `see` with the snapshot before each sample.
+fn process(
+    dataset: &Dataset,
+    samples: &[TrainSample],
+    settings: &EstimatorSettings,
+    mut see: impl FnMut(&ParameterSnapshot, &TrainSample),
+) -> Result<ParameterSnapshot, SettingError> {
     let train = Arc::clone(&dataset.train);
     let estimator = settings.build(&train)?;
     let train_id = samples.first().map_or(TrainId(1), |sample| TrainId(sample.train_id));
     let mut pipeline = Pipeline::new(train_id, 0, train, dataset.track.clone(), estimator);
     for sample in samples {
+        see(pipeline.snapshot(), sample);
         pipeline.process(sample);
     }
     Ok(*pipeline.snapshot())
