@@ -21,7 +21,7 @@ import pandas
 import polars
 import pyarrow
 import pytest
-from conftest import PATIENCE_S, ROOT, Lines, dynocar_command, wait_for
+from conftest import PATIENCE_S, PROGRAMS, ROOT, Lines, dynocar_command, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +189,11 @@ def words_of(*arguments: object) -> str:
     return done.stderr.strip().removeprefix("dynocar: ")
 
 
-def test_a_train_of_a_recording_is_chosen(recordings: Path, tmp_path: Path) -> None:
+def test_a_train_of_a_recording_is_chosen(
+    recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A recording is unpacked by the program for recordings.
+    monkeypatch.setenv("PATH", f"{PROGRAMS}{os.pathsep}{os.environ['PATH']}")
     path = tmp_path / "run.mcap"
     done = dynocar_command("convert", recordings, "-o", path)
     assert done.returncode == 0, done.stderr
