@@ -66,7 +66,7 @@ pub fn identify(
     let last = process(dataset, samples, settings, |before, sample| {
         match (is_open(before), sample.speed_mps < STOPPING_MPS) {
             (false, true) => arrived = Some(*before),
-            // What drove since was not weighed.
+            // The load that drove since was not weighed.
             (true, false) => arrived = None,
             _ => {}
         }
