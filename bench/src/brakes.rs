@@ -27,16 +27,6 @@ pub struct BrakesArguments {
 
 /// Share of the stops that are weaker.
 const PROBABILITY: f64 = 1e-6;
-const NONE: BrakeComponents = BrakeComponents {
-    units: 24,
-    friction_std: 0.0,
-    pressure_std: 0.0,
-    efficiency_std: 0.0,
-    common_std: 0.0,
-    mass_std: 0.0,
-    failure_probability: 0.0,
-};
-
 /// Answers of several seeds: their mean, their variance, and the time of one in s.
 struct Answers {
     mean: f64,
@@ -64,8 +54,9 @@ impl BrakesArguments {
     pub fn run(&self) -> Result<(), Failure> {
         expect(self.seeds >= 2, || format!("--seeds {}: expected 2 or more", self.seeds))?;
         let quantile = normal_quantile(PROBABILITY).unwrap_or(f64::NAN);
-        let differ = BrakeComponents { friction_std: 0.1, ..NONE };
-        let fails = BrakeComponents { units: 1, failure_probability: 2e-7, ..NONE };
+        let of_units = |units| BrakeComponents { units, ..BrakeComponents::default() };
+        let differ = BrakeComponents { friction_std: 0.1, ..of_units(24) };
+        let fails = BrakeComponents { failure_probability: 2e-7, ..of_units(1) };
         let all = BrakeComponents {
             friction_std: 0.06,
             pressure_std: 0.02,
@@ -73,7 +64,7 @@ impl BrakesArguments {
             common_std: 0.02,
             mass_std: 0.01,
             failure_probability: 1e-3,
-            ..NONE
+            ..of_units(24)
         };
         let cases = [
             ("24 that differ by 10 %", differ, Some(1.0 + 0.1 * quantile / 24_f64.sqrt())),

@@ -15,24 +15,18 @@ pub(crate) fn stopping_estimate(
     effort: Vec<(f64, f64)>,
     confidence: f64,
 ) -> PyResult<(f64, f64, f64, f64)> {
-    let [from_speed_mps, to_speed_mps, mass_kg, rotating_mass_factor, gradient_permille, ..] =
-        numbers;
     let [
-        _,
-        _,
-        _,
-        _,
-        _,
+        from_speed_mps,
+        to_speed_mps,
+        mass_kg,
+        rotating_mass_factor,
+        gradient_permille,
         davis_a,
         davis_b,
         davis_c,
         w0_std_n_per_kn,
         brake_scale,
         brake_scale_std,
-        ..,
-    ] = numbers;
-    let [
-        ..,
         traction_cut_off_s,
         dead_time_s,
         build_up_s,

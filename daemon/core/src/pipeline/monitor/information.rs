@@ -309,8 +309,10 @@ pub fn usual(
     base_std[BRAKE_SCALE] = 0.01 * settings.force_std_percent;
     base_std[FORCE_DELAY] = settings.data.force_delay_std_s;
     // A declared tare stands for any load up to the full one: the mean square of all of them.
-    let loads = train.full_mass_kg.map_or(0.0, |full_kg| full_kg / train.mass_kg - 1.0);
-    base_std[LOAD] = (0.01 * settings.mass_std_percent).max(loads / 3_f64.sqrt());
+    let loads = train.load_range().map_or(0.0, |(middle_kg, std_kg)| {
+        (middle_kg - train.mass_kg).hypot(std_kg) / train.mass_kg
+    });
+    base_std[LOAD] = (0.01 * settings.mass_std_percent).max(loads);
     base_std[DAY_WIND] = settings.wind_std_mps;
     let curve = settings.curve_constant_std * 1e-3 * train.curve_constant_n_per_kn_m;
     base_std[CURVE] = curve.max(CURVE_STD_MIN);
