@@ -189,7 +189,7 @@ impl TrainArguments {
         let inertia = "inertia of wheels, axles and motors as a share of the mass";
         let defaults = [
             (Value::String("my train".into()), ""),
-            (Value::Float(mass_t), "t, with its load"),
+            (Value::Float(mass_t), self.mass_full_t.map_or("t, with its load", |_| "t, tare")),
             (Value::Float(length_m), "m, over the couplers"),
             (Value::Integer(cars.into()), "with the locomotive"),
             (Value::Float(ROTATING_MASS_DEFAULT), inertia),
@@ -217,7 +217,7 @@ impl TrainArguments {
             if key == "mass_t" {
                 text += &self.mass_full_t.map_or(FULL.into(), |full_t| {
                     let assignment = format!("mass_full_t = {}", Value::Float(full_t));
-                    format!("{assignment:<31} # t, with its full load; mass_t is the tare\n")
+                    format!("{assignment:<31} # t, with its full load\n")
                 });
             }
         }
