@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
@@ -17,7 +18,7 @@ use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{
-    Candidate, map_error, map_error_as_fitted, usual_errors, vertical_curves,
+    Candidate, USUAL_LENGTH_M, map_error, map_error_as_fitted, usual_errors, vertical_curves,
 };
 use crate::explain::evidence::Fit;
 use crate::explain::gradient_prior::SURVEYED;
@@ -53,6 +54,11 @@ fn is_sought(kind: EffectKind) -> bool {
     )
 }
 
+/// Times at most that the length over which steps are rounded is found again, and the share by which what it changes
+/// may be off.
+const ROUNDING_TURNS: usize = 3;
+const ROUNDING_SHARE: f64 = 0.1;
+
 /// Why a mass of single runs is none.
 const AS_LOADS_ARE: &str =
     "its runs stand out from the others no more than the largest of as many loads do";
@@ -68,8 +74,13 @@ impl Search<'_> {
         }
         let usual = usual_errors(fit.theta[0], |kind| fit.model.has(kind));
         let shared = usual.start.len();
-        let errors = self.map_errors(fit).into_iter().chain([usual]).map(Candidate::parts);
-        let fit = self.problem.with_runs_apart(self.problem.grown(fit, errors));
+        let map_errors = self.map_errors(fit);
+        let rounded = map_errors.len().checked_sub(1).map(|last| fit.model.effects.len() + last);
+        let errors = map_errors.into_iter().chain([usual]).map(Candidate::parts);
+        let mut fit = self.problem.with_runs_apart(self.problem.grown(fit, errors));
+        if let Some(rounded) = rounded {
+            self.round_as_found(&mut fit, rounded);
+        }
         let beside = Arc::new(Beside { fit, shared });
         outcome.beside = Some((outcome.fit.theta.clone(), beside.clone()));
         beside
@@ -84,8 +95,30 @@ impl Search<'_> {
         let (Some(track), Some(span_m)) = (track, span_m.filter(|[low, high]| high > low)) else {
             return Vec::new();
         };
-        let rounded = vertical_curves(track.clone(), self.train.length_m);
+        let rounded = vertical_curves(track.clone(), self.train.length_m, USUAL_LENGTH_M, 0.0);
         vec![map_error(span_m, SURVEYED), rounded]
+    }
+
+    /// Fits again with steps rounded over the length that a fit shows, where it shows another than the usual one: a
+    /// share of another length has another shape, and a rotating mass takes up the difference.
+    fn round_as_found(&self, fit: &mut Fit, number: usize) {
+        let Some(track) = self.track else { return };
+        let mut length_m = USUAL_LENGTH_M;
+        for _ in 0..ROUNDING_TURNS {
+            let at = fit.model.ranges()[number].start;
+            let share = fit.theta[at];
+            let std = deviations_beside(fit, fit.theta.len(), 0).std[at];
+            let is_shown = std.is_finite() && share > HALF_95 * std;
+            if !is_shown || (share - 1.0).abs() < ROUNDING_SHARE {
+                return;
+            }
+            length_m *= share.sqrt();
+            let rounded = vertical_curves(track.clone(), self.train.length_m, length_m, 1.0);
+            let (mut model, mut theta) = (fit.model.clone(), fit.theta.clone());
+            model.effects[number] = rounded.hypothesis;
+            theta[at] = 1.0;
+            *fit = self.problem.fit(&model, theta, fit.noise);
+        }
     }
 
     /// Takes in what is certain beside the usual errors; false for nothing.
