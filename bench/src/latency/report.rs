@@ -3,7 +3,7 @@
 use hdrhistogram::Histogram;
 use serde_json::{Value, json};
 
-use super::case::Case;
+use super::case::LatencyCase;
 use super::costs::{Costs, MANY};
 use crate::open_loop::controller::Outcome;
 use crate::open_loop::trial::{Answerer, Extent, Trial};
@@ -12,11 +12,11 @@ use crate::rig::quantiles::{self, cells};
 use crate::statistics::median;
 
 /// A case with its trial of every round.
-pub type Rounds = (Case, Vec<Trial>);
+pub type Rounds = (LatencyCase, Vec<Trial>);
 
 /// Measured latencies.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct MeasuredCase {
     /// Each case with its trial of every round.
     pub cases: Vec<Rounds>,
     /// Cost of each call.
@@ -33,8 +33,8 @@ pub fn pooled(trials: &[Trial], of: fn(&Outcome) -> &Histogram<u64>) -> Histogra
 }
 
 /// Returns the measured latencies, for machines and for people.
-pub fn of(measured: &Measured) -> (Value, String) {
-    let Measured { cases, costs, at_rest, extent } = measured;
+pub fn of(measured: &MeasuredCase) -> (Value, String) {
+    let MeasuredCase { cases, costs, at_rest, extent } = measured;
     let (rate_hz, cores) = (extent.traffic.rate_hz, extent.cores);
     let records: Vec<Record> = cases.iter().map(|case| record(case, cases)).collect();
     let rounds = cases.first().map_or(0, |(_, trials)| trials.len());

@@ -8,7 +8,7 @@ use dynocar_tests::process::Process;
 use dynocar_transport::monotonic_now_ns;
 use hdrhistogram::Histogram;
 
-use super::traffic::Traffic;
+use super::traffic::LoopTraffic;
 use super::wire::Wire;
 use crate::output::Failure;
 use crate::rig::quantiles::{histogram, record};
@@ -63,7 +63,7 @@ struct Answer {
 /// A controller that numbers its samples.
 pub struct Controller {
     wire: Box<dyn Wire>,
-    traffic: Traffic,
+    traffic: LoopTraffic,
     /// Appointed and actual time in ns of the samples in flight, by number.
     in_flight: Box<[(i64, i64)]>,
     sent: u64,
@@ -74,7 +74,7 @@ pub struct Controller {
 
 impl Controller {
     /// A controller that has sent nothing, and receives from `pipelines` pipelines.
-    pub fn new(wire: Box<dyn Wire>, traffic: Traffic, pipelines: usize) -> Self {
+    pub fn new(wire: Box<dyn Wire>, traffic: LoopTraffic, pipelines: usize) -> Self {
         let in_flight = vec![(0, 0); IN_FLIGHT].into();
         let answers = vec![[Answer::default(); 2]; pipelines];
         Controller { wire, traffic, in_flight, sent: 0, answers, sent_before: 0 }

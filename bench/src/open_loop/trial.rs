@@ -11,7 +11,7 @@ use dynocar_transport::monotonic_now_ns;
 
 use super::controller::{Controller, Outcome, drive, settle};
 use super::sockets::{Datagrams, End, TRAIN};
-use super::traffic::{Traffic, TrafficPlan};
+use super::traffic::{LoopTraffic, TrafficPlan};
 use super::wire::{Client, Notifying, Wire};
 use crate::output::{Failure, during};
 use crate::rig::cores::{Cores, bind, prioritise};
@@ -144,7 +144,7 @@ pub fn run(setting: &Setting, extent: &Extent, is_over: &AtomicBool) -> Result<T
     prioritise(cores.priority);
     let mut controllers = (1..=trains)
         .map(|id| {
-            let traffic = Traffic::new(traffic, TrainId(id), monotonic_now_ns(), seed);
+            let traffic = LoopTraffic::new(traffic, TrainId(id), monotonic_now_ns(), seed);
             Ok(Controller::new(setting.wire(&site, TrainId(id))?, traffic, setting.polled()))
         })
         .collect::<Result<Vec<_>, Failure>>()?;

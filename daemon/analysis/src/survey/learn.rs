@@ -3,9 +3,9 @@
 
 use super::balance::Observation;
 use super::banded::NotPositive;
-use super::chainage::Estimate;
 use super::profile::{Evidence, Profile};
 use super::recording::RawRecording;
+use crate::explain::answer::WithStd;
 use crate::parallel;
 use crate::statistics::{middle, share_of};
 
@@ -148,7 +148,7 @@ const MARGIN_PA: f64 = 5e3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundBrake {
     /// Force in N for each Pa.
-    pub gain_n_per_pa: Estimate,
+    pub gain_n_per_pa: WithStd,
     /// Pressure in Pa from which on it acts.
     pub release_pa: f64,
 }
@@ -204,7 +204,7 @@ pub fn found_brake(points: &[(f64, f64)]) -> Option<FoundBrake> {
     }
     let release_pa = (-offset / gain).max(0.0);
     let is_clear = gain > SIGNIFICANT * std && release_pa.is_finite();
-    let gain_n_per_pa = Estimate { value: gain, std };
+    let gain_n_per_pa = WithStd { value: gain, std };
     is_clear.then_some(FoundBrake { gain_n_per_pa, release_pa })
 }
 

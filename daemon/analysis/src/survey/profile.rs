@@ -8,7 +8,7 @@
 use super::balance::Observation;
 use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
-use super::layout::{Course, HEIGHT_STEP_M, Layout};
+use super::layout::{HEIGHT_STEP_M, Layout, LineCourse};
 use super::normal::Normal;
 use crate::parallel;
 use crate::statistics::middle;
@@ -33,7 +33,7 @@ const CHUNK: usize = 65_536;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Altitude {
     /// The alignment.
-    pub course: Course,
+    pub course: LineCourse,
     /// Place in m along it.
     pub along_m: f64,
     /// Altitude in m.
@@ -46,7 +46,7 @@ pub struct Evidence {
     /// Where heights lie.
     pub layout: Layout,
     /// The alignment of each pass.
-    pub courses: Vec<Course>,
+    pub courses: Vec<LineCourse>,
     /// Observations of the forces, in the order of the passes.
     pub observations: Vec<Observation>,
     /// Altitudes of the GNSS.

@@ -116,7 +116,7 @@ impl Integrals {
 
 /// A step of time between two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub struct IntegralStep {
     /// Its length in s.
     pub step_s: f64,
     /// Speed in m/s at its start.
@@ -131,7 +131,7 @@ pub struct Step {
 
 /// Expectation of a measured speed by a regression.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Expectation {
+pub struct ExpectedSpeed {
     /// Measured minus predicted speed over its standard deviation.
     pub normalised: f64,
     /// Measured minus predicted speed in m/s.
@@ -144,18 +144,18 @@ pub struct Expectation {
 
 /// The regression under its assumption.
 #[derive(Clone, Debug)]
-pub struct Hypothesis {
+pub struct BiasHypothesis {
     model: BiasModel,
     /// The regression.
     pub regression: DriftingLevel<UNKNOWNS>,
 }
 
-impl Hypothesis {
+impl BiasHypothesis {
     /// A regression that starts from prior knowledge.
     pub fn new(model: BiasModel, mean: &Row, std: &Row) -> Self {
         let mut regression = DriftingLevel::new(mean, std);
         regression.restart_bias(model.std_mps2);
-        Hypothesis { model, regression }
+        BiasHypothesis { model, regression }
     }
 
     /// Bias in m/s² at a speed for a stated bias of 1 m/s².
@@ -175,7 +175,7 @@ impl Hypothesis {
     }
 
     /// Moves on by a step of time.
-    pub fn propagate(&mut self, step: &Step) {
+    pub fn propagate(&mut self, step: &IntegralStep) {
         let keep = self.model.keep(step.step_s);
         let (keep, noise_variance) = self.model.drift(keep, &step.map, step.speed_mps);
         let jump_variance = self.model.jump_variance(step.push_change_mps2, step.step_s);
@@ -188,12 +188,12 @@ impl Hypothesis {
     }
 
     /// Returns the expectation of an equation of a measured speed with a noise variance.
-    pub fn expect(&self, row: &Row, value: f64, noise_variance: f64) -> Expectation {
+    pub fn expect(&self, row: &Row, value: f64, noise_variance: f64) -> ExpectedSpeed {
         let innovation = self.regression.clone().absorb(row, value, 1.0 / noise_variance);
         let normalised = innovation.normalised.unwrap_or(0.0);
         let variance_ratio = innovation.log_variance_ratio.exp();
         let error_mps = normalised * (noise_variance * variance_ratio).sqrt();
-        Expectation {
+        ExpectedSpeed {
             normalised,
             error_mps,
             residual_mps: error_mps / variance_ratio,

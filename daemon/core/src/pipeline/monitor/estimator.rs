@@ -14,7 +14,7 @@ use super::rows::{Parameters, Row, Rows, units};
 use super::suspects::{
     BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, Onsets, SUSPECTS, suspect_of,
 };
-use super::verdict::{Evidence, Verdict};
+use super::verdict::{ResidualEvidence, Verdict};
 use super::wheel_scale::WheelScale;
 use crate::pipeline::judge::Case;
 use crate::pipeline::momentum::blocks::MomentumBlocks;
@@ -249,7 +249,7 @@ impl ResidualMonitor {
 
     fn judge(&mut self, units: &Parameters, speed_mps: f64, is_new_place: bool) {
         let Ok(base) = self.information.base() else { return self.reset() };
-        self.verdict.judge(&Evidence {
+        self.verdict.judge(&ResidualEvidence {
             information: &self.information,
             base: &base,
             onsets: &self.onsets,
