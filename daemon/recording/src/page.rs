@@ -179,7 +179,7 @@ fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field
 fn enumerations(page: &mut String) {
     page.push_str(
         "\n## Numbers and their names\n\nIn the messages the names are in capitals, after that of the \
-         vocabulary: `STATUS_ESTIMATED`. [The reading guide](guides/reading.md) has their meanings.\n\n",
+         vocabulary: `STATUS_ESTIMATED`. [The reading guide](guides/reading.md) explains all but the effects, whose names say it.\n\n",
     );
     macro_rules! names {
         ($($name:ident)*) => {$(
