@@ -1,7 +1,7 @@
 //! The speed profile that keeps the timetable with the least energy: accelerate in full, cruise, coast,
-//! brake. Found are the cruising speed and the place from which the train coasts.
+//! brake. The search finds the cruising speed and the place from which the train coasts.
 //!
-//! The way from stop to stop is that of the driver's map.
+//! Distances and gradients between stops are those of the driver's map.
 
 use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};

@@ -10,7 +10,7 @@ use super::scenario::ExplainScenario;
 use crate::output::{Record, counts, table};
 use crate::statistics::{median, quantiles, root_mean_square, share};
 
-/// An error at most this many times another is as good.
+/// Ratio up to which one error counts as equal to another.
 const NEAR: f64 = 1.1;
 /// Shares of nulls whose greatest acceptance score of a candidate is reported.
 const SHARES: [f64; 7] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0];

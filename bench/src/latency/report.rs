@@ -23,7 +23,7 @@ pub struct MeasuredCase {
     pub costs: Costs,
     /// Load of a daemon while no sample comes: processor time in % of a core, by idle strategy.
     pub at_rest: Vec<(String, f64)>,
-    /// How it was driven.
+    /// Rounds and samples of the measurement.
     pub extent: Extent,
 }
 

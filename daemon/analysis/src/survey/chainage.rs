@@ -6,7 +6,6 @@
 //! 1965) over [offset, scale, error of the fix, lag] takes them apart, robust to single wild fixes.
 
 use nalgebra::{SMatrix, SVector};
-use serde::Serialize;
 
 use super::centring::{FIX_FADING_S, FIX_STD_M};
 use super::recording::Recording;

@@ -1,3 +1,5 @@
+//! Expectation maximisation of the adhesion, by particles and by a Kalman smoother.
+
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
 use dynocar_core::pipeline::braking::engine::{Engine, EngineStep, Observation};

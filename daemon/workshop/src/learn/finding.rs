@@ -7,6 +7,7 @@ use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, ParameterValue, Verdict};
 use dynocar_analysis::explain::effects::policy_of;
+use dynocar_model::terms::place::in_words;
 use dynocar_shared::TrainId;
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -176,10 +177,8 @@ pub fn sentence(event: &MaintenanceEvent) -> String {
             false => format!(", recorded {first} to {last}"),
         };
     }
-    let places: Vec<String> =
-        event.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m")).collect();
-    if !places.is_empty() {
-        text += &format!(", at {}", places.join(", "));
+    if !event.intervals_m.is_empty() {
+        text += &format!(", at {}", in_words(&event.intervals_m));
     }
     let sizes: Vec<String> = event.size.iter().take(4).map(|(name, it)| it.shown(name)).collect();
     if sizes.is_empty() { text } else { format!("{text}: {}", sizes.join(", ")) }

@@ -21,9 +21,9 @@ use crate::report::provenance::hex;
 use dynocar::models::{Action, ModelHash, ModelText, Moment, Store, TrainModels};
 use dynocar::storage::{Disk, Storage, StorageError};
 
-/// In the store's directory: what is the learner's own.
+/// Folder of the learner within the store's directory.
 const OWN_FOLDER: &str = "learn";
-/// Held by the learner that works on a store.
+/// Lock file of the learner that works on a store.
 const LOCK_FILE: &str = "learner.lock";
 
 /// Settings of a learner.
