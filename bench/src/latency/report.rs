@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::case::LatencyCase;
 use super::costs::{Costs, MANY};
-use crate::open_loop::controller::Outcome;
+use crate::open_loop::controller::TrialOutcome;
 use crate::open_loop::trial::{Answerer, Extent, Trial};
 use crate::output::{Record, table};
 use crate::rig::quantiles::{self, cells};
@@ -28,7 +28,7 @@ pub struct MeasuredCase {
 }
 
 /// All latencies of a case.
-pub fn pooled(trials: &[Trial], of: fn(&Outcome) -> &Histogram<u64>) -> Histogram<u64> {
+pub fn pooled(trials: &[Trial], of: fn(&TrialOutcome) -> &Histogram<u64>) -> Histogram<u64> {
     quantiles::pooled(trials.iter().flat_map(|it| &it.pipelines).map(of))
 }
 

@@ -2,7 +2,7 @@
 
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::motion::Motion;
+use super::motion::DrivenMotion;
 use crate::chance::Chance;
 
 /// The traffic of every train.
@@ -22,7 +22,7 @@ pub struct TrafficPlan {
 #[derive(Clone, Debug)]
 pub struct LoopTraffic {
     plan: TrafficPlan,
-    motion: Motion,
+    motion: DrivenMotion,
     random: Chance,
     start_ns: i64,
     number: u64,
@@ -34,7 +34,7 @@ impl LoopTraffic {
     /// A train of which no sample leaves before [`LoopTraffic::begin`].
     pub fn new(plan: TrafficPlan, train: TrainId, start_ns: i64, seed: u64) -> Self {
         let random = Chance::new(seed ^ train.0.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mut motion = Motion::of(train, start_ns);
+        let mut motion = DrivenMotion::of(train, start_ns);
         let next = (motion.sample(start_ns), start_ns);
         LoopTraffic { plan, motion, random, start_ns, number: 0, count: 0, next }
     }

@@ -42,7 +42,7 @@ pub struct Altitude {
 
 /// Everything that a profile is fitted to.
 #[derive(Clone, Debug)]
-pub struct Evidence {
+pub struct ProfileEvidence {
     /// Where heights lie.
     pub layout: Layout,
     /// The alignment of each pass.
@@ -90,9 +90,9 @@ fn one_in(passes: usize) -> usize {
     passes.div_ceil(FEW_PASSES).max(1)
 }
 
-impl Evidence {
+impl ProfileEvidence {
     /// Returns the evidence of a few passes.
-    pub fn of_few_passes(&self) -> Evidence {
+    pub fn of_few_passes(&self) -> ProfileEvidence {
         let (passes, each) = (self.courses.len(), one_in(self.courses.len()));
         let is_chosen = |pass: usize| is_one_of_few(pass, passes);
         let mut numbers = vec![None; self.courses.len()];
@@ -101,7 +101,7 @@ impl Evidence {
         let renumbered =
             |it: &Observation| Some(Observation { pass: numbers[it.pass as usize]?, ..*it });
         let courses = self.courses.iter().enumerate().filter(|(pass, _)| is_chosen(*pass));
-        Evidence {
+        ProfileEvidence {
             layout: self.layout.clone(),
             courses: courses.map(|(_, course)| *course).collect(),
             observations: self.observations.iter().filter_map(renumbered).collect(),

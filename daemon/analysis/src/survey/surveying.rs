@@ -10,7 +10,7 @@ use super::layout::{Layout, LineCourse};
 use super::learn::acting_from_pa;
 use super::learn::{Learned, learn};
 use super::line::{Alignments, find, pass_of};
-use super::profile::{Altitude, Evidence, is_one_of_few};
+use super::profile::{Altitude, ProfileEvidence, is_one_of_few};
 use super::recording::{RawRecording, Recording, plane_of};
 use super::recording_parts::{RecordingPart, recording_parts};
 use super::stops::{SurveyedStop, stands, stops};
@@ -204,7 +204,7 @@ fn profile(
     let altitudes = fit.iter().zip(&courses).flat_map(|(&number, &course)| {
         altitudes(&trips[number], &recordings[trips[number].recording], course)
     });
-    let mut evidence = Evidence {
+    let mut evidence = ProfileEvidence {
         layout,
         courses: courses.clone(),
         observations: Vec::new(),
@@ -245,7 +245,7 @@ fn profile(
 
 /// Length in s of the shortest blocks of which residuals do not alternate.
 fn shortest_block_s(
-    evidence: &mut Evidence,
+    evidence: &mut ProfileEvidence,
     observed: impl Fn(f64) -> Vec<Observation>,
 ) -> Result<f64, NotPositive> {
     let [shorter @ .., longest_s] = BLOCKS_S;

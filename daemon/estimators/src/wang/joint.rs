@@ -18,7 +18,8 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::bias_model::{BiasModel, MapError};
 use super::integrals::{
-    BiasHypothesis, INVERSE_MASS, IntegralStep, Integrals, POLYNOMIALS, Regressors, Row, UNKNOWNS,
+    BiasHypothesis, INVERSE_MASS, IntegralStep, Integrals, POLYNOMIALS, RegressorRow, Regressors,
+    UNKNOWNS,
 };
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
 use super::motion::{Motion, Section};
@@ -70,11 +71,11 @@ impl JointLeastSquares {
     ) -> Result<Self, SettingError> {
         settings.check_ranges()?;
         let regressors = Regressors::new(train, settings.reference_radius_m);
-        let mut mean = Row::zeros();
+        let mut mean = RegressorRow::zeros();
         mean[INVERSE_MASS] = 1.0;
         let basic = regressors.basis.of_davis(&train.resistance);
         mean.fixed_rows_mut::<3>(POLYNOMIALS[0]).copy_from(&basic);
-        let mut std = Row::repeat(settings.resistance_std_n_per_kn);
+        let mut std = RegressorRow::repeat(settings.resistance_std_n_per_kn);
         std[INVERSE_MASS] = 0.01 * settings.mass_std_percent;
         let models = settings.bias_models();
         let initial = Bank::even(models.map(|model| BiasHypothesis::new(model, &mean, &std)), 0.0);
@@ -134,7 +135,7 @@ impl JointLeastSquares {
         self.noise.variance().sqrt()
     }
 
-    pub(super) fn davis(&self, solution: &Row, section: Section) -> Davis {
+    pub(super) fn davis(&self, solution: &RegressorRow, section: Section) -> Davis {
         let at = POLYNOMIALS[section as usize];
         self.regressors.basis.to_davis(&solution.fixed_rows::<3>(at).into_owned())
     }

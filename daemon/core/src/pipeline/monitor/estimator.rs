@@ -10,7 +10,7 @@ use super::MonitorSettings;
 use super::covariates::{CovariateImpulse, PlaceMemory, RunClock, covariates};
 use super::information::{BaseVector, Information, usual};
 use super::pressure::ReleasedPressure;
-use super::rows::{Parameters, Row, Rows, units};
+use super::rows::{DesignRow, Parameters, Rows, units};
 use super::suspects::{
     BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, Onsets, SUSPECTS, suspect_of,
 };
@@ -217,7 +217,7 @@ impl ResidualMonitor {
     }
 
     /// Whether the cause of the suspicion has ended, by a row.
-    fn watch_end(&mut self, row: &Row, innovation: f64) {
+    fn watch_end(&mut self, row: &DesignRow, innovation: f64) {
         let Some(parameter) = self.verdict.naming.parameter() else { return };
         let without = innovation + row.features[parameter] * self.model[parameter];
         let weight = row.weight;
