@@ -163,7 +163,7 @@ fn explained<E: From<RunDataError> + Send>(
     let beside = outcome.beside();
     let finished = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
     let courses = over_time::courses(&problem, finished, &spans, &deviations.std);
-    let known = caveats::Known { deviations: &deviations, places: &known, courses: &courses };
+    let known = caveats::FinishedFit { deviations: &deviations, places: &known, courses: &courses };
     let mut answer = verdict::answer(&search, &outcome, &known, &score, diagnostics);
     if let Some(estimated) = estimated_drive {
         answer.add_caveat(&estimated.answer.sentence());

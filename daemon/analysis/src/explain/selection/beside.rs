@@ -9,7 +9,7 @@ use std::sync::Arc;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
+use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, moves_places};
 use super::acceptance::{is_material, is_possible};
 use super::by_run::{Deviations, deviations, deviations_beside};
 use super::outcome::{Beside, Outcome, Trial, round_of};
@@ -18,7 +18,8 @@ use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{
-    Candidate, USUAL_LENGTH_M, map_error, map_error_as_fitted, usual_errors, vertical_curves,
+    Candidate, USUAL_LENGTH_M, map_error, map_error_as_fitted, policy_of, usual_errors,
+    vertical_curves,
 };
 use crate::explain::evidence::Fit;
 use crate::explain::gradient_prior::SURVEYED;
@@ -29,29 +30,6 @@ pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
     is_material(trial)
         && is_possible(trial)
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
-}
-
-/// Returns whether a kind acts on the train by one law wherever it is. Errors of the record and of the map, places
-/// that pieces of the map's error look like, and loads, winds and slippery rails, which differ from run to run, do
-/// not.
-fn is_sought(kind: EffectKind) -> bool {
-    use EffectKind::{
-        ActuatorDelay, GradientError, GradientShift, LocalResistance, LowAdhesion, MassChange,
-        SpeedDelay, TractionGain, WheelDiameter, Wind,
-    };
-    !matches!(
-        kind,
-        ActuatorDelay
-            | GradientError
-            | GradientShift
-            | LocalResistance
-            | LowAdhesion
-            | MassChange
-            | SpeedDelay
-            | TractionGain
-            | WheelDiameter
-            | Wind
-    )
 }
 
 /// Times at most that the length over which steps are rounded is found again, and the share by which what it changes
@@ -72,7 +50,9 @@ impl Search<'_> {
         {
             return beside.clone();
         }
-        let usual = usual_errors(fit.theta[0], |kind| fit.model.has(kind));
+        let frees = |kind: EffectKind| policy_of(kind).frees;
+        let freed: Vec<_> = fit.model.effects.iter().flat_map(|it| frees(it.kind())).collect();
+        let usual = usual_errors(fit.theta[0], |figure| !freed.contains(&&figure));
         let shared = usual.start.len();
         let map_errors = self.map_errors(fit);
         let rounded = map_errors.len().checked_sub(1).map(|last| fit.model.effects.len() + last);
@@ -132,17 +112,20 @@ impl Search<'_> {
         }
         let looked = self.with_map_as_fitted(&outcome.fit, beside);
         let fallen = outcome.fallen_kinds();
+        let is_sought = |kind: EffectKind| {
+            policy_of(kind).is_sought_beside_usual_errors && !fallen.contains(&kind)
+        };
         let tried = self.round_of(
             &looked,
             &mut Vec::new(),
-            Asked { is_asked: &|kind| is_sought(kind) && !fallen.contains(&kind), rivals_of: None },
+            Asked { is_asked: &is_sought, rivals_of: None },
         );
         let may_be = |trial: &&Trial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
-        // The remainder of a wrong wheel or gradient looks like an unmapped tunnel.
         let are_places_moved = outcome.fit.model.effects.iter().any(moves_places);
-        let is_unmapped =
-            |trial: &Trial| is_unmapped_tunnel(&trial.fit.model.effects[trial.last()]);
-        let may_stand = |trial: &&Trial| may_be(trial) && !(are_places_moved && is_unmapped(trial));
+        let is_left = |trial: &Trial| {
+            are_places_moved && is_left_by_moved_places(&trial.fit.model.effects[trial.last()])
+        };
+        let may_stand = |trial: &&Trial| may_be(trial) && !is_left(trial);
         let may_be_certain = tried.iter().filter(may_stand);
         let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
