@@ -66,13 +66,21 @@ fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
     format!(" Certain, small, and part of the updated model: {}.", small.join(", "))
 }
 
-/// That the runs held out are predicted worse with what was found; empty when they are not.
+/// Returns whether the runs held out are predicted worse with what was found, or may be; empty when they are not.
 fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
     let Some(judged) = score.judged() else { return String::new() };
     let [before, after] = judged.error_mps;
     let [shown_before, shown_after] = [before, after].map(|error| format!("{error:.3}"));
     if effects.is_empty() || after <= before || shown_after == shown_before {
         return String::new();
+    }
+    let predicted = judged.predicted();
+    if let Some([low, high]) = judged.reduction_interval_95.filter(|[_, high]| *high > 0.0) {
+        let [low, high] = [low, high].map(|share| 100.0 * share);
+        return format!(
+            " The runs held out do not tell whether they are predicted better with it{predicted}, {shown_before} m/s \
+             before and {shown_after} after: the 95 % interval of what it removes is {low:.0} to {high:.0} %."
+        );
     }
     let acts_in_runs = |it: &EffectAnswer| it.place.runs.is_some() || it.place.windows.is_some();
     let why = if effects.iter().all(acts_in_runs) {
@@ -82,9 +90,8 @@ fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
         "it holds for the runs that were fitted, not for those."
     };
     format!(
-        " The runs held out are predicted worse with it{}, {shown_before} m/s before and \
-         {shown_after} after: {why}",
-        judged.predicted()
+        " The runs held out are predicted worse with it{predicted}, {shown_before} m/s before and \
+         {shown_after} after: {why}"
     )
 }
 
