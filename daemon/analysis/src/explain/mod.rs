@@ -122,7 +122,7 @@ fn explained<E: From<RunDataError> + Send>(
     let Prepared { estimated_drive, late, preparation, runs } = Prepared::of(&dataset, density)?;
     let track = preparation.track().map(|track| &**track);
     let diagnostics = diagnostics(preparation.train(), track, &all.runs);
-    let step_s = dataset.step_s();
+    let step_s = density.step_s(dataset.step_s());
     drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         runs.into_iter().partition(|run| run.role == Role::Fit);

@@ -41,7 +41,7 @@ pub use gradient_error::map_error;
 pub use policy::{Certainty, Everyday, Figure, Policy};
 pub use proposal::{Candidate, Effect, Proposal, Whole};
 pub use usual_errors::{map_error_as_fitted, usual_errors};
-pub use vertical_curves::vertical_curves;
+pub use vertical_curves::{USUAL_LENGTH_M, vertical_curves};
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
