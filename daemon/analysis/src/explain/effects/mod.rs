@@ -12,6 +12,7 @@ mod ambient_temperature;
 mod bearing_temperature;
 mod curve_resistance;
 mod dragging_brake;
+mod force_gain;
 mod gradient_error;
 mod gradient_shift;
 mod lateness;
@@ -21,7 +22,6 @@ mod mass_change;
 mod proposal;
 mod rotating_mass;
 mod speed_delay;
-mod traction_gain;
 mod tunnel_drag;
 mod unknown;
 mod usual_errors;
@@ -44,10 +44,12 @@ pub use vertical_curves::vertical_curves;
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
 pub const LIBRARY: &[Effect] = &[
-    Effect::new(ActuatorDelay, actuator_delay::propose, Whole::None),
+    Effect::new(ActuatorDelay, actuator_delay::of_both, Whole::None),
+    Effect::new(BrakeDelay, actuator_delay::of_brake, Whole::None),
     Effect::new(SpeedDelay, speed_delay::propose, Whole::None),
     Effect::new(WheelDiameter, wheel_diameter::propose, Whole::First),
-    Effect::new(TractionGain, traction_gain::propose, Whole::First),
+    Effect::new(TractionGain, force_gain::of_traction, Whole::First),
+    Effect::new(BrakeGain, force_gain::of_brake, Whole::None),
     Effect::new(MassChange, mass_change::propose, Whole::Of(mass_change::everywhere)),
     Effect::new(RotatingMass, rotating_mass::propose, Whole::First),
     Effect::new(GradientShift, gradient_shift::propose, Whole::Of(gradient_shift::whole)),

@@ -7,7 +7,7 @@ use dynocar_model::terms::{Parameter, bearings, curve, delay, rotating, traction
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::lateness::late_forces;
+use super::lateness::{Late, late_forces};
 use super::{Candidate, Handling, Hypothesis, Nature, On, Past, SharedHypothesis, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 
@@ -59,7 +59,7 @@ pub fn usual_errors(a_n_per_kn: f64, is_in: impl Fn(EffectKind) -> bool) -> Cand
         Figure::Curves => !is_in(EffectKind::CurveResistance),
         Figure::Warming => !is_in(EffectKind::BearingTemperature),
         Figure::RotatingMass => !is_in(EffectKind::RotatingMass),
-        Figure::Brake => true,
+        Figure::Brake => !is_in(EffectKind::BrakeGain),
     };
     let free: Vec<(Figure, f64)> = FIGURES.into_iter().filter(|it| is_free(it.0)).collect();
     let parameter = |&(figure, std): &(Figure, f64)| {
@@ -112,7 +112,7 @@ impl Hypothesis for UsualErrors {
                 }
                 Figure::Lateness => {
                     let on = On { run, first, past: &mut *past };
-                    late_forces([error, 0.0], on, forces);
+                    late_forces(Late::Both, [error, 0.0], on, forces);
                 }
             }
         }
@@ -166,10 +166,17 @@ mod tests {
         let free = |kind: EffectKind| usual_errors(1.0, |own| own == kind).start.len();
         assert_eq!(free(EffectKind::LocalResistance), FIGURES.len());
         use EffectKind::{
-            ActuatorDelay, BearingTemperature, CurveResistance, RotatingMass, TractionGain,
+            ActuatorDelay, BearingTemperature, BrakeGain, CurveResistance, RotatingMass,
+            TractionGain,
         };
-        for kind in [TractionGain, ActuatorDelay, CurveResistance, BearingTemperature, RotatingMass]
-        {
+        for kind in [
+            TractionGain,
+            BrakeGain,
+            ActuatorDelay,
+            CurveResistance,
+            BearingTemperature,
+            RotatingMass,
+        ] {
             assert_eq!(free(kind), FIGURES.len() - 1, "{kind:?}");
         }
     }

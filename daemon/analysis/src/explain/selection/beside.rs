@@ -35,12 +35,14 @@ pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
 /// not.
 fn is_sought(kind: EffectKind) -> bool {
     use EffectKind::{
-        ActuatorDelay, GradientError, GradientShift, LocalResistance, LowAdhesion, MassChange,
-        SpeedDelay, TractionGain, WheelDiameter, Wind,
+        ActuatorDelay, BrakeDelay, BrakeGain, GradientError, GradientShift, LocalResistance,
+        LowAdhesion, MassChange, SpeedDelay, TractionGain, WheelDiameter, Wind,
     };
     !matches!(
         kind,
         ActuatorDelay
+            | BrakeDelay
+            | BrakeGain
             | GradientError
             | GradientShift
             | LocalResistance
