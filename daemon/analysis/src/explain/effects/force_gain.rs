@@ -4,7 +4,7 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::{Key, brake, traction};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, Nature, On, Proposal};
+use super::{Candidate, Everyday, Figure, Hypothesis, Nature, On, Policy, Proposal};
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
@@ -13,6 +13,17 @@ enum Gain {
     Traction,
     Brake,
 }
+
+/// Force sensors are a little off: an error of the record that every train has.
+pub const OF_TRACTION: Policy = Policy {
+    is_sought_beside_usual_errors: false,
+    everyday: Some(Everyday { rank: 3, most: f64::INFINITY }),
+    frees: &[Figure::Traction],
+    ..Policy::USUAL
+};
+/// The usual errors hold a scale of the brake, and a larger one is no small error.
+pub const OF_BRAKE: Policy =
+    Policy { is_sought_beside_usual_errors: false, frees: &[Figure::Brake], ..Policy::USUAL };
 
 /// Proposes a gain of the traction force.
 pub fn of_traction(scan: &Scan) -> Proposal {
