@@ -7,6 +7,7 @@ use dynocar_analysis::brakes::{Weakest, weakest, weakest_plain};
 use dynocar_model::train::BrakeComponents;
 use dynocar_shared::quantile::normal_quantile;
 
+use crate::ending::until_due;
 use crate::output::{Failure, OutputArguments, Record, expect, table};
 
 /// Error and cost of Kdry_rst from components at one stop in a million, by turns with plain Monte Carlo.
@@ -72,7 +73,7 @@ impl BrakesArguments {
             ("24 with all of it", all, None),
         ];
         let mut records = Vec::new();
-        for (name, brake, exact) in cases {
+        for (name, brake, exact) in until_due(cases) {
             let tilted =
                 Answers::of(self.seeds, |seed| weakest(&brake, PROBABILITY, self.draws, seed));
             let plain = Answers::of(self.seeds, |seed| {

@@ -8,13 +8,14 @@ use dynocar::output::report_line;
 
 use crate::brakes::BrakesArguments;
 use crate::drive::DriveArguments;
+use crate::ending;
 use crate::estimators::EstimatorsArguments;
 use crate::explain::ExplainArguments;
 use crate::latency::LatencyArguments;
 use crate::load::LoadArguments;
 use crate::monitor::MonitorArguments;
 use crate::open_loop::server::{PeerArguments, serve};
-use crate::output::Usage;
+use crate::output::{Failure, Usage};
 use crate::papers::PapersArguments;
 use crate::scenarios::ScenariosArguments;
 use crate::survey::SurveyArguments;
@@ -54,7 +55,14 @@ pub fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(status) => return status,
     };
-    let result = match &arguments.command {
+    if let Command::Peer(arguments) = &arguments.command {
+        return status(serve(arguments));
+    }
+    status(ending::begin().and_then(|()| run(&arguments.command)))
+}
+
+fn run(command: &Command) -> Result<(), Failure> {
+    match command {
         Command::Brakes(arguments) => arguments.run(),
         Command::Drive(arguments) => arguments.run(),
         Command::Estimators(arguments) => arguments.run(),
@@ -66,8 +74,15 @@ pub fn main() -> ExitCode {
         Command::Scenarios(arguments) => arguments.run(),
         Command::Survey(arguments) => arguments.run(),
         Command::Peer(arguments) => serve(arguments),
-    };
+    }
+}
+
+fn status(result: Result<(), Failure>) -> ExitCode {
     match result {
+        Ok(()) if ending::is_due() => {
+            report_line("dynocar-bench: ended by a signal: figures of what was done until then");
+            ExitCode::from(ending::STATUS)
+        }
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             report_line(&format!("dynocar-bench: {failure}"));

@@ -2,6 +2,7 @@
 //!
 //! - [`cli`]: the commands of `dynocar-bench`
 //! - `drive`: what an automatic driver gains
+//! - `ending`: Ctrl-C, in every command
 //! - `estimators`: time of an update of every estimator and pipeline
 //! - `explain`: the search for undeclared effects on simulated datasets
 //! - `latency`: sample → snapshot through real processes, compared with the floor and alternatives
@@ -21,6 +22,7 @@ mod brakes;
 mod chance;
 pub mod cli;
 mod drive;
+mod ending;
 mod estimators;
 mod explain;
 mod latency;

@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::ending;
+
 /// Does `work` on every case on `threads` threads, which leave those of rayon to the work; gives the results
 /// in the order of the cases.
 ///
@@ -13,9 +15,32 @@ pub fn over<C: Sync, R: Send>(
     threads: usize,
     work: impl Fn(&C) -> R + Sync,
 ) -> Vec<R> {
+    over_while(cases, threads, work, || true)
+}
+
+/// The same with the first of the cases, until the command is to end.
+///
+/// # Panics
+///
+/// When the work does.
+pub fn until_due<C: Sync, R: Send>(
+    cases: &[C],
+    threads: usize,
+    work: impl Fn(&C) -> R + Sync,
+) -> Vec<R> {
+    over_while(cases, threads, work, || !ending::is_due())
+}
+
+/// Cases are taken in order and finished: those that are done are the first.
+fn over_while<C: Sync, R: Send>(
+    cases: &[C],
+    threads: usize,
+    work: impl Fn(&C) -> R + Sync,
+    goes_on: impl Fn() -> bool + Sync,
+) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let take = || {
-        let at = next.fetch_add(1, Ordering::Relaxed);
+        let at = goes_on().then(|| next.fetch_add(1, Ordering::Relaxed))?;
         cases.get(at).map(|case| (at, work(case)))
     };
     let mut results: Vec<(usize, R)> = std::thread::scope(|scope| {
@@ -29,7 +54,7 @@ pub fn over<C: Sync, R: Send>(
 
 #[cfg(test)]
 mod tests {
-    use super::over;
+    use super::{over, over_while};
 
     #[test]
     fn every_case_is_worked_on_once_and_in_order() {
@@ -37,5 +62,18 @@ mod tests {
             let cases: Vec<usize> = (0..count).collect();
             assert_eq!(over(&cases, threads, |case| *case), cases);
         }
+    }
+
+    #[test]
+    fn what_was_taken_before_the_end_is_finished_and_comes_first() {
+        let cases: Vec<usize> = (0..50).collect();
+        let is_over = std::sync::atomic::AtomicBool::new(false);
+        let work = |case: &usize| {
+            is_over.fetch_or(*case == 20, std::sync::atomic::Ordering::Relaxed);
+            *case
+        };
+        let done =
+            over_while(&cases, 3, work, || !is_over.load(std::sync::atomic::Ordering::Relaxed));
+        assert!((21..=23).contains(&done.len()) && cases.starts_with(&done), "{done:?}");
     }
 }

@@ -11,6 +11,7 @@ use dynocar_tests::simulator::{
 };
 use dynocar_workshop::survey::read::{recordings, vehicle};
 
+use crate::ending::until_due;
 use crate::output::{Failure, OutputArguments, Record, table};
 
 /// Seconds for each pass of a survey of a simulated line, for growing numbers of passes.
@@ -52,7 +53,7 @@ impl SurveyArguments {
         let dataset = dynocar::dataset::load(raw)?;
         let (few, vehicle) = (recordings(&dataset), vehicle(&dataset));
         let mut records = Vec::new();
-        for &passes in &self.passes {
+        for &passes in until_due(&self.passes) {
             let raws: Vec<_> = few.iter().cycle().take(passes).cloned().collect();
             let start = Instant::now();
             let surveyed = survey(&raws, &vehicle, None)?;

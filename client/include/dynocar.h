@@ -304,7 +304,10 @@ enum {
     DYNOCAR_EFFECT_UNKNOWN = 15, /* A real residual that no known effect explains */
     /* A declared gradient that is wrong by a smooth function of the chainage */
     DYNOCAR_EFFECT_GRADIENT_ERROR = 16,
-    DYNOCAR_EFFECT_SPEED_DELAY = 17 /* A measured speed that is late */
+    DYNOCAR_EFFECT_SPEED_DELAY = 17, /* A measured speed that is late */
+    DYNOCAR_EFFECT_BRAKE_GAIN = 18, /* A brake that is weaker or stronger than reported */
+    /* A brake that acts later than reported, while traction does not */
+    DYNOCAR_EFFECT_BRAKE_DELAY = 19
 };
 
 /* Measured quantities of a sample: bits of valid. */

@@ -61,6 +61,8 @@ fn undo(kind: EffectKind, disturbances: &mut Disturbances, neutral: &Disturbance
             d.mass_windows = neutral.mass_windows;
         }
         EffectKind::TractionGain => d.traction_gain = neutral.traction_gain,
+        EffectKind::BrakeGain => d.brake_gain = neutral.brake_gain,
+        EffectKind::BrakeDelay => d.brake_late_s = neutral.brake_late_s,
         EffectKind::ActuatorDelay => (d.delay_s, d.lag_s) = (neutral.delay_s, neutral.lag_s),
         EffectKind::SpeedDelay => {
             (d.speed_delay_s, d.speed_lag_s) = (neutral.speed_delay_s, neutral.speed_lag_s);

@@ -38,8 +38,8 @@ use self::score::Scored;
 use crate::output::{
     Failure, OutputArguments, Record, containing, expect, expect_none, table, write_csv,
 };
-use crate::parallel;
 use crate::scenarios::world::Traffic;
+use crate::{ending, parallel};
 
 /// Measures the gain of a controller: an automatic driver with declared parameters, with the daemon's answers, and
 /// with the true ones.
@@ -97,7 +97,10 @@ impl DriveArguments {
         expect((10..=200).contains(&cycle_ms), || {
             format!("--cycle-ms {cycle_ms}: expected 10 to 200")
         })?;
-        let scored = parallel::over(&chosen, self.threads, |service| measure(*service, extent));
+        let mut scored =
+            parallel::until_due(&chosen, self.threads, |service| measure(*service, extent));
+        // Those whose processes the same signal ended are not whole.
+        scored.retain(|it| it.is_ok() || !ending::is_due());
         let scored = scored.into_iter().collect::<Result<Vec<Scored>, _>>()?;
         if let Some(file) = &self.picture {
             write_file(file, &picture::svg(&ordinary(&scored))?)?;

@@ -8,6 +8,7 @@ use super::journey::{DrivenLeg, Journey};
 use super::line::Service;
 use super::link::Link;
 use super::train::Train;
+use crate::ending;
 use crate::output::Failure;
 use crate::scenarios::score::Score;
 
@@ -103,6 +104,9 @@ pub fn drive(
     let dies = service.condition.daemon_dies;
     let mut death = if dies { Death::On(stops / 3) } else { Death::Never };
     loop {
+        if ending::is_due() {
+            return Err("ended on the way".into());
+        }
         let on_the_way = |(_, it): &(usize, &mut Driving)| it.journey.legs.len() < stops;
         let mut samples: Vec<(usize, TrainSample)> = all
             .iter_mut()

@@ -9,6 +9,7 @@ use std::process::Command;
 use serde_json::Value;
 
 use super::measure::quartiles;
+use crate::ending::{is_due, until_due};
 use crate::output::{Failure, Record};
 
 /// Rounds of both programs.
@@ -23,19 +24,24 @@ const ROUNDS: usize = 31;
 pub fn measure(other: &Path, case: &str) -> Result<Vec<Record>, Failure> {
     let ours = std::env::current_exe()?;
     let mut rounds: Vec<[Vec<(String, f64)>; 2]> = Vec::with_capacity(ROUNDS);
-    for round in 0..ROUNDS {
+    for round in until_due(0..ROUNDS) {
         // Who is first turns from round to round.
-        rounds.push(if round % 2 == 0 {
-            [times(&ours, case)?, times(other, case)?]
-        } else {
-            let theirs = times(other, case)?;
-            [times(&ours, case)?, theirs]
-        });
+        let (first, then) = if round % 2 == 0 { (&*ours, other) } else { (other, &*ours) };
+        match times(first, case).and_then(|first| Ok([first, times(then, case)?])) {
+            // The same signal ends the programs of the round.
+            Err(_) if is_due() => break,
+            Ok([first, then]) if round % 2 == 0 => rounds.push([first, then]),
+            Ok([first, then]) => rounds.push([then, first]),
+            Err(failure) => return Err(failure),
+        }
     }
+    let Some(first) = rounds.first() else {
+        return Err("ended before the first round was over".into());
+    };
     let named = |all: &[(String, f64)], name: &str| {
         all.iter().find(|(other, _)| other == name).map(|&(_, ns)| ns)
     };
-    let names = rounds[0][0].iter().map(|(name, _)| name.clone());
+    let names = first[0].iter().map(|(name, _)| name.clone());
     Ok(names
         .filter_map(|name| {
             let pairs = rounds.iter().map(|[a, b]| Some((named(a, &name)?, named(b, &name)?)));

@@ -18,6 +18,7 @@ use clap::Args;
 use dynocar_analysis::dataset::DatasetError;
 use serde_json::json;
 
+use crate::ending::until_due;
 use crate::output::{Failure, OutputArguments, Record, containing, table};
 use measure::{Effort, EstimatorCase};
 
@@ -51,7 +52,7 @@ impl EstimatorsArguments {
         }
         let effort = if self.quick { Effort::QUICK } else { Effort::FULL };
         let chosen = containing("--case", text, cases()?, |case| case.name.clone())?;
-        let records: Vec<Record> = chosen.into_iter().map(|it| it.measure(&effort)).collect();
+        let records: Vec<Record> = until_due(chosen).map(|it| it.measure(&effort)).collect();
         self.output.give(&json!({ "cases": records }), || table(&records))
     }
 }

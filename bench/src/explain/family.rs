@@ -103,13 +103,13 @@ impl FamilyArguments {
         scenarios.iter().flat_map(of).collect()
     }
 
-    /// Does the work on every case; gives what came of it by scenario.
+    /// Does the work on every case until the command is to end; gives what came of it by scenario.
     pub fn over<R: Clone + Send>(
         &self,
         scenarios: &[ExplainScenario],
         work: impl Fn(&Case) -> R + Sync,
     ) -> Vec<(ExplainScenario, Vec<R>)> {
-        let results = parallel::over(&self.cases(scenarios), self.threads, work);
+        let results = parallel::until_due(&self.cases(scenarios), self.threads, work);
         let by_scenario = results.chunks(self.seeds.max(1)).map(<[R]>::to_vec);
         scenarios.iter().copied().zip(by_scenario).collect()
     }

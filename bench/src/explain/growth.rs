@@ -7,6 +7,7 @@ use dynocar_tests::simulator::{SimulatorSettings, simulate};
 
 use super::family::{explained, read};
 use super::scenario::{ExplainScenario, ExplainWorld};
+use crate::ending::until_due;
 use crate::output::Record;
 
 /// Factors by which the data are multiplied.
@@ -17,7 +18,7 @@ pub fn measure(scenarios: &[ExplainScenario], seed: u64) -> Vec<Record> {
     let mut sizes = Vec::new();
     for axis in ["runs", "duration"] {
         let mut first_us = None;
-        for factor in FACTORS {
+        for factor in until_due(FACTORS) {
             let grown = |settings: SimulatorSettings| match axis {
                 "runs" => SimulatorSettings {
                     runs: factor * settings.runs,

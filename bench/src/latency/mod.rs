@@ -18,12 +18,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use dynocar::config::IdleStrategy;
-use dynocar::ending::Ending;
 use dynocar::output::report_line;
 
 use self::case::LatencyCase;
 use self::report::{MeasuredCase, Rounds};
 use crate::chance::Chance;
+use crate::ending;
 use crate::open_loop::traffic::TrafficPlan;
 use crate::open_loop::trial::{Extent, run};
 use crate::output::{Failure, OutputArguments, expect};
@@ -111,9 +111,8 @@ impl LatencyArguments {
             costs::measure(choose(20.0, 400.0) as usize)
         })?;
         let rounds = self.rounds.unwrap_or(choose(1.0, 15.0) as usize);
-        let ending = Ending::begin()?;
-        run_rounds(&mut cases, rounds, &extent, &ending)?;
-        if ending.is_due() {
+        run_rounds(&mut cases, rounds, &extent)?;
+        if ending::is_due() {
             return Ok(MeasuredCase { cases, costs, at_rest: Vec::new(), extent });
         }
         let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event].map(|idle| {
@@ -121,7 +120,7 @@ impl LatencyArguments {
             let traffic = TrafficPlan { rate_hz: 1e-3, ..extent.traffic };
             let resting = Extent { traffic, seconds: choose(0.3, 5.0), ..extent };
             let trial =
-                in_thread(|| run(&LatencyCase::all_fast(idle).setting, &resting, &ending.flag))?;
+                in_thread(|| run(&LatencyCase::all_fast(idle).setting, &resting, ending::flag()))?;
             Ok((idle.to_string(), trial.cpu_percent))
         });
         let at_rest = at_rest.into_iter().collect::<Result<_, Failure>>()?;
@@ -130,19 +129,13 @@ impl LatencyArguments {
 }
 
 /// Adds a trial of every round to each case; once the program is to end, of the rounds that were whole.
-fn run_rounds(
-    cases: &mut [Rounds],
-    rounds: usize,
-    extent: &Extent,
-    ending: &Ending,
-) -> Result<(), Failure> {
+fn run_rounds(cases: &mut [Rounds], rounds: usize, extent: &Extent) -> Result<(), Failure> {
     let mut random = Chance::new(extent.seed);
     for round in 1..=rounds {
         report_line(&format!("round {round} of {rounds}"));
         for index in random.order(cases.len()) {
-            let trial = in_thread(|| run(&cases[index].0.setting, extent, &ending.flag));
-            if ending.is_due() {
-                // Ctrl-C ends the processes of the trial, too.
+            let trial = in_thread(|| run(&cases[index].0.setting, extent, ending::flag()));
+            if ending::is_due() {
                 let whole = round - 1;
                 if whole == 0 {
                     return Err("ended before the first round was over".into());

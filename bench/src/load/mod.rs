@@ -16,6 +16,7 @@ use dynocar::config::IdleStrategy;
 use serde_json::json;
 
 use self::plan::Load;
+use crate::ending::is_due;
 use crate::open_loop::traffic::TrafficPlan;
 use crate::open_loop::trial::Extent;
 use crate::output::{Failure, OutputArguments, expect, named, table};
@@ -85,7 +86,7 @@ impl LoadArguments {
         let (mut all, mut text) = report::of(&load, &load.run()?);
         let seconds = load.extent.seconds.min(TRIAL_SECONDS);
         let short = Load { extent: Extent { seconds, ..load.extent }, ..load };
-        if self.search {
+        if self.search && !is_due() {
             let found = search::highest_rate(&short)?;
             text += &format!(
                 "highest rate without loss: {:.0} Hz a train, {:.0} samples/s\n",
@@ -93,7 +94,7 @@ impl LoadArguments {
             );
             all["search"] = json!(found);
         }
-        if self.growth {
+        if self.growth && !is_due() {
             let sizes = search::growth(&short)?;
             text += &table(&sizes);
             all["growth"] = json!(sizes);

@@ -1,10 +1,9 @@
 //! Several trains with some pipelines, against one daemon.
 
-use std::sync::atomic::AtomicBool;
-
 use dynocar::config::IdleStrategy;
 use dynocar_shared::PipelineKind;
 
+use crate::ending;
 use crate::open_loop::trial::{Answerer, Extent, Setting, Trial, run};
 use crate::output::Failure;
 use crate::rig::cores::in_thread;
@@ -29,6 +28,6 @@ impl Load {
     pub fn run(&self) -> Result<Trial, Failure> {
         let answerer = Answerer::Daemon(self.pipelines.clone(), None);
         let setting = Setting { answerer, idle: self.idle, companions: &[], candidates: 0 };
-        in_thread(|| run(&setting, &self.extent, &AtomicBool::new(false)))
+        in_thread(|| run(&setting, &self.extent, ending::flag()))
     }
 }

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::plan::Load;
 use super::report;
+use crate::ending::is_due;
 use crate::output::{Failure, Record};
 
 /// Controllers that are later than this have themselves reached their limit, in ns.
@@ -34,9 +35,12 @@ pub fn highest_rate(load: &Load) -> Result<Found, Failure> {
     let mut found = Found::default();
     let mut steps = STEPS;
     let mut load = load.clone();
-    while steps > 0 && load.extent.traffic.rate_hz < RATE_MAX_HZ {
+    while steps > 0 && load.extent.traffic.rate_hz < RATE_MAX_HZ && !is_due() {
         let rate_hz = load.extent.traffic.rate_hz;
         let trial = load.run()?;
+        if is_due() {
+            break;
+        }
         let verdict = match (trial.missing() > 0, trial.publisher_lag_ns > LAG_MAX_NS) {
             (true, _) => "samples lost",
             (false, true) => "the publishers fall behind",
@@ -80,7 +84,11 @@ pub fn growth(load: &Load) -> Result<Vec<Record>, Failure> {
             load.extent.trains = trains;
             load.pipelines.truncate(width);
             report_line(&format!("{trains} trains, {width} pipelines"));
-            sizes.push(report::size(&load, &load.run()?));
+            let trial = load.run()?;
+            if is_due() {
+                return Ok(sizes);
+            }
+            sizes.push(report::size(&load, &trial));
         }
     }
     Ok(sizes)

@@ -21,6 +21,7 @@ use clap::Args;
 use dynocar::output::report_line;
 use serde_json::json;
 
+use crate::ending::until_due;
 use crate::output::{Failure, OutputArguments, Record, expect_none, named, table, write_csv};
 use promise::Verdict;
 use row::{Row, Seeds};
@@ -75,7 +76,7 @@ impl PapersArguments {
             None => SOURCES.to_vec(),
         };
         let mut rows = Vec::new();
-        for (name, measure) in chosen {
+        for (name, measure) in until_due(chosen) {
             report_line(&format!("{name}: {} seeds from {}", seeds.count, seeds.first));
             rows.extend(measure(seeds));
         }

@@ -108,7 +108,7 @@ pub fn site() -> Site {
 /// When this program cannot be found.
 pub fn peer(site: &Site, kind: &str, arguments: &[&str]) -> Result<Process, Failure> {
     let program = std::env::current_exe().map_err(during("finding this program"))?;
-    Ok(site.start(&program.to_string_lossy(), &[&["peer", kind], arguments].concat()))
+    Ok(site.start_apart(&program.to_string_lossy(), &[&["peer", kind], arguments].concat()))
 }
 
 /// Fails when a process has ended.

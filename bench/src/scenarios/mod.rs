@@ -5,6 +5,7 @@
 //! - [`world`]: a train, its line and its day, drawn by those
 //! - [`brake`]: brakes that do not act as they report
 //! - [`drive`]: driving from stop to stop, and what the controller writes of it
+//! - [`recorded`]: the same as a dataset
 //! - [`bound`]: how well both can be known at best
 //! - [`score`]: what an answer was worth over a drive
 //! - [`table`]: the scenarios, all of it in numbers
@@ -13,16 +14,19 @@ pub mod bound;
 pub mod brake;
 pub mod drive;
 pub mod mistakes;
+pub mod recorded;
 pub mod score;
 pub mod table;
 pub mod world;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_shared::PipelineKind;
 
 use self::mistakes::Mistakes;
+use self::table::NamedScenario;
+use self::world::World;
 use crate::output::{self, Failure, OutputArguments, containing, expect, named, write_csv};
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
@@ -47,6 +51,9 @@ pub struct ScenariosArguments {
     /// How large the mistakes are: those of careful declarations, or all that default settings expect
     #[arg(long, value_enum, default_value_t = Size::Usual)]
     mistakes: Size,
+    /// Instead of measuring, write the drives as datasets into this folder
+    #[arg(long, value_name = "DIR", conflicts_with = "csv")]
+    write: Option<PathBuf>,
     /// A pipeline; may be repeated
     #[arg(long = "pipeline", value_name = "KIND", default_value = "train_kalman")]
     pipelines: Vec<String>,
@@ -90,6 +97,9 @@ impl ScenariosArguments {
         let kinds = kinds.collect::<Result<Vec<_>, _>>()?;
         let is_some = self.hours > 0.0 && self.hours.is_finite() && self.seeds > 0;
         expect(is_some, || "--hours and --seeds: expected more than 0".into())?;
+        if let Some(folder) = &self.write {
+            return self.write(&chosen, folder);
+        }
         let records = table::run(&table::Plan {
             scenarios: &chosen,
             kinds: &kinds,
@@ -103,5 +113,17 @@ impl ScenariosArguments {
             write_csv(file, &records)?;
         }
         self.output.give(&records, || output::table(&records))
+    }
+
+    /// Writes every drive of the rows as a dataset.
+    fn write(&self, rows: &[NamedScenario], folder: &Path) -> Result<(), Failure> {
+        for (name, scenario) in rows {
+            for seed in self.first_seed..self.first_seed + self.seeds {
+                let world = World::draw(*scenario, self.mistakes.mistakes(), seed);
+                let name = format!("{}, seed {seed}", name.join(", ")).replace([',', '/'], "");
+                recorded::write(world, self.hours, &folder.join(name.replace(' ', "_")))?;
+            }
+        }
+        Ok(())
     }
 }

@@ -14,6 +14,7 @@ use super::drive::{Drive, Moment};
 use super::mistakes::Mistakes;
 use super::score::{Answer, COUNTS_MPS, Score, Scores};
 use super::world::{LoadSource, Scenario, Traffic, World};
+use crate::ending::until_due;
 use crate::output::Record;
 use crate::parallel;
 
@@ -125,7 +126,7 @@ pub struct Plan<'a> {
 pub fn run(plan: &Plan<'_>) -> Result<Vec<Record>, SettingError> {
     let of = |row| plan.kinds.iter().map(move |&kind| (row, kind));
     let cases: Vec<(&NamedScenario, PipelineKind)> = plan.scenarios.iter().flat_map(of).collect();
-    let rows = parallel::over(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
+    let rows = parallel::until_due(&cases, plan.threads, |(row, kind)| measure(plan, row, *kind));
     Ok(rows.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
@@ -148,7 +149,7 @@ fn measure(
 ) -> Result<Vec<Record>, SettingError> {
     let Some(settings) = settings(kind, scenario) else { return Ok(Vec::new()) };
     let mut scores = QUANTITIES.map(|_| Vec::new());
-    for seed in plan.first_seed..plan.first_seed + plan.seeds {
+    for seed in until_due(plan.first_seed..plan.first_seed + plan.seeds) {
         let world = World::draw(*scenario, plan.mistakes, seed);
         let train = Arc::new(world.declared.clone());
         let estimator = settings.build(&train)?;
@@ -157,7 +158,8 @@ fn measure(
             all.push(score);
         }
     }
-    let rows = QUANTITIES.iter().zip(&scores).filter(|(it, _)| settings.answers(**it));
+    let rows = QUANTITIES.iter().zip(&scores);
+    let rows = rows.filter(|(it, scores)| settings.answers(**it) && !scores.is_empty());
     Ok(rows.map(|(quantity, scores)| record(plan, names, kind, *quantity, scores)).collect())
 }
 
@@ -237,13 +239,13 @@ fn record(
     let all = Scores(scores);
     let coverage = Some(all.percent(|it| it.covered)).filter(|_| all.count(|it| it.usable) > 0);
     let wrong_s = scores.iter().map(|it| it.wrong_s).fold(0.0, f64::max);
-    let hours = plan.hours * plan.seeds as f64;
+    let hours = plan.hours * scores.len() as f64;
     let record = Record::default()
         .with("traffic", traffic.as_str())
         .with("condition", condition.as_str())
         .with("pipeline", kind.name())
         .with("quantity", quantity.name())
-        .with("seeds", plan.seeds)
+        .with("seeds", scores.len())
         .with("first_seed", plan.first_seed);
     let record = all.usable(record).number("coverage_percent", coverage, 1);
     let record = all.usable_later(record);

@@ -2,6 +2,7 @@
 
 mod documents;
 mod drive;
+mod ending;
 mod latency_and_load;
 mod output;
 mod scenarios;

@@ -221,6 +221,8 @@ class Effect(_Vocabulary):
     UNKNOWN = 15  # A real residual that no known effect explains
     GRADIENT_ERROR = 16  # A declared gradient that is wrong by a smooth function of the chainage
     SPEED_DELAY = 17  # A measured speed that is late
+    BRAKE_GAIN = 18  # A brake that is weaker or stronger than reported
+    BRAKE_DELAY = 19  # A brake that acts later than reported, while traction does not
 
 
 class Has(IntFlag):

@@ -140,7 +140,10 @@ effects! {
         to_do: "check the scale of the reported forces",
         seen_over: Some("traction_force_n"),
         determined_by: HARDER,
-        separated_from: &[],
+        separated_from: &[(
+            EffectKind::BrakeGain,
+            "Pull hard without braking, and brake hard without pulling.",
+        )],
     }
     /// Forces that act later than reported.
     ActuatorDelay = 9 "actuator_delay" {
@@ -232,6 +235,34 @@ effects! {
         seen_over: Some("acceleration_mps2"),
         determined_by: MORE_RUNS,
         separated_from: &[],
+    }
+    /// A brake that is weaker or stronger than reported.
+    BrakeGain = 18 "brake_gain" {
+        title: "a brake that is weaker or stronger than reported",
+        to_do: "check what the brake exerts against what it reports: friction, pressure, brakes cut out",
+        seen_over: Some("brake_force_n"),
+        determined_by: "harder braking on the level",
+        separated_from: &[
+            (
+                EffectKind::MassChange,
+                "Pull hard at the same load: a mass is felt there, a brake is not.",
+            ),
+            (
+                EffectKind::LowAdhesion,
+                "Brake gently and hard on a dry day: the rail limits hard braking only.",
+            ),
+        ],
+    }
+    /// A brake that acts later than reported, while traction does not.
+    BrakeDelay = 19 "brake_delay" {
+        title: "a brake that acts late",
+        to_do: "check how long the brake takes to build up and to release after it is reported",
+        seen_over: Some("force_change_n_per_s"),
+        determined_by: "more brakings that begin and end at speed",
+        separated_from: &[(
+            EffectKind::ActuatorDelay,
+            "Change traction quickly without braking: only where it is late too are both.",
+        )],
     }
 }
 

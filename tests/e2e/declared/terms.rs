@@ -138,6 +138,8 @@ pub fn declarations(kind: EffectKind) -> Vec<Declaration> {
         EffectKind::GradientError => gradient_error(),
         EffectKind::MassChange => mass_change(),
         EffectKind::TractionGain => traction_gain(),
+        EffectKind::BrakeGain => brake_gain(),
+        EffectKind::BrakeDelay => brake_delay(),
         EffectKind::ActuatorDelay => actuator_delay(),
         EffectKind::SpeedDelay => speed_delay(),
         EffectKind::RotatingMass => rotating_mass(),
@@ -277,6 +279,24 @@ fn traction_gain() -> Vec<Declaration> {
         name: "traction_gain",
         train: correction("[corrections]\ntraction_gain = 1.07\n"),
         sample: |sample, _| sample.traction_force_n *= 1.07,
+        ..NOTHING
+    }]
+}
+
+fn brake_gain() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "brake_gain",
+        train: correction("[corrections]\nbrake_gain = 1.12\n"),
+        sample: |sample, _| sample.brake_force_n *= 1.12,
+        ..NOTHING
+    }]
+}
+
+fn brake_delay() -> Vec<Declaration> {
+    vec![Declaration {
+        name: "brake_delay",
+        train: correction("[corrections]\nbrake_delay_s = 1.0\nbrake_lag_s = 0.6\n"),
+        sample: |sample, at| sample.brake_force_n = (-at.commanded_n).max(0.0),
         ..NOTHING
     }]
 }

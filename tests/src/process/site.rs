@@ -80,6 +80,17 @@ impl Site {
         self.start_with(program, arguments, &[])
     }
 
+    /// Starts a program on this site that a Ctrl-C in the terminal does not reach.
+    ///
+    /// # Panics
+    ///
+    /// When it cannot be started.
+    pub fn start_apart(&self, program: &str, arguments: &[&str]) -> Process {
+        let mut command = self.command(program, arguments);
+        command.process_group(0);
+        self.start_command(command)
+    }
+
     /// Starts a program on this site with more environment variables.
     ///
     /// # Panics

@@ -64,6 +64,8 @@ pub struct Disturbances {
     pub traction_gain: f64,
     /// Reported over true brake force.
     pub brake_gain: f64,
+    /// Dead time and lag in s between reported and true brake force alone.
+    pub brake_late_s: [f64; 2],
     /// Dead time in s between reported and true forces.
     pub delay_s: f64,
     /// Lag in s between reported and true forces.
@@ -130,6 +132,7 @@ impl Disturbances {
             mass_windows: Vec::new(),
             traction_gain: 1.0,
             brake_gain: 1.0,
+            brake_late_s: [0.0; 2],
             delay_s: 0.0,
             lag_s: 0.0,
             speed_delay_s: 0.0,
@@ -252,6 +255,8 @@ impl Disturbances {
                 self.mass_windows = of_run.copied().collect();
             }
             Effect::TractionGain { gain } => self.traction_gain = *gain,
+            Effect::BrakeGain { gain } => self.brake_gain = *gain,
+            Effect::BrakeDelay { delay_s, lag_s } => self.brake_late_s = [*delay_s, *lag_s],
             Effect::ActuatorDelay { delay_s, lag_s } => {
                 (self.delay_s, self.lag_s) = (*delay_s, *lag_s);
             }

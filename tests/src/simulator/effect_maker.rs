@@ -19,9 +19,11 @@ pub fn suitable_types(kind: EffectKind) -> &'static [TrainType] {
         EffectKind::CurveResistance => &[Freight, Regional, Metro],
         EffectKind::Wind => &[Regional, HighSpeed],
         EffectKind::MassChange => &[Freight, Regional, Metro],
-        EffectKind::RotatingMass | EffectKind::ActuatorDelay | EffectKind::SpeedDelay => {
-            &[Regional, Metro]
-        }
+        EffectKind::RotatingMass
+        | EffectKind::ActuatorDelay
+        | EffectKind::BrakeDelay
+        | EffectKind::BrakeGain
+        | EffectKind::SpeedDelay => &[Regional, Metro],
         EffectKind::LowAdhesion => &[Regional, Metro, HighSpeed],
         _ => &TrainType::ALL,
     }
@@ -152,6 +154,10 @@ pub fn make_effect(
         EffectKind::TractionGain => {
             Effect::TractionGain { gain: 1.0 + random.sign() * random.uniform(0.03, 0.08) }
         }
+        EffectKind::BrakeGain => {
+            Effect::BrakeGain { gain: 1.0 + random.sign() * random.uniform(0.08, 0.15) }
+        }
+        EffectKind::BrakeDelay => brake_delay(random),
         EffectKind::ActuatorDelay => Effect::ActuatorDelay {
             delay_s: rounded(random.uniform(0.5, 1.6), 0.05),
             lag_s: random.uniform(0.4, 1.2),
@@ -189,6 +195,14 @@ pub fn make_effect(
 fn mean_gradient_length_m(scene: &EffectScene<'_>) -> f64 {
     let entries = scene.line.track.gradient().map_or(1, |gradient| gradient.entries().len());
     scene.line.length_m / entries as f64
+}
+
+/// Valves that open late, and cylinders that fill and empty.
+fn brake_delay(random: &mut Random) -> Effect {
+    Effect::BrakeDelay {
+        delay_s: rounded(random.uniform(0.0, 0.4), 0.05),
+        lag_s: random.uniform(0.3, 1.5),
+    }
 }
 
 /// A bus that is late, a filter, or both; 0.4 to 1 s together.

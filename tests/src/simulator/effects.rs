@@ -85,6 +85,18 @@ pub enum Effect {
         /// Reported over true force.
         gain: f64,
     },
+    /// The reported brake force is not the true one.
+    BrakeGain {
+        /// Reported over true force.
+        gain: f64,
+    },
+    /// The brake acts later than reported, traction does not.
+    BrakeDelay {
+        /// Dead time in s.
+        delay_s: f64,
+        /// First-order lag in s after it.
+        lag_s: f64,
+    },
     /// Forces act later than reported.
     ActuatorDelay {
         /// Dead time in s.
@@ -153,6 +165,8 @@ impl Effect {
             Effect::GradientError { .. } => EffectKind::GradientError,
             Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) => EffectKind::MassChange,
             Effect::TractionGain { .. } => EffectKind::TractionGain,
+            Effect::BrakeGain { .. } => EffectKind::BrakeGain,
+            Effect::BrakeDelay { .. } => EffectKind::BrakeDelay,
             Effect::ActuatorDelay { .. } => EffectKind::ActuatorDelay,
             Effect::SpeedDelay { .. } => EffectKind::SpeedDelay,
             Effect::RotatingMass { .. } => EffectKind::RotatingMass,
@@ -204,8 +218,10 @@ impl Effect {
                     Value::Object(entry)
                 }).collect::<Vec<_>>()
             }),
-            Effect::TractionGain { gain } => json!({ "gain": gain }),
-            Effect::ActuatorDelay { delay_s, lag_s } | Effect::SpeedDelay { delay_s, lag_s } => {
+            Effect::TractionGain { gain } | Effect::BrakeGain { gain } => json!({ "gain": gain }),
+            Effect::ActuatorDelay { delay_s, lag_s }
+            | Effect::BrakeDelay { delay_s, lag_s }
+            | Effect::SpeedDelay { delay_s, lag_s } => {
                 json!({ "delay_s": delay_s, "lag_s": lag_s })
             }
             Effect::RotatingMass { rotating_mass_factor } => {

@@ -203,10 +203,14 @@ fn extra_n_per_kn(
 /// Traction minus brake in N that acts behind the reported forces, at each sample.
 fn acting_forces_n(recording: &Recording, disturbances: &Disturbances) -> Vec<f64> {
     let mut late = DelayLine::new(disturbances.delay_s, disturbances.lag_s);
+    let [brake_delay_s, brake_lag_s] = disturbances.brake_late_s;
+    let mut late_brake = DelayLine::new(brake_delay_s, brake_lag_s);
     let acting = |sample: &ResolvedSample| {
         let force = |field: Option<f64>| field.unwrap_or(0.0);
         let reported = [force(sample.traction_force_n), force(sample.brake_force_n)];
         let at = (sample.time_ns, sample.segment);
+        let [brake_n] = late_brake.acting(at, Some([reported[1]])).unwrap_or([reported[1]]);
+        let reported = [reported[0], brake_n];
         let [traction_n, brake_n] = late.acting(at, Some(reported)).unwrap_or(reported);
         let brake_n = brake_n / disturbances.brake_gain;
         let carried_n = match (&disturbances.adhesion, sample.position_m) {

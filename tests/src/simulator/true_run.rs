@@ -57,6 +57,8 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
     let held = Controls { traction_force_n: 0.0, brake_force_n: held_n };
     let mut actuators = Actuators::new(train, plan.mass_kg, TRUE_STEP_S, held_n);
     let mut late = LateForces::new(disturbances.delay_s, disturbances.lag_s, TRUE_STEP_S, held);
+    let [brake_delay_s, brake_lag_s] = disturbances.brake_late_s;
+    let mut late_brake = LateForces::new(brake_delay_s, brake_lag_s, TRUE_STEP_S, held);
     let mut slip = WheelSlip::new(settings, stream(Stream::Slip(plan.number)));
     let mut weather = Weather::new(physics, stream(Stream::Gusts(plan.number)));
     let mut motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
@@ -79,7 +81,8 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
         let (headwind_mps, temperature_degc) = weather.advance();
         let mass_kg = plan.mass_kg * disturbances.mass_factor(time_s, position_m);
         let now = Instant { time_s, headwind_mps, temperature_degc, mass_kg };
-        let mut acting = late.advance(forces);
+        let brake_force_n = late_brake.advance(forces).brake_force_n;
+        let mut acting = late.advance(Controls { brake_force_n, ..forces });
         if let Some(cap) = &disturbances.adhesion {
             let weight_n = 1000.0 * TrainModel::weight_kn(mass_kg);
             acting.brake_force_n = cap.carried_n(acting.brake_force_n, weight_n, position_m);

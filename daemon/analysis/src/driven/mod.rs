@@ -103,8 +103,9 @@ impl DrivenTrain {
     /// Dead time in s by which forces act later than they are reported, or by which the speed is shown
     /// late, whichever is longer. The train remembers those of its last 1000 steps.
     pub fn dead_time_s(&self) -> f64 {
-        let Corrections { actuator_delay_s, speed_delay_s, .. } = self.train.corrections;
-        actuator_delay_s.max(speed_delay_s)
+        let Corrections { actuator_delay_s, brake_delay_s, speed_delay_s, .. } =
+            self.train.corrections;
+        (actuator_delay_s + brake_delay_s).max(speed_delay_s)
     }
 
     /// Returns the balance of accelerations at the end of the newest step.

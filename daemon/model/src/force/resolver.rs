@@ -162,6 +162,7 @@ fn put_behind(late: &mut LateSpeed, resolved: &mut ResolvedSample) {
 pub struct ForceResolver {
     train: Arc<TrainModel>,
     track: Option<Arc<Track>>,
+    brake_delay: Option<DelayLine<2>>,
     delay: Option<DelayLine<2>>,
     late_speed: Option<LateSpeed>,
     warm_up: WarmUp,
@@ -174,12 +175,16 @@ impl ForceResolver {
     pub fn new(train: Arc<TrainModel>, track: Option<Arc<Track>>) -> Self {
         let Corrections { actuator_delay_s, actuator_lag_s, speed_delay_s, speed_lag_s, .. } =
             train.corrections;
-        let is_late = actuator_delay_s > 0.0 || actuator_lag_s > 0.0;
+        let Corrections { brake_delay_s, brake_lag_s, .. } = train.corrections;
+        let line = |delay_s: f64, lag_s: f64| {
+            (delay_s > 0.0 || lag_s > 0.0).then(|| DelayLine::new(delay_s, lag_s))
+        };
         let is_speed_late = speed_delay_s > 0.0 || speed_lag_s > 0.0;
         ForceResolver {
             train,
             track,
-            delay: is_late.then(|| DelayLine::new(actuator_delay_s, actuator_lag_s)),
+            brake_delay: line(brake_delay_s, brake_lag_s),
+            delay: line(actuator_delay_s, actuator_lag_s),
             late_speed: is_speed_late.then(|| LateSpeed::new(speed_delay_s, speed_lag_s)),
             warm_up: WarmUp::default(),
             ambient_temperature_degc: None,
@@ -220,6 +225,7 @@ impl ForceResolver {
         });
         let tunnel_share = on_track(Track::tunnel_share);
         let traction_n = sample.get(SampleField::TractionForce);
+        let brake_n = sample.get(SampleField::BrakeForce);
         let degc = sample.get(SampleField::AmbientTemperature).or(self.ambient_temperature_degc);
         self.ambient_temperature_degc = degc;
         self.last = Some((valid.segment, sample.speed_mps));
@@ -235,7 +241,7 @@ impl ForceResolver {
             inertial_mass_kg: rotating::inertial_mass_kg(mass_kg, train.rotating_mass_factor),
             weight_kn: TrainModel::weight_kn(mass_kg),
             traction_force_n: traction_n.map(|n| traction::true_force_n(n, known.traction_gain)),
-            brake_force_n: sample.get(SampleField::BrakeForce),
+            brake_force_n: brake_n.map(|n| traction::true_force_n(n, known.brake_gain)),
             gradient_permille: stated_permille,
             gradient_std_permille: on_track(Track::gradient_std_here_permille).unwrap_or(0.0),
             curvature_per_m,
@@ -247,14 +253,7 @@ impl ForceResolver {
             since_cold_s: self.warm_up.since_cold_s(sample.time_ns),
             is_sliding: valid.is_sliding(),
         };
-        if let Some(delay) = &mut self.delay {
-            let reported = resolved.traction_force_n.zip(resolved.brake_force_n);
-            let at = (sample.time_ns, valid.segment);
-            if let Some([traction_n, brake_n]) = delay.acting(at, reported.map(Into::into)) {
-                resolved.traction_force_n = Some(traction_n);
-                resolved.brake_force_n = Some(brake_n);
-            }
-        }
+        self.put_late(&mut resolved);
         resolved.resistance = self.declared_resistance(&resolved);
         if let Some(late) = &mut self.late_speed {
             put_behind(late, &mut resolved);
@@ -264,6 +263,22 @@ impl ForceResolver {
         resolved.extra_n_per_kn =
             resolved.resistance.extra_n_per_kn(self.train.resistance, resolved.speed_mps);
         resolved
+    }
+
+    /// Puts the brake, and then both forces, behind their declared delays.
+    fn put_late(&mut self, resolved: &mut ResolvedSample) {
+        let at = (resolved.time_ns, resolved.segment);
+        for (delay, is_brake_alone) in [(&mut self.brake_delay, true), (&mut self.delay, false)] {
+            let Some(delay) = delay else { continue };
+            let reported = resolved.traction_force_n.zip(resolved.brake_force_n);
+            let Some([traction_n, brake_n]) = delay.acting(at, reported.map(Into::into)) else {
+                continue;
+            };
+            if !is_brake_alone {
+                resolved.traction_force_n = Some(traction_n);
+            }
+            resolved.brake_force_n = Some(brake_n);
+        }
     }
 
     /// Every declared term of resistance at a sample; what c and w0 scale is left open.

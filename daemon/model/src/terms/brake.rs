@@ -1,9 +1,21 @@
-//! A brake that does not release: a force that builds up from some instant on. It belongs to
-//! certain runs and is declared nowhere.
+//! A brake that exerts another force than it reports, and one that does not release: a force that builds up from
+//! some instant on, which belongs to certain runs and is declared nowhere.
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Least, Parameter, Suspect};
+use super::{Joined, Key, Least, Parameter, Suspect, adhesion};
+
+/// Reported over true brake force.
+pub const GAIN: Key = Key {
+    table: "corrections",
+    name: "brake_gain",
+    range: [0.5, 2.0],
+    allowed: "from 0.5 to 2",
+    joined: Joined::Multiplied,
+    of: |train| &mut train.corrections.brake_gain,
+};
+/// A brake that is nearer to its report is as good as declared.
+pub const GAIN_LEAST: f64 = adhesion::DECLARED_BRAKE_STD;
 
 /// The force builds up over this time in s.
 pub const BUILD_UP_S: f64 = 10.0;

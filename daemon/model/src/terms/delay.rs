@@ -20,6 +20,12 @@ pub const LAG: Key = Key {
     joined: Joined::Added,
     of: |train| &mut train.corrections.actuator_lag_s,
 };
+/// Dead time in s of the brake alone, beyond that of both.
+pub const BRAKE_DELAY: Key =
+    Key { name: "brake_delay_s", of: |train| &mut train.corrections.brake_delay_s, ..DELAY };
+/// Time constant in s of the lag of the brake alone.
+pub const BRAKE_LAG: Key =
+    Key { name: "brake_lag_s", of: |train| &mut train.corrections.brake_lag_s, ..LAG };
 /// Delay and lag.
 pub const PARAMETERS: [Parameter; 2] = [
     Parameter::new("delay_s", (0.0, DELAY.range[1]), 0.05),

@@ -30,11 +30,14 @@ pub use key::{Entry, Joined, Key, Least, Parameter, Suspect, SuspectInput};
 pub use resistance::Resistance;
 
 /// Every number of a term that stands in `[corrections]` of `train.toml`.
-pub const CORRECTIONS: [&Key; 13] = [
+pub const CORRECTIONS: [&Key; 16] = [
     &wheel::SPEED_SCALE,
     &speed_delay::DELAY,
     &speed_delay::LAG,
     &traction::GAIN,
+    &brake::GAIN,
+    &delay::BRAKE_DELAY,
+    &delay::BRAKE_LAG,
     &delay::DELAY,
     &delay::LAG,
     &tunnel::C_FACTOR,

@@ -24,6 +24,12 @@ corrections! {
     speed_lag_s = 0.0;
     /// Reported over true traction force.
     traction_gain = 1.0;
+    /// Reported over true brake force.
+    brake_gain = 1.0;
+    /// Delay of the reported brake force alone in s.
+    brake_delay_s = 0.0;
+    /// And then builds up and releases with this time constant in s.
+    brake_lag_s = 0.0;
     /// Delay of the reported forces in s.
     actuator_delay_s = 0.0;
     /// And then build up with this time constant in s.

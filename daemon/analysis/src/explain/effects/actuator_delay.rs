@@ -1,9 +1,9 @@
-//! Forces that act later than reported: a dead time, then a first-order lag.
+//! Forces that act later than reported, both or the brake alone: a dead time, then a first-order lag.
 
-use dynocar_model::terms::{delay, speed_delay};
+use dynocar_model::terms::{Key, delay, speed_delay};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::lateness::{late_by_sampling_s, late_forces, late_from, late_reported};
+use super::lateness::{Late, late_by_sampling_s, late_forces, late_from, late_reported};
 use super::{
     Candidate, Everyday, Figure, Hypothesis, Nature, On, Policy, Proposal, ReportContext, Reported,
     Turn,
@@ -14,8 +14,9 @@ use crate::explain::scan::Scan;
 /// Delay and lag in s that a fit may start from.
 const STARTS: [[f64; 2]; 4] = [[0.3, 0.3], [1.0, 1.0], [0.2, 2.0], [2.0, 0.3]];
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct DelayAndLag {
+    late: Late,
     /// Where positions are integrated from the speed, they are late with it; where nothing of the line is felt,
     /// a speed whose odometer is late with it looks the same.
     may_be_speed: bool,
@@ -30,31 +31,48 @@ pub const POLICY: Policy = Policy {
     ..Policy::USUAL
 };
 
-/// Structures for the data at hand.
-pub fn propose(scan: &Scan) -> Proposal {
-    let start = late_from(&STARTS, |start| decrease(scan, start));
+/// A late brake is an error of the record, as late forces are; of the small ones the usual errors hold a part.
+pub const OF_BRAKE: Policy =
+    Policy { is_sought_beside_usual_errors: false, is_late: true, ..Policy::USUAL };
+
+/// Proposes a delay of the brake alone.
+pub fn of_brake(scan: &Scan) -> Proposal {
+    let braking_s = scan.seconds_where(|_, sample| sample.brake_force_n.is_some_and(|n| n > 0.0));
+    if braking_s < 30.0 {
+        return Err("the runs hold hardly any braking".into());
+    }
+    Ok(vec![candidate(scan, DelayAndLag { late: Late::Brake, may_be_speed: false })])
+}
+
+/// Proposes a delay of both forces.
+pub fn of_both(scan: &Scan) -> Proposal {
     let is_any_recorded = scan.problem.runs.iter().any(|run| run.is_position_recorded);
     let is_level = scan.track.is_none_or(|track| track.is_level());
     let is_known = is_any_recorded && !is_level || scan.problem.is_position_ahead();
-    Ok(vec![Candidate::new(DelayAndLag { may_be_speed: !is_known }, start)])
+    Ok(vec![candidate(scan, DelayAndLag { late: Late::Both, may_be_speed: !is_known })])
 }
 
-/// Decrease of the cost when the forces act with this delay and lag.
-fn decrease(scan: &Scan, start: [f64; 2]) -> f64 {
-    scan.decrease_by(&DelayAndLag::default(), &start, |run, i, [declared, late]| {
-        let control_n = |force: &SampleForces| force.traction_n - force.brake_n;
-        (control_n(late) - control_n(declared)) / run.samples()[i].inertial_mass_kg
-    })
+/// A delay and lag with the start that explains most.
+fn candidate(scan: &Scan, of: DelayAndLag) -> Candidate {
+    let decrease = |start: [f64; 2]| {
+        scan.decrease_by(&of, &start, |run, i, [declared, late]| {
+            let control_n = |force: &SampleForces| force.traction_n - force.brake_n;
+            (control_n(late) - control_n(declared)) / run.samples()[i].inertial_mass_kg
+        })
+    };
+    let start = late_from(&STARTS, decrease);
+    Candidate::new(of, start)
 }
 
 impl Hypothesis for DelayAndLag {
     fn nature(&self) -> Nature<'_> {
-        Nature {
-            keys: &[&delay::DELAY, &delay::LAG],
-            turn: Turn::First,
-            looks_back: true,
-            ..Nature::of(EffectKind::ActuatorDelay, &delay::PARAMETERS)
-        }
+        const BOTH: &[&Key] = &[&delay::DELAY, &delay::LAG];
+        const BRAKE: &[&Key] = &[&delay::BRAKE_DELAY, &delay::BRAKE_LAG];
+        let (kind, keys) = match self.late {
+            Late::Both => (EffectKind::ActuatorDelay, BOTH),
+            Late::Brake => (EffectKind::BrakeDelay, BRAKE),
+        };
+        Nature { keys, turn: Turn::First, looks_back: true, ..Nature::of(kind, &delay::PARAMETERS) }
     }
 
     fn sampling_error(&self, step_s: f64) -> f64 {
@@ -72,7 +90,7 @@ impl Hypothesis for DelayAndLag {
     }
 
     fn apply(&self, parameters: &[f64], on: On, forces: &mut [SampleForces]) {
-        late_forces([parameters[0], parameters[1]], on, forces);
+        late_forces(self.late, [parameters[0], parameters[1]], on, forces);
     }
 
     fn report(&self, context: &ReportContext) -> Reported {

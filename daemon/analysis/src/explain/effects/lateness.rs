@@ -37,12 +37,27 @@ pub fn late_reported(context: &ReportContext, parameters: &[Parameter]) -> Repor
     reported
 }
 
+/// Which forces act late.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Late {
+    /// Traction and brake.
+    #[default]
+    Both,
+    /// The brake alone.
+    Brake,
+}
+
 /// Forces that act behind a dead time and a lag in s.
-pub fn late_forces(delay_and_lag_s: [f64; 2], on: On, forces: &mut [SampleForces]) {
+pub fn late_forces(late: Late, delay_and_lag_s: [f64; 2], on: On, forces: &mut [SampleForces]) {
     let line = on.past.forces(delay_and_lag_s, on.first);
     for (force, &at) in forces.iter_mut().zip(&on.run.stamps[on.first..]) {
-        if let Some(late) = line.acting(at, Some([force.traction_n, force.brake_n])) {
-            [force.traction_n, force.brake_n] = late;
+        if let Some([traction_n, brake_n]) =
+            line.acting(at, Some([force.traction_n, force.brake_n]))
+        {
+            force.brake_n = brake_n;
+            if late == Late::Both {
+                force.traction_n = traction_n;
+            }
         }
     }
 }

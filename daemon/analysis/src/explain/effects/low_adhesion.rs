@@ -103,7 +103,8 @@ fn places(
     let by_run: Vec<Tuple> =
         (0..scan.problem.runs.len()).map(|index| scan.run_tuple(index, shape)).collect();
     let everywhere = best_of_runs(scan, &by_run);
-    if everywhere.gain > 0.0 {
+    // A share everywhere in every run is the brake's.
+    if everywhere.gain > 0.0 && (form == Form::Cap || everywhere.runs.is_some()) {
         candidates.push(candidate(&everywhere));
     }
     if scan.problem.distance_ratio.is_some()
@@ -117,13 +118,6 @@ fn places(
     candidates
 }
 
-impl Slippery {
-    /// At all places, in all runs.
-    fn is_everywhere(&self) -> bool {
-        self.site.sections.is_none() && self.site.runs.is_none()
-    }
-}
-
 impl Hypothesis for Slippery {
     fn nature(&self) -> Nature<'_> {
         let is_ratio = self.form == Form::Ratio;
@@ -133,18 +127,12 @@ impl Hypothesis for Slippery {
             // A cap is no factor on a shape, and a map's error is small beside a brake force.
             shared_error: if is_ratio { self.site.map_error } else { 0.0 },
             affine_in: is_ratio.then_some(|ratio| ratio),
-            // Brakes weaker by one share everywhere, in every run and however gently they are applied, look like a
-            // mass once the traction's scale changes as much: two coincidences for one cause.
-            may_stand_for_others: !is_ratio || !self.is_everywhere(),
             ..Nature::of(EffectKind::LowAdhesion, parameters)
         }
     }
 
     fn is_material(&self, parameters: &[f64], _c: f64) -> bool {
-        // Everywhere in every run it is what the declared brake force is good for.
-        let usual = 1.0 - adhesion::DECLARED_BRAKE_STD;
-        let least = if self.is_everywhere() { usual } else { adhesion::RATIO_LEAST };
-        self.form == Form::Cap || parameters[0] < least
+        self.form == Form::Cap || parameters[0] < adhesion::RATIO_LEAST
     }
 
     fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
@@ -173,21 +161,5 @@ impl Hypothesis for Slippery {
 
     fn at_site(&self, site: Site) -> Option<SharedHypothesis> {
         Some(Arc::new(Slippery { site, ..self.clone() }))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_little_weaker_everywhere_is_the_declared_brake_and_in_some_runs_is_not() {
-        let of = |runs: Option<Vec<String>>| Slippery {
-            form: Form::Ratio,
-            site: Site { runs, ..Site::default() },
-        };
-        assert!(!of(None).is_material(&[0.96], 0.0));
-        assert!(of(None).is_material(&[0.94], 0.0));
-        assert!(of(Some(vec!["runs/01.csv".into()])).is_material(&[0.96], 0.0));
     }
 }

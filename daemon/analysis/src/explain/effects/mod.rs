@@ -12,6 +12,7 @@ mod ambient_temperature;
 mod bearing_temperature;
 mod curve_resistance;
 mod dragging_brake;
+mod force_gain;
 mod gradient_error;
 mod gradient_shift;
 mod lateness;
@@ -22,7 +23,6 @@ mod policy;
 mod proposal;
 mod rotating_mass;
 mod speed_delay;
-mod traction_gain;
 mod tunnel_drag;
 mod unknown;
 mod usual_errors;
@@ -46,10 +46,12 @@ pub use vertical_curves::{USUAL_LENGTH_M, vertical_curves};
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
 pub const LIBRARY: &[Effect] = &[
-    Effect::new(ActuatorDelay, actuator_delay::propose, Whole::None).with(&actuator_delay::POLICY),
+    Effect::new(ActuatorDelay, actuator_delay::of_both, Whole::None).with(&actuator_delay::POLICY),
+    Effect::new(BrakeDelay, actuator_delay::of_brake, Whole::None).with(&actuator_delay::OF_BRAKE),
     Effect::new(SpeedDelay, speed_delay::propose, Whole::None).with(&speed_delay::POLICY),
     Effect::new(WheelDiameter, wheel_diameter::propose, Whole::First).with(&wheel_diameter::POLICY),
-    Effect::new(TractionGain, traction_gain::propose, Whole::First).with(&traction_gain::POLICY),
+    Effect::new(TractionGain, force_gain::of_traction, Whole::First).with(&force_gain::OF_TRACTION),
+    Effect::new(BrakeGain, force_gain::of_brake, Whole::None).with(&force_gain::OF_BRAKE),
     Effect::new(MassChange, mass_change::propose, Whole::Of(mass_change::everywhere))
         .with(&mass_change::POLICY),
     Effect::new(RotatingMass, rotating_mass::propose, Whole::First).with(&rotating_mass::POLICY),

@@ -7,7 +7,7 @@ use dynocar_model::terms::{Parameter, bearings, curve, delay, rotating, traction
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
-use super::lateness::late_forces;
+use super::lateness::{Late, late_forces};
 use super::{Candidate, Figure, Handling, Hypothesis, Nature, On, Past, SharedHypothesis, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 
@@ -86,7 +86,7 @@ impl Hypothesis for UsualErrors {
                 }
                 Figure::Lateness => {
                     let on = On { run, first, past: &mut *past };
-                    late_forces([error, 0.0], on, forces);
+                    late_forces(Late::Both, [error, 0.0], on, forces);
                 }
             }
         }

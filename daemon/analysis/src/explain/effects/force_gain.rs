@@ -1,0 +1,77 @@
+//! A reported force that is not the true one, traction or brake: gain = reported over true.
+
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::{Key, brake, traction};
+use dynocar_shared::vocabulary::EffectKind;
+
+use super::{Candidate, Everyday, Figure, Hypothesis, Nature, On, Policy, Proposal};
+use crate::explain::evidence::SampleForces;
+use crate::explain::scan::Scan;
+
+#[derive(Clone, Copy, Debug)]
+enum Gain {
+    Traction,
+    Brake,
+}
+
+/// Force sensors are a little off: an error of the record that every train has.
+pub const OF_TRACTION: Policy = Policy {
+    is_sought_beside_usual_errors: false,
+    everyday: Some(Everyday { rank: 3, most: f64::INFINITY }),
+    frees: &[Figure::Traction],
+    ..Policy::USUAL
+};
+/// The usual errors hold a scale of the brake, and a larger one is no small error.
+pub const OF_BRAKE: Policy =
+    Policy { is_sought_beside_usual_errors: false, frees: &[Figure::Brake], ..Policy::USUAL };
+
+/// Proposes a gain of the traction force.
+pub fn of_traction(scan: &Scan) -> Proposal {
+    proposed(scan, Gain::Traction, |sample| sample.traction_force_n, "traction")
+}
+
+/// Proposes a gain of the brake force.
+pub fn of_brake(scan: &Scan) -> Proposal {
+    proposed(scan, Gain::Brake, |sample| sample.brake_force_n, "braking")
+}
+
+fn proposed(
+    scan: &Scan,
+    gain: Gain,
+    force_n: fn(&ResolvedSample) -> Option<f64>,
+    what: &str,
+) -> Proposal {
+    let acting_s = scan.seconds_where(|_, sample| force_n(sample).is_some_and(|n| n > 0.0));
+    if acting_s < 30.0 {
+        return Err(format!("the runs hold hardly any {what}"));
+    }
+    Ok(vec![Candidate::new(gain, vec![1.0])])
+}
+
+impl Hypothesis for Gain {
+    fn nature(&self) -> Nature<'_> {
+        const TRACTION: &[&Key] = &[&traction::GAIN];
+        const BRAKE: &[&Key] = &[&brake::GAIN];
+        let (kind, keys, least) = match self {
+            Gain::Traction => (EffectKind::TractionGain, TRACTION, traction::LEAST),
+            Gain::Brake => (EffectKind::BrakeGain, BRAKE, brake::GAIN_LEAST),
+        };
+        Nature {
+            keys,
+            none: 1.0,
+            least: Some(least),
+            affine_in: Some(f64::recip),
+            ..Nature::of(kind, &traction::PARAMETERS)
+        }
+    }
+
+    fn apply(&self, parameters: &[f64], _on: On, forces: &mut [SampleForces]) {
+        for force in forces {
+            let reported_n = match self {
+                Gain::Traction => &mut force.traction_n,
+                Gain::Brake => &mut force.brake_n,
+            };
+            *reported_n = traction::true_force_n(*reported_n, parameters[0]);
+        }
+    }
+}
