@@ -8,7 +8,7 @@ use std::io::{self, BufRead, Read, Write};
 use dynocar_dataset::{RunColumn, RunColumns, TrainColumn};
 use serde::{Deserialize, Serialize};
 
-/// What comes.
+/// Rows and columns that are to come.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Number of rows.

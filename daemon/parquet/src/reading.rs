@@ -22,7 +22,7 @@ use super::table::{
     attachments_batch, attachments_of, metadata_batch,
 };
 
-/// What reads a file's rows.
+/// A reader of a file's rows, before it begins.
 pub type Builder = ParquetRecordBatchReaderBuilder<File>;
 
 /// A message with its place in the recording and when it was recorded.

@@ -1,7 +1,5 @@
 //! Times packed into one number.
 
-use super::TimeFormat;
-
 /// Hours, minutes and seconds as digits.
 pub const PACKED_CLOCK: &str = "%H%M%S";
 const PACKED_DATE: &str = "%Y%m%d%H%M%S";
@@ -38,14 +36,13 @@ impl Packed {
         self.last = number;
     }
 
-    /// The format; `None` for numbers that are none, or that do not show it.
-    pub fn format(&self) -> Option<TimeFormat> {
-        let pattern = match self {
-            Packed { is_date: true, last, .. } if !last.is_nan() => PACKED_DATE,
-            Packed { is_short_date: true, minutes: 2.., .. } => PACKED_SHORT_DATE,
-            Packed { is_clock: true, minutes: 2.., .. } => PACKED_CLOCK,
-            _ => return None,
-        };
-        Some(TimeFormat::Pattern(pattern.into()))
+    /// The pattern; `None` for numbers that are none, or that do not show it.
+    pub fn pattern(&self) -> Option<&'static str> {
+        match self {
+            Packed { is_date: true, last, .. } if !last.is_nan() => Some(PACKED_DATE),
+            Packed { is_short_date: true, minutes: 2.., .. } => Some(PACKED_SHORT_DATE),
+            Packed { is_clock: true, minutes: 2.., .. } => Some(PACKED_CLOCK),
+            _ => None,
+        }
     }
 }

@@ -119,7 +119,7 @@ fn looks_like_unit(inside: &str, open: char) -> bool {
         || !known && (has_mark || (open == '[' && has_letters && !inside.contains(' ')))
 }
 
-/// What stands in a name's brackets where that is a multiple of a unit of the quantity, as `0.1 kN` or `x1000 lbs`.
+/// The text in a name's brackets where that is a multiple of a unit of the quantity, as `0.1 kN` or `x1000 lbs`.
 pub fn scaled_unit(name: &Name, quantity: Quantity) -> Option<&str> {
     let spelled = |text: &str| Unit::spelled(quantity.dimension(), text).is_some();
     let (_, inside) = name.text.rsplit_once(['[', '('])?;
