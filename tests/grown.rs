@@ -13,9 +13,8 @@ use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, Trai
 
 const TRAIN: &str = "[train]\nmass_t = 200\nlength_m = 100\nrotating_mass_factor = 0.06\n\
                      [resistance]\na = 1.5\nb = 0.01\nc = 0.0005\n";
-/// 0.6 N/kN while the train is neither pulled nor braked.
-const DRAG: &str = "[[extra]]\nn_per_kn = 0.6\n\
-    [[extra.factor]]\nof = \"traction_force_n\"\nform = \"up_to\"\nto = 500\n\
+/// The form of a drag while the train is neither pulled nor braked.
+const DRAG: &str = "[[extra.factor]]\nof = \"traction_force_n\"\nform = \"up_to\"\nto = 500\n\
     [[extra.factor]]\nof = \"brake_force_n\"\nform = \"up_to\"\nto = 500\n";
 const TRACK: &str = "[track]\nlength_m = 40000\ngradient = [[0.0, 0.0], [3000.0, 4.0], [5000.0, -3.0], \
                      [9000.0, 1.0], [12000.0, -5.0], [15000.0, 2.0], [22000.0, -1.0]]\n";
@@ -58,8 +57,8 @@ fn run(train: &str, number: usize) -> String {
     text
 }
 
-/// Runs of a train with the drag, declared without it.
-fn dataset() -> Dataset {
+/// Runs of a train with a drag in N/kN, declared without it.
+fn dataset_with(drag_n_per_kn: f64) -> Dataset {
     let column = |quantity: &str, column: &str, unit: &str| {
         format!("{quantity} = {{ column = \"{column}\", unit = \"{unit}\" }}\n")
     };
@@ -73,7 +72,7 @@ fn dataset() -> Dataset {
     manifest += &column("brake_force", "brake", "N");
     manifest += &column("headwind", "wind", "m/s");
     manifest += &column("rail_temperature", "rail", "degC");
-    let true_train = format!("{TRAIN}{DRAG}");
+    let true_train = format!("{TRAIN}[[extra]]\nn_per_kn = {drag_n_per_kn}\n{DRAG}");
     let runs: Vec<(String, String)> =
         (0..RUNS).map(|k| (format!("{k}.csv"), run(&true_train, k))).collect();
     for (file, _) in &runs {
@@ -84,6 +83,18 @@ fn dataset() -> Dataset {
         vec![("dataset.toml", &manifest[..]), ("train.toml", TRAIN), ("track.toml", TRACK)];
     files.extend(runs.iter().map(|(file, text)| (&file[..], &text[..])));
     Dataset::load(&files[..]).unwrap()
+}
+
+fn dataset() -> Dataset {
+    dataset_with(0.6)
+}
+
+#[test]
+fn an_everyday_effect_is_in_the_model_without_a_name_as_its_policy_says() {
+    let answer = explain(&dataset_with(0.06), &|_, _| {}).unwrap().answer;
+    assert!(answer.effects.is_empty(), "{}", answer.statement);
+    let drag = answer.considered.iter().find(|it| it.kind == "idle_drag").unwrap();
+    assert!(drag.reason.starts_with("certain and small"), "{} {drag:?}", answer.statement);
 }
 
 #[test]

@@ -23,6 +23,22 @@ const PAUSE: Duration = Duration::from_millis(1);
 /// refused. Sequence numbers go on from controller to controller. Dropping it waits for at most
 /// [`CLOSE_PATIENCE`], unless [`SamplePublisher::flush`] has waited already; what is given up the
 /// daemon counts as lost.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_client::{Host, SamplePublisher, monotonic_now_ns};
+/// use dynocar_shared::{SampleField, TrainId, TrainSample};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let host = Host::at(&folder.path().join("root"))?;
+/// let mut publisher = SamplePublisher::open(&host, TrainId(1))?;
+/// let mut sample = TrainSample::empty(TrainId(1)).with(SampleField::Speed, 21.5);
+/// sample.time_ns = monotonic_now_ns();
+/// assert_eq!(publisher.publish(&mut sample)?, 1);
+/// assert!(SamplePublisher::open(&host, TrainId(1)).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct SamplePublisher {
     host: Host,

@@ -20,6 +20,21 @@ pub const STALE_AFTER_NS: i64 = 250_000_000;
 const CLOCK_TOLERANCE_NS: i64 = 1_000_000_000;
 
 /// Reads the newest snapshot of each pipeline of one train.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_client::{Host, NoAnswer, SnapshotReader, monotonic_now_ns};
+/// use dynocar_shared::TrainId;
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let host = Host::at(&folder.path().join("root"))?;
+/// let mut reader = SnapshotReader::open(&host, TrainId(1))?;
+/// // No daemon runs here yet: the controller goes on with its own parameters, and polls again.
+/// assert_eq!(reader.poll(), 0);
+/// assert_eq!(reader.mass(monotonic_now_ns()).err(), Some(NoAnswer::NoSnapshot));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct SnapshotReader {
     host: Host,
@@ -32,6 +47,24 @@ pub struct SnapshotReader {
 }
 
 /// A snapshot with its age.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_client::Reading;
+/// use dynocar_shared::{Parameter, ParameterSnapshot};
+///
+/// /// Returns the mass in t that a controller uses.
+/// fn mass_t(reading: &Reading, built_in_t: f64) -> f64 {
+///     let learned_t = reading.snapshot.value(Parameter::Mass);
+///     learned_t.filter(|_| reading.is_usable()).unwrap_or(built_in_t)
+/// }
+///
+/// let snapshot = ParameterSnapshot::empty();
+/// let silent = Reading { snapshot: &snapshot, age_ns: 1_000_000_000, is_stale: true, quantity: None };
+/// assert_eq!(mass_t(&silent, 412.0), 412.0);
+/// assert_eq!(silent.why(), "daemon_silent");
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<'a> {
     /// The snapshot.
@@ -270,6 +303,16 @@ impl SnapshotReader {
 }
 
 /// Why there is no reading of a quantity.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_client::NoAnswer;
+///
+/// let may_come = |why: NoAnswer| why == NoAnswer::NoSnapshot;
+/// assert!(may_come(NoAnswer::NoSnapshot) && !may_come(NoAnswer::NotProvided));
+/// assert_eq!(NoAnswer::NotProvided.name(), "not_provided");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoAnswer {
     /// No daemon has been heard of, or not yet the pipeline that answers.

@@ -47,7 +47,7 @@ pub struct ReplayReport {
 
 /// Counts of one pipeline over a replay's samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Taken {
+pub struct ReplayCounts {
     /// Samples that entered the estimate.
     pub used: u64,
     /// Samples refused.
@@ -60,7 +60,7 @@ pub struct Taken {
 
 impl ReplayReport {
     /// Returns the counts of a pipeline over this replay's samples alone, from its snapshot at the end.
-    pub fn taken(&self, after: &ParameterSnapshot) -> Taken {
+    pub fn taken(&self, after: &ParameterSnapshot) -> ReplayCounts {
         let is_same = |it: &&ParameterSnapshot| {
             (it.epoch, it.pipeline_index) == (after.epoch, after.pipeline_index)
         };
@@ -73,7 +73,7 @@ impl ReplayReport {
             .filter(|&(_, count)| count > 0)
             .collect();
         reasons.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
-        Taken {
+        ReplayCounts {
             used: after.samples_used.saturating_sub(before.samples_used),
             rejected: after.samples_rejected.saturating_sub(before.samples_rejected),
             lost: after.samples_lost.saturating_sub(before.samples_lost),

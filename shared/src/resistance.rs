@@ -4,6 +4,17 @@ use crate::snapshot::ParameterSnapshot;
 use crate::vocabulary::Parameter;
 
 /// Basic resistance at a speed, with its uncertainty.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_shared::ResistanceEstimate;
+///
+/// let at_20_mps =
+///     ResistanceEstimate { w0_n_per_kn: 2.1, w0_std_n_per_kn: 0.1, is_extrapolated: false };
+/// let (force_n, std_n) = at_20_mps.force_n(1_692_000.0);
+/// assert_eq!([force_n.round(), std_n.round()], [34_857.0, 1_660.0]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResistanceEstimate {
     /// Unit basic resistance w0 in N per kN of train weight.

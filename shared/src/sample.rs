@@ -141,6 +141,18 @@ const _: () = assert!(SampleField::ALL.len() <= u16::BITS as usize, "a bit of `v
 
 impl TrainSample {
     /// Sets a measured value and its validity bit.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use dynocar_shared::{SampleField, TrainId, TrainSample};
+    ///
+    /// let sample = TrainSample::empty(TrainId(1))
+    ///     .with(SampleField::Speed, 21.5)
+    ///     .with(SampleField::TractionForce, 84_000.0);
+    /// assert_eq!(sample.get(SampleField::Speed), Some(21.5));
+    /// assert_eq!(sample.get(SampleField::BrakeForce), None);
+    /// ```
     #[must_use]
     pub const fn with(mut self, field: SampleField, value: f64) -> Self {
         self.set(field, value);

@@ -208,6 +208,19 @@ impl ParameterSnapshot {
     }
 
     /// A parameter's value in its unit.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use dynocar_shared::{Parameter, ParameterSnapshot};
+    ///
+    /// let mut snapshot = ParameterSnapshot::empty();
+    /// assert_eq!(snapshot.value(Parameter::Mass), None);
+    /// snapshot.parameter_count = 1;
+    /// snapshot.parameters[0] = Parameter::Mass as u32;
+    /// snapshot.values[0] = 412.0;
+    /// assert_eq!(snapshot.value(Parameter::Mass), Some(412.0));
+    /// ```
     pub fn value(&self, parameter: Parameter) -> Option<f64> {
         self.index_of(parameter).map(|index| self.values[index])
     }

@@ -51,6 +51,19 @@ impl BrakeResponse {
 }
 
 /// Adhesion of the rail.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_shared::{EffortPoint, RailAdhesion, RailCondition, Stop, Uncertain};
+///
+/// let effort = [EffortPoint { speed_mps: 0.0, force_n: 600e3 }];
+/// let dry = Stop::level(20.0, 400e3, [1.5, 0.01, 0.0005], &effort);
+/// let wet = RailAdhesion::Law(RailCondition::Wet, Uncertain::new(1.0, 0.1));
+/// let on_wet_rail = Stop { adhesion: wet, ..dry };
+/// assert!(on_wet_rail.estimate(0.99)?.distance_m > dry.estimate(0.99)?.distance_m);
+/// # Ok::<(), dynocar_shared::StoppingError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RailAdhesion {
     /// The rail carries any brake force.
@@ -81,6 +94,22 @@ impl RailAdhesion {
 }
 
 /// The stop that is asked about.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_shared::{EffortPoint, RailAdhesion, Stop, Uncertain};
+///
+/// let effort = [EffortPoint { speed_mps: 0.0, force_n: 400e3 }];
+/// let known = Stop::level(20.0, 400e3, [1.5, 0.01, 0.0005], &effort);
+/// let estimate = known.estimate(0.95)?;
+/// assert!((195.0..200.0).contains(&estimate.distance_m));
+/// // An uncertain brake makes the bound longer, and leaves the distance.
+/// let uncertain = Stop { brake_scale: Uncertain::new(1.0, 0.05), ..known }.estimate(0.95)?;
+/// assert_eq!(uncertain.distance_m, estimate.distance_m);
+/// assert!(uncertain.distance_bound_m > 1.05 * estimate.distance_bound_m);
+/// # Ok::<(), dynocar_shared::StoppingError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop<'a> {
     /// Speed in m/s at which the brake is commanded.

@@ -3,11 +3,11 @@
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::soak::months::story::Span;
 use dynocar_tests::soak::months::table::{HEADER, line};
-use dynocar_tests::soak::months::{Life, LifeSettings, Outcome, Story, mistakes};
+use dynocar_tests::soak::months::{Life, LifeOutcome, LifeSettings, Story, mistakes};
 
 /// A life of some days of twelve trips; a mistake in a thousand trips is let pass, so that a day or
 /// two of them are evidence enough.
-fn lived(story: Story, span: Span, days: usize) -> Outcome {
+fn lived(story: Story, span: Span, days: usize) -> LifeOutcome {
     let settings = LifeSettings {
         story,
         span,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use dynocar_analysis::advice::drive::{Drive, DriveKind, Scene};
 use dynocar_analysis::advice::known::davis_of;
 use dynocar_analysis::advice::noise::NoiseSeen;
-use dynocar_analysis::advice::rehearsal::{Known, MASS, forecast};
+use dynocar_analysis::advice::rehearsal::{KnownBefore, MASS, forecast};
 use dynocar_analysis::advice::{best, forecasts};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
@@ -138,8 +138,8 @@ impl Trial {
         (snapshot.value(Parameter::Mass).unwrap(), snapshot.std(Parameter::Mass).unwrap())
     }
 
-    fn known(&self) -> Known {
-        Known { davis: davis_of(self.snapshot()).unwrap().1, mass_std_t: self.mass_t().1 }
+    fn known(&self) -> KnownBefore {
+        KnownBefore { davis: davis_of(self.snapshot()).unwrap().1, mass_std_t: self.mass_t().1 }
     }
 
     fn scene<'a>(&self, train: &'a TrainModel) -> Scene<'a> {

@@ -13,7 +13,7 @@ use dynocar::state::{entry::StateContent, file};
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
 use dynocar_analysis::dataset::guess::{Recording, guess};
 use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train};
-use dynocar_analysis::import::{Reading, Source, import};
+use dynocar_analysis::import::{ImportReading, Source, import};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::TrainModel;
@@ -122,7 +122,7 @@ impl Target {
             Target::Track => parse_track("track.toml", &text).is_ok(),
             Target::Import => {
                 let source = [Source { label: "file", text: &text }];
-                import(&source, None, &Reading::default()).is_ok()
+                import(&source, None, &ImportReading::default()).is_ok()
             }
             // Names of files in the text lead into the corpus.
             Target::Daemon => {

@@ -1,5 +1,5 @@
 //! The braking curve to a stopping point: a constant deceleration that eases off before the train
-//! stands, so that nobody is jolted.
+//! stands, so that it stops without a jolt.
 
 use super::knowledge::{Ability, Knowledge};
 
@@ -7,7 +7,7 @@ use super::knowledge::{Ability, Knowledge};
 const SOFT_MPS: f64 = 3.0;
 /// Share of the deceleration that is left at standstill.
 const END_SHARE: f64 = 0.4;
-/// Share of what brake and rail can give that an ordinary stop plans with.
+/// Share of the deceleration that brake and rail allow with which an ordinary stop is planned.
 const PLANNED_SHARE: f64 = 0.85;
 
 /// Deceleration over speed.

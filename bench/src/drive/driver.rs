@@ -8,7 +8,7 @@
 
 use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};
-use super::plan::{COASTING_MIN_SHARE, Leg, Plan, Planner};
+use super::plan::{COASTING_MIN_SHARE, DrivePlan, Leg, Planner};
 
 /// Bandwidth in rad/s of the estimate of speed and of what is not explained, at most.
 const OBSERVER_RAD_PER_S: f64 = 0.8;
@@ -56,7 +56,7 @@ pub struct Driver {
     cycle_s: f64,
     knowledge: Knowledge,
     phase: Phase,
-    plan: Plan,
+    plan: DrivePlan,
     next_plan_s: f64,
     /// As steep as when the braking began, or less steep where brake or rail turn out to carry less.
     curve: BrakingCurve,

@@ -33,7 +33,7 @@ use dynocar::output::{report_line, write_file};
 use serde_json::json;
 
 use self::line::{CONDITIONS, ORDINARY, Service};
-use self::run::{Extent, Informant};
+use self::run::{DriveExtent, Informant};
 use self::score::Scored;
 use crate::output::{
     Failure, OutputArguments, Record, containing, expect, expect_none, table, write_csv,
@@ -48,7 +48,7 @@ use crate::scenarios::world::Traffic;
 #[derive(Debug, Args)]
 pub struct DriveArguments {
     #[command(flatten)]
-    extent: Extent,
+    extent: DriveExtent,
     /// Only scenarios whose name contains this, as metro or 'wet rail'
     #[arg(long, value_name = "TEXT", default_value = "")]
     scenario: String,
@@ -131,7 +131,7 @@ fn ordinary(scored: &[Scored]) -> Vec<&Scored> {
     first
 }
 
-fn measure(service: Service, extent: Extent) -> Result<Scored, Failure> {
+fn measure(service: Service, extent: DriveExtent) -> Result<Scored, Failure> {
     let mut all = [Vec::new(), Vec::new(), Vec::new()];
     for (driven, (informant, _)) in all.iter_mut().zip(Informant::ALL) {
         *driven = run::drive(service, informant, extent)?;

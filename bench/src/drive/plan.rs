@@ -1,7 +1,7 @@
 //! The speed profile that keeps the timetable with the least energy: accelerate in full, cruise, coast,
-//! brake. Found are the cruising speed and the place from which the train coasts.
+//! brake. The search finds the cruising speed and the place from which the train coasts.
 //!
-//! The way from stop to stop is that of the driver's map.
+//! Distances and gradients between stops are those of the driver's map.
 
 use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};
@@ -55,7 +55,7 @@ const EARLY_SHARE: f64 = 5e-4;
 
 /// Plan that the driver follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
+pub struct DrivePlan {
     /// Cruising speed in m/s.
     pub cruise_mps: f64,
     /// Distance in m from which the train coasts.
@@ -80,7 +80,7 @@ pub struct Planner<'a> {
 impl Planner<'_> {
     /// The plan with the least energy, from a distance in m and a speed in m/s, that needs no more than
     /// `left_s`; the fastest one where none does.
-    pub fn plan(&self, from: (f64, f64), left_s: f64) -> Plan {
+    pub fn plan(&self, from: (f64, f64), left_s: f64) -> DrivePlan {
         let top = self.leg.top_mps;
         let fastest = self.run(from, top, self.leg.length_m);
         if fastest.time_s >= left_s {
@@ -107,7 +107,7 @@ impl Planner<'_> {
     }
 
     /// The latest possible coasting that is still in time at a cruising speed in m/s.
-    fn in_time(&self, from: (f64, f64), cruise_mps: f64, left_s: f64) -> Option<Plan> {
+    fn in_time(&self, from: (f64, f64), cruise_mps: f64, left_s: f64) -> Option<DrivePlan> {
         let mut best = self.run(from, cruise_mps, self.leg.length_m);
         if best.time_s > left_s {
             return None;
@@ -147,7 +147,7 @@ impl Planner<'_> {
         (mut at_m, mut speed_mps): (f64, f64),
         cruise_mps: f64,
         coast_from_m: f64,
-    ) -> Plan {
+    ) -> DrivePlan {
         let curve = BrakingCurve::of(self.knowledge, self.ability, cruise_mps.max(speed_mps));
         let step_m = (self.leg.length_m - at_m).max(1.0) / STEPS as f64;
         let (mut time_s, mut energy_j) = (0.0, 0.0);
@@ -174,7 +174,7 @@ impl Planner<'_> {
             }
         }
         time_s += curve.time_s(speed_mps);
-        Plan { cruise_mps, coast_from_m, time_s, energy_j }
+        DrivePlan { cruise_mps, coast_from_m, time_s, energy_j }
     }
 
     /// Force in N over a piece of the leg, and the speed in m/s at its end.

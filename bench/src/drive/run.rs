@@ -33,7 +33,7 @@ impl Informant {
 
 /// Which trains drive how far.
 #[derive(Clone, Copy, Debug, Args)]
-pub struct Extent {
+pub struct DriveExtent {
     /// Trains for each scenario, each with a seed of its own
     #[arg(long, default_value_t = 20)]
     pub trains: usize,
@@ -86,9 +86,9 @@ impl Driving {
 pub fn drive(
     service: Service,
     informant: Informant,
-    extent: Extent,
+    extent: DriveExtent,
 ) -> Result<Vec<Driven>, Failure> {
-    let Extent { trains, stops, first_seed } = extent;
+    let DriveExtent { trains, stops, first_seed } = extent;
     let mut link = match informant {
         Informant::Dynocar => Some(Link::open(&service.declared(), trains)?),
         Informant::Declared | Informant::Truth => None,

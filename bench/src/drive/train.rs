@@ -1,4 +1,4 @@
-//! The train, whose truth nobody knows: what it does with a force, and what of that is measured.
+//! The simulated train: how it moves under a force, and what its sensors measure. No estimator sees its true parameters.
 
 use std::collections::VecDeque;
 
@@ -28,7 +28,7 @@ pub struct Train {
     pub service: Service,
     world: World,
     hidden: Hidden,
-    /// As declared.
+    /// The declared model.
     pub declared: TrainModel,
     /// Brake gear as the daemon assumes it.
     pub gear: DeclaredGear,

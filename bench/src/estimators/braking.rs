@@ -11,8 +11,8 @@ use dynocar_core::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel
 use dynocar_estimators::xie::{EmSettings, EmWindow, KalmanExpectation, ParticleExpectation};
 use dynocar_shared::Uncertain;
 
-use super::measure::Case;
-use crate::papers::braking::{Moment, XIE_TABLE_2};
+use super::measure::EstimatorCase;
+use crate::papers::braking::{BrakingMoment, XIE_TABLE_2};
 
 /// Samples of a window.
 const SAMPLES: usize = 40;
@@ -44,7 +44,7 @@ const INPUTS: StepInputs = StepInputs {
 
 /// The first observations of a braking on a wet rail.
 fn braking(samples: usize, seed: u64) -> Vec<Observation> {
-    let observation = |it: &Moment| Observation {
+    let observation = |it: &BrakingMoment| Observation {
         distance_m: it.measured_m,
         speed_mps: it.speed_mps,
         is_speed_valid: false,
@@ -59,9 +59,9 @@ fn case(
     brakings: &Rc<[Vec<Observation>]>,
     updates: usize,
     mut engine: impl Engine + 'static,
-) -> Case {
+) -> EstimatorCase {
     let brakings = Rc::clone(brakings);
-    Case::new(name, updates * brakings.len(), move || {
+    EstimatorCase::new(name, updates * brakings.len(), move || {
         let mut found = 0.0;
         for braking in brakings.iter() {
             engine.start(&braking[0]);
@@ -82,7 +82,7 @@ fn tracker(walk: Walk, lag: usize) -> Tracker {
 }
 
 /// The cases of this module.
-pub fn cases() -> Vec<Case> {
+pub fn cases() -> Vec<EstimatorCase> {
     let windows: Rc<[_]> = (1..=WINDOWS).map(|seed| braking(SAMPLES, seed)).collect();
     let long: Rc<[_]> = [braking(STEPS + 1, 99)].into();
     let settings = EmSettings {

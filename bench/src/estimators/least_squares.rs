@@ -5,7 +5,7 @@ use std::rc::Rc;
 use dynocar_core::filter::{Mils, Penalty, Rls};
 use nalgebra::Vector3;
 
-use super::measure::Case;
+use super::measure::EstimatorCase;
 use crate::chance::Chance;
 
 type Row = (Vector3<f64>, f64);
@@ -32,11 +32,11 @@ fn rows() -> Rc<[Row]> {
 }
 
 /// The cases of this module.
-pub fn cases() -> Vec<Case> {
+pub fn cases() -> Vec<EstimatorCase> {
     let rows = rows();
     let of = |name, run: fn(&[Row]) -> Vector3<f64>| {
         let rows = Rc::clone(&rows);
-        Case::new(name, ROWS, move || run(&rows))
+        EstimatorCase::new(name, ROWS, move || run(&rows))
     };
     vec![
         of("rls", |rows| rls(rows, 1.0)).aim(60.0),

@@ -11,7 +11,7 @@ use crate::output::Record;
 use crate::statistics::quantiles;
 
 /// Work that is timed.
-pub struct Case {
+pub struct EstimatorCase {
     /// Its name, in the table and in JSON.
     pub name: String,
     /// Time of an update in ns that is aimed at.
@@ -43,7 +43,7 @@ pub fn quartiles(values: Vec<f64>) -> [f64; 3] {
     quantiles(values, [0.25, 0.5, 0.75]).unwrap_or([f64::NAN; 3])
 }
 
-impl Case {
+impl EstimatorCase {
     /// A case by its name, the updates in a pass, and a pass, which gives what was estimated.
     pub fn new<T>(
         name: impl Into<String>,
@@ -51,13 +51,13 @@ impl Case {
         mut pass: impl FnMut() -> T + 'static,
     ) -> Self {
         let pass = Box::new(move || _ = black_box(pass()));
-        Case { name: name.into(), target_ns: None, updates, pass }
+        EstimatorCase { name: name.into(), target_ns: None, updates, pass }
     }
 
     /// With an aim in ns.
     #[must_use]
     pub fn aim(self, target_ns: f64) -> Self {
-        Case { target_ns: Some(target_ns), ..self }
+        EstimatorCase { target_ns: Some(target_ns), ..self }
     }
 
     /// Warms up and measures: the median time of an update over the rounds, half the distance of its quartiles, and
@@ -113,7 +113,7 @@ mod tests {
             || std::hint::black_box((0..20_000_u64).map(std::hint::black_box).sum::<u64>());
         let of = |updates, target_ns| {
             let effort = Effort { rounds: 3, slice: Duration::ZERO };
-            Case::new("c", updates, sleepy).aim(target_ns).measure(&effort)
+            EstimatorCase::new("c", updates, sleepy).aim(target_ns).measure(&effort)
         };
         let (slow, fast) = (of(1, 1.0), of(1000, 1e9));
         assert_eq!((slow.cell("met"), fast.cell("met")), (Some("NO"), Some("yes")));

@@ -19,7 +19,7 @@ use dynocar_analysis::dataset::DatasetError;
 use serde_json::json;
 
 use crate::output::{Failure, OutputArguments, Record, containing, table};
-use measure::{Case, Effort};
+use measure::{Effort, EstimatorCase};
 
 /// Time of an update of every estimator and every pipeline.
 #[derive(Debug, Args)]
@@ -61,7 +61,7 @@ impl EstimatorsArguments {
 /// # Errors
 ///
 /// When the demonstration dataset is wrong.
-fn cases() -> Result<Vec<Case>, DatasetError> {
+fn cases() -> Result<Vec<EstimatorCase>, DatasetError> {
     let mut cases = least_squares::cases();
     cases.extend(trajectory::cases());
     cases.extend(braking::cases());

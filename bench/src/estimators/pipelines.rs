@@ -16,7 +16,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 
-use super::measure::Case;
+use super::measure::EstimatorCase;
 use crate::papers::braking;
 use crate::rig::pipelines::{default_pipeline, resolving};
 
@@ -77,11 +77,11 @@ fn kinds() -> impl Iterator<Item = PipelineKind> {
 /// # Errors
 ///
 /// When the dataset is wrong.
-pub fn cases() -> Result<Vec<Case>, DatasetError> {
+pub fn cases() -> Result<Vec<EstimatorCase>, DatasetError> {
     let run = DemoRun::read()?;
     let of = |kind: PipelineKind| {
         let run = Rc::clone(&run);
-        Case::new(format!("pipeline {kind}"), run.samples.len(), move || run.process(kind))
+        EstimatorCase::new(format!("pipeline {kind}"), run.samples.len(), move || run.process(kind))
     };
     Ok(std::iter::once(mass_filter(&run)).chain(kinds().map(of)).collect())
 }
@@ -92,12 +92,12 @@ const SPEED_VARIANCE: f64 = 4e-4;
 const STEP_S: f64 = 0.2;
 
 /// Eight behaviours of a bias side by side.
-fn mass_filter(run: &DemoRun) -> Case {
+fn mass_filter(run: &DemoRun) -> EstimatorCase {
     let train = &run.train;
     let dynamics =
         Dynamics { resistance: LineResistance::declared(train), inertia: Inertia::of(train) };
     let motions = run.motions();
-    Case::new("mass Kalman step, 8 behaviours", motions.len() - 1, move || {
+    EstimatorCase::new("mass Kalman step, 8 behaviours", motions.len() - 1, move || {
         let models = MassKalmanSettings::default().bias_models();
         let mut bank = BiasBank::new(dynamics, models, (1.0, 0.2), 3000.0);
         bank.restart_speed(motions[0].speed_mps, SPEED_VARIANCE);

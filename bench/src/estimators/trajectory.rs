@@ -13,7 +13,7 @@ use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
-use super::measure::Case;
+use super::measure::EstimatorCase;
 use crate::chance::Chance;
 
 /// Rotating-mass factor of every run.
@@ -53,7 +53,7 @@ fn run(
 }
 
 /// The cases of this module.
-pub fn cases() -> Vec<Case> {
+pub fn cases() -> Vec<EstimatorCase> {
     let mut random = Chance::new(3);
     // Traction and coasting by turns; the resistance grows by half midway.
     let at = |index| {
@@ -65,7 +65,7 @@ pub fn cases() -> Vec<Case> {
     let run = Rc::new(run(StepRule::Time, STEPS, STEP_S, FIRST_MPS, at, noise_mps));
     let of = |name, pass: fn(&Run) -> Vector3<f64>| {
         let run = Rc::clone(&run);
-        Case::new(name, STEPS, move || pass(&run))
+        EstimatorCase::new(name, STEPS, move || pass(&run))
     };
     vec![
         of("trajectory filter step, one hypothesis", step_of_one),
@@ -143,7 +143,7 @@ const SLIDE: usize = 10;
 const FIT_NOISE_MPS: f64 = 0.18;
 
 /// Fits over windows of `samples` samples, each from the coefficients that the window before gave.
-fn fit(samples: usize) -> Case {
+fn fit(samples: usize) -> EstimatorCase {
     let mut random = Chance::new(samples as u64);
     let truth = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
     let at = |index| (if (index / 15) % 2 == 0 { 0.25 } else { 0.0 }, truth);
@@ -168,7 +168,7 @@ fn fit(samples: usize) -> Case {
     for window in 0..WINDOWS - 1 {
         warm.push(davis_after(window, &warm[window]));
     }
-    Case::new(format!("trajectory fit, warm, {samples} samples"), WINDOWS, move || {
+    EstimatorCase::new(format!("trajectory fit, warm, {samples} samples"), WINDOWS, move || {
         let of = |(window, start): (usize, &Davis)| davis_after(window, start).c;
         warm.iter().enumerate().map(of).sum::<f64>()
     })

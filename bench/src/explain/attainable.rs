@@ -14,7 +14,7 @@ use dynocar_tests::simulator::{Around, Effect, Law, SimulatedDataset, Unlisted};
 /// Half the difference of speeds in m/s that a law's slope is taken over.
 const SLOPE_OVER_MPS: f64 = 0.01;
 
-/// A law of the simulator, of which the numbers are looked for.
+/// A law of the simulator whose numbers are estimated.
 #[derive(Debug)]
 struct TrueLaw {
     law: Law,

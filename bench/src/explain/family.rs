@@ -12,7 +12,7 @@ use dynocar_tests::simulator::dataset_writer::{
 };
 use dynocar_tests::simulator::{SimulatedDataset, SimulatorSettings, simulate};
 
-use super::scenario::{Scenario, World};
+use super::scenario::{ExplainScenario, ExplainWorld};
 use crate::output::{Failure, OutputArguments, named};
 use crate::parallel;
 
@@ -20,11 +20,11 @@ use crate::parallel;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Case {
     /// The family.
-    pub scenario: Scenario,
+    pub scenario: ExplainScenario,
     /// The seed.
     pub seed: u64,
     /// The world it happens in.
-    pub world: World,
+    pub world: ExplainWorld,
     /// Number of runs, a quarter of them held out.
     pub runs: usize,
 }
@@ -68,8 +68,8 @@ pub struct FamilyArguments {
     #[arg(long = "kind", value_name = "NAME")]
     kinds: Vec<String>,
     /// Errors simulated besides the effect
-    #[arg(long, value_enum, default_value_t = World::Plain)]
-    world: World,
+    #[arg(long, value_enum, default_value_t = ExplainWorld::Plain)]
+    world: ExplainWorld,
     /// Runs of a dataset, a quarter of them held out
     #[arg(long, default_value_t = 8, value_parser = RangedU64ValueParser::<usize>::new().range(2..))]
     runs: usize,
@@ -89,14 +89,14 @@ impl FamilyArguments {
     /// # Errors
     ///
     /// When there is no such kind.
-    pub fn scenarios(&self, usual: Vec<Scenario>) -> Result<Vec<Scenario>, Failure> {
-        let all: Vec<_> = Scenario::all().into_iter().map(|it| (it.name(), it)).collect();
+    pub fn scenarios(&self, usual: Vec<ExplainScenario>) -> Result<Vec<ExplainScenario>, Failure> {
+        let all: Vec<_> = ExplainScenario::all().into_iter().map(|it| (it.name(), it)).collect();
         let chosen = self.kinds.iter().map(|name| named("--kind", name, &all));
         if self.kinds.is_empty() { Ok(usual) } else { chosen.collect() }
     }
 
     /// Every scenario with every seed, scenario by scenario.
-    pub fn cases(&self, scenarios: &[Scenario]) -> Vec<Case> {
+    pub fn cases(&self, scenarios: &[ExplainScenario]) -> Vec<Case> {
         let (first, world, runs) = (self.first_seed, self.world, self.runs);
         let seeds = move || first..first + self.seeds as u64;
         let of = |&scenario| seeds().map(move |seed| Case { scenario, seed, world, runs });
@@ -106,9 +106,9 @@ impl FamilyArguments {
     /// Does the work on every case; gives what came of it by scenario.
     pub fn over<R: Clone + Send>(
         &self,
-        scenarios: &[Scenario],
+        scenarios: &[ExplainScenario],
         work: impl Fn(&Case) -> R + Sync,
-    ) -> Vec<(Scenario, Vec<R>)> {
+    ) -> Vec<(ExplainScenario, Vec<R>)> {
         let results = parallel::over(&self.cases(scenarios), self.threads, work);
         let by_scenario = results.chunks(self.seeds.max(1)).map(<[R]>::to_vec);
         scenarios.iter().copied().zip(by_scenario).collect()

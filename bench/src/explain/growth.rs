@@ -6,14 +6,14 @@ use dynocar::output::report_line;
 use dynocar_tests::simulator::{SimulatorSettings, simulate};
 
 use super::family::{explained, read};
-use super::scenario::{Scenario, World};
+use super::scenario::{ExplainScenario, ExplainWorld};
 use crate::output::Record;
 
 /// Factors by which the data are multiplied.
 const FACTORS: [usize; 3] = [1, 4, 16];
 
 /// Explains one dataset of each scenario at every size, one after the other on one thread.
-pub fn measure(scenarios: &[Scenario], seed: u64) -> Vec<Record> {
+pub fn measure(scenarios: &[ExplainScenario], seed: u64) -> Vec<Record> {
     let mut sizes = Vec::new();
     for axis in ["runs", "duration"] {
         let mut first_us = None;
@@ -31,7 +31,7 @@ pub fn measure(scenarios: &[Scenario], seed: u64) -> Vec<Record> {
             };
             let (mut runs, mut duration_s, mut samples, mut seconds) = (0, 0.0, 0, 0.0);
             for scenario in scenarios {
-                let settings = grown(scenario.settings(seed, World::Plain));
+                let settings = grown(scenario.settings(seed, ExplainWorld::Plain));
                 (runs, duration_s) = (settings.runs, settings.duration_s);
                 let dataset = read(&simulate(&settings));
                 samples += dataset.runs.iter().map(|run| run.samples.len()).sum::<usize>();

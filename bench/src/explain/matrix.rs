@@ -6,17 +6,17 @@ use serde_json::{Value, json};
 
 use super::grade::{Attained, Grade};
 use super::parameters::ParameterGrade;
-use super::scenario::Scenario;
+use super::scenario::ExplainScenario;
 use crate::output::{Record, counts, table};
 use crate::statistics::{median, quantiles, root_mean_square, share};
 
-/// An error at most this many times another is as good.
+/// Ratio up to which one error counts as equal to another.
 const NEAR: f64 = 1.1;
 /// Shares of nulls whose greatest acceptance score of a candidate is reported.
 const SHARES: [f64; 7] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0];
 
 /// Returns the results of every scenario, for machines and for people.
-pub fn of(grades: &[(Scenario, Vec<Grade>)]) -> (Value, String) {
+pub fn of(grades: &[(ExplainScenario, Vec<Grade>)]) -> (Value, String) {
     let kinds: Vec<Record> = grades.iter().map(|(kind, own)| record(kind.name(), own)).collect();
     let all = || grades.iter().flat_map(|(_, grades)| grades);
     let nulls = || grades.iter().filter(|(kind, _)| kind.is_null()).flat_map(|(_, own)| own);

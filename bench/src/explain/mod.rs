@@ -26,7 +26,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use self::family::{Case, FamilyArguments, explained, read};
 use self::grade::{Grade, grade};
-use self::scenario::Scenario;
+use self::scenario::ExplainScenario;
 use crate::output::{Failure, during, table};
 
 /// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,
@@ -54,11 +54,11 @@ impl ExplainArguments {
         let family = &self.family;
         if self.growth {
             use EffectKind::{DraggingBrake, None, TunnelDrag, Wind};
-            let few = [None, TunnelDrag, DraggingBrake, Wind].map(Scenario::Kind).to_vec();
+            let few = [None, TunnelDrag, DraggingBrake, Wind].map(ExplainScenario::Kind).to_vec();
             let sizes = growth::measure(&family.scenarios(few)?, family.first_seed);
             return family.output.give(&sizes, || table(&sizes));
         }
-        let scenarios = family.scenarios(Scenario::all())?;
+        let scenarios = family.scenarios(ExplainScenario::all())?;
         if let Some(folder) = &self.write {
             for case in family.cases(&scenarios) {
                 case.write(folder).map_err(during(folder.display()))?;

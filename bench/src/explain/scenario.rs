@@ -8,7 +8,7 @@ use dynocar_tests::simulator::{
 
 /// A world that effects happen in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum World {
+pub enum ExplainWorld {
     /// Everything but the effect is as declared, to a good survey and calibrated sensors.
     Plain,
     /// Trains of cars on couplings, in a wind of each day.
@@ -19,22 +19,22 @@ pub enum World {
     Rougher,
 }
 
-impl World {
+impl ExplainWorld {
     /// By how much things are wrong in it.
     pub fn deviations(self) -> Deviations {
         match self {
-            World::Plain => Deviations::PLAIN,
-            World::Coupled => Deviations::COUPLED,
-            World::Rough => Deviations::ROUGH,
-            World::Rougher => Deviations::ROUGHER,
+            ExplainWorld::Plain => Deviations::PLAIN,
+            ExplainWorld::Coupled => Deviations::COUPLED,
+            ExplainWorld::Rough => Deviations::ROUGH,
+            ExplainWorld::Rougher => Deviations::ROUGHER,
         }
     }
 
     /// Kinds that are in this world, small, whatever else acts: to name them is no error.
     pub fn everyday(self) -> &'static [EffectKind] {
         match self {
-            World::Plain | World::Coupled => &[],
-            World::Rough | World::Rougher => &[
+            ExplainWorld::Plain | ExplainWorld::Coupled => &[],
+            ExplainWorld::Rough | ExplainWorld::Rougher => &[
                 EffectKind::ActuatorDelay,
                 EffectKind::BearingTemperature,
                 EffectKind::CurveResistance,
@@ -50,7 +50,7 @@ impl World {
 
 /// A family of datasets; a seed makes one of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scenario {
+pub enum ExplainScenario {
     /// One undeclared effect of this kind; [`EffectKind::None`] for a null.
     Kind(EffectKind),
     /// Two effects of kinds drawn from the seed.
@@ -72,15 +72,15 @@ pub enum Scenario {
 }
 
 /// The families that are no single kind, by name.
-const FAMILIES: [(Scenario, &str); 8] = [
-    (Scenario::Two, "two_effects"),
-    (Scenario::Alike, "level_straight_line"),
-    (Scenario::UnmappedTunnel, "unmapped_tunnel"),
-    (Scenario::SlowForce, "slow_force"),
-    (Scenario::AnyLaw, "any_law"),
-    (Scenario::LoadsByStop, "loads_by_stop"),
-    (Scenario::PoorNull, "none_poor_recording"),
-    (Scenario::Poor, "poor_recording"),
+const FAMILIES: [(ExplainScenario, &str); 8] = [
+    (ExplainScenario::Two, "two_effects"),
+    (ExplainScenario::Alike, "level_straight_line"),
+    (ExplainScenario::UnmappedTunnel, "unmapped_tunnel"),
+    (ExplainScenario::SlowForce, "slow_force"),
+    (ExplainScenario::AnyLaw, "any_law"),
+    (ExplainScenario::LoadsByStop, "loads_by_stop"),
+    (ExplainScenario::PoorNull, "none_poor_recording"),
+    (ExplainScenario::Poor, "poor_recording"),
 ];
 
 /// Pairs that a train meets and that no data of this kind confuse.
@@ -119,56 +119,58 @@ const LOAD_SCATTER: f64 = 0.012;
 /// One row in fifty wildly wrong, with a little of everything else.
 const HEAVY: Defects = Defects { outliers: 0.02, ..Defects::ALL };
 
-impl Scenario {
+impl ExplainScenario {
     /// All of them, in the order of the table.
-    pub fn all() -> Vec<Scenario> {
-        let kinds = EffectKind::ALL.iter().copied().map(Scenario::Kind);
+    pub fn all() -> Vec<ExplainScenario> {
+        let kinds = EffectKind::ALL.iter().copied().map(ExplainScenario::Kind);
         kinds.chain(FAMILIES.map(|(family, _)| family)).collect()
     }
 
     /// Its name on the command line and in the table.
     pub fn name(self) -> &'static str {
         match self {
-            Scenario::Kind(kind) => kind.name(),
+            ExplainScenario::Kind(kind) => kind.name(),
             other => FAMILIES.iter().find(|it| it.0 == other).map_or("", |it| it.1),
         }
     }
 
     /// True when nothing undeclared acts.
     pub fn is_null(self) -> bool {
-        matches!(self, Scenario::Kind(EffectKind::None) | Scenario::PoorNull)
+        matches!(self, ExplainScenario::Kind(EffectKind::None) | ExplainScenario::PoorNull)
     }
 
     /// The undeclared kinds of the dataset with this seed.
     pub fn kinds(self, seed: u64) -> Vec<EffectKind> {
         let drawn = |count: usize| (seed % count as u64) as usize;
         match self {
-            Scenario::Kind(EffectKind::None) | Scenario::PoorNull => Vec::new(),
-            Scenario::Kind(kind) => vec![kind],
-            Scenario::Alike => vec![EffectKind::RotatingMass],
-            Scenario::UnmappedTunnel => vec![EffectKind::TunnelDrag],
-            Scenario::SlowForce | Scenario::AnyLaw => vec![EffectKind::Unknown],
-            Scenario::LoadsByStop => vec![EffectKind::MassChange],
-            Scenario::Two => PAIRS[drawn(PAIRS.len())].to_vec(),
-            Scenario::Poor => vec![POOR[drawn(POOR.len())]],
+            ExplainScenario::Kind(EffectKind::None) | ExplainScenario::PoorNull => Vec::new(),
+            ExplainScenario::Kind(kind) => vec![kind],
+            ExplainScenario::Alike => vec![EffectKind::RotatingMass],
+            ExplainScenario::UnmappedTunnel => vec![EffectKind::TunnelDrag],
+            ExplainScenario::SlowForce | ExplainScenario::AnyLaw => vec![EffectKind::Unknown],
+            ExplainScenario::LoadsByStop => vec![EffectKind::MassChange],
+            ExplainScenario::Two => PAIRS[drawn(PAIRS.len())].to_vec(),
+            ExplainScenario::Poor => vec![POOR[drawn(POOR.len())]],
         }
     }
 
     /// Returns the settings of the simulator in a world.
-    pub fn settings(self, seed: u64, world: World) -> SimulatorSettings {
+    pub fn settings(self, seed: u64, world: ExplainWorld) -> SimulatorSettings {
         let effects = match self {
             // 0.5 to 1.1 N/kN at half the speed below which it acts.
-            Scenario::SlowForce => EffectRequest::Exactly(vec![Effect::Unlisted(Unlisted {
-                law: Law::Slow { below_mps: 15.0, least_mps: 3.0 },
-                n_per_kn: 0.5 + 0.1 * (seed % 7) as f64,
-            })]),
-            Scenario::AnyLaw => EffectRequest::AnyLaw,
-            Scenario::LoadsByStop => EffectRequest::LoadsByStop,
+            ExplainScenario::SlowForce => {
+                EffectRequest::Exactly(vec![Effect::Unlisted(Unlisted {
+                    law: Law::Slow { below_mps: 15.0, least_mps: 3.0 },
+                    n_per_kn: 0.5 + 0.1 * (seed % 7) as f64,
+                })])
+            }
+            ExplainScenario::AnyLaw => EffectRequest::AnyLaw,
+            ExplainScenario::LoadsByStop => EffectRequest::LoadsByStop,
             _ => EffectRequest::Kinds(self.kinds(seed)),
         };
         let ordinary = SimulatorSettings::new(seed, effects);
-        let is_poor = matches!(self, Scenario::PoorNull | Scenario::Poor);
-        let by_stop = self == Scenario::LoadsByStop;
+        let is_poor = matches!(self, ExplainScenario::PoorNull | ExplainScenario::Poor);
+        let by_stop = self == ExplainScenario::LoadsByStop;
         let load_share = if by_stop { LOAD_SCATTER } else { 0.0 };
         let deviations = Deviations { load_share, ..world.deviations() };
         // Trains that stop often; elsewhere there are hardly any loads.
@@ -177,8 +179,8 @@ impl Scenario {
         let defects = if is_poor { HEAVY } else { Defects::NONE };
         SimulatorSettings {
             defects,
-            is_level_and_straight: self == Scenario::Alike,
-            maps_tunnels: self != Scenario::UnmappedTunnel,
+            is_level_and_straight: self == ExplainScenario::Alike,
+            maps_tunnels: self != ExplainScenario::UnmappedTunnel,
             deviations,
             train_type,
             ..ordinary
@@ -189,8 +191,8 @@ impl Scenario {
     /// the two.
     pub fn competing(self) -> Option<(EffectKind, bool)> {
         match self {
-            Scenario::Alike => Some((EffectKind::MassChange, true)),
-            Scenario::UnmappedTunnel => Some((EffectKind::LocalResistance, false)),
+            ExplainScenario::Alike => Some((EffectKind::MassChange, true)),
+            ExplainScenario::UnmappedTunnel => Some((EffectKind::LocalResistance, false)),
             _ => None,
         }
     }

@@ -9,26 +9,26 @@ use crate::rig::pipelines;
 
 /// One line of the result.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Case {
+pub struct LatencyCase {
     /// `floor`, `dynocar/<pipeline>` or `alternative/<transport>`.
     pub name: String,
     /// Who answers, and what is beside it.
     pub setting: Setting,
 }
 
-impl Case {
+impl LatencyCase {
     fn new(name: impl Into<String>, idle: IdleStrategy, answerer: Answerer) -> Self {
         let setting = Setting { answerer, idle, companions: &[], candidates: 0 };
-        Case { name: name.into(), setting }
+        LatencyCase { name: name.into(), setting }
     }
 
     fn alone(kind: PipelineKind, idle: IdleStrategy) -> Self {
-        Case::new(format!("dynocar/{kind}"), idle, Answerer::Daemon(vec![kind], Some(kind)))
+        LatencyCase::new(format!("dynocar/{kind}"), idle, Answerer::Daemon(vec![kind], Some(kind)))
     }
 
     /// The compared pipeline, and behind it on its thread every other fast one.
     pub fn all_fast(idle: IdleStrategy) -> Self {
-        Case::new("dynocar/all_fast", idle, all_fast(true))
+        LatencyCase::new("dynocar/all_fast", idle, all_fast(true))
     }
 
     /// The compared pipeline with other readers of its channels, or with candidates on trial in its shadow.
@@ -37,9 +37,9 @@ impl Case {
         (companions, candidates): (&'static [Companion], u32),
         idle: IdleStrategy,
     ) -> Self {
-        let Case { name, setting } = Case::alone(COMPARED, idle);
+        let LatencyCase { name, setting } = LatencyCase::alone(COMPARED, idle);
         let name = format!("{name}+{what}");
-        Case { name, setting: Setting { companions, candidates, ..setting } }
+        LatencyCase { name, setting: Setting { companions, candidates, ..setting } }
     }
 
     /// Its name with what it does while no sample comes.
@@ -66,42 +66,42 @@ fn all_fast(is_first: bool) -> Answerer {
 }
 
 /// Every case, or the ones that a quick check runs.
-pub fn cases(is_quick: bool) -> Vec<Case> {
+pub fn cases(is_quick: bool) -> Vec<LatencyCase> {
     use IdleStrategy::{Adaptive, Busy, Event};
     let mut cases = vec![
-        Case::new("floor", Busy, Answerer::Floor),
-        Case::alone(COMPARED, Busy),
-        Case::alone(COMPARED, Adaptive),
-        Case::all_fast(Busy),
-        Case::new("alternative/unix_datagram", Busy, Answerer::UnixDatagram),
-        Case::new("floor", Event, Answerer::Floor),
-        Case::alone(COMPARED, Event),
-        Case::new("alternative/unix_datagram", Event, Answerer::UnixDatagram),
+        LatencyCase::new("floor", Busy, Answerer::Floor),
+        LatencyCase::alone(COMPARED, Busy),
+        LatencyCase::alone(COMPARED, Adaptive),
+        LatencyCase::all_fast(Busy),
+        LatencyCase::new("alternative/unix_datagram", Busy, Answerer::UnixDatagram),
+        LatencyCase::new("floor", Event, Answerer::Floor),
+        LatencyCase::alone(COMPARED, Event),
+        LatencyCase::new("alternative/unix_datagram", Event, Answerer::UnixDatagram),
         #[cfg(feature = "zeromq")]
-        Case::new("alternative/zeromq", Event, Answerer::ZeroMq),
+        LatencyCase::new("alternative/zeromq", Event, Answerer::ZeroMq),
     ];
     if !is_quick {
-        cases.push(Case::new("dynocar/all_fast_last", Busy, all_fast(false)));
-        cases.push(Case::alone(PipelineKind::Echo, Busy));
+        cases.push(LatencyCase::new("dynocar/all_fast_last", Busy, all_fast(false)));
+        cases.push(LatencyCase::alone(PipelineKind::Echo, Busy));
         let others = pipelines::fast().into_iter().filter(|&kind| kind != COMPARED);
-        cases.extend(others.map(|kind| Case::alone(kind, Busy)));
+        cases.extend(others.map(|kind| LatencyCase::alone(kind, Busy)));
     }
     cases
 }
 
 /// The cases with other readers, for whoever has built their programs.
-pub fn cases_with_readers() -> Vec<Case> {
+pub fn cases_with_readers() -> Vec<LatencyCase> {
     use Companion::{Live, Recorder};
     let all: [(&str, &[Companion]); 3] =
         [("recorder", &[Recorder]), ("live", &[Live]), ("recorder+live", &[Recorder, Live])];
-    let of = |idle| all.map(|(what, companions)| Case::beside(what, (companions, 0), idle));
+    let of = |idle| all.map(|(what, companions)| LatencyCase::beside(what, (companions, 0), idle));
     [of(IdleStrategy::Event), of(IdleStrategy::Busy)].concat()
 }
 
 /// The cases with models on trial.
-pub fn cases_in_shadow() -> Vec<Case> {
+pub fn cases_in_shadow() -> Vec<LatencyCase> {
     [IdleStrategy::Event, IdleStrategy::Busy]
-        .map(|idle| Case::beside("two_candidates", (&[], 2), idle))
+        .map(|idle| LatencyCase::beside("two_candidates", (&[], 2), idle))
         .into()
 }
 
@@ -130,7 +130,7 @@ mod tests {
     fn no_case_is_measured_twice() {
         let cases = [cases(false), cases_with_readers(), cases_in_shadow()].concat();
         for (index, case) in cases.iter().enumerate() {
-            let same = |it: &Case| it.label() == case.label();
+            let same = |it: &LatencyCase| it.label() == case.label();
             assert_eq!(cases.iter().position(same), Some(index));
         }
     }

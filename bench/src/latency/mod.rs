@@ -21,8 +21,8 @@ use dynocar::config::IdleStrategy;
 use dynocar::ending::Ending;
 use dynocar::output::report_line;
 
-use self::case::Case;
-use self::report::{Measured, Rounds};
+use self::case::LatencyCase;
+use self::report::{MeasuredCase, Rounds};
 use crate::chance::Chance;
 use crate::open_loop::traffic::TrafficPlan;
 use crate::open_loop::trial::{Extent, run};
@@ -84,7 +84,7 @@ impl LatencyArguments {
         self.output.give(&all, || text)
     }
 
-    fn measure(&self) -> Result<Measured, Failure> {
+    fn measure(&self) -> Result<MeasuredCase, Failure> {
         let choose = |quick: f64, usual: f64| if self.quick { quick } else { usual };
         let cores = Cores::choose(&self.place);
         let extent = Extent {
@@ -114,17 +114,18 @@ impl LatencyArguments {
         let ending = Ending::begin()?;
         run_rounds(&mut cases, rounds, &extent, &ending)?;
         if ending.is_due() {
-            return Ok(Measured { cases, costs, at_rest: Vec::new(), extent });
+            return Ok(MeasuredCase { cases, costs, at_rest: Vec::new(), extent });
         }
         let at_rest = [IdleStrategy::Adaptive, IdleStrategy::Event].map(|idle| {
             // Many seconds pass before the first sample of such a rate.
             let traffic = TrafficPlan { rate_hz: 1e-3, ..extent.traffic };
             let resting = Extent { traffic, seconds: choose(0.3, 5.0), ..extent };
-            let trial = in_thread(|| run(&Case::all_fast(idle).setting, &resting, &ending.flag))?;
+            let trial =
+                in_thread(|| run(&LatencyCase::all_fast(idle).setting, &resting, &ending.flag))?;
             Ok((idle.to_string(), trial.cpu_percent))
         });
         let at_rest = at_rest.into_iter().collect::<Result<_, Failure>>()?;
-        Ok(Measured { cases, costs, at_rest, extent })
+        Ok(MeasuredCase { cases, costs, at_rest, extent })
     }
 }
 

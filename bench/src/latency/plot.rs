@@ -6,8 +6,8 @@ use dynocar::output::write_file;
 use hdrhistogram::Histogram;
 use plotters::prelude::*;
 
-use super::case::Case;
-use super::report::{Measured, pooled};
+use super::case::LatencyCase;
+use super::report::{MeasuredCase, pooled};
 use crate::open_loop::sockets::COMPARED;
 use crate::open_loop::trial::Answerer;
 use crate::output::{Failure, during};
@@ -23,13 +23,13 @@ const NINES: f64 = 4.5;
 /// # Errors
 ///
 /// When the file cannot be written.
-pub fn draw(measured: &Measured, file: &Path) -> Result<(), Failure> {
+pub fn draw(measured: &MeasuredCase, file: &Path) -> Result<(), Failure> {
     let mut svg = String::new();
     draw_into(measured, &mut svg).map_err(during(file.display()))?;
     Ok(write_file(file, &svg)?)
 }
 
-fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Failure> {
+fn draw_into(measured: &MeasuredCase, svg: &mut String) -> Result<(), Failure> {
     let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let caption = format!("Sample → snapshot polled at {} Hz", measured.extent.traffic.rate_hz);
@@ -71,7 +71,7 @@ fn draw_into(measured: &Measured, svg: &mut String) -> Result<(), Failure> {
 }
 
 /// The other pipelines alone lie so near to each other that lines would hide lines.
-fn is_shown(case: &Case) -> bool {
+fn is_shown(case: &LatencyCase) -> bool {
     match &case.setting.answerer {
         Answerer::Daemon(_, polled) => *polled == Some(COMPARED),
         _ => true,

@@ -3,38 +3,38 @@
 use hdrhistogram::Histogram;
 use serde_json::{Value, json};
 
-use super::case::Case;
+use super::case::LatencyCase;
 use super::costs::{Costs, MANY};
-use crate::open_loop::controller::Outcome;
+use crate::open_loop::controller::TrialOutcome;
 use crate::open_loop::trial::{Answerer, Extent, Trial};
 use crate::output::{Record, table};
 use crate::rig::quantiles::{self, cells};
 use crate::statistics::median;
 
 /// A case with its trial of every round.
-pub type Rounds = (Case, Vec<Trial>);
+pub type Rounds = (LatencyCase, Vec<Trial>);
 
 /// Measured latencies.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct MeasuredCase {
     /// Each case with its trial of every round.
     pub cases: Vec<Rounds>,
     /// Cost of each call.
     pub costs: Costs,
     /// Load of a daemon while no sample comes: processor time in % of a core, by idle strategy.
     pub at_rest: Vec<(String, f64)>,
-    /// How it was driven.
+    /// Rounds and samples of the measurement.
     pub extent: Extent,
 }
 
 /// All latencies of a case.
-pub fn pooled(trials: &[Trial], of: fn(&Outcome) -> &Histogram<u64>) -> Histogram<u64> {
+pub fn pooled(trials: &[Trial], of: fn(&TrialOutcome) -> &Histogram<u64>) -> Histogram<u64> {
     quantiles::pooled(trials.iter().flat_map(|it| &it.pipelines).map(of))
 }
 
 /// Returns the measured latencies, for machines and for people.
-pub fn of(measured: &Measured) -> (Value, String) {
-    let Measured { cases, costs, at_rest, extent } = measured;
+pub fn of(measured: &MeasuredCase) -> (Value, String) {
+    let MeasuredCase { cases, costs, at_rest, extent } = measured;
     let (rate_hz, cores) = (extent.traffic.rate_hz, extent.cores);
     let records: Vec<Record> = cases.iter().map(|case| record(case, cases)).collect();
     let rounds = cases.first().map_or(0, |(_, trials)| trials.len());

@@ -4,7 +4,7 @@ use dynocar_shared::PipelineKind;
 use serde_json::{Value, json};
 
 use super::plan::Load;
-use crate::open_loop::controller::Outcome;
+use crate::open_loop::controller::TrialOutcome;
 use crate::open_loop::trial::Trial;
 use crate::output::{Record, table};
 use crate::rig::quantiles::{cells, for_people, pooled};
@@ -45,7 +45,7 @@ pub fn of(load: &Load, trial: &Trial) -> (Value, String) {
     (all, text)
 }
 
-fn pipeline((kind, it): (&PipelineKind, &Outcome), since: &str) -> Record {
+fn pipeline((kind, it): (&PipelineKind, &TrialOutcome), since: &str) -> Record {
     let counts = Record::default()
         .with("pipeline", kind)
         .with("since", since)

@@ -1,4 +1,4 @@
-//! The highest rate without loss, and how things grow with trains and pipelines.
+//! The highest rate without loss, and how latency, load and memory grow with trains and pipelines.
 
 use dynocar::output::report_line;
 use serde::Serialize;

@@ -13,7 +13,7 @@ use serde_json::json;
 
 use self::watch::{Watched, watch};
 use crate::explain::family::{Case, FamilyArguments};
-use crate::explain::scenario::Scenario;
+use crate::explain::scenario::ExplainScenario;
 use crate::output::{Failure, Record, counts, table};
 use crate::statistics::median;
 
@@ -33,7 +33,7 @@ impl MonitorArguments {
     /// When there is no such kind, or the result cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
         let family = &self.family;
-        let watched = family.over(&family.scenarios(Scenario::all())?, |case| {
+        let watched = family.over(&family.scenarios(ExplainScenario::all())?, |case| {
             let watched = watch(&case.simulate());
             if family.verbose {
                 print_case(case, &watched);
@@ -63,7 +63,7 @@ impl MonitorArguments {
 
 /// Returns the record of one kind; times are of motion. Datasets are those in which it acts, or all nulls, which
 /// are right where the monitor stayed silent.
-fn record(scenario: Scenario, all: &[Watched]) -> Record {
+fn record(scenario: ExplainScenario, all: &[Watched]) -> Record {
     let is_null = scenario.is_null();
     let watched: Vec<&Watched> = all.iter().filter(|it| is_null || it.has_acted).collect();
     let count = |is_so: &dyn Fn(&Watched) -> bool| watched.iter().filter(|it| is_so(it)).count();

@@ -8,7 +8,7 @@ use dynocar_tests::process::Process;
 use dynocar_transport::monotonic_now_ns;
 use hdrhistogram::Histogram;
 
-use super::traffic::Traffic;
+use super::traffic::LoopTraffic;
 use super::wire::Wire;
 use crate::output::Failure;
 use crate::rig::quantiles::{histogram, record};
@@ -25,7 +25,7 @@ const SETTLED_AFTER: Duration = Duration::from_secs(1);
 
 /// Counts of the samples of one pipeline, over all trains.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct TrialOutcome {
     /// Samples sent.
     pub offered: u64,
     /// Samples that entered the estimate.
@@ -39,11 +39,11 @@ pub struct Outcome {
     pub from_publish: Histogram<u64>,
 }
 
-impl Outcome {
+impl TrialOutcome {
     /// Of nothing yet.
     pub fn empty() -> Self {
         let (from_appointed, from_publish) = (histogram(), histogram());
-        Outcome { offered: 0, used: 0, rejected: 0, from_appointed, from_publish }
+        TrialOutcome { offered: 0, used: 0, rejected: 0, from_appointed, from_publish }
     }
 
     /// Samples of which the pipeline gave no account: lost, and too late to be noticed as lost.
@@ -63,7 +63,7 @@ struct Answer {
 /// A controller that numbers its samples.
 pub struct Controller {
     wire: Box<dyn Wire>,
-    traffic: Traffic,
+    traffic: LoopTraffic,
     /// Appointed and actual time in ns of the samples in flight, by number.
     in_flight: Box<[(i64, i64)]>,
     sent: u64,
@@ -74,7 +74,7 @@ pub struct Controller {
 
 impl Controller {
     /// A controller that has sent nothing, and receives from `pipelines` pipelines.
-    pub fn new(wire: Box<dyn Wire>, traffic: Traffic, pipelines: usize) -> Self {
+    pub fn new(wire: Box<dyn Wire>, traffic: LoopTraffic, pipelines: usize) -> Self {
         let in_flight = vec![(0, 0); IN_FLIGHT].into();
         let answers = vec![[Answer::default(); 2]; pipelines];
         Controller { wire, traffic, in_flight, sent: 0, answers, sent_before: 0 }
@@ -86,7 +86,8 @@ impl Controller {
     ///
     /// When one stays silent, or the peer has ended.
     pub fn await_ready(&mut self, peer: &mut Process) -> Result<(), Failure> {
-        let mut uncounted: Vec<Outcome> = self.answers.iter().map(|_| Outcome::empty()).collect();
+        let mut uncounted: Vec<TrialOutcome> =
+            self.answers.iter().map(|_| TrialOutcome::empty()).collect();
         let (start, mut next_ns) = (Instant::now(), 0);
         while self.answers.iter().any(|[now, _]| now.newest == 0) {
             if start.elapsed() > READY_WITHIN {
@@ -116,7 +117,7 @@ impl Controller {
     }
 
     /// Adds what became of the samples since counting began.
-    pub fn account(&self, outcomes: &mut [Outcome]) {
+    pub fn account(&self, outcomes: &mut [TrialOutcome]) {
         for ([now, before], outcome) in self.answers.iter().zip(outcomes) {
             outcome.offered += self.sent - self.sent_before;
             outcome.used += now.used - before.used;
@@ -152,7 +153,7 @@ impl Controller {
 
     /// Takes what has come, unless nothing can; true where it brought anything new. An answer to a sample answers those
     /// before it too, for a snapshot stands on all of them.
-    fn poll(&mut self, outcomes: &mut [Outcome]) -> Result<bool, Failure> {
+    fn poll(&mut self, outcomes: &mut [TrialOutcome]) -> Result<bool, Failure> {
         if !self.wire.carries_others() && self.is_answered() {
             std::hint::spin_loop();
             return Ok(false);
@@ -190,7 +191,7 @@ impl Controller {
 /// When a transport fails.
 pub fn drive(
     trains: &mut [Controller],
-    outcomes: &mut [Outcome],
+    outcomes: &mut [TrialOutcome],
     until_ns: i64,
     is_over: &AtomicBool,
 ) -> Result<i64, Failure> {
@@ -213,7 +214,7 @@ pub fn drive(
 /// # Errors
 ///
 /// When a transport fails.
-pub fn settle(trains: &mut [Controller], outcomes: &mut [Outcome]) -> Result<(), Failure> {
+pub fn settle(trains: &mut [Controller], outcomes: &mut [TrialOutcome]) -> Result<(), Failure> {
     let mut last_news = Instant::now();
     while !trains.iter().all(Controller::is_answered) && last_news.elapsed() < SETTLED_AFTER {
         for train in trains.iter_mut() {

@@ -18,18 +18,18 @@ const PRESSURE_PA_PER_N: f64 = 1.5;
 
 /// One train's motion; trains differ in phase.
 #[derive(Clone, Debug)]
-pub struct Motion {
+pub struct DrivenMotion {
     train: TrainId,
     start_ns: i64,
     phase: f64,
     noise: u64,
 }
 
-impl Motion {
+impl DrivenMotion {
     /// The motion of a train from a time on, in ns of the controller's clock.
     pub fn of(train: TrainId, start_ns: i64) -> Self {
         let noise = train.0.wrapping_mul(0x9e37_79b9) | 1;
-        Motion { train, start_ns, phase: train.0 as f64 * 0.37, noise }
+        DrivenMotion { train, start_ns, phase: train.0 as f64 * 0.37, noise }
     }
 
     /// The sample at a time in ns of the controller's clock; every field is set.
@@ -80,7 +80,7 @@ mod tests {
     #[test]
     fn every_sample_of_the_motion_is_valid() {
         let train = TrainId(3);
-        let mut motion = Motion::of(train, 7);
+        let mut motion = DrivenMotion::of(train, 7);
         let mut validator = Validator::new(train, MASS_KG);
         for number in 1..=200_000_u64 {
             let mut sample = motion.sample(number as i64 * 1_000_000);

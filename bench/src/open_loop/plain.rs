@@ -11,12 +11,12 @@ use iceoryx2::service::port_factory::event::PortFactory;
 
 use crate::output::Failure;
 
-/// Says what the transport refuses.
+/// Returns the failure for a refusal of the transport.
 pub fn refused<E: std::fmt::Debug>(what: &'static str) -> impl FnOnce(E) -> Failure {
     move |error| format!("iceoryx2 refused a {what}: {error:?}").into()
 }
 
-/// The service of the plain transport within a measurement's folder that notifies and listens.
+/// Returns the service of the plain transport that notifies and listens within a measurement's folder.
 ///
 /// # Errors
 ///

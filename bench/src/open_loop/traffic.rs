@@ -2,7 +2,7 @@
 
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::motion::Motion;
+use super::motion::DrivenMotion;
 use crate::chance::Chance;
 
 /// The traffic of every train.
@@ -20,9 +20,9 @@ pub struct TrafficPlan {
 
 /// One train's samples in order, each with the time at which it is to leave.
 #[derive(Clone, Debug)]
-pub struct Traffic {
+pub struct LoopTraffic {
     plan: TrafficPlan,
-    motion: Motion,
+    motion: DrivenMotion,
     random: Chance,
     start_ns: i64,
     number: u64,
@@ -30,13 +30,13 @@ pub struct Traffic {
     next: (TrainSample, i64),
 }
 
-impl Traffic {
-    /// A train of which no sample leaves before [`Traffic::begin`].
+impl LoopTraffic {
+    /// A train of which no sample leaves before [`LoopTraffic::begin`].
     pub fn new(plan: TrafficPlan, train: TrainId, start_ns: i64, seed: u64) -> Self {
         let random = Chance::new(seed ^ train.0.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mut motion = Motion::of(train, start_ns);
+        let mut motion = DrivenMotion::of(train, start_ns);
         let next = (motion.sample(start_ns), start_ns);
-        Traffic { plan, motion, random, start_ns, number: 0, count: 0, next }
+        LoopTraffic { plan, motion, random, start_ns, number: 0, count: 0, next }
     }
 
     /// Begins `count` samples from a time on.
@@ -103,7 +103,7 @@ mod tests {
 
     const TRAIN: TrainId = TrainId(2);
 
-    fn take(traffic: &mut Traffic) -> (TrainSample, i64) {
+    fn take(traffic: &mut LoopTraffic) -> (TrainSample, i64) {
         let taken = *traffic.upcoming().expect("one more");
         traffic.prepare_next();
         taken
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn samples_leave_in_order_in_bursts_and_at_the_mean_rate() {
-        let mut traffic = Traffic::new(plan(), TRAIN, 0, 1);
+        let mut traffic = LoopTraffic::new(plan(), TRAIN, 0, 1);
         traffic.begin(0, 8_000);
         let times: Vec<i64> = (0..8_000).map(|_| take(&mut traffic).1).collect();
         assert!(times.is_sorted() && traffic.upcoming().is_none());
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn the_bad_share_is_refused_and_nothing_else() {
-        let mut traffic = Traffic::new(plan(), TRAIN, 1_000_000_000, 1);
+        let mut traffic = LoopTraffic::new(plan(), TRAIN, 1_000_000_000, 1);
         traffic.begin(1_000_000_000, 20_000);
         let mut validator = Validator::new(TRAIN, 200e3);
         let mut refused = 0.0;

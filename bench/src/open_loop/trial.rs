@@ -9,9 +9,9 @@ use dynocar_shared::{PipelineKind, TrainId};
 use dynocar_tests::process::{Process, Site};
 use dynocar_transport::monotonic_now_ns;
 
-use super::controller::{Controller, Outcome, drive, settle};
+use super::controller::{Controller, TrialOutcome, drive, settle};
 use super::sockets::{Datagrams, End, TRAIN};
-use super::traffic::{Traffic, TrafficPlan};
+use super::traffic::{LoopTraffic, TrafficPlan};
 use super::wire::{Client, Notifying, Wire};
 use crate::output::{Failure, during};
 use crate::rig::cores::{Cores, bind, prioritise};
@@ -98,7 +98,7 @@ pub struct Extent {
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// By pipeline that is polled.
-    pub pipelines: Vec<Outcome>,
+    pub pipelines: Vec<TrialOutcome>,
     /// Processor time of the answering process over wall time, in %; 100 is one core.
     pub cpu_percent: f64,
     /// Its resident memory after the warm-up, in bytes.
@@ -117,7 +117,7 @@ pub struct Trial {
 impl Trial {
     /// Samples of which some pipeline gave no account.
     pub fn missing(&self) -> u64 {
-        self.pipelines.iter().map(Outcome::missing).sum()
+        self.pipelines.iter().map(TrialOutcome::missing).sum()
     }
 }
 
@@ -144,7 +144,7 @@ pub fn run(setting: &Setting, extent: &Extent, is_over: &AtomicBool) -> Result<T
     prioritise(cores.priority);
     let mut controllers = (1..=trains)
         .map(|id| {
-            let traffic = Traffic::new(traffic, TrainId(id), monotonic_now_ns(), seed);
+            let traffic = LoopTraffic::new(traffic, TrainId(id), monotonic_now_ns(), seed);
             Ok(Controller::new(setting.wire(&site, TrainId(id))?, traffic, setting.polled()))
         })
         .collect::<Result<Vec<_>, Failure>>()?;
@@ -166,7 +166,7 @@ fn measure(
     (extent, is_over): (&Extent, &AtomicBool),
 ) -> Result<Trial, Failure> {
     let (rate_hz, trains) = (extent.traffic.rate_hz, controllers.len() as f64);
-    let outcomes = || -> Vec<Outcome> { (0..polled).map(|_| Outcome::empty()).collect() };
+    let outcomes = || -> Vec<TrialOutcome> { (0..polled).map(|_| TrialOutcome::empty()).collect() };
     // Trains start evenly spread over the first period.
     let begin = |controllers: &mut [Controller], seconds: f64| {
         let start_ns = monotonic_now_ns() + 1_000_000;

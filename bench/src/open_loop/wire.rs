@@ -10,23 +10,23 @@ use iceoryx2::prelude::ipc;
 use super::plain::{self, refused};
 use crate::output::Failure;
 
-/// A transport that carries samples there and answers back.
+/// A transport of samples to an estimator and of its answers back.
 pub trait Wire {
-    /// Sends a sample, which has a number; one that a full queue refuses is lost.
+    /// Sends a numbered sample; a sample that a full queue refuses is lost.
     ///
     /// # Errors
     ///
     /// When the transport fails for good.
     fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure>;
 
-    /// Takes what has come; each answer is heard.
+    /// Receives the answers that have come, and passes each to `hear`.
     ///
     /// # Errors
     ///
     /// When the transport fails for good.
     fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure>;
 
-    /// True where other pipelines' snapshots come, too, which a controller's next poll would find in its way.
+    /// Returns whether snapshots of other pipelines come too, which a controller's next poll takes first.
     fn carries_others(&self) -> bool {
         false
     }

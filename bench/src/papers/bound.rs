@@ -9,7 +9,7 @@
 use nalgebra::{Matrix4, RowVector4, Vector4};
 
 use super::braking::{
-    Braking, Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, ShareStep,
+    Braking, BrakingMoment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, ShareStep,
     declared, disc_friction, train,
 };
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
@@ -20,7 +20,7 @@ use crate::statistics::{mean, root_mean_square};
 
 /// Prior knowledge of the coefficient.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Knowledge {
+pub enum PriorKnowledge {
     /// How the share of the declared brake force moves.
     Share(ShareStep),
     /// The curve over speed is known but for a constant scale, of this standard deviation
@@ -48,7 +48,7 @@ struct Step {
 }
 
 /// The bound at every scored moment, given the measurements up to `lag_steps` later.
-pub fn bound(braking: &Braking, knowledge: Knowledge, lag_steps: usize) -> Vec<BoundAt> {
+pub fn bound(braking: &Braking, knowledge: PriorKnowledge, lag_steps: usize) -> Vec<BoundAt> {
     let moments = braking.nominal();
     let steps = forward(braking, knowledge, &moments);
     let mut bounds = Vec::new();
@@ -72,14 +72,14 @@ pub fn bound(braking: &Braking, knowledge: Knowledge, lag_steps: usize) -> Vec<B
 }
 
 /// The known curve and its slope by speed, in units of the declared value.
-fn shape(braking: &Braking, knowledge: Knowledge, speed_mps: f64) -> (f64, f64) {
+fn shape(braking: &Braking, knowledge: PriorKnowledge, speed_mps: f64) -> (f64, f64) {
     let declared = declared(braking.sought);
     match (knowledge, braking.sought) {
-        (Knowledge::Law(_), BrakingCoefficient::Adhesion) => (
+        (PriorKnowledge::Law(_), BrakingCoefficient::Adhesion) => (
             RailCondition::Wet.adhesion(speed_mps) / declared,
             RailCondition::Wet.adhesion_slope_s_per_m(speed_mps) / declared,
         ),
-        (Knowledge::Law(_), BrakingCoefficient::Friction) => {
+        (PriorKnowledge::Law(_), BrakingCoefficient::Friction) => {
             let difference = disc_friction(speed_mps + 1e-4) - disc_friction(speed_mps - 1e-4);
             (disc_friction(speed_mps) / declared, difference / 2e-4 / declared)
         }
@@ -88,15 +88,19 @@ fn shape(braking: &Braking, knowledge: Knowledge, speed_mps: f64) -> (f64, f64) 
 }
 
 /// How the coefficient depends on the state.
-fn coefficient_row(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> RowVector4<f64> {
+fn coefficient_row(
+    braking: &Braking,
+    knowledge: PriorKnowledge,
+    moment: &BrakingMoment,
+) -> RowVector4<f64> {
     let (value, slope) = shape(braking, knowledge, moment.speed_mps);
     RowVector4::new(0.0, slope, value, 0.0) * declared(braking.sought)
 }
 
-fn forward(braking: &Braking, knowledge: Knowledge, moments: &[Moment]) -> Vec<Step> {
+fn forward(braking: &Braking, knowledge: PriorKnowledge, moments: &[BrakingMoment]) -> Vec<Step> {
     let (scale_std, share) = match knowledge {
-        Knowledge::Share(share) => (1.0, share),
-        Knowledge::Law(scale_std) => (scale_std, ShareStep::default()),
+        PriorKnowledge::Share(share) => (1.0, share),
+        PriorKnowledge::Law(scale_std) => (scale_std, ShareStep::default()),
     };
     let first_speed_std = SPEED_NOISE_MPS / 3.0_f64.sqrt();
     let prior = Vector4::new(POSITION_STD_M, first_speed_std, scale_std, share.drift_std_per_s);
@@ -138,7 +142,11 @@ fn regular(mut covariance: Matrix4<f64>) -> Matrix4<f64> {
     covariance
 }
 
-fn transition(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> Matrix4<f64> {
+fn transition(
+    braking: &Braking,
+    knowledge: PriorKnowledge,
+    moment: &BrakingMoment,
+) -> Matrix4<f64> {
     let davis = train().resistance;
     let gravity_mps2 = 1000.0 * TrainModel::weight_kn(1.0);
     let full_mps2 = declared(BrakingCoefficient::Adhesion) * gravity_mps2;
@@ -149,7 +157,7 @@ fn transition(braking: &Braking, knowledge: Knowledge, moment: &Moment) -> Matri
     jacobian[(1, SCALE)] = -STEP_S * full_mps2 * value;
     jacobian[(0, 1)] = 0.5 * STEP_S * (1.0 + jacobian[(1, 1)]);
     jacobian[(0, SCALE)] = 0.5 * STEP_S * jacobian[(1, SCALE)];
-    if let Knowledge::Share(share) = knowledge {
+    if let PriorKnowledge::Share(share) = knowledge {
         jacobian[(SCALE, DRIFT)] = STEP_S;
         jacobian[(DRIFT, DRIFT)] = share.kept;
     }
@@ -175,17 +183,17 @@ mod tests {
     #[test]
     fn later_measurements_and_a_known_law_lower_the_bound() {
         for braking in [XIE_TABLE_2, JIN_TABLE_3] {
-            let knowledge = Knowledge::Share(presumed(braking.sought));
+            let knowledge = PriorKnowledge::Share(presumed(braking.sought));
             let at = |lag_steps| deviation(&bound(&braking, knowledge, lag_steps));
             assert!(at(25) < at(10) && at(10) < at(0));
-            let known = deviation(&bound(&braking, Knowledge::Law(0.25), 0));
+            let known = deviation(&bound(&braking, PriorKnowledge::Law(0.25), 0));
             assert!(known < at(25), "{known}");
         }
     }
 
     #[test]
     fn the_bound_of_a_law_falls_with_what_is_known_of_its_scale() {
-        let at = |std| deviation(&bound(&XIE_TABLE_2, Knowledge::Law(std), 0));
+        let at = |std| deviation(&bound(&XIE_TABLE_2, PriorKnowledge::Law(std), 0));
         assert!(at(0.01) < at(0.1) && at(0.1) < at(1.0));
     }
 
@@ -193,7 +201,7 @@ mod tests {
     fn the_filter_claims_what_the_independent_recursion_allows() {
         for braking in [XIE_TABLE_2, JIN_TABLE_3] {
             let moments = braking.nominal();
-            let knowledge = Knowledge::Share(presumed(braking.sought));
+            let knowledge = PriorKnowledge::Share(presumed(braking.sought));
             for (lag_s, lag_steps) in [(0.0, 0), (LAG_S, LAG_STEPS)] {
                 let [scored] = run(&smoother(braking.sought, lag_s), &moments, [lag_steps]);
                 let bounds = bound(&braking, knowledge, lag_steps);

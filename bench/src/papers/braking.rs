@@ -121,7 +121,7 @@ pub const JIN_TABLE_4: Braking = table(BrakingCoefficient::Ratio, [350.0, 5.0, 3
 
 /// One measured moment, with the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct BrakingMoment {
     /// Time in s since the brakes came on.
     pub time_s: f64,
     /// True speed in m/s.
@@ -152,16 +152,16 @@ impl Braking {
     }
 
     /// Simulates one braking.
-    pub fn simulate(&self, seed: u64) -> Vec<Moment> {
+    pub fn simulate(&self, seed: u64) -> Vec<BrakingMoment> {
         self.integrate(&mut Chance::new(seed), 1.0)
     }
 
     /// The braking without process and measurement noise.
-    pub fn nominal(&self) -> Vec<Moment> {
+    pub fn nominal(&self) -> Vec<BrakingMoment> {
         self.integrate(&mut Chance::new(0), 0.0)
     }
 
-    fn integrate(&self, random: &mut Chance, noise: f64) -> Vec<Moment> {
+    fn integrate(&self, random: &mut Chance, noise: f64) -> Vec<BrakingMoment> {
         let train = train();
         let gravity_mps2 = 1000.0 * TrainModel::weight_kn(1.0);
         let full_mps2 = declared(BrakingCoefficient::Adhesion) * gravity_mps2;
@@ -186,7 +186,7 @@ impl Braking {
                 Some(_) => share,
             };
             let is_rail_limited = !is_rail || truth < declared;
-            moments.push(Moment {
+            moments.push(BrakingMoment {
                 time_s,
                 speed_mps,
                 position_m,

@@ -14,7 +14,8 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::{Parameter, ParameterSnapshot};
 
 use super::braking::{
-    Braking, Moment, PRESSURE_PA, SPEED_NOISE_MPS, STEP_S, ShareStep, WINDOW, disc_friction, train,
+    Braking, BrakingMoment, PRESSURE_PA, SPEED_NOISE_MPS, STEP_S, ShareStep, WINDOW, disc_friction,
+    train,
 };
 use super::row::{Row, Seeds};
 use super::score;
@@ -29,7 +30,7 @@ pub const LAG_STEPS: usize = 25;
 pub const MIDDLE_STEPS: usize = WINDOW - 1 - WINDOW / 2;
 
 /// The sample that a pipeline sees at a moment.
-fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> ResolvedSample {
+fn resolved(train: &TrainModel, moment: &BrakingMoment, is_first: bool) -> ResolvedSample {
     ResolvedSample {
         time_ns: (moment.time_s * 1e9).round() as i64,
         step_s: if is_first { 0.0 } else { STEP_S },
@@ -48,7 +49,7 @@ fn resolved(train: &TrainModel, moment: &Moment, is_first: bool) -> ResolvedSamp
 
 /// An estimate and the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scored {
+pub struct ScoredBraking {
     /// The true coefficient.
     pub truth: f64,
     /// Estimate minus truth.
@@ -61,9 +62,9 @@ pub struct Scored {
 /// moment that many steps before its update.
 pub fn run<const LAGS: usize>(
     settings: &EstimatorSettings,
-    moments: &[Moment],
+    moments: &[BrakingMoment],
     lags_steps: [usize; LAGS],
-) -> [Vec<Scored>; LAGS] {
+) -> [Vec<ScoredBraking>; LAGS] {
     let train = Arc::new(train());
     let mut estimator = settings.build(&train).expect("valid settings");
     let mut snapshot = ParameterSnapshot::empty();
@@ -78,7 +79,7 @@ pub fn run<const LAGS: usize>(
             let of = k.checked_sub(lag_steps).map(|i| &moments[i]);
             if let Some(of) = of.filter(|of| of.is_scored) {
                 let error = value - of.truth;
-                scored.push(Scored { truth: of.truth, error, std });
+                scored.push(ScoredBraking { truth: of.truth, error, std });
             }
         }
     }
@@ -101,15 +102,15 @@ pub fn over_seeds<T: Send>(seeds: Seeds, work: impl Fn(u64) -> T + Sync) -> Vec<
 
 /// Errors of one estimator over all runs.
 #[derive(Clone, Debug)]
-pub struct Score {
-    errors: score::Score,
+pub struct BrakingScore {
+    errors: score::PaperScore,
     /// Mean of |error| / truth in %.
     pub relative_percent: f64,
     /// Mean of (error / claimed standard deviation)² of each run.
     nees_of_runs: Vec<f64>,
 }
 
-impl Score {
+impl BrakingScore {
     /// Root mean square error.
     pub fn rmse(&self) -> f64 {
         root_mean_square(&self.errors.errors)
@@ -133,9 +134,9 @@ impl Score {
     /// The claimed variance counts with the curves that the estimator presumes; one curve is one
     /// of them, however many runs are made of it. The runs' scatter shows the noise alone, that
     /// of drawn runs noise and curve, which falls with the length of a run.
-    pub fn nees_freedom_of_one_curve(&self, drawn: &Score) -> f64 {
-        let runs = |it: &Score| it.nees_of_runs.len() as f64;
-        let length = |it: &Score| it.errors.errors.len() as f64 / runs(it).max(1.0);
+    pub fn nees_freedom_of_one_curve(&self, drawn: &BrakingScore) -> f64 {
+        let runs = |it: &BrakingScore| it.nees_of_runs.len() as f64;
+        let length = |it: &BrakingScore| it.errors.errors.len() as f64 / runs(it).max(1.0);
         let own = self.nees_run_variance();
         let both = drawn.nees_run_variance() * length(drawn) / length(self);
         2.0 / ((both - own).max(0.0) + own / runs(self))
@@ -147,15 +148,15 @@ impl Score {
     }
 
     /// The errors of runs, pooled.
-    pub fn of<'a>(runs: impl Iterator<Item = &'a Vec<Scored>>) -> Self {
+    pub fn of<'a>(runs: impl Iterator<Item = &'a Vec<ScoredBraking>>) -> Self {
         let (mut errors, mut relative, mut nees_of_runs) =
-            (score::Score::default(), Vec::new(), Vec::new());
+            (score::PaperScore::default(), Vec::new(), Vec::new());
         for run in runs.filter(|run| !run.is_empty()) {
             nees_of_runs.push(mean(run.iter().map(|it| (it.error / it.std).powi(2))));
             relative.extend(run.iter().map(|it| 100.0 * (it.error / it.truth).abs()));
             run.iter().for_each(|it| errors.take(it.error, it.std));
         }
-        Score { errors, relative_percent: mean(&relative), nees_of_runs }
+        BrakingScore { errors, relative_percent: mean(&relative), nees_of_runs }
     }
 }
 
@@ -165,9 +166,9 @@ pub fn score<const LAGS: usize>(
     seeds: Seeds,
     lags_steps: [usize; LAGS],
     settings: impl Fn(u64) -> EstimatorSettings + Sync,
-) -> [Score; LAGS] {
+) -> [BrakingScore; LAGS] {
     let runs = over_seeds(seeds, |seed| run(&settings(seed), &braking.simulate(seed), lags_steps));
-    std::array::from_fn(|lag| Score::of(runs.iter().map(|run| &run[lag])))
+    std::array::from_fn(|lag| BrakingScore::of(runs.iter().map(|run| &run[lag])))
 }
 
 /// Settings of the scenario: only positions are measured, and every estimate counts.
@@ -290,9 +291,9 @@ mod tests {
     #[test]
     fn a_score_of_exact_gaussian_errors_is_consistent() {
         // Errors of +- one standard deviation: NEES 1, all covered, 1 % of the truth.
-        let scored = |sign: f64| Scored { truth: 2.0, error: 0.02 * sign, std: 0.02 };
+        let scored = |sign: f64| ScoredBraking { truth: 2.0, error: 0.02 * sign, std: 0.02 };
         let runs = [vec![scored(1.0), scored(-1.0)], vec![scored(1.0)]];
-        let score = Score::of(runs.iter());
+        let score = BrakingScore::of(runs.iter());
         assert!((score.relative_percent - 1.0).abs() < 1e-12);
         assert!((score.rmse() - 0.02).abs() < 1e-15);
         assert!((score.errors.nees() - 1.0).abs() < 1e-12);
@@ -306,9 +307,10 @@ mod tests {
             let error = |run: usize| {
                 (1.0 + if run.is_multiple_of(2) { 1.0 } else { -1.0 } * variance.sqrt()).sqrt()
             };
-            let scored = |run| Scored { truth: 1.0, error: error(run), std: 1.0 };
-            let runs: Vec<Vec<Scored>> = (0..runs).map(|run| vec![scored(run); length]).collect();
-            Score::of(runs.iter())
+            let scored = |run| ScoredBraking { truth: 1.0, error: error(run), std: 1.0 };
+            let runs: Vec<Vec<ScoredBraking>> =
+                (0..runs).map(|run| vec![scored(run); length]).collect();
+            BrakingScore::of(runs.iter())
         };
         let drawn = score(0.6, 200, 100);
         // Twice as long a run halves the variance of 0.6; 0.1 of it is noise.

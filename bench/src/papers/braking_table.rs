@@ -3,11 +3,11 @@
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_estimators::xie::{EStep, EmSettings};
 
-use super::bound::{BoundAt, Knowledge, bound, deviation, mean_relative_percent};
+use super::bound::{BoundAt, PriorKnowledge, bound, deviation, mean_relative_percent};
 use super::braking::Braking;
 use super::braking_score::{
-    LAG_S, LAG_STEPS, MIDDLE_STEPS, Score, drawn_braking, ekf, em, known_law, presumed, score,
-    smoother,
+    BrakingScore, LAG_S, LAG_STEPS, MIDDLE_STEPS, drawn_braking, ekf, em, known_law, presumed,
+    score, smoother,
 };
 use super::row::{Row, Seeds};
 
@@ -32,11 +32,11 @@ pub struct Table {
 /// Scores that stand side by side in a row.
 struct Compared<'s> {
     /// Of the paper's method, where it is measured.
-    em: Option<&'s Score>,
+    em: Option<&'s BrakingScore>,
     /// Of the paper's baseline, where it is measured.
-    ekf: Option<&'s Score>,
+    ekf: Option<&'s BrakingScore>,
     /// Of our smoother.
-    ours: &'s Score,
+    ours: &'s BrakingScore,
     /// Degrees of freedom of its normalised squared error.
     freedom: f64,
 }
@@ -67,9 +67,10 @@ impl Table {
         let [ekf] = score(&self.braking, seeds, [0], |seed| ekf(sought, self.initial(seed)));
         let [present] = score(&self.braking, seeds, [0], |_| smoother(sought, 0.0));
         let [back] = score(&self.braking, seeds, [LAG_STEPS], |_| smoother(sought, LAG_S));
-        let knowledge = Knowledge::Share(presumed(sought));
+        let knowledge = PriorKnowledge::Share(presumed(sought));
         let drawn = |lag_s, lag_steps| drawn_score(sought, lag_s, lag_steps, seeds);
-        let freedom = |own: &Score, drawn: Score| own.nees_freedom_of_one_curve(&drawn);
+        let freedom =
+            |own: &BrakingScore, drawn: BrakingScore| own.nees_freedom_of_one_curve(&drawn);
         let (at_present, at_back) =
             (freedom(&present, drawn(0.0, 0)), freedom(&back, drawn(LAG_S, LAG_STEPS)));
         let mut rows = Vec::new();
@@ -102,7 +103,7 @@ impl Table {
     pub fn known_law(&self, scale_std: f64, seeds: Seeds) -> Vec<Row> {
         let sought = self.braking.sought;
         let [score] = score(&self.braking, seeds, [0], |_| known_law(sought));
-        let bounds = bound(&self.braking, Knowledge::Law(scale_std), 0);
+        let bounds = bound(&self.braking, PriorKnowledge::Law(scale_std), 0);
         self.pair(
             "the present, the law known but for its scale",
             Compared { em: None, ekf: None, ours: &score, freedom: score.nees_freedom() },
@@ -147,7 +148,7 @@ pub fn drawn_score(
     lag_s: f64,
     lag_steps: usize,
     seeds: Seeds,
-) -> Score {
+) -> BrakingScore {
     let [score] = score(&drawn_braking(sought), seeds, [lag_steps], |_| smoother(sought, lag_s));
     score
 }
@@ -161,7 +162,7 @@ pub fn drawn_rows(
     seeds: Seeds,
 ) -> Vec<Row> {
     let braking = drawn_braking(sought);
-    let knowledge = Knowledge::Share(presumed(sought));
+    let knowledge = PriorKnowledge::Share(presumed(sought));
     let row = |(what, lag_s, lag_steps)| {
         let score = drawn_score(sought, lag_s, lag_steps, seeds);
         let quantity = format!("{name}, root mean square error, {what}");

@@ -15,14 +15,15 @@ use dynocar_core::pipeline::braking::motion::{self, StepInputs};
 use dynocar_model::train::TrainModel;
 
 use super::braking::{
-    Moment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, WINDOW, XIE_TABLE_2, train,
+    BrakingMoment, POSITION_NOISE_M, POSITION_STD_M, SPEED_NOISE_MPS, STEP_S, WINDOW, XIE_TABLE_2,
+    train,
 };
 
 /// Particles of the papers.
 const PARTICLES: usize = 20;
 
 struct UniformWindow<'a> {
-    moments: &'a [Moment],
+    moments: &'a [BrakingMoment],
     inputs: StepInputs,
     adhesion: f64,
     /// Changes of the adhesion that keep every pair of particles possible.
@@ -98,7 +99,7 @@ impl ParticleModel<2> for UniformWindow<'_> {
 /// The changes of the adhesion, from lowest to highest, under which Q of the first window stays
 /// finite.
 fn finite_changes(
-    moments: &[Moment],
+    moments: &[BrakingMoment],
     adhesion: f64,
     seed: u64,
 ) -> Result<(f64, f64), ParticleError> {

@@ -19,10 +19,11 @@ use nalgebra::Matrix3;
 
 use self::methods::METHODS;
 use self::scenario::{
-    CLEAN, CONDITIONS, Condition, Measured, ROTATING_MASS_FACTOR, compared_speeds_mps, davis, truth,
+    CLEAN, CONDITIONS, MeasuredRun, ROTATING_MASS_FACTOR, RunCondition, compared_speeds_mps, davis,
+    truth,
 };
 use super::row::{Row, Seeds};
-use super::score::{Score, w0_errors};
+use super::score::{PaperScore, w0_errors};
 use crate::rig::pipelines::default_pipeline;
 use crate::statistics::mean;
 
@@ -54,10 +55,10 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 
 /// Errors of w0 under a condition; and Table 1's last column, the variance of the segments' residuals, of which the
 /// paper's are of its own recorded data, so that only the order of the methods compares.
-fn of_condition(condition: Condition, seeds: Seeds) -> (Vec<Row>, Vec<Row>) {
+fn of_condition(condition: RunCondition, seeds: Seeds) -> (Vec<Row>, Vec<Row>) {
     let mut of_methods = vec![(Vec::new(), Vec::new()); METHODS.len()];
     let (mut ours, mut online, mut our_variances) =
-        (Score::default(), Score::default(), Vec::new());
+        (PaperScore::default(), PaperScore::default(), Vec::new());
     let (speeds, truth) = (compared_speeds_mps(), truth());
     for seed in seeds.range() {
         let runs = scenario::measure(condition, seed);
@@ -80,7 +81,7 @@ fn of_condition(condition: Condition, seeds: Seeds) -> (Vec<Row>, Vec<Row>) {
         ours.take_bound(&bound, &speeds);
         online.take_bound(&bound, &speeds);
     }
-    let row = |quantity: &str, paper: &[f64], score: &Score| {
+    let row = |quantity: &str, paper: &[f64], score: &PaperScore| {
         let quantity = format!("w0 over 40-72 km/h, {quantity}, {}", condition.name);
         let mut score = score.clone();
         (score.paper, score.baseline) = (paper.to_vec(), of_methods[0].0.clone());
@@ -104,14 +105,14 @@ fn of_condition(condition: Condition, seeds: Seeds) -> (Vec<Row>, Vec<Row>) {
 }
 
 /// Our fit of whole runs: the computed speed against the measured one, all along each run.
-fn whole_runs(runs: &[Vec<Measured>]) -> Option<Estimate> {
-    let step = |pair: &[Measured]| Step {
+fn whole_runs(runs: &[Vec<MeasuredRun>]) -> Option<Estimate> {
+    let step = |pair: &[MeasuredRun]| Step {
         size: pair[1].time_s - pair[0].time_s,
         drive_mps2: 0.0,
         resistance_gain: mps2_per_n_per_kn(ROTATING_MASS_FACTOR),
     };
     let steps: Vec<Vec<Step>> = runs.iter().map(|run| run.windows(2).map(step).collect()).collect();
-    let speed_mps = |sample: &Measured| sample.speed_kmh / 3.6;
+    let speed_mps = |sample: &MeasuredRun| sample.speed_kmh / 3.6;
     let speeds: Vec<Vec<f64>> =
         runs.iter().map(|run| run.iter().map(speed_mps).collect()).collect();
     let motion_segments: Vec<MotionSegment<'_>> = steps
@@ -126,7 +127,7 @@ fn whole_runs(runs: &[Vec<Measured>]) -> Option<Estimate> {
 }
 
 /// The live pipeline over the same samples, with its default settings.
-fn live(runs: &[Vec<Measured>]) -> Estimate {
+fn live(runs: &[Vec<MeasuredRun>]) -> Estimate {
     // Declared wrongly, as in practice.
     let declared = Davis { a: 1.5, b: 0.03, c: 0.012 };
     let train = Arc::new(TrainModel {

@@ -9,7 +9,7 @@ use crate::statistics::{mean, root_mean_square, share};
 
 /// Errors, coverage and consistency of our method beside the errors of others on the same runs.
 #[derive(Clone, Debug, Default)]
-pub struct Score {
+pub struct PaperScore {
     /// Estimate minus truth.
     pub errors: Vec<f64>,
     /// The same of the paper's method.
@@ -24,7 +24,7 @@ pub struct Score {
     bounds: Vec<f64>,
 }
 
-impl Score {
+impl PaperScore {
     /// Takes in a number with its claimed standard deviation.
     pub fn take(&mut self, error: f64, std: f64) {
         self.errors.push(error);
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn an_error_of_one_standard_deviation_is_covered_and_counts_one() {
-        let mut score = Score::default();
+        let mut score = PaperScore::default();
         score.take(0.5, 0.5);
         score.take(-3.0, 1.0);
         let row = score.row(Row::new("a", "b", "c", "1", Seeds::from_zero(2)));
@@ -121,7 +121,7 @@ mod tests {
         let truth = Davis { a: 1.0, b: 0.0, c: 0.0 };
         let found = Davis { a: 1.3, ..truth };
         let covariance = Matrix3::from_diagonal(&Vector3::new(0.01, 1e-4, 1e-8));
-        let mut score = Score::default();
+        let mut score = PaperScore::default();
         score.take_resistance((&found, &covariance), &truth, &[0.0, 100.0]);
         score.take_bound(&covariance, &[0.0]);
         let row = score.row(Row::new("a", "b", "c", "N/kN", Seeds::from_zero(1)));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// Counters of the kernel so far.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Usage {
+pub struct ProcessUsage {
     /// Processor time of all living threads of the process, in s.
     pub cpu_s: f64,
     /// Its resident memory in bytes.
@@ -16,7 +16,7 @@ pub struct Usage {
 }
 
 /// The usage of a process, of which one thread is named; zeros where it, or such a thread, is not there.
-pub fn of(process_id: u32, thread: &str) -> Usage {
+pub fn of(process_id: u32, thread: &str) -> ProcessUsage {
     let folder = format!("/proc/{process_id}");
     let tasks = std::fs::read_dir(format!("{folder}/task")).into_iter().flatten().flatten();
     let tasks: Vec<PathBuf> = tasks.map(|task| task.path()).collect();
@@ -26,7 +26,7 @@ pub fn of(process_id: u32, thread: &str) -> Usage {
     let status = named.map_or_else(String::new, |task| text(task.join("status")));
     let preempted = status.lines().find_map(|it| it.strip_prefix("nonvoluntary_ctxt_switches:"));
     let wait_s = |task: &Path| 1e-9 * schedule_ns(task, 1);
-    Usage {
+    ProcessUsage {
         cpu_s: tasks.iter().map(|task| 1e-9 * schedule_ns(task, 0)).sum(),
         rss_bytes: number(pages.split(' ').nth(1)) * rustix::param::page_size() as u64,
         waits_s: [wait_s(Path::new("/proc/thread-self")), named.map_or(0.0, |task| wait_s(task))],

@@ -1,4 +1,4 @@
-//! Asking for a quantity: the reader follows what the daemon says in its snapshots.
+//! Asking for a quantity: the reader follows the pipeline that the daemon's snapshots name.
 
 use dynocar_client::{NoAnswer, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, Quantity, Status, TrainId};

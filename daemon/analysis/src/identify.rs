@@ -55,6 +55,30 @@ pub fn snapshot_after(
 /// # Errors
 ///
 /// When a setting is out of range.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_analysis::dataset::Dataset;
+/// use dynocar_analysis::identify::{identify, published_samples};
+/// use dynocar_estimators::EstimatorSettings;
+/// use dynocar_shared::{PipelineKind, Status, TrainId};
+///
+/// let described = "[dataset]\nname = \"a day\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
+///     time = { column = \"t\", unit = \"s\" }\nspeed = { column = \"v\", unit = \"km/h\" }\n\
+///     traction_force = { column = \"z\", unit = \"kN\" }\n[[runs]]\nfile = \"monday.csv\"\n";
+/// let train = "[train]\nmass_t = 200\nlength_m = 100\nrotating_mass_factor = 0.06\n\
+///     [resistance]\na = 1.5\nb = 0.01\nc = 0.0005\n";
+/// let monday = "t,v,z\n0,10.0,40\n1,10.6,40\n2,11.2,40\n3,11.8,40\n";
+/// let files = [("dataset.toml", described), ("train.toml", train), ("monday.csv", monday)];
+/// let dataset = Dataset::load(&files[..])?;
+/// let samples = published_samples(&dataset, TrainId(1));
+/// let settings = EstimatorSettings::default_of(PipelineKind::TrainKalman).expect("it is built in");
+/// // Three seconds determine nothing.
+/// let snapshot = identify(&dataset, &samples, &settings)?;
+/// assert_eq!(snapshot.status(), Status::Unestimated);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn identify(
     dataset: &Dataset,
     samples: &[TrainSample],

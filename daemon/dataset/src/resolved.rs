@@ -1,4 +1,4 @@
-//! The columns of a run after all that is particular to its file, and the samples that they give.
+//! Columns of a run in SI units, whatever the layout of its file, and the samples made of them.
 
 use std::sync::Arc;
 

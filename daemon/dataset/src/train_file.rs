@@ -29,6 +29,20 @@ pub(super) const MASS: &str = "a mass in t above 0, at most 100000";
 /// # Errors
 ///
 /// Names file, line, key, value and what was allowed. Unknown keys are refused.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_dataset::parse_train;
+///
+/// let declared = "[train]\nmass_t = 200\nlength_m = 100\nrotating_mass_factor = 0.06\n\
+///                 [resistance]\na = 1.5\nb = 0.01\nc = 0.0005\n";
+/// let train = parse_train("train.toml", declared)?;
+/// assert_eq!(train.mass_kg, 200_000.0);
+/// let error = parse_train("train.toml", &declared.replace("200", "-200")).unwrap_err();
+/// assert!(error.to_string().contains("train.mass_t = -200"), "{error}");
+/// # Ok::<(), dynocar_dataset::error::DatasetError>(())
+/// ```
 pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> {
     let document = Node::of_toml(label, text)?;
     let root = Item::root(label, &document);

@@ -1,5 +1,5 @@
 //! Variables of an FMU. Each model has a table of them, from which both `modelDescription.xml` and the values that
-//! are set and got come. A variable's value reference is its place in the table.
+//! are written and read come. A variable's value reference is its place in the table.
 
 use dynocar_analysis::driven::ForcePart;
 use dynocar_shared::layout::{FieldLayout, hex_digits, layout_hash};
@@ -11,15 +11,15 @@ use crate::units::Unit;
 /// One of the models in the library, as a simulator sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Interface {
-    /// The model identifier in the standard's sense, after which the library inside the FMU is called.
+    /// The standard's model identifier, which is also the name of the library inside the FMU.
     pub identifier: &'static str,
     /// Its name for people.
     pub name: &'static str,
-    /// Purpose of the model, in a sentence without its point.
+    /// Purpose of the model, in a sentence without a full stop.
     pub about: &'static str,
     /// Inputs and outputs of a step, in sentences.
     pub step: &'static str,
-    /// By which description and library of one FMU know each other.
+    /// Identifier that description and library of one FMU share.
     pub guid: &'static str,
     /// Every variable, in the order of the value references.
     pub variables: &'static [Variable],

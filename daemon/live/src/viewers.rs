@@ -21,8 +21,8 @@ pub enum LiveError {
     /// A channel of shared memory cannot be opened.
     #[error(transparent)]
     Channel(#[from] ChannelError),
-    /// The system gives no means to wait for viewers.
-    #[error("no means to wait for viewers: {0}")]
+    /// The event loop that waits for viewers cannot start.
+    #[error("cannot start the event loop: {0}")]
     System(#[source] std::io::Error),
     /// The address cannot be served.
     #[error("ws://{address}: cannot be served: {problem}; --port and --host name another address")]

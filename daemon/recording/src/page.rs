@@ -17,23 +17,16 @@ use crate::schema::{
 
 const HEAD: &str = "# Fields of a recording
 
-This page is what `dynocar-recording fields` prints; it is made from the same tables as the recordings'
-protobuf messages, the columns of a recording in Parquet and the types for NumPy. How to record is described
-in [the guide](guides/recording.md).
+`dynocar-recording fields` prints this page from the tables behind the recordings ([guide](guides/recording.md)).
 
-*Number* and *type* are those of the protobuf message. A field of which it says *missing unless measured* is
-`optional`: it is there when the controller measured it. Every other number that is not there is 0.
-
-*Column* is the type in Parquet, in Arrow's words: *null* where a value may be missing. Each column carries its unit,
-its meaning and the names of its numbers as metadata. Before them stand `message_number` (`UInt64`, the message's place
-among the recording's, counted from 1) and `log_time` (`Timestamp(ns, \"UTC\")`, when it was recorded).
-
-*NumPy* is the type in shared memory on a little-endian host with the offset in bytes: `dynocar.SAMPLE_DTYPE` and
-`dynocar.SNAPSHOT_DTYPE` in Python.
+- *Number* and *type* are those of the protobuf message. A missing number is 0, unless its column says *null*.
+- *Column* is Arrow's type in Parquet; *null*: missing where not measured. Metadata hold units, meanings and names. Two
+  columns come first: `message_number` (`UInt64`, from 1) and `log_time` (`Timestamp(ns, \"UTC\")`).
+- *NumPy* is the type and the offset in bytes of `dynocar.SAMPLE_DTYPE` and `dynocar.SNAPSHOT_DTYPE`.
 ";
 
 const EXPLANATION: &str = "
-`explain --annotate` adds the following messages, which have no place in Parquet.
+`explain --annotate` adds these messages, without Parquet.
 ";
 
 /// The page as Markdown.
@@ -55,9 +48,8 @@ pub fn page() -> String {
         &mut page,
         "dynocar.Estimate",
         &format!(
-            "What a pipeline estimates, each missing unless the pipeline estimates it; columns of the \
-             snapshots, under `estimate_` and the name. Each has three more, with a word before the unit and \
-             their number higher by so much: {}.",
+            "Each is missing unless the pipeline estimates it. The snapshots' columns begin with `estimate_`. \
+             Three more fields each have a word before the unit and a number higher by {}.",
             SUFFIXES.map(|(offset, word, ..)| format!("`_{word}` {offset}")).join(", ")
         ),
         PARQUET,
@@ -67,8 +59,7 @@ pub fn page() -> String {
         let row = Row::of(column, parameter_number(it), "double");
         Row { name: it.full_name(), ..row }.put(&mut page, PARQUET, &column.meaning);
     }
-    let what = "How many samples a pipeline refused, by reason; columns of the snapshots, under `rejected_` and \
-                the name.";
+    let what = "Samples refused, by reason. The snapshots' columns begin with `rejected_`.";
     table(&mut page, "dynocar.Rejected", what, PARQUET);
     for column in SNAPSHOTS.iter() {
         let Source::Rejected(it) = column.source else { continue };
@@ -180,30 +171,25 @@ fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field
         };
         let of_type = type_of(column.vocabulary, field.entry_type());
         let of_type = if field.is_array() { format!("repeated {of_type}") } else { of_type };
-        let missing = if column.is_nullable { " Missing unless measured." } else { "" };
         let row = Row::of(column, number(field), &of_type);
-        Row { numpy, ..row }.put(page, ALL, &format!("{}{missing}", field.meaning));
+        Row { numpy, ..row }.put(page, ALL, field.meaning);
     }
 }
 
 fn enumerations(page: &mut String) {
-    macro_rules! members {
-        ($name:ident) => {
-            let _ =
-                write!(page, "\n| {} | name | meaning |\n| --- | --- | --- |\n", stringify!($name));
-            for it in $name::ALL {
-                let (number, name, meaning) = (*it as u32, it.name(), plain(it.meaning()));
-                let _ = writeln!(page, "| {number} | {name} | {meaning} |");
-            }
-        };
-    }
     page.push_str(
         "\n## Numbers and their names\n\nIn the messages the names are in capitals, after that of the \
-         vocabulary: `STATUS_ESTIMATED`.\n",
+         vocabulary: `STATUS_ESTIMATED`. [The reading guide](guides/reading.md) explains all but the effects, whose names say it.\n\n",
     );
-    members!(PipelineKind);
-    members!(Status);
-    members!(Reason);
-    members!(EffectKind);
-    members!(EventKind);
+    macro_rules! names {
+        ($($name:ident)*) => {$(
+            let all = $name::ALL.iter().map(|it| format!("{} `{}`", *it as u32, it.name()));
+            let _ = writeln!(page, "- `{}`: {}", stringify!($name), all.collect::<Vec<_>>().join(", "));
+        )*};
+    }
+    names!(PipelineKind Status Reason EffectKind);
+    page.push_str("\n| EventKind | name | meaning |\n| --- | --- | --- |\n");
+    for it in EventKind::ALL {
+        let _ = writeln!(page, "| {} | {} | {} |", *it as u32, it.name(), plain(it.meaning()));
+    }
 }

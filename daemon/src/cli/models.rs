@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::{Args, Subcommand};
+use dynocar_model::terms::place::in_words;
 use dynocar_shared::TrainId;
 
 use super::Failure;
@@ -235,9 +236,8 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
         row("error", &format!("{:.3} → {:.3} {words}", error.before_mps, error.after_mps));
     }
     for effect in &origin.effects {
-        let places: Vec<String> =
-            effect.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m")).collect();
-        row("adds", [effect.kind.replace('_', " "), places.join(", ")].join(" ").trim_end());
+        let places = in_words(&effect.intervals_m);
+        row("adds", [effect.kind.replace('_', " "), places].join(" ").trim_end());
         for (name, figure) in &effect.parameters {
             row("", &figure.shown(name));
         }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use dynocar_model::terms::place::in_words;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
@@ -147,10 +148,8 @@ impl Origin {
     /// Describes the additions of the model, in a few words.
     pub fn adds(&self) -> String {
         let words = |effect: &FoundEffect| {
-            let places = effect.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m"));
-            let places: Vec<String> = places.collect();
-            let kind = effect.kind.replace('_', " ");
-            if places.is_empty() { kind } else { format!("{kind} at {}", places.join(", ")) }
+            let (kind, places) = (effect.kind.replace('_', " "), in_words(&effect.intervals_m));
+            if places.is_empty() { kind } else { format!("{kind} at {places}") }
         };
         let effects: Vec<String> = self.effects.iter().map(words).collect();
         if effects.is_empty() { "declared".into() } else { effects.join("; ") }

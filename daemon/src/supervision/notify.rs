@@ -22,7 +22,7 @@ const SILENCE_MAX: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 pub struct Supervisor {
     socket: Option<(UnixDatagram, SocketAddr)>,
-    /// How often the watchdog wants to hear of us: half of its limit.
+    /// Interval between signs of life: half of the watchdog's limit.
     feeding: Option<Duration>,
 }
 

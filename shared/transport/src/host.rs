@@ -30,6 +30,20 @@ const EXPIRED_CONNECTIONS: usize = 8;
 const TRAINS: &str = "trains";
 
 /// The run-time directory of one host, or of one of its separate installations.
+///
+/// # Examples
+///
+/// ```
+/// use dynocar_transport::Host;
+///
+/// # let folder = tempfile::tempdir()?;
+/// let root = folder.path().join("depot");
+/// let host = Host::at(&root)?;
+/// assert_eq!(host.root(), root);
+/// // A relative path is no root: two processes would not mean the same.
+/// assert!(Host::at("depot".as_ref()).is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Host {
     root: PathBuf,

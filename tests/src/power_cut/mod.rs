@@ -19,7 +19,7 @@ use dynocar::storage::{Rights, Storage};
 
 pub use noted::NotedDisk;
 pub use steps::Left;
-use steps::{AfterSteps, Step, apply};
+use steps::{AfterSteps, CutStep, apply};
 
 /// Which of its duties a disk neglects, to show that the tests notice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,17 +36,17 @@ pub enum Neglect {
 #[derive(Debug)]
 struct Asked {
     neglect: Neglect,
-    steps: Vec<Step>,
+    steps: Vec<CutStep>,
     /// Files by name as the running system sees them.
     names: BTreeMap<PathBuf, usize>,
     files: usize,
 }
 
 impl Asked {
-    fn note(&mut self, step: Step) {
+    fn note(&mut self, step: CutStep) {
         let is_neglected = match step {
-            Step::SyncBytes { .. } => self.neglect == Neglect::Bytes,
-            Step::SyncNames { .. } => self.neglect == Neglect::Names,
+            CutStep::SyncBytes { .. } => self.neglect == Neglect::Bytes,
+            CutStep::SyncNames { .. } => self.neglect == Neglect::Names,
             _ => false,
         };
         if !is_neglected {
@@ -61,7 +61,7 @@ impl Asked {
         let file = self.files;
         self.files += 1;
         self.names.insert(path.into(), file);
-        self.note(Step::Make { path: path.into(), file });
+        self.note(CutStep::Make { path: path.into(), file });
         Ok(file)
     }
 
@@ -105,8 +105,8 @@ impl Storage for LossyDisk {
     fn write_new(&self, path: &Path, content: &[u8], _: &Rights) -> io::Result<()> {
         let mut asked = self.asked();
         let file = asked.make(path)?;
-        asked.note(Step::Write { file, bytes: content.into() });
-        asked.note(Step::SyncBytes { file });
+        asked.note(CutStep::Write { file, bytes: content.into() });
+        asked.note(CutStep::SyncBytes { file });
         Ok(())
     }
 
@@ -118,7 +118,7 @@ impl Storage for LossyDisk {
     fn sync_file(&self, path: &Path) -> io::Result<()> {
         let mut asked = self.asked();
         let file = asked.file(path)?;
-        asked.note(Step::SyncBytes { file });
+        asked.note(CutStep::SyncBytes { file });
         Ok(())
     }
 
@@ -126,7 +126,7 @@ impl Storage for LossyDisk {
         let mut asked = self.asked();
         let file = asked.file(from)?;
         asked.names.insert(to.into(), file);
-        asked.note(Step::Link { to: to.into(), file });
+        asked.note(CutStep::Link { to: to.into(), file });
         Ok(())
     }
 
@@ -134,7 +134,7 @@ impl Storage for LossyDisk {
         let mut asked = self.asked();
         let file = asked.names.remove(from).ok_or(io::ErrorKind::NotFound)?;
         asked.names.insert(to.into(), file);
-        asked.note(Step::Rename { from: from.into(), to: to.into(), file });
+        asked.note(CutStep::Rename { from: from.into(), to: to.into(), file });
         Ok(())
     }
 
@@ -147,7 +147,7 @@ impl Storage for LossyDisk {
             drop(asked);
             return self.rename(from, to);
         }
-        let step = Step::RenameFolder { from: from.into(), to: to.into() };
+        let step = CutStep::RenameFolder { from: from.into(), to: to.into() };
         apply(&step, &mut asked.names);
         asked.note(step);
         Ok(())
@@ -161,12 +161,12 @@ impl Storage for LossyDisk {
     fn remove(&self, path: &Path) -> io::Result<()> {
         let mut asked = self.asked();
         asked.names.remove(path).ok_or(io::ErrorKind::NotFound)?;
-        asked.note(Step::Remove { path: path.into() });
+        asked.note(CutStep::Remove { path: path.into() });
         Ok(())
     }
 
     fn sync_directory(&self, path: &Path) -> io::Result<()> {
-        self.asked().note(Step::SyncNames { folder: path.into() });
+        self.asked().note(CutStep::SyncNames { folder: path.into() });
         Ok(())
     }
 }
@@ -179,7 +179,7 @@ struct Growing {
 
 impl Write for Growing {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.disk.asked().note(Step::Write { file: self.file, bytes: bytes.into() });
+        self.disk.asked().note(CutStep::Write { file: self.file, bytes: bytes.into() });
         Ok(bytes.len())
     }
 

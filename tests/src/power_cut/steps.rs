@@ -13,7 +13,7 @@ const NAMES_MAX: usize = 8;
 
 /// One thing that was asked for.
 #[derive(Clone, Debug)]
-pub enum Step {
+pub enum CutStep {
     /// A new file.
     Make { path: PathBuf, file: usize },
     /// At the end of a file.
@@ -32,15 +32,15 @@ pub enum Step {
     SyncNames { folder: PathBuf },
 }
 
-impl Step {
+impl CutStep {
     /// The folder in which a step changes names.
     fn folder(&self) -> Option<&Path> {
         match self {
-            Step::Make { path, .. } | Step::Remove { path } => Some(folder_of(path)),
-            Step::Link { to, .. } | Step::Rename { to, .. } | Step::RenameFolder { to, .. } => {
-                Some(folder_of(to))
-            }
-            Step::Write { .. } | Step::SyncBytes { .. } | Step::SyncNames { .. } => None,
+            CutStep::Make { path, .. } | CutStep::Remove { path } => Some(folder_of(path)),
+            CutStep::Link { to, .. }
+            | CutStep::Rename { to, .. }
+            | CutStep::RenameFolder { to, .. } => Some(folder_of(to)),
+            CutStep::Write { .. } | CutStep::SyncBytes { .. } | CutStep::SyncNames { .. } => None,
         }
     }
 }
@@ -56,33 +56,33 @@ struct Bytes {
 #[derive(Debug, Default)]
 pub struct AfterSteps {
     lasting_names: BTreeMap<PathBuf, usize>,
-    changes: Vec<Step>,
+    changes: Vec<CutStep>,
     files: BTreeMap<usize, Bytes>,
 }
 
 impl AfterSteps {
     /// One step more.
-    pub fn take(&mut self, step: &Step) {
+    pub fn take(&mut self, step: &CutStep) {
         match step {
-            Step::Write { file, bytes } => {
+            CutStep::Write { file, bytes } => {
                 self.files.entry(*file).or_default().written.extend_from_slice(bytes);
             }
-            Step::SyncBytes { file } => {
+            CutStep::SyncBytes { file } => {
                 let bytes = self.files.entry(*file).or_default();
                 bytes.lasting = bytes.written.len();
             }
-            Step::SyncNames { folder } => {
+            CutStep::SyncNames { folder } => {
                 let changes = std::mem::take(&mut self.changes);
-                let (done, open): (Vec<Step>, Vec<Step>) =
+                let (done, open): (Vec<CutStep>, Vec<CutStep>) =
                     changes.into_iter().partition(|it| it.folder() == Some(folder));
                 done.iter().for_each(|change| apply(change, &mut self.lasting_names));
                 self.changes = open;
             }
-            Step::Make { .. }
-            | Step::Link { .. }
-            | Step::Rename { .. }
-            | Step::RenameFolder { .. }
-            | Step::Remove { .. } => {
+            CutStep::Make { .. }
+            | CutStep::Link { .. }
+            | CutStep::Rename { .. }
+            | CutStep::RenameFolder { .. }
+            | CutStep::Remove { .. } => {
                 self.changes.push(step.clone());
             }
         }
@@ -148,28 +148,28 @@ impl Bytes {
 }
 
 /// A change of names takes place.
-pub fn apply(change: &Step, names: &mut BTreeMap<PathBuf, usize>) {
+pub fn apply(change: &CutStep, names: &mut BTreeMap<PathBuf, usize>) {
     match change {
-        Step::Make { path, file } => {
+        CutStep::Make { path, file } => {
             names.insert(path.clone(), *file);
         }
-        Step::Link { to, file } => {
+        CutStep::Link { to, file } => {
             names.insert(to.clone(), *file);
         }
-        Step::Rename { from, to, file } => {
+        CutStep::Rename { from, to, file } => {
             names.remove(from);
             names.insert(to.clone(), *file);
         }
-        Step::RenameFolder { from, to } => {
+        CutStep::RenameFolder { from, to } => {
             let inside = |name: &PathBuf| Some(to.join(name.strip_prefix(from).ok()?));
             *names = std::mem::take(names)
                 .into_iter()
                 .map(|(name, file)| (inside(&name).unwrap_or(name), file))
                 .collect();
         }
-        Step::Remove { path } => {
+        CutStep::Remove { path } => {
             names.remove(path);
         }
-        Step::Write { .. } | Step::SyncBytes { .. } | Step::SyncNames { .. } => {}
+        CutStep::Write { .. } | CutStep::SyncBytes { .. } | CutStep::SyncNames { .. } => {}
     }
 }

@@ -85,7 +85,7 @@ struct Cast<'a> {
 
 /// Summary of the rounds.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Summary {
+pub struct FaultsSummary {
     /// Polls of the clients that were checked.
     pub polls: u64,
     /// Daemons started.
@@ -255,10 +255,10 @@ impl<'a> Cast<'a> {
 /// # Panics
 ///
 /// When something of what the module promises does not hold; the message names seed and round.
-pub fn run(programs: &Programs, rounds: u64, seed: u64) -> Summary {
+pub fn run(programs: &Programs, rounds: u64, seed: u64) -> FaultsSummary {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut cast = Cast::new(programs);
-    let mut summary = Summary { polls: 0, daemons: 1 };
+    let mut summary = FaultsSummary { polls: 0, daemons: 1 };
     cast.await_progress(&format!("the first round of seed {seed}"));
     for round in 1..=rounds {
         let fault = FAULTS[random.random_range(0..FAULTS.len())];

@@ -27,7 +27,7 @@ const KINDS: [&str; 4] = ["v_mils", "mass_kalman", "trajectory_kalman", "echo"];
 
 /// Report of a run.
 #[derive(Clone, Debug, Default)]
-pub struct Report {
+pub struct LoadReport {
     /// Samples published over all trains.
     pub offered: u64,
     /// Samples lost, over all trains, of the pipeline that lost most.
@@ -42,7 +42,7 @@ pub struct Report {
     pub latency_p99_ns: [u64; 4],
 }
 
-impl Report {
+impl LoadReport {
     fn set_latencies(&mut self, by_quarter: [Vec<u64>; 4]) {
         for (quarter, mut latencies_ns) in by_quarter.into_iter().enumerate() {
             latencies_ns.sort_unstable();
@@ -131,7 +131,7 @@ fn start_daemon(site: &Site, programs: &Programs) -> Process {
 /// # Panics
 ///
 /// When memory grows or a sample is not accounted for.
-pub fn run(programs: &Programs, seconds: u64, seed: u64) -> Report {
+pub fn run(programs: &Programs, seconds: u64, seed: u64) -> LoadReport {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let site = Site::new();
     let daemon = start_daemon(&site, programs);
@@ -146,7 +146,7 @@ pub fn run(programs: &Programs, seconds: u64, seed: u64) -> Report {
         },
         || format!("the daemon: {}", daemon.errors()),
     );
-    let mut report = Report::default();
+    let mut report = LoadReport::default();
     let mut client: Option<Process> = None;
     let mut latencies_ns: [Vec<u64>; 4] = Default::default();
     let start = Instant::now();
@@ -211,7 +211,7 @@ fn stop_for_a_while(
 }
 
 /// Every pipeline of every train has taken, refused or missed every sample, exactly.
-fn check_accounts(controllers: &mut [Controller], daemon: &Process, report: &mut Report) {
+fn check_accounts(controllers: &mut [Controller], daemon: &Process, report: &mut LoadReport) {
     for controller in controllers {
         let offered = controller.publisher.published();
         let mut found: HashMap<u32, ParameterSnapshot> = HashMap::new();

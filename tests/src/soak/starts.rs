@@ -18,7 +18,7 @@ const STARTS_PER_ROUND: u64 = 10;
 
 /// Summary of the rounds.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Summary {
+pub struct StartsSummary {
     /// Processes started and killed.
     pub starts: u64,
     /// Roots that were served afterwards.
@@ -32,9 +32,9 @@ pub struct Summary {
 /// # Panics
 ///
 /// When a root cannot be served any more, with what the daemon said.
-pub fn run(programs: &Programs, rounds: u64, seed: u64) -> Summary {
+pub fn run(programs: &Programs, rounds: u64, seed: u64) -> StartsSummary {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut summary = Summary::default();
+    let mut summary = StartsSummary::default();
     for _ in 0..rounds {
         round(programs, &mut random, &mut summary);
     }
@@ -49,7 +49,7 @@ enum Part {
     Client,
 }
 
-fn round(programs: &Programs, random: &mut impl Rng, summary: &mut Summary) {
+fn round(programs: &Programs, random: &mut impl Rng, summary: &mut StartsSummary) {
     let site = Site::new();
     let config = site.write_config(1, "", "[[pipelines]]\nkind = \"echo\"\n");
     let config = config.to_str().expect("a UTF-8 path");

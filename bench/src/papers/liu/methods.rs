@@ -3,7 +3,7 @@
 use dynocar_core::filter::{Mils, Penalty, RunningMedian, SquareRootInformation};
 use nalgebra::Vector3;
 
-use super::scenario::{Measured, ROTATING_MASS_FACTOR};
+use super::scenario::{MeasuredRun, ROTATING_MASS_FACTOR};
 use crate::statistics::{mean, straight_line};
 
 /// p0 of eq. 11.
@@ -34,11 +34,11 @@ impl Segment {
 /// Half-overlapping segments of figure 2: each is 0.5 km/h of speed wide and the next begins in
 /// its middle, at 0.25 km/h less; a bound is reached where a measured speed first lies at or
 /// below it, as printed. The acceleration is the least-squares slope.
-pub fn segments(runs: &[Vec<Measured>]) -> Vec<Segment> {
+pub fn segments(runs: &[Vec<MeasuredRun>]) -> Vec<Segment> {
     runs.iter().flat_map(|run| segments_of(run)).collect()
 }
 
-fn segments_of(run: &[Measured]) -> Vec<Segment> {
+fn segments_of(run: &[MeasuredRun]) -> Vec<Segment> {
     let reached = |bound_kmh: f64| {
         // Rounded speeds lie on the bounds but for the last bit.
         run.iter().position(|sample| sample.speed_kmh <= bound_kmh + 1e-6)
@@ -51,7 +51,7 @@ fn segments_of(run: &[Measured]) -> Vec<Segment> {
         .collect()
 }
 
-fn segment(samples: &[Measured]) -> Option<Segment> {
+fn segment(samples: &[MeasuredRun]) -> Option<Segment> {
     if samples.len() < 2 {
         return None;
     }
@@ -135,14 +135,14 @@ mod tests {
 
     #[test]
     fn segments_of_true_speeds_give_the_true_resistance_by_every_method() {
-        let runs: Vec<Vec<Measured>> = RUNS_KMH
+        let runs: Vec<Vec<MeasuredRun>> = RUNS_KMH
             .iter()
             .map(|run| {
                 let speeds = super::super::scenario::true_speeds_kmh(*run, &truth());
                 speeds
                     .iter()
                     .enumerate()
-                    .map(|(i, &speed_kmh)| Measured { time_s: STEP_S * i as f64, speed_kmh })
+                    .map(|(i, &speed_kmh)| MeasuredRun { time_s: STEP_S * i as f64, speed_kmh })
                     .collect()
             })
             .collect();

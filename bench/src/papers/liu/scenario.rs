@@ -30,7 +30,7 @@ const UNKNOWNS: usize = 3 + RUNS_KMH.len();
 pub const OUTLIER_KMH: (f64, f64) = (1.0, 5.0);
 /// Defects of the data besides noise and rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Condition {
+pub struct RunCondition {
     /// In words.
     pub name: &'static str,
     /// Share of outliers, which are off by [`OUTLIER_KMH`].
@@ -40,18 +40,18 @@ pub struct Condition {
 }
 
 /// Every condition.
-pub const CONDITIONS: [Condition; 4] = [
-    Condition { name: "clean", outlier_share: 0.0, missing_share: 0.0 },
-    Condition { name: "5 % outliers", outlier_share: 0.05, missing_share: 0.0 },
-    Condition { name: "20 % missing", outlier_share: 0.0, missing_share: 0.2 },
-    Condition { name: "5 % outliers, 20 % missing", outlier_share: 0.05, missing_share: 0.2 },
+pub const CONDITIONS: [RunCondition; 4] = [
+    RunCondition { name: "clean", outlier_share: 0.0, missing_share: 0.0 },
+    RunCondition { name: "5 % outliers", outlier_share: 0.05, missing_share: 0.0 },
+    RunCondition { name: "20 % missing", outlier_share: 0.0, missing_share: 0.2 },
+    RunCondition { name: "5 % outliers, 20 % missing", outlier_share: 0.05, missing_share: 0.2 },
 ];
 /// Nothing is wrong.
-pub const CLEAN: Condition = CONDITIONS[0];
+pub const CLEAN: RunCondition = CONDITIONS[0];
 
 /// A measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
+pub struct MeasuredRun {
     /// Time in s since the run's first sample.
     pub time_s: f64,
     /// Speed in km/h.
@@ -85,7 +85,7 @@ pub fn true_speeds_kmh((from_kmh, to_kmh): (f64, f64), davis: &Davis) -> Vec<f64
 }
 
 /// The measured runs of a seed.
-pub fn measure(condition: Condition, seed: u64) -> Vec<Vec<Measured>> {
+pub fn measure(condition: RunCondition, seed: u64) -> Vec<Vec<MeasuredRun>> {
     let mut random = Chance::new(seed);
     RUNS_KMH
         .iter()
@@ -103,7 +103,7 @@ pub fn measure(condition: Condition, seed: u64) -> Vec<Vec<Measured>> {
                 }
                 let is_missing = random.uniform() < condition.missing_share;
                 let speed_kmh = (speed_kmh / QUANTUM_KMH).round() * QUANTUM_KMH;
-                (!is_missing).then_some(Measured { time_s: STEP_S * index as f64, speed_kmh })
+                (!is_missing).then_some(MeasuredRun { time_s: STEP_S * index as f64, speed_kmh })
             });
             samples.collect()
         })
@@ -160,13 +160,13 @@ fn normal_integral(x: f64) -> f64 {
 
 /// Bound of the covariance of a, b, c (for speeds in m/s) from the samples that there are, with each run's start
 /// speed unknown.
-pub fn bound(condition: Condition, runs: &[Vec<Measured>]) -> Matrix3<f64> {
+pub fn bound(condition: RunCondition, runs: &[Vec<MeasuredRun>]) -> Matrix3<f64> {
     // Per (m/s)².
     let weight = sample_information(condition.outlier_share) * 3.6 * 3.6;
     let mut information = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
     for (run, (&speeds_kmh, samples)) in RUNS_KMH.iter().zip(runs).enumerate() {
         let rows = derivatives(speeds_kmh);
-        let index = |sample: &Measured| (sample.time_s / STEP_S).round() as usize;
+        let index = |sample: &MeasuredRun| (sample.time_s / STEP_S).round() as usize;
         for row in samples.iter().filter_map(|sample| rows.get(index(sample))) {
             let mut full = SVector::<f64, UNKNOWNS>::zeros();
             full.as_mut_slice()[..3].copy_from_slice(&row[..3]);
@@ -239,8 +239,8 @@ mod tests {
     fn fewer_samples_allow_less() {
         let at_15 = |covariance| w0_std(&covariance, 15.0);
         let runs = measure(CLEAN, 3);
-        let of_run = |run: &Vec<Measured>| run.iter().step_by(2).copied().collect();
-        let half: Vec<Vec<Measured>> = runs.iter().map(of_run).collect();
+        let of_run = |run: &Vec<MeasuredRun>| run.iter().step_by(2).copied().collect();
+        let half: Vec<Vec<MeasuredRun>> = runs.iter().map(of_run).collect();
         let all = at_15(bound(CLEAN, &runs));
         let half = at_15(bound(CLEAN, &half));
         assert!((half / all - 2.0_f64.sqrt()).abs() < 0.03);

@@ -11,7 +11,7 @@ use super::ride::{kalman, known_resistance, leg, measure, presumed, staged, ther
 use super::shuttle::{Disturbance, EMPTY_MASS_KG, Shuttle, calm};
 use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, WANG};
-use crate::papers::score::Score;
+use crate::papers::score::PaperScore;
 use crate::statistics::mean;
 
 /// Mass in kg and published deviation in % of each line of Table 3.
@@ -104,10 +104,10 @@ fn row(quantity: &str, seeds: Seeds) -> Row {
 }
 
 /// The whole chain: resistances from one crossing, then the mass with them.
-fn after_crossing(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> Score {
+fn after_crossing(shuttle: &Shuttle, mass_kg: f64, seeds: Seeds) -> PaperScore {
     let crossing = shuttle.crossing(CROSSING, &mut calm);
     let ride = there_and_back(shuttle, mass_kg, &mut calm);
-    let mut score = Score::default();
+    let mut score = PaperScore::default();
     for seed in seeds.range() {
         let mut random = Chance::new(seed);
         let mut joint = joint_least_squares(shuttle);
@@ -127,8 +127,8 @@ fn run(
     condition: Condition,
     force_gain: f64,
     seeds: Seeds,
-) -> Score {
-    let mut score = Score::default();
+) -> PaperScore {
+    let mut score = PaperScore::default();
     for seed in seeds.range() {
         let mut disturbance = condition.disturbance(shuttle, seed);
         let ride = there_and_back(shuttle, mass_kg, &mut *disturbance);
@@ -146,7 +146,7 @@ fn run(
 
 /// Takes in the errors in % of the three ways.
 fn take(
-    score: &mut Score,
+    score: &mut PaperScore,
     samples: &[ResolvedSample],
     mass_kg: f64,
     (shuttle, resistance): (&Shuttle, &LineResistance),

@@ -17,7 +17,7 @@ use super::ride::measure;
 use super::shuttle::{Instant, Shuttle, calm};
 use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, WANG};
-use crate::papers::score::{Score, w0_errors};
+use crate::papers::score::{PaperScore, w0_errors};
 use crate::statistics::{mean, root_mean_square};
 
 /// Samples of one crossing.
@@ -67,9 +67,14 @@ fn row(what: &str, seeds: Seeds) -> Row {
     )
 }
 
-fn run(shuttle: &Shuttle, ride: &[Instant], speeds: &[Vec<f64>; 3], seeds: Seeds) -> [Score; 3] {
+fn run(
+    shuttle: &Shuttle,
+    ride: &[Instant],
+    speeds: &[Vec<f64>; 3],
+    seeds: Seeds,
+) -> [PaperScore; 3] {
     let truths = &shuttle.truth;
-    let mut scores: [Score; 3] = Default::default();
+    let mut scores: [PaperScore; 3] = Default::default();
     for seed in seeds.range() {
         let samples = measure(shuttle, ride, &mut Chance::new(seed));
         let settings = StagedDescentSettings::default();

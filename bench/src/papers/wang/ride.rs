@@ -18,7 +18,7 @@ use crate::statistics::KMH;
 const SERVICE_BRAKE_MPS2: f64 = 0.7;
 
 /// Decides on traction minus brake in N that is wanted now on the way to a stop at a chainage in m.
-pub type Driver<'a> = dyn FnMut(&Shuttle, &Instant, f64) -> f64 + 'a;
+pub type RideDriver<'a> = dyn FnMut(&Shuttle, &Instant, f64) -> f64 + 'a;
 
 /// Powers to the limit, lets the speed fall by 6 km/h while coasting, brakes for lower limits
 /// and for the stop.
@@ -100,7 +100,7 @@ impl Shuttle {
     /// Drives from standstill to standstill at `to_m`, then stands for `dwell_s`.
     pub fn drive_with(
         &self,
-        driver: &mut Driver<'_>,
+        driver: &mut RideDriver<'_>,
         start: &Instant,
         to_m: f64,
         dwell_s: f64,

@@ -19,7 +19,7 @@ use super::scenario::{
 };
 use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, XIA};
-use crate::papers::score::{Score, w0_errors};
+use crate::papers::score::{PaperScore, w0_errors};
 use crate::statistics::root_mean_square;
 
 /// Identified a of Table 3, case by case.
@@ -121,7 +121,7 @@ pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
         ("cruise, 120 km", Profile::Cruise, 120e3),
     ] {
         for (case, truth) in CASES.iter().enumerate() {
-            let mut score = Score::default();
+            let mut score = PaperScore::default();
             for seed in seeds.range() {
                 let run = drive(profile, length_m, seed, |_| *truth);
                 let speeds = &run.speeds_mps;
@@ -156,7 +156,7 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
     let (fast, all) = (fast_speeds_mps(), all_speeds_mps());
     let cruise = drive(Profile::Cruise, 120e3, 1, |_| truth);
     let full = drive(Profile::Full, 40e3, 1, |_| truth);
-    let [mut free, mut boxed, mut profile] = <[Score; 3]>::default();
+    let [mut free, mut boxed, mut profile] = <[PaperScore; 3]>::default();
     let (cruise_bound, full_bound) =
         (davis_covariance(&cruise, &truth), davis_covariance(&full, &truth));
     for seed in seeds.range() {
@@ -181,7 +181,7 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
         }
     }
     let published = w0_errors(&PUBLISHED_NOISY, &truth, &fast);
-    let line = |quantity: &str, score: &Score| {
+    let line = |quantity: &str, score: &PaperScore| {
         score.row(Row::new(XIA, "Figure 4", quantity, "N/kN", seeds))
     };
     vec![

@@ -21,7 +21,7 @@ use super::scenario::{
 };
 use crate::chance::Chance;
 use crate::papers::row::{Row, Seeds, XIA};
-use crate::papers::score::{Score, w0_std};
+use crate::papers::score::{PaperScore, w0_std};
 use crate::statistics::{mean, root_mean_square};
 
 /// Data capacity I of the paper's window.
@@ -246,7 +246,7 @@ fn drawn_row(
     seeds: Seeds,
     of_seed: impl Fn(u64, &mut Chance) -> Drawn,
 ) -> Row {
-    let mut score = Score::default();
+    let mut score = PaperScore::default();
     for seed in seeds.range() {
         let mut random = Chance::new(9000 + seed);
         if let Some((truth, (davis, covariance), bound)) = of_seed(seed, &mut random) {

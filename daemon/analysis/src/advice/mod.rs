@@ -17,8 +17,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use drive::{DriveKind, Scene};
 use known::{ANSWERED, davis_of};
-use noise::Noise;
-use rehearsal::{Forecast, Known, MASS, forecast};
+use noise::RunNoise;
+use rehearsal::{Forecast, KnownBefore, MASS, forecast};
 
 /// Times in s that a driver may be asked for, the shortest first.
 pub const WITHIN_S: [f64; 3] = [20.0, 60.0, 180.0];
@@ -67,12 +67,12 @@ pub fn forecasts(
     snapshot: &ParameterSnapshot,
     train: &TrainModel,
     (mass_t, mass_std_t): (f64, f64),
-    noise: &Noise,
+    noise: &RunNoise,
     within_s: f64,
 ) -> Vec<Forecast> {
     let Some((davis, covariance)) = davis_of(snapshot) else { return Vec::new() };
     let scene = Scene::new(train, davis, 1e3 * mass_t, snapshot.speed_max_mps);
-    let known = Known { davis: covariance, mass_std_t };
+    let known = KnownBefore { davis: covariance, mass_std_t };
     let drives = scene.catalogue(within_s);
     drives.into_iter().filter_map(|drive| forecast(&scene, &known, noise, drive)).collect()
 }
@@ -86,7 +86,7 @@ pub fn for_resistance(
     snapshot: &ParameterSnapshot,
     train: &TrainModel,
     mass: (f64, f64),
-    noise: &Noise,
+    noise: &RunNoise,
 ) -> Option<Advice> {
     let (davis, covariance) = davis_of(snapshot)?;
     let now = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
@@ -111,14 +111,14 @@ pub fn for_mass(
     snapshot: &ParameterSnapshot,
     train: &TrainModel,
     (davis, covariance): (Davis, Matrix3<f64>),
-    noise: &Noise,
+    noise: &RunNoise,
 ) -> Option<Advice> {
     let (mass_t, std_t) = (snapshot.value(Parameter::Mass)?, snapshot.std(Parameter::Mass)?);
     if !(mass_t > 0.0 && std_t > MASS_GOOD_SHARE * mass_t) {
         return None;
     }
     let scene = Scene::new(train, davis, 1e3 * mass_t, snapshot.speed_max_mps);
-    let known = Known { davis: covariance, mass_std_t: std_t };
+    let known = KnownBefore { davis: covariance, mass_std_t: std_t };
     let within = |within_s: f64| {
         let drives = scene.catalogue(within_s).into_iter();
         drives

@@ -15,7 +15,7 @@ use super::known::davis_of;
 
 /// The noise that an estimate of the resistance has to do with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise {
+pub struct RunNoise {
     /// Standard deviation of a measured speed in m/s.
     pub speed_noise_mps: f64,
     /// Root of the density of disturbing forces in N/kN √s.
@@ -94,7 +94,7 @@ impl NoiseSeen {
 
     /// Returns the noise behind the newest snapshot of the pipeline; `None` while nothing has been learned, or if
     /// the noise of this kind of pipeline cannot be estimated.
-    pub fn noise(&self, newest: &ParameterSnapshot, train: &TrainModel) -> Option<Noise> {
+    pub fn noise(&self, newest: &ParameterSnapshot, train: &TrainModel) -> Option<RunNoise> {
         let step_s = self.step_s?;
         let rate = if self.rates.len() >= LOOKS_MIN {
             fastest(&self.rates)
@@ -104,7 +104,7 @@ impl NoiseSeen {
         };
         let speed_noise_mps = TrainKalmanSettings::default().speed_noise_mps;
         let noise =
-            Noise { speed_noise_mps, disturbance_n_per_kn_sqrt_s: rate.sqrt().recip(), step_s };
+            RunNoise { speed_noise_mps, disturbance_n_per_kn_sqrt_s: rate.sqrt().recip(), step_s };
         let is_known = noise.speed_noise_mps > 0.0 && noise.disturbance_n_per_kn_sqrt_s > 0.0;
         (is_known && (noise.speed_noise_mps + noise.disturbance_n_per_kn_sqrt_s).is_finite())
             .then_some(noise)
@@ -156,7 +156,7 @@ mod tests {
         snapshot
     }
 
-    fn after(seconds: u32, stands_from_s: u32) -> Option<Noise> {
+    fn after(seconds: u32, stands_from_s: u32) -> Option<RunNoise> {
         let train = TrainModel {
             rotating_mass_factor: 0.06,
             ..TrainModel::bare("test", 1e5, Davis { a: 1.5, b: 0.02, c: 0.003 })

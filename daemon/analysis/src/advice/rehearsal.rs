@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, SVector};
 
 use super::drive::{Drive, DriveKind, Scene};
 use super::known::ANSWERED;
-use super::noise::Noise;
+use super::noise::RunNoise;
 
 /// Shortest step in s; samples that come faster are taken together.
 const STEP_MIN_S: f64 = 0.2;
@@ -31,7 +31,7 @@ pub type Answered = SVector<f64, 4>;
 
 /// Knowledge before a manoeuvre.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
+pub struct KnownBefore {
     /// Covariance of a, b and c.
     pub davis: Matrix3<f64>,
     /// Standard deviation of the mass in t; 0 where it is exact.
@@ -53,7 +53,12 @@ pub struct Forecast {
 
 /// Returns the knowledge after a manoeuvre; `None` when the present knowledge is not a covariance, or the train
 /// cannot drive the manoeuvre for a second.
-pub fn forecast(scene: &Scene<'_>, known: &Known, noise: &Noise, drive: Drive) -> Option<Forecast> {
+pub fn forecast(
+    scene: &Scene<'_>,
+    known: &KnownBefore,
+    noise: &RunNoise,
+    drive: Drive,
+) -> Option<Forecast> {
     let mut rehearsal = Rehearsal::new(scene, known, noise)?;
     rehearsal.speed_mps = drive.from_mps;
     let hold =
@@ -87,7 +92,7 @@ struct Rehearsal<'a> {
 }
 
 impl<'a> Rehearsal<'a> {
-    fn new(scene: &'a Scene<'a>, known: &Known, noise: &Noise) -> Option<Self> {
+    fn new(scene: &'a Scene<'a>, known: &KnownBefore, noise: &RunNoise) -> Option<Self> {
         let together = (STEP_MIN_S / noise.step_s).ceil().max(1.0);
         let step_s = together * noise.step_s;
         let measured_mps = noise.speed_noise_mps / together.sqrt();
@@ -159,7 +164,7 @@ impl<'a> Rehearsal<'a> {
     }
 }
 
-impl Known {
+impl KnownBefore {
     fn kept(&self, scene: &Scene<'_>) -> Option<KeptEstimate> {
         let Davis { a, b, c } = scene.davis;
         let it = &self.davis;

@@ -13,7 +13,7 @@ use super::selection::{Deviations, Outcome, Search};
 use crate::statistics::share_of;
 
 /// How surely the numbers of a finished search are known.
-pub struct Known<'a> {
+pub struct FinishedFit<'a> {
     /// The numbers.
     pub deviations: &'a Deviations,
     /// The place of each effect.
@@ -22,7 +22,7 @@ pub struct Known<'a> {
     pub courses: &'a [(EffectKind, Vec<Course>)],
 }
 
-impl Known<'_> {
+impl FinishedFit<'_> {
     /// The courses of an effect.
     pub fn courses(&self, kind: EffectKind) -> Vec<Course> {
         let own = self.courses.iter().filter(|it| it.0 == kind);
@@ -35,7 +35,7 @@ pub fn caveats(
     search: &Search,
     outcome: &Outcome,
     effects: &[EffectAnswer],
-    known: &Known,
+    known: &FinishedFit,
     score: &Score,
     identifiability: &[Identifiability],
 ) -> Vec<String> {

@@ -1,6 +1,5 @@
 //! Kinds that could stand in the place of an accepted effect, and other forms that a force outside the library may have.
 
-use dynocar_model::terms::speed_delay;
 use dynocar_shared::vocabulary::{self, EffectKind};
 
 use super::answer::RunnerUp;
@@ -42,13 +41,6 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         CompetingHypotheses { accepted, kinds }
     };
     let named = effects.iter().filter(|effect| outcome.is_named(effect.kind()));
-    // A late speed of as little as these forces would be within usual errors itself.
-    let is_large = |accepted: EffectKind| {
-        let index = outcome.fit.model.position(accepted);
-        let late_s: f64 =
-            index.map_or(0.0, |index| outcome.fit.effect_parameters(index).iter().sum());
-        move |twin: &EffectKind| *twin != EffectKind::SpeedDelay || late_s > speed_delay::LEAST_S
-    };
     let each = named.map(|effect| {
         let kind = effect.kind();
         let swapped = outcome.instead.iter().filter(|_| effects.len() > 1);
@@ -57,9 +49,8 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
         let mut rounds = outcome.rounds.iter().rev();
         let taken_in = rounds.find(|round| round.iter().any(|trial| trial.kind == kind));
         let taken_in = taken_in.map_or(&[][..], |round| &round[..]);
-        let twins: Vec<EffectKind> =
-            effect.nature().twins.iter().copied().filter(is_large(kind)).collect();
-        of(kind, instead.map_or(taken_in, |(_, tried)| tried), &twins)
+        let twins = effect.twins(outcome.values(kind).unwrap_or_default());
+        of(kind, instead.map_or(taken_in, |(_, tried)| tried), twins)
     });
     each.filter(|competing| !competing.kinds.is_empty()).collect()
 }

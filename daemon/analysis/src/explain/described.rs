@@ -1,9 +1,13 @@
 //! Effects in words, for the statement.
 
+use dynocar_model::terms::place::in_words;
 use dynocar_shared::HALF_95;
 
 use super::answer::{EffectAnswer, Location, ParameterValue, PlaceUncertainty};
 use super::selection::{Outcome, Trial};
+
+/// Intervals of a place at most in a sentence.
+const PLACES_SHOWN: usize = 4;
 
 /// An effect with its numbers, where it acts, and how surely that is known.
 pub(super) fn describe(effect: &EffectAnswer) -> String {
@@ -32,9 +36,9 @@ pub(super) fn describe(effect: &EffectAnswer) -> String {
 pub(super) fn describe_place(place: &Location) -> Vec<String> {
     let mut parts = Vec::new();
     if let Some(intervals) = &place.intervals_m {
-        let shown = intervals.iter().take(4).map(|[from, to]| format!("{from:.0}–{to:.0} m"));
-        let more = if intervals.len() > 4 { " …" } else { "" };
-        parts.push(format!("at {}{more}", shown.collect::<Vec<_>>().join(", ")));
+        let shown = &intervals[..intervals.len().min(PLACES_SHOWN)];
+        let more = if intervals.len() > PLACES_SHOWN { " …" } else { "" };
+        parts.push(format!("at {}{more}", in_words(shown)));
     }
     if let Some(windows) = &place.windows {
         let shown =

@@ -198,8 +198,6 @@ pub struct Nature<'h> {
     pub is_one_number_a_run: bool,
     /// Whether it could act in the place of another effect.
     pub may_stand_for_others: bool,
-    /// Kinds that none of the runs at hand could distinguish from it.
-    pub twins: &'static [EffectKind],
 }
 
 impl<'h> Nature<'h> {
@@ -223,7 +221,6 @@ impl<'h> Nature<'h> {
             looks_back: false,
             is_one_number_a_run: false,
             may_stand_for_others: true,
-            twins: &[],
         }
     }
 }
@@ -326,6 +323,11 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     /// The same structure with one of its ends elsewhere; `None` where that makes no place.
     fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
         self.at_site(self.site()?.moved(end, at)?)
+    }
+
+    /// Kinds that none of the runs at hand could distinguish from it.
+    fn twins(&self, _parameters: &[f64]) -> &'static [EffectKind] {
+        &[]
     }
 
     /// True when it acts in certain runs only: an event, and no property of train or line.

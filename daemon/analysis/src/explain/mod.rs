@@ -122,7 +122,7 @@ fn explained<E: From<RunDataError> + Send>(
     let Prepared { estimated_drive, late, preparation, runs } = Prepared::of(&dataset, density)?;
     let track = preparation.track().map(|track| &**track);
     let diagnostics = diagnostics(preparation.train(), track, &all.runs);
-    let step_s = dataset.step_s();
+    let step_s = density.step_s(dataset.step_s());
     drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         runs.into_iter().partition(|run| run.role == Role::Fit);
@@ -163,7 +163,7 @@ fn explained<E: From<RunDataError> + Send>(
     let beside = outcome.beside();
     let finished = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
     let courses = over_time::courses(&problem, finished, &spans, &deviations.std);
-    let known = caveats::Known { deviations: &deviations, places: &known, courses: &courses };
+    let known = caveats::FinishedFit { deviations: &deviations, places: &known, courses: &courses };
     let mut answer = verdict::answer(&search, &outcome, &known, &score, diagnostics);
     if let Some(estimated) = estimated_drive {
         answer.add_caveat(&estimated.answer.sentence());

@@ -10,7 +10,7 @@ use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location, Meaning,
     Verdict,
 };
-use super::caveats::{Known, caveats, told_by_data, trimmed};
+use super::caveats::{FinishedFit, caveats, told_by_data, trimmed};
 use super::competing::runners_up;
 use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, separating_run};
 use super::described::{describe, describe_place, small};
@@ -34,7 +34,7 @@ const LIBRARY_SHARE_MIN: f64 = 0.5;
 pub fn answer(
     search: &Search,
     outcome: &Outcome,
-    known: &Known,
+    known: &FinishedFit,
     score: &Score,
     diagnostics: Vec<DatasetDiagnostic>,
 ) -> ExplainAnswer {
@@ -131,7 +131,7 @@ fn moving_s(search: &Search) -> f64 {
     search.problem.runs.iter().fold(0.0, |sum, run| sum + run.moving_s())
 }
 
-fn effect_answers(search: &Search, outcome: &Outcome, known: &Known) -> Vec<EffectAnswer> {
+fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Vec<EffectAnswer> {
     let Deviations { std, covariance, c } = known.deviations;
     let fit = &outcome.fit;
     let apart = ScaleSources::of(search.problem, outcome).filter(ScaleSources::are_apart);

@@ -8,7 +8,7 @@ use crate::dataset::{DatasetError, SourcePosition};
 
 /// How a file is to be read where its format leaves a choice.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reading {
+pub struct ImportReading {
     /// Share of the permitted load that is on the train, 0 to 1, where a file gives the load.
     pub load_share: f64,
     /// Which of several effort curves counts, by the name of its mode; the file's default without.

@@ -27,7 +27,7 @@ mod ttobench_train;
 mod vehicle;
 
 pub use format::Format;
-pub use imported::{Account, FieldOutcome, ImportedLine, ImportedTrain, Reading};
+pub use imported::{Account, FieldOutcome, ImportReading, ImportedLine, ImportedTrain};
 
 use crate::dataset::DatasetError;
 use crate::dataset::document::Item;
@@ -61,7 +61,7 @@ pub struct Imported {
 pub fn import(
     sources: &[Source],
     forced: Option<Format>,
-    reading: &Reading,
+    reading: &ImportReading,
 ) -> Result<Imported, DatasetError> {
     let mut read = Vec::new();
     for source in sources {

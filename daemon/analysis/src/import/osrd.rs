@@ -5,7 +5,7 @@
 
 use dynocar_model::train::{Davis, TrainModel};
 
-use super::imported::{Account, ImportedTrain, Reading, force_n};
+use super::imported::{Account, ImportReading, ImportedTrain, force_n};
 use crate::brakes::{Steps, read};
 use crate::dataset::document::{Item, above_zero};
 use crate::dataset::train_file::growing;
@@ -35,7 +35,7 @@ const RESISTANCE_N_PER_KN: (f64, f64) = (0.1, 60.0);
 const SPEED_MPS: f64 = 20.0;
 
 /// The train of a file.
-pub(super) fn train(root: &Item, reading: &Reading) -> Result<ImportedTrain, DatasetError> {
+pub(super) fn train(root: &Item, reading: &ImportReading) -> Result<ImportedTrain, DatasetError> {
     let mut account = Account::default();
     let mass_kg = root.required("mass", "a mass in kg from 1000 to 1e8", 1e3..=1e8)?;
     account.taken("mass", "mass_t", "kg / 1000");
@@ -170,7 +170,7 @@ fn resistance(
 /// The default curve of the mode that is wanted, or of the file's default mode.
 fn effort(
     item: &Item,
-    reading: &Reading,
+    reading: &ImportReading,
     account: &mut Account,
 ) -> Result<Vec<(f64, f64)>, DatasetError> {
     let modes = item.need("modes", "effort curves by mode")?;

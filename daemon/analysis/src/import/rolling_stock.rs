@@ -3,7 +3,7 @@
 
 use dynocar_model::train::{Davis, EffortCurve};
 
-use super::imported::{Account, ImportedTrain, Reading};
+use super::imported::{Account, ImportReading, ImportedTrain};
 use super::vehicle::{Kind, Vehicle, vehicle};
 use crate::dataset::DatasetError;
 use crate::dataset::document::Item;
@@ -19,7 +19,7 @@ const WITHOUT_PLACE: [(&str, &str); 4] = [
 /// train each vehicle is one.
 pub(super) fn trains(
     roots: &[Item],
-    reading: &Reading,
+    reading: &ImportReading,
 ) -> Result<Vec<ImportedTrain>, DatasetError> {
     let mut vehicles: Vec<Vehicle> = Vec::new();
     let mut trains: Vec<(&str, Item)> = Vec::new();
@@ -97,7 +97,7 @@ fn train(
     id: &str,
     name: &str,
     formation: &[&Vehicle],
-    reading: &Reading,
+    reading: &ImportReading,
 ) -> ImportedTrain {
     let mut account = Account::default();
     let share = reading.load_share;

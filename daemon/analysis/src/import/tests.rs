@@ -13,17 +13,17 @@ const TRAM: &str = include_str!("../../../../tests/corpus/import/osrd_whole.json
 const EXPRESS: &str = include_str!("../../../../tests/corpus/import/osrd_each_kg.json");
 
 fn read(text: &str) -> Imported {
-    read_as(text, &Reading::default())
+    read_as(text, &ImportReading::default())
 }
 
-fn read_as(text: &str, reading: &Reading) -> Imported {
+fn read_as(text: &str, reading: &ImportReading) -> Imported {
     let source = Source { label: "file", text };
     import(&[source], None, reading).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn refusal(text: &str) -> String {
     let source = Source { label: "file", text };
-    import(&[source], None, &Reading::default()).unwrap_err().to_string()
+    import(&[source], None, &ImportReading::default()).unwrap_err().to_string()
 }
 
 fn assert_close(found: &[f64], expected: &[f64]) {
@@ -78,7 +78,7 @@ fn a_formation_weighs_and_resists_as_its_vehicles_by_their_laws() {
 
 #[test]
 fn a_load_weighs_on_the_wagons_and_not_on_the_locomotive() {
-    let reading = Reading { load_share: 0.5, ..Reading::default() };
+    let reading = ImportReading { load_share: 0.5, ..ImportReading::default() };
     let ore = &read_as(STOCK, &reading).trains[0];
     assert_eq!(ore.mass_kg, Some(180e3));
     assert_close(&davis(ore), &[366.2 / 180.0, 7.776 / 180.0, 0.008064]);
@@ -117,7 +117,7 @@ fn vehicles_may_stand_in_another_file_than_their_train() {
     let schema = head.split_once("trains:").unwrap().0;
     let stock = format!("{schema}vehicles:{vehicles}");
     let sources = [Source { label: "a", text: head }, Source { label: "b", text: &stock }];
-    let both = import(&sources, None, &Reading::default()).unwrap();
+    let both = import(&sources, None, &ImportReading::default()).unwrap();
     assert_eq!(davis(&both.trains[0]), davis(&read(STOCK).trains[0]));
     let words =
         "file:9: trains[1].formation[1]: the vehicle 'shunter' is described in none of the files";
@@ -217,7 +217,7 @@ fn davis_coefficients_are_reported_by_their_size() {
 #[test]
 fn another_mode_of_traction_is_taken_when_it_is_wanted() {
     let effort = |mode: Option<&str>| {
-        let reading = Reading { mode: mode.map(Into::into), ..Reading::default() };
+        let reading = ImportReading { mode: mode.map(Into::into), ..ImportReading::default() };
         let source = [Source { label: "file", text: TRAM }];
         import(&source, None, &reading).map(|it| flat(it.trains[0].traction.as_ref().unwrap()))
     };
@@ -314,7 +314,7 @@ fn railml_is_refused_with_the_reason_and_other_xml_with_its_root() {
 fn a_format_may_be_forced_and_then_says_what_is_missing() {
     let forced = |text, format| {
         let source = [Source { label: "file", text }];
-        import(&source, Some(format), &Reading::default()).unwrap_err().to_string()
+        import(&source, Some(format), &ImportReading::default()).unwrap_err().to_string()
     };
     assert_eq!(
         forced(TRAM, Format::Railtoolkit),

@@ -31,7 +31,7 @@ pub struct LawPoint {
 
 /// How the brake came after its command.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Response {
+pub struct MeasuredResponse {
     /// Time in s without brake.
     pub dead_time_s: f64,
     /// Time in s over which the deceleration then grows to its full value.
@@ -40,7 +40,7 @@ pub struct Response {
     pub std_s: f64,
 }
 
-impl Response {
+impl MeasuredResponse {
     /// That of some stops, each by the time it loses and the moment of that loss, as a ramp has them.
     fn of(built: &[(&Curve, &Point)]) -> Self {
         let count = built.len() as f64;
@@ -52,7 +52,7 @@ impl Response {
         let build_up_s = (24.0 * (mean(1) - 0.5 * lost_s * lost_s)).max(0.0).sqrt();
         let build_up_s = build_up_s.min(2.0 * lost_s);
         let assumed = ASSUMED_FREEDOM * (ASSUMED_RESPONSE * lost_s).powi(2);
-        Response {
+        MeasuredResponse {
             dead_time_s: lost_s - 0.5 * build_up_s,
             build_up_s,
             std_s: ((assumed + squares) / (ASSUMED_FREEDOM + count - 1.0)).sqrt(),
@@ -61,7 +61,7 @@ impl Response {
 
     /// The same for a stop that is asked about.
     pub fn shared(&self) -> BrakeResponse {
-        let Response { dead_time_s, build_up_s, std_s } = *self;
+        let MeasuredResponse { dead_time_s, build_up_s, std_s } = *self;
         BrakeResponse { dead_time_s, build_up_s, std_s, ..BrakeResponse::IMMEDIATE }
     }
 
@@ -89,7 +89,7 @@ pub struct Law {
     /// The speeds, growing.
     pub points: Vec<LawPoint>,
     /// How the brake comes after its command.
-    pub response: Response,
+    pub response: MeasuredResponse,
     /// Standard deviation of a stop's deceleration over the law's: from the stops, and what was
     /// assumed beforehand.
     pub repeatability: f64,
@@ -171,7 +171,7 @@ impl Law {
             let next = own * (1.0 + 1.0 / point.stops as f64).sqrt();
             point.next_std_mps2 = next.hypot(point.std_mps2);
         }
-        let response = Response::of(&built);
+        let response = MeasuredResponse::of(&built);
         Some(Law { points, response, repeatability, freedom, factors, stops: built.len() })
     }
 

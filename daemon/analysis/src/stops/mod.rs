@@ -24,6 +24,6 @@ pub use cut_off::CutOff;
 pub use day::{Day, DecelerationSpread, FromSpeed, Spread};
 pub use find::{FindSettings, FoundBy, Stop, find};
 pub use friction::{FrictionPoint, friction};
-pub use law::{Gradient, Law, LawPoint, Response, StoppingDistance};
+pub use law::{Gradient, Law, LawPoint, MeasuredResponse, StoppingDistance};
 pub use recorded::{Manner, RecordedStop};
 pub use study::{Study, StudySettings};

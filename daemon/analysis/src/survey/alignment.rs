@@ -19,7 +19,7 @@ pub struct Alignment {
 
 /// Where a point lies beside an alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Beside {
+pub struct Foot {
     /// Chainage in m of the nearest point of the alignment.
     pub chainage_m: f64,
     /// Distance in m from it, positive to the left.
@@ -93,9 +93,9 @@ impl Alignment {
     }
 
     /// The nearest point within a window of chainages in m.
-    pub fn beside(&self, point_m: [f64; 2], from_m: f64, to_m: f64) -> Beside {
+    pub fn beside(&self, point_m: [f64; 2], from_m: f64, to_m: f64) -> Foot {
         let (first, last) = (self.segment(from_m), self.segment(to_m));
-        let mut nearest = (f64::INFINITY, Beside { chainage_m: from_m, left_m: f64::INFINITY });
+        let mut nearest = (f64::INFINITY, Foot { chainage_m: from_m, left_m: f64::INFINITY });
         for segment in first..=last {
             let (from, to) = (self.nodes_m[segment], self.nodes_m[segment + 1]);
             let along = [to[0] - from[0], to[1] - from[1]];
@@ -110,7 +110,7 @@ impl Alignment {
             if distance < nearest.0 {
                 let chainage_m = (segment as f64 + share) * self.step_m;
                 let left = along[0] * offset[1] - along[1] * offset[0];
-                nearest = (distance, Beside { chainage_m, left_m: distance.sqrt().copysign(left) });
+                nearest = (distance, Foot { chainage_m, left_m: distance.sqrt().copysign(left) });
             }
         }
         nearest.1

@@ -6,11 +6,11 @@
 //! 1965) over [offset, scale, error of the fix, lag] takes them apart, robust to single wild fixes.
 
 use nalgebra::{SMatrix, SVector};
-use serde::Serialize;
 
 use super::centring::{FIX_FADING_S, FIX_STD_M};
 use super::recording::Recording;
 use super::tracking::Placed;
+use crate::explain::answer::WithStd;
 
 /// Standard deviation in m of the wheels' slip over 1 m; it grows with the root of the distance.
 const SLIP_M: f64 = 0.05;
@@ -24,39 +24,30 @@ const HALF_WEIGHT_M: f64 = 2.5;
 type State = SVector<f64, 4>;
 type Covariance = SMatrix<f64, 4, 4>;
 
-/// A value with its standard deviation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Estimate {
-    /// The value.
-    pub value: f64,
-    /// Its standard deviation.
-    pub std: f64,
-}
-
 /// Values common to all passes of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelsAndLag {
     /// True over counted distance, less 1.
-    pub scale: Estimate,
+    pub scale: WithStd,
     /// Age in s of a fix at its stamp.
-    pub lag_s: Estimate,
+    pub lag_s: WithStd,
 }
 
 impl WheelsAndLag {
     /// Before anything is known.
     pub const UNKNOWN: WheelsAndLag = WheelsAndLag {
-        scale: Estimate { value: 0.0, std: 0.04 },
-        lag_s: Estimate { value: 0.7, std: 0.7 },
+        scale: WithStd { value: 0.0, std: 0.04 },
+        lag_s: WithStd { value: 0.7, std: 0.7 },
     };
 
     /// Combines several passes; the scale may differ by `scale_spread` between them.
     pub fn together(passes: &[WheelsAndLag], scale_spread: f64) -> Option<WheelsAndLag> {
-        let mean = |of: fn(&WheelsAndLag) -> Estimate, spread: f64| {
+        let mean = |of: fn(&WheelsAndLag) -> WithStd, spread: f64| {
             let weight = |pass: &WheelsAndLag| 1.0 / (of(pass).std.powi(2) + spread * spread);
             let total: f64 = passes.iter().map(weight).sum();
             let value =
                 passes.iter().map(|pass| weight(pass) * of(pass).value).sum::<f64>() / total;
-            (total > 0.0).then_some(Estimate { value, std: (1.0 / total).sqrt() })
+            (total > 0.0).then_some(WithStd { value, std: (1.0 / total).sqrt() })
         };
         Some(WheelsAndLag {
             scale: mean(|pass| pass.scale, scale_spread)?,
@@ -105,8 +96,8 @@ pub fn chain(
     let (last, covariance) = smoothed[smoothed.len() - 1];
     let std = |index: usize| covariance[(index, index)].max(0.0).sqrt();
     let learned = WheelsAndLag {
-        scale: Estimate { value: last[1], std: std(1) },
-        lag_s: Estimate { value: last[3], std: std(3) },
+        scale: WithStd { value: last[1], std: std(1) },
+        lag_s: WithStd { value: last[3], std: std(3) },
     };
     let mut chainage_m = Vec::with_capacity(rows.len());
     let mut next = 0;

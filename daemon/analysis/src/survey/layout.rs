@@ -24,14 +24,14 @@ pub struct Layout {
 
 /// A pass's alignment in the system: which block, and +1 along it, -1 against it from an end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Course {
+pub struct LineCourse {
     /// Number of the block of heights.
     pub block: usize,
     /// For a pass against the block's sense: length of the alignment in m.
     pub against_from_m: Option<f64>,
 }
 
-impl Course {
+impl LineCourse {
     /// Place in m along the block.
     pub fn in_block(&self, along_m: f64) -> f64 {
         self.against_from_m.map_or(along_m, |length_m| length_m - along_m)
@@ -81,7 +81,7 @@ impl Layout {
     /// The gradient under a vehicle as a combination of heights.
     pub fn gradient(
         &self,
-        course: Course,
+        course: LineCourse,
         along_m: f64,
         reach_m: f64,
         row: &mut Vec<(usize, f64)>,

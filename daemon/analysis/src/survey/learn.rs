@@ -3,9 +3,9 @@
 
 use super::balance::Observation;
 use super::banded::NotPositive;
-use super::chainage::Estimate;
-use super::profile::{Evidence, Profile};
+use super::profile::{Profile, ProfileEvidence};
 use super::recording::RawRecording;
+use crate::explain::answer::WithStd;
 use crate::parallel;
 use crate::statistics::{middle, share_of};
 
@@ -39,7 +39,7 @@ pub struct Learned {
 /// # Errors
 ///
 /// When there is nothing to learn from.
-pub fn learn(evidence: &mut Evidence, acting_from_pa: f64) -> Result<Learned, NotPositive> {
+pub fn learn(evidence: &mut ProfileEvidence, acting_from_pa: f64) -> Result<Learned, NotPositive> {
     let all = std::mem::take(&mut evidence.observations);
     let (braked, free): (Vec<Observation>, Vec<Observation>) =
         all.into_iter().partition(|it| it.friction_pa[2] > acting_from_pa);
@@ -69,7 +69,7 @@ pub fn learn(evidence: &mut Evidence, acting_from_pa: f64) -> Result<Learned, No
 }
 
 /// True when every alignment has two passes, so that one can be left out.
-fn can_leave_out(evidence: &Evidence) -> bool {
+fn can_leave_out(evidence: &ProfileEvidence) -> bool {
     let mut passes = std::collections::BTreeMap::<usize, usize>::new();
     for course in &evidence.courses {
         *passes.entry(course.block).or_default() += 1;
@@ -78,7 +78,7 @@ fn can_leave_out(evidence: &Evidence) -> bool {
 }
 
 /// Number of the group in which an observation is left out.
-fn group(evidence: &Evidence, observation: &Observation, by_pass: bool) -> u32 {
+fn group(evidence: &ProfileEvidence, observation: &Observation, by_pass: bool) -> u32 {
     if !by_pass {
         return (observation.along_m / BLOCK_M).max(0.0) as u32 % FOLDS;
     }
@@ -88,7 +88,7 @@ fn group(evidence: &Evidence, observation: &Observation, by_pass: bool) -> u32 {
 }
 
 /// The walk under which what was left out is predicted best: how smooth a line is, some passes of it show.
-fn smoothest(evidence: &Evidence) -> Result<f64, NotPositive> {
+fn smoothest(evidence: &ProfileEvidence) -> Result<f64, NotPositive> {
     let few = evidence.of_few_passes();
     let evidence = if can_leave_out(&few) { &few } else { evidence };
     let by_pass = can_leave_out(evidence);
@@ -114,7 +114,7 @@ fn smoothest(evidence: &Evidence) -> Result<f64, NotPositive> {
 }
 
 /// How far each pass is predicted by the others.
-fn left_out(evidence: &Evidence, walk_per_m: f64) -> Result<Vec<f64>, NotPositive> {
+fn left_out(evidence: &ProfileEvidence, walk_per_m: f64) -> Result<Vec<f64>, NotPositive> {
     let passes = evidence.courses.len();
     let mut sums = vec![(0.0, 0usize); passes];
     if can_leave_out(evidence) {
@@ -148,7 +148,7 @@ const MARGIN_PA: f64 = 5e3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundBrake {
     /// Force in N for each Pa.
-    pub gain_n_per_pa: Estimate,
+    pub gain_n_per_pa: WithStd,
     /// Pressure in Pa from which on it acts.
     pub release_pa: f64,
 }
@@ -204,7 +204,7 @@ pub fn found_brake(points: &[(f64, f64)]) -> Option<FoundBrake> {
     }
     let release_pa = (-offset / gain).max(0.0);
     let is_clear = gain > SIGNIFICANT * std && release_pa.is_finite();
-    let gain_n_per_pa = Estimate { value: gain, std };
+    let gain_n_per_pa = WithStd { value: gain, std };
     is_clear.then_some(FoundBrake { gain_n_per_pa, release_pa })
 }
 

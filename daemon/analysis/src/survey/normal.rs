@@ -11,7 +11,7 @@ const COUNT: usize = Common::COUNT;
 /// Covariance of the common unknowns, or their normal matrix.
 pub type CommonCovariance = SMatrix<f64, COUNT, COUNT>;
 /// A value for each node and common unknown.
-pub type Columns = Vec<[f64; COUNT]>;
+pub type BorderColumns = Vec<[f64; COUNT]>;
 
 /// Information of some observations, or of the prior, on the unknowns.
 pub struct Normal {
@@ -19,7 +19,7 @@ pub struct Normal {
     pub matrix: Banded,
     /// Right-hand side of the heights.
     pub right: Vec<f64>,
-    border: Columns,
+    border: BorderColumns,
     corner: CommonCovariance,
     corner_right: SVector<f64, COUNT>,
     /// Sizes in N of the residuals.
@@ -129,7 +129,7 @@ pub struct Solution {
     /// Covariance of the common unknowns, with the heights' noise let in.
     pub covariance: CommonCovariance,
     /// Inverse of the heights' matrix times what they share with the common unknowns.
-    pub columns: Columns,
+    pub columns: BorderColumns,
     /// Factor of the heights' matrix.
     pub factor: Factor,
 }

@@ -8,7 +8,7 @@
 use super::balance::Observation;
 use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
-use super::layout::{Course, HEIGHT_STEP_M, Layout};
+use super::layout::{HEIGHT_STEP_M, Layout, LineCourse};
 use super::normal::Normal;
 use crate::parallel;
 use crate::statistics::middle;
@@ -33,7 +33,7 @@ const CHUNK: usize = 65_536;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Altitude {
     /// The alignment.
-    pub course: Course,
+    pub course: LineCourse,
     /// Place in m along it.
     pub along_m: f64,
     /// Altitude in m.
@@ -42,11 +42,11 @@ pub struct Altitude {
 
 /// Everything that a profile is fitted to.
 #[derive(Clone, Debug)]
-pub struct Evidence {
+pub struct ProfileEvidence {
     /// Where heights lie.
     pub layout: Layout,
     /// The alignment of each pass.
-    pub courses: Vec<Course>,
+    pub courses: Vec<LineCourse>,
     /// Observations of the forces, in the order of the passes.
     pub observations: Vec<Observation>,
     /// Altitudes of the GNSS.
@@ -90,9 +90,9 @@ fn one_in(passes: usize) -> usize {
     passes.div_ceil(FEW_PASSES).max(1)
 }
 
-impl Evidence {
+impl ProfileEvidence {
     /// Returns the evidence of a few passes.
-    pub fn of_few_passes(&self) -> Evidence {
+    pub fn of_few_passes(&self) -> ProfileEvidence {
         let (passes, each) = (self.courses.len(), one_in(self.courses.len()));
         let is_chosen = |pass: usize| is_one_of_few(pass, passes);
         let mut numbers = vec![None; self.courses.len()];
@@ -101,7 +101,7 @@ impl Evidence {
         let renumbered =
             |it: &Observation| Some(Observation { pass: numbers[it.pass as usize]?, ..*it });
         let courses = self.courses.iter().enumerate().filter(|(pass, _)| is_chosen(*pass));
-        Evidence {
+        ProfileEvidence {
             layout: self.layout.clone(),
             courses: courses.map(|(_, course)| *course).collect(),
             observations: self.observations.iter().filter_map(renumbered).collect(),

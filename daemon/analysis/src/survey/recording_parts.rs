@@ -15,7 +15,7 @@ pub const SAME_ALIGNMENT_M: f64 = 40.0;
 const RETURN_MIN_M: f64 = 200.0;
 /// A return counts once this many points follow an earlier path.
 const RETURN_POINTS: usize = 15;
-/// Around a loop at the end of a line, its stand is looked for this many m further.
+/// The stop in a loop at the end of a line is sought this many m beyond the loop.
 const TERMINAL_MARGIN_M: f64 = 100.0;
 
 /// A part of a recording that does not come back on itself.

@@ -15,7 +15,7 @@ const SHARE_MIN: f64 = 0.5;
 
 /// A stop of the line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Stop {
+pub struct SurveyedStop {
     /// Mean chainage in m.
     pub chainage_m: f64,
     /// Name, empty where not known.
@@ -58,7 +58,7 @@ pub fn stands(raw: &RawRecording, first_row: usize, chainage_m: &[f64]) -> Vec<f
 }
 
 /// The stops of a direction from the stands of its passes.
-pub fn stops(direction: i8, passes: &[Vec<f64>]) -> Vec<Stop> {
+pub fn stops(direction: i8, passes: &[Vec<f64>]) -> Vec<SurveyedStop> {
     let mut all: Vec<(f64, usize)> = passes
         .iter()
         .enumerate()
@@ -78,7 +78,7 @@ pub fn stops(direction: i8, passes: &[Vec<f64>]) -> Vec<Stop> {
         let squares: f64 = cluster.iter().map(|stand| (stand.0 - mean).powi(2)).sum();
         let std_m = (count > 1.0).then(|| (squares / (count - 1.0)).sqrt());
         let (name, stands) = (String::new(), cluster.len());
-        stops.push(Stop { chainage_m: mean, name, std_m, direction, stands });
+        stops.push(SurveyedStop { chainage_m: mean, name, std_m, direction, stands });
     }
     stops
 }

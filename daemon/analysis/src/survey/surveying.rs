@@ -6,14 +6,14 @@ use super::banded::NotPositive;
 use super::chainage::WheelsAndLag;
 use super::common::Prior;
 use super::geodesy::LocalPlane;
-use super::layout::{Course, Layout};
+use super::layout::{Layout, LineCourse};
 use super::learn::acting_from_pa;
 use super::learn::{Learned, learn};
 use super::line::{Alignments, find, pass_of};
-use super::profile::{Altitude, Evidence, is_one_of_few};
+use super::profile::{Altitude, ProfileEvidence, is_one_of_few};
 use super::recording::{RawRecording, Recording, plane_of};
 use super::recording_parts::{RecordingPart, recording_parts};
-use super::stops::{Stop, stands, stops};
+use super::stops::{SurveyedStop, stands, stops};
 use super::trips::{NotUsed, Trip, not_used, trips};
 use crate::parallel;
 use crate::statistics::rms;
@@ -93,7 +93,7 @@ pub struct Survey {
     /// Parts that are not a trip.
     pub not_used: Vec<NotUsed>,
     /// The stops.
-    pub stops: Vec<Stop>,
+    pub stops: Vec<SurveyedStop>,
     /// Scale of the wheels and lag of the GNSS, from the GNSS itself.
     pub wheels: WheelsAndLag,
     /// Standard deviation of the wheels' scale with the uncertainty of the alignment's length.
@@ -157,7 +157,7 @@ fn found_stops(
     alignments: &Alignments,
     trips: &[Trip],
     of_all: bool,
-) -> Vec<Stop> {
+) -> Vec<SurveyedStop> {
     let mut found = Vec::new();
     for direction in [1, -1] {
         let own = trips.iter().filter(|it| it.direction == direction && (of_all || it.is_fit));
@@ -195,7 +195,7 @@ fn profile(
     }
     let layout = Layout::new(&lengths_m, vehicle.length_m);
     let course = |&number: &usize| course(trips[number].direction, alignments);
-    let courses: Vec<Course> = fit.iter().map(course).collect();
+    let courses: Vec<LineCourse> = fit.iter().map(course).collect();
     // Where each direction has an alignment of its own, its profile holds the curves' resistance too.
     let curves = if alignments.is_one_track() { curves(&alignments.growing) } else { Vec::new() };
     // True over recorded speed, when the chainage is GNSS's; else the wheels are believed.
@@ -204,7 +204,7 @@ fn profile(
     let altitudes = fit.iter().zip(&courses).flat_map(|(&number, &course)| {
         altitudes(&trips[number], &recordings[trips[number].recording], course)
     });
-    let mut evidence = Evidence {
+    let mut evidence = ProfileEvidence {
         layout,
         courses: courses.clone(),
         observations: Vec::new(),
@@ -245,7 +245,7 @@ fn profile(
 
 /// Length in s of the shortest blocks of which residuals do not alternate.
 fn shortest_block_s(
-    evidence: &mut Evidence,
+    evidence: &mut ProfileEvidence,
     observed: impl Fn(f64) -> Vec<Observation>,
 ) -> Result<f64, NotPositive> {
     let [shorter @ .., longest_s] = BLOCKS_S;
@@ -263,11 +263,11 @@ fn shortest_block_s(
 }
 
 /// Where a direction lies in the profile.
-fn course(direction: i8, alignments: &Alignments) -> Course {
+fn course(direction: i8, alignments: &Alignments) -> LineCourse {
     match (direction, alignments.is_one_track()) {
-        (1, _) => Course { block: 0, against_from_m: None },
-        (_, true) => Course { block: 0, against_from_m: Some(alignments.growing.length_m()) },
-        (_, false) => Course { block: 1, against_from_m: None },
+        (1, _) => LineCourse { block: 0, against_from_m: None },
+        (_, true) => LineCourse { block: 0, against_from_m: Some(alignments.growing.length_m()) },
+        (_, false) => LineCourse { block: 1, against_from_m: None },
     }
 }
 
@@ -280,7 +280,7 @@ fn curvature<'c>(curves: impl Iterator<Item = &'c FoundCurve>, at_m: f64, vehicl
     curves.map(inside).sum()
 }
 
-fn altitudes(trip: &Trip, recording: &Recording, course: Course) -> Vec<Altitude> {
+fn altitudes(trip: &Trip, recording: &Recording, course: LineCourse) -> Vec<Altitude> {
     let raw = recording.raw;
     let mut found: Vec<Altitude> = Vec::new();
     let rows = trip.rows();

@@ -1,6 +1,6 @@
 //! Following a recording along an alignment: a chainage for each fix.
 
-use super::alignment::{Alignment, Beside};
+use super::alignment::{Alignment, Foot};
 use super::geodesy::distance_squared;
 use super::recording::{Fix, Recording};
 use super::recording_parts::SAME_ALIGNMENT_M;
@@ -80,7 +80,7 @@ fn follow_from(
             let difference_m = (beside.chainage_m - expected_m).clamp(-10.0, 10.0);
             offset_m += FOLLOWING * difference_m;
             seen_at_m = travelled_m;
-            let Beside { chainage_m, left_m } = beside;
+            let Foot { chainage_m, left_m } = beside;
             placed.push(Placed { row: fix.row, chainage_m, left_m });
         } else if travelled_m - seen_at_m > LEFT_AFTER_M {
             return (placed, index);

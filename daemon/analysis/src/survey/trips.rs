@@ -3,10 +3,11 @@
 use serde::Serialize;
 
 use super::centring::Pass;
-use super::chainage::{Chained, Estimate, WheelsAndLag, chain};
+use super::chainage::{Chained, WheelsAndLag, chain};
 use super::line::Alignments;
 use super::recording::Recording;
 use super::tracking::follow;
+use crate::explain::answer::WithStd;
 use crate::parallel;
 
 /// A trip reaches beyond its first and last fix by this many m and s: it stands there.
@@ -84,10 +85,10 @@ pub fn trips(
         let is_fit = recording.raw.is_fit;
         // Another day's wheels may be worn or new.
         let scale = match is_fit || !has_fit {
-            true => Estimate { value: together.scale.value, std: 2.0 * SCALE_SPREAD },
+            true => WithStd { value: together.scale.value, std: 2.0 * SCALE_SPREAD },
             false => WheelsAndLag::UNKNOWN.scale,
         };
-        let lag_s = Estimate { std: together.lag_s.std.max(0.05), ..together.lag_s };
+        let lag_s = WithStd { std: together.lag_s.std.max(0.05), ..together.lag_s };
         let along = chain(recording, rows, &placed, WheelsAndLag { scale, lag_s })?;
         Some(Trip { recording: pass.recording, is_fit, direction: pass.direction, along })
     };

@@ -24,7 +24,7 @@ pub const PARAMETERS: usize = 2;
 
 /// Innovation of a measurement, as computed when it was absorbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Innovation {
+pub struct LevelInnovation {
     /// Measured minus predicted over its predicted standard deviation; `None` where the
     /// measurement only fixed what was free before.
     pub normalised: Option<f64>,
@@ -139,7 +139,7 @@ impl<const N: usize> DriftingLevel<N> {
     /// # Real-time
     ///
     /// N rotations, no allocation.
-    pub fn absorb(&mut self, row: &SVector<f64, N>, value: f64, weight: f64) -> Innovation {
+    pub fn absorb(&mut self, row: &SVector<f64, N>, value: f64, weight: f64) -> LevelInnovation {
         let root_weight = weight.sqrt();
         let mut rest: [f64; N] = std::array::from_fn(|i| row[i] * root_weight);
         let mut rest_value = value * root_weight;
@@ -162,7 +162,7 @@ impl<const N: usize> DriftingLevel<N> {
             }
         }
         let normalised = if is_free { None } else { Some(rest_value) };
-        Innovation { normalised, log_variance_ratio: -2.0 * cosines.ln() }
+        LevelInnovation { normalised, log_variance_ratio: -2.0 * cosines.ln() }
     }
 
     /// Level, bias and parameters; the level is 0 while it is free.

@@ -46,7 +46,7 @@ const WITHDRAWN_SHARE_MAX: f64 = 0.05;
 
 /// Verdict on a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum GateVerdict {
     /// Take it as it is.
     Take,
     /// Nothing yet: later samples decide, or it adds nothing new.
@@ -139,11 +139,11 @@ impl SampleGate {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn judge(&mut self, sample: &ResolvedSample) -> Verdict {
+    pub fn judge(&mut self, sample: &ResolvedSample) -> GateVerdict {
         let Some(now) = Reading::of(sample) else {
             // The estimator says what is wrong with it.
             self.forget();
-            return Verdict::Take;
+            return GateVerdict::Take;
         };
         let (Some(level), Some(newest)) = (self.level, self.newest) else {
             return self.begin(now);
@@ -159,7 +159,7 @@ impl SampleGate {
         self.compare(sample, &now, &level, &newest)
     }
 
-    /// The samples that [`Verdict::Release`] speaks of, the oldest first.
+    /// The samples that [`GateVerdict::Release`] speaks of, the oldest first.
     pub fn released(&self, index: usize) -> Option<ResolvedSample> {
         self.held.get(index).copied().flatten()
     }
@@ -182,25 +182,25 @@ impl SampleGate {
         self.skipped_s = 0.0;
     }
 
-    fn begin(&mut self, now: Reading) -> Verdict {
+    fn begin(&mut self, now: Reading) -> GateVerdict {
         self.forget();
         self.level = Some(now);
         self.newest = Some(now);
-        self.unless_in_doubt(Verdict::Take)
+        self.unless_in_doubt(GateVerdict::Take)
     }
 
     /// A sample that adds nothing new.
-    fn pass_over(&mut self, step_s: f64) -> Verdict {
+    fn pass_over(&mut self, step_s: f64) -> GateVerdict {
         self.skipped_s += step_s;
         if self.skipped_s <= BRIDGED_MAX_S {
-            return Verdict::Wait;
+            return GateVerdict::Wait;
         }
         let newest = self.newest;
         self.forget();
         // The content stays known, so that what repeats it further is refused as well.
         (self.level, self.newest) = (newest, newest);
         self.skipped_s = f64::INFINITY;
-        Verdict::Refuse(RejectionReason::Frozen)
+        GateVerdict::Refuse(RejectionReason::Frozen)
     }
 
     /// Judges a sample by the level and by the reading before it.
@@ -210,13 +210,13 @@ impl SampleGate {
         now: &Reading,
         level: &Reading,
         before: &Reading,
-    ) -> Verdict {
+    ) -> GateVerdict {
         let step_s = sample.step_s + self.skipped_s;
         let since_level_s = step_s + self.held_s();
         if since_level_s > BRIDGED_MAX_S {
             let verdict = self.begin(*now);
             self.held[0] = Some(ResolvedSample { step_s: 0.0, ..*sample });
-            return if verdict == Verdict::Take { Verdict::Release(1) } else { verdict };
+            return if verdict == GateVerdict::Take { GateVerdict::Release(1) } else { verdict };
         }
         let departure = self.departure(now, level, since_level_s);
         // A reading that failed comes back at once, a new level may drift towards the old one.
@@ -237,25 +237,25 @@ impl SampleGate {
         }
     }
 
-    fn take(&mut self, sample: ResolvedSample, came_step_s: f64, now: &Reading) -> Verdict {
+    fn take(&mut self, sample: ResolvedSample, came_step_s: f64, now: &Reading) -> GateVerdict {
         self.level = Some(*now);
         self.is_confirmed = true;
         self.skipped_s = 0.0;
         self.withdrawn_share -= self.withdrawn_share / MEMORY;
         if sample.step_s == came_step_s {
-            return self.unless_in_doubt(Verdict::Take);
+            return self.unless_in_doubt(GateVerdict::Take);
         }
         self.held[0] = Some(sample);
-        self.unless_in_doubt(Verdict::Release(1))
+        self.unless_in_doubt(GateVerdict::Release(1))
     }
 
-    fn hold(&mut self, sample: ResolvedSample, now: &Reading, is_above: bool) -> Verdict {
+    fn hold(&mut self, sample: ResolvedSample, now: &Reading, is_above: bool) -> GateVerdict {
         self.held[self.held_count] = Some(sample);
         self.held_count += 1;
         self.is_above = is_above;
         self.skipped_s = 0.0;
         if self.held_count < AGREEING {
-            return Verdict::Wait;
+            return GateVerdict::Wait;
         }
         self.held_count = 0;
         self.level = Some(*now);
@@ -265,7 +265,7 @@ impl SampleGate {
         }
         self.is_confirmed = true;
         self.withdrawn_share *= (1.0 - 1.0 / MEMORY).powi(AGREEING as i32);
-        self.unless_in_doubt(Verdict::Release(AGREEING))
+        self.unless_in_doubt(GateVerdict::Release(AGREEING))
     }
 
     fn withdraw_held(&mut self) {
@@ -275,8 +275,8 @@ impl SampleGate {
         self.held_count = 0;
     }
 
-    fn unless_in_doubt(&self, verdict: Verdict) -> Verdict {
-        if self.is_in_doubt() { Verdict::Refuse(RejectionReason::Outlier) } else { verdict }
+    fn unless_in_doubt(&self, verdict: GateVerdict) -> GateVerdict {
+        if self.is_in_doubt() { GateVerdict::Refuse(RejectionReason::Outlier) } else { verdict }
     }
 
     /// Time in s that the held samples have taken.
@@ -353,15 +353,15 @@ pub trait Gated {
     /// The work of as many samples as can be held, no allocation.
     fn pass(&mut self, sample: &ResolvedSample) -> Outcome {
         match self.gate().judge(sample) {
-            Verdict::Take => self.take(sample),
-            Verdict::Wait => Outcome::Used,
-            Verdict::Release(count) => {
+            GateVerdict::Take => self.take(sample),
+            GateVerdict::Wait => Outcome::Used,
+            GateVerdict::Release(count) => {
                 (0..count).fold(Outcome::Used, |last, index| match self.gate().released(index) {
                     Some(released) => self.take(&released),
                     None => last,
                 })
             }
-            Verdict::Refuse(reason) => {
+            GateVerdict::Refuse(reason) => {
                 self.leave_out(sample, reason);
                 Outcome::Rejected(reason)
             }

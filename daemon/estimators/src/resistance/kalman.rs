@@ -19,7 +19,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::least_squares::ResistanceLeastSquares;
 use super::noise_bank::LikeliestNoise;
-use super::regression::{Motion, Solution};
+use super::regression::{AffineMotion, Solution};
 use super::report::Report;
 use super::settings::KalmanSettings;
 
@@ -269,13 +269,13 @@ impl ResistanceKalman {
     }
 
     /// Speed and disturbance for given unknowns, as this filter knows them.
-    fn own_motion(&self) -> Option<Motion> {
+    fn own_motion(&self) -> Option<AffineMotion> {
         let (mean, covariance) = (&self.filter.mean, &self.filter.covariance);
         let tie = covariance.fixed_view::<UNKNOWNS, FIRST_UNKNOWN>(FIRST_UNKNOWN, 0).into_owned();
         let unknowns = covariance.fixed_view::<UNKNOWNS, UNKNOWNS>(FIRST_UNKNOWN, FIRST_UNKNOWN);
         let gain = unknowns.into_owned().cholesky()?.solve(&tie).transpose();
         let estimate = mean.fixed_rows::<UNKNOWNS>(FIRST_UNKNOWN);
-        Some(Motion {
+        Some(AffineMotion {
             at_zero: mean.fixed_rows::<FIRST_UNKNOWN>(0) - gain * estimate,
             gain,
             covariance: covariance.fixed_view::<FIRST_UNKNOWN, FIRST_UNKNOWN>(0, 0) - gain * tie,

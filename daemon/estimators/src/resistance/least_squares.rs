@@ -11,7 +11,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
 use super::noise_bank::NoiseBank;
-use super::regression::{Motion, Observation, Solution, Unknowns, WhiteRow};
+use super::regression::{AffineMotion, Observation, Solution, Unknowns, WhiteRow};
 use super::report::{DrivenSpeeds, Evidence, Report};
 use super::source::RowSource;
 use crate::liu::solver::{Solver, bank_penalty};
@@ -173,7 +173,7 @@ impl ResistanceLeastSquares {
 
     /// Speed and disturbance at the newest sample, which closed a block that was taken in;
     /// `None` when the source has no blocks.
-    pub(super) fn motion(&self) -> Option<Motion> {
+    pub(super) fn motion(&self) -> Option<AffineMotion> {
         let since = self.source.since_block()?;
         Some(self.bank.likeliest_motion(&since))
     }

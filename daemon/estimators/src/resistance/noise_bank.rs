@@ -10,7 +10,7 @@ use dynocar_core::filter::bank::{Bank, Mixture};
 use dynocar_core::pipeline::momentum::{Disturbance, PARAMETERS, SinceBlock, gap_s};
 
 use super::regression::{
-    Motion, NoiseModel, Observation, PRIOR_ROWS, Solution, Unknowns, WhiteRow,
+    AffineMotion, Observation, PRIOR_ROWS, RegressionNoise, Solution, Unknowns, WhiteRow,
 };
 
 /// Standard deviations of the disturbance in N/kN: from nothing to as large as resistance itself.
@@ -52,7 +52,7 @@ pub struct LikeliestNoise {
 /// Noise models side by side; the first has no disturbance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseBank {
-    models: Bank<NoiseModel, MODELS>,
+    models: Bank<RegressionNoise, MODELS>,
     /// Their probabilities.
     shares: [f64; MODELS],
     /// Solutions of those that matter, after the newest row.
@@ -75,7 +75,7 @@ impl NoiseBank {
                 time_s: TIMES_S[index % TIMES_S.len()],
             },
         };
-        let of_index = |index| NoiseModel::new(disturbance(index), penalty);
+        let of_index = |index| RegressionNoise::new(disturbance(index), penalty);
         let mut models = Bank::even((0..MODELS).map(of_index), 0.0);
         models.believe(LIKELIEST_AT_FIRST);
         NoiseBank {
@@ -175,7 +175,7 @@ impl NoiseBank {
     }
 
     /// Speed and disturbance by the likeliest model, so long after the newest block.
-    pub fn likeliest_motion(&self, since: &SinceBlock) -> Motion {
+    pub fn likeliest_motion(&self, since: &SinceBlock) -> AffineMotion {
         self.models.likeliest().motion(since)
     }
 
@@ -260,7 +260,7 @@ impl NoiseBank {
         self.shares = self.models.shares(|_| true);
     }
 
-    fn undisturbed(&self) -> &NoiseModel {
+    fn undisturbed(&self) -> &RegressionNoise {
         &self.models.hypotheses()[0]
     }
 

@@ -24,7 +24,7 @@ pub struct Solution {
 
 /// Speed in m/s, then disturbance in N/kN, as affine functions of the unknowns.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct AffineMotion {
     /// Their values were all unknowns 0.
     pub at_zero: Vector2<f64>,
     /// Their derivatives by the unknowns.
@@ -146,7 +146,7 @@ pub struct WhiteRow {
 /// scale; the generalised least squares of the rows and their restricted likelihood (Patterson
 /// and Thompson 1971).
 #[derive(Clone, Debug, PartialEq)]
-pub struct NoiseModel {
+pub struct RegressionNoise {
     /// The disturbance, before the scale.
     pub disturbance: Disturbance,
     whitener: RowWhitener,
@@ -155,10 +155,10 @@ pub struct NoiseModel {
     log_variances: f64,
 }
 
-impl NoiseModel {
+impl RegressionNoise {
     /// A model without rows, with the penalty `sum of weight * unknown^2`.
     pub fn new(disturbance: Disturbance, penalty: &Unknowns) -> Self {
-        NoiseModel {
+        RegressionNoise {
             disturbance,
             whitener: RowWhitener::new(nalgebra::zero(), nalgebra::zero()),
             information: SquareRootInformation::new(penalty, &Unknowns::zeros()),
@@ -232,7 +232,7 @@ impl NoiseModel {
     }
 
     /// Speed and disturbance now, so long after the newest block.
-    pub fn motion(&self, since: &SinceBlock) -> Motion {
+    pub fn motion(&self, since: &SinceBlock) -> AffineMotion {
         let duration_s = since.impulse[1];
         let mut to_now = Matrix2::identity();
         to_now[(MOMENTUM, DISTURBANCE)] = -duration_s;
@@ -247,7 +247,7 @@ impl NoiseModel {
         covariance[(DISTURBANCE, DISTURBANCE)] += walk * duration_s;
         let to_speed = Matrix2::new(1.0 / since.inertia, 0.0, 0.0, 1.0);
         let columns = to_speed * columns;
-        Motion {
+        AffineMotion {
             at_zero: columns.column(0).into_owned(),
             gain: -columns.fixed_columns::<UNKNOWNS>(1),
             covariance: to_speed * covariance * to_speed * self.scale(),

@@ -33,7 +33,7 @@ pub const INVERSE_MASS: usize = PARAMETERS;
 pub const POLYNOMIALS: [usize; 3] = [PARAMETERS + 1, PARAMETERS + 4, PARAMETERS + 7];
 
 /// A value for each unknown.
-pub type Row = SVector<f64, UNKNOWNS>;
+pub type RegressorRow = SVector<f64, UNKNOWNS>;
 
 /// Conversion of a motion into rates of the integrals.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +61,7 @@ impl Regressors {
         let unit_mps2 = self.inertia.mps2_per_n_per_kn();
         let phi = self.basis.at(motion.speed_mps) * unit_mps2;
         let shares = [1.0, self.reference_radius_m * motion.curvature_per_m, motion.tunnel_share];
-        let mut row = Row::zeros();
+        let mut row = RegressorRow::zeros();
         row[INVERSE_MASS] = self.inertia.push_mps2(motion);
         for (at, share) in POLYNOMIALS.into_iter().zip(shares) {
             row.fixed_rows_mut::<3>(at).copy_from(&(phi * -share));
@@ -76,7 +76,7 @@ impl Regressors {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integrals {
     /// Of what each parameter multiplies, in m/s; 0 at the level.
-    row: Row,
+    row: RegressorRow,
     /// Of the deceleration by gradient and declared resistance, in m/s.
     known_mps: f64,
     /// Of the size that accelerations tied to the place may have, in m/s.
@@ -86,7 +86,7 @@ pub struct Integrals {
 impl Integrals {
     /// At the start.
     pub fn zero() -> Self {
-        Integrals { row: Row::zeros(), known_mps: 0.0, tied_mps: 0.0 }
+        Integrals { row: RegressorRow::zeros(), known_mps: 0.0, tied_mps: 0.0 }
     }
 
     /// Moves on by a step between two rates (trapezoid).
@@ -107,7 +107,7 @@ impl Integrals {
     }
 
     /// The equation of a measured speed: row and value.
-    pub fn equation(&self, speed_mps: f64) -> (Row, f64) {
+    pub fn equation(&self, speed_mps: f64) -> (RegressorRow, f64) {
         let mut row = self.row;
         row[LEVEL] = 1.0;
         (row, speed_mps + self.known_mps)
@@ -116,7 +116,7 @@ impl Integrals {
 
 /// A step of time between two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub struct IntegralStep {
     /// Its length in s.
     pub step_s: f64,
     /// Speed in m/s at its start.
@@ -131,7 +131,7 @@ pub struct Step {
 
 /// Expectation of a measured speed by a regression.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Expectation {
+pub struct ExpectedSpeed {
     /// Measured minus predicted speed over its standard deviation.
     pub normalised: f64,
     /// Measured minus predicted speed in m/s.
@@ -144,18 +144,18 @@ pub struct Expectation {
 
 /// The regression under its assumption.
 #[derive(Clone, Debug)]
-pub struct Hypothesis {
+pub struct BiasHypothesis {
     model: BiasModel,
     /// The regression.
     pub regression: DriftingLevel<UNKNOWNS>,
 }
 
-impl Hypothesis {
+impl BiasHypothesis {
     /// A regression that starts from prior knowledge.
-    pub fn new(model: BiasModel, mean: &Row, std: &Row) -> Self {
+    pub fn new(model: BiasModel, mean: &RegressorRow, std: &RegressorRow) -> Self {
         let mut regression = DriftingLevel::new(mean, std);
         regression.restart_bias(model.std_mps2);
-        Hypothesis { model, regression }
+        BiasHypothesis { model, regression }
     }
 
     /// Bias in m/s² at a speed for a stated bias of 1 m/s².
@@ -175,7 +175,7 @@ impl Hypothesis {
     }
 
     /// Moves on by a step of time.
-    pub fn propagate(&mut self, step: &Step) {
+    pub fn propagate(&mut self, step: &IntegralStep) {
         let keep = self.model.keep(step.step_s);
         let (keep, noise_variance) = self.model.drift(keep, &step.map, step.speed_mps);
         let jump_variance = self.model.jump_variance(step.push_change_mps2, step.step_s);
@@ -188,12 +188,12 @@ impl Hypothesis {
     }
 
     /// Returns the expectation of an equation of a measured speed with a noise variance.
-    pub fn expect(&self, row: &Row, value: f64, noise_variance: f64) -> Expectation {
+    pub fn expect(&self, row: &RegressorRow, value: f64, noise_variance: f64) -> ExpectedSpeed {
         let innovation = self.regression.clone().absorb(row, value, 1.0 / noise_variance);
         let normalised = innovation.normalised.unwrap_or(0.0);
         let variance_ratio = innovation.log_variance_ratio.exp();
         let error_mps = normalised * (noise_variance * variance_ratio).sqrt();
-        Expectation {
+        ExpectedSpeed {
             normalised,
             error_mps,
             residual_mps: error_mps / variance_ratio,
@@ -203,7 +203,7 @@ impl Hypothesis {
 
     /// Absorbs an equation; gives the logarithm of its likelihood, up to what is common to all
     /// assumptions.
-    pub fn absorb(&mut self, row: &Row, value: f64, weight: f64) -> f64 {
+    pub fn absorb(&mut self, row: &RegressorRow, value: f64, weight: f64) -> f64 {
         let innovation = self.regression.absorb(row, value, weight);
         let evidence =
             |normalised: f64| -0.5 * (normalised * normalised + innovation.log_variance_ratio);

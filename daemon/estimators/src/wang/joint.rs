@@ -18,7 +18,8 @@ use nalgebra::{Matrix3, SMatrix};
 
 use super::bias_model::{BiasModel, MapError};
 use super::integrals::{
-    Hypothesis, INVERSE_MASS, Integrals, POLYNOMIALS, Regressors, Row, Step, UNKNOWNS,
+    BiasHypothesis, INVERSE_MASS, IntegralStep, Integrals, POLYNOMIALS, RegressorRow, Regressors,
+    UNKNOWNS,
 };
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
 use super::motion::{Motion, Section};
@@ -35,8 +36,8 @@ const REFRESH_EVERY: u32 = 50;
 pub struct JointLeastSquares {
     pub(super) settings: JointLeastSquaresSettings,
     pub(super) regressors: Regressors,
-    initial: Bank<Hypothesis, JOINT_MODELS>,
-    pub(super) bank: Bank<Hypothesis, JOINT_MODELS>,
+    initial: Bank<BiasHypothesis, JOINT_MODELS>,
+    pub(super) bank: Bank<BiasHypothesis, JOINT_MODELS>,
     stops: StopWatch,
     last: Option<(Motion, Integrals)>,
     integrals: Integrals,
@@ -70,14 +71,14 @@ impl JointLeastSquares {
     ) -> Result<Self, SettingError> {
         settings.check_ranges()?;
         let regressors = Regressors::new(train, settings.reference_radius_m);
-        let mut mean = Row::zeros();
+        let mut mean = RegressorRow::zeros();
         mean[INVERSE_MASS] = 1.0;
         let basic = regressors.basis.of_davis(&train.resistance);
         mean.fixed_rows_mut::<3>(POLYNOMIALS[0]).copy_from(&basic);
-        let mut std = Row::repeat(settings.resistance_std_n_per_kn);
+        let mut std = RegressorRow::repeat(settings.resistance_std_n_per_kn);
         std[INVERSE_MASS] = 0.01 * settings.mass_std_percent;
         let models = settings.bias_models();
-        let initial = Bank::even(models.map(|model| Hypothesis::new(model, &mean, &std)), 0.0);
+        let initial = Bank::even(models.map(|model| BiasHypothesis::new(model, &mean, &std)), 0.0);
         Ok(JointLeastSquares {
             settings,
             regressors,
@@ -134,7 +135,7 @@ impl JointLeastSquares {
         self.noise.variance().sqrt()
     }
 
-    pub(super) fn davis(&self, solution: &Row, section: Section) -> Davis {
+    pub(super) fn davis(&self, solution: &RegressorRow, section: Section) -> Davis {
         let at = POLYNOMIALS[section as usize];
         self.regressors.basis.to_davis(&solution.fixed_rows::<3>(at).into_owned())
     }
@@ -227,13 +228,13 @@ impl JointLeastSquares {
     /// A step with what comes to the level in addition to the bias: what the trapezoid misses, and what
     /// the noise of the speed does in the features. There it moves the resistance, and with it
     /// the integral, by a random walk.
-    fn step(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> Step {
+    fn step(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> IntegralStep {
         let [tied, push] = Integrals::changes(&last.1, rates);
         let tied_before = std::mem::replace(&mut self.tied_change, tied);
         let slope = self.latest.slope(&last.0, last.0.speed_mps);
         let walk_mps =
             step_s * self.regressors.inertia.mps2_per_n_per_kn() * slope * self.speed_noise_mps();
-        Step {
+        IntegralStep {
             step_s,
             speed_mps: last.0.speed_mps,
             push_change_mps2: push,

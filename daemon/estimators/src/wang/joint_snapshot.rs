@@ -8,7 +8,7 @@ use dynocar_core::pipeline::output::{
 use dynocar_shared::{ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 
-use super::integrals::{INVERSE_MASS, POLYNOMIALS, Row, UNKNOWNS};
+use super::integrals::{INVERSE_MASS, POLYNOMIALS, RegressorRow, UNKNOWNS};
 use super::joint::JointLeastSquares;
 use super::motion::Section;
 
@@ -63,7 +63,7 @@ impl JointLeastSquares {
     /// deviation of the mass.
     fn write_estimate(
         &self,
-        solution: &Row,
+        solution: &RegressorRow,
         root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
         snapshot: &mut ParameterSnapshot,
     ) -> f64 {

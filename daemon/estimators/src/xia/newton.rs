@@ -20,7 +20,7 @@ use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton}
 use crate::xia::trajectory::fit::{
     DavisPrior, FitError, FitSettings, TrajectoryFit, TrajectoryFitter,
 };
-use crate::xia::trajectory::motion::{Motion, MotionTracker, UnexplainedForce};
+use crate::xia::trajectory::motion::{MotionTracker, MotionUpdate, UnexplainedForce};
 use crate::xia::trajectory::quality::{Estimate, LongRunVariance, prior_std};
 use crate::xia::trajectory::step::StepRule;
 
@@ -242,7 +242,7 @@ impl Gated for TrajectoryNewton {
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         let outcome = match self.tracker.advance(sample) {
-            Motion::Continue(motion) => {
+            MotionUpdate::Continue(motion) => {
                 self.unexplained.push(&motion, sample, &self.davis);
                 self.speeds.push(sample.speed_mps);
                 if self.window.push(&motion, sample.speed_mps) {
@@ -251,17 +251,17 @@ impl Gated for TrajectoryNewton {
                     Outcome::Used
                 }
             }
-            Motion::Begin => {
+            MotionUpdate::Begin => {
                 self.end_window();
                 self.window.begin(sample.speed_mps);
                 self.unexplained.begin(sample.speed_mps);
                 Outcome::Used
             }
-            Motion::Standstill => {
+            MotionUpdate::Standstill => {
                 self.end_window();
                 Outcome::Used
             }
-            Motion::Unusable(reason) => {
+            MotionUpdate::Unusable(reason) => {
                 self.end_window();
                 Outcome::Rejected(reason)
             }

@@ -246,7 +246,7 @@ impl MoveNoise {
 
 /// Observations of a window and the belief about its first state.
 #[derive(Clone, Debug)]
-pub struct Window {
+pub struct ObservedWindow {
     /// In order of time; the first entry's inputs lead into the window.
     pub entries: Vec<Entry>,
     /// Distance in m and speed in m/s at the first entry, before its measurement.
@@ -260,7 +260,7 @@ pub struct Window {
 #[derive(Clone, Copy, Debug)]
 pub struct WindowModel<'a> {
     /// The window.
-    pub window: &'a Window,
+    pub window: &'a ObservedWindow,
     /// Noise of motion and measurement.
     pub noise: &'a MotionNoise,
     /// The coefficient over the demand.

@@ -17,7 +17,7 @@ mod expectation;
 mod sliding;
 
 pub use expectation::{
-    Expectation, KalmanExpectation, ParticleExpectation, Statistics, Window, WindowModel,
+    Expectation, KalmanExpectation, ObservedWindow, ParticleExpectation, Statistics, WindowModel,
 };
 pub use sliding::{EStep, EmSettings, EmWindow};
 

@@ -2,7 +2,7 @@
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::pipeline::Estimator;
-use dynocar_core::pipeline::braking::engine::{Engine, Estimate, Observation, Step};
+use dynocar_core::pipeline::braking::engine::{Engine, EngineStep, Estimate, Observation};
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::law::Law;
 use dynocar_core::pipeline::braking::motion::{MotionNoise, SCALE, StepInputs, Walk};
@@ -16,7 +16,8 @@ use nalgebra::{SMatrix, SVector};
 use serde::Deserialize;
 
 use super::expectation::{
-    Entry, Expectation, KalmanExpectation, MoveNoise, ParticleExpectation, Window, WindowModel,
+    Entry, Expectation, KalmanExpectation, MoveNoise, ObservedWindow, ParticleExpectation,
+    WindowModel,
 };
 
 /// How the expectation of the EM is taken.
@@ -102,7 +103,7 @@ pub struct EmWindow<E> {
     /// Noise of motion and measurement; speeds are not used.
     noise: MotionNoise,
     expectation: E,
-    window: Window,
+    window: ObservedWindow,
     share: f64,
     estimate: Option<Estimate>,
 }
@@ -115,7 +116,7 @@ impl<E: Expectation> EmWindow<E> {
             settings,
             noise,
             expectation,
-            window: Window { entries: Vec::with_capacity(settings.window), first },
+            window: ObservedWindow { entries: Vec::with_capacity(settings.window), first },
             share: 1.0,
             estimate: None,
         }
@@ -227,19 +228,19 @@ impl<E: Expectation> Engine for EmWindow<E> {
         self.window.entries.push(Entry { inputs, observed: *first, noise });
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<Step> {
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<EngineStep> {
         if self.window.entries.is_empty() {
             self.start(observed);
-            return Some(Step::Restarted);
+            return Some(EngineStep::Restarted);
         }
         let noise = MoveNoise::over(&self.noise, inputs.step_s);
         self.window.entries.push(Entry { inputs: *inputs, observed: *observed, noise });
         if self.window.entries.len() < self.settings.window {
-            return Some(Step::Collected);
+            return Some(EngineStep::Collected);
         }
         self.maximise()?;
         self.slide();
-        Some(Step::Updated { normalised_innovation: None })
+        Some(EngineStep::Updated { normalised_innovation: None })
     }
 
     fn set_distance_variance(&mut self, variance_m2: f64) {

@@ -1,6 +1,8 @@
+//! Expectation maximisation of the adhesion, by particles and by a Kalman smoother.
+
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::braking::engine::{Engine, Observation, Step};
+use dynocar_core::pipeline::braking::engine::{Engine, EngineStep, Observation};
 use dynocar_core::pipeline::braking::law::Law;
 use dynocar_core::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::BrakingSettings;
@@ -63,7 +65,7 @@ fn model(initial: f64) -> EmSettings {
     }
 }
 
-fn window(seed: u64) -> Window {
+fn window(seed: u64) -> ObservedWindow {
     let noise = MoveNoise::over(&NOISE, 0.2);
     let entries: Vec<_> = observed(seed)
         .into_iter()
@@ -73,7 +75,7 @@ fn window(seed: u64) -> Window {
         SVector::from([entries[0].observed.distance_m, FIRST_MPS]),
         SVector::from([0.1, 0.1]),
     );
-    Window { entries, first }
+    ObservedWindow { entries, first }
 }
 
 /// The estimate after one window.
@@ -81,12 +83,12 @@ fn estimate<E: Expectation>(model: EmSettings, expectation: E, seed: u64) -> Unc
     let mut em = EmWindow::new(model, NOISE, expectation);
     let observed = observed(seed);
     em.start(&Observation { speed_mps: FIRST_MPS, ..observed[0] });
-    let mut last = Step::Collected;
+    let mut last = EngineStep::Collected;
     for observation in &observed[1..] {
-        assert_eq!(last, Step::Collected);
+        assert_eq!(last, EngineStep::Collected);
         last = em.step(&inputs(), observation).unwrap();
     }
-    assert_eq!(last, Step::Updated { normalised_innovation: None });
+    assert_eq!(last, EngineStep::Updated { normalised_innovation: None });
     em.estimate().unwrap().coefficient
 }
 

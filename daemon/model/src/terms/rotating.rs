@@ -4,7 +4,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Joined, Key, Least, Parameter, Suspect};
 
-/// gamma.
+/// Key of the rotating-mass factor gamma.
 pub const FACTOR: Key = Key {
     table: "train",
     name: "rotating_mass_factor",
@@ -15,9 +15,9 @@ pub const FACTOR: Key = Key {
 };
 /// Locomotives with small loads reach 0.25 to 0.3.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("rotating_mass_factor", (0.0, 0.5), 0.005)];
-/// Least effect; a load changes the factor by less.
+/// Least difference of the factor that counts as an effect; a load changes it by less.
 pub const LEAST: f64 = 0.01;
-/// Standard deviation of what is declared: it is taken from a table of trains alike, and seldom weighed.
+/// Standard deviation of the declared factor, which is taken from a table of similar trains and seldom measured.
 pub const USUAL_STD: f64 = 0.01;
 
 /// Inertial mass in kg.
@@ -26,7 +26,7 @@ pub fn inertial_mass_kg(mass_kg: f64, factor: f64) -> f64 {
     mass_kg * (1.0 + factor)
 }
 
-/// Unit: what is added to gamma.
+/// The monitor's suspect; its unit is an addition to gamma.
 pub const SUSPECT: Suspect = Suspect {
     effect: EffectKind::RotatingMass,
     prior_std: 0.05,

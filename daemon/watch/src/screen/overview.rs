@@ -9,7 +9,7 @@ use ratatui::widgets::{Paragraph, Wrap};
 use super::plots::{self, sparkline};
 use super::style::{Palette, heading};
 use crate::state::{PipelineState, Point, TrainState};
-use crate::words::{Row, residual, rows};
+use crate::words::{TableRow, residual, rows};
 
 /// Columns of the table after the number: interval and unit, state of use, why; the age takes the rest.
 const COLUMNS: [usize; 3] = [20, 15, 26];
@@ -72,7 +72,7 @@ fn quantities(
     lines
 }
 
-fn line_of(row: Row, columns: [usize; 3], palette: Palette) -> Line<'static> {
+fn line_of(row: TableRow, columns: [usize; 3], palette: Palette) -> Line<'static> {
     let [interval, state, why] = columns;
     let number = format!("{:>9}  ", row.number);
     let interval_and_unit = format!("{} {}", row.interval, row.unit);

@@ -10,7 +10,7 @@ use dynocar_transport::Host;
 use super::threads::Threads;
 use crate::learn::watch::{Suspicions, TimeOfDay, watch};
 use crate::learn::{
-    Bounds, LearnError, Learner, LearnerSettings, Outcome, Round, TrainRound, page,
+    Bounds, LearnError, Learner, LearnerSettings, Round, RoundOutcome, TrainRound, page,
 };
 use crate::report::PAGE_MARK;
 use crate::report::provenance::own_command_line;
@@ -91,7 +91,7 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
     let mut suspicions = suspicions.collect::<Result<Vec<_>, Failure>>()?;
     watch(&mut learner, &mut suspicions, arguments.at, &stop, &mut |learner, round| {
         // That there was nothing new is no news to a log.
-        let is_new = |it: &TrainRound| it.outcome != Outcome::NothingNew;
+        let is_new = |it: &TrainRound| it.outcome != RoundOutcome::NothingNew;
         for line in round.trains.iter().filter(|it| is_new(it)).map(of_train) {
             tracing::info!("{}", line.trim_end());
         }
@@ -128,9 +128,9 @@ fn of_train(round: &TrainRound) -> String {
     let plural = if *runs == 1 { "" } else { "s" };
     let head = format!("train {train}: {runs} run{plural}, model {in_force} in force: ");
     let found = match outcome {
-        Outcome::NothingNew => "nothing new since the last time".into(),
-        Outcome::TooFewRuns => "too few runs to learn from".into(),
-        Outcome::Explained(it) => {
+        RoundOutcome::NothingNew => "nothing new since the last time".into(),
+        RoundOutcome::TooFewRuns => "too few runs to learn from".into(),
+        RoundOutcome::Explained(it) => {
             let mut parts = vec![it.statement.clone()];
             parts.extend(it.candidate.map(|hash| format!("new candidate {hash}")));
             parts.extend(it.same_as.map(|hash| format!("model {hash} says so already")));

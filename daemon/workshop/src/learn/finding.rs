@@ -6,15 +6,20 @@ use std::collections::BTreeMap;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, ParameterValue, Verdict};
+use dynocar_analysis::explain::effects::policy_of;
+use dynocar_model::terms::place::in_words;
 use dynocar_shared::TrainId;
+use dynocar_shared::vocabulary::EffectKind;
 
 use super::memory::OpenQuestion;
 use super::pool::Pool;
 use dynocar::models::origin::{EventWindow, HeldOutError};
 use dynocar::models::{Figure, FoundEffect, MaintenanceEvent, ModelHash, Moment};
 
-/// Kinds that act in the runs in which they are found and in no others, wherever the answer names none.
-const PASSING: [&str; 2] = ["dragging_brake", "low_adhesion"];
+/// Whether a kind acts in the runs in which it is found and in no others, wherever the answer names none.
+fn is_passing(kind: &str) -> bool {
+    EffectKind::from_name(kind).is_some_and(|kind| policy_of(kind).is_passing)
+}
 
 /// An effect as records hold it.
 pub fn found_effect(effect: &EffectAnswer) -> FoundEffect {
@@ -64,7 +69,7 @@ pub fn is_event(effect: &EffectAnswer, not_expressed: &[String]) -> bool {
     let place = &effect.place;
     let by_run = |value: &ParameterValue| matches!(value, ParameterValue::ByRun(_));
     not_expressed.iter().any(|kind| kind == effect.kind)
-        && (PASSING.contains(&effect.kind)
+        && (is_passing(effect.kind)
             || place.windows.is_some()
             || place.runs.is_some()
             || effect.parameters.values().any(by_run))
@@ -75,7 +80,7 @@ pub fn is_event(effect: &EffectAnswer, not_expressed: &[String]) -> bool {
 pub fn is_to_be_reported(event: &MaintenanceEvent, explanation: &Explanation) -> bool {
     let newest = explanation.problem.runs.last().map(|run| run.file.as_str());
     let acts_in_newest = event.windows.iter().any(|window| Some(window.run.as_str()) == newest);
-    PASSING.contains(&event.kind.as_str()) || !acts_in_newest
+    is_passing(&event.kind) || !acts_in_newest
 }
 
 /// The errors on the runs held out, where the model is better on them.
@@ -172,10 +177,8 @@ pub fn sentence(event: &MaintenanceEvent) -> String {
             false => format!(", recorded {first} to {last}"),
         };
     }
-    let places: Vec<String> =
-        event.intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m")).collect();
-    if !places.is_empty() {
-        text += &format!(", at {}", places.join(", "));
+    if !event.intervals_m.is_empty() {
+        text += &format!(", at {}", in_words(&event.intervals_m));
     }
     let sizes: Vec<String> = event.size.iter().take(4).map(|(name, it)| it.shown(name)).collect();
     if sizes.is_empty() { text } else { format!("{text}: {}", sizes.join(", ")) }

@@ -21,9 +21,9 @@ use crate::report::provenance::hex;
 use dynocar::models::{Action, ModelHash, ModelText, Moment, Store, TrainModels};
 use dynocar::storage::{Disk, Storage, StorageError};
 
-/// In the store's directory: what is the learner's own.
+/// Folder of the learner within the store's directory.
 const OWN_FOLDER: &str = "learn";
-/// Held by the learner that works on a store.
+/// Lock file of the learner that works on a store.
 const LOCK_FILE: &str = "learner.lock";
 
 /// Settings of a learner.
@@ -69,12 +69,12 @@ pub struct TrainRound {
     /// The runs that there are.
     pub runs: usize,
     /// Outcome of the runs.
-    pub outcome: Outcome,
+    pub outcome: RoundOutcome,
 }
 
 /// Outcome of the runs of a train.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
+pub enum RoundOutcome {
     /// The same runs and model as the last time.
     NothingNew,
     /// Fewer than two runs.
@@ -167,7 +167,7 @@ impl Learner {
         let choices = pool::choices(&runs, &bounds);
         let digest = digest(in_force, &choices);
         if self.memory.explained.get(&train.to_string()) == Some(&digest) {
-            return Ok(Some(round_of(Outcome::NothingNew)));
+            return Ok(Some(round_of(RoundOutcome::NothingNew)));
         }
         let outcome = match self.explained(&models, in_force, &choices, now, stop)? {
             Some(outcome) => outcome,
@@ -186,11 +186,11 @@ impl Learner {
         choices: &[Vec<FoundRun>],
         now: Moment,
         stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Option<Outcome>, LearnError> {
+    ) -> Result<Option<RoundOutcome>, LearnError> {
         let text = models.text(in_force)?;
         let (model, track) = models.load(in_force)?;
         let (model, track) = (Arc::new(model), track.map(Arc::new));
-        let mut outcome = Outcome::TooFewRuns;
+        let mut outcome = RoundOutcome::TooFewRuns;
         for choice in choices {
             let declared = Declared { text: &text, train: &model, track: track.as_ref() };
             let read = pool::read(choice, declared, &self.settings.bounds, &mut self.memory);
@@ -212,14 +212,14 @@ impl Learner {
             };
             let explained = conclusion.draw(&self.memory)?;
             // The first words on what is open stand; more runs may only settle it.
-            if verdict == Verdict::Effect || outcome == Outcome::TooFewRuns {
-                outcome = Outcome::Explained(Box::new(explained));
+            if verdict == Verdict::Effect || outcome == RoundOutcome::TooFewRuns {
+                outcome = RoundOutcome::Explained(Box::new(explained));
             }
             if verdict == Verdict::Effect {
                 break;
             }
         }
-        if let Outcome::Explained(explained) = &outcome
+        if let RoundOutcome::Explained(explained) = &outcome
             && let Some(question) = &explained.question
             && self.memory.ask(question)
         {

@@ -29,5 +29,5 @@ pub mod watch;
 
 pub use conclusion::Explained;
 pub use error::LearnError;
-pub use learner::{Learner, LearnerSettings, Outcome, Round, TrainRound};
+pub use learner::{Learner, LearnerSettings, Round, RoundOutcome, TrainRound};
 pub use pool::Bounds;

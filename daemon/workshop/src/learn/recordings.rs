@@ -1,4 +1,4 @@
-//! Recordings, unpacked once into a folder of the learner's own: the ring that they come from forgets.
+//! Recordings, unpacked once into a folder of the learner, because the flight recorder's ring deletes the oldest.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -16,7 +16,7 @@ use dynocar::unpacking::{UnpackError, unpack};
 
 /// How a finished recording ends.
 const MCAP_END: &[u8] = b"\x89MCAP0\r\n";
-/// In an unpacked recording: where it came from.
+/// File in an unpacked recording that names its source.
 const SOURCE_FILE: &str = "recording.toml";
 /// The most bytes that the unpacked recordings of a train take.
 const BYTES_MAX: u64 = 4 << 30;

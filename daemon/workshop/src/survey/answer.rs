@@ -1,9 +1,9 @@
 //! The result of a survey for machines.
 
 use dynocar_analysis::dataset::Dataset;
+use dynocar_analysis::explain::answer::WithStd;
 use dynocar_analysis::statistics::middle;
-use dynocar_analysis::survey::chainage::Estimate;
-use dynocar_analysis::survey::stops::Stop;
+use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{NotUsed, Survey, Trip, Vehicle};
 use serde::Serialize;
 
@@ -33,7 +33,7 @@ pub struct SurveyedLine {
     /// Length in m.
     pub length_m: f64,
     /// Its stops.
-    pub stops: Vec<Stop>,
+    pub stops: Vec<SurveyedStop>,
     /// Median standard deviation in ‰ of the mean gradient over 100 m; absent on a known line.
     pub gradient_std_permille: Option<f64>,
     /// Passes that it was learned from.
@@ -68,25 +68,25 @@ pub struct TripAnswer {
 #[derive(Debug, Serialize)]
 pub struct LearnedAnswer {
     /// Nominal or empty mass in t, without rotating parts.
-    pub mass_t: Estimate,
+    pub mass_t: WithStd,
     /// The same with rotating parts, which is what the balance of forces shows.
-    pub inertial_mass_t: Estimate,
+    pub inertial_mass_t: WithStd,
     /// Mass of a passenger in kg, where they are counted.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub passenger_mass_kg: Option<Estimate>,
+    pub passenger_mass_kg: Option<WithStd>,
     /// a, b, c in N/kN.
-    pub resistance: [Estimate; 3],
+    pub resistance: [WithStd; 3],
     /// Recorded over true speed.
-    pub speed_scale: Estimate,
+    pub speed_scale: WithStd,
     /// Seconds by which forces are stamped late; negative where they act late.
-    pub force_late_s: Estimate,
+    pub force_late_s: WithStd,
     /// Seconds by which the written forces were moved.
     pub force_moved_s: f64,
     /// Age of a position at its stamp in s.
-    pub position_late_s: Estimate,
+    pub position_late_s: WithStd,
     /// Friction brake in N/Pa, where it shows.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub friction_brake_n_per_pa: Option<Estimate>,
+    pub friction_brake_n_per_pa: Option<WithStd>,
     /// Pressure in Pa from which on it acts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub release_pressure_pa: Option<f64>,
@@ -148,7 +148,7 @@ impl SurveyedLine {
 impl LearnedAnswer {
     /// Returns the learned values for people: in few words where a terminal shows them, the unit, in all words, and
     /// the value.
-    pub fn rows(&self) -> Vec<(&'static str, &'static str, &'static str, Estimate)> {
+    pub fn rows(&self) -> Vec<(&'static str, &'static str, &'static str, WithStd)> {
         let [a, b, c] = self.resistance.map(Some);
         let rows = [
             ("mass", "t", "mass, t", Some(self.mass_t)),
@@ -170,7 +170,7 @@ impl LearnedAnswer {
         let profile = survey.profile.as_ref()?;
         let (fitted, brake) = (&profile.learned.profile, profile.learned.brake.as_ref());
         let (common, std, prior) = (&fitted.common, &fitted.common_std, &vehicle.prior);
-        let estimate = |value: f64, std: f64| Estimate { value, std };
+        let estimate = |value: f64, std: f64| WithStd { value, std };
         let mass = |factor: f64| {
             let value = factor * (prior.mass_kg / 1e3 * (1.0 + common.mass_share()));
             estimate(value, factor * (prior.mass_kg / 1e3 * std.mass_share()))

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar::dataset::{Source, load};
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::survey::stops::Stop;
+use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, survey};
 
 use answer::SurveyAnswer;
@@ -69,7 +69,7 @@ pub fn survey_folder<'s>(
 }
 
 /// Stops of a known line keep their names.
-fn name_stops(stops: &mut [Stop], known: &[(f64, String)]) {
+fn name_stops(stops: &mut [SurveyedStop], known: &[(f64, String)]) {
     for stop in stops {
         let away = |known: &&(f64, String)| (known.0 - stop.chainage_m).abs();
         let nearest = known.iter().min_by(|one, other| away(one).total_cmp(&away(other)));

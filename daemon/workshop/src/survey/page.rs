@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::report::words::number;
-use dynocar_analysis::survey::stops::Stop;
+use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{NotUsed, Survey};
 use dynocar_shared::HALF_95;
 
@@ -159,7 +159,7 @@ fn learned(answer: &SurveyAnswer) -> String {
     table("Learned, with 95 % intervals", &columns, &rows)
 }
 
-const STOPS: &[TableColumn<'_, Stop>] = &[
+const STOPS: &[TableColumn<'_, SurveyedStop>] = &[
     ("chainage, m", Numbers, &|it| format!("{:.1}", it.chainage_m)),
     ("name", Names, &|it| escape(&it.name)),
     ("direction", Numbers, &|it| it.direction.to_string()),

@@ -30,7 +30,7 @@ enum Source {
 
 /// A column of the trips' files.
 #[derive(Clone, Copy)]
-pub struct Column {
+pub struct TripColumn {
     /// Quantity of the column.
     pub quantity: Quantity,
     /// Its unit.
@@ -40,7 +40,7 @@ pub struct Column {
 }
 
 /// Every column that there may be.
-const COLUMNS: [Column; 19] = {
+const COLUMNS: [TripColumn; 19] = {
     use Source::{Extra, Field, Made};
     [
         column(Quantity::Time, "s", 3, Made),
@@ -65,16 +65,21 @@ const COLUMNS: [Column; 19] = {
     ]
 };
 
-const fn column(quantity: Quantity, unit: &'static str, decimals: usize, source: Source) -> Column {
-    Column { quantity, unit, decimals, source }
+const fn column(
+    quantity: Quantity,
+    unit: &'static str,
+    decimals: usize,
+    source: Source,
+) -> TripColumn {
+    TripColumn { quantity, unit, decimals, source }
 }
 
 /// The columns of a dataset's trips.
-pub fn columns(dataset: &Dataset) -> Vec<Column> {
+pub fn columns(dataset: &Dataset) -> Vec<TripColumn> {
     let any = |is_there: &dyn Fn(&Run) -> bool| dataset.runs.iter().any(is_there);
     let has = |field: SampleField| any(&|run| run.samples.iter().any(|it| it.get(field).is_some()));
     let is_signed = any(&|run| run.traction_source == ForceSource::ControlForce);
-    let is_there = |column: &Column| match (column.source, column.quantity) {
+    let is_there = |column: &TripColumn| match (column.source, column.quantity) {
         (Source::Field(field), _) => has(field),
         (Source::Extra, quantity) => any(&|run| run.extra(quantity).is_some()),
         (_, Quantity::ControlForce) => is_signed,
@@ -117,7 +122,7 @@ pub fn run_csv(material: &Material, trip: &Trip) -> String {
             let step_s = (next.time_ns - sample.time_ns) as f64 * 1e-9;
             Some(stamped_late(here, force(next).unwrap_or(here), step_s, late_s))
         };
-        let value = |column: &Column| match (column.source, column.quantity) {
+        let value = |column: &TripColumn| match (column.source, column.quantity) {
             (Source::Field(field), _) => sample.get(field),
             (Source::Extra, quantity) => run.extra(quantity)?[ordered[row]],
             (_, Quantity::Time) => Some(sample.time_ns as f64 * 1e-9),
@@ -132,7 +137,7 @@ pub fn run_csv(material: &Material, trip: &Trip) -> String {
             (_, Quantity::WheelSlide) => Some(f64::from(sample.flags & 1)),
             _ => None,
         };
-        let cell = |column: &Column| {
+        let cell = |column: &TripColumn| {
             value(column).map_or(String::new(), |value| format!("{value:.*}", column.decimals))
         };
         text += &(columns.iter().map(cell).collect::<Vec<_>>().join(",") + "\n");

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use dynocar_analysis::dataset::DatasetFiles;
 use dynocar_analysis::survey::alignment::FoundCurve;
 use dynocar_analysis::survey::layout::HEIGHT_STEP_M;
-use dynocar_analysis::survey::stops::Stop;
+use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, SurveyedProfile};
 use toml::{Table, Value};
 
 use super::material::{Material, SurveyFailure};
-use super::trip_rows::{Column, columns, run_csv};
+use super::trip_rows::{TripColumn, columns, run_csv};
 use crate::track_text::TrackText;
 use crate::updated::set;
 use dynocar::dataset::open;
@@ -130,7 +130,7 @@ fn dataset_toml(material: &Material) -> String {
         let _ = writeln!(text, "description = {}", quoted(description));
     }
     text += "[train]\nfile = \"train.toml\"\n[track]\nfile = \"track.toml\"\n[columns]\n";
-    for Column { quantity, unit, .. } in columns(dataset) {
+    for TripColumn { quantity, unit, .. } in columns(dataset) {
         let name = quantity.name();
         let _ = writeln!(text, "{name} = {{ column = \"{name}\", unit = \"{unit}\" }}");
     }
@@ -197,8 +197,9 @@ fn track_toml(material: &Material) -> String {
         };
         text.list("curves", profile.curves.iter().map(entry));
     }
-    let stop =
-        |stop: &Stop| format!("{:.1}, {}", stop.chainage_m, Value::String(stop.name.clone()));
+    let stop = |stop: &SurveyedStop| {
+        format!("{:.1}, {}", stop.chainage_m, Value::String(stop.name.clone()))
+    };
     text.list("stops", survey.stops.iter().map(stop));
     if !alignments.is_one_track() {
         text.value("alignment_falling", "\"alignment_falling.csv\"");

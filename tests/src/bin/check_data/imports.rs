@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_analysis::import::{Imported, Reading, Source, import};
+use dynocar_analysis::import::{ImportReading, Imported, Source, import};
 
 use super::report::Report;
 use super::trainruns::{THEIR_GRAVITY_MPS2, TRAINS};
@@ -79,7 +79,7 @@ fn read(files: &[PathBuf], load_share: f64) -> Result<Imported, String> {
         texts.push((label, text));
     }
     let sources: Vec<Source> = texts.iter().map(|(label, text)| Source { label, text }).collect();
-    let reading = Reading { load_share, mode: None };
+    let reading = ImportReading { load_share, mode: None };
     import(&sources, None, &reading).map_err(|error| error.to_string())
 }
 

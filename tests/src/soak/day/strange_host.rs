@@ -8,14 +8,14 @@ use std::process::Command;
 /// Code that the program under test loads before the C library.
 const SOURCE: &str = include_str!("strange_host.c");
 
-/// The strange host of one program; everybody else's clock and disk are as they are.
+/// Clock and disk of one program that can be disturbed; other programs keep the real ones.
 pub struct StrangeHost {
     control: File,
     variables: [(&'static str, String); 3],
 }
 
 impl StrangeHost {
-    /// A host that is not strange yet, with files of its own in `site`; its disk is that of `folder`.
+    /// Returns a host without disturbances, with files of its own in `site`; its disk is that of `folder`.
     ///
     /// # Panics
     ///

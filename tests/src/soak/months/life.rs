@@ -15,7 +15,7 @@ use dynocar_shared::{TrainId, TrainSample};
 use dynocar_workshop::learn::{Bounds, Learner, LearnerSettings};
 
 use super::story::{LifeSettings, Story};
-use super::table::{Adoption, Outcome};
+use super::table::{Adoption, LifeOutcome};
 use crate::simulator::dataset_writer::write_dataset;
 use crate::simulator::run_maker::RunPlan;
 use crate::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, World};
@@ -44,7 +44,7 @@ pub struct Life<'f> {
     learner: Learner,
     monitor: Pipeline,
     sequence: u64,
-    outcome: Outcome,
+    outcome: LifeOutcome,
 }
 
 impl<'f> Life<'f> {
@@ -95,7 +95,7 @@ impl<'f> Life<'f> {
         })
         .expect("a learner");
         let monitor = build_pipeline(&config.pipelines[0], 0, &train).expect("a monitor");
-        let outcome = Outcome::of(settings);
+        let outcome = LifeOutcome::of(settings);
         let sequence = 0;
         Life {
             settings,
@@ -113,7 +113,7 @@ impl<'f> Life<'f> {
     }
 
     /// Lives all days.
-    pub fn live(mut self) -> Outcome {
+    pub fn live(mut self) -> LifeOutcome {
         for day in 0..self.settings.days {
             self.live_day(day);
         }

@@ -1,7 +1,7 @@
 //! How often a model that is no better is adopted, over hundreds of train years.
 //!
 //! For each of many simulated trains without an effect, some hundred trips are driven and predicted by
-//! the declared model and by rivals that nothing speaks for. Years are then made of these trips, drawn
+//! the declared model and by rival models that are no better. Years are then made of these trips, drawn
 //! with replacement: what is measured is the judgement on scores as trips give them.
 
 use std::sync::Arc;

@@ -17,4 +17,4 @@ pub mod table;
 
 pub use life::Life;
 pub use story::{LifeSettings, Story};
-pub use table::Outcome;
+pub use table::LifeOutcome;

@@ -27,7 +27,7 @@ pub enum Story {
 pub struct Span {
     /// The first day on which something is undeclared.
     pub onset: usize,
-    /// The first day on which nothing is any more.
+    /// The first day on which nothing is undeclared any more.
     pub end: usize,
 }
 

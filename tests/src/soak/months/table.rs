@@ -23,7 +23,7 @@ pub struct Adoption {
 
 /// Outcome of one life.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct LifeOutcome {
     /// How it was lived.
     pub settings: LifeSettings,
     /// Open-loop error over 60 s of the model in force, by day, in m/s.
@@ -36,11 +36,11 @@ pub struct Outcome {
     pub events: Vec<String>,
 }
 
-impl Outcome {
+impl LifeOutcome {
     /// Of a life that begins.
     pub fn of(settings: LifeSettings) -> Self {
         let (errors_mps, adoptions) = (Vec::new(), Vec::new());
-        Outcome { settings, errors_mps, adoptions, rounds: 0, events: Vec::new() }
+        LifeOutcome { settings, errors_mps, adoptions, rounds: 0, events: Vec::new() }
     }
 
     /// Mean over some days of the error of the model in force, in m/s.
@@ -68,7 +68,7 @@ pub const HEADER: &str = "| story | seed | onset to adoption, days | error befor
     | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
 
 /// A life as a line of a table.
-pub fn line(outcome: &Outcome) -> String {
+pub fn line(outcome: &LifeOutcome) -> String {
     let LifeSettings { story, span, seed, days, .. } = outcome.settings;
     let last = if story.ends() { span.end } else { days };
     let adopted = outcome.first_change(span.onset..last, false);

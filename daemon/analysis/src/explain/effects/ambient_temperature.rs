@@ -4,7 +4,9 @@ use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Entry, ambient};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, Nature, On, Proposal, ReportContext, Reported};
+use super::{
+    Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, ReportContext, Reported,
+};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 use crate::statistics::span;
@@ -24,6 +26,9 @@ fn mean_degc(run: &RunData) -> Option<f64> {
         .fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
     (count > 0).then(|| sum / f64::from(count))
 }
+
+/// It is one number a run, and each run has its load and wind, which follow some temperature by chance.
+pub const POLICY: Policy = Policy { certainty: Certainty::BesideUsualErrors, ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

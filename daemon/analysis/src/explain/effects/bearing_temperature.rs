@@ -4,12 +4,15 @@ use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Resistance, bearings};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Handling, Hypothesis, Nature, On, Proposal};
+use super::{Candidate, Figure, Handling, Hypothesis, Nature, On, Policy, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
 #[derive(Debug)]
 struct Warming;
+
+/// It estimates a figure that is usually a little wrong.
+pub const POLICY: Policy = Policy { frees: &[Figure::Warming], ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -4,7 +4,7 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::curve;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Handling, Hypothesis, Nature, On, Proposal};
+use super::{Candidate, Figure, Handling, Hypothesis, Nature, On, Policy, Proposal};
 use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -14,6 +14,9 @@ struct Curves {
     declared_k: f64,
     intervals_m: Vec<[f64; 2]>,
 }
+
+/// It estimates a figure that is usually a little wrong.
+pub const POLICY: Policy = Policy { frees: &[Figure::Curves], ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -17,7 +17,9 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::unknown::leaves_a_force;
-use super::{Candidate, Handling, Hypothesis, Nature, On, Proposal, ReportContext, Reported};
+use super::{
+    Candidate, Handling, Hypothesis, Nature, On, Policy, Proposal, ReportContext, Reported,
+};
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::gradient_prior::{ErrorScale, MAP, UNSURVEYED};
@@ -42,6 +44,9 @@ struct Profile {
     is_one_way: bool,
     choice_cost: f64,
 }
+
+/// An error of the map, whose usual errors are in the model there.
+pub const POLICY: Policy = Policy { is_sought_beside_usual_errors: false, ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
@@ -155,9 +160,12 @@ impl Hypothesis for Profile {
             choice_cost: self.choice_cost,
             shared_error: MAP_ERROR_PERMILLE,
             handling: Handling::Gradient,
-            twins: if self.is_one_way { &[EffectKind::LocalResistance] } else { &[] },
             ..Nature::of(EffectKind::GradientError, &self.parameters)
         }
+    }
+
+    fn twins(&self, _parameters: &[f64]) -> &'static [EffectKind] {
+        if self.is_one_way { &[EffectKind::LocalResistance] } else { &[] }
     }
 
     fn size(&self, parameters: &[f64]) -> f64 {

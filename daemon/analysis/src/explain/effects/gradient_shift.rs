@@ -6,7 +6,7 @@ use dynocar_model::terms::{Entry, gradient};
 use dynocar_model::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, Nature, On, OnOthers, Proposal};
+use super::{Candidate, Hypothesis, Nature, On, OnOthers, Policy, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -18,6 +18,9 @@ struct Shift {
     track: Arc<Track>,
     length_m: f64,
 }
+
+/// An error of the map, whose usual errors are in the model there.
+pub const POLICY: Policy = Policy { is_sought_beside_usual_errors: false, ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

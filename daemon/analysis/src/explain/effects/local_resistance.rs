@@ -6,7 +6,7 @@ use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Entry, place};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Handling, Hypothesis, Nature, On, Proposal, SharedHypothesis};
+use super::{Candidate, Handling, Hypothesis, Nature, On, Policy, Proposal, SharedHypothesis};
 use crate::explain::answer::{Location, RunWindow};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Inside, Site, find};
@@ -47,6 +47,14 @@ impl Passage {
         intervals_m.iter().filter_map(window).collect()
     }
 }
+
+/// Pieces of the map's error look like such a place, and the remainder of a wrong wheel or gradient does.
+pub const POLICY: Policy = Policy {
+    is_one_of_many: true,
+    is_left_by_moved_places: true,
+    is_sought_beside_usual_errors: false,
+    ..Policy::USUAL
+};
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
@@ -95,15 +103,16 @@ impl Local {
 
 impl Hypothesis for Local {
     fn nature(&self) -> Nature<'_> {
-        let twins: &[EffectKind] =
-            if self.only.is_some() { &[EffectKind::DraggingBrake] } else { &[] };
         Nature {
             choice_cost: self.site.choice_cost,
             shared_error: self.site.map_error,
             handling: Handling::Added,
-            twins,
             ..Nature::of(EffectKind::LocalResistance, &place::PARAMETERS)
         }
+    }
+
+    fn twins(&self, _parameters: &[f64]) -> &'static [EffectKind] {
+        if self.only.is_some() { &[EffectKind::DraggingBrake] } else { &[] }
     }
 
     fn unit_n_per_kn(&self, _others: &[f64], run: &RunData, n_per_kn: &mut Vec<f64>) {

@@ -7,7 +7,7 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::adhesion;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, Nature, On, Proposal, SharedHypothesis};
+use super::{Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::places::{Found, Inside, Site, best_of_runs, find};
 use crate::explain::scan::{Scan, Tuple};
@@ -39,6 +39,14 @@ fn weight_n(sample: &ResolvedSample) -> f64 {
 fn braking(sample: &ResolvedSample) -> f64 {
     sample.brake_force_n.unwrap_or(0.0) / weight_n(sample)
 }
+
+/// Rails differ from run to run, so it is never certain.
+pub const POLICY: Policy = Policy {
+    certainty: Certainty::Never,
+    is_sought_beside_usual_errors: false,
+    is_passing: true,
+    ..Policy::USUAL
+};
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -4,8 +4,8 @@
 //! which interval, which windows. A hypothesis changes the forces on the train for given
 //! parameters by the law of its term ([`dynocar_model::terms`]), and nothing else is needed: the same code
 //! fits it, simulates it and predicts with it, and the daemon applies the same law to what is
-//! written of it into the files. A new kind is one file, one line in [`LIBRARY`] and
-//! a row among the kinds of `dynocar_shared::vocabulary`.
+//! written of it into the files. How the search treats a kind is its [`Policy`]. A new kind is one file, one line in
+//! [`LIBRARY`] and a row among the kinds of `dynocar_shared::vocabulary`.
 
 mod actuator_delay;
 mod ambient_temperature;
@@ -18,6 +18,7 @@ mod lateness;
 mod local_resistance;
 mod low_adhesion;
 mod mass_change;
+mod policy;
 mod proposal;
 mod rotating_mass;
 mod speed_delay;
@@ -37,31 +38,63 @@ pub use super::hypothesis::{
     SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
+pub use policy::{Certainty, Everyday, Figure, Policy};
 pub use proposal::{Candidate, Effect, Proposal, Whole};
 pub use usual_errors::{map_error_as_fitted, usual_errors};
-pub use vertical_curves::vertical_curves;
+pub use vertical_curves::{USUAL_LENGTH_M, vertical_curves};
 
 /// Every kind, in the order of the search: timing, scales, mass and gain, what is tied to a
 /// place, environment, actuators. What is in no library comes last.
 pub const LIBRARY: &[Effect] = &[
-    Effect::new(ActuatorDelay, actuator_delay::propose, Whole::None),
-    Effect::new(SpeedDelay, speed_delay::propose, Whole::None),
-    Effect::new(WheelDiameter, wheel_diameter::propose, Whole::First),
-    Effect::new(TractionGain, traction_gain::propose, Whole::First),
-    Effect::new(MassChange, mass_change::propose, Whole::Of(mass_change::everywhere)),
-    Effect::new(RotatingMass, rotating_mass::propose, Whole::First),
-    Effect::new(GradientShift, gradient_shift::propose, Whole::Of(gradient_shift::whole)),
-    Effect::new(GradientError, gradient_error::propose, Whole::None),
-    Effect::new(CurveResistance, curve_resistance::propose, Whole::First),
-    Effect::new(TunnelDrag, tunnel_drag::propose, Whole::Of(tunnel_drag::whole)),
-    Effect::new(LocalResistance, local_resistance::propose, Whole::None),
-    Effect::new(Wind, wind::propose, Whole::First),
-    Effect::new(AmbientTemperature, ambient_temperature::propose, Whole::First),
-    Effect::new(BearingTemperature, bearing_temperature::propose, Whole::None),
-    Effect::new(DraggingBrake, dragging_brake::propose, Whole::None),
-    Effect::new(LowAdhesion, low_adhesion::propose, Whole::None),
-    Effect::new(Unknown, unknown::propose_bands, Whole::None),
+    Effect::new(ActuatorDelay, actuator_delay::propose, Whole::None).with(&actuator_delay::POLICY),
+    Effect::new(SpeedDelay, speed_delay::propose, Whole::None).with(&speed_delay::POLICY),
+    Effect::new(WheelDiameter, wheel_diameter::propose, Whole::First).with(&wheel_diameter::POLICY),
+    Effect::new(TractionGain, traction_gain::propose, Whole::First).with(&traction_gain::POLICY),
+    Effect::new(MassChange, mass_change::propose, Whole::Of(mass_change::everywhere))
+        .with(&mass_change::POLICY),
+    Effect::new(RotatingMass, rotating_mass::propose, Whole::First).with(&rotating_mass::POLICY),
+    Effect::new(GradientShift, gradient_shift::propose, Whole::Of(gradient_shift::whole))
+        .with(&gradient_shift::POLICY),
+    Effect::new(GradientError, gradient_error::propose, Whole::None).with(&gradient_error::POLICY),
+    Effect::new(CurveResistance, curve_resistance::propose, Whole::First)
+        .with(&curve_resistance::POLICY),
+    Effect::new(TunnelDrag, tunnel_drag::propose, Whole::Of(tunnel_drag::whole))
+        .with(&tunnel_drag::POLICY),
+    Effect::new(LocalResistance, local_resistance::propose, Whole::None)
+        .with(&local_resistance::POLICY),
+    Effect::new(Wind, wind::propose, Whole::First).with(&wind::POLICY),
+    Effect::new(AmbientTemperature, ambient_temperature::propose, Whole::First)
+        .with(&ambient_temperature::POLICY),
+    Effect::new(BearingTemperature, bearing_temperature::propose, Whole::None)
+        .with(&bearing_temperature::POLICY),
+    Effect::new(DraggingBrake, dragging_brake::propose, Whole::None).with(&dragging_brake::POLICY),
+    Effect::new(LowAdhesion, low_adhesion::propose, Whole::None).with(&low_adhesion::POLICY),
+    Effect::new(Unknown, unknown::propose_bands, Whole::None).with(&unknown::POLICY),
 ];
 /// Unnamed effects, by their form: tried where the library leaves a force.
-pub const UNKNOWN: &Effect = &Effect::new(Unknown, unknown::propose_forms, Whole::None);
+pub const UNKNOWN: &Effect =
+    &Effect::new(Unknown, unknown::propose_forms, Whole::None).with(&unknown::POLICY);
 pub use unknown::{a_form_explains_more, leaves_a_force};
+
+/// Returns the policy in a kind's row of the library; the usual one for what has no row.
+pub fn policy_of(kind: EffectKind) -> &'static Policy {
+    LIBRARY.iter().find(|effect| effect.kind == kind).map_or(&Policy::USUAL, |it| &it.policy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_is_freed_by_one_kind() {
+        let freed: Vec<Figure> = LIBRARY.iter().flat_map(|it| it.policy.frees).copied().collect();
+        assert!((1..freed.len()).all(|k| !freed[k..].contains(&freed[k - 1])), "{freed:?}");
+    }
+
+    #[test]
+    fn a_kind_that_is_never_certain_is_not_sought_for_certainty() {
+        for effect in LIBRARY.iter().filter(|it| it.policy.certainty == Certainty::Never) {
+            assert!(!effect.policy.is_sought_beside_usual_errors, "{:?}", effect.kind);
+        }
+    }
+}

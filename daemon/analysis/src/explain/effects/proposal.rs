@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use dynocar_shared::vocabulary::EffectKind;
 
+use super::policy::Policy;
 use crate::explain::hypothesis::{Handling, Hypothesis, SharedHypothesis};
 use crate::explain::scan::Scan;
 
@@ -68,14 +69,21 @@ pub enum Whole {
 pub struct Effect {
     /// Its name.
     pub kind: EffectKind,
+    /// How the search treats it.
+    pub policy: Policy,
     propose: fn(&Scan) -> Proposal,
     whole: Whole,
 }
 
 impl Effect {
-    /// A kind with its search.
+    /// Returns a kind with its search, which is treated as usual.
     pub const fn new(kind: EffectKind, propose: fn(&Scan) -> Proposal, whole: Whole) -> Self {
-        Effect { kind, propose, whole }
+        Effect { kind, policy: Policy::USUAL, propose, whole }
+    }
+
+    /// Returns the kind with a policy of its own.
+    pub const fn with(self, policy: &Policy) -> Self {
+        Effect { policy: *policy, ..self }
     }
 
     /// Structures for the data at hand, given what the current model leaves.

@@ -4,7 +4,7 @@
 use dynocar_model::terms::rotating;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, Nature, On, OnOthers, Proposal};
+use super::{Candidate, Figure, Hypothesis, Nature, On, OnOthers, Policy, Proposal};
 use crate::explain::evidence::{RunScatter, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -12,6 +12,9 @@ use crate::explain::scan::Scan;
 struct Gamma {
     declared: f64,
 }
+
+/// It estimates a figure that is usually a little wrong.
+pub const POLICY: Policy = Policy { frees: &[Figure::RotatingMass], ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

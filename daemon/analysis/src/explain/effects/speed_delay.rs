@@ -7,7 +7,10 @@ use dynocar_model::train::Davis;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::lateness::{late_by_sampling_s, late_from, late_reported};
-use super::{Candidate, Hypothesis, Nature, On, OnOthers, Proposal, ReportContext, Reported, Turn};
+use super::{
+    Candidate, Certainty, Everyday, Hypothesis, Nature, On, OnOthers, Policy, Proposal,
+    ReportContext, Reported, Turn,
+};
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
@@ -16,6 +19,15 @@ const STARTS: [[f64; 2]; 4] = [[0.6, 0.1], [0.1, 0.6], [1.2, 0.3], [0.3, 1.2]];
 
 #[derive(Debug)]
 struct DelayAndLag;
+
+/// Late forces look like a late speed, so it is never certain.
+pub const POLICY: Policy = Policy {
+    certainty: Certainty::Never,
+    is_sought_beside_usual_errors: false,
+    everyday: Some(Everyday { rank: 4, most: f64::INFINITY }),
+    is_late: true,
+    ..Policy::USUAL
+};
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

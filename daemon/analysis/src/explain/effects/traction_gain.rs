@@ -3,12 +3,20 @@
 use dynocar_model::terms::traction;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, Nature, On, Proposal};
+use super::{Candidate, Everyday, Figure, Hypothesis, Nature, On, Policy, Proposal};
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
 #[derive(Debug)]
 struct Gain;
+
+/// Force sensors are a little off: an error of the record that every train has.
+pub const POLICY: Policy = Policy {
+    is_sought_beside_usual_errors: false,
+    everyday: Some(Everyday { rank: 3, most: f64::INFINITY }),
+    frees: &[Figure::Traction],
+    ..Policy::USUAL
+};
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

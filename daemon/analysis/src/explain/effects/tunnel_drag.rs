@@ -12,7 +12,7 @@ use dynocar_model::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{
-    Candidate, Hypothesis, Nature, On, Proposal, ReportContext, Reported, SharedHypothesis,
+    Candidate, Hypothesis, Nature, On, Policy, Proposal, ReportContext, Reported, SharedHypothesis,
 };
 use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
@@ -31,6 +31,10 @@ struct Tunnels {
     length_m: f64,
     mapped_m: Vec<[f64; 2]>,
 }
+
+/// Mapped tunnels are one number of the line; the place of an unmapped one was chosen, and the remainder of a wrong
+/// wheel or gradient looks like it.
+pub const POLICY: Policy = Policy { is_left_by_moved_places: true, ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -8,28 +8,10 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::lateness::late_forces;
-use super::{Candidate, Handling, Hypothesis, Nature, On, Past, SharedHypothesis, Turn};
+use super::{Candidate, Figure, Handling, Hypothesis, Nature, On, Past, SharedHypothesis, Turn};
 use crate::explain::evidence::{RunData, SampleForces};
 
-/// A figure that is usually a little wrong.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Figure {
-    /// By a share of the traction force.
-    Traction,
-    /// By a share of the brake force.
-    Brake,
-    /// Seconds between a report and its force.
-    Lateness,
-    /// By a share of the curve resistance.
-    Curves,
-    /// By a share of a when bearings are cold.
-    Warming,
-    /// By so much of the rotating-mass factor: seldom weighed, the same in every run, and for the motion a scale
-    /// of all that acts, gradients among it, as a wheel's is.
-    RotatingMass,
-}
-
-/// All of them with the standard deviations of their errors.
+/// Figures that are usually a little wrong, with the standard deviations of their errors.
 const FIGURES: [(Figure, f64); 6] = [
     (Figure::Traction, traction::USUAL_STD),
     (Figure::Brake, traction::USUAL_STD),
@@ -51,16 +33,8 @@ struct UsualErrors {
     information: DMatrix<f64>,
 }
 
-/// The errors of the figures that none of some effects is about, at none.
-pub fn usual_errors(a_n_per_kn: f64, is_in: impl Fn(EffectKind) -> bool) -> Candidate {
-    let is_free = |figure: Figure| match figure {
-        Figure::Traction => !is_in(EffectKind::TractionGain),
-        Figure::Lateness => !is_in(EffectKind::ActuatorDelay),
-        Figure::Curves => !is_in(EffectKind::CurveResistance),
-        Figure::Warming => !is_in(EffectKind::BearingTemperature),
-        Figure::RotatingMass => !is_in(EffectKind::RotatingMass),
-        Figure::Brake => true,
-    };
+/// Nuisance parameters for the errors of the figures that no effect of the model estimates, initialised to zero.
+pub fn usual_errors(a_n_per_kn: f64, is_free: impl Fn(Figure) -> bool) -> Candidate {
     let free: Vec<(Figure, f64)> = FIGURES.into_iter().filter(|it| is_free(it.0)).collect();
     let parameter = |&(figure, std): &(Figure, f64)| {
         // Nothing acts before it is reported, and what warms up resists less.
@@ -162,21 +136,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_figure_that_an_effect_is_about_has_no_usual_error_beside_it() {
-        let free = |kind: EffectKind| usual_errors(1.0, |own| own == kind).start.len();
-        assert_eq!(free(EffectKind::LocalResistance), FIGURES.len());
-        use EffectKind::{
-            ActuatorDelay, BearingTemperature, CurveResistance, RotatingMass, TractionGain,
-        };
-        for kind in [TractionGain, ActuatorDelay, CurveResistance, BearingTemperature, RotatingMass]
-        {
-            assert_eq!(free(kind), FIGURES.len() - 1, "{kind:?}");
+    fn a_figure_that_an_effect_estimates_has_no_usual_error_beside_it() {
+        for (figure, _) in FIGURES {
+            let free = usual_errors(1.0, |own| own != figure).start.len();
+            assert_eq!(free, FIGURES.len() - 1, "{figure:?}");
         }
     }
 
     #[test]
     fn nothing_acts_before_it_is_reported_and_the_prior_is_what_is_usual() {
-        let errors = usual_errors(1.0, |_| false).hypothesis;
+        let errors = usual_errors(1.0, |_| true).hypothesis;
         let prior = errors.nature().prior.expect("a prior");
         for (i, (figure, std)) in FIGURES.into_iter().enumerate() {
             assert!((prior[(i, i)] * std * std - 1.0).abs() < 1e-12);

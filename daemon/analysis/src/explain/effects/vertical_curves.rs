@@ -14,33 +14,41 @@ use nalgebra::DMatrix;
 use super::{Candidate, Handling, Hypothesis, Nature, On};
 use crate::explain::evidence::{RunData, SampleForces};
 
-/// Length in m over which a step is rounded for a share of 1; what a train feels grows with the square of the
-/// length.
-const LENGTH_M: f64 = 60.0;
-/// Standard deviation of the share, its greatest, and the step of differences: lengths up to 190 m.
+/// Usual length in m over which a step is rounded; what a train feels grows with the square of the length.
+pub const USUAL_LENGTH_M: f64 = 60.0;
+/// Standard deviation of the share of that, its greatest, and the step of differences: lengths up to 190 m.
 const USUAL_STD: f64 = 1.0;
 const SHARE_MAX: f64 = 10.0;
 const STEP: f64 = 0.1;
-/// Places at which the mean over the length is taken.
-const PLACES: usize = 4;
+/// Greatest distance in m of the places at which the mean over the length is taken.
+const APART_M: f64 = 15.0;
 
 #[derive(Debug)]
 struct Rounded {
     track: Arc<Track>,
     train_length_m: f64,
+    /// Length in m over which steps are rounded for a share of 1.
+    length_m: f64,
     parameters: [Parameter; 1],
     information: DMatrix<f64>,
 }
 
-/// Steps that are rounded over some length, at none.
-pub fn vertical_curves(track: Arc<Track>, train_length_m: f64) -> Candidate {
+/// Returns a share of what steps that are rounded over a length in m change, from a share to start from.
+pub fn vertical_curves(
+    track: Arc<Track>,
+    train_length_m: f64,
+    length_m: f64,
+    share: f64,
+) -> Candidate {
+    let usual = (USUAL_LENGTH_M / length_m).powi(2);
     let rounded = Rounded {
         track,
         train_length_m,
-        parameters: [Parameter::new("vertical_curves", (0.0, SHARE_MAX), STEP)],
-        information: DMatrix::from_element(1, 1, USUAL_STD.powi(-2)),
+        length_m,
+        parameters: [Parameter::new("vertical_curves", (0.0, SHARE_MAX * usual), STEP * usual)],
+        information: DMatrix::from_element(1, 1, (USUAL_STD * usual).powi(-2)),
     };
-    Candidate::new(rounded, vec![0.0])
+    Candidate::new(rounded, vec![share])
 }
 
 impl Rounded {
@@ -50,9 +58,10 @@ impl Rounded {
             let place_m = centre_m + offset_m;
             self.track.gradient_towards_permille(direction, place_m, self.train_length_m)
         };
-        let place_m = |k: usize| LENGTH_M * ((k as f64 + 0.5) / PLACES as f64 - 0.5);
-        let around: f64 = (0..PLACES).filter_map(|k| at(place_m(k))).sum();
-        direction * (around / PLACES as f64 - at(0.0).unwrap_or(0.0))
+        let places = (self.length_m / APART_M).ceil().max(2.0);
+        let place_m = |k: usize| self.length_m * ((k as f64 + 0.5) / places - 0.5);
+        let around: f64 = (0..places as usize).filter_map(|k| at(place_m(k))).sum();
+        direction * (around / places - at(0.0).unwrap_or(0.0))
     }
 }
 
@@ -93,9 +102,10 @@ mod tests {
     fn a_step_is_rounded_to_both_sides_and_a_slope_stays() {
         let steps = [(0.0, 0.0), (1000.0, 8.0)];
         let track = Track::new("line".into(), None, Some(&steps), None, None).unwrap();
-        let rounded = |length_m| Rounded {
+        let rounded = |train_length_m| Rounded {
             track: Arc::new(track.clone()),
-            train_length_m: length_m,
+            train_length_m,
+            length_m: USUAL_LENGTH_M,
             parameters: [Parameter::new("vertical_curves", (0.0, SHARE_MAX), STEP)],
             information: DMatrix::identity(1, 1),
         };

@@ -4,12 +4,19 @@
 use dynocar_model::terms::wheel;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, Nature, On, OnOthers, Proposal};
+use super::{Candidate, Everyday, Hypothesis, Nature, On, OnOthers, Policy, Proposal};
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
 #[derive(Debug)]
 struct Scale;
+
+/// Wheels wear: an error of the record that every train has.
+pub const POLICY: Policy = Policy {
+    is_sought_beside_usual_errors: false,
+    everyday: Some(Everyday { rank: 2, most: f64::INFINITY }),
+    ..Policy::USUAL
+};
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -5,7 +5,10 @@ use std::collections::BTreeMap;
 use dynocar_model::terms::{Parameter, wind};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Hypothesis, Nature, On, Proposal, ReportContext, Reported};
+use super::{
+    Candidate, Certainty, Everyday, Hypothesis, Nature, On, Policy, Proposal, ReportContext,
+    Reported,
+};
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{CERTAIN_STDS, RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -23,6 +26,14 @@ struct ByRun {
     runs: Vec<(String, f64)>,
     parameters: Vec<Parameter>,
 }
+
+/// Winds differ from run to run, so it is never certain; on ordinary days they are part of the model without a name.
+pub const POLICY: Policy = Policy {
+    certainty: Certainty::Never,
+    is_sought_beside_usual_errors: false,
+    everyday: Some(Everyday { rank: 5, most: wind::EVERYDAY_MPS }),
+    ..Policy::USUAL
+};
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -17,7 +17,7 @@ use super::cleaning;
 use super::drift::drift_m;
 use super::positions::{by_part_s, distance_ratio};
 use super::sample_forces::DeclaredForces;
-use super::thinning::thinned;
+use super::thinning::{MEAN_S, thinned};
 
 /// A run, ready for fitting and for open-loop simulation.
 #[derive(Clone, Debug)]
@@ -141,6 +141,16 @@ pub enum Density {
     /// About a second apart, each the mean of those that it stands for; a run whose force comes from its power stays
     /// as recorded.
     Thinned,
+}
+
+impl Density {
+    /// Returns the time in s between samples that were recorded some s apart.
+    pub fn step_s(self, recorded_s: f64) -> f64 {
+        match self {
+            Density::Recorded => recorded_s,
+            Density::Thinned => recorded_s.max(MEAN_S),
+        }
+    }
 }
 
 /// Makes all runs of a dataset ready, as recorded.

@@ -11,7 +11,7 @@ use dynocar_model::terms::Resistance;
 use super::bins::{MOVING_MPS, SEGMENT_GAP_MAX_S};
 
 /// Time in s that a mean stands for.
-const MEAN_S: f64 = 1.0;
+pub(super) const MEAN_S: f64 = 1.0;
 
 /// The samples of a recording, thinned.
 pub(super) fn thinned(recording: &Recording) -> Vec<ResolvedSample> {

@@ -146,7 +146,7 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<Found> {
         runs,
         gain,
         estimate: 0.0,
-        choice_cost: interval_cost + subset,
+        choice_cost: subset,
         map_error: 0.0,
     };
     places.polish(&mut found, 0);
@@ -155,15 +155,17 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<Found> {
         if added.gain - found.gain < (interval_cost + 6.0).max(FURTHER_SHARE * found.gain) {
             break;
         }
-        found = Found { choice_cost: found.choice_cost + interval_cost, ..added };
+        found = added;
     }
     if found.intervals_m.len() > 1 {
-        // Each was found beside those before it alone.
+        // Each was found beside those before it alone, and the runs by the first: others end before they reach it.
         for _ in 0..SWEEPS {
+            places.choose_runs(&mut found, runs_min);
             (0..found.intervals_m.len()).for_each(|index| places.polish(&mut found, index));
         }
     }
     least_first(&mut found.intervals_m, |it| it[0]);
+    found.choice_cost += found.intervals_m.len() as f64 * interval_cost;
     found.map_error = places.map_error(&found);
     Some(found)
 }
@@ -257,6 +259,17 @@ impl Places<'_, '_> {
         grown.gain = gain;
         self.polish(&mut grown, found.intervals_m.len());
         Some(grown)
+    }
+
+    /// Chooses the runs again by all intervals together, where that explains more after its cost, which is all that
+    /// `choice_cost` holds here.
+    fn choose_runs(&self, found: &mut Found, runs_min: usize) {
+        let tuples: Vec<Tuple> =
+            (0..self.bins.len()).map(|index| self.run_tuple(index, &found.intervals_m)).collect();
+        let (runs, gain, estimate, choice_cost) = best_runs(self.scan, &tuples, runs_min);
+        if gain - choice_cost > found.gain - found.choice_cost {
+            *found = Found { runs, gain, estimate, choice_cost, ..found.clone() };
+        }
     }
 
     /// Moves the ends of an interval while that explains more.

@@ -40,7 +40,7 @@ pub enum Covariate {
 }
 
 /// A covariate for people.
-pub struct Row {
+pub struct CovariateRow {
     /// Which.
     pub covariate: Covariate,
     title: &'static str,
@@ -48,12 +48,17 @@ pub struct Row {
     per_unit: f64,
 }
 
-const fn row(covariate: Covariate, title: &'static str, unit: &'static str, per_unit: f64) -> Row {
-    Row { covariate, title, unit, per_unit }
+const fn row(
+    covariate: Covariate,
+    title: &'static str,
+    unit: &'static str,
+    per_unit: f64,
+) -> CovariateRow {
+    CovariateRow { covariate, title, unit, per_unit }
 }
 
 /// Those that every window of every run may have, in the order of the page.
-pub const COMMON: [Row; 13] = [
+pub const COMMON: [CovariateRow; 13] = [
     row(Covariate::Chainage, "Chainage", "km", 1000.0),
     row(Covariate::Speed, "Speed", "m/s", 1.0),
     row(Covariate::TimeSinceStart, "Time since start", "s", 1.0),
@@ -69,7 +74,7 @@ pub const COMMON: [Row; 13] = [
     row(Covariate::CylinderPressure, "Brake-cylinder pressure", "kPa", 1000.0),
 ];
 /// Of one run only.
-const TIME_IN_RUN: Row = row(Covariate::TimeInRun(0), "Time in the run", "s", 1.0);
+const TIME_IN_RUN: CovariateRow = row(Covariate::TimeInRun(0), "Time in the run", "s", 1.0);
 
 impl Covariate {
     /// Always shown when the data have them.
@@ -98,8 +103,8 @@ impl Covariate {
         })
     }
 
-    fn row(self) -> &'static Row {
-        let own = |row: &&Row| row.covariate == self;
+    fn row(self) -> &'static CovariateRow {
+        let own = |row: &&CovariateRow| row.covariate == self;
         COMMON.iter().find(own).unwrap_or(&TIME_IN_RUN)
     }
 

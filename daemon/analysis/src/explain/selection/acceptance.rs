@@ -8,7 +8,7 @@ use super::outcome::{Outcome, Trial};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
 use super::search::Search;
-use crate::explain::effects::SharedHypothesis;
+use crate::explain::effects::{Certainty, SharedHypothesis, policy_of};
 use crate::explain::evidence::{
     CERTAIN_STDS, CERTAIN_STDS_BY_RUN, EQUAL, Fit, OUTSIDE_COST, SCORE_MIN, acceptance_score,
 };
@@ -80,11 +80,7 @@ pub fn deciding_score(
 
 /// Whether an effect is certain, however little it takes from the error: strong evidence for one number of the
 /// whole train or line, less of it where it takes more, which the runs agree on. What is chosen among many must take
-/// more from the error; among runs or forms, it is certain only beside the usual errors, which such choices stand for
-/// else. One number a run (an outside temperature) is certain only there, too, where each run has its load and wind.
-/// Never certain are loads, winds and slippery rails, which change from run to run, a late speed, which late forces
-/// look like, a brake beside slippery rails and a local resistance or an unmapped tunnel beside gradients or a wrong
-/// wheel, which leave such where pieces of the line end.
+/// more from the error. Where a kind may be certain at all, its [policy](policy_of) says.
 pub(super) fn is_certain(
     fit: &Fit,
     index: usize,
@@ -92,30 +88,23 @@ pub(super) fn is_certain(
     reduction: f64,
     is_beside_usual_errors: bool,
 ) -> bool {
-    use EffectKind::{
-        DraggingBrake, LocalResistance, LowAdhesion, MassChange, SpeedDelay, TunnelDrag, Unknown,
-        Wind,
-    };
     let effect = &fit.model.effects[index];
-    let is_unmapped = is_unmapped_tunnel(effect);
+    let policy = policy_of(effect.kind());
     let is_by_run = effect.nature().is_one_number_a_run;
-    let is_chosen_among_many =
-        is_unmapped || matches!(effect.kind(), DraggingBrake | LocalResistance | Unknown);
-    let are_places_moved = fit.model.effects.iter().any(moves_places);
-    let is_on_slippery_rails = fit.model.has(LowAdhesion);
-    let needs_the_score = match effect.kind() {
-        LowAdhesion | MassChange | SpeedDelay | Wind => true,
-        DraggingBrake => !is_beside_usual_errors || is_on_slippery_rails,
-        Unknown => !is_beside_usual_errors,
-        _ if is_by_run => !is_beside_usual_errors,
-        LocalResistance => are_places_moved,
-        // There the map's error is beside it.
-        TunnelDrag if is_unmapped => are_places_moved && !is_beside_usual_errors,
-        _ => false,
+    let may_be_certain = match policy.certainty {
+        Certainty::Anywhere => true,
+        Certainty::BesideUsualErrors => is_beside_usual_errors,
+        Certainty::Never => false,
     };
+    let is_doubtful = policy.uncertain_beside.iter().any(|kind| fit.model.has(*kind));
+    // Among the usual errors is the map's.
+    let is_left = !is_beside_usual_errors
+        && is_left_by_moved_places(effect)
+        && fit.model.effects.iter().any(moves_places);
+    let needs_the_score = !may_be_certain || is_doubtful || is_left;
     // The size of a form hangs on its shape, what it explains does not.
     let runs_agree = || match effect.kind() {
-        Unknown => {
+        EffectKind::Unknown => {
             let size = fit.model.ranges()[index].start;
             let gain = (evidence + penalty(fit, index)).max(0.0);
             gain.sqrt() > CERTAIN_STDS * scatter_factor(fit, size)
@@ -129,7 +118,7 @@ pub(super) fn is_certain(
     let is_sure = if is_by_run {
         // Other differences between runs may follow the measurement: at most 9.6 where nothing acts.
         evidence > OUTSIDE_COST
-    } else if is_chosen_among_many {
+    } else if is_chosen_among_many(effect) {
         evidence > CERTAIN && takes_enough
     } else {
         evidence > CERTAIN || takes_enough
@@ -141,12 +130,17 @@ pub(super) fn is_certain(
 /// Whether an effect leaves a force where pieces of the line end: a gradient, or a wheel by which positions are counted
 /// between fixes.
 pub(super) fn moves_places(effect: &SharedHypothesis) -> bool {
-    effect.is_gradient() || effect.kind() == EffectKind::WheelDiameter
+    effect.is_gradient() || effect.nature().changes_speed_scale
 }
 
-/// Whether an effect is the drag of a tunnel that was chosen; where the map has its tunnels, it is one number of the line.
-pub(super) fn is_unmapped_tunnel(effect: &SharedHypothesis) -> bool {
-    effect.kind() == EffectKind::TunnelDrag && !effect.ends().is_empty()
+/// Whether the remainder of what [moves places](moves_places) looks like an effect, whose place was chosen.
+pub(super) fn is_left_by_moved_places(effect: &SharedHypothesis) -> bool {
+    policy_of(effect.kind()).is_left_by_moved_places && is_chosen_among_many(effect)
+}
+
+/// Whether the form, place or run of an effect was chosen among many.
+fn is_chosen_among_many(effect: &SharedHypothesis) -> bool {
+    policy_of(effect.kind()).is_one_of_many || !effect.ends().is_empty()
 }
 
 /// Size of an effect in standard deviations by the scatter between the runs.

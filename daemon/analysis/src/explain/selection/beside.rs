@@ -6,9 +6,10 @@
 
 use std::sync::Arc;
 
+use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_unmapped_tunnel, moves_places};
+use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, moves_places};
 use super::acceptance::{is_material, is_possible};
 use super::by_run::{Deviations, deviations, deviations_beside};
 use super::outcome::{Beside, Outcome, Trial, round_of};
@@ -17,7 +18,8 @@ use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::{Asked, PROMISE_TIMES};
 use crate::explain::effects::{
-    Candidate, map_error, map_error_as_fitted, usual_errors, vertical_curves,
+    Candidate, USUAL_LENGTH_M, map_error, map_error_as_fitted, policy_of, usual_errors,
+    vertical_curves,
 };
 use crate::explain::evidence::Fit;
 use crate::explain::gradient_prior::SURVEYED;
@@ -30,28 +32,10 @@ pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
 }
 
-/// Returns whether a kind acts on the train by one law wherever it is. Errors of the record and of the map, places
-/// that pieces of the map's error look like, and loads, winds and slippery rails, which differ from run to run, do
-/// not.
-fn is_sought(kind: EffectKind) -> bool {
-    use EffectKind::{
-        ActuatorDelay, GradientError, GradientShift, LocalResistance, LowAdhesion, MassChange,
-        SpeedDelay, TractionGain, WheelDiameter, Wind,
-    };
-    !matches!(
-        kind,
-        ActuatorDelay
-            | GradientError
-            | GradientShift
-            | LocalResistance
-            | LowAdhesion
-            | MassChange
-            | SpeedDelay
-            | TractionGain
-            | WheelDiameter
-            | Wind
-    )
-}
+/// Times at most that the length over which steps are rounded is found again, and the share by which what it changes
+/// may be off.
+const ROUNDING_TURNS: usize = 3;
+const ROUNDING_SHARE: f64 = 0.1;
 
 /// Why a mass of single runs is none.
 const AS_LOADS_ARE: &str =
@@ -66,10 +50,17 @@ impl Search<'_> {
         {
             return beside.clone();
         }
-        let usual = usual_errors(fit.theta[0], |kind| fit.model.has(kind));
+        let frees = |kind: EffectKind| policy_of(kind).frees;
+        let freed: Vec<_> = fit.model.effects.iter().flat_map(|it| frees(it.kind())).collect();
+        let usual = usual_errors(fit.theta[0], |figure| !freed.contains(&&figure));
         let shared = usual.start.len();
-        let errors = self.map_errors(fit).into_iter().chain([usual]).map(Candidate::parts);
-        let fit = self.problem.with_runs_apart(self.problem.grown(fit, errors));
+        let map_errors = self.map_errors(fit);
+        let rounded = map_errors.len().checked_sub(1).map(|last| fit.model.effects.len() + last);
+        let errors = map_errors.into_iter().chain([usual]).map(Candidate::parts);
+        let mut fit = self.problem.with_runs_apart(self.problem.grown(fit, errors));
+        if let Some(rounded) = rounded {
+            self.round_as_found(&mut fit, rounded);
+        }
         let beside = Arc::new(Beside { fit, shared });
         outcome.beside = Some((outcome.fit.theta.clone(), beside.clone()));
         beside
@@ -84,8 +75,30 @@ impl Search<'_> {
         let (Some(track), Some(span_m)) = (track, span_m.filter(|[low, high]| high > low)) else {
             return Vec::new();
         };
-        let rounded = vertical_curves(track.clone(), self.train.length_m);
+        let rounded = vertical_curves(track.clone(), self.train.length_m, USUAL_LENGTH_M, 0.0);
         vec![map_error(span_m, SURVEYED), rounded]
+    }
+
+    /// Fits again with steps rounded over the length that a fit shows, where it shows another than the usual one: a
+    /// share of another length has another shape, and a rotating mass takes up the difference.
+    fn round_as_found(&self, fit: &mut Fit, number: usize) {
+        let Some(track) = self.track else { return };
+        let mut length_m = USUAL_LENGTH_M;
+        for _ in 0..ROUNDING_TURNS {
+            let at = fit.model.ranges()[number].start;
+            let share = fit.theta[at];
+            let std = deviations_beside(fit, fit.theta.len(), 0).std[at];
+            let is_shown = std.is_finite() && share > HALF_95 * std;
+            if !is_shown || (share - 1.0).abs() < ROUNDING_SHARE {
+                return;
+            }
+            length_m *= share.sqrt();
+            let rounded = vertical_curves(track.clone(), self.train.length_m, length_m, 1.0);
+            let (mut model, mut theta) = (fit.model.clone(), fit.theta.clone());
+            model.effects[number] = rounded.hypothesis;
+            theta[at] = 1.0;
+            *fit = self.problem.fit(&model, theta, fit.noise);
+        }
     }
 
     /// Takes in what is certain beside the usual errors; false for nothing.
@@ -99,17 +112,20 @@ impl Search<'_> {
         }
         let looked = self.with_map_as_fitted(&outcome.fit, beside);
         let fallen = outcome.fallen_kinds();
+        let is_sought = |kind: EffectKind| {
+            policy_of(kind).is_sought_beside_usual_errors && !fallen.contains(&kind)
+        };
         let tried = self.round_of(
             &looked,
             &mut Vec::new(),
-            Asked { is_asked: &|kind| is_sought(kind) && !fallen.contains(&kind), rivals_of: None },
+            Asked { is_asked: &is_sought, rivals_of: None },
         );
         let may_be = |trial: &&Trial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
-        // The remainder of a wrong wheel or gradient looks like an unmapped tunnel.
         let are_places_moved = outcome.fit.model.effects.iter().any(moves_places);
-        let is_unmapped =
-            |trial: &Trial| is_unmapped_tunnel(&trial.fit.model.effects[trial.last()]);
-        let may_stand = |trial: &&Trial| may_be(trial) && !(are_places_moved && is_unmapped(trial));
+        let is_left = |trial: &Trial| {
+            are_places_moved && is_left_by_moved_places(&trial.fit.model.effects[trial.last()])
+        };
+        let may_stand = |trial: &&Trial| may_be(trial) && !is_left(trial);
         let may_be_certain = tried.iter().filter(may_stand);
         let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));

@@ -18,7 +18,7 @@ use crate::explain::scan::Scan;
 pub type Progress<'p> = &'p (dyn Fn(f64, &str) + Sync);
 
 /// How many steps of a round are done, by all threads together.
-pub struct Steps<'s> {
+pub struct RoundSteps<'s> {
     progress: Progress<'s>,
     round: usize,
     count: usize,
@@ -31,10 +31,10 @@ pub fn round_share(round: usize, done: f64) -> f64 {
     0.05 + 0.9 * (1.0 - left)
 }
 
-impl<'s> Steps<'s> {
+impl<'s> RoundSteps<'s> {
     /// Returns the progress of a round after `round` effects, which takes `count` steps at most.
     pub fn of(progress: Progress<'s>, round: usize, count: usize) -> Self {
-        Steps { progress, round, count, done: AtomicUsize::new(0) }
+        RoundSteps { progress, round, count, done: AtomicUsize::new(0) }
     }
 
     /// Does one step for a kind.
@@ -193,7 +193,7 @@ mod tests {
         let shares = Mutex::new(Vec::new());
         let progress = |share: f64, _: &str| shares.lock().unwrap().push(share);
         for round in 0..5 {
-            let steps = Steps::of(&progress, round, 3);
+            let steps = RoundSteps::of(&progress, round, 3);
             (0..3).for_each(|_| steps.done_with(&LIBRARY[0], || ()));
         }
         let shares = shares.into_inner().unwrap();

@@ -5,7 +5,6 @@
 //! them certain, and they take little from the open-loop error. Left out of the model they would stand in its
 //! noise and hide what matters.
 
-use dynocar_model::terms::wind;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{CERTAIN, is_accepted};
@@ -13,35 +12,20 @@ use super::outcome::{Outcome, Trial};
 use super::price::penalty;
 use super::refusal::Refusal;
 use super::search::Search;
-use crate::explain::effects::SharedHypothesis;
+use crate::explain::effects::{SharedHypothesis, policy_of};
 use crate::explain::evidence::Fit;
 use crate::explain::score::reduction;
 use crate::statistics::rms;
 
-/// Kinds by which clocks, wheels and force sensors are always a little off, the most usual first.
-const EVERYDAY: [EffectKind; 5] = [
-    EffectKind::ActuatorDelay,
-    EffectKind::WheelDiameter,
-    EffectKind::TractionGain,
-    EffectKind::SpeedDelay,
-    EffectKind::Wind,
-];
-
-/// Kinds by which something is late.
-const LATE: [EffectKind; 2] = [EffectKind::ActuatorDelay, EffectKind::SpeedDelay];
-
-/// Whether winds are such as blow on ordinary days.
-fn is_everyday_wind(trial: &Trial) -> bool {
-    rms(trial.fit.effect_parameters(trial.last())) <= wind::EVERYDAY_MPS
-}
-
 /// Whether an everyday kind is certain, and only for its size no effect.
 fn is_certain_and_small(trial: &Trial) -> bool {
     let refusal = Search::refusal(trial);
-    let late = trial.fit.model.effects.iter().filter(|it| LATE.contains(&it.kind())).count();
+    let late = trial.fit.model.effects.iter().filter(|it| policy_of(it.kind()).is_late).count();
+    let everyday = policy_of(trial.kind).everyday;
     trial.evidence > CERTAIN
-        && (trial.kind != EffectKind::Wind || is_everyday_wind(trial))
-        && late < LATE.len()
+        && everyday.is_some_and(|it| rms(trial.fit.effect_parameters(trial.last())) <= it.most)
+        // The kinds that make something late look alike: one of them is enough.
+        && late <= 1
         && matches!(refusal, Some(Refusal::Immaterial | Refusal::Weak(_)))
 }
 
@@ -53,9 +37,11 @@ impl Search<'_> {
         &self,
         trials: &[Trial],
     ) -> Option<(Vec<EffectKind>, Fit)> {
-        let of = |kind: &EffectKind| trials.iter().find(|trial| trial.kind == *kind);
+        let rank = |trial: &Trial| policy_of(trial.kind).everyday.map(|it| it.rank);
+        let mut everyday: Vec<&Trial> = trials.iter().filter(|it| rank(it).is_some()).collect();
+        everyday.sort_by_key(|trial| rank(trial));
         let mut taken: Option<(Vec<EffectKind>, Fit)> = None;
-        for alone in EVERYDAY.iter().filter_map(of).filter(|trial| is_certain_and_small(trial)) {
+        for alone in everyday.into_iter().filter(|trial| is_certain_and_small(trial)) {
             let Some((kinds, fit)) = &mut taken else {
                 taken = Some((vec![alone.kind], alone.fit.clone()));
                 continue;
@@ -107,7 +93,7 @@ impl Search<'_> {
     /// Everyday scales of which nothing is left beside the usual errors: the 95 % interval there holds none.
     fn usual_scales(&self, outcome: &mut Outcome) -> Vec<EffectKind> {
         let is_scale = |effect: &SharedHypothesis| {
-            EVERYDAY.contains(&effect.kind()) && effect.parameters().len() == 1
+            policy_of(effect.kind()).everyday.is_some() && effect.parameters().len() == 1
         };
         if !outcome.fit.model.effects.iter().any(is_scale) {
             return Vec::new();

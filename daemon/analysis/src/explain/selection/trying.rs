@@ -6,8 +6,8 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::outcome::Trial;
 use super::price::{discounted, penalty};
+use super::search::RoundSteps;
 use super::search::Search;
-use super::search::Steps;
 use crate::explain::effects::{Candidate, Effect, LIBRARY, UNKNOWN};
 use crate::explain::evidence::{Fit, Noise};
 use crate::explain::scan::Scan;
@@ -75,7 +75,8 @@ impl Search<'_> {
         asked: Asked,
     ) -> Vec<Trial> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
-        let steps = Steps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
+        let steps =
+            RoundSteps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
         let share = if asked.rivals_of.is_some() { RIVAL_SHARE } else { FINALIST_SHARE };
         let mut trials = self.try_all(base, &scan, &steps, not_testable, asked);
         let before = FitErrors::of(self.problem, base);
@@ -115,7 +116,7 @@ impl Search<'_> {
         &self,
         base: &Fit,
         scan: &Scan,
-        steps: &Steps,
+        steps: &RoundSteps,
         not_testable: &mut Vec<(EffectKind, String)>,
         Asked { is_asked, rivals_of }: Asked,
     ) -> Vec<(Trial, &'static Effect)> {

@@ -1,3 +1,5 @@
+//! The particle filter against an exact Kalman smoother.
+
 use super::*;
 use crate::filter::Gaussian;
 use crate::filter::test_runs::MovingState;

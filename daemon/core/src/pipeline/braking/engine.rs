@@ -97,7 +97,7 @@ pub struct Observation {
 
 /// Result of an engine's update with an observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step {
+pub enum EngineStep {
     /// It entered the window; the estimate stays as it was.
     Collected,
     /// The estimate was updated.
@@ -137,7 +137,7 @@ pub trait Engine: Send {
     /// # Real-time
     ///
     /// Allocates nothing.
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<Step>;
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<EngineStep>;
 
     /// Takes the variance of a measured distance in m² for another one from the next step on.
     fn set_distance_variance(&mut self, variance_m2: f64);

@@ -7,7 +7,7 @@ use dynocar_shared::{
 };
 use nalgebra::{Matrix1, Matrix2, SVector};
 
-use super::engine::{BrakingSettings, Engine, Estimate, Observation, Step};
+use super::engine::{BrakingSettings, Engine, EngineStep, Estimate, Observation};
 use super::intake::{BrakingCoefficient, BrakingIntake, Intake};
 use super::motion::StepInputs;
 use crate::pipeline::judge::Case;
@@ -75,16 +75,16 @@ impl BrakingSettings {
 impl<E: Engine> BrakingEstimator<E> {
     fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Outcome {
         match self.engine.step(inputs, observed) {
-            Some(Step::Collected) => Outcome::Used,
-            Some(Step::Updated { normalised_innovation }) => {
+            Some(EngineStep::Collected) => Outcome::Used,
+            Some(EngineStep::Updated { normalised_innovation }) => {
                 if let Some(normalised) = normalised_innovation {
                     self.innovations.push(normalised);
                 }
                 self.hold(observed.speed_mps);
                 Outcome::Updated
             }
-            Some(Step::Outlier) => Outcome::Rejected(RejectionReason::Outlier),
-            Some(Step::Restarted) => {
+            Some(EngineStep::Outlier) => Outcome::Rejected(RejectionReason::Outlier),
+            Some(EngineStep::Restarted) => {
                 self.resets += 1;
                 self.is_current = false;
                 self.innovations.break_here();

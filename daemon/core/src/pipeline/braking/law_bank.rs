@@ -8,7 +8,7 @@
 use dynocar_shared::Uncertain;
 use nalgebra::Vector1;
 
-use super::engine::{Engine, Estimate, Observation, Step};
+use super::engine::{Engine, EngineStep, Estimate, Observation};
 use super::law::Law;
 use super::motion::{DRIFT, SCALE, SPEED, STATES, StepInputs};
 use super::tracker::{TrackerModel, measure};
@@ -112,10 +112,10 @@ impl Engine for LawBank {
         self.is_started = true;
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<Step> {
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<EngineStep> {
         if !self.is_started {
             self.start(observed);
-            return Some(Step::Restarted);
+            return Some(EngineStep::Restarted);
         }
         let priors = self.mix(inputs.step_s);
         for ((law, weight), prior) in self.laws.weighed_mut().zip(priors) {
@@ -132,7 +132,7 @@ impl Engine for LawBank {
         }
         self.shares = self.laws.shares(|_| true);
         let normalised = self.laws.likeliest().normalised;
-        Some(Step::Updated { normalised_innovation: Some(normalised) })
+        Some(EngineStep::Updated { normalised_innovation: Some(normalised) })
     }
 
     fn set_distance_variance(&mut self, variance_m2: f64) {

@@ -6,7 +6,7 @@
 use dynocar_shared::Uncertain;
 use nalgebra::{SMatrix, SVector};
 
-use super::engine::{BrakingSettings, Engine, Estimate, Observation, Step};
+use super::engine::{BrakingSettings, Engine, EngineStep, Estimate, Observation};
 use super::law::Law;
 use super::motion::{self, DISTANCE, MotionNoise, SCALE, SPEED, STATES, StepInputs, Walk};
 use crate::filter::fixed_lag::FixedLagSmoother;
@@ -210,10 +210,10 @@ impl Engine for Tracker {
         self.restart(first);
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<Step> {
+    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<EngineStep> {
         let Some(state) = &mut self.state else {
             self.start(observed);
-            return Some(Step::Restarted);
+            return Some(EngineStep::Restarted);
         };
         self.time_s += inputs.step_s;
         let jacobian = self.model.advance(inputs, state);
@@ -237,9 +237,9 @@ impl Engine for Tracker {
             if is_outlier {
                 if self.outliers.push(true) {
                     self.restart(observed);
-                    return Some(Step::Restarted);
+                    return Some(EngineStep::Restarted);
                 }
-                return Some(Step::Outlier);
+                return Some(EngineStep::Outlier);
             }
             let gain = state.take(component, &innovation, variance);
             if has_lag {
@@ -254,10 +254,10 @@ impl Engine for Tracker {
         }
         if is_change && self.detects_changes {
             self.restart(observed);
-            return Some(Step::Restarted);
+            return Some(EngineStep::Restarted);
         }
         self.remember(observed.demand);
-        Some(Step::Updated { normalised_innovation: first_innovation })
+        Some(EngineStep::Updated { normalised_innovation: first_innovation })
     }
 
     fn set_distance_variance(&mut self, variance_m2: f64) {

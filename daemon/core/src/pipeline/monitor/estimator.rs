@@ -10,11 +10,11 @@ use super::MonitorSettings;
 use super::covariates::{CovariateImpulse, PlaceMemory, RunClock, covariates};
 use super::information::{BaseVector, Information, usual};
 use super::pressure::ReleasedPressure;
-use super::rows::{Parameters, Row, Rows, units};
+use super::rows::{DesignRow, Parameters, Rows, units};
 use super::suspects::{
     BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, Onsets, SUSPECTS, suspect_of,
 };
-use super::verdict::{Evidence, Verdict};
+use super::verdict::{ResidualEvidence, Verdict};
 use super::wheel_scale::WheelScale;
 use crate::pipeline::judge::Case;
 use crate::pipeline::momentum::blocks::MomentumBlocks;
@@ -217,7 +217,7 @@ impl ResidualMonitor {
     }
 
     /// Whether the cause of the suspicion has ended, by a row.
-    fn watch_end(&mut self, row: &Row, innovation: f64) {
+    fn watch_end(&mut self, row: &DesignRow, innovation: f64) {
         let Some(parameter) = self.verdict.naming.parameter() else { return };
         let without = innovation + row.features[parameter] * self.model[parameter];
         let weight = row.weight;
@@ -249,7 +249,7 @@ impl ResidualMonitor {
 
     fn judge(&mut self, units: &Parameters, speed_mps: f64, is_new_place: bool) {
         let Ok(base) = self.information.base() else { return self.reset() };
-        self.verdict.judge(&Evidence {
+        self.verdict.judge(&ResidualEvidence {
             information: &self.information,
             base: &base,
             onsets: &self.onsets,

@@ -11,7 +11,7 @@ use dynocar_model::train::TrainModel;
 use nalgebra::{SMatrix, SVector};
 
 use super::MonitorSettings;
-use super::rows::{Parameters, Row};
+use super::rows::{DesignRow, Parameters};
 use super::suspects::{BASE, CURVE, DAY_WIND, LOAD, PARAMETERS, WARMING};
 use crate::filter::NotPositiveDefinite;
 use crate::pipeline::momentum::{
@@ -191,7 +191,7 @@ impl Information {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn push(&mut self, row: &Row, kept: f64) {
+    pub fn push(&mut self, row: &DesignRow, kept: f64) {
         self.matrix.ger(row.weight, &row.features, &row.features, kept);
         self.side.axpy(row.weight * row.observed, &row.features, kept);
         self.square_sum = kept * self.square_sum + row.weight * row.observed * row.observed;
@@ -335,7 +335,7 @@ mod tests {
             let mut features = Parameters::zeros();
             (features[0], features[one], features[two]) = (at(3.0), at(5.0), at(5.0) + at(7.0));
             let observed = 2.0 * features[one] + 0.7 * at(9.0);
-            information.push(&Row { features, observed, weight: 1.0 }, 1.0);
+            information.push(&DesignRow { features, observed, weight: 1.0 }, 1.0);
         }
         let base = information.base().unwrap();
         let alone = base.alternative(two, 1.0);
@@ -357,7 +357,7 @@ mod tests {
         let mut information = Information::new(&BaseVector::repeat(1.0));
         let mut features = Parameters::zeros();
         features[TRACTION_SCALE] = 1e4;
-        information.push(&Row { features, observed: 0.02 * 1e4, weight: 1.0 }, 1.0);
+        information.push(&DesignRow { features, observed: 0.02 * 1e4, weight: 1.0 }, 1.0);
         let scale = |it: &Information| it.base().unwrap().parameter(TRACTION_SCALE);
         assert!(scale(&information).1.sqrt() < 2e-4);
         information.loosen(TRACTION_SCALE, 0.003);

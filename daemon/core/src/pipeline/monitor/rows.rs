@@ -21,7 +21,7 @@ pub type Parameters = SVector<f64, PARAMETERS>;
 
 /// `observed = features . parameters + error`, the error of unit variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct DesignRow {
     /// Regressors.
     pub features: Parameters,
     /// Observed sum.
@@ -79,7 +79,7 @@ impl Rows {
         block: &MomentumBlock,
         units: &Parameters,
         predicted: impl Fn(&Parameters) -> f64,
-    ) -> Option<Row> {
+    ) -> Option<DesignRow> {
         let gap_s = gap_s(&mut self.last_time_ns, block.time_ns);
         let small = self.small_forces(block);
         if block.is_first {
@@ -99,12 +99,12 @@ impl Rows {
         &mut self,
         block: &MomentumBlock,
         predicted: impl Fn(&Parameters) -> f64,
-    ) -> Option<Row> {
+    ) -> Option<DesignRow> {
         let sighting = momentum_seen(block.momentum, block.momentum_variance);
         let row = self.whitener.take(&sighting).ok()?.columns;
         let (observed, features) = (row[0], row.fixed_rows::<PARAMETERS>(1).into_owned());
         let weight = (HUBER / (observed - predicted(&features)).abs()).min(1.0);
-        Some(Row { features, observed, weight })
+        Some(DesignRow { features, observed, weight })
     }
 
     /// The small forces that are no effect.

@@ -17,15 +17,15 @@ pub const BASE: usize = UNKNOWNS + USUAL.len();
 pub const LOAD: usize = UNKNOWNS;
 /// Index of the headwind of a run in m/s.
 pub const DAY_WIND: usize = UNKNOWNS + 1;
-/// Place of what the curve constant lacks, in 1000 N/kN m.
+/// Index of the error of the curve constant, in 1000 N/kN m.
 pub const CURVE: usize = UNKNOWNS + 2;
-/// Place of what cold bearings add at the start of a run, as a share of a.
+/// Index of the resistance that cold bearings add at the start of a run, as a share of a.
 pub const WARMING: usize = UNKNOWNS + 3;
-/// Parameters that count only where their value is unusual, the delay apart.
+/// Parameters that are suspects only where their value is unusual; the delay is judged by itself.
 pub const UNUSUAL: [usize; 5] = [TRACTION_SCALE, LOAD, DAY_WIND, CURVE, WARMING];
 /// Suspects with a column of their own in addition to the base model.
 pub const SUSPECTS: usize = TERMS.len() + BANDS.len();
-/// These: the terms, and laws of the speed that none of them follows.
+/// The suspects: terms, and forces in bands of the speed, which follow no term.
 pub const BANK: [Suspect; SUSPECTS] = {
     let mut bank = [BANDS[0]; SUSPECTS];
     let mut index = 0;

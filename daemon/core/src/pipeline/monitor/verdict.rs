@@ -31,7 +31,7 @@ const PRIOR_ROWS: f64 = 20.0;
 
 /// Evidence from which the verdict is formed.
 #[derive(Clone, Copy, Debug)]
-pub struct Evidence<'a> {
+pub struct ResidualEvidence<'a> {
     /// All rows.
     pub information: &'a Information,
     /// The base model solved.
@@ -144,7 +144,7 @@ impl Verdict {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn judge(&mut self, evidence: &Evidence) {
+    pub fn judge(&mut self, evidence: &ResidualEvidence) {
         self.leg_blocks = self.leg_blocks.saturating_add(1);
         let mut found = [None; CANDIDATES];
         let mut best: f64 = 0.0;
@@ -182,7 +182,7 @@ impl Verdict {
 
     /// Returns the evidence that a parameter of the base model is unusual, and its cost: against any usual value,
     /// and as the best account of the rows.
-    fn unusual(&self, parameter: usize, evidence: &Evidence) -> Option<[(f64, f64); 2]> {
+    fn unusual(&self, parameter: usize, evidence: &ResidualEvidence) -> Option<[(f64, f64); 2]> {
         let usual_std = evidence.base.usual_std(parameter);
         let (it, given_base) = evidence.base.unusual(parameter, suspect_of(parameter).prior_std);
         let least = self.least(parameter);
@@ -194,7 +194,7 @@ impl Verdict {
     }
 
     /// Blocks for which a suspect could act; `None` for a brake that was not yet looked for.
-    fn age(&self, parameter: usize, evidence: &Evidence) -> Option<u32> {
+    fn age(&self, parameter: usize, evidence: &ResidualEvidence) -> Option<u32> {
         match parameter.checked_sub(FIRST_ONSET) {
             Some(index) => evidence.onsets.age(index),
             None if suspect_of(parameter).changes_at_stops => Some(self.leg_blocks),
@@ -203,7 +203,7 @@ impl Verdict {
     }
 
     /// Returns the evidence for a law of the speed given the named suspect.
-    fn left_by_name(&self, evidence: &Evidence) -> f64 {
+    fn left_by_name(&self, evidence: &ResidualEvidence) -> f64 {
         let Some(named) = self.naming.parameter() else { return 0.0 };
         let bands = (FIRST_BAND..FIRST_ONSET).filter(|&band| band != named);
         let left = bands.map(|band| {
@@ -223,7 +223,7 @@ impl Verdict {
         left.fold(0.0, f64::max)
     }
 
-    fn name(&mut self, evidence: &Evidence) {
+    fn name(&mut self, evidence: &ResidualEvidence) {
         let mut net = self.own;
         let mut rank = self.given_base;
         for suspect in 0..SUSPECTS {
@@ -269,7 +269,7 @@ fn is_there(parameter: usize, it: &Alternative, least: f64) -> bool {
 
 /// Returns the evidence for forces that act late, and its cost: the delay of the base model, beyond the error of a
 /// logger that writes means over a step.
-fn late(evidence: &Evidence) -> (f64, f64) {
+fn late(evidence: &ResidualEvidence) -> (f64, f64) {
     let (late_s, variance) = evidence.base.parameter(FORCE_DELAY);
     let beyond_s = late_s - delay::TOLERATED_S.max(evidence.period_s);
     let cost = (evidence.base.usual_std(FORCE_DELAY).powi(2) / variance).ln().max(0.0);

@@ -21,7 +21,7 @@ const PRIOR_STD: f64 = 0.02;
 
 /// A line through the points of a row, as sums over them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Row {
+struct DesignRow {
     count: f64,
     distance: f64,
     distance_square: f64,
@@ -46,7 +46,7 @@ struct Going {
     samples: f64,
     strangers: u32,
     next_m: f64,
-    row: Row,
+    row: DesignRow,
 }
 
 /// Watches the scale of the speed.
@@ -110,7 +110,7 @@ impl WheelScale {
             samples: 0.0,
             strangers: 0,
             next_m: APART_M,
-            row: Row::default(),
+            row: DesignRow::default(),
         });
     }
 
@@ -132,7 +132,7 @@ impl WheelScale {
     }
 }
 
-impl Row {
+impl DesignRow {
     fn push(&mut self, travelled_m: f64, offset_m: f64) {
         self.count += 1.0;
         self.distance += travelled_m;

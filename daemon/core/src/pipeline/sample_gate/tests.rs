@@ -28,11 +28,11 @@ fn taken(gate: &mut SampleGate, samples: &[ResolvedSample]) -> Vec<(f64, f64, f6
             (1e-9 * it.time_ns as f64, force.round(), it.step_s)
         };
         match gate.judge(it) {
-            Verdict::Take => all.push(figures(it)),
-            Verdict::Release(count) => {
+            GateVerdict::Take => all.push(figures(it)),
+            GateVerdict::Release(count) => {
                 all.extend((0..count).map(|index| figures(&gate.released(index).unwrap())));
             }
-            Verdict::Wait | Verdict::Refuse(_) => {}
+            GateVerdict::Wait | GateVerdict::Refuse(_) => {}
         }
     }
     all
@@ -137,7 +137,7 @@ fn what_a_moving_train_repeats_place_and_all_shows_nothing() {
     assert_eq!(all[11].2, 0.0, "after seconds of it the motion begins anew");
     let mut gate = SampleGate::default();
     let verdicts: Vec<_> = samples[..40].iter().map(|it| gate.judge(it)).collect();
-    assert_eq!(verdicts[39], Verdict::Refuse(RejectionReason::Frozen));
+    assert_eq!(verdicts[39], GateVerdict::Refuse(RejectionReason::Frozen));
     // A train that says nothing of its place may well hold its speed.
     samples.iter_mut().for_each(|it| it.position_m = None);
     assert_eq!(taken(&mut SampleGate::default(), &samples).len(), 60);
@@ -164,6 +164,6 @@ fn samples_that_cannot_be_judged_pass_to_the_estimator() {
     ];
     for it in odd {
         gate.judge(&sample(0, 50.0));
-        assert_eq!(gate.judge(&it), Verdict::Take, "{it:?}");
+        assert_eq!(gate.judge(&it), GateVerdict::Take, "{it:?}");
     }
 }

@@ -16,7 +16,7 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, S
 use nalgebra::Vector3;
 
 use super::hypothesis::Innovation;
-use super::motion::{Motion, MotionStep, MotionTracker, UnexplainedForce};
+use super::motion::{MotionStep, MotionTracker, MotionUpdate, UnexplainedForce};
 use super::noise::NoiseModel;
 use super::online::{OnlineFilter, OnlineSettings, StepDoubt};
 use super::quality::{Estimate, prior_std};
@@ -169,15 +169,15 @@ impl Gated for TrajectoryKalman {
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
         self.rounding.see(sample.speed_mps);
         let outcome = match self.tracker.advance(sample) {
-            Motion::Continue(motion) => self.take_step(&motion, sample),
-            Motion::Begin => {
+            MotionUpdate::Continue(motion) => self.take_step(&motion, sample),
+            MotionUpdate::Begin => {
                 self.filter.begin(sample.speed_mps);
                 self.unexplained.begin(sample.speed_mps);
                 self.innovations.break_here();
                 Outcome::Used
             }
-            Motion::Standstill => Outcome::Used,
-            Motion::Unusable(reason) => Outcome::Rejected(reason),
+            MotionUpdate::Standstill => Outcome::Used,
+            MotionUpdate::Unusable(reason) => Outcome::Rejected(reason),
         };
         self.health.note(outcome, sample)
     }

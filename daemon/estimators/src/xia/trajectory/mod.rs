@@ -3,9 +3,9 @@
 //!
 //! - [`step`]: how a train moves over one step, with derivatives
 //! - [`motion`]: from resolved samples to steps
-//! - [`residuals`], [`fit`]: ours, offline and over windows
-//! - [`hypothesis`], [`noise`], [`online`]: ours, sample by sample
-//! - [`quality`]: what an estimate is worth
+//! - [`residuals`], [`fit`]: Dynocar's own method, offline and over windows
+//! - [`hypothesis`], [`noise`], [`online`]: Dynocar's own method, sample by sample
+//! - [`quality`]: whether an estimate may be trusted
 //! - [`A`], [`B`], [`C`], [`SPEED`]: places in vectors and matrices
 
 pub mod fit;

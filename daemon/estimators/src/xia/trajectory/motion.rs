@@ -10,7 +10,7 @@ use super::step::{Step, StepRule};
 
 /// Addition of a sample to a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Motion {
+pub enum MotionUpdate {
     /// The trajectory begins anew at this sample's speed: the forces up to here are not known.
     Begin,
     /// One more step.
@@ -69,27 +69,27 @@ impl MotionTracker {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn advance(&mut self, sample: &ResolvedSample) -> Motion {
+    pub fn advance(&mut self, sample: &ResolvedSample) -> MotionUpdate {
         let last = self.last.take();
         if sample.is_sliding {
-            return Motion::Unusable(RejectionReason::WheelSlide);
+            return MotionUpdate::Unusable(RejectionReason::WheelSlide);
         }
         if sample.speed_mps <= MOVING_MPS {
-            return Motion::Standstill;
+            return MotionUpdate::Standstill;
         }
         let Some(driving_force_n) = sample.driving_force_n() else {
-            return Motion::Unusable(RejectionReason::Missing);
+            return MotionUpdate::Unusable(RejectionReason::Missing);
         };
         let drive_mps2 = driving_force_n / sample.inertial_mass_kg;
         let resistance_gain = sample.weight_kn / sample.inertial_mass_kg;
         let speed_mps = sample.speed_mps;
         if !(drive_mps2.is_finite() && resistance_gain.is_finite() && speed_mps.is_finite()) {
-            return Motion::Unusable(RejectionReason::NotFinite);
+            return MotionUpdate::Unusable(RejectionReason::NotFinite);
         }
         self.last = Some(Anchor { segment: sample.segment, speed_mps, drive_mps2 });
         match last {
             Some(last) if last.segment == sample.segment && sample.step_s > 0.0 => {
-                Motion::Continue(MotionStep {
+                MotionUpdate::Continue(MotionStep {
                     duration_s: sample.step_s,
                     distance_m: 0.5 * (last.speed_mps + speed_mps) * sample.step_s,
                     drive_mps2: 0.5 * (last.drive_mps2 + drive_mps2),
@@ -97,7 +97,7 @@ impl MotionTracker {
                     resistance_gain,
                 })
             }
-            _ => Motion::Begin,
+            _ => MotionUpdate::Begin,
         }
     }
 }
@@ -198,8 +198,10 @@ pub(super) mod tests {
     #[test]
     fn two_samples_of_a_segment_make_a_step_of_mean_force() {
         let mut tracker = MotionTracker::default();
-        assert_eq!(tracker.advance(&sample(0, 10.0, 1.06e4)), Motion::Begin);
-        let Motion::Continue(step) = tracker.advance(&sample(1, 10.2, 3.18e4)) else { panic!() };
+        assert_eq!(tracker.advance(&sample(0, 10.0, 1.06e4)), MotionUpdate::Begin);
+        let MotionUpdate::Continue(step) = tracker.advance(&sample(1, 10.2, 3.18e4)) else {
+            panic!()
+        };
         assert!((step.drive_mps2 - 0.2).abs() < 1e-12);
         assert!((step.distance_m - 2.02).abs() < 1e-12);
         assert!((step.resistance_gain - 9.81e-3 / 1.06).abs() < 1e-12);
@@ -211,15 +213,15 @@ pub(super) mod tests {
         let sliding = ResolvedSample { is_sliding: true, ..sample(1, 10.0, 0.0) };
         let next_segment = ResolvedSample { segment: 2, ..sample(1, 10.0, 0.0) };
         for (between, expected) in [
-            (missing, Motion::Unusable(RejectionReason::Missing)),
-            (sliding, Motion::Unusable(RejectionReason::WheelSlide)),
-            (sample(1, 0.0, 0.0), Motion::Standstill),
-            (next_segment, Motion::Begin),
+            (missing, MotionUpdate::Unusable(RejectionReason::Missing)),
+            (sliding, MotionUpdate::Unusable(RejectionReason::WheelSlide)),
+            (sample(1, 0.0, 0.0), MotionUpdate::Standstill),
+            (next_segment, MotionUpdate::Begin),
         ] {
             let mut tracker = MotionTracker::default();
             tracker.advance(&sample(0, 10.0, 0.0));
             assert_eq!(tracker.advance(&between), expected);
-            assert_eq!(tracker.advance(&sample(2, 10.0, 0.0)), Motion::Begin);
+            assert_eq!(tracker.advance(&sample(2, 10.0, 0.0)), MotionUpdate::Begin);
         }
     }
 
@@ -227,7 +229,7 @@ pub(super) mod tests {
     fn a_force_that_is_not_a_number_is_refused() {
         let mut tracker = MotionTracker::default();
         let bad = ResolvedSample { traction_force_n: Some(f64::NAN), ..sample(0, 10.0, 0.0) };
-        assert_eq!(tracker.advance(&bad), Motion::Unusable(RejectionReason::NotFinite));
+        assert_eq!(tracker.advance(&bad), MotionUpdate::Unusable(RejectionReason::NotFinite));
     }
 }
 
@@ -235,7 +237,7 @@ pub(super) mod tests {
 mod unexplained_tests {
     use super::*;
     use crate::xia::trajectory::motion::tests::sample;
-    use crate::xia::trajectory::motion::{Motion, MotionTracker};
+    use crate::xia::trajectory::motion::{MotionTracker, MotionUpdate};
 
     #[test]
     fn a_hidden_brake_shows_as_retarding_force() {
@@ -245,7 +247,7 @@ mod unexplained_tests {
         force.begin(speed_mps);
         for index in 0..1000 {
             let now = sample(index, speed_mps, 0.0);
-            if let Motion::Continue(motion) = tracker.advance(&now) {
+            if let MotionUpdate::Continue(motion) = tracker.advance(&now) {
                 force.push(&motion, &now, &davis);
             }
             // Resistance of 981 N and a hidden brake of 2000 N on 106 t.

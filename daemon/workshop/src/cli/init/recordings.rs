@@ -1,4 +1,4 @@
-//! Recordings that nobody described: their letters, their names as a dataset has them, and the dataset that they would be.
+//! Recordings without a description: their encoding, their names in a dataset, and the dataset that they would make.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -21,11 +21,11 @@ use crate::paths::{self, real};
 /// Name and text of a file.
 pub type NamedText = (String, String);
 
-/// Files in the encoding that they share, and that.
+/// Returns the texts of the files, and the encoding that they share.
 ///
 /// # Errors
 ///
-/// When one cannot be read, or is written in other letters than the others.
+/// When one cannot be read, or has another encoding than the others.
 pub fn texts(
     paths: &[PathBuf],
     given: Option<&'static Encoding>,

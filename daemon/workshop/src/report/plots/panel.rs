@@ -13,7 +13,7 @@ use super::axes::{
 use super::picture::{
     ACTING, AFTER, BEFORE, DrawError, Plot, PlotError, SCALE, before_name, picture,
 };
-use super::reading::Reading;
+use super::reading::PointerReading;
 
 /// Nominal size in px.
 const SIZE: (u32, u32) = (470, 290);
@@ -89,13 +89,13 @@ pub(super) fn reading(
     unit: &'static str,
     bins: &[PanelBin],
     has_effect: bool,
-) -> Reading {
+) -> PointerReading {
     let sides: [(&str, Mean); 3] = [
         (before_name(has_effect), |bin| bin.before_n_per_kn),
         ("after", |bin| bin.after_n_per_kn),
         ("effect", |bin| bin.effect_n_per_kn),
     ];
-    let reading = Reading::new(name, unit, true, bins.iter().map(|bin| bin.at).collect());
+    let reading = PointerReading::new(name, unit, true, bins.iter().map(|bin| bin.at).collect());
     let shown = sides.into_iter().take(if has_effect { 3 } else { 1 });
     shown.fold(reading, |reading, (name, side)| {
         let (values, halves) = bins.iter().map(side).unzip();

@@ -13,7 +13,7 @@ use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
 use plotters::style::RGBColor;
 use serde_json::json;
 
-use super::reading::{self, Reading};
+use super::reading::{self, PointerReading};
 use crate::report::html::escape;
 
 /// Returns the name of the model without effects beside its data.
@@ -43,7 +43,7 @@ pub struct Plot {
     /// The picture, for the page.
     pub svg: String,
     /// The data of its charts, from the top.
-    pub readings: Vec<Reading>,
+    pub readings: Vec<PointerReading>,
 }
 
 /// Where a chart lies in its drawing: left, top, right, bottom, lower end of the labels below it;

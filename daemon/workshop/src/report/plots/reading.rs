@@ -22,7 +22,7 @@ pub struct Series {
 
 /// Pointer readings of one chart.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
+pub struct PointerReading {
     /// Name of the horizontal axis.
     pub name: String,
     /// Its unit; empty for a pure number.
@@ -35,10 +35,10 @@ pub struct Reading {
     pub series: Vec<Series>,
 }
 
-impl Reading {
+impl PointerReading {
     /// A chart without data yet.
     pub fn new(name: impl Into<String>, unit: &'static str, is_points: bool, at: Vec<f64>) -> Self {
-        Reading { name: name.into(), unit, is_points, at, series: Vec::new() }
+        PointerReading { name: name.into(), unit, is_points, at, series: Vec::new() }
     }
 
     /// The same with a series more.
@@ -68,8 +68,8 @@ impl Reading {
 }
 
 /// The readings of a plot's charts, for the page's script.
-pub fn json(readings: &[Reading]) -> String {
-    Value::from(readings.iter().map(Reading::json).collect::<Vec<_>>()).to_string()
+pub fn json(readings: &[PointerReading]) -> String {
+    Value::from(readings.iter().map(PointerReading::json).collect::<Vec<_>>()).to_string()
 }
 
 /// Decimals in which a picture of these values shows a difference.
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn data_are_whole_steps_as_fine_as_the_picture_shows_them() {
         let at = vec![0.0, 2.5, f64::NAN, 100.0];
-        let reading = Reading::new("Time", "s", false, at).with(
+        let reading = PointerReading::new("Time", "s", false, at).with(
             "speed",
             "m/s",
             vec![1.0, 1.5, f64::NAN, -3.0],

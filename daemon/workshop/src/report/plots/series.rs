@@ -10,7 +10,7 @@ use super::axes::{Axis, Chart, band, chart, frame, padded, range_with_zero, stro
 use super::picture::{
     AFTER, AXIS, BEFORE, DrawError, Plot, PlotError, SCALE, Width, before_name, picture,
 };
-use super::reading::Reading;
+use super::reading::PointerReading;
 
 /// Nominal size in px of the errors of runs.
 const RUNS_SIZE: (u32, u32) = (470, 230);
@@ -59,7 +59,7 @@ pub fn days(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<
         days.iter().map(|day| pick(day).unwrap_or(f64::NAN)).collect::<Vec<f64>>()
     };
     let at = days.iter().map(|day| day.day).collect();
-    let reading = Reading::new("Day", "", true, at)
+    let reading = PointerReading::new("Day", "", true, at)
         .with("in force", "m/s", values(|day| day.in_force_mps), Vec::new())
         .with("declared", "m/s", values(|day| day.declared_mps), Vec::new());
     Ok(Plot { svg, readings: vec![reading] })
@@ -119,7 +119,8 @@ pub fn gradient(
     })?;
     let at = entries.iter().map(|entry| entry.0 / 1e3).collect();
     let values = entries.iter().map(|entry| entry.1).collect();
-    let reading = Reading::new("Chainage", "km", false, at).with("gradient", "‰", values, halves);
+    let reading =
+        PointerReading::new("Chainage", "km", false, at).with("gradient", "‰", values, halves);
     Ok(Plot { svg, readings: vec![reading] })
 }
 
@@ -164,7 +165,7 @@ pub fn errors_of_runs(
     })?;
     let at = known.iter().map(|run| run.0 as f64).collect();
     let errors = |side: usize| known.iter().map(|run| run.1[side]).collect();
-    let mut reading = Reading::new("Run", "", true, at);
+    let mut reading = PointerReading::new("Run", "", true, at);
     reading = reading.with(before_name(has_effect), "m/s", errors(0), Vec::new());
     if has_effect {
         reading = reading.with("after", "m/s", errors(1), Vec::new());

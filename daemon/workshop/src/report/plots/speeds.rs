@@ -10,7 +10,7 @@ use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, shade, str
 use super::picture::{
     ACTING, AFTER, BEFORE, DrawError, MEASURED, Plot, PlotError, SCALE, Width, before_name, picture,
 };
-use super::reading::Reading;
+use super::reading::PointerReading;
 
 /// The run as SVG.
 ///
@@ -79,12 +79,12 @@ fn from_start(trace: &Trace) -> (Trace, String) {
     (trace, format!("Time since {start}"))
 }
 
-fn readings(trace: &Trace, time: &str, has_effect: bool) -> Vec<Reading> {
+fn readings(trace: &Trace, time: &str, has_effect: bool) -> Vec<PointerReading> {
     let values = |value: &dyn Fn(&SpeedPoint) -> f64| -> Vec<f64> {
         // Nothing is read between two pieces.
         trace.pieces.iter().flat_map(|it| it.iter().map(value).chain([f64::NAN])).collect()
     };
-    let time = || Reading::new(time, "s", false, values(&|p| p.time_s));
+    let time = || PointerReading::new(time, "s", false, values(&|p| p.time_s));
     let (mut speeds, mut errors) =
         (time().with("measured", "m/s", values(&|p| p.measured_mps), Vec::new()), time());
     for (name, _, speed) in predicted(has_effect) {

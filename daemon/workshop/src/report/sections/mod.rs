@@ -1,11 +1,11 @@
-//! The parts of the page.
+//! Sections of the report's page.
 
 pub mod errors;
 pub mod model;
 pub mod quality;
 pub mod residual;
 
-/// A part of the page.
+/// A section of the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Section {
     /// Its anchor.

@@ -11,7 +11,7 @@ use dynocar_model::terms::brake::{self, BUILD_UP_S, build_up};
 use dynocar_shared::vocabulary::EffectKind;
 
 use self::onsets::{GRID_MIN_S, TAIL_MIN_S, by_speed, onset_tuple};
-use super::{Candidate, Hypothesis, Nature, On, Proposal, SharedHypothesis};
+use super::{Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, SharedHypothesis};
 use crate::explain::answer::{Location, RunWindow};
 use crate::explain::evidence::SampleForces;
 use crate::explain::places::{Axis, End, Reach};
@@ -31,6 +31,16 @@ struct Dragging {
     fit_runs: usize,
     choice_cost: f64,
 }
+
+/// Its runs are chosen among many, which the usual errors of single runs stand for; beside slippery rails a
+/// slide looks like a brake that drags.
+pub const POLICY: Policy = Policy {
+    certainty: Certainty::BesideUsualErrors,
+    uncertain_beside: &[EffectKind::LowAdhesion],
+    is_one_of_many: true,
+    is_passing: true,
+    ..Policy::USUAL
+};
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

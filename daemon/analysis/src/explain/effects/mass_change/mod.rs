@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use dynocar_model::terms::masses::LEAST_SHARE;
 
-use super::{Candidate, Proposal};
+use super::{Candidate, Certainty, Policy, Proposal};
 use crate::explain::evidence::{EQUAL, RunData};
 use crate::explain::hypothesis::SharedHypothesis;
 use crate::explain::places::span_m;
@@ -19,6 +19,10 @@ use parts::{Along, Part, STATION_M, STOP_MIN_S, stations, stops};
 
 /// Sections or windows at most.
 const PARTS_MAX: usize = 5;
+
+/// Loads differ from run to run, so it is never certain.
+pub const POLICY: Policy =
+    Policy { certainty: Certainty::Never, is_sought_beside_usual_errors: false, ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

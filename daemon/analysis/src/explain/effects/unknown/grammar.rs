@@ -7,7 +7,7 @@
 use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
 
 use super::form::{FormForce, choice_cost};
-use super::known::Known;
+use super::known::KnownCovariate;
 use super::shape::{Ground, Tried};
 use crate::explain::effects::Candidate;
 use crate::explain::scan::Scan;
@@ -76,7 +76,7 @@ fn products(ground: &Ground, first: Vec<Factor>, second: Vec<Factor>) -> Vec<Tri
 
 /// Every form of one covariate, and the products; the best first.
 fn all_tried(ground: &Ground) -> Vec<Tried> {
-    let alone: Vec<Factor> = ground.known.iter().flat_map(Known::alone).collect();
+    let alone: Vec<Factor> = ground.known.iter().flat_map(KnownCovariate::alone).collect();
     let mut all = parallel::of_each(&alone, |factor| ground.tried(vec![*factor], false));
     sort(&mut all);
     let Some(speed) = ground.covariate(Covariate::Speed) else { return all };
@@ -84,7 +84,7 @@ fn all_tried(ground: &Ground) -> Vec<Tried> {
     let mut first: Vec<Factor> = of_speed.take(BEST_FOR_PRODUCTS).map(|it| it.factors[0]).collect();
     first.extend(speed.powers(&WHOLE_EXPONENTS));
     let others = ground.known.iter().filter(|one| one.of != Covariate::Speed);
-    let second: Vec<Factor> = others.flat_map(Known::given_speed).collect();
+    let second: Vec<Factor> = others.flat_map(KnownCovariate::given_speed).collect();
     all.extend(products(ground, first, second));
     sort(&mut all);
     all

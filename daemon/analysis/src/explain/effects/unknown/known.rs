@@ -10,7 +10,7 @@ const FEW_BINS: usize = 8;
 const FEW_SHARE: f64 = 0.03;
 
 /// Values of a covariate over all bins of the fit runs.
-pub struct Known {
+pub struct KnownCovariate {
     /// Which.
     pub of: Covariate,
     /// By run and bin; `NaN` where it is not known.
@@ -23,7 +23,7 @@ pub struct Known {
     pub high: f64,
 }
 
-impl Known {
+impl KnownCovariate {
     /// `None` where it is known nowhere or is the same throughout.
     pub fn of(scan: &Scan, of: Covariate) -> Option<Self> {
         let of_run =
@@ -36,7 +36,7 @@ impl Known {
         let few = FEW_BINS.min((FEW_SHARE * known.len() as f64) as usize);
         let least = *known.select_nth_unstable_by(few, f64::total_cmp).1;
         let is_varied = high - low > 1e-6 && (high - low).is_finite();
-        is_varied.then_some(Known { of, values, low, least, high })
+        is_varied.then_some(KnownCovariate { of, values, low, least, high })
     }
 
     fn at(&self, share: f64) -> f64 {

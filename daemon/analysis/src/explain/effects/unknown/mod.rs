@@ -13,13 +13,17 @@ mod grammar;
 mod known;
 mod shape;
 
-use super::{Candidate, Proposal};
+use super::{Candidate, Certainty, Policy, Proposal};
 use crate::explain::evidence::SCORE_MIN;
 use crate::explain::scan::Scan;
 
 /// Bands and forms that are worth a fit.
 const BANDS_MAX: usize = 2;
 const FORMS_MAX: usize = 4;
+
+/// Its form is chosen among many, which the usual errors stand for.
+pub const POLICY: Policy =
+    Policy { certainty: Certainty::BesideUsualErrors, is_one_of_many: true, ..Policy::USUAL };
 
 /// Whether some range of some covariate holds a force that would be accepted: whatever has a form
 /// shows there too.

@@ -2,7 +2,7 @@
 
 use dynocar_model::terms::extra::{Covariate, Factor};
 
-use super::known::Known;
+use super::known::KnownCovariate;
 use super::known::{estimated, is_exponent};
 use crate::explain::scan::{Scan, Tuple};
 
@@ -28,7 +28,7 @@ pub struct Tried {
 pub struct Ground<'s> {
     scan: &'s Scan<'s>,
     /// The covariates that vary.
-    pub known: Vec<Known>,
+    pub known: Vec<KnownCovariate>,
     /// By run and bin: acceleration in m/s² that 1 N/kN gives.
     per_unit_mps2: Vec<Vec<f64>>,
     /// Price of a number (Schwarz).
@@ -38,7 +38,7 @@ pub struct Ground<'s> {
 impl<'s> Ground<'s> {
     /// Returns the data of a scan.
     pub fn of(scan: &'s Scan) -> Self {
-        let known = Covariate::ALL.iter().filter_map(|&of| Known::of(scan, of)).collect();
+        let known = Covariate::ALL.iter().filter_map(|&of| KnownCovariate::of(scan, of)).collect();
         let number_cost = (scan.fit.observations().max(2) as f64).ln();
         let per_unit_mps2 = scan.problem.runs.iter().map(|run| {
             let middles = run.bins.iter().map(|bin| &run.samples()[bin.middle()]);
@@ -48,7 +48,7 @@ impl<'s> Ground<'s> {
     }
 
     /// A covariate, where it varies.
-    pub fn covariate(&self, of: Covariate) -> Option<&Known> {
+    pub fn covariate(&self, of: Covariate) -> Option<&KnownCovariate> {
         self.known.iter().find(|known| known.of == of)
     }
 

@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 use crate::report::plots::axes::{Chart, letters, range_with_zero, stroke};
 use crate::report::plots::panel::{reading, vertical_range};
 use crate::report::plots::picture::{ACTING, AFTER, DrawError};
-use crate::report::plots::reading::{Reading, thinned};
+use crate::report::plots::reading::{PointerReading, thinned};
 
 /// Nominal height in px of a panel, of one that shows places only, and of a row of places more.
 const HEIGHT: u32 = 190;
@@ -64,9 +64,9 @@ impl Panel {
         }
     }
 
-    pub fn reading(&self, has_effect: bool) -> Reading {
+    pub fn reading(&self, has_effect: bool) -> PointerReading {
         match &self.content {
-            Content::Places(_) => Reading::new("Chainage", "km", false, Vec::new()),
+            Content::Places(_) => PointerReading::new("Chainage", "km", false, Vec::new()),
             Content::Means(direction, bins) => {
                 let mut reading = reading("Chainage", "km", bins, has_effect);
                 // Points that are not drawn are not read.
@@ -77,7 +77,7 @@ impl Panel {
             }
             Content::Line { points, halves } => {
                 let (at, values) = points.iter().copied().unzip();
-                let reading = Reading::new("Chainage", "km", false, at);
+                let reading = PointerReading::new("Chainage", "km", false, at);
                 reading.with(&self.name[..], self.unit, values, halves.clone())
             }
         }

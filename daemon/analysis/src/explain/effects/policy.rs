@@ -1,0 +1,81 @@
+//! How the search treats a kind of effect: what makes it certain, where it is sought, and which usual errors it
+//! replaces. The policy of a kind stands in its own file and in its row of the library.
+
+use dynocar_shared::vocabulary::EffectKind;
+
+/// Where strong evidence alone accepts a kind, however little the kind takes from the error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Certainty {
+    /// With the usual errors in the model, and without them.
+    Anywhere,
+    /// Only with the usual errors in the model, which otherwise look like it.
+    BesideUsualErrors,
+    /// Nowhere: only the acceptance score accepts it.
+    Never,
+}
+
+/// A declared figure that is usually a little wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Figure {
+    /// By a share of the traction force.
+    Traction,
+    /// By a share of the brake force.
+    Brake,
+    /// Seconds between a report and its force.
+    Lateness,
+    /// By a share of the curve resistance.
+    Curves,
+    /// By a share of a when bearings are cold.
+    Warming,
+    /// By so much of the rotating-mass factor: seldom weighed, the same in every run, and for the motion a scale
+    /// of all that acts, gradients among it, as a wheel's is.
+    RotatingMass,
+}
+
+/// An error of declared figures that every railway has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Everyday {
+    /// Place among such errors: the most usual has 1, and of one place the stronger comes first.
+    pub rank: u8,
+    /// Greatest root mean square of its parameters on ordinary days.
+    pub most: f64,
+}
+
+/// Policy of a kind of effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Policy {
+    /// Where it may be certain.
+    pub certainty: Certainty,
+    /// Kinds in the model beside which it is not certain.
+    pub uncertain_beside: &'static [EffectKind],
+    /// Whether its form or place is one of many, even if no end of it was estimated: it must also take from the error.
+    pub is_one_of_many: bool,
+    /// Whether a wrong gradient or wheel leaves such a force where pieces of the line end, so that a place that was
+    /// chosen is not certain beside these.
+    pub is_left_by_moved_places: bool,
+    /// Whether it is sought with the usual errors in the model: it acts on the train by one law wherever that is.
+    pub is_sought_beside_usual_errors: bool,
+    /// The kind as a small error that every railway has; `None` if it is no such error.
+    pub everyday: Option<Everyday>,
+    /// Whether it makes something late; two such kinds look alike.
+    pub is_late: bool,
+    /// Whether it acts in the runs in which it is found and in no others.
+    pub is_passing: bool,
+    /// Figures that it estimates, which have no usual error beside it.
+    pub frees: &'static [Figure],
+}
+
+impl Policy {
+    /// The policy of a kind about which nothing is unusual.
+    pub const USUAL: Policy = Policy {
+        certainty: Certainty::Anywhere,
+        uncertain_beside: &[],
+        is_one_of_many: false,
+        is_left_by_moved_places: false,
+        is_sought_beside_usual_errors: true,
+        everyday: None,
+        is_late: false,
+        is_passing: false,
+        frees: &[],
+    };
+}
