@@ -5,7 +5,6 @@ use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
 
-use arrow_array::array::AnyDictionaryArray;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     ArrowPrimitiveType, Decimal32Type, Decimal64Type, Decimal128Type, Decimal256Type, DecimalType,
@@ -20,7 +19,7 @@ use parquet::arrow::ProjectionMask;
 use super::error::guarded;
 use crate::error::{TableError, TableProblem};
 use crate::reading::open;
-use crate::trains::TrainsBy;
+use crate::trains::{TrainsBy, keys_of};
 
 /// A column that is wanted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -147,14 +146,6 @@ fn numbers(array: &dyn Array, wanted: &Wanted) -> Result<Vec<f64>, TableProblem>
         DataType::Null => vec![f64::NAN; array.len()],
         _ => return Err(refuse("numbers, true and false, or times".into()))
     })
-}
-
-/// The place of each row's value among a dictionary's.
-pub fn keys_of(dictionary: &dyn AnyDictionaryArray) -> impl Iterator<Item = Option<usize>> {
-    let has_values = !dictionary.values().is_empty();
-    let keys = has_values.then(|| dictionary.normalized_keys()).unwrap_or_default();
-    (0..dictionary.len())
-        .map(move |row| keys.get(row).copied().filter(|_| dictionary.is_valid(row)))
 }
 
 fn each<T>(values: impl IntoIterator<Item = Option<T>>, number: impl Fn(T) -> f64) -> Vec<f64> {

@@ -1,5 +1,6 @@
 //! Whose the rows of a Parquet file are.
 
+use arrow_array::array::AnyDictionaryArray;
 use arrow_array::cast::AsArray;
 use arrow_array::types::Float64Type;
 use arrow_array::{Array, downcast_integer_array};
@@ -9,7 +10,6 @@ use dynocar_dataset::trains::names_trains;
 use parquet::arrow::ProjectionMask;
 
 use crate::error::TableProblem;
-use crate::numbers::keys_of;
 use crate::reading::Builder;
 
 /// Which column says whose the rows are.
@@ -85,4 +85,12 @@ fn texts(array: &dyn Array) -> Option<Vec<Option<String>>> {
         }
         _ => None,
     }
+}
+
+/// The place of each row's value among a dictionary's.
+pub fn keys_of(dictionary: &dyn AnyDictionaryArray) -> impl Iterator<Item = Option<usize>> {
+    let has_values = !dictionary.values().is_empty();
+    let keys = has_values.then(|| dictionary.normalized_keys()).unwrap_or_default();
+    (0..dictionary.len())
+        .map(move |row| keys.get(row).copied().filter(|_| dictionary.is_valid(row)))
 }
