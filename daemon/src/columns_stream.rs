@@ -1,14 +1,23 @@
 //! Columns of numbers from one program to another, rows after rows, so that neither waits for the other's last: a
-//! line of JSON with the number of rows that are to come and every column's name, then blocks. A block is the
-//! number of its rows and these rows' values, column after column; one without rows is the last. All numbers take
-//! eight bytes with the lowest first.
+//! line of JSON with the number of rows that are to come, every column's name, and the column that says whose the rows
+//! are; then blocks. A block is the number of its rows and these rows' values, column after column, the trains last;
+//! one without rows is the last. All numbers take eight bytes with the lowest first.
 
 use std::io::{self, BufRead, Read, Write};
 
-use dynocar_dataset::RunColumn;
+use dynocar_dataset::{RunColumn, RunColumns, TrainColumn};
+use serde::{Deserialize, Serialize};
 
-/// Rows to come, and name and whether there are values of each column.
-type Header = (usize, Vec<(String, bool)>);
+/// Rows and columns that are to come.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Number of rows.
+    pub rows: usize,
+    /// Each column's name, and whether it has values.
+    pub columns: Vec<(String, bool)>,
+    /// Name and trains of the column that says whose the rows are.
+    pub trains: Option<(String, Vec<String>)>,
+}
 
 /// Bytes of a value.
 const BYTES: usize = size_of::<f64>();
@@ -25,20 +34,19 @@ pub struct Sender<W> {
 }
 
 impl<W: Write> Sender<W> {
-    /// Begins, with the number of rows that are to come and each column's name, and whether it has values.
+    /// Begins, with what is to come.
     ///
     /// # Errors
     ///
     /// When the other side does not take them.
-    pub fn begin(rows: usize, columns: Vec<(String, bool)>, mut output: W) -> io::Result<Self> {
-        let header: Header = (rows, columns);
-        let mut line = serde_json::to_vec(&header)?;
+    pub fn begin(header: &Header, mut output: W) -> io::Result<Self> {
+        let mut line = serde_json::to_vec(&[header])?;
         line.push(b'\n');
         output.write_all(&line)?;
         Ok(Sender { output, block: Vec::new() })
     }
 
-    /// Hands rows over: as many values for each column that has some, in the order of the columns.
+    /// Hands rows over: as many values for each column that has some, in the order of the columns, then the trains.
     ///
     /// # Errors
     ///
@@ -71,14 +79,14 @@ impl<W: Write> Sender<W> {
 }
 
 /// The columns that are handed over, and nothing of what follows them; `None` where none are, or not to their end.
-pub fn read(mut input: impl BufRead) -> Option<Vec<RunColumn>> {
+pub fn read(mut input: impl BufRead) -> Option<RunColumns> {
     // Where something went wrong before, the input is a document that says so, which is left.
     if input.fill_buf().ok()?.first() != Some(&b'[') {
         return None;
     }
     let mut line = Vec::new();
     input.read_until(b'\n', &mut line).ok()?;
-    let (rows, columns): Header = serde_json::from_slice(&line).ok()?;
+    let [Header { rows, columns, trains }] = serde_json::from_slice(&line).ok()?;
     let empty = |has_values: bool| {
         has_values.then(|| {
             let mut values = Vec::new();
@@ -90,15 +98,18 @@ pub fn read(mut input: impl BufRead) -> Option<Vec<RunColumn>> {
     let columns = columns.into_iter();
     let mut columns: Vec<RunColumn> =
         columns.map(|(name, has_values)| RunColumn { name, values: empty(has_values) }).collect();
+    let train_column = |(name, trains)| TrainColumn { name, trains, rows: Vec::new() };
+    let mut trains: Option<TrainColumn> = trains.map(train_column);
     let mut chunk = vec![0; CHUNK];
     loop {
         let mut count = [0; BYTES];
         input.read_exact(&mut count).ok()?;
         let rows = usize::try_from(u64::from_le_bytes(count)).ok()?;
         if rows == 0 {
-            return Some(columns);
+            return Some(RunColumns { columns, trains });
         }
-        for values in columns.iter_mut().filter_map(|it| it.values.as_mut()) {
+        let values = columns.iter_mut().filter_map(|it| it.values.as_mut());
+        for values in values.chain(trains.as_mut().map(|it| &mut it.rows)) {
             take(&mut input, rows, &mut chunk, values)?;
         }
     }
@@ -123,17 +134,25 @@ mod tests {
     #[test]
     fn columns_arrive_to_the_bit_and_what_is_cut_off_does_not() {
         let names = [("v, \"km/h\"\n", true), ("note", false), ("more than a chunk", true)];
-        let names = names.map(|(name, has_values)| (name.to_owned(), has_values));
+        let columns = names.map(|(name, has_values)| (name.to_owned(), has_values)).into();
+        let trains = Some(("unit".to_owned(), vec!["a".to_owned(), "b".to_owned()]));
         let many: Vec<f64> = (0..20_000).map(|it| f64::from(it) * 0.1).collect();
         let mut bytes = Vec::new();
-        let mut sender = Sender::begin(3, names.into(), &mut bytes).unwrap();
-        sender.rows(&[vec![0.1, -0.0, f64::MAX], vec![1.0, f64::INFINITY, -1.0]]).unwrap();
-        sender.rows(&[vec![], vec![]]).unwrap();
-        sender.rows(&[many.clone(), many.clone()]).unwrap();
+        let header = Header { rows: 3, columns, trains };
+        let mut sender = Sender::begin(&header, &mut bytes).unwrap();
+        let own = vec![0.0, f64::NAN, 1.0];
+        sender.rows(&[vec![0.1, -0.0, f64::MAX], vec![1.0, f64::INFINITY, -1.0], own]).unwrap();
+        sender.rows(&[vec![], vec![], vec![]]).unwrap();
+        sender.rows(&[many.clone(), many.clone(), vec![1.0; many.len()]]).unwrap();
         sender.end().unwrap();
         bytes.extend(b"after");
         let mut rest = &bytes[..];
-        let columns = read(&mut rest).unwrap();
+        let RunColumns { columns, trains } = read(&mut rest).unwrap();
+        let cells: Vec<String> = trains.iter().flat_map(|it| it.cells()).map(Into::into).collect();
+        assert_eq!(
+            (cells.len(), &cells[..4]),
+            (20_003, &["a", "", "b", "b"].map(String::from)[..])
+        );
         assert_eq!(rest, b"after");
         let [first, note, last] = &columns[..] else { panic!("{} columns", columns.len()) };
         assert_eq!((first.name.as_str(), note.values.as_ref()), ("v, \"km/h\"\n", None));

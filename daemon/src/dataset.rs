@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use dynocar_dataset::encoding::decoded;
-use dynocar_dataset::train_rows::TrainRows;
 use dynocar_dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest,
     RunContent, is_parquet, parse_track, parse_train, top_keys,
@@ -49,10 +48,6 @@ impl SourceArguments {
         Source { path: &self.dataset, train: self.train.map(TrainId) }
     }
 }
-
-/// Error of a choice that is made of text alone.
-const ROWS_OF_PARQUET: &str =
-    "[train] rows: expected CSV, found Parquet: write one file for each train";
 
 /// Why a path leads to no dataset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -157,12 +152,7 @@ impl DatasetFiles for DatasetFolder {
         let file = self.path_of(path);
         if is_parquet(path) {
             require_regular(&file)?;
-            let unsaid = match &manifest.train_rows {
-                TrainRows::Unsaid => true,
-                TrainRows::All => false,
-                TrainRows::Of { .. } => return Err(FileProblem::Table(ROWS_OF_PARQUET.into())),
-            };
-            let columns = columns_of(&file, &manifest.columns, unsaid);
+            let columns = columns_of(&file, &manifest.columns, &manifest.train_rows);
             return columns.map(RunContent::Columns).map_err(FileProblem::Table);
         }
         let encoding = manifest.layout.encoding;

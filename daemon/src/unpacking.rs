@@ -5,7 +5,8 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use dynocar_dataset::{ColumnMapping, RunColumn};
+use dynocar_dataset::train_rows::TrainRows;
+use dynocar_dataset::{ColumnMapping, RunColumns};
 use dynocar_shared::TrainId;
 use tempfile::TempDir;
 
@@ -23,6 +24,11 @@ fn program_of(path: &Path) -> Option<&'static str> {
     }
 }
 
+/// True for the name of a file, or a folder of files, of Parquet.
+pub fn is_parquet(path: &Path) -> bool {
+    path.extension().is_some_and(|it| it == "parquet")
+}
+
 /// True for the name of a recording.
 pub fn is_recording(path: &Path) -> bool {
     program_of(path).is_some()
@@ -31,25 +37,26 @@ pub fn is_recording(path: &Path) -> bool {
 /// The program that carries out a command with these words: that of recordings, unless one of them is
 /// the name of a recording in Parquet.
 pub fn program_for<'w>(words: impl IntoIterator<Item = &'w OsStr>) -> &'static str {
-    let is_parquet = |it: &OsStr| Path::new(it).extension().is_some_and(|it| it == "parquet");
-    if words.into_iter().any(is_parquet) { PARQUET } else { RECORDING }
+    if words.into_iter().any(|it| is_parquet(Path::new(it))) { PARQUET } else { RECORDING }
 }
 
-/// All columns of a Parquet file, with what the mapped ones hold.
+/// All columns of a Parquet file, with what the mapped ones hold, and whose the rows are where that is asked for.
 ///
 /// # Errors
 ///
-/// In words, without the file's name; where rows of several trains are in turn, unless nothing is `unsaid` of them.
+/// In words, without the file's name.
 pub fn columns_of(
     file: &Path,
     mappings: &[ColumnMapping],
-    unsaid: bool,
-) -> Result<Vec<RunColumn>, String> {
+    train_rows: &TrainRows,
+) -> Result<RunColumns, String> {
     let mut command = call(PARQUET);
     command.arg("columns").arg(file);
-    if unsaid {
-        command.arg("--of-one-train");
-    }
+    match train_rows {
+        TrainRows::Unsaid => command.arg("--trains"),
+        TrainRows::Of { column, .. } => command.arg(format!("--trains={column}")),
+        TrainRows::All => &mut command,
+    };
     for it in mappings {
         for name in it.names() {
             command.arg("--column").arg(name).arg(it.unit.name());

@@ -52,7 +52,9 @@ pub fn described(
         std::fs::write(&path, bytes).expect("a file");
         arguments.push(path.display().to_string());
     }
-    arguments.extend(["--mass-t", "150", "--length-m", "80"].map(String::from));
+    if !more.contains(&"--mass-t") {
+        arguments.extend(["--mass-t", "150", "--length-m", "80"].map(String::from));
+    }
     arguments.extend(more.iter().map(|it| (*it).to_owned()));
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let mut process = site.start(DYNOCAR, &arguments);

@@ -9,6 +9,8 @@ use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
 use super::text_layout::{Marks, THOUSANDS, TextLayout};
 
+/// The typographic minus.
+const MINUS: char = '\u{2212}';
 /// Words of programs for a missing number, in small letters.
 const MISSING: &str = "n/a na n.a. n/d nd n.d. n.v. k.a. #n/a #na #n/v #nv #n/d <na> <null> nan null (null) none nil nat - . ? \
                        * missing bad bad_input i/o_timeout error err fault fehler invalid inv ungültig no_data nodata \
@@ -25,7 +27,15 @@ pub fn parse_cell(cell: &[u8], marks: Marks) -> Option<f64> {
         Some(mark) => decimal(&ungrouped(text, mark, char::from(marks.decimal))?, marks.decimal),
         None => decimal(text, marks.decimal),
     };
-    number.or_else(|| is_missing(text).then_some(f64::NAN))
+    let otherwise = || plain(text).and_then(|it| decimal(&it, marks.decimal));
+    number.or_else(|| is_missing(text).then_some(f64::NAN)).or_else(otherwise)
+}
+
+/// A number that is written otherwise: with a typographic minus, Fortran's exponent, or as a spreadsheet's text.
+fn plain(text: &str) -> Option<String> {
+    let own = text.strip_prefix("=\"").and_then(|it| it.strip_suffix('"')).unwrap_or(text);
+    let is_number = own.starts_with(['+', '-', '.', MINUS]) || own.starts_with(char::is_numeric);
+    is_number.then(|| own.replace(MINUS, "-").replace("D+", "e+").replace("D-", "e-"))
 }
 
 fn decimal(text: &str, mark: u8) -> Option<f64> {
@@ -73,6 +83,8 @@ pub fn truth(cell: &[u8]) -> Option<f64> {
 
 /// True for a cell that begins as no number does: a word.
 pub fn is_word(cell: &[u8]) -> bool {
+    let cell = cell.strip_prefix(b"=\"").unwrap_or(cell);
+    let cell = cell.strip_prefix(MINUS.encode_utf8(&mut [0; 3]).as_bytes()).unwrap_or(cell);
     let first = cell.iter().find(|byte| !b"+-.,".contains(byte));
     first.is_some_and(|byte| !byte.is_ascii_digit())
 }

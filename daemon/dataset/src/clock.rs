@@ -5,6 +5,8 @@
 
 use std::borrow::Cow;
 
+use packed::PACKED_CLOCK;
+pub(super) use packed::Packed;
 use time::format_description::{self, OwnedFormatItem};
 use time::parsing::Parsed;
 use time::{Date, Time};
@@ -27,7 +29,7 @@ pub enum TimeFormat {
 }
 
 /// The formats that are looked for in cells that nobody described, the likeliest first.
-const PATTERNS: [&str; 20] = [
+const PATTERNS: [&str; 28] = [
     "%d.%m.%Y %H:%M:%S",
     "%-d.%-m.%Y %-H:%M:%S",
     "%d/%m/%Y %H:%M:%S",
@@ -45,14 +47,20 @@ const PATTERNS: [&str; 20] = [
     "%d %b %Y %H:%M:%S",
     "%b %d, %Y %-I:%M:%S %p",
     "%b %d %Y %H:%M:%S",
+    "%b %d, %Y %H:%M:%S",
+    "%B %d, %Y %H:%M:%S",
+    "%d %B %Y %H:%M:%S",
     "%d-%b-%y %H:%M:%S",
     "%a %b %d %H:%M:%S %Y",
-    "%M:%S",
+    "%a, %d %b %Y %H:%M:%S",
+    "%Y年%m月%d日 %H:%M:%S",
+    "%Y-%m-%d_%H-%M-%S",
+    "%Y%m%d_%H%M%S",
+    DOTTED_CLOCK,
+    "%-M:%S",
 ];
-/// Times packed into one number.
-const PACKED_CLOCK: &str = "%H%M%S";
-const PACKED_DATE: &str = "%Y%m%d%H%M%S";
-
+/// A clock's time that is a date, too, unless a comma stands before its fraction.
+const DOTTED_CLOCK: &str = "%H.%M.%S";
 impl TimeFormat {
     /// Returns the format of this name, or of this pattern; `None` if it is not a format, or leaves hours or part
     /// of the date open.
@@ -105,10 +113,18 @@ impl TimeFormat {
         let all = [TimeFormat::Iso, TimeFormat::Clock, TimeFormat::Elapsed];
         let all = all.into_iter().chain(patterns);
         // No number is a time, and most cells are numbers.
-        let may_be = cell.contains(&b':') || cell.get(8) == Some(&b'T');
+        let may_be = cell.contains(&b':')
+            || matches!(cell.get(8), Some(b'T' | b'_'))
+            || cell.get(10) == Some(&b'_')
+            || cell.get(8) == Some(&b',');
         let is_it = |it: &TimeFormat| match it {
             // Hours and minutes look like minutes and seconds.
             TimeFormat::Pattern(pattern) if !has(pattern, HOUR) && !cell.contains(&b'.') => false,
+            TimeFormat::Pattern(pattern)
+                if pattern == DOTTED_CLOCK && cell.get(8) != Some(&b',') =>
+            {
+                false
+            }
             // Within a day it is a clock's.
             TimeFormat::Elapsed if DayClock::new(&TimeFormat::Clock).seconds(cell).is_some() => {
                 false
@@ -116,43 +132,6 @@ impl TimeFormat {
             _ => DayClock::new(it).seconds(cell).is_some(),
         };
         all.filter(|it| may_be && is_it(it)).collect()
-    }
-}
-
-/// Whether numbers are times that are packed: hours, minutes and seconds as digits, with or without a date before.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Packed {
-    is_clock: bool,
-    is_date: bool,
-    last: f64,
-    /// How often the seconds began anew.
-    minutes: usize,
-}
-
-impl Packed {
-    /// Nothing seen yet.
-    pub const NEW: Packed = Packed { is_clock: true, is_date: true, last: f64::NAN, minutes: 0 };
-
-    /// Takes in a number.
-    pub fn push(&mut self, number: f64) {
-        let clock = number.rem_euclid(1e6);
-        let part = |below: f64, over: f64| (clock / over).floor().rem_euclid(100.0) < below;
-        let is_clock = part(24.0, 1e4) && part(60.0, 100.0) && part(60.0, 1.0);
-        self.is_clock &= is_clock && (0.0..240_000.0).contains(&number);
-        self.is_date &= is_clock && (19_700_101e6..21_000_101e6).contains(&number);
-        // From 59 to 0 a packed time leaps by 40 at least, and a count of seconds does not.
-        self.minutes += usize::from(number - self.last >= 40.0 && number % 100.0 < 30.0);
-        self.last = number;
-    }
-
-    /// The format; `None` for numbers that are none, or that do not show it.
-    pub fn format(&self) -> Option<TimeFormat> {
-        let pattern = match self {
-            Packed { is_date: true, last, .. } if !last.is_nan() => PACKED_DATE,
-            Packed { is_clock: true, minutes: 2.., .. } => PACKED_CLOCK,
-            _ => return None,
-        };
-        Some(TimeFormat::Pattern(pattern.into()))
     }
 }
 
@@ -240,6 +219,8 @@ impl DayClock {
         if self.format == TimeFormat::Elapsed {
             return Some((None, elapsed_s(cell)?));
         }
+        // Spreadsheets mark a text so.
+        let cell = cell.strip_prefix(b"'").unwrap_or(cell);
         let mut parsed = Parsed::new();
         let (mut padded, mut half) = (Cow::Borrowed(cell), None);
         if let TimeFormat::Pattern(pattern) = &self.format {
@@ -331,12 +312,12 @@ fn with_zeros(cell: &[u8]) -> Option<Vec<u8>> {
     Some([&b"000000"[..zeros], cell].concat())
 }
 
-/// A fraction of a second behind a point, a comma, or a colon before thousandths, or as further digits; 0 without; and
+/// A fraction of a second behind a point, a comma, a stroke, or a colon before thousandths, or as further digits; 0 without; and
 /// what follows.
 fn fraction(text: &[u8]) -> Option<(f64, &[u8])> {
     let thousandths = text.strip_prefix(b":").filter(|it| it.len() >= 3);
     let more = Some(text).filter(|it| it.first().is_some_and(u8::is_ascii_digit));
-    let marked = text.strip_prefix(b".").or(text.strip_prefix(b","));
+    let marked = text.split_first().filter(|it| b".,_".contains(it.0)).map(|it| it.1);
     let Some(digits) = marked.or(thousandths).or(more) else {
         return Some((0.0, text));
     };
@@ -346,8 +327,13 @@ fn fraction(text: &[u8]) -> Option<(f64, &[u8])> {
     Some((value / 10_f64.powi(count as i32), rest))
 }
 
-/// A zone's offset in s: none, `Z`, `UTC`, or as `+01:00`, `+0100`, with or without a space before.
+/// A zone's offset in s: none, `Z`, `UTC`, or as `+01:00`, `+0100`, with or without a space before or a name behind.
 fn zone_s(text: &[u8]) -> Option<f64> {
+    // Its name may stand behind it in brackets.
+    let text = match text.iter().position(|it| *it == b'[') {
+        Some(at) if text.ends_with(b"]") => &text[..at],
+        _ => text,
+    };
     let (sign, digits) = match text.trim_ascii_start() {
         b"" | b"Z" | b"UTC" | b"GMT" => return Some(0.0),
         b"CET" | b"MEZ" | b"BST" => return Some(3600.0),
@@ -385,5 +371,6 @@ pub(super) fn unix_s(at: &toml::value::Datetime) -> Option<i64> {
     Some((i64::from(day.to_julian_day()) - UNIX_DAY) * 86_400 + second - 60 * zone_min)
 }
 
+mod packed;
 #[cfg(test)]
 mod tests;

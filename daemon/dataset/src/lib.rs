@@ -79,7 +79,7 @@ pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use resolved::{DATASET_TRAIN, GradientSource};
 pub use run::{EXTRAS, Extra, Run, is_parquet, recorded_unix_s};
-pub use run_content::{RunColumn, RunContent};
+pub use run_content::{RunColumn, RunColumns, RunContent, TrainColumn};
 pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;

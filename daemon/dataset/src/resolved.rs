@@ -154,9 +154,9 @@ impl<'d> Resolved<'d> {
 fn drop_timeless(table: &mut Table) -> (Vec<u64>, usize) {
     let times = table.column(Quantity::Time).unwrap_or_default();
     // Nanoseconds in an i64 reach 292 years; a time beyond is no time.
-    // Counts since the year 0 or 1 are later counted from the first row.
+    // Counts since the year 0 or 1, and Julian days, are later counted from the first row.
     let is_far = times.iter().find(|time| !time.is_nan()).is_some_and(|time| time.abs() > 9.2e9);
-    let most_s = if is_far { 1e11 } else { 9.2e9 };
+    let most_s = if is_far { 2.2e11 } else { 9.2e9 };
     let keep: Vec<bool> = times.iter().map(|time| time.abs() < most_s).collect();
     let (mut before, mut dropped) = (Vec::with_capacity(keep.len()), 0);
     for &is_kept in &keep {

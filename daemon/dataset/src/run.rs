@@ -16,11 +16,11 @@ use super::motion::PositionSource;
 use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
-use super::run_content::RunContent;
+use super::run_content::{RunColumns, RunContent};
 use super::stamps;
 use super::table::Table;
 use super::train_rows::TrainRows;
-use super::trains::{TrainsColumn, only};
+use super::trains::{TrainsColumn, keep_only, only};
 
 const DAY_S: i64 = 86_400;
 
@@ -172,10 +172,9 @@ pub(super) fn read(
     label: &str,
     content: RunContent,
 ) -> Result<Run, DatasetError> {
-    let mappings = &context.manifest.columns;
     let table = match content {
-        RunContent::Text(text) => of_train(context.manifest, label, &text)?,
-        RunContent::Columns(columns) => Table::of_columns(label, columns, mappings)?,
+        RunContent::Text(text) => of_text(context.manifest, label, &text)?,
+        RunContent::Columns(columns) => of_columns(context.manifest, label, columns)?,
     };
     let rows = table.lines.rows;
     let has_speed = table.filled(Quantity::Speed).is_some();
@@ -226,8 +225,8 @@ pub(super) fn read(
     })
 }
 
-/// Reads the rows of the train.
-fn of_train(manifest: &Manifest, label: &str, text: &str) -> Result<Table, DatasetError> {
+/// Reads the rows of the train of a text.
+fn of_text(manifest: &Manifest, label: &str, text: &str) -> Result<Table, DatasetError> {
     let Manifest { layout, columns, train_rows, .. } = manifest;
     let own = match train_rows {
         TrainRows::Of { column, value } => only(label, text, layout, (column, value))?,
@@ -238,6 +237,27 @@ fn of_train(manifest: &Manifest, label: &str, text: &str) -> Result<Table, Datas
         && let Some(trains) = TrainsColumn::of(text, layout)
     {
         trains.refuse(label, &table)?;
+    }
+    Ok(table)
+}
+
+/// Reads the rows of the train of a file's columns.
+fn of_columns(
+    manifest: &Manifest,
+    label: &str,
+    RunColumns { columns, trains }: RunColumns,
+) -> Result<Table, DatasetError> {
+    let mut table = Table::of_columns(label, columns, &manifest.columns)?;
+    match &manifest.train_rows {
+        TrainRows::Of { column, value } => {
+            keep_only(label, &mut table, trains.as_ref(), (column, value))?;
+        }
+        TrainRows::Unsaid => {
+            if let Some(trains) = trains.as_ref().and_then(TrainsColumn::of_table) {
+                trains.refuse(label, &table)?;
+            }
+        }
+        TrainRows::All => {}
     }
     Ok(table)
 }

@@ -6,6 +6,7 @@ use super::cell::truth;
 use super::error::{DatasetError, SourcePosition};
 use super::lines::{Row, RowReader, below};
 use super::quantity::Quantity;
+use super::run_content::TrainColumn;
 use super::table::Table;
 use super::text_layout::TextLayout;
 
@@ -17,6 +18,8 @@ const NAMES: &str = "vehicle vehicleid vehid veh vehiclename vehicleno vehiclenu
                      idtren idtreno поезд номерпоезда";
 /// A position that changes by this many m and twice what the speed says is another train's.
 const JUMP_MIN_M: f64 = 100.0;
+/// The line of the first row where the names stand in the first.
+const FIRST_ROW_LINE: usize = 2;
 /// Trains that a message names at most.
 const SHOWN_MAX: usize = 8;
 
@@ -82,6 +85,13 @@ impl TrainsColumn {
         cells.column(name)
     }
 
+    /// The trains that a table's rows are of; `None` where its column names no several.
+    pub(super) fn of_table(column: &TrainColumn) -> Option<Self> {
+        let mut cells = TrainCells::default();
+        column.cells().zip(FIRST_ROW_LINE..).for_each(|(cell, line)| cells.push(cell, line));
+        cells.column(column.name.clone())
+    }
+
     /// True where a train comes again after another: no train changes its number so.
     pub fn is_interleaved(&self) -> bool {
         self.changes.len() >= self.trains.len()
@@ -139,9 +149,8 @@ pub fn only<'t>(
     layout: &TextLayout,
     (name, value): (&str, &str),
 ) -> Result<Cow<'t, str>, DatasetError> {
-    let at_names = || SourcePosition::line(label, layout.skip_rows + 1);
     let (_, index) = column(text, layout, |other| other == name)
-        .ok_or_else(|| at_names().problem(format!("no column '{name}' for [train] rows")))?;
+        .ok_or_else(|| no_column(label, layout.skip_rows + 1, name))?;
     let mut others = Vec::new();
     let mut count = 0;
     rows(text, layout, |row, line| {
@@ -152,10 +161,7 @@ pub fn only<'t>(
         }
     });
     if count == 0 {
-        let found = TrainsColumn::of(text, layout).filter(|it| it.name == name);
-        let found = found.map_or(String::new(), |it| format!("; {}", it.words()));
-        return Err(SourcePosition::whole(label)
-            .problem(format!("no row of train '{value}' in column '{name}'{found}")));
+        return Err(no_row(label, (name, value), TrainsColumn::of(text, layout)));
     }
     let mut others = others.into_iter().peekable();
     let kept = text.split_inclusive('\n').zip(1..).map(|(whole, line)| {
@@ -163,6 +169,40 @@ pub fn only<'t>(
         if is_other { "\n" } else { whole }
     });
     Ok(Cow::Owned(kept.collect()))
+}
+
+/// Drops a table's rows of other trains.
+///
+/// # Errors
+///
+/// When no such column or no row of the train is there.
+pub(super) fn keep_only(
+    label: &str,
+    table: &mut Table,
+    column: Option<&TrainColumn>,
+    (name, value): (&str, &str),
+) -> Result<(), DatasetError> {
+    let column = column.ok_or_else(|| no_column(label, FIRST_ROW_LINE - 1, name))?;
+    let own: Vec<bool> = column.cells().map(|cell| cell == value).collect();
+    if !own.contains(&true) {
+        return Err(no_row(label, (name, value), TrainsColumn::of_table(column)));
+    }
+    table.retain(&own);
+    table.lines.rows = own.iter().filter(|&&is_own| is_own).count();
+    Ok(())
+}
+
+fn no_column(label: &str, line: usize, name: &str) -> DatasetError {
+    let words = format!("no column '{name}' for [train] rows");
+    SourcePosition::line(label, line).problem(words)
+}
+
+/// The error of a train that has no row; `found` are those of a column that names trains.
+fn no_row(label: &str, (name, value): (&str, &str), found: Option<TrainsColumn>) -> DatasetError {
+    let found = found.filter(|it| it.name == name);
+    let found = found.map_or(String::new(), |it| format!("; {}", it.words()));
+    let words = format!("no row of train '{value}' in column '{name}'{found}");
+    SourcePosition::whole(label).problem(words)
 }
 
 /// Name and place of the first column whose name passes.

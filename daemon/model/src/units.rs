@@ -67,7 +67,7 @@ const STANDARD_GRAVITY_MPS2: f64 = 9.80665;
 const HORSEPOWER_W: f64 = 550.0 * 0.3048 * POUND_FORCE_N;
 
 /// The units, with what files call them; of a dimension the first ones are usual.
-static UNITS: [Unit; 75] = {
+static UNITS: [Unit; 80] = {
     use Dimension::*;
     [
         unit(
@@ -102,19 +102,20 @@ static UNITS: [Unit; 75] = {
             Speed,
             1.0,
             1.0,
-            "mps mpers ms1 mpersec msec meterpersecond meterspersecond metrepersecond metrespersecond мс",
+            "mps mpers ms1 mpersec msec meterprosekunde meternprosekunde metresparseconde metrosporsegundo metrialsecondo meterpersecond meterspersecond metrepersecond metrespersecond мс",
         ),
         unit(
             "km/h",
             Speed,
             1.0,
             3.6,
-            "kph kmph kmperh kmh1 kmhr kmperhour kmstd kilometerperhour kilometersperhour kilometreperhour kilometresperhour кмч",
+            "kph kmph kmperh kmh1 kmhr kmperhour kmstd kilometerperhour kilometersperhour kilometreperhour kilometresperhour kilometerprostunde kilometernprostunde kilometresparheure kilometresheure kilometrosporhora chilometriallora chilometriorari kilometerperuur kilometertimmen quilometrosporhora кмч",
         ),
         unit("mph", Speed, MILE_PER_HOUR_MPS, 1.0, "miph mih mileperhour milesperhour"),
         rare("kn", Speed, 1852.0, 3600.0, "kt kts knot knots knoten"),
         rare("cm/s", Speed, 1.0, 1e2, "cms cmps centimeterspersecond"),
         rare("mm/s", Speed, 1.0, 1e3, "mms mmps millimeterspersecond"),
+        rare("dm/s", Speed, 1.0, 10.0, "dms decimeterspersecond"),
         rare("m/min", Speed, 1.0, 60.0, "mmin mpermin metersperminute metresperminute"),
         rare("ft/s", Speed, 0.3048, 1.0, "fts fps ftpersec feetpersecond"),
         unit(
@@ -139,7 +140,7 @@ static UNITS: [Unit; 75] = {
             Force,
             1e3 * POUND_FORCE_N,
             1.0,
-            "kip kips klb klbs kilopoundsforce kilopoundforce",
+            "kip kips klb klbs kilopounds kilopound kilopoundsforce kilopoundforce",
         ),
         rare(
             "kp",
@@ -153,8 +154,10 @@ static UNITS: [Unit; 75] = {
             Force,
             1e3 * STANDARD_GRAVITY_MPS2,
             1.0,
-            "mp megapond tonneforce tonnesforce тс",
+            "mp megapond tonneforce tonnesforce metrictonforce metrictonsforce metrictonf тс",
         ),
+        rare("short tonf", Force, 2e3 * POUND_FORCE_N, 1.0, "ustonf ustonsforce shorttonsforce"),
+        rare("long tonf", Force, 2240.0 * POUND_FORCE_N, 1.0, "uktonf uktonsforce longtonsforce"),
         rare("daN", Force, 10.0, 1.0, "decanewton decanewtons dekanewton"),
         unit("Pa", Pressure, 1.0, 1.0, "pascal pascals"),
         unit("kPa", Pressure, 1e3, 1.0, "kilopascal kilopascals"),
@@ -184,12 +187,20 @@ static UNITS: [Unit; 75] = {
             Ratio,
             1.0,
             1e3,
-            "promille permil mmm mperkm mkm metersperkilometer metresperkilometre",
+            "promille permil permill pourmille permille pormil promil mmm mperkm mkm nkn npkn metersperkilometer metresperkilometre",
         ),
-        unit("%", Ratio, 1.0, 1e2, "pct percent prozent pourcent perc pc"),
+        unit(
+            "%",
+            Ratio,
+            1.0,
+            1e2,
+            "pct percent prozent pourcent percento porciento procent perc pc m100m ft100ft",
+        ),
         unit("1", Ratio, 1.0, 1.0, "pu ratio mm fraction share anteil"),
         // A slope's angle, as small as those of railways: its tangent is the angle to 0.2 %.
         rare("deg", Ratio, std::f64::consts::PI, 180.0, "degree degrees grad degrad winkelgrad"),
+        rare("ft/mi", Ratio, 0.3048, 1609.344, "feetpermile ftpermile ftpermi fpmi"),
+        rare("gon", Ratio, std::f64::consts::PI, 200.0, "gradian gradians neugrad"),
         rare("rad", Ratio, 1.0, 1.0, "radian radians"),
         rare("mrad", Ratio, 1.0, 1e3, "milliradian milliradians"),
         unit("deg", Angle, 1.0, 1.0, "degree degrees grad"),
@@ -254,6 +265,9 @@ const fn shifted(
 /// Small letters and digits only.
 fn fold(text: &str) -> String {
     let digits = |letter: char| match letter {
+        'ä' | 'á' | 'à' => 'a',
+        'é' | 'è' => 'e',
+        'ó' | 'ò' => 'o',
         '¹' => '1',
         '²' => '2',
         '³' => '3',
@@ -281,7 +295,7 @@ impl Unit {
     pub fn spelled(dimension: Dimension, text: &str) -> Option<Unit> {
         let text = text.trim();
         match (dimension, text) {
-            (Dimension::Ratio, "‰" | "0/00" | "o/oo") => {
+            (Dimension::Ratio, "‰" | "0/00" | "o/oo" | "°/oo") => {
                 return Self::find(dimension, "permille");
             }
             (Dimension::Ratio | Dimension::Count, "-" | "") => return Self::find(dimension, "1"),

@@ -4,20 +4,21 @@
 use std::fs::File;
 use std::io::ErrorKind;
 use std::os::fd::AsFd;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use dynocar::cli::{Failure, carry_out};
 use dynocar::output::{OutputError, report_line, require_new};
 use dynocar::programs::{PARQUET, called_as};
+use dynocar::unpacking::is_parquet;
 use dynocar_recording::cli::{ConvertArguments, VerifyArguments};
 use dynocar_recording::convert::{from_dataset, unpack};
 
 use super::reading::write_mcap;
 use crate::numbers::{Wanted, send_columns};
 use crate::reading::{Content, read};
-use crate::trains::require_one_train;
+use crate::trains::TrainsBy;
 use crate::writing::{Written, write_folder};
 
 /// Recordings as Parquet and back.
@@ -48,9 +49,9 @@ struct ColumnsArguments {
     /// A column whose cells are wanted, and the unit of its numbers
     #[arg(long = "column", num_args = 2, value_names = ["NAME", "UNIT"], allow_hyphen_values = true)]
     columns: Vec<String>,
-    /// Refuse rows of several trains in turn
-    #[arg(long)]
-    of_one_train: bool,
+    /// Hand over whose the rows are, by the column of this name, or else by any that names trains
+    #[arg(long, num_args = 0..=1, require_equals = true, value_name = "COLUMN")]
+    trains: Option<Option<String>>,
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.
@@ -64,10 +65,6 @@ pub fn main() -> ExitCode {
             Command::Columns(arguments) => hand_over(arguments),
         },
     )
-}
-
-fn is_parquet(path: &Path) -> bool {
-    path.extension().is_some_and(|it| it == "parquet")
 }
 
 fn convert(arguments: &ConvertArguments) -> Result<(), Failure> {
@@ -137,15 +134,13 @@ fn verify(arguments: &VerifyArguments) -> Result<(), Failure> {
 fn hand_over(arguments: &ColumnsArguments) -> Result<(), Failure> {
     let wanted = |pair: &[String]| Wanted { column: pair[0].clone(), unit: pair[1].clone() };
     let wanted: Vec<Wanted> = arguments.columns.chunks(2).map(wanted).collect();
-    if arguments.of_one_train {
-        require_one_train(&arguments.file)
-            .map_err(|error| Failure::Input(error.problem.to_string()))?;
-    }
+    let trains = arguments.trains.clone();
+    let trains = trains.map(|it| it.map_or(TrainsBy::AnyName, TrainsBy::Name));
     // As a file it takes whole blocks at once.
     let output = std::io::stdout().as_fd().try_clone_to_owned();
     let output = output.map_err(OutputError::StandardOutput)?;
     // Whoever calls has named the file.
-    let handed_over = send_columns(&arguments.file, &wanted, File::from(output))
+    let handed_over = send_columns(&arguments.file, &wanted, trains.as_ref(), File::from(output))
         .map_err(|error| Failure::Input(error.problem.to_string()))?;
     match handed_over {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {

@@ -55,9 +55,6 @@ pub enum TableProblem {
         /// The row, counted from 1.
         row: usize,
     },
-    /// The rows are of several trains.
-    #[error("{0}: write one file for each, or rows = \"all\" into [train] where they are one")]
-    SeveralTrains(String),
     /// The contents are not a readable recording.
     #[error(transparent)]
     Recording(#[from] ReadProblem),

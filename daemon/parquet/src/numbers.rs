@@ -12,13 +12,14 @@ use arrow_array::types::{
 };
 use arrow_array::{Array, PrimitiveArray, downcast_integer, make_array, new_empty_array};
 use arrow_schema::{DataType, TimeUnit};
-use dynocar::columns_stream::Sender;
+use dynocar::columns_stream::{Header, Sender};
 use dynocar_model::units::{Dimension, Unit};
 use parquet::arrow::ProjectionMask;
 
 use super::error::guarded;
 use crate::error::{TableError, TableProblem};
 use crate::reading::open;
+use crate::trains::{TrainsBy, keys_of};
 
 /// A column that is wanted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,7 +35,8 @@ pub struct Wanted {
 const BATCH_ROWS: usize = 8192;
 
 /// Hands over all columns of a file, with the numbers in the wanted ones, batch after batch: what is missing is
-/// `NaN`, true is 1 and false 0. Where a wanted column is not there, none has numbers.
+/// `NaN`, true is 1 and false 0. Where a wanted column is not there, none has numbers. Beside them come the trains,
+/// where a column says whose the rows are.
 ///
 /// # Errors
 ///
@@ -43,11 +45,12 @@ const BATCH_ROWS: usize = 8192;
 pub fn send_columns(
     path: &Path,
     wanted: &[Wanted],
+    trains: Option<&TrainsBy>,
     output: impl Write,
 ) -> Result<io::Result<()>, TableError> {
     guarded(path, || {
         let mut sender = None;
-        let sent = send(path, wanted, output, &mut sender);
+        let sent = send(path, (wanted, trains), output, &mut sender);
         // An error is reported behind the columns.
         let ended = sender.map_or(Ok(()), Sender::end);
         sent.map(|it| it.and(ended))
@@ -57,7 +60,7 @@ pub fn send_columns(
 /// Leaves the sender in its place once it has begun.
 fn send<W: Write>(
     path: &Path,
-    wanted: &[Wanted],
+    (wanted, trains): (&[Wanted], Option<&TrainsBy>),
     output: W,
     sender: &mut Option<Sender<W>>,
 ) -> Result<io::Result<()>, TableProblem> {
@@ -76,20 +79,27 @@ fn send<W: Write>(
     let rows = builder.metadata().file_metadata().num_rows().try_into().unwrap_or(0);
     let columns = fields.iter().enumerate();
     let columns = columns.map(|(index, it)| (it.name().clone(), places.contains_key(&index)));
-    let sender = match Sender::begin(rows, columns.collect(), output) {
+    let columns = columns.collect();
+    let trains = trains.map(|it| it.read(open(path)?)).transpose()?.flatten();
+    let (trains, rows_trains) = trains.map(|it| ((it.name, it.trains), it.rows)).unzip();
+    let sender = match Sender::begin(&Header { rows, columns, trains }, output) {
         Ok(it) => sender.insert(it),
         Err(error) => return Ok(Err(error)),
     };
     if places.is_empty() {
-        return Ok(Ok(()));
+        return Ok(rows_trains.map_or(Ok(()), |it| sender.rows(&[it])));
     }
+    let mut rows_trains = rows_trains.as_deref();
     let mask = ProjectionMask::roots(builder.parquet_schema(), places.keys().copied());
     let batches = builder.with_projection(mask).with_batch_size(BATCH_ROWS).build();
     for batch in batches.map_err(TableProblem::not_parquet)? {
         let batch = batch.map_err(TableProblem::not_parquet)?;
         let arrays = places.values().zip(batch.columns());
-        let block: Vec<Vec<f64>> =
+        let mut block: Vec<Vec<f64>> =
             arrays.map(|(wanted, array)| numbers(array, wanted)).collect::<Result<_, _>>()?;
+        block.extend(
+            rows_trains.as_mut().and_then(|it| it.split_off(..batch.num_rows())).map(Vec::from),
+        );
         if let Err(error) = sender.rows(&block) {
             return Ok(Err(error));
         }
@@ -126,6 +136,12 @@ fn numbers(array: &dyn Array, wanted: &Wanted) -> Result<Vec<f64>, TableProblem>
         DataType::Decimal64(..) => decimals::<Decimal64Type>(array),
         DataType::Decimal128(..) => decimals::<Decimal128Type>(array),
         DataType::Decimal256(..) => decimals::<Decimal256Type>(array),
+        // Numbers that repeat, as categories.
+        DataType::Dictionary(..) => {
+            let dictionary = array.as_any_dictionary();
+            let values = numbers(dictionary.values(), wanted)?;
+            keys_of(dictionary).map(|key| key.map_or(f64::NAN, |key| values[key])).collect()
+        }
         // A column in which every value is missing.
         DataType::Null => vec![f64::NAN; array.len()],
         _ => return Err(refuse("numbers, true and false, or times".into()))

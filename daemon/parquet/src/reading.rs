@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Schema};
 use dynocar::storage::{Disk, settle};
+use dynocar::unpacking::is_parquet;
 use dynocar_recording::columns::{Column, Row, Source};
 use dynocar_recording::error::{ReadProblem, WriteError};
 use dynocar_recording::recording::{Metadata, Recording};
@@ -20,6 +21,9 @@ use super::table::{
     ATTACHMENTS, Attached, KIND, LAYOUT, METADATA, TABLES, TableKind, add_metadata,
     attachments_batch, attachments_of, metadata_batch,
 };
+
+/// A reader of a file's rows, before it begins.
+pub type Builder = ParquetRecordBatchReaderBuilder<File>;
 
 /// A message with its place in the recording and when it was recorded.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +76,7 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, TableError> {
         }
         let entries = std::fs::read_dir(path)?.map(|it| Ok(it?.path()));
         let mut files = entries.collect::<std::io::Result<Vec<PathBuf>>>()?;
-        files.retain(|it| it.extension().is_some_and(|it| it == "parquet"));
+        files.retain(|it| is_parquet(it));
         files.sort();
         if files.is_empty() { Err(TableProblem::NotOurs) } else { Ok(files) }
     };
@@ -84,7 +88,7 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, TableError> {
 /// # Errors
 ///
 /// When the system does not give it, or it is no Parquet.
-pub fn open(path: &Path) -> Result<ParquetRecordBatchReaderBuilder<File>, TableProblem> {
+pub fn open(path: &Path) -> Result<Builder, TableProblem> {
     ParquetRecordBatchReaderBuilder::try_new(File::open(path)?).map_err(TableProblem::not_parquet)
 }
 

@@ -204,3 +204,20 @@ fn what_no_train_does_is_refused_in_words() {
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
     assert!(said(&output).contains("nowhere/train.toml"), "{}", said(&output));
 }
+
+#[test]
+fn a_point_again_a_step_back_and_a_leap_move_no_train() {
+    let fmu = Fmu::of(&PLANT, demo().to_str().unwrap());
+    set(&fmu, "initial_speed_mps", 10.0);
+    fmu.initialize();
+    for time_s in [0.0, 10.0, 20.0] {
+        assert_eq!(fmu.step_for(time_s, 10.0), Status::Ok, "{}", fmu.said());
+        let at_m = real(&fmu, "motion.position_m");
+        for elsewhere_s in [time_s, time_s - 5.0, -50.0, time_s + 10.1, 1000.0] {
+            assert_eq!(fmu.step_for(elsewhere_s, 10.0), Status::Error, "{elsewhere_s}");
+            let expected = format!("expected {} s, the end of the step before", time_s + 10.0);
+            assert!(fmu.said().contains(&expected), "{}", fmu.said());
+            assert_eq!(real(&fmu, "motion.position_m"), at_m);
+        }
+    }
+}

@@ -182,7 +182,8 @@ impl Facts {
             }
             _ => {}
         }
-        self.packed = other.packed.filter(|it| self.numbers == 0 || self.packed() == it.format());
+        let own = self.packed.and_then(|it| it.pattern());
+        self.packed = other.packed.filter(|it| self.numbers == 0 || own == it.pattern());
         self.numbers += other.numbers;
         self.texts += other.texts;
         self.truths += other.truths;
@@ -234,7 +235,7 @@ impl Facts {
 
     /// The format in which the numbers are packed times.
     pub fn packed(&self) -> Option<TimeFormat> {
-        self.packed?.format()
+        self.packed?.pattern().map(|it| TimeFormat::Pattern(it.into()))
     }
 
     /// -1 where the number falls in most steps, else 1.

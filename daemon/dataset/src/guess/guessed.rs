@@ -7,7 +7,7 @@ use dynocar_shared::SampleField;
 use super::facts::Facts;
 use super::name::{Name, named_unit};
 use super::plausible::{UnitChoice, choose_unit};
-use crate::diagnostic::concerned;
+use crate::diagnostic::{Diagnostic, concerned};
 use crate::{GradientSource, PositionSource, Quantity, Run, TextLayout, TimeFormat};
 
 /// A recording's file.
@@ -208,10 +208,30 @@ impl Guess {
 
 impl Guess {
     /// Turns the runs that go the other way by most steps from one time to the next, where the files have the rows in
-    /// another order; true where any was turned.
+    /// another order, and those without a position that speed up where the recorded gradient climbs, which leaves a
+    /// doubt; true where any was turned.
     pub fn turn_runs<'r>(&mut self, runs: impl IntoIterator<Item = &'r Run>) -> bool {
         let mut is_turned = false;
         for (guessed, run) in self.runs.iter_mut().zip(runs) {
+            let is_against = |it: &Diagnostic| {
+                it.fault.is_some_and(|(it, _)| it.fault == InputFault::GradientSign)
+            };
+            if run.position_source != PositionSource::Column
+                && run.gradient_source == GradientSource::Column
+                && guessed.direction == 1
+                && run.diagnostics.iter().any(is_against)
+            {
+                guessed.direction = -1;
+                is_turned = true;
+                let gradient = self.columns.iter_mut().find(|it| it.quantity == Quantity::Gradient);
+                gradient.into_iter().for_each(|it| {
+                    it.doubts.push(format!(
+                        "{} has no position and speeds up where it climbs: taken to go against the chainage \
+                         (direction = -1)",
+                        run.file
+                    ));
+                });
+            }
             let positions: Vec<f64> =
                 run.samples.iter().filter_map(|it| it.get(SampleField::Position)).collect();
             let signs = positions.windows(2).map(|it| (it[1] - it[0]).partial_cmp(&0.0));

@@ -11,6 +11,9 @@ use crate::{TextLayout, TimeFormat};
 
 /// Possible separators of cells, in the order of preference.
 const DELIMITERS: [u8; 4] = *b";\t|,";
+/// Types of numbers and times, without their bits.
+const TYPES: &str = "double float real single date int integer uint long number numeric decimal dbl flt sgl timestamp datetime \
+                     bigint smallint tinyint i u f";
 /// Number of rows that show the layout.
 const ROWS_MAX: usize = 200;
 
@@ -133,6 +136,18 @@ impl Row {
         own.peek().is_some() && !own.any(|cell| is_value(cell) && !is_missing(cell))
     }
 
+    /// True for the names of types of numbers and times.
+    fn is_of_types(&self) -> bool {
+        let is_type = |cell: &str| {
+            // ClickHouse writes `Nullable(DateTime64(6))`.
+            let word = cell.to_lowercase().replace("nullable(", "");
+            let kind = word.split(['(', ')']).next().unwrap_or_default();
+            let kind = kind.trim_end_matches(|it: char| it.is_ascii_digit());
+            TYPES.split(' ').any(|it| it == kind) || word.starts_with("datetime64")
+        };
+        self.filled().next().is_some() && self.filled().all(is_type)
+    }
+
     /// True where at least half of the cells are units and none is a value. Letters alone are as well the
     /// names of columns: t, v, F; but not where less of them stand there than above.
     fn is_of_units(&self, names: &Row) -> bool {
@@ -179,11 +194,16 @@ fn block(rows: &[Row]) -> Option<Block> {
     let words = (0..values).rev().find(|&index| rows[index].is_of_words())?;
     let above = words.checked_sub(1).filter(|&above| {
         let (names, units) = (&rows[above], &rows[words]);
-        units.is_of_units(names)
-            && names.is_of_words()
-            && names.filled().count() >= units.filled().count()
+        let is_below = units.is_of_units(names)
+            || units.is_of_types() && !names.is_of_types() && !is_below_names(rows, above);
+        is_below && names.is_of_words() && names.filled().count() >= units.filled().count()
     });
     Some(Block { header: above.unwrap_or(words), units: above.map(|_| words) })
+}
+
+/// True for a line of units that stands below names itself.
+fn is_below_names(rows: &[Row], at: usize) -> bool {
+    at.checked_sub(1).is_some_and(|above| rows[at].is_of_units(&rows[above]))
 }
 
 /// How well the rows fall into columns: the more columns the better, where rows agree on them with

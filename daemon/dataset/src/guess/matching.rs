@@ -4,7 +4,7 @@ use dynocar_model::units::{Dimension, Unit, is_unit};
 
 use super::facts::{Facts, Text};
 use super::guessed::GuessedColumn;
-use super::name::{Name, readings};
+use super::name::{Name, readings, scaled_unit};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
 use crate::names::nearest;
@@ -127,6 +127,11 @@ fn by_name(name: &Name, quantity: Quantity) -> Option<Result<Match, String>> {
         })
         .max_by_key(|(it, _)| it.score);
     let Some((mut best, words)) = best else { return by_unit_alone(name, quantity).map(Ok) };
+    if let Some(text) = scaled_unit(name, quantity) {
+        return Some(Err(
+            contradiction(words, quantity).unwrap_or(format!("{UNKNOWN_UNIT}'{text}'"))
+        ));
+    }
     if let Some(text) = &name.unit {
         let Some(unit) = Unit::spelled(quantity.dimension(), text) else {
             let problem = match is_unit(text) {

@@ -21,7 +21,10 @@ impl Name {
     /// Takes a name apart: `F_trac [kN]` is f, trac and the unit kN.
     pub fn parse(text: &str) -> Self {
         let text = text.trim();
-        let (rest, unit) = split_unit(text);
+        // Recorders of buses write the source behind a stroke: `speed\CAN1:1`.
+        let is_source = |it: &str| it.contains(':') && it.ends_with(|it: char| it.is_ascii_digit());
+        let own = text.rsplit_once('\\').filter(|it| is_source(it.1)).map_or(text, |it| it.0);
+        let (rest, unit) = split_unit(own);
         Name { text: text.into(), words: words(&rest), unit }
     }
 
@@ -63,8 +66,12 @@ pub fn readings(name: &Name, quantity: Quantity) -> Vec<(&[String], Option<Unit>
     let words = &name.words[..];
     let mut readings = vec![(words, None)];
     if name.unit.is_none() {
-        for count in 1..words.len().min(6) {
-            let (rest, unit) = words.split_at(words.len() - count);
+        // A number behind the unit is a part's.
+        let is_number = |word: &String| word.chars().all(|it| it.is_ascii_digit());
+        let end = words.len() - usize::from(words.last().is_some_and(is_number));
+        let ends = [end, words.len()].into_iter().skip(usize::from(end == words.len()));
+        for (end, count) in ends.flat_map(|end| (1..end.min(6)).map(move |count| (end, count))) {
+            let (rest, unit) = words[..end].split_at(end - count);
             if let Some(unit) = Unit::spelled(quantity.dimension(), &unit.concat()) {
                 readings.push((rest, Some(unit)));
             }
@@ -102,9 +109,26 @@ fn split_unit(text: &str) -> (String, Option<String>) {
 fn looks_like_unit(inside: &str, open: char) -> bool {
     let inside = inside.trim();
     let has_mark = inside.contains(['/', '·', '*', '^', '²', '³', '⁻']);
-    let known = words(inside).iter().any(|word| is_word(word));
-    let is_word = !inside.contains(' ') && inside.chars().any(char::is_alphabetic);
-    !known && (has_mark || (open == '[' && is_word))
+    let words = words(inside);
+    let known = words.iter().any(|word| is_word(word));
+    let has_letters = inside.chars().any(char::is_alphabetic);
+    // Letters of quantities are units, too: of `dm/s` the last word is one.
+    let is_share = has_letters && has_mark && words.last().is_some_and(|word| is_unit(word));
+    is_share
+        || inside.starts_with("1:")
+        || !known && (has_mark || (open == '[' && has_letters && !inside.contains(' ')))
+}
+
+/// The text in a name's brackets where that is a multiple of a unit of the quantity, as `0.1 kN` or `x1000 lbs`.
+pub fn scaled_unit(name: &Name, quantity: Quantity) -> Option<&str> {
+    let spelled = |text: &str| Unit::spelled(quantity.dimension(), text).is_some();
+    let (_, inside) = name.text.rsplit_once(['[', '('])?;
+    let inside = inside.split([']', ')']).next()?;
+    let (numbers, units): (Vec<String>, Vec<String>) = words(inside)
+        .into_iter()
+        .partition(|it| it == "x" || it.chars().all(|it| it.is_ascii_digit()));
+    let is_scaled = !numbers.is_empty() && spelled(&units.concat()) && !spelled(inside);
+    is_scaled.then_some(inside)
 }
 
 /// The words of a name: separated by marks, by capitals and by digits.
@@ -153,14 +177,17 @@ fn fold_into(word: &mut String, letter: char) {
             'ö' | 'ø' => word.push_str("oe"),
             'ü' => word.push_str("ue"),
             'ß' => word.push_str("ss"),
-            'é' | 'è' | 'ê' | 'ë' | 'ě' | 'ę' => word.push('e'),
-            'à' | 'á' | 'â' | 'ã' | 'å' | 'ą' => word.push('a'),
-            'ó' | 'ò' | 'ô' | 'õ' => word.push('o'),
-            'í' | 'ì' | 'î' | 'ï' => word.push('i'),
-            'ú' | 'ù' | 'û' | 'ů' => word.push('u'),
+            'é' | 'è' | 'ê' | 'ë' | 'ě' | 'ę' | 'ė' => word.push('e'),
+            'à' | 'á' | 'â' | 'ã' | 'å' | 'ą' | 'ă' => word.push('a'),
+            'ó' | 'ò' | 'ô' | 'õ' | 'ő' => word.push('o'),
+            'í' | 'ì' | 'î' | 'ï' | 'ı' => word.push('i'),
+            'ú' | 'ù' | 'û' | 'ů' | 'ű' => word.push('u'),
             'ç' | 'č' | 'ć' => word.push('c'),
+            'ğ' => word.push('g'),
+            'đ' => word.push('d'),
+            'ț' | 'ţ' => word.push('t'),
             'ñ' | 'ň' | 'ń' => word.push('n'),
-            'š' | 'ś' => word.push('s'),
+            'š' | 'ś' | 'ş' | 'ș' => word.push('s'),
             'ž' | 'ź' | 'ż' => word.push('z'),
             'ł' => word.push('l'),
             'ř' => word.push('r'),

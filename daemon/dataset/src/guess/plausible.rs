@@ -10,6 +10,8 @@ use crate::Quantity;
 const FAR: f64 = 20.0;
 /// Some 3000 years in s.
 const TIME_MAX_S: f64 = 1e11;
+/// Julian days from 1858 to 2132, which count from before the year 0.
+const JULIAN_DAYS: std::ops::Range<f64> = 2.4e6..2.5e6;
 /// The factor of recorders that write counts of a thousandth.
 const RAW_COUNT: f64 = 1e-3;
 
@@ -96,8 +98,10 @@ fn by_values(
     max: f64,
 ) -> UnitChoice {
     let units = usual.units.iter().filter_map(|name| Unit::find(quantity.dimension(), name));
-    // No clock counts longer than from the year 0.
-    let units = units.filter(|it| quantity != Quantity::Time || it.to_base(max) < TIME_MAX_S);
+    // No other clock counts longer than from the year 0.
+    let is_clock =
+        |it: &Unit| it.to_base(max) < TIME_MAX_S || it.name() == "d" && JULIAN_DAYS.contains(&max);
+    let units = units.filter(|it| quantity != Quantity::Time || is_clock(it));
     let mut fits: Vec<(f64, Unit)> =
         units.map(|unit| (usual.distance(unit.to_base(figure)), unit)).collect();
     // Stable: of units that fit alike, the likelier comes first.

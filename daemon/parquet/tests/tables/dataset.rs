@@ -6,26 +6,30 @@ use std::sync::Arc;
 use arrow_array::types::Int32Type;
 use arrow_array::{
     ArrayRef, BooleanArray, Decimal128Array, DictionaryArray, DurationMillisecondArray,
-    Float32Array, Float64Array, Int16Array, RecordBatch, StringArray, Time32MillisecondArray,
-    TimestampMicrosecondArray, UInt64Array,
+    Float32Array, Float64Array, Int16Array, Int32Array, RecordBatch, StringArray,
+    Time32MillisecondArray, TimestampMicrosecondArray, UInt64Array,
 };
 use dynocar::columns_stream;
 use dynocar::programs::ErrorDocument;
-use dynocar_analysis::dataset::{Dataset, DatasetFiles, FileProblem, Manifest, is_parquet};
-use dynocar_dataset::{RunColumn, RunContent};
+use dynocar_analysis::dataset::train_rows::TrainRows;
+use dynocar_analysis::dataset::{
+    ColumnMapping, Dataset, DatasetFiles, FileProblem, MANIFEST_FILE, Manifest, is_parquet,
+};
+use dynocar_dataset::{RunColumn, RunColumns, RunContent};
 use dynocar_parquet::numbers::{Wanted, send_columns};
+use dynocar_parquet::trains::TrainsBy;
 
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 
-use crate::support::{program, shared, table};
+use crate::support::{TRAIN, program, shared, table};
 
 fn read(path: &Path, wanted: &[(&str, &str)]) -> Vec<RunColumn> {
     let wanted = wanted.iter().map(|it| Wanted { column: it.0.into(), unit: it.1.into() });
     let mut bytes = Vec::new();
-    send_columns(path, &wanted.collect::<Vec<_>>(), &mut bytes).unwrap().unwrap();
-    columns_stream::read(&bytes[..]).unwrap()
+    send_columns(path, &wanted.collect::<Vec<_>>(), None, &mut bytes).unwrap().unwrap();
+    columns_stream::read(&bytes[..]).unwrap().columns
 }
 
 /// The numbers of one column, `None` where missing.
@@ -40,6 +44,8 @@ fn numbers_truths_and_times_of_every_kind_become_numbers_and_what_is_missing_is_
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("own.parquet");
     let at = vec![Some(1_700_000_000_000_001), Some(1_700_000_000_500_000), None];
+    let keys = Int32Array::from(vec![Some(0), None, Some(0)]);
+    let repeated = DictionaryArray::new(keys, shared(Float64Array::from(vec![2.5])));
     let decimals = Decimal128Array::from(vec![Some(-1234), Some(5), None]);
     table(
         &path,
@@ -52,6 +58,7 @@ fn numbers_truths_and_times_of_every_kind_become_numbers_and_what_is_missing_is_
             ("force", shared(Int16Array::from(vec![-3, 0, 7]))),
             ("slides", shared(BooleanArray::from(vec![Some(true), Some(false), None]))),
             ("big", shared(UInt64Array::from(vec![u64::MAX, 0, 1]))),
+            ("again", shared(repeated)),
             ("dec", shared(decimals.with_precision_and_scale(9, 2).unwrap())),
         ],
     );
@@ -65,6 +72,7 @@ fn numbers_truths_and_times_of_every_kind_become_numbers_and_what_is_missing_is_
         ("force", "kN", some([-3.0, 0.0, 7.0])),
         ("slides", "1", [Some(1.0), Some(0.0), None]),
         ("big", "1", some([u64::MAX as f64, 0.0, 1.0])),
+        ("again", "kN", [Some(2.5), None, Some(2.5)]),
         ("dec", "1", [Some(-12.34), Some(0.05), None]),
     ];
     let all = read(&path, &cases.map(|(name, unit, _)| (name, unit)));
@@ -76,7 +84,7 @@ fn numbers_truths_and_times_of_every_kind_become_numbers_and_what_is_missing_is_
     assert_eq!(numbers(&read(&path, &[("since", "s")]), "since"), some([-1.5, 0.0, 0.25]));
     let without = read(&path, &[("speed", "m/s"), ("force", "kN")]);
     assert!(without.iter().all(|it| it.values.is_none()), "the names state the choices");
-    assert_eq!(without.len(), 9);
+    assert_eq!(without.len(), 10);
 }
 
 /// The demo's files, its runs as Parquet.
@@ -97,7 +105,8 @@ impl DatasetFiles for AsParquet {
         assert!(is_parquet(path));
         let columns = manifest.columns.iter();
         let pairs: Vec<_> = columns.map(|it| (it.column.as_str(), it.unit.name())).collect();
-        Ok(RunContent::Columns(read(&self.tables.join(path), &pairs)))
+        let columns = read(&self.tables.join(path), &pairs);
+        Ok(RunContent::Columns(RunColumns { columns, trains: None }))
     }
 }
 
@@ -186,37 +195,113 @@ fn every_compression_of_other_tools_is_read() {
 }
 
 #[test]
-fn rows_of_several_trains_in_turn_are_refused_with_their_names() {
+fn whose_the_rows_are_is_handed_over_of_texts_and_numbers_of_every_kind() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("own.parquet");
-    let shown = path.display().to_string();
     let turns = |names: [&'static str; 2]| (0..60).map(move |row| names[row / 2 % 2]);
     let texts = |names| shared(StringArray::from_iter_values(turns(names)));
-    let coded: DictionaryArray<Int32Type> = turns(["a", "b"]).collect();
+    let coded: DictionaryArray<Int32Type> =
+        turns(["a", "b"]).enumerate().map(|(row, it)| (row != 1).then_some(it)).collect();
     let numbers = Int16Array::from_iter_values((0..60).map(|row| 7 + row % 3));
-    let changed =
-        StringArray::from_iter_values((0..60).map(|row| if row < 30 { "1" } else { "2" }));
-    for (name, column, expected) in [
-        (
-            "vehicle_id",
-            texts(["ice1", "re2"]),
-            Some("of 2 trains, by column 'vehicle_id': 'ice1', 're2'"),
-        ),
-        ("Train", shared(coded), Some("of 2 trains, by column 'Train': 'a', 'b'")),
-        ("unit no", shared(numbers), Some("of 3 trains, by column 'unit no': '7', '8', '9'")),
-        ("note", texts(["x", "y"]), None),
-        ("vehicle_id", texts(["ice1", "ice1"]), None),
-        ("train number", shared(changed), None),
+    let floats = Float64Array::from_iter((0..60).map(|row| (row != 1).then_some(7.0)));
+    let by = |name: &str| TrainsBy::Name(name.to_owned());
+    for (name, column, wanted, expected) in [
+        ("vehicle_id", texts(["ice1", "re2"]), TrainsBy::AnyName, Some(["ice1", "ice1", "re2"])),
+        ("Train", shared(coded), TrainsBy::AnyName, Some(["a", "", "b"])),
+        (" unit no ", shared(numbers), TrainsBy::AnyName, Some(["7", "8", "9"])),
+        ("Zug", shared(floats), TrainsBy::AnyName, Some(["7", "", "7"])),
+        ("note", texts(["x", "y"]), TrainsBy::AnyName, None),
+        ("note", texts(["x", "y"]), by("note"), Some(["x", "x", "y"])),
+        ("train", texts(["x", "y"]), by("note"), None),
     ] {
         let v = shared(Float64Array::from_iter_values((0..60).map(f64::from)));
         table(&path, vec![("v", v), (name, column)]);
-        let output = program(&["columns", &shown, "--of-one-train", "--column", "v", "m/s"]);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        match expected {
-            Some(words) => {
-                assert!(output.status.code() == Some(2) && said.contains(words), "{said}")
-            }
-            None => assert!(output.status.success(), "{name}: {said}"),
+        for wants in [&[][..], &[Wanted { column: "v".into(), unit: "m/s".into() }]] {
+            let mut bytes = Vec::new();
+            send_columns(&path, wants, Some(&wanted), &mut bytes).unwrap().unwrap();
+            let found = columns_stream::read(&bytes[..]).unwrap();
+            let trains = found.trains.as_ref();
+            let cells = trains.map(|it| it.cells().take(3).collect::<Vec<_>>());
+            assert_eq!(cells, expected.map(Vec::from), "{name}");
+            assert!(trains.is_none_or(|it| it.rows.len() == 60 && it.name == name.trim()));
+        }
+    }
+}
+
+/// A dataset of one file of two trains.
+struct OfTwoTrains {
+    manifest: String,
+    train: String,
+    table: PathBuf,
+}
+
+impl DatasetFiles for OfTwoTrains {
+    fn read(&self, path: &str) -> Result<String, FileProblem> {
+        Ok(if path == MANIFEST_FILE { self.manifest.clone() } else { self.train.clone() })
+    }
+
+    fn read_run(&self, _path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
+        let columns = manifest.columns.iter();
+        let wanted =
+            |it: &ColumnMapping| Wanted { column: it.column.clone(), unit: it.unit.name().into() };
+        let by = match &manifest.train_rows {
+            TrainRows::Unsaid => Some(TrainsBy::AnyName),
+            TrainRows::Of { column, .. } => Some(TrainsBy::Name(column.clone())),
+            TrainRows::All => None,
+        };
+        let (mut bytes, wanted) = (Vec::new(), columns.map(wanted).collect::<Vec<_>>());
+        send_columns(&self.table, &wanted, by.as_ref(), &mut bytes).unwrap().unwrap();
+        Ok(RunContent::Columns(columns_stream::read(&bytes[..]).unwrap()))
+    }
+}
+
+#[test]
+fn the_rows_of_one_train_are_chosen_of_a_table_of_several_in_any_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = (0..200).map(|row| (f64::from(row) * 0.2, "ice1", f64::from(row) * 0.05));
+    let other = (0..200).map(|row| (f64::from(row) * 0.2 + 0.1, "re2", 20.0));
+    let one_after_the_other: Vec<(f64, &str, f64)> = own.chain(other).collect();
+    let mut by_time = one_after_the_other.clone();
+    by_time.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut backwards = by_time.clone();
+    backwards.reverse();
+    for (order, rows) in
+        [("in turn", one_after_the_other), ("by time", by_time), ("backwards", backwards)]
+    {
+        let table_path = folder.path().join(format!("{order}.parquet"));
+        let numbers = |of: fn(&(f64, &str, f64)) -> f64| {
+            shared(Float64Array::from_iter_values(rows.iter().map(of)))
+        };
+        let trains = shared(StringArray::from_iter_values(rows.iter().map(|it| it.1)));
+        let columns =
+            vec![("t", numbers(|it| it.0)), ("vehicle_id", trains), ("v", numbers(|it| it.2))];
+        table(&table_path, columns);
+        let load = |rows: &str| {
+            let manifest = format!(
+                "[dataset]\nname = \"x\"\n[train]\nfile = \"train.toml\"\n{rows}\n[columns]\ntime = {{ column = \
+                 \"t\", unit = \"s\" }}\nspeed = {{ column = \"v\", unit = \"m/s\" }}\n[[runs]]\nfile = \"a.parquet\"\n"
+            );
+            Dataset::load(&OfTwoTrains { manifest, train: TRAIN.into(), table: table_path.clone() })
+        };
+        let of = |column: &str, value: &str| {
+            load(&format!("rows = {{ column = \"{column}\", value = \"{value}\" }}"))
+        };
+        let found = of("vehicle_id", "ice1").unwrap();
+        let speeds = found.runs[0].samples.iter().map(|it| it.speed_mps);
+        assert!(speeds.eq((0..200).map(|row| f64::from(row) * 0.05)), "{order}");
+        let other = of("vehicle_id", "re2").unwrap();
+        assert!(other.runs[0].samples.len() == 200, "{order}");
+        assert!(other.runs[0].samples.iter().all(|it| it.speed_mps == 20.0), "{order}");
+        for (found, words) in [
+            (load(""), "of 2 trains, by column 'vehicle_id': "),
+            (
+                of("vehicle_id", "ice2"),
+                "no row of train 'ice2' in column 'vehicle_id'; the rows are of 2 trains",
+            ),
+            (of("unit", "ice1"), "no column 'unit' for [train] rows"),
+        ] {
+            let message = found.unwrap_err().to_string();
+            assert!(message.contains(words), "{order}: {message}");
         }
     }
 }

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
 use dynocar::text_file::{read_beginning, read_bytes};
-use dynocar::unpacking::columns_of;
+use dynocar::unpacking::{columns_of, is_parquet};
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
 use dynocar_analysis::dataset::guess::layout;
 use dynocar_analysis::dataset::train_rows::TrainRows;
 use dynocar_analysis::dataset::trains::{TrainsColumn, only};
 use dynocar_analysis::dataset::{
-    ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, SourcePosition,
+    ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, RunColumns,
+    SourcePosition, TrainColumn,
 };
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
@@ -73,7 +74,6 @@ pub fn texts(
 
 /// Parquet files as texts of their columns of numbers and times, as CSV has them; `None` for other files.
 fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
-    let is_parquet = |path: &PathBuf| path.extension().is_some_and(|it| it == "parquet");
     match paths.iter().filter(|path| is_parquet(path)).count() {
         0 => return Ok(None),
         count if count == paths.len() => {}
@@ -83,14 +83,21 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
         let label = path.display().to_string();
         let refused =
             |words: String| Failure::At(SourcePosition::whole(&label), format!("{label}: {words}"));
-        let names = columns_of(path, &[], true).map_err(&refused)?;
-        let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
-        for name in names.into_iter().map(|it| it.name) {
-            // A column of texts or lists is none that can be mapped.
-            let Ok(read) = numbers_of(path, &name) else { continue };
-            columns.push((name, read));
+        let RunColumns { columns: names, trains } =
+            columns_of(path, &[], &TrainRows::Unsaid).map_err(&refused)?;
+        let mut columns: Vec<(String, Result<Vec<f64>, String>)> = Vec::new();
+        for name in names.iter().map(|it| it.name.clone()) {
+            let read = numbers_of(path, &name);
+            if trains.as_ref().is_none_or(|it| it.name != name.trim()) {
+                columns.push((name, read));
+            }
         }
-        Ok((label, as_csv(&columns)))
+        if columns.iter().all(|it| it.1.is_err()) {
+            let names = names.iter().map(|it| format!("'{}'", it.name)).collect::<Vec<_>>();
+            let words = "expected columns of numbers and times, found texts, lists or structures";
+            return Err(refused(format!("{words}: {}", names.join(", "))));
+        }
+        Ok((label, as_csv(&columns, trains.as_ref())))
     };
     paths.iter().map(table).collect::<Result<_, Failure>>().map(Some)
 }
@@ -98,19 +105,26 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
 /// A column's numbers, times in s.
 fn numbers_of(path: &Path, name: &str) -> Result<Vec<f64>, String> {
     let mapping = ColumnMapping::of_time(name);
-    let columns = columns_of(path, &[mapping], false)?;
+    let columns = columns_of(path, &[mapping], &TrainRows::All)?.columns;
     columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
 }
 
-fn as_csv(columns: &[(String, Vec<f64>)]) -> String {
-    let quoted = |(name, _): &(String, Vec<f64>)| format!("\"{}\"", name.replace('"', "\"\""));
-    let mut text = columns.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n";
-    for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
-        let cell = |(_, values): &(String, Vec<f64>)| match values[row] {
-            missing if missing.is_nan() => String::new(),
-            value => value.to_string(),
+/// Columns as text; one that cannot be mapped holds the type of what it holds.
+fn as_csv(columns: &[(String, Result<Vec<f64>, String>)], trains: Option<&TrainColumn>) -> String {
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let names = columns.iter().map(|it| &it.0[..]).chain(trains.map(|it| &it.name[..]));
+    let mut text = names.map(quoted).collect::<Vec<_>>().join(",") + "\n";
+    let mut train_cells = trains.into_iter().flat_map(TrainColumn::cells);
+    let rows = columns.iter().find_map(|(_, values)| values.as_ref().ok()).map_or(0, Vec::len);
+    for row in 0..rows {
+        let cell = |(_, values): &(String, Result<Vec<f64>, String>)| match values {
+            Ok(values) if values[row].is_nan() => String::new(),
+            Ok(values) => values[row].to_string(),
+            Err(problem) => quoted(problem.rsplit(" found ").next().unwrap_or_default()),
         };
-        text += &(columns.iter().map(cell).collect::<Vec<_>>().join(",") + "\n");
+        let train = train_cells.next().map(|it| if it.is_empty() { it.into() } else { quoted(it) });
+        let cells = columns.iter().map(cell).chain(train);
+        text += &(cells.collect::<Vec<_>>().join(",") + "\n");
     }
     text
 }
