@@ -61,9 +61,9 @@ fn what_looks_back_does_the_same_block_by_block() {
     proposed(|Explanation { problem, .. }, _, candidates| {
         let looking_back: Vec<Candidate> =
             candidates.into_iter().filter(|it| it.hypothesis.nature().looks_back).collect();
-        assert_eq!(looking_back.len(), 2, "late forces and a late speed");
+        assert_eq!(looking_back.len(), 3, "late forces, a late brake and a late speed");
         for (Candidate { hypothesis, .. }, run) in
-            looking_back.iter().zip([&problem.runs[0], &problem.runs[1]])
+            looking_back.iter().zip(problem.runs[..2].iter().cycle())
         {
             let parameters = [0.37, 0.6];
             let mut at_once: Vec<SampleForces> = run.declared.all().collect();

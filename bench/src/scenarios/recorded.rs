@@ -14,7 +14,7 @@ use crate::output::{Failure, during};
 
 /// A run ends at the first stop after this time in s, or where the train turns.
 const RUN_S: f64 = 900.0;
-/// What is recorded, by its column.
+/// Recorded fields by column.
 const FIELDS: [(&str, SampleField); 7] = [
     ("position", SampleField::Position),
     ("speed", SampleField::Speed),
@@ -35,7 +35,7 @@ struct Run {
     text: String,
 }
 
-/// Writes so many hours of a drive into a folder; the last quarter of the runs is held out.
+/// Writes some hours of a drive into a folder; the last quarter of the runs is held out.
 ///
 /// # Errors
 ///

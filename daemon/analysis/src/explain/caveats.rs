@@ -66,7 +66,7 @@ fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
     format!(" Certain, small, and part of the updated model: {}.", small.join(", "))
 }
 
-/// Returns whether the runs held out are predicted worse with what was found, or may be; empty when they are not.
+/// Returns that the runs held out are predicted worse with what was found; empty when they are not.
 fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
     let Some(judged) = score.judged() else { return String::new() };
     let [before, after] = judged.error_mps;
@@ -74,24 +74,24 @@ fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
     if effects.is_empty() || after <= before || shown_after == shown_before {
         return String::new();
     }
-    let predicted = judged.predicted();
-    if let Some([low, high]) = judged.reduction_interval_95.filter(|[_, high]| *high > 0.0) {
-        let [low, high] = [low, high].map(|share| 100.0 * share);
-        return format!(
-            " The runs held out do not tell whether they are predicted better with it{predicted}, {shown_before} m/s \
-             before and {shown_after} after: the 95 % interval of what it removes is {low:.0} to {high:.0} %."
-        );
-    }
     let acts_in_runs = |it: &EffectAnswer| it.place.runs.is_some() || it.place.windows.is_some();
-    let why = if effects.iter().all(acts_in_runs) {
-        "it was found in single runs, and is not looked for in those held out. Where they err most, it may \
-         act too: fit them (role = \"fit\") to find out."
-    } else {
-        "it holds for the runs that were fitted, not for those."
+    let why = match judged.reduction_interval_95 {
+        _ if effects.iter().all(acts_in_runs) => {
+            "it was found in single runs, and is not looked for in those held out. Where they err most, it may \
+             act too: fit them (role = \"fit\") to find out."
+                .to_owned()
+        }
+        Some([low, high]) if high > 0.0 => format!(
+            "this may be chance, the 95 % interval of what it removes is {:.0} to {:.0} %.",
+            100.0 * low,
+            100.0 * high
+        ),
+        _ => "it holds for the runs that were fitted, not for those.".to_owned(),
     };
     format!(
-        " The runs held out are predicted worse with it{predicted}, {shown_before} m/s before and \
-         {shown_after} after: {why}"
+        " The runs held out are predicted worse with it{}, {shown_before} m/s before and \
+         {shown_after} after: {why}",
+        judged.predicted()
     )
 }
 

@@ -87,7 +87,7 @@ fn a_format_is_recognised_by_its_cells() {
         ("3/18/2026 7:13:20 AM", Some("%-m/%-d/%Y %-I:%M:%S %p")),
         ("7:13:20 AM", Some("%-I:%M:%S %p")),
         ("07:13:20:250", Some("clock")),
-        ("13:20.5", Some("%M:%S")),
+        ("13:20.5", Some("%-M:%S")),
         ("0 days 00:00:00.200000", Some("elapsed")),
         ("18-Mar-2026 07:13:20.000", Some("%d-%b-%Y %H:%M:%S")),
         ("20260318T071320.200", Some("%Y%m%dT%H%M%S")),

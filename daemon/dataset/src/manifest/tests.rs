@@ -151,7 +151,8 @@ fn mistakes_are_named_with_line_and_choices() {
             ("unit = \"km/h\"", "unit = \"kmh\""),
             "dataset.toml:13: unknown unit 'kmh' in columns.speed.unit; did you mean 'km/h'? \
              (choices: 'm/s', 'km/h', 'mph', 'kn', 'cm/s', \
-             'mm/s', 'm/min', 'ft/s')",
+             'mm/s', 'dm/s', \
+             'm/min', 'ft/s')",
         ),
         (
             ("role = \"holdout\"", "role = \"test\""),
@@ -198,8 +199,8 @@ fn mistakes_are_named_with_line_and_choices() {
         ),
         (
             ("{ column = \"i\", unit = \"%\" }", "{ column = \"i\" }"),
-            "dataset.toml:14: missing key columns.gradient.unit: expected a unit: permille, %, 1, deg, \
-             rad, mrad",
+            "dataset.toml:14: missing key columns.gradient.unit: expected a unit: permille, %, 1, deg, ft/mi, \
+             gon, rad, mrad",
         ),
         (
             ("gradient = { column = \"i\", unit = \"%\" }", "gradient = \"i\""),
