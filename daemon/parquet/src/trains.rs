@@ -90,7 +90,7 @@ fn texts(array: &dyn Array) -> Option<Vec<Option<String>>> {
 /// The place of each row's value among a dictionary's.
 pub fn keys_of(dictionary: &dyn AnyDictionaryArray) -> impl Iterator<Item = Option<usize>> {
     let has_values = !dictionary.values().is_empty();
-    let keys = has_values.then(|| dictionary.normalized_keys()).unwrap_or_default();
+    let keys = if has_values { dictionary.normalized_keys() } else { Vec::new() };
     (0..dictionary.len())
         .map(move |row| keys.get(row).copied().filter(|_| dictionary.is_valid(row)))
 }
