@@ -37,10 +37,6 @@ pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
 const ROUNDING_TURNS: usize = 3;
 const ROUNDING_SHARE: f64 = 0.1;
 
-/// Why a mass of single runs is none.
-const AS_LOADS_ARE: &str =
-    "its runs stand out from the others no more than the largest of as many loads do";
-
 impl Search<'_> {
     /// Searches for effects with the usual errors in the model.
     pub fn beside_usual_errors(&self, outcome: &mut Outcome) -> Arc<Beside> {
@@ -185,7 +181,7 @@ impl Search<'_> {
                 return Some((index, Refusal::Chance));
             }
             if effects[index].place().windows.is_some() && joint.is_as_loads_are(index) {
-                return Some((index, Refusal::Contradiction(AS_LOADS_ARE)));
+                return Some((index, Refusal::UsualLoads));
             }
             // A form may be greatest where what it follows ends.
             let may_fall = kind != EffectKind::Unknown && at_bound(&outcome.fit, index).is_none();

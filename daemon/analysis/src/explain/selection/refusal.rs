@@ -16,6 +16,8 @@ pub enum Refusal {
     AtBound(AtBound),
     /// The fitted values contradict the kind.
     Contradiction(&'static str),
+    /// It changes the mass of single runs no more than loads usually do, which explains it.
+    UsualLoads,
     /// For its evidence it takes too little from the error, this share of it.
     Weak(f64),
 }
@@ -39,7 +41,10 @@ impl std::fmt::Display for Refusal {
                      looked for"
                 );
             }
-            Refusal::Contradiction(why) => return f.write_str(why),
+            Refusal::Contradiction(why) => why,
+            Refusal::UsualLoads => {
+                "its runs stand out from the others no more than the largest of as many loads do"
+            }
             Refusal::Weak(share) if *share < 0.005 => "takes nothing from the error",
             Refusal::Weak(share) => {
                 let why = if *share < LITTLE { ": too little" } else { ", on too little evidence" };
