@@ -2,6 +2,7 @@
 
 mod advice;
 mod brake_steps;
+mod common_to_runs;
 mod couplings;
 mod drive_power;
 mod effects;

@@ -35,7 +35,7 @@ pub fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec
         // Nobody knows which numbers of a form are those of a law outside the library.
         Effect::Unlisted(_) => return Vec::new(),
         Effect::GradientError { profile } => return gradient_errors(profile, own, simulated),
-        Effect::Wind { .. } => truths["wind_plus_mps"] = wind_of_the_days(simulated).into(),
+        Effect::Wind { .. } => truths["wind_plus_mps"] = wind_of_the_days(own, simulated).into(),
         _ => {}
     }
     let one = |name: &str, truth: f64| {
@@ -92,10 +92,14 @@ fn disturbances(simulated: &SimulatedDataset, plan: &RunPlan) -> Disturbances {
     Disturbances::of(effects, train, line, plan, settings)
 }
 
-/// Mean wind in m/s towards direction -1 that blew in the fit runs: the effect's and each day's own.
-fn wind_of_the_days(simulated: &SimulatedDataset) -> f64 {
-    let fit_runs = simulated.runs.iter().filter(|run| !run.plan.is_holdout);
-    let winds_mps = fit_runs.map(|run| run.plan.direction * run.disturbances.headwind_mps);
+/// Mean wind in m/s towards direction -1 that blew in the runs whose winds the answer gives, else in all that were
+/// fitted: the effect's and each day's own.
+fn wind_of_the_days(own: &Value, simulated: &SimulatedDataset) -> f64 {
+    let given = own["parameters"]["headwind_mps"].as_object();
+    let is_given = |file: &str| given.is_none_or(|given| given.contains_key(file));
+    let runs = simulated.runs.iter().filter(|run| !run.plan.is_holdout);
+    let runs = runs.filter(|run| is_given(&run.plan.file()));
+    let winds_mps = runs.map(|run| run.plan.direction * run.disturbances.headwind_mps);
     mean(winds_mps.collect::<Vec<f64>>())
 }
 
