@@ -32,18 +32,22 @@ impl ExplainWorld {
 
     /// Kinds that are in this world, small, whatever else acts: to name them is no error.
     pub fn everyday(self) -> &'static [EffectKind] {
+        // The last is a deviation of the rougher world alone.
+        const KINDS: [EffectKind; 9] = [
+            EffectKind::ActuatorDelay,
+            EffectKind::BearingTemperature,
+            EffectKind::CurveResistance,
+            EffectKind::GradientError,
+            EffectKind::MassChange,
+            EffectKind::TractionGain,
+            EffectKind::WheelDiameter,
+            EffectKind::Wind,
+            EffectKind::RotatingMass,
+        ];
         match self {
             ExplainWorld::Plain | ExplainWorld::Coupled => &[],
-            ExplainWorld::Rough | ExplainWorld::Rougher => &[
-                EffectKind::ActuatorDelay,
-                EffectKind::BearingTemperature,
-                EffectKind::CurveResistance,
-                EffectKind::GradientError,
-                EffectKind::MassChange,
-                EffectKind::TractionGain,
-                EffectKind::WheelDiameter,
-                EffectKind::Wind,
-            ],
+            ExplainWorld::Rough => &KINDS[..KINDS.len() - 1],
+            ExplainWorld::Rougher => &KINDS,
         }
     }
 }

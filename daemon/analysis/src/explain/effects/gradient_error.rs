@@ -45,8 +45,13 @@ struct Profile {
     choice_cost: f64,
 }
 
-/// An error of the map, whose usual errors are in the model there.
-pub const POLICY: Policy = Policy { is_sought_beside_usual_errors: false, ..Policy::USUAL };
+/// An error of the map, whose usual errors are in the model there. A wind along the line is the mean of such an error,
+/// whose other nodes then explain the usual ones.
+pub const POLICY: Policy = Policy {
+    is_sought_beside_usual_errors: false,
+    gives_way_to: &[EffectKind::Wind],
+    ..Policy::USUAL
+};
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -46,6 +46,8 @@ pub struct Everyday {
 pub struct Policy {
     /// Where it may be certain.
     pub certainty: Certainty,
+    /// Kinds that take its place where they explain more than it beside the usual errors.
+    pub gives_way_to: &'static [EffectKind],
     /// Kinds in the model beside which it is not certain.
     pub uncertain_beside: &'static [EffectKind],
     /// Whether its form or place is one of many, even if no end of it was estimated: it must also take from the error.
@@ -69,6 +71,7 @@ impl Policy {
     /// The policy of a kind about which nothing is unusual.
     pub const USUAL: Policy = Policy {
         certainty: Certainty::Anywhere,
+        gives_way_to: &[],
         uncertain_beside: &[],
         is_one_of_many: false,
         is_left_by_moved_places: false,

@@ -1,5 +1,7 @@
 //! Why an effect is not accepted, in words.
 
+use dynocar_shared::vocabulary::EffectKind;
+
 use crate::explain::effects::AtBound;
 
 /// A smaller share of the error is what an effect is refused for, a larger one its evidence.
@@ -18,6 +20,8 @@ pub enum Refusal {
     Contradiction(&'static str),
     /// It changes the mass of single runs no more than loads usually do, which explains it.
     UsualLoads,
+    /// This kind explains more beside the usual errors, which are its other half.
+    GivesWay(EffectKind),
     /// For its evidence it takes too little from the error, this share of it.
     Weak(f64),
 }
@@ -44,6 +48,9 @@ impl std::fmt::Display for Refusal {
             Refusal::Contradiction(why) => why,
             Refusal::UsualLoads => {
                 "its runs stand out from the others no more than the largest of as many loads do"
+            }
+            Refusal::GivesWay(kind) => {
+                return write!(f, "{} and the usual errors explain more", kind.name());
             }
             Refusal::Weak(share) if *share < 0.005 => "takes nothing from the error",
             Refusal::Weak(share) => {

@@ -1,8 +1,13 @@
 //! Retrial of accepted effects beside those that came after them.
 
+use dynocar_shared::vocabulary::EffectKind;
+
 use super::acceptance::{is_accepted, may_be};
 use super::outcome::{Outcome, Round, round_of};
+use super::refusal::Refusal;
 use super::search::Search;
+use super::trying::Asked;
+use crate::explain::effects::policy_of;
 use crate::explain::evidence::{EQUAL, Fit};
 use crate::explain::score::reduction;
 
@@ -36,6 +41,30 @@ impl Search<'_> {
             tried.push((stands, round_of(trials)));
         }
         outcome.instead = tried;
+    }
+
+    /// Puts a kind in the place of an effect where it explains more than that beside the usual errors; false for
+    /// nothing. Beside effects alone, one that has the usual errors in its form would win.
+    pub(super) fn give_way(&self, outcome: &mut Outcome) -> bool {
+        let may_give_way = |kind: &EffectKind| {
+            !policy_of(*kind).gives_way_to.is_empty() && outcome.is_on_trial(*kind)
+        };
+        let Some(kind) = outcome.kinds().into_iter().find(may_give_way) else { return false };
+        let Some(index) = outcome.fit.model.position(kind) else { return false };
+        let rest = self.without(&outcome.fit, index);
+        let is_asked = |other: EffectKind| policy_of(kind).gives_way_to.contains(&other);
+        let asked = Asked { is_asked: &is_asked, rivals_of: None };
+        let trials = self.round_of(&rest, &mut Vec::new(), asked);
+        let Some(best) = self.best(&trials, &outcome.fallen_kinds()) else { return false };
+        let own = Self::total(&self.beside_usual_errors(outcome).fit);
+        let mut other = Outcome { fit: best.fit.clone(), ..outcome.clone() };
+        if Self::total(&self.beside_usual_errors(&mut other).fit) > own - EQUAL {
+            return false;
+        }
+        other.fallen.push((kind, Refusal::GivesWay(best.kind)));
+        other.instead.push((best.kind, round_of(trials)));
+        *outcome = other;
+        true
     }
 
     /// Drops effects that the others have made needless, and that none of the others stands in for against

@@ -94,7 +94,10 @@ impl Search<'_> {
         }
         self.take_what_scores(&mut outcome);
         loop {
-            while self.take_certain_beside(&mut outcome) || self.drop_fallen(&mut outcome) {
+            while self.take_certain_beside(&mut outcome)
+                || self.drop_fallen(&mut outcome)
+                || self.give_way(&mut outcome)
+            {
                 self.take_what_scores(&mut outcome);
             }
             // Certain and small effects have joined since; an effect that they leave too little to take may be

@@ -149,8 +149,21 @@ impl Fit {
     }
 
     /// The same with nothing held: what the data say of a coefficient at its bound.
+    ///
+    /// A parameter of which nothing says anything, as the time constant of an effect of no size, is known to be within
+    /// its bounds.
     pub fn free_information(&self) -> DMatrix<f64> {
-        self.runs.iter().fold(self.prior_information.clone(), |sum, run| sum + &run.information)
+        let known = self.runs.iter().map(|run| &run.information);
+        let mut information = known.fold(self.prior_information.clone(), |sum, run| sum + run);
+        for (effect, range) in self.model.effects.iter().zip(self.model.ranges()) {
+            for (i, within) in range.zip(effect.parameters()) {
+                if information[(i, i)] == 0.0 {
+                    // The inverse variance of a number that may be anywhere between them.
+                    information[(i, i)] = 12.0 / (within.upper - within.lower).powi(2);
+                }
+            }
+        }
+        information
     }
 
     /// Score of all runs and the prior: nearly none where the fit ended.
