@@ -1,4 +1,4 @@
-//! Datasets on disk; a recording is one once it is unpacked.
+//! Datasets on disk; a recording in Parquet is one once it is unpacked.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use dynocar_shared::TrainId;
 
 pub use crate::text_file::read_text;
 use crate::text_file::{read_bytes, require_regular};
-pub use crate::unpacking::is_recording;
+pub use crate::unpacking::is_parquet_recording;
 use crate::unpacking::{UnpackError, Unpacked, columns_of};
 
 /// A path that leads to a dataset, and the train that is meant where a recording holds several.
@@ -106,7 +106,7 @@ impl DatasetFolder {
     /// When there is nothing, or a folder that is no dataset.
     pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
         let Source { path, train } = source.into();
-        if is_recording(path) {
+        if is_parquet_recording(path) {
             let unpacked = Unpacked::of(path, train)?;
             let folder = unpacked.folder();
             let manifest = folder.join(MANIFEST_FILE);

@@ -2,13 +2,13 @@
 //!
 //! Failures of the command line: wrong input, or work that could not be done.
 
-mod annotate;
 mod record;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
+use dynocar::cli::replay::{self, ReplayArguments};
 use dynocar::cli::{Failure, carry_out};
 use dynocar::config::DaemonConfig;
 use dynocar::output::{print, report_line, require_new};
@@ -19,6 +19,7 @@ use super::convert::{
     FromDatasetError, ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset,
 };
 use super::copying::recover;
+use super::dataset;
 use super::error::CopyError;
 use super::joining::read_all;
 use super::page::page;
@@ -35,9 +36,6 @@ pub use record::WantedArguments;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Report a failure to another program, in this file
-    #[arg(long, global = true, hide = true)]
-    json: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -48,9 +46,9 @@ enum Command {
     Recover(RecoverArguments),
     Convert(ConvertArguments),
     #[command(hide = true)]
-    Annotate(annotate::AnnotateArguments),
-    #[command(hide = true)]
     Verify(VerifyArguments),
+    #[command(hide = true)]
+    Play(ReplayArguments),
     /// Print the reference page of the recorded fields
     #[command(hide = true)]
     Fields,
@@ -150,15 +148,15 @@ pub fn command() -> clap::Command {
 pub fn main() -> ExitCode {
     carry_out(
         program(),
-        |it: &Arguments| it.json.as_deref(),
-        |arguments| match &arguments.command {
+        |_| None,
+        |arguments: &Arguments| match &arguments.command {
             Command::Record(arguments) => record::execute(arguments),
             Command::FlightRecorder(arguments) => record::execute_flight_recorder(arguments),
             Command::Keep(arguments) => record::execute_keep(arguments),
             Command::Recover(arguments) => execute_recover(arguments),
             Command::Convert(arguments) => execute_convert(arguments),
-            Command::Annotate(arguments) => annotate::execute(arguments),
             Command::Verify(arguments) => execute_verify(arguments),
+            Command::Play(arguments) => replay::execute(arguments, |source| dataset::load(source)),
             Command::Fields => print(&page()).map_err(Failure::from),
         },
     )

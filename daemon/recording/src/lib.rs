@@ -22,6 +22,7 @@
 //! - [`error`]: what is wrong with a file, and which
 //! - [`annotate`]: an explanation beside the data
 //! - [`convert`]: recordings to datasets and back
+//! - [`dataset`]: the dataset at a path, be it a folder or a recording
 //! - [`verify`]: every recorded snapshot computed again
 //! - [`cli`]: the command line
 
@@ -31,6 +32,7 @@ pub mod codec;
 pub mod columns;
 pub mod convert;
 pub mod copying;
+pub mod dataset;
 pub mod error;
 pub mod event;
 pub mod joining;

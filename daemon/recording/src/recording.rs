@@ -29,6 +29,8 @@ pub struct Recording {
     pub topics: Vec<String>,
     /// Where a file broke off, in words.
     pub broken: Option<String>,
+    /// Snapshots and events that were read and not kept.
+    pub left_out: usize,
 }
 
 impl Visitor for Recording {
@@ -77,20 +79,26 @@ impl Recording {
     ///
     /// Without a file.
     pub fn load_all(paths: &[PathBuf]) -> Result<Self, ReadError> {
-        let mut logged = Logged::default();
-        let endings = read_all(paths, &mut logged)?;
-        let mut recording = logged.in_order();
-        let broken: Vec<String> =
-            endings.iter().zip(paths).filter_map(|(ending, path)| ending.words(path)).collect();
-        recording.broken = (!broken.is_empty()).then(|| broken.join("; "));
-        if recording.samples.is_empty() {
-            let found = match recording.topics.as_slice() {
-                [] => "no message".to_owned(),
-                topics => topics.join(", "),
-            };
-            return Err(ReadError::of(&paths[0])(ReadProblem::NoSamples { found }));
-        }
-        Ok(recording)
+        Logged::default().read(paths)
+    }
+
+    /// The same without its snapshots and events, which are counted.
+    ///
+    /// # Errors
+    ///
+    /// As [`load_all`](Self::load_all).
+    ///
+    /// # Panics
+    ///
+    /// Without a file.
+    pub fn of_samples(paths: &[PathBuf]) -> Result<Self, ReadError> {
+        Logged { keeps_samples_only: true, ..Logged::default() }.read(paths)
+    }
+
+    /// The files of the dataset that is attached, by their names in it.
+    pub fn attached_dataset(&self) -> impl Iterator<Item = (&str, &Vec<u8>)> {
+        let files = self.attachments.iter();
+        files.filter_map(|(name, content)| Some((name.strip_prefix(DATASET_FOLDER)?, content)))
     }
 
     /// The trains that there are samples of, in order.
@@ -99,6 +107,9 @@ impl Recording {
     }
 }
 
+/// The folder in which a dataset's files are attached.
+pub const DATASET_FOLDER: &str = "dataset/";
+
 /// A recording that is read, with the times at which its messages were logged.
 #[derive(Debug, Default)]
 struct Logged {
@@ -106,6 +117,7 @@ struct Logged {
     log_time: u64,
     samples: Vec<u64>,
     snapshots: Vec<u64>,
+    keeps_samples_only: bool,
 }
 
 impl Visitor for Logged {
@@ -114,6 +126,10 @@ impl Visitor for Logged {
     fn item(&mut self, item: Item<'_>) -> Result<(), ReadError> {
         match item {
             Item::Sample(_) => self.samples.push(self.log_time),
+            Item::Snapshot(_) | Item::Event(_) if self.keeps_samples_only => {
+                self.recording.left_out += 1;
+                return Ok(());
+            }
             Item::Snapshot(_) => self.snapshots.push(self.log_time),
             _ => {}
         }
@@ -128,11 +144,22 @@ impl Visitor for Logged {
 
 impl Logged {
     /// Returns the recording in order, each message once.
-    fn in_order(self) -> Recording {
+    fn read(mut self, paths: &[PathBuf]) -> Result<Recording, ReadError> {
+        let endings = read_all(paths, &mut self)?;
         let Logged { mut recording, samples, snapshots, .. } = self;
         samples_in_order(&mut recording.samples, &samples);
         snapshots_in_order(&mut recording.snapshots, &snapshots);
-        recording
+        let broken: Vec<String> =
+            endings.iter().zip(paths).filter_map(|(ending, path)| ending.words(path)).collect();
+        recording.broken = (!broken.is_empty()).then(|| broken.join("; "));
+        if recording.samples.is_empty() {
+            let found = match recording.topics.as_slice() {
+                [] => "no message".to_owned(),
+                topics => topics.join(", "),
+            };
+            return Err(ReadError::of(&paths[0])(ReadProblem::NoSamples { found }));
+        }
+        Ok(recording)
     }
 }
 

@@ -11,9 +11,9 @@ use dynocar_analysis::identify::published_samples;
 use dynocar_shared::{TrainId, TrainSample};
 use mcap::McapError;
 
-use super::DATASET_FOLDER;
 use super::rows::{RowError, from_rows, is_rows};
 use crate::error::WriteError;
+use crate::recording::DATASET_FOLDER;
 use crate::topic::Message;
 use crate::writing::{RecordingWriter, WallClock};
 
