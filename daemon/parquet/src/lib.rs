@@ -6,7 +6,7 @@
 //!
 //! # Layout
 //!
-//! - [`cells`]: the columns of `dynocar_recording::columns` as Arrow has them
+//! - [`cells`]: the columns of `dynocar_mcap::columns` as Arrow has them
 //! - [`error`]: why a file cannot be read, and how a damaged file affects its library
 //! - [`writing`]: MCAP to Parquet
 //! - [`reading`], [`table`]: Parquet to what a recording holds, and to MCAP

@@ -14,19 +14,16 @@ use dynocar::config::DaemonConfig;
 use dynocar::output::{print, report_line, require_new};
 use dynocar::programs::{RECORDING, called_as};
 
-use super::annotate::AnnotateError;
-use super::convert::{
-    FromDatasetError, ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset,
-};
-use super::copying::recover;
-use super::dataset;
-use super::error::CopyError;
-use super::joining::read_all;
 use super::page::page;
-use super::reading::Ending;
 use super::record::{KeepError, RecordError};
-use super::recording::Recording;
 use super::verify::{Configurations, Outcome, overlay, text, verify};
+use dynocar_mcap::convert::{ModelFiles, Unpacked, from_dataset, to_dataset};
+use dynocar_mcap::copying::recover;
+use dynocar_mcap::dataset;
+use dynocar_mcap::error::CopyError;
+use dynocar_mcap::joining::read_all;
+use dynocar_mcap::reading::Ending;
+use dynocar_mcap::recording::Recording;
 
 pub use record::WantedArguments;
 
@@ -246,47 +243,6 @@ impl VerifyArguments {
             Ok(())
         } else {
             Err(Failure::Verdict(1))
-        }
-    }
-}
-
-/// A file that is no recording is wrong input; one that cannot be written is not.
-impl From<CopyError> for Failure {
-    fn from(error: CopyError) -> Self {
-        match error {
-            CopyError::Read(error) => Failure::input(error),
-            CopyError::Write(error) => Failure::work(error),
-        }
-    }
-}
-
-/// A dataset that makes no recording is wrong input; a recording that cannot be written is not.
-impl From<FromDatasetError> for Failure {
-    fn from(error: FromDatasetError) -> Self {
-        match error {
-            FromDatasetError::Dataset(error) => error.into(),
-            FromDatasetError::Write(_) => Failure::work(error),
-            error => Failure::input(error),
-        }
-    }
-}
-
-/// A recording that makes no dataset is wrong input; a dataset that cannot be written is not.
-impl From<ToDatasetError> for Failure {
-    fn from(error: ToDatasetError) -> Self {
-        match error {
-            ToDatasetError::Output(error) => error.into(),
-            error => Failure::input(error),
-        }
-    }
-}
-
-/// A recording that is another than the one explained is wrong input.
-impl From<AnnotateError> for Failure {
-    fn from(error: AnnotateError) -> Self {
-        match error {
-            AnnotateError::Copy(error) => error.into(),
-            error => Failure::input(error),
         }
     }
 }

@@ -6,8 +6,8 @@ use dynocar::cli::Failure;
 use dynocar::dataset::Source;
 use dynocar::output::report_line;
 use dynocar_analysis::explain::report::timeline::Timeline;
-use dynocar_recording::annotate;
-use dynocar_recording::convert::from_dataset;
+use dynocar_mcap::annotate;
+use dynocar_mcap::convert::from_dataset;
 use tempfile::TempDir;
 
 /// Copies a recording, or the dataset at a path as one, into a new file with an explanation of it.

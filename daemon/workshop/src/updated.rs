@@ -20,7 +20,7 @@ use toml::{Table, Value};
 use dynocar::dataset::Source;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::write_in_folder;
-use dynocar_recording::dataset::open;
+use dynocar_mcap::dataset::open;
 
 pub use runs::name_model;
 pub use runs::{UPDATED_MARK, UpdatedModelError};

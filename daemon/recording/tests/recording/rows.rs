@@ -6,8 +6,8 @@ use dynocar_shared::SampleField;
 use proptest::prelude::*;
 
 use dynocar_analysis::dataset::{Dataset, DatasetFiles};
-use dynocar_recording::convert::{ModelFiles, dataset_of, from_rows, is_rows, to_rows};
-use dynocar_recording::recording::Recording;
+use dynocar_mcap::convert::{ModelFiles, dataset_of, from_rows, is_rows, to_rows};
+use dynocar_mcap::recording::Recording;
 use dynocar_shared::layout::Words;
 use dynocar_shared::{TrainId, TrainSample};
 

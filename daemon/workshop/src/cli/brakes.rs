@@ -20,7 +20,7 @@ use crate::report::provenance::{Provenance, own_command_line};
 use dynocar::cli::Failure;
 use dynocar::dataset::labelled_text;
 use dynocar::output::{give, report_line, require_files, write_file, write_json};
-use dynocar_recording::dataset;
+use dynocar_mcap::dataset;
 
 /// Estimate a brake's ETCS parameters and stopping distances from recorded stops.
 ///

@@ -20,7 +20,7 @@ use serde::Serialize;
 use dynocar::cli::Failure;
 use dynocar::dataset::{FileKind, LoadError, Source, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
-use dynocar_recording::dataset;
+use dynocar_mcap::dataset;
 
 /// Runs `dynocar check`.
 ///

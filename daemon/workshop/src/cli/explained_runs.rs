@@ -14,7 +14,7 @@ use dynocar_analysis::parallel;
 
 use dynocar::cli::Failure;
 use dynocar::dataset::{LoadError, Source};
-use dynocar_recording::dataset::{FilesOfDataset, open};
+use dynocar_mcap::dataset::{FilesOfDataset, open};
 use dynocar_shared::TrainId;
 
 /// The runs of a dataset.

@@ -14,7 +14,7 @@ use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{
     report_line, require_file, require_folder, require_replaceable, write_file, write_in_folder,
 };
-use dynocar_recording::dataset;
+use dynocar_mcap::dataset;
 
 /// Write the estimators, or the train itself, as an FMU for a simulator.
 ///

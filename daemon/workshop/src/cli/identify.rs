@@ -23,7 +23,7 @@ use dynocar::output::{give, require_files};
 use dynocar_analysis::identify::{
     default_estimators, identify, recommended_estimators, samples_of_runs,
 };
-use dynocar_recording::dataset;
+use dynocar_mcap::dataset;
 
 /// Estimate resistance, mass, adhesion and friction from recorded runs.
 #[derive(Debug, Args)]

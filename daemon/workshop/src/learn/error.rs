@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use dynocar::models::ModelsError;
 use dynocar::state::StateError;
 use dynocar::storage::StorageError;
-use dynocar_recording::convert::ToDatasetError;
+use dynocar_mcap::convert::ToDatasetError;
 
 /// Why learning does not go on.
 #[derive(Debug, thiserror::Error)]

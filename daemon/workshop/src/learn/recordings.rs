@@ -12,7 +12,7 @@ use super::error::LearnError;
 use super::memory::Memory;
 use dynocar::models::Moment;
 use dynocar::storage::{Disk, Storage, StorageError, part_of};
-use dynocar_recording::convert::{ModelFiles, ToDatasetError, to_dataset};
+use dynocar_mcap::convert::{ModelFiles, ToDatasetError, to_dataset};
 
 /// How a finished recording ends.
 const MCAP_END: &[u8] = b"\x89MCAP0\r\n";

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use dynocar::dataset::{LoadError, Source};
 use dynocar::models::moment::Moment;
-use dynocar_recording::dataset;
+use dynocar_mcap::dataset;
 
 /// A file and what is in it.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -21,7 +21,7 @@ use dynocar::dataset::Source;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, survey};
-use dynocar_recording::dataset::load;
+use dynocar_mcap::dataset::load;
 
 use answer::SurveyAnswer;
 use material::Material;

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
+use dynocar::cli::Failure;
 use dynocar::output::{OutputError, require_new, write_file};
 use dynocar::storage::{Disk, Storage, folder_of};
 use dynocar_analysis::dataset::{
@@ -40,6 +41,16 @@ pub enum ToDatasetError {
     /// It holds another thing than a dataset of one train.
     #[error(transparent)]
     Content(#[from] AtPath<NoDataset>),
+}
+
+/// A recording that makes no dataset is wrong input; a dataset that cannot be written is not.
+impl From<ToDatasetError> for Failure {
+    fn from(error: ToDatasetError) -> Self {
+        match error {
+            ToDatasetError::Output(error) => error.into(),
+            error => Failure::input(error),
+        }
+    }
 }
 
 /// Errors of a recording that is to become a dataset.
