@@ -9,7 +9,6 @@ use dynocar_dataset::{
 };
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_model::units::Unit;
 use dynocar_shared::TrainId;
 
 pub use crate::text_file::read_text;
@@ -189,9 +188,8 @@ fn described(folder: &Path) -> String {
 ///
 /// The first mistake, with file, line and choices.
 pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(DatasetFolder, DatasetHead), LoadError> {
-    let source = source.into();
     let folder = DatasetFolder::at(source)?;
-    let head = DatasetHead::open(&folder).map_err(|error| other_kind(source.path, error))?;
+    let head = DatasetHead::open(&folder).map_err(|error| other_kind(&folder.manifest, error))?;
     Ok((folder, head))
 }
 
@@ -246,27 +244,8 @@ pub fn kind_of(keys: &[String]) -> Option<FileKind> {
 ///
 /// The first mistake, with file, line and choices.
 pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
-    load_with_speed_unit(source).map(|(dataset, _)| dataset)
-}
-
-/// Reads a dataset with all its runs, and the unit in which they hold the speed.
-///
-/// # Errors
-///
-/// The first mistake, with file, line and choices.
-pub fn load_with_speed_unit<'p>(
-    source: impl Into<Source<'p>>,
-) -> Result<(Dataset, Unit), LoadError> {
-    let folder = DatasetFolder::at(source)?;
-    let read = || {
-        let head = DatasetHead::open(&folder)?;
-        let unit = head.manifest.speed_unit();
-        Ok((head.read(&folder)?, unit))
-    };
-    read().map_err(|error: DatasetError| match error.place.file == folder.label(MANIFEST_FILE) {
-        true => other_kind(&folder.manifest, error),
-        false => error.into(),
-    })
+    let (folder, head) = open(source)?;
+    Ok(head.read(&folder)?)
 }
 
 /// Reads a train file.

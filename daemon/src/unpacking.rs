@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use crate::columns_stream;
 use crate::output::report_line;
-use crate::programs::{CallFailure, PARQUET, RECORDING, call, output_of, taken_of};
+use crate::programs::{CallFailure, PARQUET, RECORDING, call, taken_of};
 
 /// True for the name of a file, or a folder of files, of Parquet.
 pub fn is_parquet(path: &Path) -> bool {
@@ -53,7 +53,8 @@ pub fn columns_of(
         }
     }
     let columns = taken_of(PARQUET, &mut command, |it| columns_stream::read(it));
-    columns.map_err(CallFailure::words)?.ok_or_else(|| format!("{PARQUET}: hands over no columns"))
+    let (columns, _) = columns.map_err(CallFailure::words)?;
+    columns.ok_or_else(|| format!("{PARQUET}: hands over no columns"))
 }
 
 /// Why a recording is not unpacked.
@@ -86,7 +87,7 @@ fn unpack(recording: &Path, folder: &Path, train: Option<TrainId>) -> Result<(),
         command.arg("--train").arg(train.0.to_string());
     }
     command.arg(recording);
-    let (_, words) = output_of(PARQUET, &mut command).map_err(|failure| match failure {
+    let ((), words) = taken_of(PARQUET, &mut command, |_| ()).map_err(|failure| match failure {
         CallFailure::Input(problem) => UnpackError::Content { path: path.clone(), problem },
         CallFailure::Work(problem) => UnpackError::Failed { path: path.clone(), problem },
     })?;

@@ -140,10 +140,6 @@ pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
 pub fn load_with_speed_unit<'p>(
     source: impl Into<Source<'p>>,
 ) -> Result<(Dataset, Unit), LoadError> {
-    let source = source.into();
-    if !is_mcap(source.path) {
-        return dynocar::dataset::load_with_speed_unit(source);
-    }
     let (files, head) = open(source)?;
     let unit = head.manifest.speed_unit();
     Ok((head.read(&files)?, unit))

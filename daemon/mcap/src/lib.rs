@@ -14,7 +14,7 @@
 //! - [`topic`]: the streams of messages, and the messages
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`joining`]: the files of a recording that rotated, read as one
-//! - [`recording`], `order`: a recording in memory, in the order in which it was recorded
+//! - [`recording`]: a recording in memory, in the order in which it was recorded
 //! - [`convert`]: recordings to datasets, in memory or in a folder, and back
 //! - [`dataset`]: the dataset at a path, be it a folder or a recording
 //! - [`copying`]: copies of recordings, ours or not: a broken file made whole
@@ -31,7 +31,6 @@ pub mod error;
 pub mod event;
 pub mod joining;
 pub mod message;
-mod order;
 pub mod reading;
 pub mod recording;
 pub mod schema;

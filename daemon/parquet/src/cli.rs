@@ -16,9 +16,8 @@ use dynocar_mcap::convert::{from_dataset, unpack};
 use dynocar_recording::cli::{ConvertArguments, VerifyArguments};
 
 use super::reading::write_mcap;
-use crate::numbers::{Wanted, send_columns};
+use crate::numbers::{TrainsBy, Wanted, send_columns};
 use crate::reading::{Content, read};
-use crate::trains::TrainsBy;
 use crate::writing::{Written, write_folder};
 
 /// Recordings as Parquet and back.
