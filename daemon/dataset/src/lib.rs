@@ -61,13 +61,13 @@ pub mod track_file;
 pub mod train_file;
 pub mod train_rows;
 pub mod trains;
+mod unusual_resistance;
 
 #[cfg(test)]
 mod tests;
 
 pub use clock::TimeFormat;
 pub use dataset_diagnostic::DatasetDiagnostic;
-pub use declared::unusual_resistance;
 pub use diagnostic::Diagnostic;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
@@ -84,6 +84,7 @@ pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
+pub use unusual_resistance::unusual_resistance;
 
 use std::sync::Arc;
 
