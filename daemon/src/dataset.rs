@@ -1,4 +1,4 @@
-//! Datasets on disk; a recording is one once it is unpacked.
+//! Datasets on disk; a recording in Parquet is one once it is unpacked.
 
 use std::path::{Path, PathBuf};
 
@@ -9,12 +9,11 @@ use dynocar_dataset::{
 };
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_model::units::Unit;
 use dynocar_shared::TrainId;
 
 pub use crate::text_file::read_text;
 use crate::text_file::{read_bytes, require_regular};
-pub use crate::unpacking::is_recording;
+pub use crate::unpacking::is_parquet_recording;
 use crate::unpacking::{UnpackError, Unpacked, columns_of};
 
 /// A path that leads to a dataset, and the train that is meant where a recording holds several.
@@ -106,7 +105,7 @@ impl DatasetFolder {
     /// When there is nothing, or a folder that is no dataset.
     pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
         let Source { path, train } = source.into();
-        if is_recording(path) {
+        if is_parquet_recording(path) {
             let unpacked = Unpacked::of(path, train)?;
             let folder = unpacked.folder();
             let manifest = folder.join(MANIFEST_FILE);
@@ -189,9 +188,8 @@ fn described(folder: &Path) -> String {
 ///
 /// The first mistake, with file, line and choices.
 pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(DatasetFolder, DatasetHead), LoadError> {
-    let source = source.into();
     let folder = DatasetFolder::at(source)?;
-    let head = DatasetHead::open(&folder).map_err(|error| other_kind(source.path, error))?;
+    let head = DatasetHead::open(&folder).map_err(|error| other_kind(&folder.manifest, error))?;
     Ok((folder, head))
 }
 
@@ -246,27 +244,8 @@ pub fn kind_of(keys: &[String]) -> Option<FileKind> {
 ///
 /// The first mistake, with file, line and choices.
 pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
-    load_with_speed_unit(source).map(|(dataset, _)| dataset)
-}
-
-/// Reads a dataset with all its runs, and the unit in which they hold the speed.
-///
-/// # Errors
-///
-/// The first mistake, with file, line and choices.
-pub fn load_with_speed_unit<'p>(
-    source: impl Into<Source<'p>>,
-) -> Result<(Dataset, Unit), LoadError> {
-    let folder = DatasetFolder::at(source)?;
-    let read = || {
-        let head = DatasetHead::open(&folder)?;
-        let unit = head.manifest.speed_unit();
-        Ok((head.read(&folder)?, unit))
-    };
-    read().map_err(|error: DatasetError| match error.place.file == folder.label(MANIFEST_FILE) {
-        true => other_kind(&folder.manifest, error),
-        false => error.into(),
-    })
+    let (folder, head) = open(source)?;
+    Ok(head.read(&folder)?)
 }
 
 /// Reads a train file.

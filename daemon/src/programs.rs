@@ -68,29 +68,17 @@ impl CallFailure {
     }
 }
 
-/// Calls a program that reports failures as [`ErrorDocument`], and waits for its end; gives its standard output
-/// and its diagnostics.
+/// Calls a program that reports failures as [`ErrorDocument`], and waits for its end; gives what is made of its standard
+/// output while it comes, of which the rest may be a failure's document, and its diagnostics.
 ///
 /// # Errors
 ///
 /// In words when it does not start or does not end with 0.
-pub fn output_of(package: &str, command: &mut Command) -> Result<(Vec<u8>, String), CallFailure> {
-    let output = ends_with_this(command).args(["--json", "-"]).output();
-    let output = output.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
-    finished(package, output)
-}
-
-/// The same, with what is made of its standard output while it comes; what is left of that may be a failure's
-/// document.
-///
-/// # Errors
-///
-/// As [`output_of`].
 pub fn taken_of<T>(
     package: &str,
     command: &mut Command,
     take: impl FnOnce(&mut dyn BufRead) -> T,
-) -> Result<T, CallFailure> {
+) -> Result<(T, String), CallFailure> {
     command
         .args(["--json", "-"])
         .stdin(Stdio::null())
@@ -114,15 +102,10 @@ pub fn taken_of<T>(
         (taken, end.map(|it| Output { stdout: rest, ..it }))
     });
     let output = output.map_err(|error| CallFailure::Work(format!("{package}: {error}")))?;
-    finished(package, output)?;
-    taken.ok_or_else(|| CallFailure::Work(format!("{package}: no standard output")))
-}
-
-/// The standard output and diagnostics of a program that has ended with 0.
-fn finished(package: &str, output: Output) -> Result<(Vec<u8>, String), CallFailure> {
     let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
     if output.status.success() {
-        return Ok((output.stdout, words));
+        let taken = taken.map(|it| (it, words));
+        return taken.ok_or_else(|| CallFailure::Work(format!("{package}: no standard output")));
     }
     Err(match serde_json::from_slice(&output.stdout) {
         Ok(ErrorDocument { error }) if error.exit_status == 2 => CallFailure::Input(error.message),

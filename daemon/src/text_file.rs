@@ -98,10 +98,34 @@ pub fn require_regular(path: &Path) -> Result<(), FileProblem> {
 ///
 /// If there is no file, it is not a regular file, too large, of another format, not UTF-8 or not readable.
 pub fn read_text(path: &Path) -> Result<String, FileProblem> {
-    String::from_utf8(read_bytes(path, UTF_8)?).map_err(|error| {
+    in_utf8(read_bytes(path, UTF_8)?)
+}
+
+/// Returns the text of bytes in UTF-8.
+///
+/// # Errors
+///
+/// If they are of another format or not UTF-8.
+pub fn text_of(bytes: Vec<u8>) -> Result<String, FileProblem> {
+    require_text(&bytes, UTF_8)?;
+    in_utf8(bytes)
+}
+
+fn in_utf8(bytes: Vec<u8>) -> Result<String, FileProblem> {
+    String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         FileProblem::NotUtf8 { line: 1 + good.iter().filter(|&&byte| byte == b'\n').count() }
     })
+}
+
+/// Refuses the bytes of a file that should be text in an encoding and begins as another format does.
+///
+/// # Errors
+///
+/// If they are of another format.
+pub fn require_text(bytes: &[u8], encoding: &'static Encoding) -> Result<(), FileProblem> {
+    let head = &bytes[..bytes.len().min(HEAD_BYTES as usize)];
+    other_format(head, encoding).map_or(Ok(()), |what| Err(FileProblem::NotText(what)))
 }
 
 /// Reads a file that should be text in an encoding.
@@ -111,9 +135,7 @@ pub fn read_text(path: &Path) -> Result<String, FileProblem> {
 /// If there is no file, it is not a regular file, too large, of another format or not readable.
 pub fn read_bytes(path: &Path, encoding: &'static Encoding) -> Result<Vec<u8>, FileProblem> {
     let (mut bytes, file) = begin(path, HEAD_BYTES)?;
-    if let Some(what) = other_format(&bytes, encoding) {
-        return Err(FileProblem::NotText(what));
-    }
+    require_text(&bytes, encoding)?;
     // A file that grows while it is read is no longer than it was said to be by much.
     file.take(BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
     Ok(bytes)

@@ -1,5 +1,5 @@
-//! Recordings as datasets: unpacked into a folder for as long as it is needed, by the program that
-//! knows their format; and Parquet files of a dataset as columns of numbers.
+//! Recordings in Parquet as datasets: unpacked into a folder for as long as it is needed, by the program that
+//! knows the format; and Parquet files of a dataset as columns of numbers.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -12,26 +12,16 @@ use tempfile::TempDir;
 
 use crate::columns_stream;
 use crate::output::report_line;
-use crate::programs::{CallFailure, PARQUET, RECORDING, call, output_of, taken_of};
-
-/// Returns the program that knows a recording's format, by the recording's name; `None` for other files: a file of
-/// MCAP, and a folder or a file of Parquet.
-fn program_of(path: &Path) -> Option<&'static str> {
-    match path.extension()?.to_str()? {
-        "mcap" if path.is_file() => Some(RECORDING),
-        "parquet" if path.exists() => Some(PARQUET),
-        _ => None,
-    }
-}
+use crate::programs::{CallFailure, PARQUET, RECORDING, call, taken_of};
 
 /// True for the name of a file, or a folder of files, of Parquet.
 pub fn is_parquet(path: &Path) -> bool {
     path.extension().is_some_and(|it| it == "parquet")
 }
 
-/// True for the name of a recording.
-pub fn is_recording(path: &Path) -> bool {
-    program_of(path).is_some()
+/// True for the name of a recording in Parquet.
+pub fn is_parquet_recording(path: &Path) -> bool {
+    is_parquet(path) && path.exists()
 }
 
 /// The program that carries out a command with these words: that of recordings, unless one of them is
@@ -63,7 +53,8 @@ pub fn columns_of(
         }
     }
     let columns = taken_of(PARQUET, &mut command, |it| columns_stream::read(it));
-    columns.map_err(CallFailure::words)?.ok_or_else(|| format!("{PARQUET}: hands over no columns"))
+    let (columns, _) = columns.map_err(CallFailure::words)?;
+    columns.ok_or_else(|| format!("{PARQUET}: hands over no columns"))
 }
 
 /// Why a recording is not unpacked.
@@ -87,22 +78,16 @@ pub enum UnpackError {
     },
 }
 
-/// Unpacks what a recording holds of a train, its only one where none is named, into a new folder; what the
-/// program diagnoses is reported.
-///
-/// # Errors
-///
-/// See [`UnpackError`].
-pub fn unpack(recording: &Path, folder: &Path, train: Option<TrainId>) -> Result<(), UnpackError> {
+/// Unpacks what a recording holds of a train into a new folder.
+fn unpack(recording: &Path, folder: &Path, train: Option<TrainId>) -> Result<(), UnpackError> {
     let path = recording.to_path_buf();
-    let program = program_of(recording).unwrap_or(RECORDING);
-    let mut command = call(program);
+    let mut command = call(PARQUET);
     command.args(["convert", "--quiet", "-o"]).arg(folder);
     if let Some(train) = train {
         command.arg("--train").arg(train.0.to_string());
     }
     command.arg(recording);
-    let (_, words) = output_of(program, &mut command).map_err(|failure| match failure {
+    let ((), words) = taken_of(PARQUET, &mut command, |_| ()).map_err(|failure| match failure {
         CallFailure::Input(problem) => UnpackError::Content { path: path.clone(), problem },
         CallFailure::Work(problem) => UnpackError::Failed { path: path.clone(), problem },
     })?;

@@ -9,8 +9,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use dynocar_client::{Host, SamplePublisher, SnapshotReader};
-use dynocar_recording::copying::recover;
-use dynocar_recording::recording::Recording;
+use dynocar_mcap::copying::recover;
+use dynocar_mcap::recording::Recording;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use dynocar_tests::process::{Process, Site, await_true};
 use dynocar_tests::soak::day::strange_host::StrangeHost;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
-use dynocar_recording::reading::{Ending, read};
-use dynocar_recording::recording::Recording;
+use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::recording::Recording;
 use dynocar_shared::TrainId;
 use dynocar_tests::process::{Process, Site, Terminal, Tie, await_true};
 use dynocar_transport::{Peer, Role};

@@ -9,12 +9,12 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
 use dynocar::storage::{Disk, Rights, Storage};
-use dynocar_recording::copying::recover_on;
-use dynocar_recording::event::{Event, EventKind};
-use dynocar_recording::reading::{Ending, read};
+use dynocar_mcap::copying::recover_on;
+use dynocar_mcap::event::{Event, EventKind};
+use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::recording::Recording;
+use dynocar_mcap::topic::Message;
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation};
-use dynocar_recording::recording::Recording;
-use dynocar_recording::topic::Message;
 use dynocar_shared::{TrainId, TrainSample};
 use dynocar_tests::power_cut::{Left, LossyDisk, Neglect, NotedDisk};
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dynocar_tests::sources::workspace;
 
 /// Where messages are raised.
-const FOLDERS: [&str; 17] = [
+const FOLDERS: [&str; 18] = [
     "daemon/src",
     "daemon/workshop/src",
     "daemon/model/src",
@@ -19,6 +19,7 @@ const FOLDERS: [&str; 17] = [
     "client/src",
     "client/python/dynocar/fleet",
     "client/python/src",
+    "daemon/mcap/src",
     "daemon/recording/src",
     "daemon/parquet/src",
     "daemon/watch/src",

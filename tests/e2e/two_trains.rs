@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use dynocar_analysis::identify::published_samples;
-use dynocar_recording::topic::Message;
-use dynocar_recording::writing::{RecordingWriter, WallClock};
+use dynocar_mcap::topic::Message;
+use dynocar_mcap::writing::{RecordingWriter, WallClock};
 use dynocar_shared::{TrainId, TrainSample};
 use dynocar_tests::process::Site;
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// The source folders of all packages.
-pub const FOLDERS: [&str; 18] = [
+pub const FOLDERS: [&str; 19] = [
     "shared/src",
     "shared/transport/src",
     "client/src",
@@ -16,6 +16,7 @@ pub const FOLDERS: [&str; 18] = [
     "daemon/fmu/src",
     "daemon/src",
     "daemon/workshop/src",
+    "daemon/mcap/src",
     "daemon/recording/src",
     "daemon/parquet/src",
     "daemon/live/src",

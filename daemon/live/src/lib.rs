@@ -1,7 +1,7 @@
 //! `dynocar live`: what a controller and the daemon write, served to viewers as it comes, by the
 //! Foxglove WebSocket protocol.
 //!
-//! Topics, schemas and messages are those of a recording (`dynocar_recording`), and the channels are
+//! Topics, schemas and messages are those of a recording (`dynocar_mcap`), and the channels are
 //! read by the same readers: what is seen live is what would be recorded, but for the samples, of which
 //! viewers get as many as a picture needs.
 //!

@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dynocar::output::report_line;
-use dynocar_recording::event::EventKind;
-use dynocar_recording::schema::DESCRIPTORS;
-use dynocar_recording::topic::{ENCODING, LAYOUT, Message, Topic};
+use dynocar_mcap::event::EventKind;
+use dynocar_mcap::schema::DESCRIPTORS;
+use dynocar_mcap::topic::{ENCODING, LAYOUT, Message, Topic};
+use dynocar_mcap::writing::WallClock;
 use dynocar_recording::train_channels::Sink;
-use dynocar_recording::writing::WallClock;
 use dynocar_transport::ChannelError;
 use foxglove::websocket::{ChannelView, Client, ServerListener};
 use foxglove::{ChannelId, Context, PartialMetadata, RawChannel, Schema};

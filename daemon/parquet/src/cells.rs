@@ -1,4 +1,4 @@
-//! The columns of `dynocar_recording::columns` as Arrow has them: schema, and words as arrays and back.
+//! The columns of `dynocar_mcap::columns` as Arrow has them: schema, and words as arrays and back.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use arrow_array::types::{
 use arrow_array::{Array, ArrayRef, FixedSizeListArray, PrimitiveArray, StringArray};
 use arrow_buffer::NullBuffer;
 use arrow_schema::{DataType, Field, Schema, TimeUnit};
-use dynocar_recording::columns::Column;
+use dynocar_mcap::columns::Column;
 
 /// Cells of a column, row after row.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -12,13 +12,12 @@ use dynocar::cli::{Failure, carry_out};
 use dynocar::output::{OutputError, report_line, require_new};
 use dynocar::programs::{PARQUET, called_as};
 use dynocar::unpacking::is_parquet;
+use dynocar_mcap::convert::{from_dataset, unpack};
 use dynocar_recording::cli::{ConvertArguments, VerifyArguments};
-use dynocar_recording::convert::{from_dataset, unpack};
 
 use super::reading::write_mcap;
-use crate::numbers::{Wanted, send_columns};
+use crate::numbers::{TrainsBy, Wanted, send_columns};
 use crate::reading::{Content, read};
-use crate::trains::TrainsBy;
 use crate::writing::{Written, write_folder};
 
 /// Recordings as Parquet and back.

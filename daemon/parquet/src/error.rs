@@ -9,7 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::Path;
 use std::sync::Once;
 
-use dynocar_recording::error::{AtPath, ReadProblem};
+use dynocar_mcap::error::{AtPath, ReadProblem};
 
 /// Why a Parquet file, or a folder of them, cannot be read.
 pub type TableError = AtPath<TableProblem>;

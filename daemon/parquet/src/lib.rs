@@ -6,11 +6,11 @@
 //!
 //! # Layout
 //!
-//! - [`cells`]: the columns of `dynocar_recording::columns` as Arrow has them
+//! - [`cells`]: the columns of `dynocar_mcap::columns` as Arrow has them
 //! - [`error`]: why a file cannot be read, and how a damaged file affects its library
 //! - [`writing`]: MCAP to Parquet
 //! - [`reading`], [`table`]: Parquet to what a recording holds, and to MCAP
-//! - [`numbers`], [`trains`]: a Parquet file of anybody as columns of numbers, and whose its rows are
+//! - [`numbers`]: a Parquet file of anybody as columns of numbers, and whose its rows are
 //! - [`cli`]: the command line
 
 pub mod cells;
@@ -19,5 +19,4 @@ pub mod error;
 pub mod numbers;
 pub mod reading;
 pub mod table;
-pub mod trains;
 pub mod writing;

@@ -9,10 +9,10 @@ use arrow_array::{Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Schema};
 use dynocar::storage::{Disk, settle};
 use dynocar::unpacking::is_parquet;
-use dynocar_recording::columns::{Column, Row, Source};
-use dynocar_recording::error::{ReadProblem, WriteError};
-use dynocar_recording::recording::{Metadata, Recording};
-use dynocar_recording::writing::{McapError, RecordingWriter};
+use dynocar_mcap::columns::{Column, Row, Source};
+use dynocar_mcap::error::{ReadProblem, WriteError};
+use dynocar_mcap::recording::{Metadata, Recording};
+use dynocar_mcap::writing::{McapError, RecordingWriter};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::cells::{Cells, cells_of, data_type};

@@ -9,10 +9,10 @@ use arrow_array::{
     Array, ArrayRef, BinaryArray, RecordBatch, StringArray, TimestampNanosecondArray, UInt64Array,
 };
 use arrow_schema::ArrowError;
-use dynocar_recording::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS};
-use dynocar_recording::event::Event;
-use dynocar_recording::recording::Metadata;
-use dynocar_recording::schema::EVENT;
+use dynocar_mcap::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS};
+use dynocar_mcap::event::Event;
+use dynocar_mcap::recording::Metadata;
+use dynocar_mcap::schema::EVENT;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 
 use crate::cells::ZONE;

@@ -2,30 +2,28 @@
 //!
 //! Failures of the command line: wrong input, or work that could not be done.
 
-mod annotate;
 mod record;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
+use dynocar::cli::replay::{self, ReplayArguments};
 use dynocar::cli::{Failure, carry_out};
 use dynocar::config::DaemonConfig;
 use dynocar::output::{print, report_line, require_new};
 use dynocar::programs::{RECORDING, called_as};
 
-use super::annotate::AnnotateError;
-use super::convert::{
-    FromDatasetError, ModelFiles, ToDatasetError, Unpacked, from_dataset, to_dataset,
-};
-use super::copying::recover;
-use super::error::CopyError;
-use super::joining::read_all;
 use super::page::page;
-use super::reading::Ending;
 use super::record::{KeepError, RecordError};
-use super::recording::Recording;
 use super::verify::{Configurations, Outcome, overlay, text, verify};
+use dynocar_mcap::convert::{ModelFiles, Unpacked, from_dataset, to_dataset};
+use dynocar_mcap::copying::recover;
+use dynocar_mcap::dataset;
+use dynocar_mcap::error::CopyError;
+use dynocar_mcap::joining::read_all;
+use dynocar_mcap::reading::Ending;
+use dynocar_mcap::recording::Recording;
 
 pub use record::WantedArguments;
 
@@ -35,9 +33,6 @@ pub use record::WantedArguments;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Report a failure to another program, in this file
-    #[arg(long, global = true, hide = true)]
-    json: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -48,9 +43,9 @@ enum Command {
     Recover(RecoverArguments),
     Convert(ConvertArguments),
     #[command(hide = true)]
-    Annotate(annotate::AnnotateArguments),
-    #[command(hide = true)]
     Verify(VerifyArguments),
+    #[command(hide = true)]
+    Play(ReplayArguments),
     /// Print the reference page of the recorded fields
     #[command(hide = true)]
     Fields,
@@ -150,15 +145,15 @@ pub fn command() -> clap::Command {
 pub fn main() -> ExitCode {
     carry_out(
         program(),
-        |it: &Arguments| it.json.as_deref(),
-        |arguments| match &arguments.command {
+        |_| None,
+        |arguments: &Arguments| match &arguments.command {
             Command::Record(arguments) => record::execute(arguments),
             Command::FlightRecorder(arguments) => record::execute_flight_recorder(arguments),
             Command::Keep(arguments) => record::execute_keep(arguments),
             Command::Recover(arguments) => execute_recover(arguments),
             Command::Convert(arguments) => execute_convert(arguments),
-            Command::Annotate(arguments) => annotate::execute(arguments),
             Command::Verify(arguments) => execute_verify(arguments),
+            Command::Play(arguments) => replay::execute(arguments, |source| dataset::load(source)),
             Command::Fields => print(&page()).map_err(Failure::from),
         },
     )
@@ -248,47 +243,6 @@ impl VerifyArguments {
             Ok(())
         } else {
             Err(Failure::Verdict(1))
-        }
-    }
-}
-
-/// A file that is no recording is wrong input; one that cannot be written is not.
-impl From<CopyError> for Failure {
-    fn from(error: CopyError) -> Self {
-        match error {
-            CopyError::Read(error) => Failure::input(error),
-            CopyError::Write(error) => Failure::work(error),
-        }
-    }
-}
-
-/// A dataset that makes no recording is wrong input; a recording that cannot be written is not.
-impl From<FromDatasetError> for Failure {
-    fn from(error: FromDatasetError) -> Self {
-        match error {
-            FromDatasetError::Dataset(error) => error.into(),
-            FromDatasetError::Write(_) => Failure::work(error),
-            error => Failure::input(error),
-        }
-    }
-}
-
-/// A recording that makes no dataset is wrong input; a dataset that cannot be written is not.
-impl From<ToDatasetError> for Failure {
-    fn from(error: ToDatasetError) -> Self {
-        match error {
-            ToDatasetError::Output(error) => error.into(),
-            error => Failure::input(error),
-        }
-    }
-}
-
-/// A recording that is another than the one explained is wrong input.
-impl From<AnnotateError> for Failure {
-    fn from(error: AnnotateError) -> Self {
-        match error {
-            AnnotateError::Copy(error) => error.into(),
-            error => Failure::input(error),
         }
     }
 }

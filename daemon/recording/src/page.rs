@@ -6,11 +6,11 @@ use dynocar_shared::schema::{Field, unit_of};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, Reason, Status};
 
-use super::annotate::messages::MESSAGES;
-use crate::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
-use crate::event::{Event, EventKind};
-use crate::message::MessageField;
-use crate::schema::{
+use dynocar_mcap::annotate::messages::MESSAGES;
+use dynocar_mcap::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
+use dynocar_mcap::event::{Event, EventKind};
+use dynocar_mcap::message::MessageField;
+use dynocar_mcap::schema::{
     ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, number, parameter_number,
     rejection_number, scalar, vocabulary_of_type,
 };

@@ -16,8 +16,8 @@ use dynocar_shared::{TrainId, TrainSample};
 use dynocar_transport::channel::{Receiver, Transport};
 use dynocar_transport::{ChannelError, Host, Role, monotonic_now_ns};
 
-use super::event::{Event, EventKind};
-use super::topic::Message;
+use dynocar_mcap::event::{Event, EventKind};
+use dynocar_mcap::topic::Message;
 
 /// How long a reader sleeps between two looks at the channels: at 1 kHz a buffer of 512 samples
 /// leaves it a hundred times as long.

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::Failure;
 use super::companion::{become_it, words_of_command};
 use crate::config::DaemonConfig;
-use crate::dataset::{FileKind, is_recording, kind_of, labelled_text};
+use crate::dataset::{FileKind, kind_of, labelled_text};
 use crate::output::{give, report_line, require_file, write_json};
 use crate::programs::{ErrorAnswer, WORKSHOP};
 
@@ -128,7 +128,7 @@ fn understood<'a>(path: &Path, config: &'a DaemonConfig) -> CheckAnswer<Content<
 /// True for a configuration, by its tables; a TOML file that cannot be read is refused here.
 fn may_be_configuration(path: &Path) -> Result<bool, Failure> {
     let is_toml = path.extension().is_some_and(|extension| extension == "toml");
-    if !is_toml || !path.is_file() || is_recording(path) {
+    if !is_toml || !path.is_file() {
         return Ok(false);
     }
     let (label, text) = labelled_text(path)?;

@@ -11,7 +11,7 @@ mod failure;
 mod groups;
 mod health;
 pub mod models;
-mod replay;
+pub mod replay;
 pub mod run;
 pub mod text;
 
@@ -95,7 +95,7 @@ impl Command {
             Command::Run(arguments) => run::execute(arguments),
             Command::Health(arguments) => health::execute(arguments),
             Command::Check(arguments) => check::execute(arguments),
-            Command::Replay(arguments) => replay::execute(arguments),
+            Command::Replay(arguments) => replay::execute_or_become(arguments),
             Command::Models(arguments) => models::execute(arguments),
             Command::Init(passed) => workshop("init", passed),
             Command::Import(passed) => workshop("import", passed),

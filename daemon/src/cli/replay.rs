@@ -11,9 +11,10 @@ use dynocar_shared::{PipelineKind, TrainId};
 use dynocar_transport::Host;
 
 use super::Failure;
-use super::companion::{self, Passed};
+use super::companion::{Passed, become_it, words_of_command};
 use crate::dataset::{self, LoadError, Source};
 use crate::output::report_line;
+use crate::programs::RECORDING;
 use crate::redrawn::{Redrawn, bar, can_draw};
 use crate::replay::{Rate, ReplayReport, Replayer};
 use crate::unpacking::{UnpackError, program_for};
@@ -49,25 +50,40 @@ pub struct ReplayArguments {
     wait: f64,
 }
 
-/// Plays the runs.
+/// Plays the runs of a dataset, or becomes the program that knows the format of a recording.
+///
+/// # Errors
+///
+/// As [`execute`], and when there is no such program.
+pub fn execute_or_become(arguments: &ReplayArguments) -> Result<(), Failure> {
+    if arguments.verify {
+        let with = arguments.with.iter().flat_map(|it| ["--with".into(), it.into()]);
+        let files = arguments.dataset.iter().map(OsString::from);
+        let words = Passed::from(files.chain(with).collect::<Vec<_>>());
+        return become_it(program_for(words.words()), Some("verify"), &words);
+    }
+    if arguments.dataset.iter().any(|it| it.extension().is_some_and(|it| it == "mcap")) {
+        return become_it(RECORDING, Some("play"), &words_of_command());
+    }
+    execute(arguments, |source| dataset::load(source))
+}
+
+/// Plays the runs of what a function reads.
 ///
 /// # Errors
 ///
 /// A wrong dataset or run number is an input failure; a channel that cannot be opened, and samples
 /// that nobody used, are a failure of the work.
-pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
-    if arguments.verify {
-        let with = arguments.with.iter().flat_map(|it| ["--with".into(), it.into()]);
-        let files = arguments.dataset.iter().map(OsString::from);
-        let words = Passed::from(files.chain(with).collect::<Vec<_>>());
-        return companion::become_it(program_for(words.words()), Some("verify"), &words);
-    }
+pub fn execute(
+    arguments: &ReplayArguments,
+    read: impl Fn(Source) -> Result<Dataset, LoadError>,
+) -> Result<(), Failure> {
     let [dataset] = &arguments.dataset[..] else {
         let words = "expected one dataset or recording: several files are for --verify";
         return Err(Failure::Input(words.into()));
     };
     let train = TrainId(arguments.train.unwrap_or(1));
-    let dataset = load(dataset, arguments.train.map(TrainId))?;
+    let dataset = of_train(dataset, arguments.train.map(TrainId), read)?;
     let runs = match arguments.run {
         None => &dataset.runs[..],
         Some(number) if (1..=dataset.runs.len()).contains(&number) => {
@@ -111,11 +127,16 @@ pub fn execute(arguments: &ReplayArguments) -> Result<(), Failure> {
 }
 
 /// Reads what is played. The only train of a recording may be played as another.
-fn load(path: &Path, train: Option<TrainId>) -> Result<Dataset, LoadError> {
-    let train = train.filter(|_| dataset::is_recording(path));
-    match dataset::load(Source { path, train }) {
-        Err(LoadError::Recording(UnpackError::Content { .. })) => dataset::load(path),
-        loaded => loaded,
+fn of_train(
+    path: &Path,
+    train: Option<TrainId>,
+    read: impl Fn(Source) -> Result<Dataset, LoadError>,
+) -> Result<Dataset, LoadError> {
+    match read(Source { path, train }) {
+        Err(LoadError::NoRecording { .. } | LoadError::Recording(UnpackError::Content { .. })) => {
+            read(Source { path, train: None })
+        }
+        read => read,
     }
 }
 

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use dynocar::config::DaemonConfig;
-use dynocar_recording::schema::DESCRIPTORS;
-use dynocar_recording::topic::Topic;
+use dynocar_mcap::schema::DESCRIPTORS;
+use dynocar_mcap::topic::Topic;
 use prost::Message;
 use prost_types::field_descriptor_proto::Type;
 use prost_types::{FileDescriptorProto, FileDescriptorSet};

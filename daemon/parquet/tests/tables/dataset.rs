@@ -16,8 +16,7 @@ use dynocar_analysis::dataset::{
     ColumnMapping, Dataset, DatasetFiles, FileProblem, MANIFEST_FILE, Manifest, is_parquet,
 };
 use dynocar_dataset::{RunColumn, RunColumns, RunContent};
-use dynocar_parquet::numbers::{Wanted, send_columns};
-use dynocar_parquet::trains::TrainsBy;
+use dynocar_parquet::numbers::{TrainsBy, Wanted, send_columns};
 
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;

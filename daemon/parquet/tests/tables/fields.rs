@@ -1,8 +1,8 @@
 //! The Arrow schema, the columns and the page of the fields say the same.
 
 use arrow_schema::Schema;
+use dynocar_mcap::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS};
 use dynocar_parquet::cells::schema;
-use dynocar_recording::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS};
 use dynocar_shared::schema::unit_end;
 
 fn page() -> String {

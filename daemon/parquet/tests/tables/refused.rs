@@ -4,10 +4,10 @@ use std::fs::File;
 use std::path::Path;
 
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, StringArray};
+use dynocar_mcap::columns::{Row, SAMPLES};
 use dynocar_parquet::cells::schema;
 use dynocar_parquet::reading::read;
 use dynocar_parquet::writing::write_folder;
-use dynocar_recording::columns::{Row, SAMPLES};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use dynocar_mcap::columns::Row;
+use dynocar_mcap::event::Event;
 use dynocar_parquet::reading::{read, write_mcap};
 use dynocar_parquet::writing::write_folder;
-use dynocar_recording::columns::Row;
-use dynocar_recording::event::Event;
 use dynocar_shared::layout::Words;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use proptest::prelude::*;

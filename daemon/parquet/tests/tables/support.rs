@@ -6,11 +6,11 @@ use std::process::{Command, Output};
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, RecordBatch};
-use dynocar_recording::columns::Row;
-use dynocar_recording::error::ReadError;
-use dynocar_recording::reading::{Item, Raw, Visitor, read};
-use dynocar_recording::recording::Metadata;
-use dynocar_recording::writing::RecordingWriter;
+use dynocar_mcap::columns::Row;
+use dynocar_mcap::error::ReadError;
+use dynocar_mcap::reading::{Item, Raw, Visitor, read};
+use dynocar_mcap::recording::Metadata;
+use dynocar_mcap::writing::RecordingWriter;
 use parquet::arrow::ArrowWriter;
 
 /// Contents of a file, message by message.

@@ -9,7 +9,7 @@ use dynocar::models::{ModelText, Store, TrainModels};
 use dynocar_shared::TrainId;
 use toml::Table;
 
-use crate::event::{Event, EventKind};
+use dynocar_mcap::event::{Event, EventKind};
 
 /// A file to be attached: its name there and its content.
 pub type File = (String, String);

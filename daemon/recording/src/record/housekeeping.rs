@@ -17,7 +17,7 @@ use dynocar::storage::{SharedStorage, Storage, settle};
 
 use super::keeping::{KeepError, Keeper};
 use super::ring::{Aged, Ages};
-use crate::event::Event;
+use dynocar_mcap::event::Event;
 
 /// A task of the housekeeping.
 #[derive(Debug)]

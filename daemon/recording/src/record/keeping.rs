@@ -17,7 +17,7 @@ use dynocar_shared::Status;
 
 use super::kept_event::{self, KeptEvent, Reason, beside, forget_unfinished, kept_bytes};
 use super::ring::Aged;
-use crate::event::{Event, EventKind};
+use dynocar_mcap::event::{Event, EventKind};
 
 /// Beside the ring: what is kept.
 const KEPT_FOLDER: &str = "kept";

@@ -11,7 +11,7 @@ use dynocar::stamp::{SinceBoot, Stamp};
 use dynocar::storage::{Rights, SharedStorage, StorageError, replace};
 use serde::{Deserialize, Serialize};
 
-use crate::event::{Event, EventKind};
+use dynocar_mcap::event::{Event, EventKind};
 
 /// In the folder of an event: why it is kept.
 const EVENT_FILE: &str = "stretch.toml";

@@ -16,13 +16,13 @@ use std::time::{Duration, Instant};
 use configuration::{Configuration, Maintenance};
 use dynocar::output::report_line;
 use dynocar::storage::{Disk, SharedStorage, folder_of};
+use dynocar_mcap::writing::McapError;
 use dynocar_shared::TrainId;
 use dynocar_transport::ChannelError;
-use mcap::McapError;
 
-use crate::event::{Event, EventKind};
-use crate::topic::Message;
 use crate::train_channels::{PAUSE, Sink, TrainChannels, Wanted};
+use dynocar_mcap::event::{Event, EventKind};
+use dynocar_mcap::topic::Message;
 
 pub use files::Files;
 pub use housekeeping::Rotation;

@@ -3,8 +3,8 @@
 use dynocar::config::{ConfigError, DaemonConfig};
 use toml::{Table, Value};
 
-use crate::recording::Recording;
-use crate::writing::{CONFIGURATION, folder_of_configuration};
+use dynocar_mcap::recording::Recording;
+use dynocar_mcap::writing::{CONFIGURATION, folder_of_configuration};
 
 /// Why an attached configuration cannot be used.
 #[derive(Debug, thiserror::Error)]

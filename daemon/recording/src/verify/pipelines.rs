@@ -8,8 +8,8 @@ use dynocar_core::pipeline::Pipeline;
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 
 use super::{Configurations, STAMPS};
-use crate::recording::Recording;
-use crate::schema::SNAPSHOT_FIELDS;
+use dynocar_mcap::recording::Recording;
+use dynocar_mcap::schema::SNAPSHOT_FIELDS;
 
 /// Where a computed snapshot is another than the recorded one.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,11 +6,11 @@ use dynocar_analysis::explain::answer::Verdict;
 use dynocar_analysis::explain::report::timeline::{
     ActingEffect, ResidualWindow, RunTimeline, SpeedPoint, Timeline,
 };
-use dynocar_recording::annotate::messages::{Effect, PredictedSpeed, Residual};
-use dynocar_recording::annotate::{AnnotateError, OtherRuns, annotate};
-use dynocar_recording::error::ReadError;
-use dynocar_recording::reading::{Item, Raw, Visitor, read};
-use dynocar_recording::recording::Recording;
+use dynocar_mcap::annotate::messages::{Effect, PredictedSpeed, Residual};
+use dynocar_mcap::annotate::{AnnotateError, OtherRuns, annotate};
+use dynocar_mcap::error::ReadError;
+use dynocar_mcap::reading::{Item, Raw, Visitor, read};
+use dynocar_mcap::recording::Recording;
 use dynocar_shared::TrainSample;
 use prost::Message;
 

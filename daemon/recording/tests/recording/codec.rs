@@ -3,7 +3,7 @@
 use dynocar_shared::SampleField;
 use proptest::prelude::*;
 
-use dynocar_recording::codec::{
+use dynocar_mcap::codec::{
     CodecError, decode_sample, decode_snapshot, encode_sample, encode_snapshot,
 };
 use dynocar_shared::layout::Words;

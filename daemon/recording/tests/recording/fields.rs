@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use dynocar_recording::columns::{EVENTS, SAMPLES, SNAPSHOTS};
-use dynocar_recording::event::{Event, EventKind};
+use dynocar_mcap::columns::{EVENTS, SAMPLES, SNAPSHOTS};
+use dynocar_mcap::event::{Event, EventKind};
+use dynocar_mcap::schema::{DESCRIPTORS, SUFFIXES, suffixed_name};
 use dynocar_recording::page::page;
-use dynocar_recording::schema::{DESCRIPTORS, SUFFIXES, suffixed_name};
 use dynocar_shared::Parameter;
 use prost::Message;
 use prost::encoding::{DecodeContext, decode_key, skip_field};

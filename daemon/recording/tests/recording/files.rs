@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::support::{samples, snapshots, write};
-use dynocar_recording::copying::recover;
-use dynocar_recording::reading::{Ending, read};
-use dynocar_recording::recording::Recording;
+use dynocar_mcap::copying::recover;
+use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::recording::Recording;
 use dynocar_shared::TrainSample;
 use proptest::prelude::*;
 
@@ -132,11 +132,14 @@ fn a_recording_becomes_a_dataset_and_the_same_samples_come_back() {
     convert(&path, &at("dataset"));
     let dataset = dynocar::dataset::load(&at("dataset")).unwrap();
     assert_eq!(dataset.runs.iter().map(|it| it.samples.len()).sum::<usize>(), 600);
+    assert_eq!(dynocar_mcap::dataset::load(&path).unwrap().runs, dataset.runs);
     convert(&at("dataset"), &at("again.mcap"));
     let (one, two) = (Recording::load(&path).unwrap(), Recording::load(&at("again.mcap")).unwrap());
     assert_eq!(one.samples, two.samples);
     // A dataset that was no recording comes back file by file.
     convert(&crate::support::config_folder().join("demo"), &at("demo.mcap"));
+    let demo = dynocar::dataset::load(&crate::support::config_folder().join("demo")).unwrap();
+    assert_eq!(dynocar_mcap::dataset::load(&at("demo.mcap")).unwrap(), demo);
     convert(&at("demo.mcap"), &at("demo"));
     for file in ["dataset.toml", "train.toml", "track.toml", "runs/01.csv", "runs/06.csv"] {
         let original =

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use dynocar::storage::Disk;
-use dynocar_recording::copying::recover;
-use dynocar_recording::event::{Event, EventKind};
+use dynocar_mcap::copying::recover;
+use dynocar_mcap::event::{Event, EventKind};
+use dynocar_mcap::recording::Recording;
+use dynocar_mcap::topic::Message;
 use dynocar_recording::record::{Files, Keeper, Keeping, Rotation, request_keeping};
-use dynocar_recording::recording::Recording;
-use dynocar_recording::topic::Message;
 use dynocar_shared::{Status, TrainId, TrainSample};
 
 const HOUR: Duration = Duration::from_secs(3600);

@@ -3,12 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar::dataset;
-use dynocar_recording::convert::{ModelFiles, to_dataset};
-use dynocar_recording::recording::Recording;
-use dynocar_recording::topic::Message;
-use dynocar_recording::writing::{RecordingWriter, WallClock};
-use dynocar_shared::TrainSample;
+use dynocar::dataset::{self, Source};
+use dynocar_mcap::convert::{ModelFiles, to_dataset};
+use dynocar_mcap::recording::Recording;
+use dynocar_mcap::topic::Message;
+use dynocar_mcap::writing::{RecordingWriter, WallClock};
+use dynocar_shared::{TrainId, TrainSample};
 
 use crate::support::{config_folder, samples};
 
@@ -156,6 +156,8 @@ fn of_several_trains_the_chosen_one_is_read() {
         to_dataset(paths, &folder, Some(train), &ModelFiles::default()).unwrap();
         let read = dataset::load(&folder).unwrap();
         assert_eq!(read.train.mass_kg, mass_kg);
+        let source = Source { path: &path, train: Some(TrainId(train)) };
+        assert_eq!(dynocar_mcap::dataset::load(source).unwrap(), read);
         let speeds = read.runs.iter().flat_map(|run| &run.samples).map(|it| it.speed_mps);
         assert!(speeds.eq(own.iter().map(|it| it.speed_mps + more_mps)), "train {train}");
     }

@@ -7,9 +7,9 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use crate::support_site::{Controller, TRAIN, TestSite, await_true};
-use dynocar_recording::event::EventKind;
-use dynocar_recording::reading::{Ending, read};
-use dynocar_recording::recording::Recording;
+use dynocar_mcap::event::EventKind;
+use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::recording::Recording;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use dynocar_transport::channel::Transport;

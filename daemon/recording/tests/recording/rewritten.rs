@@ -5,11 +5,11 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use dynocar_recording::convert::{ModelFiles, from_dataset, to_dataset};
-use dynocar_recording::copying::recover;
-use dynocar_recording::error::CopyError;
-use dynocar_recording::reading::{ChannelInfo, Item, Raw, Visitor, read};
-use dynocar_recording::recording::Recording;
+use dynocar_mcap::convert::{ModelFiles, from_dataset, to_dataset};
+use dynocar_mcap::copying::recover;
+use dynocar_mcap::error::CopyError;
+use dynocar_mcap::reading::{ChannelInfo, Item, Raw, Visitor, read};
+use dynocar_mcap::recording::Recording;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 

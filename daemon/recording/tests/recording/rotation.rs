@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use dynocar::storage::Disk;
+use dynocar_mcap::topic::Message;
 use dynocar_recording::record::{Files, RecordError, Rotation};
-use dynocar_recording::topic::Message;
 use dynocar_shared::{TrainId, TrainSample};
 
 /// The numbered files of a folder, in order, with their lengths.

@@ -6,10 +6,8 @@ use dynocar::config::DaemonConfig;
 use dynocar::dataset;
 use dynocar::pipelines::build_pipeline;
 use dynocar_analysis::identify::published_samples;
-use dynocar_recording::topic::Message;
-use dynocar_recording::writing::{
-    CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration,
-};
+use dynocar_mcap::topic::Message;
+use dynocar_mcap::writing::{CONFIGURATION, RecordingWriter, WallClock, folder_of_configuration};
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 
 /// The daemon's start, on the monotonic clock of the recording.

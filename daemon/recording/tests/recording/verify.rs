@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use crate::support::{samples, snapshots, write};
-use dynocar_recording::recording::Recording;
+use dynocar_mcap::recording::Recording;
+use dynocar_mcap::writing::{RecordingWriter, WallClock};
 use dynocar_recording::verify::{Configurations, Outcome, Verified, verify};
-use dynocar_recording::writing::{RecordingWriter, WallClock};
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 
 fn verified(samples: &[TrainSample], snapshots: &[ParameterSnapshot]) -> Vec<Verified> {

@@ -18,8 +18,9 @@ use crate::report::PAGE_MARK;
 use crate::report::html::Columns;
 use crate::report::provenance::{Provenance, own_command_line};
 use dynocar::cli::Failure;
-use dynocar::dataset;
+use dynocar::dataset::labelled_text;
 use dynocar::output::{give, report_line, require_files, write_file, write_json};
+use dynocar_mcap::dataset;
 
 /// Estimate a brake's ETCS parameters and stopping distances from recorded stops.
 ///
@@ -356,7 +357,7 @@ const TABLES: Columns<TableLaw> = &[
 
 /// The brakes behind the tables of a file.
 fn tables(file: &Path, json: Option<&Path>) -> Result<(), Failure> {
-    let (label, text) = dataset::labelled_text(file).map_err(Failure::input)?;
+    let (label, text) = labelled_text(file).map_err(Failure::input)?;
     let tables = parse(&text).map_err(|words| Failure::Input(format!("{label}: {words}")))?;
     let laws = of_each(&tables, |(name, rows)| TableLaw::of(name, rows));
     let none = || Failure::Input(format!("{label}: no brake stops as these rows say"));

@@ -18,8 +18,9 @@ use dynocar_shared::TrainId;
 use serde::Serialize;
 
 use dynocar::cli::Failure;
-use dynocar::dataset::{self, FileKind, LoadError, Source, kind_of, labelled_text};
+use dynocar::dataset::{FileKind, LoadError, Source, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
+use dynocar_mcap::dataset;
 
 /// Runs `dynocar check`.
 ///

@@ -13,7 +13,8 @@ use dynocar_analysis::explain::{Explanation, explain, explain_many};
 use dynocar_analysis::parallel;
 
 use dynocar::cli::Failure;
-use dynocar::dataset::{DatasetFolder, LoadError, Source, open};
+use dynocar::dataset::{LoadError, Source};
+use dynocar_mcap::dataset::{FilesOfDataset, open};
 use dynocar_shared::TrainId;
 
 /// The runs of a dataset.
@@ -28,7 +29,7 @@ pub struct ExplainedRuns {
 
 /// Runs of which some are in memory.
 struct ManyRuns {
-    folder: DatasetFolder,
+    folder: FilesOfDataset,
     head: DatasetHead,
     held: Held,
     /// Those that are, until they are explained.
@@ -134,7 +135,7 @@ impl ExplainedRuns {
     fn unusable(&self, error: RunDataError) -> Failure {
         let RunDataError::Simulate { file, source } = error;
         let label =
-            DatasetFolder::at(self.source()).map_or(file.clone(), |folder| folder.label(&file));
+            FilesOfDataset::at(self.source()).map_or(file.clone(), |folder| folder.label(&file));
         let diagnostics: String =
             self.dataset.diagnostics().iter().map(|diagnostic| format!("; {diagnostic}")).collect();
         Failure::At(SourcePosition::whole(&label), format!("{label}: {source}{diagnostics}"))
@@ -143,7 +144,7 @@ impl ExplainedRuns {
 
 /// Reads one run.
 fn read(
-    folder: &DatasetFolder,
+    folder: &FilesOfDataset,
     head: &DatasetHead,
     traction_only: bool,
     index: usize,

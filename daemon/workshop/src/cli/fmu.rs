@@ -9,11 +9,12 @@ use dynocar_fmu::{ESTIMATORS, PLANT, STEP_DEFAULT_S, STEP_MAX_S};
 
 use crate::fmu::{FmuError, INPUTS_MARK, archive, find_library, inputs, read_library};
 use dynocar::cli::Failure;
-use dynocar::dataset;
+use dynocar::dataset::{labelled_text, load_track, load_train};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{
     report_line, require_file, require_folder, require_replaceable, write_file, write_in_folder,
 };
+use dynocar_mcap::dataset;
 
 /// Write the estimators, or the train itself, as an FMU for a simulator.
 ///
@@ -98,14 +99,14 @@ fn named_files(
     train: Option<&Path>,
     track: Option<&Path>,
 ) -> Result<Vec<(ModelFile, String)>, Failure> {
-    let text = |path: &Path| dataset::labelled_text(path).map(|(_, text)| text);
+    let text = |path: &Path| labelled_text(path).map(|(_, text)| text);
     let mut files = Vec::new();
     if let Some(path) = train {
-        dataset::load_train(path)?;
+        load_train(path)?;
         files.push((ModelFile::Train, text(path)?));
     }
     if let Some(path) = track {
-        dataset::load_track(path)?;
+        load_track(path)?;
         files.push((ModelFile::Track, text(path)?));
     }
     Ok(files)

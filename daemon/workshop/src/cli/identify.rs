@@ -18,11 +18,12 @@ use self::answer::EstimatorAnswer;
 use self::runs::{EstimatorSpread, RunAnswer};
 use super::text::diagnostics;
 use dynocar::cli::Failure;
-use dynocar::dataset::{self, SourceArguments};
+use dynocar::dataset::SourceArguments;
 use dynocar::output::{give, require_files};
 use dynocar_analysis::identify::{
     default_estimators, identify, recommended_estimators, samples_of_runs,
 };
+use dynocar_mcap::dataset;
 
 /// Estimate resistance, mass, adhesion and friction from recorded runs.
 #[derive(Debug, Args)]

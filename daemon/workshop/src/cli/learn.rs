@@ -20,7 +20,6 @@ use dynocar::config::DaemonConfig;
 use dynocar::ending;
 use dynocar::observing::ObservedTrain;
 use dynocar::output::{print, require_files, write_file};
-use dynocar::unpacking::UnpackError;
 
 /// Turn recorded runs into candidate models, while trains run.
 ///
@@ -101,10 +100,7 @@ fn learn(arguments: &LearnArguments) -> Result<(), Failure> {
 
 impl From<LearnError> for Failure {
     fn from(error: LearnError) -> Self {
-        match error {
-            LearnError::Unpack(UnpackError::Content { .. }) => Failure::input(error),
-            error => Failure::work(error),
-        }
+        Failure::work(error)
     }
 }
 

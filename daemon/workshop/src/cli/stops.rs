@@ -13,8 +13,9 @@ use serde::Serialize;
 use super::text::{TextTable, diagnostics};
 use crate::report::html::Columns;
 use dynocar::cli::Failure;
-use dynocar::dataset::{self, SourceArguments};
+use dynocar::dataset::SourceArguments;
 use dynocar::output::{give, require_files};
+use dynocar_mcap::dataset;
 use dynocar_shared::HALF_95;
 
 /// Estimate deceleration and stopping distance from recorded stops, without forces.

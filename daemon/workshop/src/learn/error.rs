@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use dynocar::models::ModelsError;
 use dynocar::state::StateError;
 use dynocar::storage::StorageError;
-use dynocar::unpacking::UnpackError;
+use dynocar_mcap::convert::ToDatasetError;
 
 /// Why learning does not go on.
 #[derive(Debug, thiserror::Error)]
@@ -27,9 +27,9 @@ pub enum LearnError {
         /// The lock.
         path: PathBuf,
     },
-    /// A recording cannot be unpacked, whatever it holds.
+    /// A recording cannot be unpacked.
     #[error(transparent)]
-    Unpack(#[from] UnpackError),
+    Unpack(#[from] ToDatasetError),
     /// The memory cannot be written.
     #[error(transparent)]
     Memory(#[from] StateError),

@@ -12,7 +12,7 @@ use super::error::LearnError;
 use super::memory::Memory;
 use dynocar::models::Moment;
 use dynocar::storage::{Disk, Storage, StorageError, part_of};
-use dynocar::unpacking::{UnpackError, unpack};
+use dynocar_mcap::convert::{ModelFiles, ToDatasetError, to_dataset};
 
 /// How a finished recording ends.
 const MCAP_END: &[u8] = b"\x89MCAP0\r\n";
@@ -64,16 +64,15 @@ pub fn take_up(
     };
     Disk.make_folder(folder).map_err(failed("making the folder"))?;
     let part = part_of(&unpacked);
-    if let Err(error) = unpack(recording, &part, Some(train)) {
+    let paths = [recording.to_path_buf()];
+    if let Err(error) = to_dataset(&paths, &part, Some(train.0), &ModelFiles::default()) {
         let _ = std::fs::remove_dir_all(&part);
-        return match error {
-            UnpackError::Content { .. } => {
-                info!(train = train.0, "a recording is not used: {error}");
-                memory.unusable.insert(key, error.to_string());
-                Ok(())
-            }
-            error => Err(error.into()),
-        };
+        if let ToDatasetError::Output(_) = error {
+            return Err(error.into());
+        }
+        info!(train = train.0, "a recording is not used: {error}");
+        memory.unusable.insert(key, error.to_string());
+        return Ok(());
     }
     let name = recording.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let source = toml::to_string(&Source { name, recorded }).unwrap_or_default();

@@ -5,8 +5,9 @@ use std::time::SystemTime;
 use dynocar_analysis::dataset::MANIFEST_FILE;
 use sha2::{Digest, Sha256};
 
-use dynocar::dataset::{self, LoadError, Source};
+use dynocar::dataset::{LoadError, Source};
 use dynocar::models::moment::Moment;
+use dynocar_mcap::dataset;
 
 /// A file and what is in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,14 +69,14 @@ impl Provenance {
 }
 
 fn digests(source: Source) -> Result<Vec<FileDigest>, LoadError> {
-    let (folder, head) = dataset::open(source)?;
+    let (files, head) = dataset::open(source)?;
     let manifest = &head.manifest;
     let mut paths = vec![MANIFEST_FILE.to_string(), manifest.train_file.path.clone()];
     paths.extend(manifest.track_file.as_ref().map(|file| file.path.clone()));
     paths.extend(manifest.runs.iter().map(|run| run.file.clone()));
     let digest = |path: String| {
         // A file that was read a moment ago and is gone now has no content to state.
-        let content = std::fs::read(folder.path_of(&path)).unwrap_or_default();
+        let content = files.bytes(&path);
         FileDigest { bytes: content.len(), sha256: hex(&content), path }
     };
     Ok(paths.into_iter().map(digest).collect())

@@ -4,10 +4,11 @@
 
 use std::path::Path;
 
-use dynocar::dataset::{DatasetFolder, LoadError, read_text};
+use dynocar::dataset::{LoadError, read_text};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{OutputError, require_new, write_in_folder};
 use dynocar_analysis::dataset::DatasetFiles;
+use dynocar_mcap::dataset::FilesOfDataset;
 use toml::{Table, Value};
 
 use crate::paths::from_folder;
@@ -22,21 +23,20 @@ pub fn name_model(manifest: &mut Table, has_track: bool) {
     };
 }
 
-/// Names the runs where they lie; those of a recording, which is unpacked for as long as it is read,
-/// are written into the folder.
+/// Names the runs where they lie; those of a recording are written into the folder.
 ///
 /// # Errors
 ///
 /// When a run cannot be written, or would take the place of another file.
 pub fn keep_runs(
     manifest: &mut Table,
-    source: &DatasetFolder,
+    source: &FilesOfDataset,
     folder: &Path,
 ) -> Result<(), UpdatedModelError> {
     let runs = manifest.get_mut("runs").and_then(Value::as_array_mut);
     for run in runs.into_iter().flatten() {
         let Some(Value::String(file)) = run.get_mut("file") else { continue };
-        if !source.is_unpacked() {
+        if !source.is_recording() {
             *file = seen_from(folder, &source.path_of(file));
             continue;
         }

@@ -2,7 +2,6 @@
 //! predicted speeds of some runs, thinned for drawing.
 
 use dynocar_model::simulate::Restart;
-use serde::{Deserialize, Serialize};
 
 use super::effect::described;
 use super::panels::{Zones, zones};
@@ -15,7 +14,7 @@ use crate::explain::score::{predicted, run_error};
 use crate::statistics::greatest_first;
 
 /// An explanation in time.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Timeline {
     /// The verdict.
     pub verdict: Verdict,
@@ -30,7 +29,7 @@ pub struct Timeline {
 }
 
 /// One run in time; times are in s in the recording's own count.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RunTimeline {
     /// The run's file.
     pub file: String,
@@ -45,7 +44,7 @@ pub struct RunTimeline {
 }
 
 /// Speeds at one moment.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedPoint {
     /// The moment in s.
     pub time_s: f64,
@@ -58,7 +57,7 @@ pub struct SpeedPoint {
 }
 
 /// The resistance that a model lacks over about 20 s; positive retards.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResidualWindow {
     /// First moment in s.
     pub from_s: f64,
@@ -71,7 +70,7 @@ pub struct ResidualWindow {
 }
 
 /// A section of a run in which an effect acts.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ActingEffect {
     /// The effect's kind.
     pub kind: String,

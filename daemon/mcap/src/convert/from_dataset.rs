@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Component, Path};
 
+use dynocar::cli::Failure;
 use dynocar::dataset::{self, LoadError};
 use dynocar::storage::{Disk, settle};
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, MANIFEST_FILE};
@@ -11,9 +12,9 @@ use dynocar_analysis::identify::published_samples;
 use dynocar_shared::{TrainId, TrainSample};
 use mcap::McapError;
 
-use super::DATASET_FOLDER;
 use super::rows::{RowError, from_rows, is_rows};
 use crate::error::WriteError;
+use crate::recording::DATASET_FOLDER;
 use crate::topic::Message;
 use crate::writing::{RecordingWriter, WallClock};
 
@@ -40,6 +41,17 @@ pub enum FromDatasetError {
     /// The recording cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+/// A dataset that makes no recording is wrong input; a recording that cannot be written is not.
+impl From<FromDatasetError> for Failure {
+    fn from(error: FromDatasetError) -> Self {
+        match error {
+            FromDatasetError::Dataset(error) => error.into(),
+            FromDatasetError::Write(_) => Failure::work(error),
+            error => Failure::input(error),
+        }
+    }
 }
 
 /// Writes a dataset as a new recording; gives the number of samples.

@@ -4,6 +4,8 @@ use std::error::Error;
 use std::fmt::{Debug, Display, Formatter};
 use std::path::{Path, PathBuf};
 
+use dynocar::cli::Failure;
+
 use crate::codec::CodecError;
 use crate::schema::SAMPLE;
 
@@ -129,4 +131,14 @@ pub enum CopyError {
     /// The other file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+/// A file that is no recording is wrong input; one that cannot be written is not.
+impl From<CopyError> for Failure {
+    fn from(error: CopyError) -> Self {
+        match error {
+            CopyError::Read(error) => Failure::input(error),
+            CopyError::Write(error) => Failure::work(error),
+        }
+    }
 }

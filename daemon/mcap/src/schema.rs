@@ -156,7 +156,7 @@ fn typed(mut field: FieldDescriptorProto, of_type: Type, name: &str) -> FieldDes
 }
 
 /// The protobuf type of a Rust type.
-pub(crate) fn scalar(type_name: &str) -> Type {
+pub fn scalar(type_name: &str) -> Type {
     match type_name {
         "f64" => Type::Double,
         "i64" => Type::Int64,

@@ -1,6 +1,8 @@
 //! Samples as rows of CSV, and back, to the bit; of NaN there is one.
 
+use dynocar_analysis::dataset::{ColumnMapping, RunColumn, RunColumns};
 use dynocar_shared::layout::Words;
+use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::schema::{Field, Missing};
 use dynocar_shared::{TrainId, TrainSample};
 
@@ -50,7 +52,7 @@ pub fn to_rows<'a>(samples: impl IntoIterator<Item = &'a TrainSample>) -> String
             text += &cell(field, sample, fields[field.index]);
             text.push(',');
         }
-        let is_sliding = sample.flags & dynocar_shared::sample::FLAG_WHEEL_SLIDE != 0;
+        let is_sliding = sample.flags & FLAG_WHEEL_SLIDE != 0;
         text += if is_sliding { "1\n" } else { "0\n" };
     }
     text
@@ -64,6 +66,38 @@ fn cell(field: &Field, sample: &TrainSample, words: &dyn Words) -> String {
         (_, "f64") => f64::from_bits(word).to_string(),
         (_, "i64" | "i8") => (word as i64).to_string(),
         _ => word.to_string(),
+    }
+}
+
+/// The columns of samples that mappings name, as those of a text of [`to_rows`] are read.
+pub fn columns_of_samples(samples: &[TrainSample], mappings: &[ColumnMapping]) -> RunColumns {
+    let names = columns().map(|it| it.layout.name).chain([WHEEL_SLIDE]);
+    let column = |name: &str| {
+        let is_mapped = mappings.iter().any(|it| it.names().any(|it| it == name));
+        let values = is_mapped.then(|| Vec::with_capacity(samples.len()));
+        RunColumn { name: name.into(), values }
+    };
+    let mut all: Vec<RunColumn> = names.map(column).collect();
+    for sample in samples {
+        let words = sample.fields();
+        let numbers = columns().map(|field| number(field, sample, words[field.index]));
+        let is_sliding = f64::from(u8::from(sample.flags & FLAG_WHEEL_SLIDE != 0));
+        for (column, number) in all.iter_mut().zip(numbers.chain([is_sliding])) {
+            // A negative zero in a cell is read as 0.
+            column.values.iter_mut().for_each(|it| it.push(number + 0.0));
+        }
+    }
+    RunColumns { columns: all, trains: None }
+}
+
+/// The number of a field, `NaN` where it is missing.
+fn number(field: &Field, sample: &TrainSample, words: &dyn Words) -> f64 {
+    let word = words.word(0);
+    match (field.missing, field.layout.type_name) {
+        (Missing::Unless(quantity), _) if sample.valid & quantity.bit() == 0 => f64::NAN,
+        (_, "f64") => f64::from_bits(word),
+        (_, "i64" | "i8") => word as i64 as f64,
+        _ => word as f64,
     }
 }
 

@@ -8,6 +8,7 @@ pub mod messages;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use dynocar::cli::Failure;
 use dynocar::storage::Disk;
 use dynocar_analysis::explain::report::timeline::{RunTimeline, Timeline};
 use mcap::McapError;
@@ -29,6 +30,16 @@ pub enum AnnotateError {
     /// The explanation is of other data.
     #[error(transparent)]
     OtherRuns(#[from] AtPath<OtherRuns>),
+}
+
+/// A recording that is another than the one explained is wrong input.
+impl From<AnnotateError> for Failure {
+    fn from(error: AnnotateError) -> Self {
+        match error {
+            AnnotateError::Copy(error) => error.into(),
+            error => Failure::input(error),
+        }
+    }
 }
 
 /// Runs of a recording that are not those of an explanation.

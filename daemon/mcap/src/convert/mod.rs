@@ -5,12 +5,11 @@
 //! to the bit. A recording made of a dataset has the dataset's files attached, and gives those back.
 
 mod from_dataset;
+mod recorded_dataset;
 mod rows;
 mod to_dataset;
 
 pub use from_dataset::{FromDatasetError, from_dataset};
+pub use recorded_dataset::{Content, RecordedDataset};
 pub use rows::{RowError, from_rows, is_rows, to_rows};
-pub use to_dataset::{ModelFiles, ToDatasetError, Unpacked, to_dataset, unpack};
-
-/// The folder in which a dataset's files are attached.
-pub const DATASET_FOLDER: &str = "dataset/";
+pub use to_dataset::{ModelFiles, ToDatasetError, Unpacked, dataset_of, to_dataset, unpack};

@@ -1,16 +1,19 @@
 //! A recording to a dataset.
 
+use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
-use dynocar::dataset;
+use dynocar::cli::Failure;
 use dynocar::output::{OutputError, require_new, write_file};
 use dynocar::storage::{Disk, Storage, folder_of};
-use dynocar_analysis::dataset::{Dataset, FileEntry, MANIFEST_FILE, Quantity};
+use dynocar_analysis::dataset::{
+    Dataset, DatasetHead, FileEntry, MANIFEST_FILE, Manifest, Quantity,
+};
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::DATASET_FOLDER;
-use super::rows::{WHEEL_SLIDE, to_rows};
+use super::recorded_dataset::{Content, RecordedDataset};
+use super::rows::WHEEL_SLIDE;
 use crate::error::{AtPath, ReadError};
 use crate::recording::Recording;
 
@@ -38,6 +41,16 @@ pub enum ToDatasetError {
     /// It holds another thing than a dataset of one train.
     #[error(transparent)]
     Content(#[from] AtPath<NoDataset>),
+}
+
+/// A recording that makes no dataset is wrong input; a dataset that cannot be written is not.
+impl From<ToDatasetError> for Failure {
+    fn from(error: ToDatasetError) -> Self {
+        match error {
+            ToDatasetError::Output(error) => error.into(),
+            error => Failure::input(error),
+        }
+    }
 }
 
 /// Errors of a recording that is to become a dataset.
@@ -85,7 +98,7 @@ pub enum NoDataset {
 /// Summary of the dataset made from a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unpacked {
-    /// Runs that were written.
+    /// Runs in it.
     pub runs: usize,
     /// Samples in them.
     pub samples: usize,
@@ -107,7 +120,7 @@ pub fn to_dataset(
     files: &ModelFiles,
 ) -> Result<Unpacked, ToDatasetError> {
     require_new(folder)?;
-    unpack(&paths[0], Recording::load_all(paths)?, folder, train, files)
+    unpack(&paths[0], Recording::of_samples(paths)?, folder, train, files)
 }
 
 /// Writes what a recording holds as a dataset into a new folder; `path` names it.
@@ -122,56 +135,78 @@ pub fn unpack(
     train: Option<u64>,
     files: &ModelFiles,
 ) -> Result<Unpacked, ToDatasetError> {
-    let train = chosen(&recording, train).map_err(AtPath::<NoDataset>::of(path))?;
-    let attached: Vec<(&str, &Vec<u8>)> = recording
-        .attachments
-        .iter()
-        .filter_map(|(name, content)| Some((name.strip_prefix(DATASET_FOLDER)?, content)))
-        .collect();
+    let (dataset, unpacked) = dataset_of(path, recording, train, files)?;
+    for name in dataset.names() {
+        let path = folder.join(name);
+        Disk.make_folder(folder_of(&path))
+            .map_err(|source| OutputError::File { path: path.clone(), source })?;
+        write_file(&path, &dataset.bytes(name).unwrap_or_default())?;
+    }
+    Ok(unpacked)
+}
+
+/// Returns what a recording holds as a dataset; `path` names it.
+///
+/// # Errors
+///
+/// See [`ToDatasetError`].
+pub fn dataset_of(
+    path: &Path,
+    recording: Recording,
+    train: Option<u64>,
+    files: &ModelFiles,
+) -> Result<(RecordedDataset, Unpacked), ToDatasetError> {
+    let refused = |problem| ToDatasetError::from(AtPath::<NoDataset>::of(path)(problem));
+    let train = chosen(&recording, train).map_err(refused)?;
     let mut unpacked = Unpacked {
-        left_out: recording.snapshots.len() + recording.events.len(),
+        samples: recording.samples.len(),
+        left_out: recording.left_out + recording.snapshots.len() + recording.events.len(),
         broken: recording.broken.clone(),
         ..Unpacked::default()
     };
-    if attached.iter().any(|(name, _)| *name == MANIFEST_FILE) {
-        for (name, content) in attached {
+    let mut dataset = RecordedDataset::new(path);
+    let mut declared = None;
+    if recording.attached_dataset().any(|(name, _)| name == MANIFEST_FILE) {
+        for (name, content) in recording.attached_dataset() {
             if !is_below(name) {
-                let outside = NoDataset::Outside { name: name.into() };
-                return Err(AtPath::<NoDataset>::of(path)(outside).into());
+                return Err(refused(NoDataset::Outside { name: name.into() }));
             }
             unpacked.runs += usize::from(!name.ends_with(".toml"));
-            write(folder, name, content)?;
+            dataset.put(name, Content::Bytes(content.clone()));
         }
-        unpacked.samples = recording.samples.len();
+        let head = DatasetHead::open(&dataset);
         // Its reader reports its faults.
-        if dataset::load(folder).map_or(true, |it| are_of(&it, &recording.samples)) {
-            return Ok(unpacked);
+        let read = head.clone().and_then(|it| it.read(&dataset));
+        if read.map_or(true, |it| are_of(&it, &recording.samples)) {
+            return Ok((dataset, unpacked));
         }
+        declared = head.ok().and_then(|it| read_models(&dataset, &it.manifest));
     }
-    let (train_text, track_text) = match read_models(folder) {
+    let (train_text, track_text) = match declared {
         Some(models) if files.train.is_none() => models,
         _ => models(path, &recording, train, files)?,
     };
-    write(folder, "train.toml", &train_text)?;
-    if let Some(text) = &track_text {
-        write(folder, "track.toml", text)?;
+    dataset.put("train.toml", Content::Bytes(train_text));
+    let has_track = track_text.is_some();
+    if let Some(text) = track_text {
+        dataset.put("track.toml", Content::Bytes(text));
     }
     let samples: Vec<TrainSample> =
         recording.samples.into_iter().filter(|it| it.train_id == train).collect();
     let restarts = samples.windows(2).filter(|it| it[1].sequence <= it[0].sequence).count();
     if restarts * RESTARTS_RARE > samples.len() {
-        return Err(AtPath::<NoDataset>::of(path)(NoDataset::SeveralControllers { train }).into());
+        return Err(refused(NoDataset::SeveralControllers { train }));
     }
     let runs: Vec<&[TrainSample]> = samples
         .chunk_by(|one, next| (one.run, one.direction) == (next.run, next.direction))
         .collect();
-    let manifest = manifest(path, &runs, &samples, track_text.is_some());
-    write(folder, MANIFEST_FILE, manifest.as_bytes())?;
+    let manifest = manifest(path, &runs, &samples, has_track);
+    dataset.put(MANIFEST_FILE, Content::Bytes(manifest.into_bytes()));
     for (index, run) in runs.iter().enumerate() {
-        write(folder, &run_file(index), to_rows(*run).as_bytes())?;
+        dataset.put(&run_file(index), Content::Samples(run.to_vec()));
     }
     (unpacked.runs, unpacked.samples) = (runs.len(), samples.len());
-    Ok(unpacked)
+    Ok((dataset, unpacked))
 }
 
 /// True where a recording's samples are those of the dataset that is attached to it, all and no other: another tool may
@@ -187,11 +222,9 @@ fn are_of(dataset: &Dataset, samples: &[TrainSample]) -> bool {
 }
 
 /// The files of train and line of a dataset that is attached.
-fn read_models(folder: &Path) -> Option<Models> {
-    let (files, head) = dataset::open(folder).ok()?;
-    let read = |it: &FileEntry| std::fs::read(files.path_of(&it.path)).ok();
-    let track = head.manifest.track_file.as_ref().and_then(read);
-    Some((read(&head.manifest.train_file)?, track))
+fn read_models(dataset: &RecordedDataset, manifest: &Manifest) -> Option<Models> {
+    let read = |it: &FileEntry| dataset.bytes(&it.path).map(Cow::into_owned);
+    Some((read(&manifest.train_file)?, manifest.track_file.as_ref().and_then(read)))
 }
 
 fn chosen(recording: &Recording, train: Option<u64>) -> Result<u64, NoDataset> {
@@ -235,13 +268,6 @@ fn models(
         None => attached(format!("track-{train}.toml")),
     };
     Ok((train_text, track_text))
-}
-
-fn write(folder: &Path, name: &str, content: &[u8]) -> Result<(), OutputError> {
-    let path = folder.join(name);
-    Disk.make_folder(folder_of(&path))
-        .map_err(|source| OutputError::File { path: path.clone(), source })?;
-    write_file(&path, content)
 }
 
 fn is_below(name: &str) -> bool {

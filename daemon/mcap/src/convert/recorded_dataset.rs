@@ -1,0 +1,97 @@
+//! A dataset that a recording is, in memory: its files by their names, and runs that are samples.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use dynocar::text_file::{require_text, text_of};
+use dynocar::unpacking::columns_of;
+use dynocar_analysis::dataset::encoding::decoded;
+use dynocar_analysis::dataset::{
+    DatasetFiles, FileProblem, Manifest, RunColumns, RunContent, is_parquet,
+};
+use dynocar_shared::TrainSample;
+use tempfile::NamedTempFile;
+
+use super::rows::{columns_of_samples, to_rows};
+
+/// Contents of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Content {
+    /// Bytes that are attached.
+    Bytes(Vec<u8>),
+    /// A run that was recorded.
+    Samples(Vec<TrainSample>),
+}
+
+/// A dataset that a recording is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedDataset {
+    recording: PathBuf,
+    files: Vec<(String, Content)>,
+}
+
+impl RecordedDataset {
+    /// One without files.
+    pub fn new(recording: &Path) -> Self {
+        RecordedDataset { recording: recording.into(), files: Vec::new() }
+    }
+
+    /// Adds a file, or replaces that of the same name.
+    pub fn put(&mut self, name: &str, content: Content) {
+        self.files.retain(|it| it.0 != name);
+        self.files.push((name.into(), content));
+    }
+
+    /// The names of its files.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.iter().map(|it| it.0.as_str())
+    }
+
+    /// The bytes of a file as [`unpack`](super::unpack) writes it; `None` where there is none.
+    pub fn bytes(&self, path: &str) -> Option<Cow<'_, [u8]>> {
+        Some(match self.file(path)? {
+            Content::Bytes(bytes) => bytes.into(),
+            Content::Samples(samples) => to_rows(samples).into_bytes().into(),
+        })
+    }
+
+    fn file(&self, path: &str) -> Option<&Content> {
+        // One path may be written in several ways.
+        let found = self.files.iter().find(|it| Path::new(&it.0) == Path::new(path));
+        found.map(|it| &it.1)
+    }
+}
+
+impl DatasetFiles for RecordedDataset {
+    fn read(&self, path: &str) -> Result<String, FileProblem> {
+        text_of(self.bytes(path).ok_or(FileProblem::Missing)?.into_owned())
+    }
+
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
+        match self.file(path).ok_or(FileProblem::Missing)? {
+            Content::Samples(samples) => {
+                Ok(RunContent::Columns(columns_of_samples(samples, &manifest.columns)))
+            }
+            Content::Bytes(bytes) if is_parquet(path) => parquet_columns(bytes, manifest)
+                .map(RunContent::Columns)
+                .map_err(FileProblem::Table),
+            Content::Bytes(bytes) => {
+                let encoding = manifest.layout.encoding;
+                require_text(bytes, encoding)?;
+                decoded(bytes.clone(), encoding).map(RunContent::Text)
+            }
+        }
+    }
+
+    fn label(&self, path: &str) -> String {
+        format!("{}/{path}", self.recording.display())
+    }
+}
+
+/// The columns of an attached Parquet file, by the program that reads it from the disk.
+fn parquet_columns(bytes: &[u8], manifest: &Manifest) -> Result<RunColumns, String> {
+    let unwritten = |error: std::io::Error| error.to_string();
+    let file = NamedTempFile::with_prefix("dynocar-").map_err(unwritten)?;
+    std::fs::write(file.path(), bytes).map_err(unwritten)?;
+    columns_of(file.path(), &manifest.columns, &manifest.train_rows)
+}

@@ -1,0 +1,146 @@
+//! The dataset at a path, be it a folder or a recording, which is one in memory.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use dynocar::dataset::{DatasetFolder, LoadError, Source, is_parquet_recording};
+use dynocar::output::report_line;
+use dynocar::unpacking::UnpackError;
+use dynocar_analysis::dataset::{
+    Dataset, DatasetFiles, DatasetHead, FileProblem, Manifest, RunContent,
+};
+use dynocar_model::units::Unit;
+
+use crate::convert::{ModelFiles, RecordedDataset, ToDatasetError, Unpacked, dataset_of};
+use crate::recording::Recording;
+
+/// True for the name of a recording.
+pub fn is_recording(path: &Path) -> bool {
+    is_mcap(path) || is_parquet_recording(path)
+}
+
+fn is_mcap(path: &Path) -> bool {
+    path.extension().is_some_and(|it| it == "mcap") && path.is_file()
+}
+
+/// The files of a dataset.
+#[derive(Clone, Debug)]
+pub enum FilesOfDataset {
+    /// In a folder.
+    Folder(DatasetFolder),
+    /// In a recording.
+    Recording(RecordedDataset),
+}
+
+impl FilesOfDataset {
+    /// Those of the dataset at a path: its folder, its `dataset.toml`, or a recording.
+    ///
+    /// # Errors
+    ///
+    /// When there is nothing, or what is no dataset.
+    pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
+        let source = source.into();
+        if !is_mcap(source.path) {
+            return DatasetFolder::at(source).map(FilesOfDataset::Folder);
+        }
+        let train = source.train.map(|it| it.0);
+        let paths = [source.path.to_path_buf()];
+        let read = || -> Result<(RecordedDataset, Unpacked), ToDatasetError> {
+            let recording = Recording::of_samples(&paths)?;
+            dataset_of(source.path, recording, train, &ModelFiles::default())
+        };
+        let (dataset, unpacked) = read().map_err(|error| UnpackError::Content {
+            path: source.path.into(),
+            problem: error.to_string(),
+        })?;
+        if let Some(broken) = &unpacked.broken {
+            report_line(&format!("dynocar: {broken}; `dynocar recover` makes it whole"));
+        }
+        Ok(FilesOfDataset::Recording(dataset))
+    }
+
+    /// True for a recording, beside which nothing of them lies.
+    pub fn is_recording(&self) -> bool {
+        match self {
+            FilesOfDataset::Folder(folder) => folder.is_unpacked(),
+            FilesOfDataset::Recording(_) => true,
+        }
+    }
+
+    /// Where a file lies, or would lie.
+    pub fn path_of(&self, path: &str) -> PathBuf {
+        match self {
+            FilesOfDataset::Folder(folder) => folder.path_of(path),
+            FilesOfDataset::Recording(dataset) => dataset.label(path).into(),
+        }
+    }
+
+    /// The bytes of a file; none where there is none.
+    pub fn bytes(&self, path: &str) -> Cow<'_, [u8]> {
+        match self {
+            FilesOfDataset::Folder(it) => {
+                std::fs::read(it.path_of(path)).unwrap_or_default().into()
+            }
+            FilesOfDataset::Recording(dataset) => dataset.bytes(path).unwrap_or_default(),
+        }
+    }
+
+    fn files(&self) -> &dyn DatasetFiles {
+        match self {
+            FilesOfDataset::Folder(folder) => folder,
+            FilesOfDataset::Recording(dataset) => dataset,
+        }
+    }
+}
+
+impl DatasetFiles for FilesOfDataset {
+    fn read(&self, path: &str) -> Result<String, FileProblem> {
+        self.files().read(path)
+    }
+
+    fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
+        self.files().read_run(path, manifest)
+    }
+
+    fn label(&self, path: &str) -> String {
+        self.files().label(path)
+    }
+}
+
+/// Reads what a dataset declares, but no run.
+///
+/// # Errors
+///
+/// The first mistake, with file, line and choices.
+pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(FilesOfDataset, DatasetHead), LoadError> {
+    let source = source.into();
+    if !is_mcap(source.path) {
+        let (folder, head) = dynocar::dataset::open(source)?;
+        return Ok((FilesOfDataset::Folder(folder), head));
+    }
+    let files = FilesOfDataset::at(source)?;
+    let head = DatasetHead::open(&files)?;
+    Ok((files, head))
+}
+
+/// Reads a dataset with all its runs.
+///
+/// # Errors
+///
+/// The first mistake, with file, line and choices.
+pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
+    load_with_speed_unit(source).map(|(dataset, _)| dataset)
+}
+
+/// Reads a dataset with all its runs, and the unit in which they hold the speed.
+///
+/// # Errors
+///
+/// The first mistake, with file, line and choices.
+pub fn load_with_speed_unit<'p>(
+    source: impl Into<Source<'p>>,
+) -> Result<(Dataset, Unit), LoadError> {
+    let (files, head) = open(source)?;
+    let unit = head.manifest.speed_unit();
+    Ok((head.read(&files)?, unit))
+}

@@ -1,0 +1,38 @@
+//! Recordings of what a controller and the daemon write, as [MCAP](https://mcap.dev) files with
+//! protobuf messages: read, written, copied, converted and annotated. Recording itself is another package's.
+//!
+//! Samples are the truth of a recording: the daemon's pipelines are functions of them, so that every
+//! snapshot can be computed again, and is, by `dynocar replay --verify`.
+//!
+//! # Layout
+//!
+//! - [`schema`]: the protobuf messages, made from the layouts of sample and snapshot
+//! - [`columns`]: the same as columns of tables, for whoever writes tables
+//! - [`codec`]: samples and snapshots as messages, and back, to the bit
+//! - [`event`]: what happens around them
+//! - [`message`]: messages that are declared once
+//! - [`topic`]: the streams of messages, and the messages
+//! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
+//! - [`joining`]: the files of a recording that rotated, read as one
+//! - [`recording`]: a recording in memory, in the order in which it was recorded
+//! - [`convert`]: recordings to datasets, in memory or in a folder, and back
+//! - [`dataset`]: the dataset at a path, be it a folder or a recording
+//! - [`copying`]: copies of recordings, ours or not: a broken file made whole
+//! - [`annotate`]: an explanation beside the data
+//! - [`error`]: what is wrong with a file, and which
+
+pub mod annotate;
+pub mod codec;
+pub mod columns;
+pub mod convert;
+pub mod copying;
+pub mod dataset;
+pub mod error;
+pub mod event;
+pub mod joining;
+pub mod message;
+pub mod reading;
+pub mod recording;
+pub mod schema;
+pub mod topic;
+pub mod writing;
