@@ -22,6 +22,13 @@ const HEAD: &str = "# Fields of a recording
 - *NumPy* is the type and the offset in bytes of `dynocar.SAMPLE_DTYPE` and `dynocar.SNAPSHOT_DTYPE`.
 ";
 
+const REJECTED: &str = "
+## `dynocar.Rejected`
+
+Samples refused, with a field for each [reason](guides/reading.md#why-samples-are-refused): `uint32`, in a snapshot's
+column `rejected_<reason>` of `UInt32`.
+";
+
 const EXPLANATION: &str = "
 `explain --annotate` adds these messages, without Parquet.
 ";
@@ -50,12 +57,7 @@ pub fn page() -> String {
         let Source::Value(it) = column.source else { continue };
         Row { name: it.full_name(), ..Row::of(column) }.put(&mut page, PARQUET, &column.meaning);
     }
-    let what = "Samples refused, by reason, in columns of a snapshot that begin with `rejected_`.";
-    table(&mut page, "dynocar.Rejected", what, PARQUET);
-    for column in SNAPSHOTS.iter() {
-        let Source::Rejected(it) = column.source else { continue };
-        Row { name: it.name(), ..Row::of(column) }.put(&mut page, PARQUET, &column.meaning);
-    }
+    page.push_str(REJECTED);
     let columns: Vec<&Column> = EVENTS.iter().collect();
     listed(&mut page, Event::NAME, Event::MEANING, Event::FIELDS, &columns[STAMPS..]);
     page.push_str(EXPLANATION);
