@@ -64,6 +64,8 @@ pub struct Run {
     /// that are missing by the time that passed, so that they count as lost. Rows out of order
     /// or repeated are kept for validation to refuse and count.
     pub samples: Vec<TrainSample>,
+    /// Least and greatest recorded position in m, but for a few that may be wrong; known also where the samples are elsewhere.
+    pub span_m: Option<[f64; 2]>,
     /// Those of [`EXTRAS`] that are recorded.
     pub extras: Vec<(Quantity, Extra)>,
     /// Where the positions come from.
@@ -219,10 +221,25 @@ pub(super) fn read(
         gradient_source: resolved.gradient_source,
         traction_source: resolved.forces.traction.source,
         brake_source: resolved.forces.brake.source,
+        span_m: span_m(&samples),
         samples,
         quality,
         diagnostics,
     })
+}
+
+/// Share of a run's positions that may be wrong at either end of its span.
+const WRONG_SHARE: f64 = 0.005;
+
+/// Returns the least and the greatest position of some samples, but for a few that may be wrong; `None` where they
+/// hold none.
+fn span_m(samples: &[TrainSample]) -> Option<[f64; 2]> {
+    let positions = samples.iter().filter_map(|sample| sample.get(SampleField::Position));
+    let mut positions_m: Vec<f64> = positions.collect();
+    let last = positions_m.len().checked_sub(1)?;
+    let wrong = (WRONG_SHARE * last as f64) as usize;
+    let mut at = |index: usize| *positions_m.select_nth_unstable_by(index, f64::total_cmp).1;
+    Some([at(wrong), at(last - wrong)])
 }
 
 /// Reads the rows of the train of a text.

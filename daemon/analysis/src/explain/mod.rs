@@ -126,7 +126,9 @@ fn explained<E: From<RunDataError> + Send>(
     drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         runs.into_iter().partition(|run| run.role == Role::Fit);
-    let problem = FitProblem::new(fit_runs, preparation.train().resistance);
+    let spans_m = many.iter().flat_map(|many| many.dataset.with_role(Role::Fit));
+    let spans_m = spans_m.filter_map(|run| run.span_m);
+    let problem = FitProblem::new(fit_runs, preparation.train().resistance).reaching(spans_m);
     let search = Search {
         problem: &problem,
         holdout: &holdout,

@@ -82,6 +82,13 @@ impl Hypothesis for Steady {
     }
 }
 
+impl ByRun {
+    /// The parameter of a run; another run than those has what they share.
+    fn own(&self, run: &RunData) -> Option<usize> {
+        self.runs.iter().position(|(file, _)| *file == run.file)
+    }
+}
+
 impl Hypothesis for ByRun {
     fn nature(&self) -> Nature<'_> {
         Nature::of(EffectKind::Wind, &self.parameters)
@@ -112,13 +119,13 @@ impl Hypothesis for ByRun {
     }
 
     fn touches(&self, parameter: usize, run: &RunData) -> bool {
-        self.runs[parameter].0 == run.file
+        let own = self.own(run);
+        own.is_none_or(|own| own == parameter)
     }
 
     fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
-        let own = self.runs.iter().position(|(file, _)| *file == run.file);
         let wind_plus_mps =
-            own.map_or_else(|| of_another_run(parameters), |index| parameters[index]);
+            self.own(run).map_or_else(|| of_another_run(parameters), |own| parameters[own]);
         blow(wind_plus_mps, &run.directions[first..], forces);
     }
 

@@ -47,6 +47,8 @@ pub struct FitProblem {
     declared_responses: Vec<Response>,
     /// Measured distance over distance by integrated speed, with its standard deviation.
     pub distance_ratio: Option<(f64, f64)>,
+    /// Least and greatest chainage in m of all runs for which the fit speaks, in memory or not.
+    reach_m: Option<[f64; 2]>,
     /// Seconds by which the speed is late by the position, with their standard deviation.
     speed_late_s: Option<(f64, f64)>,
 }
@@ -193,6 +195,11 @@ impl Fit {
     }
 }
 
+/// Returns the least interval that holds two others.
+fn union([low, high]: [f64; 2], [least, greatest]: [f64; 2]) -> [f64; 2] {
+    [low.min(least), high.max(greatest)]
+}
+
 impl FitProblem {
     /// The problem of fitting these runs around declared Davis coefficients.
     pub fn new(runs: Vec<RunData>, declared: Davis) -> Self {
@@ -214,8 +221,21 @@ impl FitProblem {
             scatter_columns,
             declared_responses,
             distance_ratio,
+            reach_m: None,
             speed_late_s,
         }
+    }
+
+    /// Makes a fit speak for further runs, between these chainages in m: what is unknown along the line is so there
+    /// too.
+    #[must_use]
+    pub fn reaching(self, spans_m: impl Iterator<Item = [f64; 2]>) -> Self {
+        FitProblem { reach_m: spans_m.chain(self.reach_m).reduce(union), ..self }
+    }
+
+    /// Returns an interval of the line with all that the fit speaks for.
+    pub fn with_reach_m(&self, span_m: [f64; 2]) -> [f64; 2] {
+        self.reach_m.map_or(span_m, |reach_m| union(span_m, reach_m))
     }
 
     /// Whether positions show that the speed is late.
