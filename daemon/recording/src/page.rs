@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dynocar_shared::schema::{Field, unit_of};
+use dynocar_shared::schema::Field;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, Reason, Status};
 
@@ -10,19 +10,23 @@ use dynocar_mcap::annotate::messages::MESSAGES;
 use dynocar_mcap::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
 use dynocar_mcap::event::{Event, EventKind};
 use dynocar_mcap::message::MessageField;
-use dynocar_mcap::schema::{
-    ESTIMATE, REJECTED, SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, number, parameter_number,
-    rejection_number, scalar, vocabulary_of_type,
-};
+use dynocar_mcap::schema::{SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, scalar, vocabulary_of_type};
 
 const HEAD: &str = "# Fields of a recording
 
 `dynocar-recording fields` prints this page from the tables behind the recordings ([guide](guides/recording.md)).
 
-- *Number* and *type* are those of the protobuf message. A missing number is 0, unless its column says *null*.
-- *Column* is Arrow's type in Parquet; *null*: missing where not measured. Metadata hold units, meanings and names. Two
-  columns come first: `message_number` (`UInt64`, from 1) and `log_time` (`Timestamp(ns, \"UTC\")`).
+- A name ends with its unit. Every file holds the schema of its messages, with the numbers of their fields.
+- *Column* is Arrow's type in Parquet, *null* where a value may be missing. Two columns come first: `message_number`
+  (`UInt64`, from 1) and `log_time` (`Timestamp(ns, \"UTC\")`).
 - *NumPy* is the type and the offset in bytes of `dynocar.SAMPLE_DTYPE` and `dynocar.SNAPSHOT_DTYPE`.
+";
+
+const REJECTED: &str = "
+## `dynocar.Rejected`
+
+Samples refused, with a field for each [reason](guides/reading.md#why-samples-are-refused): `uint32`, in a snapshot's
+column `rejected_<reason>` of `UInt32`.
 ";
 
 const EXPLANATION: &str = "
@@ -39,33 +43,21 @@ pub fn page() -> String {
         "A pipeline's knowledge of one train at one moment.",
         (&SNAPSHOT_FIELDS, &SNAPSHOTS),
     );
-    let nested = [("estimate", ESTIMATE, "Estimate"), ("rejected", REJECTED, "Rejected")];
-    for (name, number, of_type) in nested {
-        let row = Row { name, number: Some(number), of_type, ..Row::default() };
-        row.put(&mut page, ALL, &format!("By name, see `dynocar.{of_type}`."));
-    }
     table(
         &mut page,
         "dynocar.Estimate",
         &format!(
-            "Each is missing unless the pipeline estimates it. The snapshots' columns begin with `estimate_`. \
-             Three more fields each have a word before the unit and a number higher by {}.",
-            SUFFIXES.map(|(offset, word, ..)| format!("`_{word}` {offset}")).join(", ")
+            "The estimates of a snapshot by name, in columns that begin with `estimate_`; each is missing unless \
+             the pipeline estimates it. Three more fields have {} before the unit.",
+            SUFFIXES.map(|(_, word, ..)| format!("`_{word}`")).join(", ")
         ),
         PARQUET,
     );
     for column in SNAPSHOTS.iter() {
         let Source::Value(it) = column.source else { continue };
-        let row = Row::of(column, parameter_number(it), "double");
-        Row { name: it.full_name(), ..row }.put(&mut page, PARQUET, &column.meaning);
+        Row { name: it.full_name(), ..Row::of(column) }.put(&mut page, PARQUET, &column.meaning);
     }
-    let what = "Samples refused, by reason. The snapshots' columns begin with `rejected_`.";
-    table(&mut page, "dynocar.Rejected", what, PARQUET);
-    for column in SNAPSHOTS.iter() {
-        let Source::Rejected(it) = column.source else { continue };
-        let row = Row::of(column, rejection_number(it), "uint32");
-        Row { name: it.name(), ..row }.put(&mut page, PARQUET, &column.meaning);
-    }
+    page.push_str(REJECTED);
     let columns: Vec<&Column> = EVENTS.iter().collect();
     listed(&mut page, Event::NAME, Event::MEANING, Event::FIELDS, &columns[STAMPS..]);
     page.push_str(EXPLANATION);
@@ -76,35 +68,30 @@ pub fn page() -> String {
     page
 }
 
-/// How many of the columns `column` and `NumPy` a table has.
-type Shown = usize;
-const ALL: Shown = 2;
-const PARQUET: Shown = 1;
-
-/// The cells of these columns.
-fn cells(shown: Shown, column: &str, numpy: &str) -> String {
-    [column, numpy][..shown].iter().map(|text| format!(" {text} |")).collect()
-}
+/// The columns of a table between the name and the meaning of a field.
+type Shown = &'static [&'static str];
+const ALL: Shown = &["column", "NumPy"];
+const PARQUET: Shown = &["column"];
+const MESSAGE: Shown = &["type"];
 
 fn table(page: &mut String, name: &str, what: &str, shown: Shown) {
-    let (title, line) = (cells(shown, "column", "NumPy"), cells(shown, "---", "---"));
+    let titles: String = shown.iter().map(|title| format!(" {title} |")).collect();
+    let lines = " --- |".repeat(shown.len());
     let _ = write!(
         page,
-        "\n## `{name}`\n\n{what}\n\n| field | number | type |{title} unit | meaning |\n\
-         | --- | --- | --- |{line} --- | --- |\n"
+        "\n## `{name}`\n\n{what}\n\n| field |{titles} meaning |\n| --- |{lines} --- |\n"
     );
 }
 
 /// A message by the table of its fields, and the columns that they are where they are any.
 fn listed(page: &mut String, name: &str, what: &str, fields: &[MessageField], columns: &[&Column]) {
-    let shown = if columns.is_empty() { 0 } else { PARQUET };
+    let shown = if columns.is_empty() { MESSAGE } else { PARQUET };
     table(page, &format!("dynocar.{name}"), &plain(what), shown);
     for (index, it) in fields.iter().enumerate() {
-        let of_type = &type_of(vocabulary_of_type(it.type_name), it.type_name);
-        let (number, unit) = (it.number, unit_of(it.name));
+        let of_type = type_of(vocabulary_of_type(it.type_name), it.type_name);
         let row = match columns.get(index) {
-            Some(column) => Row::of(column, number, of_type),
-            None => Row { name: it.name, number: Some(number), of_type, unit, ..Row::default() },
+            Some(column) => Row::of(column),
+            None => Row { name: it.name, column: of_type, ..Row::default() },
         };
         row.put(page, shown, it.meaning);
     }
@@ -114,32 +101,21 @@ fn listed(page: &mut String, name: &str, what: &str, fields: &[MessageField], co
 #[derive(Default)]
 struct Row<'a> {
     name: &'a str,
-    number: Option<u32>,
-    of_type: &'a str,
     column: String,
     numpy: String,
-    unit: &'a str,
 }
 
 impl<'a> Row<'a> {
-    fn of(column: &'a Column, number: u32, of_type: &'a str) -> Self {
+    fn of(column: &'a Column) -> Self {
         let null = if column.is_nullable { ", null" } else { "" };
-        Row {
-            name: &column.name,
-            number: Some(number),
-            of_type,
-            column: format!("{}{null}", column.arrow_type()),
-            numpy: String::new(),
-            unit: column.unit,
-        }
+        let of_type = format!("{}{null}", column.arrow_type());
+        Row { name: &column.name, column: of_type, ..Row::default() }
     }
 
     fn put(&self, page: &mut String, shown: Shown, meaning: &str) {
-        let Row { name, of_type, unit, .. } = self;
-        let number = self.number.map_or("".to_owned(), |it| it.to_string());
-        let cells = cells(shown, &self.column, &self.numpy);
-        let meaning = plain(meaning);
-        let _ = writeln!(page, "| `{name}` | {number} | {of_type} |{cells} {unit} | {meaning} |");
+        let cells = [&self.column, &self.numpy];
+        let cells: String = cells[..shown.len()].iter().map(|it| format!(" {it} |")).collect();
+        let _ = writeln!(page, "| `{}` |{cells} {} |", self.name, plain(meaning));
     }
 }
 
@@ -169,17 +145,14 @@ fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field
             row.put(page, ALL, &format!("{} Elsewhere a value is there or not.", field.meaning));
             continue;
         };
-        let of_type = type_of(column.vocabulary, field.entry_type());
-        let of_type = if field.is_array() { format!("repeated {of_type}") } else { of_type };
-        let row = Row::of(column, number(field), &of_type);
-        Row { numpy, ..row }.put(page, ALL, field.meaning);
+        Row { numpy, ..Row::of(column) }.put(page, ALL, field.meaning);
     }
 }
 
 fn enumerations(page: &mut String) {
     page.push_str(
         "\n## Numbers and their names\n\nIn the messages the names are in capitals, after that of the \
-         vocabulary: `STATUS_ESTIMATED`. [The reading guide](guides/reading.md) explains all but the effects, whose names say it.\n\n",
+         vocabulary: `STATUS_ESTIMATED`. [The reading guide](guides/reading.md) explains all but the effects.\n\n",
     );
     macro_rules! names {
         ($($name:ident)*) => {$(

@@ -4,11 +4,10 @@
 //! over a recorded run, and each step is [`advance`]: what the updated model predicts there, the train
 //! drives here. Only the speed at which a resistance is evaluated is its own, not a measured one.
 
-mod balance;
+mod force_parts;
 
 use std::sync::Arc;
 
-pub use balance::{Balance, ForcePart};
 use dynocar_model::force::ForceResolver;
 use dynocar_model::simulate::is_pulled;
 use dynocar_model::simulate::motion::{Motion, STEP_MAX_S, advance};
@@ -17,6 +16,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::{Corrections, TrainModel};
 use dynocar_model::validation::ValidSample;
 use dynocar_shared::{SampleField, TrainSample};
+pub use force_parts::{Balance, ForcePart};
 
 use crate::explain::evidence::SampleForces;
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::balance::Observation;
+use super::observation::Observation;
 
 /// Acceleration of gravity in m/s².
 pub const GRAVITY_MPS2: f64 = 9.81;

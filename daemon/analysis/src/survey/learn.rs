@@ -1,8 +1,8 @@
 //! From passes with a chainage to a profile: how smooth it is; what the friction brake does, from what the balance lacks
 //! under its pressure.
 
-use super::balance::Observation;
 use super::banded::NotPositive;
+use super::observation::Observation;
 use super::profile::{Profile, ProfileEvidence};
 use super::recording::RawRecording;
 use crate::explain::answer::WithStd;

@@ -17,7 +17,6 @@
 //! - [`survey()`]: all of it in turn
 
 pub mod alignment;
-pub mod balance;
 pub mod banded;
 mod both_directions;
 mod centring;
@@ -28,6 +27,7 @@ pub mod layout;
 pub mod learn;
 pub mod line;
 mod normal;
+pub mod observation;
 pub mod profile;
 pub mod recording;
 mod recording_parts;

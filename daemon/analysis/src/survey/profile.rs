@@ -5,11 +5,11 @@
 //! forces are estimated jointly with them. The heights make a banded system, the few common unknowns
 //! its border; the mass of each pass is fitted in turns, so that work grows linearly with passes.
 
-use super::balance::Observation;
 use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
 use super::layout::{HEIGHT_STEP_M, Layout, LineCourse};
 use super::normal::Normal;
+use super::observation::Observation;
 use crate::parallel;
 use crate::statistics::middle;
 

@@ -1,7 +1,6 @@
 //! The survey as a whole.
 
 use super::alignment::{FoundCurve, curves, turning_rad};
-use super::balance::{Observation, observations};
 use super::banded::NotPositive;
 use super::chainage::WheelsAndLag;
 use super::common::Prior;
@@ -10,6 +9,7 @@ use super::layout::{Layout, LineCourse};
 use super::learn::acting_from_pa;
 use super::learn::{Learned, learn};
 use super::line::{Alignments, find, pass_of};
+use super::observation::{Observation, observations};
 use super::profile::{Altitude, ProfileEvidence, is_one_of_few};
 use super::recording::{RawRecording, Recording, plane_of};
 use super::recording_parts::{RecordingPart, recording_parts};

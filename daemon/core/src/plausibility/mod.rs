@@ -9,10 +9,10 @@
 //! - [`diagnosis`]: which input fault makes all figures come out as they did
 //! - [`input_fault`]: the input faults, their names, severity and words
 
-pub mod balance;
 pub mod diagnosis;
 pub mod input_fault;
 pub mod watch;
+pub mod window_balance;
 
 use std::sync::Arc;
 

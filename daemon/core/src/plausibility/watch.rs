@@ -6,7 +6,7 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::balance::{Balance, Slopes, WindowMean};
+use super::window_balance::{Balance, Slopes, WindowMean};
 use crate::filter::RunningMedian;
 
 /// Time in s over which accelerations are averaged; one step where the steps are longer.

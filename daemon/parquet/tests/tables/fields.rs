@@ -3,23 +3,22 @@
 use arrow_schema::Schema;
 use dynocar_mcap::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS};
 use dynocar_parquet::cells::schema;
-use dynocar_shared::schema::unit_end;
+use dynocar_shared::RejectionReason;
+use dynocar_shared::schema::{unit_end, unit_of};
 
 fn page() -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording_fields.md");
     std::fs::read_to_string(path).expect("the page")
 }
 
-/// The rows of a message's table on the page: name, column, unit, meaning.
-fn rows(page: &str, message: &str) -> Vec<[String; 4]> {
+/// Returns name and column of each row of a message's table on the page.
+fn rows(page: &str, message: &str) -> Vec<[String; 2]> {
     let start = page.find(&format!("## `dynocar.{message}`")).expect("a table");
     let end = page[start + 1..].find("\n## ").map_or(page.len(), |it| start + 1 + it);
     let rows = page[start..end].lines().filter(|it| it.starts_with("| `"));
     rows.map(|row| {
         let cells: Vec<&str> = row.trim_matches('|').split(" | ").map(str::trim).collect();
-        let last = cells.len() - 1;
-        let name = cells[0].trim_matches('`').to_owned();
-        [name, cells[3].into(), cells[last - 1].into(), cells[last].into()]
+        [cells[0].trim_matches('`').to_owned(), cells[1].into()]
     })
     .collect()
 }
@@ -47,23 +46,30 @@ fn the_page_shows_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
     let page = page();
     let tables = [
         (&*SAMPLES, &["TrainSample"][..]),
-        (&*SNAPSHOTS, &["ParameterSnapshot", "Estimate", "Rejected"]),
+        (&*SNAPSHOTS, &["ParameterSnapshot", "Estimate"]),
         (&*EVENTS, &["Event"]),
     ];
     for (columns, messages) in tables {
         let mut declared = Vec::new();
         for message in messages {
-            for [name, column, unit, _] in rows(&page, message) {
+            for [name, column] in rows(&page, message) {
                 let names = match *message {
-                    "Rejected" => vec![format!("rejected_{name}")],
                     "Estimate" => of_estimate(&name),
                     _ => vec![name],
                 };
-                // `valid`, `estimate` and `rejected` are no columns.
+                // `valid` is not a column. A name ends with its unit.
                 if !column.is_empty() {
-                    declared.extend(names.into_iter().map(|it| [it, column.clone(), unit.clone()]));
+                    declared.extend(names.into_iter().map(|it| {
+                        let unit = unit_of(&it).to_owned();
+                        [it, column.clone(), unit]
+                    }));
                 }
             }
+        }
+        if messages.contains(&"Estimate") {
+            let rejected = |it: &RejectionReason| format!("rejected_{}", it.name());
+            let of = |it| [rejected(it), "UInt32".to_owned(), String::new()];
+            declared.extend(RejectionReason::ALL.iter().map(of));
         }
         assert_eq!(in_words(&schema(columns), columns), declared);
     }
