@@ -87,3 +87,13 @@ fn a_map_is_unsure_also_where_only_runs_go_that_are_not_searched() {
     // Held at the last value of the map's error, one run of 96 moves the gain by 0.013.
     assert!((found - truth).abs() < 0.008, "{found}: {}", answer.statement);
 }
+
+#[test]
+fn a_wind_beside_the_usual_errors_of_the_map_is_no_error_of_the_map() {
+    let settings = SimulatorSettings::new(9_600_003, EffectRequest::Kinds(vec![EffectKind::Wind]));
+    let answer =
+        explained_of(32, SimulatorSettings { deviations: Deviations::ROUGHER, ..settings });
+    let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
+    assert!(kinds.contains(&EffectKind::Wind.name()), "{}", answer.statement);
+    assert!(!kinds.contains(&EffectKind::GradientError.name()), "{}", answer.statement);
+}

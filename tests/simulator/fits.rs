@@ -57,6 +57,23 @@ fn a_fit_that_goes_on_from_another_ends_where_one_from_the_start_does() {
 }
 
 #[test]
+fn a_time_constant_of_an_effect_of_no_size_leaves_the_others_known() {
+    proposed(|Explanation { problem, outcome, .. }, _, candidates| {
+        let base = &outcome.base;
+        let is_warming = |it: &Candidate| it.hypothesis.kind() == EffectKind::BearingTemperature;
+        let warming = candidates.into_iter().find(is_warming).expect("bearings warm up");
+        let model = base.model.with(warming.hypothesis.clone());
+        let (size, tau_s) = (warming.hypothesis.none(), 250.0);
+        let fit = problem.at(&model, [&base.theta[..], &[size, tau_s]].concat(), base.noise);
+        let covariance = fit.factor().expect("all is known to be somewhere").inverse();
+        let within = &warming.hypothesis.parameters()[1];
+        let anywhere_s = (within.upper - within.lower) / 12_f64.sqrt();
+        let std_s = covariance[(4, 4)].sqrt();
+        assert!((std_s - anywhere_s).abs() < 1e-6 * anywhere_s, "{std_s} s");
+    });
+}
+
+#[test]
 fn what_looks_back_does_the_same_block_by_block() {
     proposed(|Explanation { problem, .. }, _, candidates| {
         let looking_back: Vec<Candidate> =
