@@ -11,7 +11,7 @@
 //! - `recording_parts`, [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`mod@line`]: the line that
 //!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`]: what it shows
-//! - [`balance`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,
+//! - [`observation`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,
 //!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
 //!   `normal`, [`banded`]: its equations and their solver
 //! - [`survey()`]: all of it in turn

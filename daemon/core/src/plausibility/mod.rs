@@ -5,7 +5,7 @@
 //!
 //! # Layout, in the order of the work
 //!
-//! - [`watch`]: sample by sample, with [`balance`] (forces against acceleration)
+//! - [`watch`]: sample by sample, with [`window_balance`] (forces against acceleration)
 //! - [`diagnosis`]: which input fault makes all figures come out as they did
 //! - [`input_fault`]: the input faults, their names, severity and words
 
