@@ -68,8 +68,8 @@ impl CallFailure {
     }
 }
 
-/// Calls a program that reports failures as [`ErrorDocument`], and waits for its end; gives what is made of its standard
-/// output while it comes, of which the rest may be a failure's document, and its diagnostics.
+/// Calls a program that reports failures as [`ErrorDocument`], and waits for its end. Gives what is made of its
+/// standard output while it comes, of which the rest may be a failure's document, and its diagnostics.
 ///
 /// # Errors
 ///

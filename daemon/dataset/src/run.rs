@@ -64,7 +64,8 @@ pub struct Run {
     /// that are missing by the time that passed, so that they count as lost. Rows out of order
     /// or repeated are kept for validation to refuse and count.
     pub samples: Vec<TrainSample>,
-    /// Least and greatest recorded position in m, but for a few that may be wrong; known also where the samples are elsewhere.
+    /// Least and greatest recorded position in m, but for a few that may be wrong; stays when
+    /// [`split_off_samples`](Run::split_off_samples) takes the samples.
     pub span_m: Option<[f64; 2]>,
     /// Those of [`EXTRAS`] that are recorded.
     pub extras: Vec<(Quantity, Extra)>,

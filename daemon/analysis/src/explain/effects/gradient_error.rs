@@ -45,8 +45,8 @@ struct Profile {
     choice_cost: f64,
 }
 
-/// An error of the map, whose usual errors are in the model there. A wind along the line is the mean of such an error,
-/// whose other nodes then explain the usual ones.
+/// An error of the map, whose usual errors are in the model there. A wind along the line acts as the mean of such an
+/// error does, whose other nodes would then explain the usual errors, too.
 pub const POLICY: Policy = Policy {
     is_sought_beside_usual_errors: false,
     gives_way_to: &[EffectKind::Wind],

@@ -83,7 +83,7 @@ impl Hypothesis for Steady {
 }
 
 impl ByRun {
-    /// The parameter of a run; another run than those has what they share.
+    /// Returns the index of a run's own wind; `None` for a run that was not fitted, which has the mean of the winds.
     fn own(&self, run: &RunData) -> Option<usize> {
         self.runs.iter().position(|(file, _)| *file == run.file)
     }

@@ -104,7 +104,7 @@ pub fn span_m(scan: &Scan) -> Option<[f64; 2]> {
     span.filter(|[low, high]| high - low > 4.0 * SHORTEST_M)
 }
 
-/// The same of all runs for which the fit speaks, in memory or not.
+/// The chainage in m over which all runs move for which the fit speaks, in memory or not.
 pub fn reach_m(scan: &Scan) -> Option<[f64; 2]> {
     span_m(scan).map(|span_m| scan.problem.with_reach_m(span_m))
 }

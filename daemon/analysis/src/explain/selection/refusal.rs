@@ -20,7 +20,7 @@ pub enum Refusal {
     Contradiction(&'static str),
     /// It changes the mass of single runs no more than loads usually do, which explains it.
     UsualLoads,
-    /// This kind explains more beside the usual errors, which are its other half.
+    /// This kind explains more together with the usual errors.
     GivesWay(EffectKind),
     /// For its evidence it takes too little from the error, this share of it.
     Weak(f64),

@@ -43,8 +43,8 @@ impl Search<'_> {
         outcome.instead = tried;
     }
 
-    /// Puts a kind in the place of an effect where it explains more than that beside the usual errors; false for
-    /// nothing. Beside effects alone, one that has the usual errors in its form would win.
+    /// Replaces an effect by a kind that explains more than it beside the usual errors; returns whether it did.
+    /// Without the usual errors an effect that can take their form would win.
     pub(super) fn give_way(&self, outcome: &mut Outcome) -> bool {
         let may_give_way = |kind: &EffectKind| {
             !policy_of(*kind).gives_way_to.is_empty() && outcome.is_on_trial(*kind)

@@ -239,8 +239,8 @@ impl FitProblem {
         }
     }
 
-    /// Makes a fit speak for further runs, between these chainages in m: what is unknown along the line is so there
-    /// too.
+    /// Extends the part of the line for which the fit speaks by those of further runs, in m of chainage, so that the
+    /// map is unsure there too.
     #[must_use]
     pub fn reaching(self, spans_m: impl Iterator<Item = [f64; 2]>) -> Self {
         FitProblem { reach_m: spans_m.chain(self.reach_m).reduce(union), ..self }
