@@ -1,9 +1,9 @@
 //! Where the run-time files of this host lie.
 //!
 //! A root directory holds who serves and who drives each train, in `trains/`. The transport's files lie
-//! beside its segments in `/dev/shm`, under names that follow from the root's device and inode: two
-//! spellings of one directory meet, two directories never do, and the sockets' names are short however
-//! long the root's is.
+//! beside its segments in `/dev/shm`, under names that follow from the root's device, inode and
+//! birth: two spellings of one directory meet, two directories never do, also where one is removed and
+//! another made, and the sockets' names are short however long the root's is.
 
 use std::fs::{DirBuilder, File, OpenOptions, Permissions};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
@@ -15,7 +15,7 @@ use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 
 use crate::error::ChannelError;
-use crate::identity::{Identity, SHARED_MEMORY, identity_of};
+use crate::identity::{DirectoryIdentity, SHARED_MEMORY};
 
 /// Longest root directory in bytes: the system's limit of a path, less the names of files in it.
 const ROOT_BYTES_MAX: usize = 4000;
@@ -47,7 +47,7 @@ const TRAINS: &str = "trains";
 #[derive(Clone, Debug)]
 pub struct Host {
     root: PathBuf,
-    identity: Identity,
+    identity: DirectoryIdentity,
 }
 
 impl Host {
@@ -94,7 +94,8 @@ impl Host {
         for directory in [root, &root.join(TRAINS)] {
             make_private_directory(directory)?;
         }
-        let identity = identity_of(root).map_err(unusable(root, "looking at the directory"))?;
+        let identity =
+            DirectoryIdentity::of(root).map_err(unusable(root, "looking at the directory"))?;
         Ok(Host { root: root.to_path_buf(), identity })
     }
 
@@ -117,11 +118,7 @@ impl Host {
 
     /// Prefix of this root's shared-memory segments.
     pub fn segment_prefix(&self) -> String {
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        for byte in self.identity.iter().flat_map(|it| it.to_le_bytes()) {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-        format!("{SEGMENT_PREFIX}{:08x}_", hash as u32 ^ (hash >> 32) as u32)
+        format!("{SEGMENT_PREFIX}{:08x}_", self.identity.hash())
     }
 
     /// Requires that the root is the directory that it was.
@@ -130,7 +127,7 @@ impl Host {
     ///
     /// [`ChannelError::RootGone`] when it was removed, or another one took its place.
     pub fn require_root(&self) -> Result<(), ChannelError> {
-        match identity_of(&self.root) {
+        match DirectoryIdentity::of(&self.root) {
             Ok(identity) if identity == self.identity => Ok(()),
             _ => Err(ChannelError::RootGone { path: self.root.clone() }),
         }
@@ -251,6 +248,21 @@ mod tests {
         }
         std::fs::rename(one.root(), parent.path().join("gone")).unwrap();
         assert!(matches!(one.require_root(), Err(ChannelError::RootGone { .. })));
+    }
+
+    #[test]
+    fn a_directory_made_anew_has_nothing_of_the_one_removed() {
+        let parent = tempfile::tempdir().unwrap();
+        let root = parent.path().join("depot");
+        let mut before = Vec::new();
+        for _ in 0..8 {
+            let prefix = Host::at(&root).unwrap().segment_prefix();
+            assert!(!before.contains(&prefix), "{prefix}");
+            before.push(prefix);
+            std::fs::remove_dir_all(&root).unwrap();
+            // File systems tell births apart by the ticks of the system's clock.
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
     }
 
     #[test]
