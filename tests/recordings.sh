@@ -19,7 +19,7 @@ python3 -m venv "$place/venv"
 "$place/venv/bin/pip" install --quiet --disable-pip-version-check mcap==1.6.0 mcap-protobuf-support==0.6.0 \
   pyarrow==26.0.1 pandas==3.1.1
 
-cargo build --release --workspace --bin dynocar --bin dynocar-workshop --bin dynocar-recording --bin dynocar-parquet
+cargo build --release --workspace --bin dynocar --bin dynocar-workshop --bin dynocar-recording
 dynocar=${CARGO_TARGET_DIR:-target}/release/dynocar
 export DYNOCAR_ROOT=$place/root STATE_DIRECTORY=$place/state
 

@@ -1,12 +1,11 @@
 #!/bin/sh
 # Builds dynocar_<version>_<arch>.deb from the release binaries. dynocar-workshop must lie beside the program;
-# dynocar-watch, dynocar-recording, dynocar-live and dynocar-parquet go into it where they do.
+# dynocar-watch, dynocar-recording and dynocar-live go into it where they do.
 # usage: build.sh [--program FILE] [--libraries FOLDER] [--out FOLDER]
 #   --program    the program, default target/release/dynocar
 #   --libraries  where libdynocar_client.a and libdynocar_fmu.so lie, default target/release
 #   --out        where the package goes, default target/debian
-# Build first: cargo build --release -p dynocar -p dynocar-workshop -p dynocar-watch -p dynocar-recording -p dynocar-live \
-#                  -p dynocar-parquet &&
+# Build first: cargo build --release -p dynocar -p dynocar-workshop -p dynocar-watch -p dynocar-recording -p dynocar-live &&
 #              cargo build --release -p dynocar-client -p dynocar-fmu
 set -eu
 
@@ -55,7 +54,7 @@ put() { # SOURCE TARGET [MODE]
 # The programs, what shells offer for them, and their manual.
 put "$program" usr/bin/dynocar 755
 put "$workshop" usr/bin/dynocar-workshop 755
-for companion in dynocar-watch dynocar-recording dynocar-live dynocar-parquet; do
+for companion in dynocar-watch dynocar-recording dynocar-live; do
     if [ -f "$(dirname "$program")/$companion" ]; then
         put "$(dirname "$program")/$companion" "usr/bin/$companion" 755
     else

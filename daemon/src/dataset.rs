@@ -1,4 +1,4 @@
-//! Datasets on disk; a recording in Parquet is one once it is unpacked.
+//! Datasets on disk.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,8 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainId;
 
+use crate::text_file::read_bytes;
 pub use crate::text_file::read_text;
-use crate::text_file::{read_bytes, require_regular};
-pub use crate::unpacking::is_parquet_recording;
-use crate::unpacking::{UnpackError, Unpacked, columns_of};
 
 /// A path that leads to a dataset, and the train that is meant where a recording holds several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +46,11 @@ impl SourceArguments {
     }
 }
 
+/// True for the name of a file, or a folder of files, of Parquet.
+pub fn is_parquet_path(path: &Path) -> bool {
+    path.extension().is_some_and(|it| it == "parquet")
+}
+
 /// Why a path leads to no dataset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LoadError {
@@ -79,9 +82,14 @@ pub enum LoadError {
         /// The dataset.
         path: PathBuf,
     },
-    /// A recording cannot be unpacked.
-    #[error(transparent)]
-    Recording(#[from] UnpackError),
+    /// A recording holds no dataset that can be read.
+    #[error("{problem}")]
+    Recording {
+        /// The recording.
+        path: PathBuf,
+        /// Why not; it names the file.
+        problem: String,
+    },
     /// A file of the dataset is wrong.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -93,24 +101,16 @@ pub enum LoadError {
 pub struct DatasetFolder {
     folder: PathBuf,
     manifest: PathBuf,
-    /// The recording that was unpacked into the folder, which goes with the last who knows it.
-    recording: Option<Unpacked>,
 }
 
 impl DatasetFolder {
-    /// The dataset at a path: its folder, or its `dataset.toml`, or a recording.
+    /// The dataset at a path: its folder, or its `dataset.toml`.
     ///
     /// # Errors
     ///
     /// When there is nothing, or a folder that is no dataset.
     pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
         let Source { path, train } = source.into();
-        if is_parquet_recording(path) {
-            let unpacked = Unpacked::of(path, train)?;
-            let folder = unpacked.folder();
-            let manifest = folder.join(MANIFEST_FILE);
-            return Ok(DatasetFolder { folder, manifest, recording: Some(unpacked) });
-        }
         if train.is_some() && path.exists() {
             return Err(LoadError::NoRecording { path: path.into() });
         }
@@ -119,7 +119,7 @@ impl DatasetFolder {
             if !manifest.exists() {
                 return Err(LoadError::NotADataset { path: path.into(), hint: described(path) });
             }
-            return Ok(DatasetFolder { folder: path.into(), manifest, recording: None });
+            return Ok(DatasetFolder { folder: path.into(), manifest });
         }
         if !path.exists() {
             return Err(LoadError::NoSuchPath { path: path.into() });
@@ -128,12 +128,7 @@ impl DatasetFolder {
             return Err(LoadError::NoManifest { path: path.into(), found: "not a TOML file" });
         }
         let folder = path.parent().unwrap_or(Path::new("")).into();
-        Ok(DatasetFolder { folder, manifest: path.into(), recording: None })
-    }
-
-    /// True for a recording, whose files lie there only while this does.
-    pub fn is_unpacked(&self) -> bool {
-        self.recording.is_some()
+        Ok(DatasetFolder { folder, manifest: path.into() })
     }
 
     /// Where a file lies that the dataset names.
@@ -150,19 +145,14 @@ impl DatasetFiles for DatasetFolder {
     fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
         let file = self.path_of(path);
         if is_parquet(path) {
-            require_regular(&file)?;
-            let columns = columns_of(&file, &manifest.columns, &manifest.train_rows);
-            return columns.map(RunContent::Columns).map_err(FileProblem::Table);
+            return Err(FileProblem::Table("it is Parquet, which the workshop reads".into()));
         }
         let encoding = manifest.layout.encoding;
         decoded(read_bytes(&file, encoding)?, encoding).map(RunContent::Text)
     }
 
     fn label(&self, path: &str) -> String {
-        match &self.recording {
-            Some(unpacked) => format!("{}/{path}", unpacked.recording().display()),
-            None => self.path_of(path).display().to_string(),
-        }
+        self.path_of(path).display().to_string()
     }
 }
 

@@ -3,7 +3,6 @@
 //! # Layout
 //!
 //! - [`cli`]: the commands of `dynocar`, one file each
-//! - [`columns_stream`]: columns of numbers from one program to another
 //! - [`config`]: the daemon's configuration
 //! - [`dataset`]: recorded runs from disk
 //! - [`ending`]: when a long-running program ends
@@ -24,11 +23,9 @@
 //! - [`storage`]: files that are replaced as a whole
 //! - [`supervision`]: what a supervisor and an operator see of the daemon
 //! - [`text_file`]: text files from disk
-//! - [`unpacking`]: recordings as datasets
 //! - [`replay`]: recorded runs into the sample channel
 
 pub mod cli;
-pub mod columns_stream;
 pub mod config;
 pub mod dataset;
 pub mod demo;
@@ -50,4 +47,3 @@ pub mod state;
 pub mod storage;
 pub mod supervision;
 pub mod text_file;
-pub mod unpacking;

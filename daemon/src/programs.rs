@@ -1,23 +1,19 @@
 //! Programs beside this one: what they are built on is nothing that a daemon needs.
 //!
-//! A failure for machines: for whoever asked for a result as JSON, and for a program of ours that called another.
+//! A failure for machines: for whoever asked for a result as JSON.
 
 use std::ffi::{OsStr, OsString};
-use std::io::{self, BufRead, BufReader, Read};
+use std::io;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::Command;
 
-use serde::{Deserialize, Serialize};
-
-use crate::runtime::system::ends_with_this;
+use serde::Serialize;
 
 /// The program of what is done away from the controller.
 pub const WORKSHOP: &str = "dynocar-workshop";
-/// The program of everything about recordings.
+/// The program that records.
 pub const RECORDING: &str = "dynocar-recording";
-/// The program of everything about Parquet.
-pub const PARQUET: &str = "dynocar-parquet";
 /// The program of the live screen.
 pub const WATCH: &str = "dynocar-watch";
 /// The program that serves viewers.
@@ -27,10 +23,7 @@ pub const LIVE: &str = "dynocar-live";
 const BENCH: &str = "dynocar-bench";
 
 /// All of them.
-const PROGRAMS: [&str; 7] = [USUAL, WORKSHOP, RECORDING, PARQUET, WATCH, LIVE, BENCH];
-
-/// Bytes of a program's output that are read at once.
-const READ_AT_ONCE: usize = 1 << 16;
+const PROGRAMS: [&str; 6] = [USUAL, WORKSHOP, RECORDING, WATCH, LIVE, BENCH];
 
 /// Name of the calling program that is usual.
 const USUAL: &str = "dynocar";
@@ -49,70 +42,6 @@ pub fn called_as(package: &'static str) -> &'static str {
     let name = std::env::args_os().next().unwrap_or_default();
     let is_usual = Path::new(&name).file_name().is_some_and(|it| it == USUAL);
     if is_usual { USUAL } else { package }
-}
-
-/// Why a program that was called did not do its work.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum CallFailure {
-    /// It found something wrong with what it was given: its words, without its name.
-    Input(String),
-    /// It did not start, or the work failed.
-    Work(String),
-}
-
-impl CallFailure {
-    /// The words.
-    pub fn words(self) -> String {
-        let (CallFailure::Input(words) | CallFailure::Work(words)) = self;
-        words
-    }
-}
-
-/// Calls a program that reports failures as [`ErrorDocument`], and waits for its end. Gives what is made of its
-/// standard output while it comes, of which the rest may be a failure's document, and its diagnostics.
-///
-/// # Errors
-///
-/// In words when it does not start or does not end with 0.
-pub fn taken_of<T>(
-    package: &str,
-    command: &mut Command,
-    take: impl FnOnce(&mut dyn BufRead) -> T,
-) -> Result<(T, String), CallFailure> {
-    command
-        .args(["--json", "-"])
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let program = ends_with_this(command).spawn();
-    let mut program = program.map_err(|error| CallFailure::Work(not_started(package, &error)))?;
-    let stdout = program.stdout.take();
-    // Beside what it writes for us it may write on standard error as much as it likes.
-    let (taken, output) = std::thread::scope(|threads| {
-        let end = threads.spawn(move || program.wait_with_output());
-        let mut rest = Vec::new();
-        let taken = stdout.map(|it| {
-            let mut input = BufReader::with_capacity(READ_AT_ONCE, it);
-            let taken = take(&mut input);
-            // How the program ended shows a broken pipe.
-            let _ = input.read_to_end(&mut rest);
-            taken
-        });
-        let end = end.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        (taken, end.map(|it| Output { stdout: rest, ..it }))
-    });
-    let output = output.map_err(|error| CallFailure::Work(format!("{package}: {error}")))?;
-    let words = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-    if output.status.success() {
-        let taken = taken.map(|it| (it, words));
-        return taken.ok_or_else(|| CallFailure::Work(format!("{package}: no standard output")));
-    }
-    Err(match serde_json::from_slice(&output.stdout) {
-        Ok(ErrorDocument { error }) if error.exit_status == 2 => CallFailure::Input(error.message),
-        Ok(ErrorDocument { error }) => CallFailure::Work(error.message),
-        // It was killed.
-        Err(_) => CallFailure::Work(format!("{package}: {}: {words}", output.status)),
-    })
 }
 
 fn beside_this(package: &str) -> Option<OsString> {
@@ -140,7 +69,7 @@ pub fn not_started(package: &str, error: &io::Error) -> String {
 }
 
 /// A failure for machines.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ErrorAnswer {
     /// As on standard error.
     pub message: String,
@@ -153,7 +82,7 @@ pub struct ErrorAnswer {
 }
 
 /// Document of an error in place of a result.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize)]
 pub struct ErrorDocument {
     /// Reason for the missing result.
     pub error: ErrorAnswer,

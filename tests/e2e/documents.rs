@@ -69,7 +69,7 @@ fn the_book_has_a_chapter_for_every_page() {
 /// The command line that takes these words: `dynocar` hands some of its commands to other programs.
 fn command_line(words: &[String]) -> (clap::Command, usize) {
     match words.first().map(String::as_str) {
-        Some("record" | "flight-recorder" | "keep" | "recover" | "convert") => {
+        Some("record" | "flight-recorder" | "keep" | "recover") => {
             (dynocar_recording::cli::command(), 0)
         }
         Some("watch") => (dynocar_watch::cli::command(), 1),

@@ -1,4 +1,4 @@
-//! Contents of a run's file: rows of text, or columns that another program has read.
+//! Contents of a run's file: rows of text, or columns of numbers.
 
 /// Contents of a run's file.
 #[derive(Clone, Debug, PartialEq)]

@@ -39,7 +39,7 @@ pub fn command() -> clap::Command {
 
 /// Parses the command line, serves until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    carry_out("dynocar live", |_| None, execute)
+    carry_out("dynocar live", execute)
 }
 
 fn execute(arguments: &Arguments) -> Result<(), Failure> {

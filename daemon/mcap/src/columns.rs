@@ -40,7 +40,7 @@ pub enum Source {
 pub struct Column {
     /// Its name, with the unit.
     pub name: String,
-    /// The Rust type of an entry; `string` for a text, `time` for ns since 1970.
+    /// The Rust type of an entry; `string` for a text, `bytes`, `time` for ns since 1970.
     pub type_name: &'static str,
     /// Entries of each list; `None` where it holds no lists.
     pub list: Option<usize>,
@@ -149,9 +149,14 @@ fn of_field(field: &'static Field) -> Option<Column> {
 }
 
 impl Column {
-    /// The type in Arrow's words.
-    pub fn arrow_type(&self) -> String {
-        let entry = match self.type_name {
+    /// A column that stands beside those of messages.
+    pub fn beside(name: &str, type_name: &'static str, is_nullable: bool) -> Self {
+        Column { is_nullable, ..plain(name.into(), type_name, "", Source::Number) }
+    }
+
+    /// The type of an entry in Arrow's words.
+    pub fn entry_arrow_type(&self) -> &'static str {
+        match self.type_name {
             "f64" => "Float64",
             "i64" => "Int64",
             "i32" => "Int32",
@@ -161,8 +166,14 @@ impl Column {
             "u16" => "UInt16",
             "u8" => "UInt8",
             "time" => "Timestamp(ns, \"UTC\")",
+            "bytes" => "Binary",
             _ => "Utf8",
-        };
+        }
+    }
+
+    /// The type in Arrow's words.
+    pub fn arrow_type(&self) -> String {
+        let entry = self.entry_arrow_type();
         match self.list {
             None => entry.into(),
             Some(entries) => format!("FixedSizeList({entries} x non-null {entry})"),

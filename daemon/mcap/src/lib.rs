@@ -1,5 +1,5 @@
 //! Recordings of what a controller and the daemon write, as [MCAP](https://mcap.dev) files with
-//! protobuf messages: read, written, copied, converted and annotated. Recording itself is another package's.
+//! protobuf messages: read, written, copied and annotated. Recording itself is another package's.
 //!
 //! Samples are the truth of a recording: the daemon's pipelines are functions of them, so that every
 //! snapshot can be computed again, and is, by `dynocar replay --verify`.
@@ -15,8 +15,6 @@
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
 //! - [`joining`]: the files of a recording that rotated, read as one
 //! - [`recording`]: a recording in memory, in the order in which it was recorded
-//! - [`convert`]: recordings to datasets, in memory or in a folder, and back
-//! - [`dataset`]: the dataset at a path, be it a folder or a recording
 //! - [`copying`]: copies of recordings, ours or not: a broken file made whole
 //! - [`annotate`]: an explanation beside the data
 //! - [`error`]: what is wrong with a file, and which
@@ -24,9 +22,7 @@
 pub mod annotate;
 pub mod codec;
 pub mod columns;
-pub mod convert;
 pub mod copying;
-pub mod dataset;
 pub mod error;
 pub mod event;
 pub mod joining;

@@ -6,7 +6,6 @@
 use std::any::Any;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
-use std::path::Path;
 use std::sync::Once;
 
 use dynocar_mcap::error::{AtPath, ReadProblem};
@@ -79,10 +78,7 @@ thread_local! {
 /// # Errors
 ///
 /// As the work, and where the file makes the library panic.
-pub fn guarded<T>(
-    path: &Path,
-    work: impl FnOnce() -> Result<T, TableProblem>,
-) -> Result<T, TableError> {
+pub fn guarded<T>(work: impl FnOnce() -> Result<T, TableProblem>) -> Result<T, TableProblem> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let former_hook = take_hook();
@@ -96,10 +92,9 @@ pub fn guarded<T>(
     // Half-done work is dropped with the error.
     let done = catch_unwind(AssertUnwindSafe(work));
     IS_READING.set(false);
-    let done = done.unwrap_or_else(|panic| {
+    done.unwrap_or_else(|panic| {
         Err(TableProblem::NotParquet(format!("damaged: {}", words(panic.as_ref()))))
-    });
-    done.map_err(TableError::of(path))
+    })
 }
 
 fn words(panic: &(dyn Any + Send)) -> &str {

@@ -6,17 +6,20 @@
 //!
 //! # Layout
 //!
-//! - [`cells`]: the columns of `dynocar_mcap::columns` as Arrow has them
+//! - [`table`]: the tables of a recording, after `dynocar_mcap::columns`
+//! - [`arrow_schema`]: what Arrow's schema, beside Parquet's, says of a table
 //! - [`error`]: why a file cannot be read, and how a damaged file affects its library
-//! - [`writing`]: MCAP to Parquet
-//! - [`reading`], [`table`]: Parquet to what a recording holds, and to MCAP
-//! - [`numbers`]: a Parquet file of anybody as columns of numbers, and whose its rows are
-//! - [`cli`]: the command line
+//! - [`column_type`], [`file`](mod@file): types of the columns of a file, and their cells
+//! - [`columns`]: a Parquet file of anybody as columns of numbers, and whose its rows are
+//! - [`reading`]: Parquet to what a recording holds, and to MCAP
+//! - [`table_file`], [`writing`]: MCAP to Parquet
 
-pub mod cells;
-pub mod cli;
+pub mod arrow_schema;
+pub mod column_type;
+pub mod columns;
 pub mod error;
-pub mod numbers;
+pub mod file;
 pub mod reading;
 pub mod table;
+pub mod table_file;
 pub mod writing;

@@ -5,25 +5,19 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use arrow_array::{Array, RecordBatch};
-use arrow_schema::{ArrowError, DataType, Schema};
+use dynocar::dataset::is_parquet_path;
 use dynocar::storage::{Disk, settle};
-use dynocar::unpacking::is_parquet;
 use dynocar_mcap::columns::{Column, Row, Source};
 use dynocar_mcap::error::{ReadProblem, WriteError};
 use dynocar_mcap::recording::{Metadata, Recording};
 use dynocar_mcap::writing::{McapError, RecordingWriter};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::data_type::ByteArray;
 
-use super::cells::{Cells, cells_of, data_type};
-use super::error::{TableError, TableProblem, guarded};
-use super::table::{
-    ATTACHMENTS, Attached, KIND, LAYOUT, METADATA, TABLES, TableKind, add_metadata,
-    attachments_batch, attachments_of, metadata_batch,
+use crate::error::{TableError, TableProblem, guarded};
+use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
+use crate::table::{
+    ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachment_columns, metadata_columns,
 };
-
-/// A reader of a file's rows, before it begins.
-pub type Builder = ParquetRecordBatchReaderBuilder<File>;
 
 /// A message with its place in the recording and when it was recorded.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +29,9 @@ pub struct Logged {
     /// The message.
     pub row: Row,
 }
+
+/// An attached file: its name, when it was attached, its content.
+pub type Attached = (String, u64, Vec<u8>);
 
 /// Contents of a recording.
 #[derive(Debug, Default)]
@@ -56,7 +53,8 @@ pub fn read(path: &Path) -> Result<Content, TableError> {
     let mut content = Content::default();
     let mut metadata = BTreeMap::new();
     for file in files(path)? {
-        guarded(&file, || read_file(&file, path.is_dir(), &mut content, &mut metadata))?;
+        guarded(|| read_file(&file, path.is_dir(), &mut content, &mut metadata))
+            .map_err(TableError::of(&file))?;
     }
     content.metadata.extend(metadata.into_values());
     content.messages.sort_by_key(|it| it.number);
@@ -76,20 +74,11 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, TableError> {
         }
         let entries = std::fs::read_dir(path)?.map(|it| Ok(it?.path()));
         let mut files = entries.collect::<std::io::Result<Vec<PathBuf>>>()?;
-        files.retain(|it| is_parquet(it));
+        files.retain(|it| is_parquet_path(it));
         files.sort();
         if files.is_empty() { Err(TableProblem::NotOurs) } else { Ok(files) }
     };
     listed().map_err(TableError::of(path))
-}
-
-/// Opens a file of anybody.
-///
-/// # Errors
-///
-/// When the system does not give it, or it is no Parquet.
-pub fn open(path: &Path) -> Result<Builder, TableProblem> {
-    ParquetRecordBatchReaderBuilder::try_new(File::open(path)?).map_err(TableProblem::not_parquet)
 }
 
 fn read_file(
@@ -98,28 +87,13 @@ fn read_file(
     content: &mut Content,
     metadata: &mut BTreeMap<u64, Metadata>,
 ) -> Result<(), TableProblem> {
-    let builder = open(path)?;
-    let said = builder.metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default();
+    let file = ParquetFile::open(File::open(path)?)?;
+    let said = file.key_values();
     let value = |key: &str| said.iter().find(|it| it.key == key).and_then(|it| it.value.clone());
     let kind = value(KIND).ok_or(TableProblem::NotOurs)?;
-    let schema = builder.schema().clone();
-    let batches = builder.build().map_err(TableProblem::not_parquet)?;
-    let batches = batches.map(|it| it.map_err(TableProblem::not_parquet));
     let table = match kind.as_str() {
-        ATTACHMENTS => {
-            require_same(attachments_batch(&[]), &schema)?;
-            for batch in batches {
-                content.attached.extend(attachments_of(&batch?));
-            }
-            return Ok(());
-        }
-        METADATA => {
-            require_same(metadata_batch(&[]), &schema)?;
-            for batch in batches {
-                add_metadata(&batch?, metadata);
-            }
-            return Ok(());
-        }
+        ATTACHMENTS => return read_attached(&file, &mut content.attached),
+        METADATA => return read_metadata(&file, metadata),
         name => TABLES.iter().find(|it| it.name == name).ok_or(TableProblem::NotOurs)?,
     };
     let (expected, found) = (table.layout, value(LAYOUT).unwrap_or("none".into()));
@@ -132,89 +106,176 @@ fn read_file(
             texts.filter_map(|it| Some((it.key.clone(), 0, it.value.clone()?.into_bytes())));
         content.attached.extend(texts);
     }
-    let indices = indices(table.columns, &schema)?;
-    let mut rows_before = 0;
-    for batch in batches {
-        let batch = batch?;
-        take_rows(table, &indices, &batch, rows_before, &mut content.messages)?;
-        rows_before += batch.num_rows();
-    }
-    Ok(())
+    read_messages(&file, table, &mut content.messages)
 }
 
-/// Refuses a table whose columns are others than those of a batch of ours.
-fn require_same(ours: Result<RecordBatch, ArrowError>, found: &Schema) -> Result<(), TableProblem> {
-    let ours = ours.map_err(TableProblem::not_parquet)?;
-    for (index, field) in ours.schema().fields().iter().enumerate() {
-        let found = found.fields().get(index).filter(|it| it.name() == field.name());
-        require(field.name(), field.data_type(), found.map(|it| it.data_type()))?;
-    }
-    Ok(())
-}
-
-/// Refuses a column that is not there or of another type.
-fn require(
-    column: &str,
-    expected: &DataType,
-    found: Option<&DataType>,
-) -> Result<(), TableProblem> {
-    let (column, words) = (column.to_owned(), expected.to_string());
-    match found {
-        None => Err(TableProblem::NoColumn { column, expected: words }),
-        Some(it) if it != expected => {
-            Err(TableProblem::OtherType { column, expected: words, found: it.to_string() })
-        }
-        Some(_) => Ok(()),
-    }
-}
-
-/// Where the columns stand in a file; `None` for one that only repeats others.
-fn indices(columns: &[Column], schema: &Schema) -> Result<Vec<Option<usize>>, TableProblem> {
-    let index = |column: &Column| {
-        if column.is_repetition() {
-            return Ok(None);
-        }
-        let index = schema.index_of(&column.name).ok();
-        let found = index.map(|it| schema.field(it).data_type());
-        require(&column.name, &data_type(column), found)?;
-        Ok(index)
+fn read_attached(file: &ParquetFile, attached: &mut Vec<Attached>) -> Result<(), TableProblem> {
+    let [names, times, contents] = attachment_columns();
+    let times = numbers_of(file, &times)?.into_iter();
+    let names = bytes_of(file, &names)?.into_iter().flatten();
+    let contents = bytes_of(file, &contents)?.into_iter().flatten();
+    let file = |((name, time), content): ((ByteArray, u64), ByteArray)| {
+        (text(&name), time, content.data().to_vec())
     };
-    columns.iter().map(index).collect()
+    attached.extend(names.zip(times).zip(contents).map(file));
+    Ok(())
 }
 
-fn take_rows(
+fn read_metadata(
+    file: &ParquetFile,
+    metadata: &mut BTreeMap<u64, Metadata>,
+) -> Result<(), TableProblem> {
+    let [numbers, names, keys, values] = metadata_columns();
+    let numbers = numbers_of(file, &numbers)?;
+    let [names, keys, values] =
+        [bytes_of(file, &names)?, bytes_of(file, &keys)?, bytes_of(file, &values)?];
+    for (row, number) in numbers.into_iter().enumerate() {
+        let name = names[row].as_ref().map(text).unwrap_or_default();
+        let none = || Metadata { name, metadata: BTreeMap::new() };
+        let record = metadata.entry(number).or_insert_with(none);
+        if let (Some(key), Some(value)) = (&keys[row], &values[row]) {
+            record.metadata.insert(text(key), text(value));
+        }
+    }
+    Ok(())
+}
+
+/// Reads the messages of a table, column after column.
+fn read_messages(
+    file: &ParquetFile,
     table: &TableKind,
-    indices: &[Option<usize>],
-    batch: &RecordBatch,
-    rows_before: usize,
     messages: &mut Vec<Logged>,
 ) -> Result<(), TableProblem> {
+    let own: Vec<&Column> = table.columns.iter().filter(|it| !it.is_repetition()).collect();
+    // Each is there before the first is read.
+    let found = own.iter().map(|it| of_file(file, it)).collect::<Result<Vec<_>, _>>()?;
     let first = messages.len();
-    let none = Logged { number: 0, log_time: 0, row: (table.empty)() };
-    messages.resize(first + batch.num_rows(), none);
-    for (column, index) in table.columns.iter().zip(indices) {
-        let Some(index) = index else { continue };
-        let array = batch.column(*index);
-        if !column.is_nullable && array.null_count() > 0 {
-            let row = (0..array.len()).find(|&row| array.is_null(row)).unwrap_or(0);
-            let (column, row) = (column.name.clone(), rows_before + row + 1);
-            return Err(TableProblem::NoValue { column, row });
-        }
-        let Cells { words, mut texts, is_there } = cells_of(column, array);
-        let width = column.list.unwrap_or(1);
-        for (row, it) in messages[first..].iter_mut().enumerate() {
-            let words = is_there[row].then(|| words.get(row * width..(row + 1) * width)).flatten();
-            match (column.source, &mut it.row) {
-                (Source::Number, _) => it.number = words.map_or(0, |it| it[0]),
-                (Source::LogTime, _) => it.log_time = words.map_or(0, |it| it[0]),
-                (Source::Event(_), Row::Event(event)) if column.type_name == "string" => {
-                    event.text = std::mem::take(&mut texts[row]);
-                }
-                (_, row) => row.set_words(column, words),
+    for (column, found) in own.into_iter().zip(found) {
+        let mut row = first;
+        each_cell(file, (column, found), |cell| {
+            if row == messages.len() {
+                messages.push(Logged { number: 0, log_time: 0, row: (table.empty)() });
             }
-        }
+            let it = &mut messages[row];
+            row += 1;
+            match (column.source, cell, &mut it.row) {
+                (Source::Number, Cell::Words(words), _) => it.number = words[0],
+                (Source::LogTime, Cell::Words(words), _) => it.log_time = words[0],
+                (_, Cell::Bytes(bytes), Row::Event(event)) => event.text = text(bytes),
+                (_, Cell::Words(words), row) => row.set_words(column, Some(words)),
+                (_, _, row) => row.set_words(column, None),
+            }
+        })?;
     }
     Ok(())
+}
+
+fn text(bytes: &ByteArray) -> String {
+    String::from_utf8_lossy(bytes.data()).into_owned()
+}
+
+/// A file's column, which is refused where it is not there or of another type.
+fn of_file<'f>(file: &'f ParquetFile, expected: &Column) -> Result<&'f FileColumn, TableProblem> {
+    let Some(found) = file.columns.iter().find(|it| it.name == expected.name) else {
+        let (column, expected) = (expected.name.clone(), expected.arrow_type());
+        return Err(TableProblem::NoColumn { column, expected });
+    };
+    let is_list = expected.list.is_some();
+    let entries = if is_list { found.entries.as_ref() } else { Some(&found.column_type) };
+    if entries.is_none_or(|it| it.words != expected.entry_arrow_type()) {
+        return Err(found.refused(expected.arrow_type()));
+    }
+    Ok(found)
+}
+
+/// A cell of a table.
+enum Cell<'c> {
+    /// A number, or the numbers of a list.
+    Words(&'c [u64]),
+    /// A text or bytes.
+    Bytes(&'c ByteArray),
+    /// No value.
+    Missing,
+}
+
+/// Takes the cells of a column, row after row.
+fn each_cell(
+    file: &ParquetFile,
+    (expected, found): (&Column, &FileColumn),
+    mut take: impl FnMut(Cell<'_>),
+) -> Result<(), TableProblem> {
+    let is_signed = expected.type_name.starts_with('i');
+    let of_short = |it: i32| {
+        if is_signed { i64::from(it).cast_unsigned() } else { it.cast_unsigned().into() }
+    };
+    let (mut rows, mut without_value) = (0, None);
+    let mut take = |cell: Cell<'_>| {
+        rows += 1;
+        if let (Cell::Missing, None) = (&cell, without_value) {
+            without_value = Some(rows);
+        }
+        take(cell);
+    };
+    file.read(found, |part| {
+        let cells = part.cells;
+        let mut words = Vec::new();
+        macro_rules! each {
+            ($reader:expr, $word:expr) => {
+                match expected.list {
+                    None => cells.each($reader, |it| {
+                        take(
+                            it.map($word)
+                                .as_ref()
+                                .map_or(Cell::Missing, |it| Cell::Words(std::slice::from_ref(it))),
+                        );
+                    }),
+                    Some(entries) => cells.each_list($reader, entries, |it| {
+                        words.clear();
+                        words.extend(it.iter().map($word));
+                        take(Cell::Words(&words));
+                    }),
+                }
+            };
+        }
+        match part.reader {
+            ColumnReader::DoubleColumnReader(it) => each!(it, |it| it.to_bits()),
+            ColumnReader::Int64ColumnReader(it) => each!(it, |it| it.cast_unsigned()),
+            ColumnReader::Int32ColumnReader(it) => each!(it, |it| of_short(*it)),
+            ColumnReader::ByteArrayColumnReader(it) => {
+                cells.each(it, |it| take(it.map_or(Cell::Missing, Cell::Bytes)))
+            }
+            _ => Err(damaged("another type than it says")),
+        }
+    })?;
+    match without_value {
+        Some(row) if !expected.is_nullable => {
+            Err(TableProblem::NoValue { column: expected.name.clone(), row })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The cells of a column, made something else.
+fn cells_of<T>(
+    file: &ParquetFile,
+    column: &Column,
+    mut make: impl FnMut(Cell<'_>) -> T,
+) -> Result<Vec<T>, TableProblem> {
+    let mut cells = Vec::new();
+    each_cell(file, (column, of_file(file, column)?), |it| cells.push(make(it)))?;
+    Ok(cells)
+}
+
+fn numbers_of(file: &ParquetFile, column: &Column) -> Result<Vec<u64>, TableProblem> {
+    cells_of(file, column, |it| if let Cell::Words(words) = it { words[0] } else { 0 })
+}
+
+fn bytes_of(file: &ParquetFile, column: &Column) -> Result<Vec<Option<ByteArray>>, TableProblem> {
+    cells_of(
+        file,
+        column,
+        |it| if let Cell::Bytes(bytes) = it { Some(bytes.clone()) } else { None },
+    )
 }
 
 impl Content {

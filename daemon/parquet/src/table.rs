@@ -1,26 +1,27 @@
-//! Names of the files of a recording, their metadata, and the tables of attached files and metadata.
+//! The tables of a recording: names, metadata and columns.
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
-use arrow_array::cast::AsArray;
-use arrow_array::types::{TimestampNanosecondType, UInt64Type};
-use arrow_array::{
-    Array, ArrayRef, BinaryArray, RecordBatch, StringArray, TimestampNanosecondArray, UInt64Array,
-};
-use arrow_schema::ArrowError;
 use dynocar_mcap::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS};
 use dynocar_mcap::event::Event;
-use dynocar_mcap::recording::Metadata;
 use dynocar_mcap::schema::EVENT;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
-
-use crate::cells::ZONE;
+use parquet::basic::{LogicalType, Repetition, TimeUnit, Type as PhysicalType};
+use parquet::errors::ParquetError;
+use parquet::schema::types::{Type, TypePtr};
 
 /// Key of a file's metadata: which table of a recording it is.
 pub const KIND: &str = "dynocar.table";
 /// Key of a file's metadata: the layout of its messages.
 pub const LAYOUT: &str = "dynocar.layout";
+/// The table of attached files.
+pub const ATTACHMENTS: &str = "attachments";
+/// The table of metadata.
+pub const METADATA: &str = "metadata";
+
+/// Name of the entries of lists.
+pub const ENTRY: &str = "item";
+
 /// A table of messages.
 pub struct TableKind {
     /// Name under [`KIND`].
@@ -55,77 +56,69 @@ pub static TABLES: [TableKind; 3] = [
     },
 ];
 
-/// The table of attached files.
-pub const ATTACHMENTS: &str = "attachments";
-/// The table of metadata.
-pub const METADATA: &str = "metadata";
-
-/// An attached file: its name, when it was attached, its content.
-pub type Attached = (String, u64, Vec<u8>);
-
-/// Attached files as a table.
-///
-/// # Errors
-///
-/// None that a caller could cause.
-pub fn attachments_batch(attached: &[Attached]) -> Result<RecordBatch, ArrowError> {
-    let names = attached.iter().map(|it| Some(it.0.as_str()));
-    let times: Vec<i64> = attached.iter().map(|it| it.1 as i64).collect();
-    let contents = attached.iter().map(|it| Some(it.2.as_slice()));
-    RecordBatch::try_from_iter_with_nullable([
-        ("name", Arc::new(names.collect::<StringArray>()) as ArrayRef, false),
-        (
-            "log_time",
-            Arc::new(TimestampNanosecondArray::from(times).with_timezone(ZONE)) as ArrayRef,
-            false,
-        ),
-        ("content", Arc::new(contents.collect::<BinaryArray>()) as ArrayRef, false),
-    ])
-}
-
-/// Metadata as a table: a row for each pair, and one without a key for a record that has none.
-///
-/// # Errors
-///
-/// None that a caller could cause.
-pub fn metadata_batch(metadata: &[Metadata]) -> Result<RecordBatch, ArrowError> {
-    let rows = metadata.iter().enumerate().flat_map(|(index, it)| {
-        let pairs = it.metadata.iter().map(|(key, value)| Some((key.as_str(), value.as_str())));
-        let none = it.metadata.is_empty().then_some(None);
-        pairs.chain(none).map(move |pair| (index as u64, it.name.as_str(), pair))
-    });
-    let rows: Vec<_> = rows.collect();
-    let numbers: UInt64Array = rows.iter().map(|it| Some(it.0)).collect();
-    let names: StringArray = rows.iter().map(|it| Some(it.1)).collect();
-    let keys: StringArray = rows.iter().map(|it| it.2.map(|pair| pair.0)).collect();
-    let values: StringArray = rows.iter().map(|it| it.2.map(|pair| pair.1)).collect();
-    RecordBatch::try_from_iter_with_nullable([
-        ("record", Arc::new(numbers) as ArrayRef, false),
-        ("name", Arc::new(names) as ArrayRef, false),
-        ("key", Arc::new(keys) as ArrayRef, true),
-        ("value", Arc::new(values) as ArrayRef, true),
-    ])
-}
-
-/// The attached files of a table that has their columns.
-pub fn attachments_of(batch: &RecordBatch) -> Vec<Attached> {
-    let (names, contents) =
-        (batch.column(0).as_string::<i32>(), batch.column(2).as_binary::<i32>());
-    let times = batch.column(1).as_primitive::<TimestampNanosecondType>();
-    let row = |row| (names.value(row).into(), times.value(row) as u64, contents.value(row).into());
-    (0..batch.num_rows()).map(row).collect()
-}
-
-/// Adds the rows of a table that has the columns of metadata.
-pub fn add_metadata(batch: &RecordBatch, metadata: &mut BTreeMap<u64, Metadata>) {
-    let numbers = batch.column(0).as_primitive::<UInt64Type>();
-    let [names, keys, values] = [1, 2, 3].map(|it| batch.column(it).as_string::<i32>());
-    for row in 0..batch.num_rows() {
-        let name = names.value(row).to_owned();
-        let none = || Metadata { name, metadata: BTreeMap::new() };
-        let record = metadata.entry(numbers.value(row)).or_insert_with(none);
-        if keys.is_valid(row) && values.is_valid(row) {
-            record.metadata.insert(keys.value(row).into(), values.value(row).into());
+/// A column's type in its file.
+fn parquet_type(column: &Column) -> Result<Type, ParquetError> {
+    let repetition = if column.is_nullable { Repetition::OPTIONAL } else { Repetition::REQUIRED };
+    let name = if column.list.is_some() { ENTRY } else { &column.name };
+    let (physical, logical) = match column.type_name {
+        "f64" => (PhysicalType::DOUBLE, None),
+        "string" => (PhysicalType::BYTE_ARRAY, Some(LogicalType::String)),
+        "bytes" => (PhysicalType::BYTE_ARRAY, None),
+        "time" => (PhysicalType::INT64, Some(LogicalType::timestamp(true, TimeUnit::NANOS))),
+        "i64" => (PhysicalType::INT64, None),
+        "i32" => (PhysicalType::INT32, None),
+        _ => {
+            let (bits, is_signed) = integer(column);
+            let physical = if bits == 64 { PhysicalType::INT64 } else { PhysicalType::INT32 };
+            (physical, Some(LogicalType::integer(bits, is_signed)))
         }
+    };
+    let entry = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+    let entry = entry.with_logical_type(logical).build()?;
+    if column.list.is_none() {
+        return Ok(entry);
     }
+    let group = |name, repetition, field| {
+        let group = Type::group_type_builder(name).with_repetition(repetition);
+        group.with_fields(vec![Arc::new(field)])
+    };
+    let entries = group("list", Repetition::REPEATED, entry).build()?;
+    let list = group(&column.name, Repetition::REQUIRED, entries);
+    list.with_logical_type(Some(LogicalType::List)).build()
+}
+
+/// The bits of a column's whole numbers, and whether they have a sign.
+pub fn integer(column: &Column) -> (i8, bool) {
+    let (sign, bits) = column.type_name.split_at(1);
+    (bits.parse().unwrap_or(64), sign == "i")
+}
+
+/// The columns of attached files.
+pub fn attachment_columns() -> [Column; 3] {
+    [
+        Column::beside("name", "string", false),
+        Column::beside("log_time", "time", false),
+        Column::beside("content", "bytes", false),
+    ]
+}
+
+/// The columns of metadata: a row for each pair, and one without a key for a record that has none.
+pub fn metadata_columns() -> [Column; 4] {
+    [
+        Column::beside("record", "u64", false),
+        Column::beside("name", "string", false),
+        Column::beside("key", "string", true),
+        Column::beside("value", "string", true),
+    ]
+}
+
+/// The schema of a table's file.
+///
+/// # Errors
+///
+/// None that a caller could cause.
+pub fn file_schema(columns: &[Column]) -> Result<TypePtr, ParquetError> {
+    let fields = columns.iter().map(|it| parquet_type(it).map(Arc::new));
+    let fields = fields.collect::<Result<Vec<_>, _>>()?;
+    Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))
 }

@@ -2,12 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use arrow_array::RecordBatch;
-use arrow_schema::SchemaRef;
 use dynocar::operator::pipeline_name;
 use dynocar::storage::{Disk, Storage, folder_of, settle};
 use dynocar_mcap::columns::{Column, Row, Source};
@@ -17,20 +13,17 @@ use dynocar_mcap::joining::read_all;
 use dynocar_mcap::reading::{Ending, Item, Raw, Visitor};
 use dynocar_mcap::recording::Metadata;
 use dynocar_mcap::schema::{EVENT, SAMPLE, SNAPSHOT};
-use parquet::arrow::ArrowWriter;
-use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
-use parquet::schema::types::ColumnPath;
 
-use crate::cells::{Cells, array_of, schema};
+use crate::reading::Attached;
 use crate::table::{
-    ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachments_batch, metadata_batch,
+    ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachment_columns, metadata_columns,
 };
+use crate::table_file::{Cells, TableFile};
 
-/// Rows that are encoded at a time.
-const BATCH_ROWS: usize = 1 << 16;
+/// Rows of a part of a file, which is encoded at once.
+const PART_ROWS: usize = 1 << 16;
 
 /// Summary of the written files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -93,7 +86,7 @@ struct Tables<'p> {
     /// The newest message's place in the recording.
     number: u64,
     log_time: u64,
-    attached: Vec<(String, u64, Vec<u8>)>,
+    attached: Vec<Attached>,
     metadata: Vec<Metadata>,
     written: Written,
 }
@@ -157,121 +150,104 @@ impl Tables<'_> {
             let path = path_of(&name);
             table.finish(&path, said.into_iter().flatten()).map_err(WriteError::of(&path))?;
         }
-        let others =
-            [(ATTACHMENTS, attachments_batch(&attached)), (METADATA, metadata_batch(&metadata))];
-        for (kind, batch) in others {
+        let others = [
+            (ATTACHMENTS, attachment_columns().to_vec(), cells_of_attached(&attached)),
+            (METADATA, metadata_columns().to_vec(), cells_of_metadata(&metadata)),
+        ];
+        for (kind, columns, cells) in others {
             let path = path_of(kind);
-            let write = |batch: RecordBatch| {
-                let said = KeyValue::new(KIND.to_owned(), kind.to_owned());
-                let properties = WriterProperties::builder()
-                    .set_key_value_metadata(Some(vec![said]))
-                    .set_compression(COMPRESSION())
-                    .build();
-                let file = File::create_new(&path)?;
-                let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties))?;
-                writer.write(&batch)?;
-                end(writer, &path)
+            let said = KeyValue::new(KIND.to_owned(), kind.to_owned());
+            let write = || {
+                let mut file = TableFile::create(&path, columns, vec![said])?;
+                file.write(cells)?;
+                file.finish()?;
+                Ok::<_, ParquetError>(settle(&Disk, &path)?)
             };
-            batch.map_err(ParquetError::from).and_then(write).map_err(WriteError::of(&path))?;
+            write().map_err(WriteError::of(&path))?;
         }
         Ok(written)
     }
 }
 
-/// Ends a file, and brings it to the disk.
-fn end(writer: ArrowWriter<File>, path: &Path) -> Result<(), ParquetError> {
-    writer.close()?;
-    Ok(settle(&Disk, path)?)
+/// Attached files as the cells of their table.
+fn cells_of_attached(attached: &[Attached]) -> Vec<Cells> {
+    let (mut names, mut times, mut contents) = Default::default();
+    for (name, time, content) in attached {
+        Cells::put_bytes(&mut names, Some(name.as_bytes()));
+        Cells::put_word(&mut times, *time);
+        Cells::put_bytes(&mut contents, Some(content));
+    }
+    vec![names, times, contents]
 }
 
-const COMPRESSION: fn() -> Compression = || Compression::ZSTD(ZstdLevel::default());
+/// Metadata as the cells of their table.
+fn cells_of_metadata(metadata: &[Metadata]) -> Vec<Cells> {
+    let (mut numbers, mut names, mut keys, mut values) = Default::default();
+    for (number, it) in metadata.iter().enumerate() {
+        let pairs = it.metadata.iter().map(|(key, value)| Some((key.as_bytes(), value.as_bytes())));
+        let none = it.metadata.is_empty().then_some(None);
+        for pair in pairs.chain(none) {
+            Cells::put_word(&mut numbers, number as u64);
+            Cells::put_bytes(&mut names, Some(it.name.as_bytes()));
+            Cells::put_bytes(&mut keys, pair.map(|it| it.0));
+            Cells::put_bytes(&mut values, pair.map(|it| it.1));
+        }
+    }
+    vec![numbers, names, keys, values]
+}
 
 /// A table that is written.
 struct Table {
     columns: &'static [Column],
-    schema: SchemaRef,
     cells: Vec<Cells>,
     rows: usize,
-    writer: ArrowWriter<File>,
+    file: TableFile,
 }
 
 impl Table {
     fn new(path: &Path, kind: &TableKind) -> Result<Self, ParquetError> {
         let columns: &[Column] = kind.columns;
-        let schema = Arc::new(schema(columns));
         let said = [(KIND, kind.name), (LAYOUT, kind.layout)];
         let said = said.map(|(key, value)| KeyValue::new(key.to_owned(), value.to_owned()));
-        let properties = properties(columns, said.into());
-        let file = File::create_new(path)?;
-        let writer = ArrowWriter::try_new(file, Arc::clone(&schema), Some(properties))?;
-        let cells = vec![Cells::default(); columns.len()];
-        Ok(Table { columns, schema, cells, rows: 0, writer })
+        let file = TableFile::create(path, columns.to_vec(), said.into())?;
+        Ok(Table { columns, cells: vec![Cells::default(); columns.len()], rows: 0, file })
     }
 
     fn put(&mut self, number: u64, log_time: u64, row: &Row) -> Result<(), ParquetError> {
         for (column, cells) in self.columns.iter().zip(&mut self.cells) {
-            let is_there = match (column.source, row) {
-                (Source::Number, _) => {
-                    cells.words.push(number);
-                    true
-                }
-                (Source::LogTime, _) => {
-                    cells.words.push(log_time);
-                    true
-                }
+            match (column.source, row) {
+                (Source::Number, _) => cells.put_word(number),
+                (Source::LogTime, _) => cells.put_word(log_time),
                 (_, Row::Event(event)) if column.type_name == "string" => {
-                    cells.texts.push(event.text.clone());
-                    true
+                    cells.put_bytes(Some(event.text.as_bytes()));
                 }
-                _ => row.put_words(column, &mut cells.words),
-            };
-            cells.is_there.push(is_there);
+                _ => {
+                    let is_there = row.put_words(column, &mut cells.words);
+                    cells.is_there.push(is_there);
+                }
+            }
         }
         self.rows += 1;
-        if self.rows < BATCH_ROWS { Ok(()) } else { self.flush() }
+        if self.rows < PART_ROWS { Ok(()) } else { self.flush() }
     }
 
     fn flush(&mut self) -> Result<(), ParquetError> {
         self.rows = 0;
-        let cells = self.cells.iter_mut().map(std::mem::take);
-        let arrays = self.columns.iter().zip(cells).map(|(column, cells)| array_of(column, cells));
-        let batch = RecordBatch::try_new(Arc::clone(&self.schema), arrays.collect())?;
-        self.writer.write(&batch)
+        self.file.write(self.cells.iter_mut().map(std::mem::take).collect())
     }
 
     /// Ends the file; attached texts of a configuration become metadata.
     fn finish<'a>(
         mut self,
         path: &Path,
-        attached: impl Iterator<Item = &'a (String, u64, Vec<u8>)>,
+        attached: impl Iterator<Item = &'a Attached>,
     ) -> Result<(), ParquetError> {
         self.flush()?;
         for (name, _, content) in attached.filter(|it| it.0.starts_with("configuration-")) {
             let text = String::from_utf8_lossy(content).into_owned();
-            self.writer.append_key_value_metadata(KeyValue::new(name.clone(), text));
+            self.file.say(KeyValue::new(name.clone(), text));
         }
-        end(self.writer, path)
+        self.file.finish()?;
+        Ok(settle(&Disk, path)?)
     }
-}
-
-/// Numbers by their differences or by their bytes: dictionaries take numbers for the same that are equal but
-/// not the same to the bit.
-fn properties(columns: &[Column], said: Vec<KeyValue>) -> WriterProperties {
-    let mut builder = WriterProperties::builder()
-        .set_key_value_metadata(Some(said))
-        .set_dictionary_enabled(false)
-        .set_compression(COMPRESSION());
-    for column in columns {
-        let encoding = match column.type_name {
-            "string" => continue,
-            "f64" => Encoding::BYTE_STREAM_SPLIT,
-            _ => Encoding::DELTA_BINARY_PACKED,
-        };
-        let mut path = vec![column.name.clone()];
-        if column.list.is_some() {
-            path.extend(["list".to_owned(), "element".to_owned()]);
-        }
-        builder = builder.set_column_encoding(ColumnPath::new(path), encoding);
-    }
-    builder.build()
 }

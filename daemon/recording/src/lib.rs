@@ -1,10 +1,9 @@
-//! The recorder of what a controller and the daemon write, and the commands of recordings.
+//! The recorder of what a controller and the daemon write.
 //!
 //! # Layout
 //!
 //! - [`train_channels`]: what a recorder and a live view read of the trains' channels
 //! - [`record`]: the recorder
-//! - [`verify`]: every recorded snapshot computed again
 //! - [`page`]: the reference page of the recorded fields
 //! - [`cli`]: the command line
 
@@ -12,4 +11,3 @@ pub mod cli;
 pub mod page;
 pub mod record;
 pub mod train_channels;
-pub mod verify;

@@ -1,6 +1,6 @@
 //! Commands that programs of their own carry out.
 
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
 
 use clap::Args;
@@ -15,13 +15,6 @@ pub struct Passed {
     /// Options, as the command's own `--help` lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
     words: Vec<OsString>,
-}
-
-impl Passed {
-    /// The words.
-    pub fn words(&self) -> impl Iterator<Item = &OsStr> {
-        self.words.iter().map(OsString::as_os_str)
-    }
 }
 
 impl From<Vec<OsString>> for Passed {

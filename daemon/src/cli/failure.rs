@@ -10,7 +10,6 @@ use crate::config::ConfigError;
 use crate::dataset::LoadError;
 use crate::output::{OutputError, report_line, require_file, write_json};
 use crate::programs::{ErrorAnswer, ErrorDocument};
-use crate::unpacking::UnpackError;
 
 /// Why a command ended without a result; says which exit status follows.
 #[derive(Debug)]
@@ -102,8 +101,7 @@ impl From<LoadError> for Failure {
         let message = error.to_string();
         match error {
             LoadError::Dataset(error) => error.into(),
-            LoadError::Recording(UnpackError::Failed { .. }) => Failure::Work(message),
-            LoadError::Recording(UnpackError::Content { path, .. })
+            LoadError::Recording { path, .. }
             | LoadError::NoSuchPath { path }
             | LoadError::NotADataset { path, .. }
             | LoadError::NoManifest { path, .. }

@@ -27,7 +27,6 @@ use self::companion::{Passed, become_it};
 use super::programs::ErrorDocument;
 use crate::output::{OutputError, write_json};
 use crate::programs::{LIVE, RECORDING, WATCH, WORKSHOP};
-use crate::unpacking::program_for;
 
 /// Dynocar, a dynamometer car in software.
 #[derive(Debug, Parser)]
@@ -112,9 +111,7 @@ impl Command {
             Command::FlightRecorder(passed) => recording("flight-recorder", passed),
             Command::Keep(passed) => recording("keep", passed),
             Command::Recover(passed) => recording("recover", passed),
-            Command::Convert(passed) => {
-                become_it(program_for(passed.words()), Some("convert"), passed)
-            }
+            Command::Convert(passed) => workshop("convert", passed),
             Command::Watch(passed) => become_it(WATCH, None, passed),
             Command::Live(passed) => become_it(LIVE, None, passed),
         }
@@ -146,11 +143,9 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Parses the command line of a program of the project, carries it out, and reports a failure to people, and to
-/// machines where they wanted the result.
+/// Parses the command line of a program of the project, carries it out, and reports a failure to people.
 pub fn carry_out<A: Parser>(
     program: &str,
-    json: impl FnOnce(&A) -> Option<&Path>,
     execute: impl FnOnce(&A) -> Result<(), Failure>,
 ) -> ExitCode {
     let arguments = match parse::<A>(program) {
@@ -159,7 +154,7 @@ pub fn carry_out<A: Parser>(
     };
     match execute(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(program, json(&arguments)),
+        Err(failure) => failure.report(program, None),
     }
 }
 

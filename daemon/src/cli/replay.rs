@@ -6,18 +6,17 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use dynocar_dataset::{Dataset, Run};
+use dynocar_dataset::{Dataset, DatasetHead, Run, is_parquet};
 use dynocar_shared::{PipelineKind, TrainId};
 use dynocar_transport::Host;
 
 use super::Failure;
 use super::companion::{Passed, become_it, words_of_command};
-use crate::dataset::{self, LoadError, Source};
+use crate::dataset::{self, LoadError, Source, is_parquet_path};
 use crate::output::report_line;
-use crate::programs::RECORDING;
+use crate::programs::WORKSHOP;
 use crate::redrawn::{Redrawn, bar, can_draw};
 use crate::replay::{Rate, ReplayReport, Replayer};
-use crate::unpacking::{UnpackError, program_for};
 
 /// How often progress is shown.
 const SHOW_EVERY: Duration = Duration::from_millis(100);
@@ -50,7 +49,7 @@ pub struct ReplayArguments {
     wait: f64,
 }
 
-/// Plays the runs of a dataset, or becomes the program that knows the format of a recording.
+/// Plays the runs of a dataset, or becomes the workshop, which knows the formats of recordings.
 ///
 /// # Errors
 ///
@@ -60,12 +59,19 @@ pub fn execute_or_become(arguments: &ReplayArguments) -> Result<(), Failure> {
         let with = arguments.with.iter().flat_map(|it| ["--with".into(), it.into()]);
         let files = arguments.dataset.iter().map(OsString::from);
         let words = Passed::from(files.chain(with).collect::<Vec<_>>());
-        return become_it(program_for(words.words()), Some("verify"), &words);
+        return become_it(WORKSHOP, Some("verify"), &words);
     }
-    if arguments.dataset.iter().any(|it| it.extension().is_some_and(|it| it == "mcap")) {
-        return become_it(RECORDING, Some("play"), &words_of_command());
+    if arguments.dataset.iter().any(|it| needs_workshop(it)) {
+        return become_it(WORKSHOP, Some("play"), &words_of_command());
     }
     execute(arguments, |source| dataset::load(source))
+}
+
+/// True for a recording, and for a dataset with runs in Parquet.
+fn needs_workshop(path: &Path) -> bool {
+    let is_recording = path.extension().is_some_and(|it| it == "mcap") || is_parquet_path(path);
+    let has_parquet = |head: &DatasetHead| head.manifest.runs.iter().any(|it| is_parquet(&it.file));
+    is_recording || dataset::open(path).is_ok_and(|(_, head)| has_parquet(&head))
 }
 
 /// Plays the runs of what a function reads.
@@ -133,7 +139,7 @@ fn of_train(
     read: impl Fn(Source) -> Result<Dataset, LoadError>,
 ) -> Result<Dataset, LoadError> {
     match read(Source { path, train }) {
-        Err(LoadError::NoRecording { .. } | LoadError::Recording(UnpackError::Content { .. })) => {
+        Err(LoadError::NoRecording { .. } | LoadError::Recording { .. }) => {
             read(Source { path, train: None })
         }
         read => read,

@@ -44,7 +44,7 @@ pub fn command() -> clap::Command {
 
 /// Parses the command line, watches until asked to end, reports a failure on standard error.
 pub fn main() -> ExitCode {
-    carry_out("dynocar watch", |_| None, execute)
+    carry_out("dynocar watch", execute)
 }
 
 fn execute(arguments: &Arguments) -> Result<(), Failure> {

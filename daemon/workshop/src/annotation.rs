@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use crate::from_dataset::from_dataset;
 use dynocar::cli::Failure;
 use dynocar::dataset::Source;
 use dynocar::output::report_line;
 use dynocar_analysis::explain::report::timeline::Timeline;
 use dynocar_mcap::annotate;
-use dynocar_mcap::convert::from_dataset;
 use tempfile::TempDir;
 
 /// Copies a recording, or the dataset at a path as one, into a new file with an explanation of it.

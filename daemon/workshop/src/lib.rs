@@ -7,6 +7,8 @@
 //!
 //! - [`brakes_page`]: the parameters of a brake as a page of HTML
 //! - [`cli`]: its commands, one file each
+//! - [`convert`], [`from_dataset`]: recordings to datasets, in memory or in a folder, and back
+//! - [`dataset`]: the dataset at a path, be it a folder or a recording
 //! - [`fmu`]: the estimators as an FMU
 //! - [`annotation`]: an explanation beside the data that it explains
 //! - [`learn`]: recorded runs into candidates for the store
@@ -16,12 +18,16 @@
 //! - [`run_facts`]: what is shown of a recorded run
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
 //! - [`track_text`]: the text of a line's file
+//! - [`verify`]: every recorded snapshot computed again
 
 pub mod annotation;
 pub mod brakes_page;
 pub mod cli;
 pub mod clock;
+pub mod convert;
+pub mod dataset;
 pub mod fmu;
+pub mod from_dataset;
 pub mod learn;
 pub mod paths;
 pub mod report;
@@ -29,3 +35,4 @@ pub mod run_facts;
 pub mod survey;
 pub mod track_text;
 pub mod updated;
+pub mod verify;

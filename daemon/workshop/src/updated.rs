@@ -17,10 +17,10 @@ use dynocar_model::terms::extra::{self, Extra, Factor};
 use dynocar_model::terms::{Entry, Key};
 use toml::{Table, Value};
 
+use crate::dataset::open;
 use dynocar::dataset::Source;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::write_in_folder;
-use dynocar_mcap::dataset::open;
 
 pub use runs::name_model;
 pub use runs::{UPDATED_MARK, UpdatedModelError};

@@ -9,26 +9,36 @@ use arrow_array::{
     Float32Array, Float64Array, Int16Array, Int32Array, RecordBatch, StringArray,
     Time32MillisecondArray, TimestampMicrosecondArray, UInt64Array,
 };
-use dynocar::columns_stream;
-use dynocar::programs::ErrorDocument;
 use dynocar_analysis::dataset::train_rows::TrainRows;
 use dynocar_analysis::dataset::{
     ColumnMapping, Dataset, DatasetFiles, FileProblem, MANIFEST_FILE, Manifest, is_parquet,
 };
-use dynocar_dataset::{RunColumn, RunColumns, RunContent};
-use dynocar_parquet::numbers::{TrainsBy, Wanted, send_columns};
+use dynocar_dataset::{RunColumn, RunContent};
+use dynocar_model::units::{Dimension, Unit};
+use dynocar_parquet::columns::{columns_of, columns_of_bytes};
 
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 
-use crate::support::{TRAIN, program, shared, table};
+use crate::support::{TRAIN, shared, table};
 
-fn read(path: &Path, wanted: &[(&str, &str)]) -> Vec<RunColumn> {
-    let wanted = wanted.iter().map(|it| Wanted { column: it.0.into(), unit: it.1.into() });
-    let mut bytes = Vec::new();
-    send_columns(path, &wanted.collect::<Vec<_>>(), None, &mut bytes).unwrap().unwrap();
-    columns_stream::read(&bytes[..]).unwrap().columns
+/// Columns that are wanted, with their units.
+fn wanted(columns: &[(&str, &str)]) -> Vec<ColumnMapping> {
+    let mapping = |(column, unit): &(&str, &str)| {
+        let dimensions = [Dimension::Time, Dimension::Speed, Dimension::Force, Dimension::Count];
+        let mut units = dimensions.into_iter().filter_map(|it| Unit::find(it, unit));
+        ColumnMapping { unit: units.next().expect(unit), ..ColumnMapping::of_time(column) }
+    };
+    columns.iter().map(mapping).collect()
+}
+
+fn read(path: &Path, columns: &[(&str, &str)]) -> Vec<RunColumn> {
+    let found = columns_of(path, &wanted(columns), &TrainRows::All).unwrap();
+    let bytes = std::fs::read(path).unwrap();
+    let again = columns_of_bytes(bytes, &wanted(columns), &TrainRows::All).unwrap();
+    assert_eq!(format!("{found:?}"), format!("{again:?}"));
+    found.columns
 }
 
 /// The numbers of one column, `None` where missing.
@@ -102,10 +112,8 @@ impl DatasetFiles for AsParquet {
 
     fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
         assert!(is_parquet(path));
-        let columns = manifest.columns.iter();
-        let pairs: Vec<_> = columns.map(|it| (it.column.as_str(), it.unit.name())).collect();
-        let columns = read(&self.tables.join(path), &pairs);
-        Ok(RunContent::Columns(RunColumns { columns, trains: None }))
+        let columns = columns_of(&self.tables.join(path), &manifest.columns, &TrainRows::All);
+        Ok(RunContent::Columns(columns.unwrap()))
     }
 }
 
@@ -140,7 +148,6 @@ fn a_dataset_of_parquet_files_is_read_as_one_of_csv() {
 fn columns_that_hold_no_numbers_are_named_with_what_they_hold() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("own.parquet");
-    let shown = path.display().to_string();
     let list =
         arrow_array::ListArray::from_iter_primitive::<arrow_array::types::Float64Type, _, _>(vec![
             Some(vec![Some(1.0)]),
@@ -160,10 +167,8 @@ fn columns_that_hold_no_numbers_are_named_with_what_they_hold() {
         (["t", "m/s"], "column t: expected numbers in m/s, found Timestamp(µs)"),
     ];
     for ([column, unit], expected) in cases {
-        let output = program(&["columns", &shown, "--column", column, unit, "--json", "-"]);
-        assert_eq!(output.status.code(), Some(2));
-        let answer: ErrorDocument = serde_json::from_slice(&output.stdout).unwrap();
-        assert_eq!((answer.error.message.as_str(), answer.error.exit_status), (expected, 2));
+        let refused = columns_of(&path, &wanted(&[(column, unit)]), &TrainRows::All);
+        assert_eq!(refused.unwrap_err().to_string(), expected);
     }
 }
 
@@ -203,22 +208,20 @@ fn whose_the_rows_are_is_handed_over_of_texts_and_numbers_of_every_kind() {
         turns(["a", "b"]).enumerate().map(|(row, it)| (row != 1).then_some(it)).collect();
     let numbers = Int16Array::from_iter_values((0..60).map(|row| 7 + row % 3));
     let floats = Float64Array::from_iter((0..60).map(|row| (row != 1).then_some(7.0)));
-    let by = |name: &str| TrainsBy::Name(name.to_owned());
-    for (name, column, wanted, expected) in [
-        ("vehicle_id", texts(["ice1", "re2"]), TrainsBy::AnyName, Some(["ice1", "ice1", "re2"])),
-        ("Train", shared(coded), TrainsBy::AnyName, Some(["a", "", "b"])),
-        (" unit no ", shared(numbers), TrainsBy::AnyName, Some(["7", "8", "9"])),
-        ("Zug", shared(floats), TrainsBy::AnyName, Some(["7", "", "7"])),
-        ("note", texts(["x", "y"]), TrainsBy::AnyName, None),
+    let by = |name: &str| TrainRows::Of { column: name.to_owned(), value: String::new() };
+    for (name, column, rows, expected) in [
+        ("vehicle_id", texts(["ice1", "re2"]), TrainRows::Unsaid, Some(["ice1", "ice1", "re2"])),
+        ("Train", shared(coded), TrainRows::Unsaid, Some(["a", "", "b"])),
+        (" unit no ", shared(numbers), TrainRows::Unsaid, Some(["7", "8", "9"])),
+        ("Zug", shared(floats), TrainRows::Unsaid, Some(["7", "", "7"])),
+        ("note", texts(["x", "y"]), TrainRows::Unsaid, None),
         ("note", texts(["x", "y"]), by("note"), Some(["x", "x", "y"])),
         ("train", texts(["x", "y"]), by("note"), None),
     ] {
         let v = shared(Float64Array::from_iter_values((0..60).map(f64::from)));
         table(&path, vec![("v", v), (name, column)]);
-        for wants in [&[][..], &[Wanted { column: "v".into(), unit: "m/s".into() }]] {
-            let mut bytes = Vec::new();
-            send_columns(&path, wants, Some(&wanted), &mut bytes).unwrap().unwrap();
-            let found = columns_stream::read(&bytes[..]).unwrap();
+        for wants in [&[][..], &[("v", "m/s")]] {
+            let found = columns_of(&path, &wanted(wants), &rows).unwrap();
             let trains = found.trains.as_ref();
             let cells = trains.map(|it| it.cells().take(3).collect::<Vec<_>>());
             assert_eq!(cells, expected.map(Vec::from), "{name}");
@@ -240,17 +243,8 @@ impl DatasetFiles for OfTwoTrains {
     }
 
     fn read_run(&self, _path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
-        let columns = manifest.columns.iter();
-        let wanted =
-            |it: &ColumnMapping| Wanted { column: it.column.clone(), unit: it.unit.name().into() };
-        let by = match &manifest.train_rows {
-            TrainRows::Unsaid => Some(TrainsBy::AnyName),
-            TrainRows::Of { column, .. } => Some(TrainsBy::Name(column.clone())),
-            TrainRows::All => None,
-        };
-        let (mut bytes, wanted) = (Vec::new(), columns.map(wanted).collect::<Vec<_>>());
-        send_columns(&self.table, &wanted, by.as_ref(), &mut bytes).unwrap().unwrap();
-        Ok(RunContent::Columns(columns_stream::read(&bytes[..]).unwrap()))
+        let columns = columns_of(&self.table, &manifest.columns, &manifest.train_rows);
+        Ok(RunContent::Columns(columns.unwrap()))
     }
 }
 

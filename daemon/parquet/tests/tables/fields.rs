@@ -1,10 +1,33 @@
 //! The Arrow schema, the columns and the page of the fields say the same.
 
 use arrow_schema::Schema;
-use dynocar_mcap::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS};
-use dynocar_parquet::cells::schema;
-use dynocar_shared::RejectionReason;
+use dynocar_mcap::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS};
+use dynocar_mcap::event::Event;
+use dynocar_parquet::writing::write_folder;
 use dynocar_shared::schema::{unit_end, unit_of};
+use dynocar_shared::{ParameterSnapshot, RejectionReason, TrainId, TrainSample};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+use crate::support::write;
+
+/// The schemas that Arrow reads of the files of samples, snapshots and events.
+fn schemas() -> [Schema; 3] {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let sample = TrainSample::empty(TrainId(1));
+    let snapshot = ParameterSnapshot { train_id: 1, ..ParameterSnapshot::empty() };
+    let rows = [Row::Sample(sample), Row::Snapshot(snapshot.into()), Row::Event(Event::default())];
+    write(&at("run.mcap"), &rows.map(|it| (1, it)));
+    write_folder(&[at("run.mcap")], &at("run.parquet")).unwrap();
+    ["samples-1", "snapshots-1-", "events"].map(|name| {
+        let mut files = std::fs::read_dir(at("run.parquet")).unwrap().map(|it| it.unwrap().path());
+        let is_it =
+            |it: &std::path::PathBuf| it.file_name().unwrap().to_str().unwrap().starts_with(name);
+        let file = std::fs::File::open(files.find(is_it).expect(name)).unwrap();
+        let builder = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+        (**builder.schema()).clone()
+    })
+}
 
 fn page() -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording_fields.md");
@@ -49,7 +72,7 @@ fn the_page_shows_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
         (&*SNAPSHOTS, &["ParameterSnapshot", "Estimate"]),
         (&*EVENTS, &["Event"]),
     ];
-    for (columns, messages) in tables {
+    for ((columns, messages), schema) in tables.into_iter().zip(schemas()) {
         let mut declared = Vec::new();
         for message in messages {
             for [name, column] in rows(&page, message) {
@@ -71,13 +94,13 @@ fn the_page_shows_the_arrow_type_of_every_column_and_the_schema_has_them_all() {
             let of = |it| [rejected(it), "UInt32".to_owned(), String::new()];
             declared.extend(RejectionReason::ALL.iter().map(of));
         }
-        assert_eq!(in_words(&schema(columns), columns), declared);
+        assert_eq!(in_words(&schema, columns), declared);
     }
 }
 
 #[test]
 fn fields_say_unit_meaning_and_the_names_of_their_numbers() {
-    let schema = schema(&SNAPSHOTS);
+    let [_, schema, _] = schemas();
     let said = |name: &str, key: &str| {
         schema.field_with_name(name).unwrap().metadata().get(key).cloned().unwrap_or_default()
     };

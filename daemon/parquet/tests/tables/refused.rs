@@ -4,8 +4,8 @@ use std::fs::File;
 use std::path::Path;
 
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, StringArray};
-use dynocar_mcap::columns::{Row, SAMPLES};
-use dynocar_parquet::cells::schema;
+use arrow_schema::DataType;
+use dynocar_mcap::columns::Row;
 use dynocar_parquet::reading::read;
 use dynocar_parquet::writing::write_folder;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
@@ -15,7 +15,7 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
 
-use crate::support::{program, said, shared, table, write};
+use crate::support::{command, shared, table, write};
 
 /// Returns the message of every command for a wrong path.
 fn refusal(path: &Path) -> String {
@@ -23,10 +23,10 @@ fn refusal(path: &Path) -> String {
     let out = out.display().to_string();
     let mut printed = String::new();
     for arguments in [&["convert", &shown, "-o", &out][..], &["verify", &shown]] {
-        let output = program(arguments);
-        printed = said(&output);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
-        assert!(printed.starts_with(&format!("dynocar-parquet: {shown}")), "{printed}");
+        let status;
+        (printed, status) = command(arguments).unwrap_err();
+        assert_eq!(status, 2, "{arguments:?}: {printed}");
+        assert!(printed.starts_with(&shown), "{printed}");
         assert!(!Path::new(&out).exists());
     }
     printed
@@ -114,7 +114,7 @@ fn a_table_of_another_release_or_without_a_column_or_with_another_is_named() {
     let shown = path.display().to_string();
     let rows = 50;
     let texts = shared(StringArray::from(vec!["x"; rows]));
-    let nulls: ArrayRef = arrow_array::new_null_array(schema(&SAMPLES).field(2).data_type(), rows);
+    let nulls: ArrayRef = arrow_array::new_null_array(&DataType::Int64, rows);
     assert!(nulls.is_null(0));
     let cases = [
         ("speed_mps", Some(texts), None, "column speed_mps: expected Float64, found Utf8"),
@@ -147,35 +147,21 @@ fn nothing_is_overwritten_and_parquet_is_not_converted_into_itself() {
         ("run.parquet", "run.mcap", "exists already"),
     ];
     for (from, to, expected) in cases {
-        let output = program(&["convert", &shown(from), "-o", &shown(to)]);
-        assert_eq!(output.status.code(), Some(2), "{from} to {to}");
-        assert!(said(&output).contains(expected), "{}", said(&output));
+        let (words, status) = command(&["convert", &shown(from), "-o", &shown(to)]).unwrap_err();
+        assert_eq!(status, 2, "{from} to {to}");
+        assert!(words.contains(expected), "{words}");
     }
 }
 
 #[test]
-fn a_closed_pipe_is_no_failure_and_a_full_disk_is_reported() {
+fn a_folder_is_all_there_or_not_at_all() {
     let folder = tempfile::tempdir().unwrap();
-    let from = recording(folder.path());
-    let program = env!("CARGO_BIN_EXE_dynocar-parquet");
-    let own = [from.to_str().unwrap(), "--column", "speed_mps", "m/s"];
-    for arguments in [&["--help"][..], &[&["columns"][..], &own].concat()] {
-        let (_, closed) = std::io::pipe().unwrap();
-        let mut command = std::process::Command::new(program);
-        let output = command.args(arguments).stdout(closed).output().unwrap();
-        assert_eq!((output.status.code(), said(&output)), (Some(0), String::new()));
-        let full = File::options().write(true).open("/dev/full").unwrap();
-        let output = command.stdout(full).output().unwrap();
-        let words = "dynocar-parquet: standard output: cannot be written: No space left on device";
-        assert!(said(&output).starts_with(words), "{}", said(&output));
-        assert_eq!(output.status.code(), Some(1));
-    }
-    // A folder is all there or not at all.
+    recording(folder.path());
     let (mcap, out) = (folder.path().join("run.mcap"), folder.path().join("no/such.parquet"));
-    let output =
-        crate::support::program(&["convert", mcap.to_str().unwrap(), "-o", out.to_str().unwrap()]);
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(said(&output).contains("such.parquet: cannot be written"), "{}", said(&output));
+    let words = ["convert", mcap.to_str().unwrap(), "-o", out.to_str().unwrap()];
+    let (words, status) = command(&words).unwrap_err();
+    assert_eq!(status, 1, "{words}");
+    assert!(words.contains("such.parquet: cannot be written"), "{words}");
 }
 
 proptest! {

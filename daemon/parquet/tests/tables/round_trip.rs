@@ -10,7 +10,7 @@ use dynocar_shared::layout::Words;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
 use proptest::prelude::*;
 
-use crate::support::{Everything, program, said, write};
+use crate::support::{Everything, command, write};
 
 /// Any bits, often those of numbers that are easily taken for others.
 fn word() -> impl Strategy<Value = u64> {
@@ -94,15 +94,8 @@ fn a_long_recording_becomes_smaller_and_comes_back_and_a_trains_file_stands_for_
     let at = |name: &str| folder.path().join(name);
     let shown = |name: &str| at(name).display().to_string();
     let samples = long(&at("run.mcap"));
-    let output = program(&["convert", &shown("run.mcap"), "-o", &shown("run.parquet")]);
-    assert!(output.status.success(), "{}", said(&output));
-    assert!(
-        said(&output).ends_with("149999 samples, 0 snapshots, 0 events\n"),
-        "{}",
-        said(&output)
-    );
-    let output = program(&["convert", &shown("run.parquet"), "-o", &shown("again.mcap")]);
-    assert!(output.status.success(), "{}", said(&output));
+    command(&["convert", &shown("run.mcap"), "-o", &shown("run.parquet")]).unwrap();
+    command(&["convert", &shown("run.parquet"), "-o", &shown("again.mcap")]).unwrap();
     assert!(Everything::of(&at("run.mcap")) == Everything::of(&at("again.mcap")));
     let size = |name: &str| std::fs::metadata(at(name)).unwrap().len();
     let tables = size("run.parquet/samples-1.parquet") + size("run.parquet/samples-2.parquet");
@@ -115,8 +108,7 @@ fn a_long_recording_becomes_smaller_and_comes_back_and_a_trains_file_stands_for_
     let recording = alone.into_recording();
     let expected: Vec<TrainSample> = samples.into_iter().filter(|it| it.train_id == 1).collect();
     assert!(recording.samples == expected);
-    let output = program(&["convert", &shown("alone.parquet"), "-o", &shown("dataset")]);
-    assert!(output.status.success(), "{}", said(&output));
+    command(&["convert", &shown("alone.parquet"), "-o", &shown("dataset")]).unwrap();
     let dataset = dynocar::dataset::load(&at("dataset")).unwrap();
     assert_eq!(dataset.runs[0].samples.len(), expected.len());
 }
@@ -127,8 +119,7 @@ fn a_dataset_becomes_parquet_as_a_controller_would_have_had_it_recorded_and_come
     let at = |name: &str| folder.path().join(name);
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/demo");
     for (from, to) in [(&demo, at("demo.parquet")), (&at("demo.parquet"), at("demo"))] {
-        let output = program(&["convert", from.to_str().unwrap(), "-o", to.to_str().unwrap()]);
-        assert!(output.status.success(), "{}", said(&output));
+        command(&["convert", from.to_str().unwrap(), "-o", to.to_str().unwrap()]).unwrap();
     }
     for file in ["dataset.toml", "train.toml", "track.toml", "runs/01.csv", "runs/06.csv"] {
         let same = std::fs::read(demo.join(file)).unwrap()

@@ -2,7 +2,6 @@
 
 use std::fs::File;
 use std::path::Path;
-use std::process::{Command, Output};
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, RecordBatch};
@@ -89,13 +88,10 @@ pub fn shared(array: impl arrow_array::Array + 'static) -> ArrayRef {
     Arc::new(array)
 }
 
-/// The program.
-pub fn program(arguments: &[&str]) -> Output {
-    let program = env!("CARGO_BIN_EXE_dynocar-parquet");
-    Command::new(program).args(arguments).output().expect("the program")
-}
-
-/// Returns the text on standard error.
-pub fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+/// Carries out a command of the workshop; gives the message of a failure and its exit status.
+pub fn command(words: &[&str]) -> Result<(), (String, u8)> {
+    dynocar_workshop::cli::execute(words.iter().copied()).map_err(|failure| {
+        let answer = failure.answer().expect("a failure in words");
+        (answer.message, answer.exit_status)
+    })
 }

@@ -24,10 +24,11 @@ fn refusal(path: &Path) -> String {
     for arguments in
         [["convert", shown, "-o", out.to_str().unwrap()].as_slice(), ["verify", shown].as_slice()]
     {
-        let output = program(arguments);
-        printed = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
-        assert!(printed.starts_with(&format!("dynocar-recording: {shown}: ")), "{printed}");
+        let failure = dynocar_workshop::cli::execute(arguments.iter().copied()).unwrap_err();
+        let answer = failure.answer().expect("a failure in words");
+        printed = answer.message;
+        assert_eq!(answer.exit_status, 2, "{arguments:?}: {printed}");
+        assert!(printed.starts_with(&format!("{shown}: ")), "{printed}");
         assert!(!out.exists(), "nothing is left of {arguments:?}");
     }
     printed
@@ -126,20 +127,20 @@ fn a_recording_becomes_a_dataset_and_the_same_samples_come_back() {
     let path = recording(folder.path());
     let at = |name: &str| folder.path().join(name);
     let convert = |from: &Path, to: &Path| {
-        let output = program(&["convert", from.to_str().unwrap(), "-o", to.to_str().unwrap()]);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let words = ["convert", from.to_str().unwrap(), "-o", to.to_str().unwrap()];
+        dynocar_workshop::cli::execute(words).unwrap();
     };
     convert(&path, &at("dataset"));
     let dataset = dynocar::dataset::load(&at("dataset")).unwrap();
     assert_eq!(dataset.runs.iter().map(|it| it.samples.len()).sum::<usize>(), 600);
-    assert_eq!(dynocar_mcap::dataset::load(&path).unwrap().runs, dataset.runs);
+    assert_eq!(dynocar_workshop::dataset::load(&path).unwrap().runs, dataset.runs);
     convert(&at("dataset"), &at("again.mcap"));
     let (one, two) = (Recording::load(&path).unwrap(), Recording::load(&at("again.mcap")).unwrap());
     assert_eq!(one.samples, two.samples);
     // A dataset that was no recording comes back file by file.
     convert(&crate::support::config_folder().join("demo"), &at("demo.mcap"));
     let demo = dynocar::dataset::load(&crate::support::config_folder().join("demo")).unwrap();
-    assert_eq!(dynocar_mcap::dataset::load(&at("demo.mcap")).unwrap(), demo);
+    assert_eq!(dynocar_workshop::dataset::load(&at("demo.mcap")).unwrap(), demo);
     convert(&at("demo.mcap"), &at("demo"));
     for file in ["dataset.toml", "train.toml", "track.toml", "runs/01.csv", "runs/06.csv"] {
         let original =

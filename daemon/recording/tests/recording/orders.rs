@@ -4,11 +4,11 @@
 use std::path::{Path, PathBuf};
 
 use dynocar::dataset::{self, Source};
-use dynocar_mcap::convert::{ModelFiles, to_dataset};
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::topic::Message;
 use dynocar_mcap::writing::{RecordingWriter, WallClock};
 use dynocar_shared::{TrainId, TrainSample};
+use dynocar_workshop::convert::{ModelFiles, to_dataset};
 
 use crate::support::{config_folder, samples};
 
@@ -157,7 +157,7 @@ fn of_several_trains_the_chosen_one_is_read() {
         let read = dataset::load(&folder).unwrap();
         assert_eq!(read.train.mass_kg, mass_kg);
         let source = Source { path: &path, train: Some(TrainId(train)) };
-        assert_eq!(dynocar_mcap::dataset::load(source).unwrap(), read);
+        assert_eq!(dynocar_workshop::dataset::load(source).unwrap(), read);
         let speeds = read.runs.iter().flat_map(|run| &run.samples).map(|it| it.speed_mps);
         assert!(speeds.eq(own.iter().map(|it| it.speed_mps + more_mps)), "train {train}");
     }

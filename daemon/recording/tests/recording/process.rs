@@ -7,6 +7,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use crate::support_site::{Controller, TRAIN, TestSite, await_true};
+use dynocar::config::DaemonConfig;
 use dynocar_mcap::event::EventKind;
 use dynocar_mcap::reading::{Ending, read};
 use dynocar_mcap::recording::Recording;
@@ -14,6 +15,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use dynocar_transport::channel::Transport;
 use dynocar_transport::monotonic_now_ns;
+use dynocar_workshop::verify::{Configurations, Outcome, overlay, text, verify};
 use rustix::process::{Pid, Signal, kill_process};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-recording");
@@ -110,14 +112,17 @@ fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() 
     assert_eq!(read(&whole, &mut again).unwrap(), Ending::Whole);
     assert_eq!((&again.samples, &again.snapshots), (&left.samples, &left.snapshots));
 
-    let verified = run(&["verify", "--with"], &[&site.at("daemon.toml"), &whole]);
-    let printed = words(&verified);
+    let configurations = Configurations::of(&again).unwrap();
+    let verified = verify(&again, &configurations);
+    let other = DaemonConfig::load(&site.at("daemon.toml")).unwrap();
+    let recorded = configurations.of_epoch(verified.last().unwrap().epoch).0;
+    let printed = text(&verified) + &overlay([recorded, &other], &again.samples, "daemon.toml");
     assert_eq!(printed.matches("daemon of epoch").count(), 2, "{printed}");
     assert!(printed.contains("recorded configuration"), "{printed}");
     // On a machine so busy that samples are lost, daemon and recorder did not take the same.
     let lost = left.snapshots.iter().any(|it| it.samples_lost > 0)
         || count(&site, EventKind::SamplesLost) > 0;
-    assert!(lost || verified.status.success(), "{printed}");
+    assert!(lost || verified.iter().all(|it| it.outcome == Outcome::Same), "{printed}");
     assert!(lost || !printed.contains("cannot"), "{printed}");
 }
 

@@ -5,11 +5,12 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use dynocar_mcap::convert::{ModelFiles, from_dataset, to_dataset};
 use dynocar_mcap::copying::recover;
 use dynocar_mcap::error::CopyError;
 use dynocar_mcap::reading::{ChannelInfo, Item, Raw, Visitor, read};
 use dynocar_mcap::recording::Recording;
+use dynocar_workshop::convert::{ModelFiles, to_dataset};
+use dynocar_workshop::from_dataset::from_dataset;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, WriteOptions, Writer};
 

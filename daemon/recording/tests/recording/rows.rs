@@ -6,10 +6,10 @@ use dynocar_shared::SampleField;
 use proptest::prelude::*;
 
 use dynocar_analysis::dataset::{Dataset, DatasetFiles};
-use dynocar_mcap::convert::{ModelFiles, dataset_of, from_rows, is_rows, to_rows};
 use dynocar_mcap::recording::Recording;
 use dynocar_shared::layout::Words;
 use dynocar_shared::{TrainId, TrainSample};
+use dynocar_workshop::convert::{ModelFiles, dataset_of, from_rows, is_rows, to_rows};
 
 use crate::support::config_folder;
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use crate::support::{samples, snapshots, write};
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::writing::{RecordingWriter, WallClock};
-use dynocar_recording::verify::{Configurations, Outcome, Verified, verify};
 use dynocar_shared::{ParameterSnapshot, TrainSample};
+use dynocar_workshop::verify::{Configurations, Outcome, Verified, verify};
 
 fn verified(samples: &[TrainSample], snapshots: &[ParameterSnapshot]) -> Vec<Verified> {
     let folder = tempfile::tempdir().unwrap();

@@ -17,10 +17,10 @@ use dynocar_analysis::dataset::{SourcePosition, parse_track, parse_train, top_ke
 use dynocar_shared::TrainId;
 use serde::Serialize;
 
+use crate::dataset;
 use dynocar::cli::Failure;
 use dynocar::dataset::{FileKind, LoadError, Source, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
-use dynocar_mcap::dataset;
 
 /// Runs `dynocar check`.
 ///

@@ -12,9 +12,9 @@ use dynocar_analysis::explain::selection::Progress;
 use dynocar_analysis::explain::{Explanation, explain, explain_many};
 use dynocar_analysis::parallel;
 
+use crate::dataset::{FilesOfDataset, open};
 use dynocar::cli::Failure;
 use dynocar::dataset::{LoadError, Source};
-use dynocar_mcap::dataset::{FilesOfDataset, open};
 use dynocar_shared::TrainId;
 
 /// The runs of a dataset.

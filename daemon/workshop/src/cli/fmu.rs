@@ -7,6 +7,7 @@ use dynocar_analysis::dataset::{DatasetError, DatasetFiles};
 use dynocar_fmu::variables::ModelFile;
 use dynocar_fmu::{ESTIMATORS, PLANT, STEP_DEFAULT_S, STEP_MAX_S};
 
+use crate::dataset;
 use crate::fmu::{FmuError, INPUTS_MARK, archive, find_library, inputs, read_library};
 use dynocar::cli::Failure;
 use dynocar::dataset::{labelled_text, load_track, load_train};
@@ -14,7 +15,6 @@ use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{
     report_line, require_file, require_folder, require_replaceable, write_file, write_in_folder,
 };
-use dynocar_mcap::dataset;
 
 /// Write the estimators, or the train itself, as an FMU for a simulator.
 ///

@@ -17,13 +17,13 @@ use serde::Serialize;
 use self::answer::EstimatorAnswer;
 use self::runs::{EstimatorSpread, RunAnswer};
 use super::text::diagnostics;
+use crate::dataset;
 use dynocar::cli::Failure;
 use dynocar::dataset::SourceArguments;
 use dynocar::output::{give, require_files};
 use dynocar_analysis::identify::{
     default_estimators, identify, recommended_estimators, samples_of_runs,
 };
-use dynocar_mcap::dataset;
 
 /// Estimate resistance, mass, adhesion and friction from recorded runs.
 #[derive(Debug, Args)]

@@ -3,6 +3,7 @@
 
 pub mod brakes;
 pub mod check;
+mod convert;
 mod documents;
 pub mod explain;
 mod explained;
@@ -17,13 +18,17 @@ mod survey;
 mod text;
 mod threads;
 mod train_text;
+mod verify;
 
 use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use dynocar::cli::check::CheckArguments;
+use dynocar::cli::replay::{self, ReplayArguments};
 use dynocar::cli::{Failure, parse};
+
+use crate::dataset::load;
 
 /// Dynocar, a dynamometer car in software: the workshop, which `dynocar` calls.
 #[derive(Debug, Parser)]
@@ -45,6 +50,11 @@ enum Command {
     Survey(survey::SurveyArguments),
     Fmu(fmu::FmuArguments),
     Learn(learn::LearnArguments),
+    Convert(convert::ConvertArguments),
+    #[command(hide = true)]
+    Verify(verify::VerifyArguments),
+    #[command(hide = true)]
+    Play(ReplayArguments),
     Completions(documents::CompletionsArguments),
     Man(documents::ManArguments),
 }
@@ -62,6 +72,9 @@ impl Command {
             Command::Survey(arguments) => survey::execute(arguments),
             Command::Fmu(arguments) => fmu::execute(arguments),
             Command::Learn(arguments) => learn::execute(arguments),
+            Command::Convert(arguments) => convert::execute(arguments),
+            Command::Verify(arguments) => verify::execute(arguments),
+            Command::Play(arguments) => replay::execute(arguments, |source| load(source)),
             Command::Completions(arguments) => documents::complete(arguments, all_commands()),
             Command::Man(arguments) => documents::write_manual(arguments, all_commands()),
         }
@@ -85,14 +98,26 @@ impl Command {
 /// The commands of `dynocar`, those of the workshop with their own options.
 fn all_commands() -> clap::Command {
     let own = Arguments::command();
-    own.get_subcommands().fold(dynocar::cli::commands(), |all, command| {
-        all.mut_subcommand(command.get_name(), |_| command.clone())
-    })
+    own.get_subcommands()
+        .filter(|it| !it.is_hide_set())
+        .fold(dynocar::cli::commands(), |all, command| {
+            all.mut_subcommand(command.get_name(), |_| command.clone())
+        })
 }
 
 /// All commands of the workshop, with their options.
 pub fn commands() -> clap::Command {
     Arguments::command()
+}
+
+/// Carries out a command line, for a caller in the same process.
+///
+/// # Errors
+///
+/// A command line that is wrong is an input failure; else as the command.
+pub fn execute<'w>(words: impl IntoIterator<Item = &'w str>) -> Result<(), Failure> {
+    let words = std::iter::once("dynocar").chain(words);
+    Arguments::try_parse_from(words).map_err(Failure::input)?.command.execute()
 }
 
 /// Parses the command line, runs the command, reports a failure on standard error.

@@ -11,11 +11,11 @@ use dynocar_analysis::stops::{
 use serde::Serialize;
 
 use super::text::{TextTable, diagnostics};
+use crate::dataset;
 use crate::report::html::Columns;
 use dynocar::cli::Failure;
 use dynocar::dataset::SourceArguments;
 use dynocar::output::{give, require_files};
-use dynocar_mcap::dataset;
 use dynocar_shared::HALF_95;
 
 /// Estimate deceleration and stopping distance from recorded stops, without forces.

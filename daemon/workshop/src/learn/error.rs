@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use crate::convert::ToDatasetError;
 use dynocar::models::ModelsError;
 use dynocar::state::StateError;
 use dynocar::storage::StorageError;
-use dynocar_mcap::convert::ToDatasetError;
 
 /// Why learning does not go on.
 #[derive(Debug, thiserror::Error)]

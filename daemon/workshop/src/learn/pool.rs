@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use dynocar::dataset::{DatasetFolder, LoadError};
+use dynocar::dataset::LoadError;
 use dynocar::models::ModelText;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar_analysis::dataset::{
@@ -19,6 +19,7 @@ use toml::Table;
 
 use super::memory::Memory;
 use super::source::{FoundRun, report_unusable};
+use crate::dataset::FilesOfDataset;
 use crate::updated::name_model;
 
 /// Bounds of what is explained together.
@@ -195,7 +196,7 @@ fn duration_s(run: &Run) -> f64 {
 /// The files of a dataset, but for those of train and line.
 #[derive(Debug)]
 pub struct Overlay<'a> {
-    dataset: DatasetFolder,
+    dataset: FilesOfDataset,
     model: &'a ModelText,
 }
 
@@ -206,7 +207,7 @@ impl<'a> Overlay<'a> {
     ///
     /// When there is no dataset.
     pub fn at(folder: &Path, model: &'a ModelText) -> Result<Self, LoadError> {
-        Ok(Overlay { dataset: DatasetFolder::at(folder)?, model })
+        Ok(Overlay { dataset: FilesOfDataset::at(folder)?, model })
     }
 
     /// The description, which names the files of the model.

@@ -10,9 +10,9 @@ use tracing::info;
 
 use super::error::LearnError;
 use super::memory::Memory;
+use crate::convert::{ModelFiles, ToDatasetError, to_dataset};
 use dynocar::models::Moment;
 use dynocar::storage::{Disk, Storage, StorageError, part_of};
-use dynocar_mcap::convert::{ModelFiles, ToDatasetError, to_dataset};
 
 /// How a finished recording ends.
 const MCAP_END: &[u8] = b"\x89MCAP0\r\n";

@@ -5,9 +5,9 @@ use std::time::SystemTime;
 use dynocar_analysis::dataset::MANIFEST_FILE;
 use sha2::{Digest, Sha256};
 
+use crate::dataset;
 use dynocar::dataset::{LoadError, Source};
 use dynocar::models::moment::Moment;
-use dynocar_mcap::dataset;
 
 /// A file and what is in it.
 #[derive(Clone, Debug, PartialEq, Eq)]

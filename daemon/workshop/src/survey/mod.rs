@@ -17,11 +17,11 @@ pub mod write;
 
 use std::path::{Path, PathBuf};
 
+use crate::dataset::load;
 use dynocar::dataset::Source;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, survey};
-use dynocar_mcap::dataset::load;
 
 use answer::SurveyAnswer;
 use material::Material;

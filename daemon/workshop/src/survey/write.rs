@@ -12,10 +12,10 @@ use toml::{Table, Value};
 
 use super::material::{Material, SurveyFailure};
 use super::trip_rows::{TripColumn, columns, run_csv};
+use crate::dataset::open;
 use crate::track_text::TrackText;
 use crate::updated::set;
 use dynocar::output::{require_replaceable, write_in_folder};
-use dynocar_mcap::dataset::open;
 
 /// Length of the beginning by which a file of a survey is known.
 const MARK_LENGTH: usize = 20;

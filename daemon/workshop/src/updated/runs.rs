@@ -4,11 +4,11 @@
 
 use std::path::Path;
 
+use crate::dataset::FilesOfDataset;
 use dynocar::dataset::{LoadError, read_text};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{OutputError, require_new, write_in_folder};
 use dynocar_analysis::dataset::DatasetFiles;
-use dynocar_mcap::dataset::FilesOfDataset;
 use toml::{Table, Value};
 
 use crate::paths::from_folder;

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
+use dynocar::dataset::is_parquet_path;
 use dynocar::text_file::{read_beginning, read_bytes};
-use dynocar::unpacking::{columns_of, is_parquet};
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
 use dynocar_analysis::dataset::guess::layout;
 use dynocar_analysis::dataset::train_rows::TrainRows;
@@ -14,6 +14,7 @@ use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, RunColumns,
     SourcePosition, TrainColumn,
 };
+use dynocar_parquet::columns::columns_of;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use crate::paths::{self, real};
@@ -74,7 +75,7 @@ pub fn texts(
 
 /// Parquet files as texts of their columns of numbers and times, as CSV has them; `None` for other files.
 fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
-    match paths.iter().filter(|path| is_parquet(path)).count() {
+    match paths.iter().filter(|path| is_parquet_path(path)).count() {
         0 => return Ok(None),
         count if count == paths.len() => {}
         _ => return Err(Failure::Input("--csv: expected files of one format".into())),
@@ -84,7 +85,7 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
         let refused =
             |words: String| Failure::At(SourcePosition::whole(&label), format!("{label}: {words}"));
         let RunColumns { columns: names, trains } =
-            columns_of(path, &[], &TrainRows::Unsaid).map_err(&refused)?;
+            columns_of(path, &[], &TrainRows::Unsaid).map_err(|it| refused(it.to_string()))?;
         let mut columns: Vec<(String, Result<Vec<f64>, String>)> = Vec::new();
         for name in names.iter().map(|it| it.name.clone()) {
             let read = numbers_of(path, &name);
@@ -105,8 +106,8 @@ fn tables(paths: &[PathBuf]) -> Result<Option<Vec<NamedText>>, Failure> {
 /// A column's numbers, times in s.
 fn numbers_of(path: &Path, name: &str) -> Result<Vec<f64>, String> {
     let mapping = ColumnMapping::of_time(name);
-    let columns = columns_of(path, &[mapping], &TrainRows::All)?.columns;
-    columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
+    let read = columns_of(path, &[mapping], &TrainRows::All).map_err(|it| it.to_string())?;
+    read.columns.into_iter().find_map(|it| it.values).ok_or_else(|| "no values".into())
 }
 
 /// Columns as text; one that cannot be mapped holds the type of what it holds.

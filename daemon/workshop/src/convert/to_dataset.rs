@@ -14,8 +14,8 @@ use dynocar_shared::{SampleField, TrainSample};
 
 use super::recorded_dataset::{Content, RecordedDataset};
 use super::rows::WHEEL_SLIDE;
-use crate::error::{AtPath, ReadError};
-use crate::recording::Recording;
+use dynocar_mcap::error::{AtPath, ReadError};
+use dynocar_mcap::recording::Recording;
 
 /// Samples for each time that the numbers begin anew, at least: below it they are of several controllers.
 const RESTARTS_RARE: usize = 20;

@@ -1,15 +1,13 @@
-//! Recordings to datasets and back, without loss.
+//! Recordings to datasets, without loss.
 //!
 //! A dataset made of a recording holds each sample as a row with all of its fields under their own
 //! names, of which `dataset.toml` maps what a dataset knows; from such rows the same samples come back,
 //! to the bit. A recording made of a dataset has the dataset's files attached, and gives those back.
 
-mod from_dataset;
 mod recorded_dataset;
 mod rows;
 mod to_dataset;
 
-pub use from_dataset::{FromDatasetError, from_dataset};
 pub use recorded_dataset::{Content, RecordedDataset};
 pub use rows::{RowError, from_rows, is_rows, to_rows};
 pub use to_dataset::{ModelFiles, ToDatasetError, Unpacked, dataset_of, to_dataset, unpack};

@@ -5,18 +5,18 @@ use std::io::BufWriter;
 use std::path::{Component, Path};
 
 use dynocar::cli::Failure;
-use dynocar::dataset::{self, LoadError};
+use dynocar::dataset::LoadError;
 use dynocar::storage::{Disk, settle};
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, MANIFEST_FILE};
 use dynocar_analysis::identify::published_samples;
 use dynocar_shared::{TrainId, TrainSample};
-use mcap::McapError;
 
-use super::rows::{RowError, from_rows, is_rows};
-use crate::error::WriteError;
-use crate::recording::DATASET_FOLDER;
-use crate::topic::Message;
-use crate::writing::{RecordingWriter, WallClock};
+use crate::convert::{RowError, from_rows, is_rows};
+use crate::dataset::open;
+use dynocar_mcap::error::WriteError;
+use dynocar_mcap::recording::DATASET_FOLDER;
+use dynocar_mcap::topic::Message;
+use dynocar_mcap::writing::{McapError, RecordingWriter, WallClock};
 
 /// Between two runs of a dataset, for nobody knows the time that passed, in ns.
 const BETWEEN_RUNS_NS: i64 = 1_000_000_000;
@@ -60,7 +60,7 @@ impl From<FromDatasetError> for Failure {
 ///
 /// See [`FromDatasetError`].
 pub fn from_dataset(folder: &Path, path: &Path) -> Result<usize, FromDatasetError> {
-    let (files, head) = dataset::open(folder)?;
+    let (files, head) = open(folder)?;
     let manifest = &head.manifest;
     let mut names = vec![MANIFEST_FILE.to_owned(), manifest.train_file.path.clone()];
     names.extend(manifest.track_file.iter().map(|it| it.path.clone()));
@@ -70,12 +70,10 @@ pub fn from_dataset(folder: &Path, path: &Path) -> Result<usize, FromDatasetErro
         let (label, file) = (files.label(MANIFEST_FILE), file.clone());
         return Err(FromDatasetError::Outside { label, file });
     }
-    let dataset = dataset::load(folder)?;
+    let dataset = head.read(&files).map_err(LoadError::from)?;
     // They were read a moment ago.
-    let contents: Vec<(String, Vec<u8>)> = names
-        .into_iter()
-        .map(|name| (name.clone(), std::fs::read(files.path_of(&name)).unwrap_or_default()))
-        .collect();
+    let contents: Vec<(String, Vec<u8>)> =
+        names.into_iter().map(|name| (name.clone(), files.bytes(&name).into_owned())).collect();
     let samples = samples(&dataset, &contents)?;
     write(path, &contents, &samples).map_err(WriteError::of(path))?;
     Ok(samples.len())

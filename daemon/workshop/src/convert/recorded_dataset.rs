@@ -4,13 +4,10 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use dynocar::text_file::{require_text, text_of};
-use dynocar::unpacking::columns_of;
 use dynocar_analysis::dataset::encoding::decoded;
-use dynocar_analysis::dataset::{
-    DatasetFiles, FileProblem, Manifest, RunColumns, RunContent, is_parquet,
-};
+use dynocar_analysis::dataset::{DatasetFiles, FileProblem, Manifest, RunContent, is_parquet};
+use dynocar_parquet::columns::columns_of_bytes;
 use dynocar_shared::TrainSample;
-use tempfile::NamedTempFile;
 
 use super::rows::{columns_of_samples, to_rows};
 
@@ -72,9 +69,11 @@ impl DatasetFiles for RecordedDataset {
             Content::Samples(samples) => {
                 Ok(RunContent::Columns(columns_of_samples(samples, &manifest.columns)))
             }
-            Content::Bytes(bytes) if is_parquet(path) => parquet_columns(bytes, manifest)
-                .map(RunContent::Columns)
-                .map_err(FileProblem::Table),
+            Content::Bytes(bytes) if is_parquet(path) => {
+                columns_of_bytes(bytes.clone(), &manifest.columns, &manifest.train_rows)
+                    .map(RunContent::Columns)
+                    .map_err(|problem| FileProblem::Table(problem.to_string()))
+            }
             Content::Bytes(bytes) => {
                 let encoding = manifest.layout.encoding;
                 require_text(bytes, encoding)?;
@@ -86,12 +85,4 @@ impl DatasetFiles for RecordedDataset {
     fn label(&self, path: &str) -> String {
         format!("{}/{path}", self.recording.display())
     }
-}
-
-/// The columns of an attached Parquet file, by the program that reads it from the disk.
-fn parquet_columns(bytes: &[u8], manifest: &Manifest) -> Result<RunColumns, String> {
-    let unwritten = |error: std::io::Error| error.to_string();
-    let file = NamedTempFile::with_prefix("dynocar-").map_err(unwritten)?;
-    std::fs::write(file.path(), bytes).map_err(unwritten)?;
-    columns_of(file.path(), &manifest.columns, &manifest.train_rows)
 }

@@ -6,7 +6,7 @@ use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::schema::{Field, Missing};
 use dynocar_shared::{TrainId, TrainSample};
 
-use crate::schema::SAMPLE_FIELDS;
+use dynocar_mcap::schema::SAMPLE_FIELDS;
 
 /// Column of the wheel-slide bit of `flags`, for a dataset knows no bits.
 pub const WHEEL_SLIDE: &str = "wheel_slide";

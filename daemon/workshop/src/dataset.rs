@@ -3,24 +3,32 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use dynocar::dataset::{DatasetFolder, LoadError, Source, is_parquet_recording};
+use dynocar::dataset::{DatasetFolder, LoadError, Source, is_parquet_path};
 use dynocar::output::report_line;
-use dynocar::unpacking::UnpackError;
+use dynocar::text_file::require_regular;
 use dynocar_analysis::dataset::{
-    Dataset, DatasetFiles, DatasetHead, FileProblem, Manifest, RunContent,
+    Dataset, DatasetFiles, DatasetHead, FileProblem, Manifest, RunContent, is_parquet,
 };
 use dynocar_model::units::Unit;
 
-use crate::convert::{ModelFiles, RecordedDataset, ToDatasetError, Unpacked, dataset_of};
-use crate::recording::Recording;
+use crate::convert::{ModelFiles, RecordedDataset, dataset_of};
+use dynocar_mcap::recording::Recording;
+use dynocar_parquet::columns::columns_of;
+use dynocar_parquet::reading;
 
 /// True for the name of a recording.
 pub fn is_recording(path: &Path) -> bool {
-    is_mcap(path) || is_parquet_recording(path)
+    let is_mcap = path.extension().is_some_and(|it| it == "mcap") && path.is_file();
+    is_mcap || is_parquet_path(path) && path.exists()
 }
 
-fn is_mcap(path: &Path) -> bool {
-    path.extension().is_some_and(|it| it == "mcap") && path.is_file()
+/// Reads the samples of a recording, and what is attached.
+fn samples_of(path: &Path) -> Result<Recording, String> {
+    if is_parquet_path(path) {
+        let content = reading::read(path).map_err(|error| error.to_string())?;
+        return Ok(content.into_recording());
+    }
+    Recording::of_samples(&[path.to_path_buf()]).map_err(|error| error.to_string())
 }
 
 /// The files of a dataset.
@@ -40,19 +48,16 @@ impl FilesOfDataset {
     /// When there is nothing, or what is no dataset.
     pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
         let source = source.into();
-        if !is_mcap(source.path) {
+        if !is_recording(source.path) {
             return DatasetFolder::at(source).map(FilesOfDataset::Folder);
         }
-        let train = source.train.map(|it| it.0);
-        let paths = [source.path.to_path_buf()];
-        let read = || -> Result<(RecordedDataset, Unpacked), ToDatasetError> {
-            let recording = Recording::of_samples(&paths)?;
-            dataset_of(source.path, recording, train, &ModelFiles::default())
+        let read = || {
+            let train = source.train.map(|it| it.0);
+            dataset_of(source.path, samples_of(source.path)?, train, &ModelFiles::default())
+                .map_err(|error| error.to_string())
         };
-        let (dataset, unpacked) = read().map_err(|error| UnpackError::Content {
-            path: source.path.into(),
-            problem: error.to_string(),
-        })?;
+        let refused = |problem| LoadError::Recording { path: source.path.into(), problem };
+        let (dataset, unpacked) = read().map_err(refused)?;
         if let Some(broken) = &unpacked.broken {
             report_line(&format!("dynocar: {broken}; `dynocar recover` makes it whole"));
         }
@@ -61,10 +66,7 @@ impl FilesOfDataset {
 
     /// True for a recording, beside which nothing of them lies.
     pub fn is_recording(&self) -> bool {
-        match self {
-            FilesOfDataset::Folder(folder) => folder.is_unpacked(),
-            FilesOfDataset::Recording(_) => true,
-        }
+        matches!(self, FilesOfDataset::Recording(_))
     }
 
     /// Where a file lies, or would lie.
@@ -99,7 +101,17 @@ impl DatasetFiles for FilesOfDataset {
     }
 
     fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
-        self.files().read_run(path, manifest)
+        let FilesOfDataset::Folder(folder) = self else {
+            return self.files().read_run(path, manifest);
+        };
+        if !is_parquet(path) {
+            return folder.read_run(path, manifest);
+        }
+        let file = folder.path_of(path);
+        require_regular(&file)?;
+        columns_of(&file, &manifest.columns, &manifest.train_rows)
+            .map(RunContent::Columns)
+            .map_err(|problem| FileProblem::Table(problem.to_string()))
     }
 
     fn label(&self, path: &str) -> String {
@@ -114,7 +126,7 @@ impl DatasetFiles for FilesOfDataset {
 /// The first mistake, with file, line and choices.
 pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(FilesOfDataset, DatasetHead), LoadError> {
     let source = source.into();
-    if !is_mcap(source.path) {
+    if !is_recording(source.path) {
         let (folder, head) = dynocar::dataset::open(source)?;
         return Ok((FilesOfDataset::Folder(folder), head));
     }

@@ -1,0 +1,226 @@
+//! A Parquet file that is open: its columns, and the cells of one after the other.
+
+use std::collections::BTreeMap;
+
+use parquet::column::reader::ColumnReaderImpl;
+use parquet::data_type::DataType;
+use parquet::file::metadata::KeyValue;
+use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
+use parquet::schema::types::Type;
+
+use crate::arrow_schema::{Hint, hints};
+use crate::column_type::{ColumnType, Kind, is_list};
+use crate::error::TableProblem;
+
+pub use parquet::column::reader::ColumnReader;
+
+/// Rows decoded at once: few enough that they stay in the processor's memory until they are taken.
+const BATCH_ROWS: usize = 8192;
+/// Rows for which room is made before they come: a file that promises more may be damaged.
+const ROWS_RESERVED_MAX: usize = 1 << 24;
+
+/// A Parquet file.
+pub struct ParquetFile {
+    reader: Box<dyn FileReader>,
+    /// Its columns.
+    pub columns: Vec<FileColumn>,
+}
+
+/// A column of a Parquet file.
+#[derive(Clone, Debug)]
+pub struct FileColumn {
+    /// Its name.
+    pub name: String,
+    /// Its type.
+    pub column_type: ColumnType,
+    /// The type of the entries, where it holds lists of plain values.
+    pub entries: Option<ColumnType>,
+    /// The place of its values.
+    leaf: usize,
+}
+
+/// A column in a part of a file's rows.
+pub struct Part {
+    /// Reads its values.
+    pub reader: ColumnReader,
+    /// The layout of its cells.
+    pub cells: CellLayout,
+}
+
+/// Layout of the cells in a part of a column.
+#[derive(Clone, Copy, Debug)]
+pub struct CellLayout {
+    rows: usize,
+    /// The level of a value that is there.
+    level: i16,
+}
+
+impl ParquetFile {
+    /// Opens a file of anybody.
+    ///
+    /// # Errors
+    ///
+    /// When it is no Parquet.
+    pub fn open(content: impl ChunkReader + 'static) -> Result<Self, TableProblem> {
+        let reader = SerializedFileReader::new(content).map_err(TableProblem::not_parquet)?;
+        let metadata = reader.metadata().file_metadata();
+        let schema = metadata.schema_descr();
+        let mut hints = hints(metadata.key_value_metadata().map_or(&[], |it| it));
+        let fields = schema.root_schema().get_fields();
+        // Another tool may have changed the columns and left the metadata.
+        hints.resize(if hints.len() == fields.len() { fields.len() } else { 0 }, Hint::None);
+        hints.resize(fields.len(), Hint::None);
+        // A structure has several places of values, of which none is read.
+        let of_leaf = |leaf| (schema.get_column_root_idx(leaf), leaf);
+        let leaves: BTreeMap<usize, usize> = (0..schema.num_columns()).map(of_leaf).collect();
+        let column = |(field, hint): (usize, Hint)| FileColumn {
+            name: fields[field].name().to_owned(),
+            column_type: ColumnType::of(&fields[field], Some(hint)),
+            entries: entry_of(&fields[field]).map(|it| ColumnType::of(it, None)),
+            leaf: leaves.get(&field).copied().unwrap_or(0),
+        };
+        let columns = hints.into_iter().enumerate().map(column).collect();
+        Ok(ParquetFile { reader: Box::new(reader), columns })
+    }
+
+    /// Its metadata.
+    pub fn key_values(&self) -> &[KeyValue] {
+        self.reader.metadata().file_metadata().key_value_metadata().map_or(&[], |it| it)
+    }
+
+    /// The number of its rows for which room may be made.
+    pub fn rows_reserved(&self) -> usize {
+        let rows = self.reader.metadata().file_metadata().num_rows();
+        rows.try_into().unwrap_or(0).min(ROWS_RESERVED_MAX)
+    }
+
+    /// Reads a column, part of the rows after part.
+    ///
+    /// # Errors
+    ///
+    /// When the file is damaged, and as `take`.
+    pub fn read(
+        &self,
+        column: &FileColumn,
+        mut take: impl FnMut(Part) -> Result<(), TableProblem>,
+    ) -> Result<(), TableProblem> {
+        for index in 0..self.reader.num_row_groups() {
+            let group = self.reader.get_row_group(index).map_err(TableProblem::not_parquet)?;
+            let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+            let level = group.metadata().column(column.leaf).column_descr().max_def_level();
+            let reader = group.get_column_reader(column.leaf).map_err(TableProblem::not_parquet)?;
+            take(Part { reader, cells: CellLayout { rows, level } })?;
+        }
+        Ok(())
+    }
+}
+
+/// The entries of a field that holds lists of plain values.
+fn entry_of(field: &Type) -> Option<&Type> {
+    let entries = if is_list(field) { only_field(field)? } else { return None };
+    only_field(entries).filter(|it| it.is_primitive())
+}
+
+fn only_field(group: &Type) -> Option<&Type> {
+    if !group.is_group() {
+        return None;
+    }
+    let [only] = group.get_fields() else { return None };
+    Some(only)
+}
+
+impl CellLayout {
+    /// Takes each row's value, `None` where it is missing.
+    ///
+    /// # Errors
+    ///
+    /// When the file is damaged.
+    pub fn each<T: DataType>(
+        self,
+        reader: ColumnReaderImpl<T>,
+        mut take: impl FnMut(Option<&T::T>),
+    ) -> Result<(), TableProblem> {
+        self.batches(reader, |values, levels, _| {
+            if levels.iter().all(|it| *it == self.level) {
+                values.iter().for_each(|it| take(Some(it)));
+            } else {
+                let mut values = values.iter();
+                for level in levels {
+                    take(if *level == self.level { values.next() } else { None });
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// Takes each row's list of as many entries.
+    ///
+    /// # Errors
+    ///
+    /// When the file is damaged, or a list has other than `entries` entries.
+    pub fn each_list<T: DataType>(
+        self,
+        reader: ColumnReaderImpl<T>,
+        entries: usize,
+        mut take: impl FnMut(&[T::T]),
+    ) -> Result<(), TableProblem> {
+        self.batches(reader, |values, levels, starts| {
+            // Each list's first entry has the level 0.
+            let is_whole =
+                |it: &[i16]| it.len() == entries && it[0] == 0 && it[1..].iter().all(|it| *it > 0);
+            if levels.len() != values.len() || !starts.chunks(entries).all(is_whole) {
+                return Err(damaged(&format!("lists of other than {entries} entries")));
+            }
+            values.chunks(entries).for_each(&mut take);
+            Ok(())
+        })
+    }
+
+    fn batches<T: DataType>(
+        self,
+        mut reader: ColumnReaderImpl<T>,
+        mut take: impl FnMut(&[T::T], &[i16], &[i16]) -> Result<(), TableProblem>,
+    ) -> Result<(), TableProblem> {
+        let (mut values, mut levels, mut starts) = (Vec::new(), Vec::new(), Vec::new());
+        let mut rows = 0;
+        loop {
+            values.clear();
+            levels.clear();
+            starts.clear();
+            let read = reader
+                .read_records(BATCH_ROWS, Some(&mut levels), Some(&mut starts), &mut values)
+                .map_err(TableProblem::not_parquet)?;
+            if read.0 == 0 {
+                break;
+            }
+            rows += read.0;
+            take(&values, &levels, &starts)?;
+        }
+        if rows == self.rows {
+            Ok(())
+        } else {
+            Err(damaged(&format!("{rows} of {} rows", self.rows)))
+        }
+    }
+}
+
+/// The error of a file that holds something else than it says.
+pub fn damaged(found: &str) -> TableProblem {
+    TableProblem::NotParquet(format!("damaged: {found}"))
+}
+
+impl FileColumn {
+    /// The words of what was found where another type was expected.
+    pub fn refused(&self, expected: impl Into<String>) -> TableProblem {
+        TableProblem::OtherType {
+            column: self.name.clone(),
+            expected: expected.into(),
+            found: self.column_type.words.clone(),
+        }
+    }
+
+    /// True where its values are of a kind.
+    pub fn is(&self, kind: Kind) -> bool {
+        self.column_type.kind == kind
+    }
+}

@@ -1,0 +1,67 @@
+//! `dynocar replay --verify`: every snapshot of a recording computed again.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use dynocar::cli::Failure;
+use dynocar::config::DaemonConfig;
+use dynocar::dataset::is_parquet_path;
+use dynocar::output::{print, report_line};
+use dynocar_mcap::error::CopyError;
+use dynocar_mcap::recording::Recording;
+
+use super::convert::one;
+use crate::verify::{Configurations, Outcome, overlay, text, verify};
+
+/// Compute every recorded snapshot again.
+#[derive(Debug, Args)]
+pub struct VerifyArguments {
+    /// The recording; of one that rotated, its files in order
+    #[arg(required = true)]
+    recording: Vec<PathBuf>,
+    /// Also say what this configuration of the daemon would have estimated
+    #[arg(long, value_name = "FILE")]
+    with: Option<PathBuf>,
+}
+
+/// Computes every snapshot of a recording again, and says what became of them.
+///
+/// # Errors
+///
+/// When it holds none, there is nothing to compute them by, or one is another.
+pub fn execute(arguments: &VerifyArguments) -> Result<(), Failure> {
+    let VerifyArguments { recording: paths, with } = arguments;
+    let recording = &if paths.iter().any(|it| is_parquet_path(it)) {
+        one(paths)?.into_recording()
+    } else {
+        Recording::load_all(paths).map_err(CopyError::from)?
+    };
+    let path = &paths[0];
+    if let Some(broken) = &recording.broken {
+        report_line(&format!("dynocar: {broken}"));
+    }
+    if recording.snapshots.is_empty() {
+        let words = "no snapshots: nothing to verify";
+        return Err(Failure::Input(format!("{}: {words}", path.display())));
+    }
+    let configurations = Configurations::of(recording);
+    let configurations =
+        configurations.map_err(|it| Failure::Input(format!("{}: {it}", path.display())))?;
+    let other = with.as_deref().map(DaemonConfig::load).transpose()?;
+    let verified = verify(recording, &configurations);
+    let (samples, snapshots) = (recording.samples.len(), recording.snapshots.len());
+    let names = paths.iter().map(|it| it.display().to_string()).collect::<Vec<_>>();
+    let names = names.join(", ");
+    print(&format!("{names}: {samples} samples, {snapshots} snapshots\n"))?;
+    print(&text(&verified))?;
+    if let (Some(other), Some(file)) = (&other, with) {
+        let newest = verified.last().map_or(0, |it| it.epoch);
+        let recorded = configurations.of_epoch(newest).0;
+        print(&overlay([recorded, other], &recording.samples, &file.display().to_string()))?;
+    }
+    if verified.iter().all(|it| it.outcome == Outcome::Same) {
+        Ok(())
+    } else {
+        Err(Failure::Verdict(1))
+    }
+}
