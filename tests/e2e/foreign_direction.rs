@@ -1,4 +1,4 @@
-//! Recordings without a position, of runs in both directions of one line.
+//! Recordings without a position, of runs in both directions of one line, and their gradients' units.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -52,6 +52,33 @@ fn without_a_position_a_run_against_the_gradient_is_turned_and_that_is_a_doubt()
         assert!(said.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{said}");
         let mass_t = mass_t(&site);
         assert!((mass_t.0 - 1692.0).abs() < 3.0 * mass_t.1, "{mass_t:?}");
+    }
+}
+
+#[test]
+fn a_gradient_in_a_unit_that_its_name_hides_is_corrected_and_one_that_it_denies_is_refused() {
+    let degrees = 180.0 / std::f64::consts::PI * 1e-3;
+    for (name, factor, unit) in [
+        ("slope", degrees, Some("deg")),
+        ("grade", degrees, Some("deg")),
+        ("slope", 0.1, Some("%")),
+        ("slope [%]", degrees, None),
+        ("gradient [deg]", 0.1, None),
+        ("gradient [permille]", degrees, None),
+    ] {
+        let header = format!("time [s],v [m/s],traction_force [N],brake_force [N],{name}\n");
+        let texts = without_position(&header, factor);
+        let names = ["a.csv", "b.csv", "c.csv"];
+        let files: Vec<(&str, &[u8])> =
+            names.into_iter().zip(texts.iter().map(|it| it.as_bytes())).collect();
+        let (_site, read, said) = described(&files, &["--mass-t", "1692", "--length-m", "310.9"]);
+        let diagnostics = read.expect("a dataset").diagnostics();
+        let refused = diagnostics.iter().find(|it| it.code == "gradient_scale");
+        assert_eq!(refused.is_some(), unit.is_none(), "{name}: {refused:?}\n{said}");
+        if let Some(unit) = unit {
+            let found = said.lines().find(|it| it.contains(&format!("'{name}'"))).expect(&said);
+            assert!(found.contains(&format!(" {unit} ")), "{name}: {found}");
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Diagnostics to know before results from a dataset are believed, each once.
 
+use dynocar_core::plausibility::diagnosis::gradient_fault;
+use dynocar_core::plausibility::window_balance::Balance;
 use dynocar_core::plausibility::{DetectedFault, Severity};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
@@ -59,7 +61,9 @@ pub fn diagnostics<'r>(
     let mut diagnostics: Vec<_> = of_declared.iter().map(|it| of(Vec::new(), it)).collect();
     // The factors of an input fault that several runs share, from the lowest to the highest.
     let mut faults: Vec<(usize, DetectedFault, Unit, (f64, f64))> = Vec::new();
+    let mut all = AllRuns::default();
     for run in runs {
+        all.push(run);
         for diagnostic in run.diagnostics.iter().filter(|it| it.severity > Severity::Info) {
             let known = match diagnostic.fault {
                 Some((detected, read_as)) => {
@@ -93,6 +97,32 @@ pub fn diagnostics<'r>(
     for (index, detected, read_as, range) in faults {
         diagnostics[index].text = detected.words_for(range, &read_as);
     }
+    diagnostics.extend(all.gradient_scale());
     diagnostics.sort_by_key(|diagnostic| std::cmp::Reverse(diagnostic.severity));
     diagnostics
+}
+
+/// What runs show together that are too short to show it alone, as those from stop to stop.
+#[derive(Default)]
+struct AllRuns {
+    balance: Option<(Balance, Unit)>,
+    files: Vec<String>,
+    has_fault: bool,
+}
+
+impl AllRuns {
+    fn push(&mut self, run: &Run) {
+        let of_all = || (Balance::of_all(), run.gradient_unit);
+        self.balance.get_or_insert_with(of_all).0.add(&run.balance);
+        self.files.push(run.file.clone());
+        self.has_fault |= run.diagnostics.iter().any(|it| it.fault.is_some());
+    }
+
+    /// Returns that the gradients are in another unit, where no run shows a fault by itself.
+    fn gradient_scale(self) -> Option<DatasetDiagnostic> {
+        let (balance, read_as) = self.balance.filter(|_| !self.has_fault)?;
+        let found = Diagnostic::of_fault(gradient_fault(&balance)?, read_as);
+        let Diagnostic { code, severity, text, .. } = found;
+        Some(DatasetDiagnostic { code, severity, runs: self.files, text })
+    }
 }

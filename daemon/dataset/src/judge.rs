@@ -1,5 +1,7 @@
 //! Judgement of a recorded run by validation and the laws that judge samples live.
 
+use dynocar_core::plausibility::diagnosis::gradient_fault;
+use dynocar_core::plausibility::window_balance::Balance;
 use dynocar_core::plausibility::{DetectedFaults, Plausibility};
 use dynocar_model::force::ForceResolver;
 use dynocar_model::validation::Validator;
@@ -12,6 +14,7 @@ pub(super) struct Judge {
     validator: Validator,
     resolver: ForceResolver,
     plausibility: Plausibility,
+    balance: Balance,
     /// False for positions that were integrated from the speed, which show nothing about it.
     is_position_recorded: bool,
     rows: usize,
@@ -27,6 +30,7 @@ impl Judge {
             validator: Validator::new(DATASET_TRAIN, nominal_mass_kg),
             resolver: ForceResolver::new(context.train.clone(), context.track.cloned()),
             plausibility: Plausibility::new(context.train.clone()),
+            balance: Balance::of_all(),
             is_position_recorded,
             rows: 0,
             refused: [(0, 0); RejectionReason::ALL.len()],
@@ -51,11 +55,24 @@ impl Judge {
             sample.valid &= !SampleField::Position.bit();
         }
         self.plausibility.take(&sample, resolved.map(drop), gradient_permille);
+        if let Some(window) = self.plausibility.ended_window() {
+            self.balance.push(window);
+        }
     }
 
-    /// Returns the impossibilities of the samples.
-    pub fn detected(&self) -> &DetectedFaults {
-        self.plausibility.detected()
+    /// Returns the impossibilities of the samples: those that a pipeline would see, else what the run as a whole shows.
+    pub fn detected(&self) -> DetectedFaults {
+        let live = self.plausibility.detected();
+        if live.is_empty() {
+            gradient_fault(&self.balance).into_iter().collect()
+        } else {
+            live.clone()
+        }
+    }
+
+    /// Returns how forces, gradients and accelerations go together over the whole run.
+    pub fn balance(&self) -> Balance {
+        self.balance
     }
 
     /// The reasons for which validation refuses samples, how many, and the row of the first.

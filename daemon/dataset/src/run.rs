@@ -3,11 +3,13 @@
 use std::mem::take;
 
 use dynocar_core::plausibility::InputFault;
+use dynocar_core::plausibility::window_balance::Balance;
 use dynocar_model::train::Drive;
+use dynocar_model::units::Unit;
 use dynocar_shared::{SampleField, TrainSample};
 
 use super::diagnosing::diagnostics;
-use super::diagnostic::Diagnostic;
+use super::diagnostic::{Diagnostic, read_as};
 use super::error::{DatasetError, SourcePosition};
 use super::forces::{self, ForceSource};
 use super::judge::Judge;
@@ -77,6 +79,10 @@ pub struct Run {
     pub traction_source: ForceSource,
     /// Where the brake force comes from.
     pub brake_source: ForceSource,
+    /// How forces, gradients and accelerations go together over all of it.
+    pub balance: Balance,
+    /// The unit in which its gradients were read.
+    pub gradient_unit: Unit,
     /// Quality of the data.
     pub quality: RunQuality,
     /// Diagnostics: likely mistakes, or facts to know.
@@ -204,7 +210,7 @@ pub(super) fn read(
     let samples: Vec<TrainSample> =
         resolved.samples(number, context.train).inspect(|sample| judge.take(sample)).collect();
     let quality = quality::assess(&resolved, &samples, &judge);
-    let diagnostics = diagnostics(context, &resolved, &quality, judge.detected());
+    let diagnostics = diagnostics(context, &resolved, &quality, &judge.detected());
     Ok(Run {
         file: entry.file.clone(),
         number,
@@ -224,6 +230,8 @@ pub(super) fn read(
         brake_source: resolved.forces.brake.source,
         span_m: span_m(&samples),
         samples,
+        balance: judge.balance(),
+        gradient_unit: read_as(context.manifest, InputFault::GradientScale),
         quality,
         diagnostics,
     })

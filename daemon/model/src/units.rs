@@ -198,7 +198,7 @@ static UNITS: [Unit; 80] = {
         ),
         unit("1", Ratio, 1.0, 1.0, "pu ratio mm fraction share anteil"),
         // A slope's angle, as small as those of railways: its tangent is the angle to 0.2 %.
-        rare("deg", Ratio, std::f64::consts::PI, 180.0, "degree degrees grad degrad winkelgrad"),
+        unit("deg", Ratio, std::f64::consts::PI, 180.0, "degree degrees grad degrad winkelgrad"),
         rare("ft/mi", Ratio, 0.3048, 1609.344, "feetpermile ftpermile ftpermi fpmi"),
         rare("gon", Ratio, std::f64::consts::PI, 200.0, "gradian gradians neugrad"),
         rare("rad", Ratio, 1.0, 1.0, "radian radians"),

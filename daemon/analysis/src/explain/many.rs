@@ -96,15 +96,15 @@ impl Held {
         spans
     }
 
-    /// The places of the runs of a role that are not held, by group.
-    fn others(&self, role: Role) -> Vec<Vec<usize>> {
+    /// The places of the runs of a role, by group.
+    fn members(&self, role: Role) -> Vec<Vec<usize>> {
         let own = || self.groups.iter().enumerate().filter(|(_, group)| group.role == role);
         let count = own().map(|(_, group)| group.number + 1).max().unwrap_or(0);
-        let mut others = vec![Vec::new(); count];
-        for (index, group) in own().filter(|(_, group)| !group.is_held) {
-            others[group.number].push(index);
+        let mut members = vec![Vec::new(); count];
+        for (index, group) in own() {
+            members[group.number].push(index);
         }
-        others
+        members
     }
 }
 
@@ -173,31 +173,32 @@ fn is_common(fit: &Fit) -> bool {
 }
 
 impl<E: From<RunDataError> + Send> Many<'_, E> {
-    /// Moves a model that was found in the held runs to where all fit it best: beside the usual errors, and the one
-    /// that predicts.
+    /// Moves a model that was found in the held runs, thinned, to where all fit it best as they were recorded: beside
+    /// the usual errors, and the one that predicts. Returns false, and moves nothing, where only some runs show its
+    /// effects.
     pub(super) fn join(
         &self,
         search: &Search,
         preparation: &Preparation,
         outcome: &mut Outcome,
-    ) -> Result<(), E> {
+    ) -> Result<bool, E> {
         let problem = search.problem;
         let Some(joint) = outcome.beside().filter(|_| is_common(&outcome.fit)) else {
-            return Ok(());
+            return Ok(false);
         };
         (search.progress)(0.95, "reading all runs");
-        let more = self.normals(problem, preparation, [&joint.fit, &outcome.fit, &outcome.base])?;
-        let [beside, own, base] = more;
+        let fits = [&joint.fit, &outcome.fit, &outcome.base];
+        let [beside, own, base] = self.normals(problem, preparation, fits)?;
         let fit = problem.joined_by(&joint.fit, &beside);
         let effects = 3..outcome.fit.theta.len();
         let moved: Vec<f64> = effects.map(|i| fit.theta[i] - joint.fit.theta[i]).collect();
         outcome.set_beside(Beside { fit, shared: joint.shared });
         outcome.fit = problem.with_davis_joined(&outcome.fit, &own, &moved);
         outcome.base = problem.with_davis_joined(&outcome.base, &base, &[]);
-        Ok(())
+        Ok(true)
     }
 
-    /// Returns the normal equations of the fit runs that are not held, by group.
+    /// Returns the normal equations of the fit runs, by group.
     fn normals<const N: usize>(
         &self,
         problem: &FitProblem,
@@ -205,9 +206,9 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         fits: [&Fit; N],
     ) -> Result<[Vec<RunNormal>; N], E> {
         let mut sums = fits.map(|_| Vec::new());
-        for group in self.held.others(Role::Fit) {
+        for group in self.held.members(Role::Fit) {
             let each = parallel::of_each(&group, |index| -> Result<_, E> {
-                let run = preparation.run((self.read)(*index)?, Density::Thinned)?;
+                let run = preparation.run((self.read)(*index)?, Density::Recorded)?;
                 Ok(fits.map(|fit| problem.normal_of(&run, fit)))
             });
             let mut sum = fits.map(|fit| RunNormal::none(fit.theta.len()));
@@ -283,8 +284,8 @@ mod tests {
             };
             assert_eq!(count(Role::Fit), fit_runs_held(fit), "{fit} + {holdout}");
             assert_eq!(count(Role::Holdout), holdout.min(HOLDOUT_RUNS_HELD), "{fit} + {holdout}");
-            let others: usize = held.others(Role::Fit).iter().map(Vec::len).sum();
-            assert_eq!(others + fit_runs_held(fit), fit);
+            let members: usize = held.members(Role::Fit).iter().map(Vec::len).sum();
+            assert_eq!(members, fit);
             let newest = held.groups.iter().rfind(|it| it.role == Role::Fit);
             assert!(newest.is_some_and(|it| it.is_held));
             assert!(fit_runs_held(fit) <= FIT_RUNS_HELD[1]);

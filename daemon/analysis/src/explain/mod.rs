@@ -122,7 +122,8 @@ fn explained<E: From<RunDataError> + Send>(
     let Prepared { estimated_drive, late, preparation, runs } = Prepared::of(&dataset, density)?;
     let track = preparation.track().map(|track| &**track);
     let diagnostics = diagnostics(preparation.train(), track, &all.runs);
-    let step_s = density.step_s(dataset.step_s());
+    let recorded_s = dataset.step_s();
+    let step_s = density.step_s(recorded_s);
     drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         runs.into_iter().partition(|run| run.role == Role::Fit);
@@ -148,7 +149,8 @@ fn explained<E: From<RunDataError> + Send>(
     progress(0.95, "scoring the holdout runs");
     let scores = match &many {
         Some(many) => {
-            many.join(&search, &preparation, &mut outcome)?;
+            let is_joined = many.join(&search, &preparation, &mut outcome)?;
+            let step_s = if is_joined { recorded_s } else { step_s };
             deviations = selection::deviations_given(&outcome, step_s);
             many.scores(&holdout, &preparation, &outcome)?
         }

@@ -10,9 +10,11 @@
 //! | traction and brake exchanged | -1 | 1 | 1 |
 
 use arrayvec::ArrayVec;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use super::input_fault::{DetectedFault, InputFault};
 use super::watch::Figures;
+use super::window_balance::{Balance, Fitted};
 
 /// Factors of forces within these bounds are effects that a train can have.
 const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
@@ -28,6 +30,15 @@ const USUAL_STEP_S: (f64, f64) = (0.002, 20.0);
 const EFFORT_SHARES: (f64, f64) = (0.02, 4.0);
 /// Gradients in ‰ (root mean square) below and beyond which a wrong unit is credible.
 const GRADIENT_RMS_PERMILLE: (f64, f64) = (3.0, 25.0);
+/// Factors of the gradient within these bounds are effects that a train and its line can have: those of simulated
+/// runs with every effect, large, lie between 0.8 and 1.3, and what is wrong at its place looks too large.
+const GRADIENT_FACTORS: (f64, f64) = (1.0 / 1.5, 1.4);
+/// Windows of a recorded run, and deviations from 0, that are enough to judge its gradients by all of it.
+const ALL_WINDOWS_MIN: f64 = 60.0;
+const ALL_DEVIATIONS_MIN: f64 = 20.0;
+/// Gradients at a wrong place or with noise look too large, too; they leave all of the true ones' scatter that they do
+/// not explain, and a wrong unit less than this share of it.
+const SCATTER_SHARE_MAX: f64 = 0.4;
 /// The least mean pressure in Pa of brakes that are applied; what is too high is out of range.
 const BRAKING_PRESSURE_MIN_PA: f64 = 5e3;
 /// An ordinary one.
@@ -181,9 +192,26 @@ fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
     let rms = figures.gradient_rms_permille;
     let is_credible =
         if factor > 1.0 { rms < GRADIENT_RMS_PERMILLE.0 } else { rms > GRADIENT_RMS_PERMILLE.1 };
-    if is_credible && InputFault::GradientScale.misfit(1.0 / factor).is_some() {
+    let is_beyond_effects = is_outside(factor, FORCE_FACTORS);
+    if is_credible && is_beyond_effects && InputFault::GradientScale.misfit(1.0 / factor).is_some()
+    {
         add(found, InputFault::GradientScale, 1.0 / factor);
     }
+}
+
+/// Judges the gradients of a recorded run by all of it, which shows smaller factors than a few windows do: degrees
+/// that were read as per cent.
+pub fn gradient_fault(all: &Balance) -> Option<DetectedFault> {
+    let [.., gradient] = all.fit()?;
+    let Fitted { factor, scatter_mps2, .. } = gradient;
+    let is_known = all.windows() >= ALL_WINDOWS_MIN && gradient.is_known(ALL_DEVIATIONS_MIN);
+    if !is_known || factor < 0.0 || !is_outside(factor, GRADIENT_FACTORS) {
+        return None;
+    }
+    let of_gradients_mps2 = 1e-3 * STANDARD_GRAVITY_MPS2 * all.gradient_rms_permille();
+    let left_mps2 = of_gradients_mps2 * (1.0 - factor * factor).max(0.0).sqrt();
+    let is_scale = factor > 1.0 || scatter_mps2 < SCATTER_SHARE_MAX * left_mps2;
+    is_scale.then_some(DetectedFault { fault: InputFault::GradientScale, factor: 1.0 / factor })
 }
 
 /// The factor of units that brings a pressure next to an ordinary one.

@@ -23,6 +23,7 @@ pub use diagnosis::DetectedFaults;
 pub use input_fault::{DetectedFault, InputFault, Severity};
 
 use watch::Watch;
+use window_balance::WindowMean;
 
 /// Judges the samples of one train as they come.
 #[derive(Clone, Debug)]
@@ -67,6 +68,11 @@ impl Plausibility {
         if self.watch.take(sample, is_valid, gradient_permille) {
             self.detected = diagnosis::diagnose(&self.watch.figures());
         }
+    }
+
+    /// Returns the means of the window that the last sample ended; `None` where it ended none.
+    pub fn ended_window(&self) -> Option<&WindowMean> {
+        self.watch.ended()
     }
 
     /// Returns the recent impossibilities of the samples.

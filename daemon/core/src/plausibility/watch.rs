@@ -75,6 +75,8 @@ pub struct Watch {
     usual_step_s: f64,
     gradient_permille: f64,
     window: Window,
+    /// The window that the last sample ended.
+    ended: Option<WindowMean>,
     distances: Distances,
     balance: Balance,
     distance_ratios: RunningMedian<RATIOS>,
@@ -93,6 +95,7 @@ impl Watch {
             usual_step_s: 0.0,
             gradient_permille: 0.0,
             window: Window::default(),
+            ended: None,
             distances: Distances::default(),
             balance: Balance::default(),
             distance_ratios: RunningMedian::default(),
@@ -118,6 +121,7 @@ impl Watch {
         is_valid: bool,
         gradient_permille: Option<f64>,
     ) -> bool {
+        self.ended = None;
         if let Some(gradient) = gradient_permille.filter(|gradient| gradient.is_finite()) {
             self.gradient_permille = gradient;
         }
@@ -143,6 +147,11 @@ impl Watch {
         }
         let is_compared = self.compare_distances(&last, sample, step_s);
         self.extend_window(&last, sample, step_s) || is_compared
+    }
+
+    /// Returns the means of the window that the last sample ended; `None` where it ended none.
+    pub fn ended(&self) -> Option<&WindowMean> {
+        self.ended.as_ref()
     }
 
     /// Returns the figures of the samples so far.
@@ -231,6 +240,7 @@ impl Watch {
             speed_mps: window.travelled_m * per_s,
         };
         self.balance.push(&mean);
+        self.ended = Some(mean);
         self.masses += 1.0;
         self.mass_ratio = mass_kg / self.train.mass_kg;
         let curves =

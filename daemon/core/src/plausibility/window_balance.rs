@@ -48,9 +48,31 @@ pub struct Slopes {
     pub gradient: Option<f64>,
 }
 
-/// Sums over the windows lately.
+/// The factor of one quantity as least squares give it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Fitted {
+    /// Acceleration over what the reported quantity would give.
+    pub factor: f64,
+    /// Its standard deviation, were the windows' errors independent.
+    pub std: f64,
+    /// Share of the quantity's scatter that the other ones leave to it.
+    pub own_share: f64,
+    /// Standard deviation in m/s² of a window about the fit.
+    pub scatter_mps2: f64,
+}
+
+impl Fitted {
+    /// True when the motion determines the factor, so many standard deviations away from 0.
+    pub fn is_known(&self, deviations: f64) -> bool {
+        self.own_share > OWN_SHARE_MIN && self.factor.abs() > deviations * self.std
+    }
+}
+
+/// Sums over windows: those lately, unless it is told to forget nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
+    /// Share of what stands in the sums that is kept when a window comes in.
+    keep: f64,
     gram: SMatrix<f64, COLUMNS, COLUMNS>,
     with_inertia: SVector<f64, COLUMNS>,
     inertia_square: f64,
@@ -60,6 +82,7 @@ pub struct Balance {
 impl Default for Balance {
     fn default() -> Self {
         Balance {
+            keep: 1.0 - 1.0 / MEMORY,
             gram: SMatrix::zeros(),
             with_inertia: SVector::zeros(),
             inertia_square: 0.0,
@@ -69,6 +92,11 @@ impl Default for Balance {
 }
 
 impl Balance {
+    /// Sums over all windows, for recorded data.
+    pub fn of_all() -> Self {
+        Balance { keep: 1.0, ..Balance::default() }
+    }
+
     /// Takes in a window.
     ///
     /// # Real-time
@@ -86,7 +114,7 @@ impl Balance {
         if !row.iter().chain([&mean.inertia_mps2]).all(|value| value.abs() < BELIEVED_MAX) {
             return;
         }
-        let keep = 1.0 - 1.0 / MEMORY;
+        let keep = self.keep;
         self.gram = self.gram * keep + row * row.transpose();
         self.with_inertia = self.with_inertia * keep + row * mean.inertia_mps2;
         self.inertia_square = self.inertia_square * keep + mean.inertia_mps2 * mean.inertia_mps2;
@@ -98,10 +126,17 @@ impl Balance {
         1e3 / STANDARD_GRAVITY_MPS2 * (self.gram[(2, 2)] / self.windows.max(1.0)).sqrt()
     }
 
-    /// The factors by least squares.
+    /// The factors by least squares, as far as the motion determines them.
     pub fn slopes(&self) -> Slopes {
+        let slope = |fitted: Fitted| fitted.is_known(KNOWN_DEVIATIONS).then_some(fitted.factor);
+        let [traction, brake, gradient] = self.fit().unwrap_or_default();
+        Slopes { traction: slope(traction), brake: slope(brake), gradient: slope(gradient) }
+    }
+
+    /// The factors of traction, brake and gradient by least squares; `None` for too few windows.
+    pub fn fit(&self) -> Option<[Fitted; 3]> {
         if self.windows < WINDOWS_MIN {
-            return Slopes::default();
+            return None;
         }
         // Each column over its own size: quantities in wrong units differ by many powers of ten.
         let scale =
@@ -111,19 +146,33 @@ impl Balance {
             // A column that is not there stands alone.
             if i == j { entry.max(f64::MIN_POSITIVE) + 1e-9 } else { entry }
         });
-        let Some(factored) = scaled.cholesky() else { return Slopes::default() };
-        let inverse = factored.inverse();
+        let inverse = scaled.cholesky()?.inverse();
         let right = self.with_inertia.component_div(&scale);
         let solution = inverse * right;
         let left = (self.inertia_square - solution.dot(&right)).max(0.0);
         let variance = left / (self.windows - COLUMNS as f64).max(1.0);
-        let slope = |column: usize| {
-            let own_share = 1.0 / inverse[(column, column)];
-            let factor = solution[column] / scale[column];
-            let std = (variance * inverse[(column, column)]).sqrt() / scale[column];
-            let is_there = self.gram[(column, column)] > 0.0 && own_share > OWN_SHARE_MIN;
-            (is_there && factor.abs() > KNOWN_DEVIATIONS * std).then_some(factor)
-        };
-        Slopes { traction: slope(0), brake: slope(1), gradient: slope(2) }
+        Some(std::array::from_fn(|column| Fitted {
+            factor: solution[column] / scale[column],
+            std: (variance * inverse[(column, column)]).sqrt() / scale[column],
+            own_share: if self.gram[(column, column)] > 0.0 {
+                1.0 / inverse[(column, column)]
+            } else {
+                0.0
+            },
+            scatter_mps2: variance.sqrt(),
+        }))
+    }
+
+    /// Adds the windows of another run.
+    pub fn add(&mut self, other: &Balance) {
+        self.gram += other.gram;
+        self.with_inertia += other.with_inertia;
+        self.inertia_square += other.inertia_square;
+        self.windows += other.windows;
+    }
+
+    /// Windows in the sums.
+    pub fn windows(&self) -> f64 {
+        self.windows
     }
 }

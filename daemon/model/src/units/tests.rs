@@ -38,6 +38,7 @@ fn every_unit_converts_to_its_base() {
         (Ratio, "permille", 3.0, 0.003),
         (Ratio, "%", 93.0, 0.93),
         (Ratio, "1", 0.4, 0.4),
+        (Ratio, "deg", 180.0, std::f64::consts::PI),
         (Angle, "deg", 47.4, 47.4),
         (Angle, "rad", std::f64::consts::PI, 180.0),
         (Curvature, "1/m", -0.01, -0.01),

@@ -128,13 +128,10 @@ impl FitProblem {
         self.at(model, theta, noise)
     }
 
-    /// A fit where more runs say the same model's parameters too, each of them beside one of its own: a step to
+    /// A fit where all runs say the same model's parameters, in groups that each have one of its own: a step to
     /// the least cost of all, with what they say there to first order.
-    pub fn joined_by(&self, fit: &Fit, more: &[RunNormal]) -> Fit {
-        let mut all = fit.clone();
-        for (own, more) in all.runs.iter_mut().zip(more) {
-            own.add(more);
-        }
+    pub fn joined_by(&self, fit: &Fit, groups: &[RunNormal]) -> Fit {
+        let mut all = Fit { runs: groups.to_vec(), ..fit.clone() };
         let Some((theta, _)) = self.bounded_step(&all, &all.score(), 0.0) else { return all };
         let step = DVector::from_iterator(
             theta.len(),
@@ -148,13 +145,10 @@ impl FitProblem {
         all
     }
 
-    /// A fit where more runs say its parameters too: a, b and c where all fit best, and the effects moved by what is
-    /// given.
-    pub fn with_davis_joined(&self, fit: &Fit, more: &[RunNormal], moved: &[f64]) -> Fit {
-        let mut all = fit.clone();
-        for (own, more) in all.runs.iter_mut().zip(more) {
-            own.add(more);
-        }
+    /// A fit where all runs, in groups, say its parameters: a, b and c where all fit best, and the effects moved by
+    /// what is given.
+    pub fn with_davis_joined(&self, fit: &Fit, groups: &[RunNormal], moved: &[f64]) -> Fit {
+        let all = Fit { runs: groups.to_vec(), ..fit.clone() };
         let (information, score) = (all.information(), all.score());
         let moved = DVector::from_column_slice(moved);
         let pull = score.rows(0, 3) - information.view((0, 3), (3, moved.len())) * &moved;
