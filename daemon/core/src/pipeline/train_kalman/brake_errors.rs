@@ -52,12 +52,12 @@ impl LearnedStd {
 pub struct Lateness {
     /// The mean: the same at every stop, an error that no standard deviation stands for.
     pub mean: f64,
-    /// What differs from braking to braking.
+    /// Its difference from braking to braking.
     pub spread: LearnedStd,
 }
 
 impl Lateness {
-    /// Takes in what the brake exerts beyond what is expected, over its standard deviation, in the direction of a late one.
+    /// Takes in the brake's error over its standard deviation, in the direction of a late one.
     ///
     /// No brake acts before its report.
     fn learn(&mut self, (mean, variance): (f64, f64), renewed: f64) {

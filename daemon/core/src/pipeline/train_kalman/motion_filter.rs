@@ -50,7 +50,7 @@ pub fn wind_over(time_s: f64, std_mps: f64) -> (f64, f64) {
     (keep, std_mps * std_mps * (1.0 - keep * keep))
 }
 
-/// How a brake comes to exert what is reported: it may take another time for each.
+/// Ways in which a brake follows its report: each may take another time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Following {
     /// It builds up.
@@ -84,7 +84,7 @@ pub struct Step {
     pub brake_std: f64,
     /// Share of its square by how late it is.
     pub brake_lateness: f64,
-    /// How the brake follows its report.
+    /// Way in which the brake follows its report.
     pub following: Following,
     /// Variance in (N/kN s)² of the impulse by gusts, and by where on the line a known force acts.
     pub impulse_variance: f64,

@@ -34,9 +34,9 @@ const RELEASED: f64 = 0.1;
 
 /// Error of a brake force over a step.
 struct BrakeError {
-    /// How it follows its report.
+    /// Way in which it follows its report.
     following: Following,
-    /// What it is expected to exert beyond its report in N/kN.
+    /// Expected force beyond its report in N/kN.
     late: f64,
     /// Standard deviation in N/kN.
     std: f64,
