@@ -12,7 +12,11 @@ use crate::open_loop::sockets::COMPARED;
 use crate::open_loop::trial::Answerer;
 use crate::output::{Failure, during};
 
-const SIZE: (u32, u32) = (1_000, 640);
+const SIZE: (u32, u32) = (1_240, 640);
+/// Width in px of the curves; their names stand beside them.
+const CURVES_PX: u32 = 960;
+/// Height in px of a name, and of the names' first line.
+const NAME_PX: (i32, i32) = (22, 56);
 /// Latencies shown, in µs.
 const SPAN_US: (f64, f64) = (0.2, 20_000.0);
 /// The axis runs over log10(1 / share of samples that took longer): 0 is all, 4 is 1 in 10,000.
@@ -33,7 +37,8 @@ fn draw_into(measured: &MeasuredCase, svg: &mut String) -> Result<(), Failure> {
     let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let caption = format!("Sample → snapshot polled at {} Hz", measured.extent.traffic.rate_hz);
-    let mut chart = ChartBuilder::on(&area)
+    let (curves, names) = area.split_horizontally(CURVES_PX);
+    let mut chart = ChartBuilder::on(&curves)
         .caption(caption, ("sans-serif", 22))
         .margin(12)
         .x_label_area_size(44)
@@ -50,22 +55,12 @@ fn draw_into(measured: &MeasuredCase, svg: &mut String) -> Result<(), Failure> {
     let shown = measured.cases.iter().filter(|(case, _)| is_shown(case));
     for (index, (case, outcomes)) in shown.enumerate() {
         let color = Palette99::pick(index).to_rgba();
-        let label = case.label();
-        chart
-            .draw_series(LineSeries::new(
-                points(&pooled(outcomes, |outcome| &outcome.from_appointed)),
-                color.stroke_width(2),
-            ))?
-            .label(label)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+        let latencies = pooled(outcomes, |outcome| &outcome.from_appointed);
+        chart.draw_series(LineSeries::new(points(&latencies), color.stroke_width(2)))?;
+        let y = NAME_PX.1 + NAME_PX.0 * index as i32;
+        names.draw(&PathElement::new([(4, y), (24, y)], color.stroke_width(2)))?;
+        names.draw(&Text::new(case.label(), (32, y - 7), ("sans-serif", 13)))?;
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.3))
-        .label_font(("sans-serif", 13))
-        .draw()?;
     area.present()?;
     Ok(())
 }

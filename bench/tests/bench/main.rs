@@ -3,6 +3,7 @@
 mod documents;
 mod drive;
 mod ending;
+mod explained_brakes;
 mod latency_and_load;
 mod output;
 mod scenarios;

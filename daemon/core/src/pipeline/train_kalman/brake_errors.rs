@@ -1,6 +1,9 @@
 //! How late and how strong brakes are, learned from braking to braking.
+//!
+//! A brake that lags does so at every stop: with a lateness of mean zero each of a hundred departures pushes the resistance
+//! at low speed the same way, by less than its standard deviation, and all of them by far more.
 
-use super::motion_filter::{BRAKE_ERROR, STATES, Step};
+use super::motion_filter::{BRAKE_ERROR, Following, STATES, Step};
 use crate::filter::Gaussian;
 
 /// Weight that a standard deviation beforehand counts for, and what is looked back over.
@@ -28,25 +31,52 @@ impl LearnedStd {
 
     /// Takes in the mean and the variance of an error of variance 1, of which so much is new.
     ///
-    /// The mean's square has one less the variance as its expectation, and says the more the smaller that is.
-    fn learn(&mut self, (mean, variance): (f64, f64), renewed: f64) {
+    /// The mean's square has one less the variance as its expectation, and says the more the smaller that is. Returns the
+    /// share of what is learned now in all that is looked back over.
+    fn learn(&mut self, (mean, variance): (f64, f64), renewed: f64) -> f64 {
         let known = (1.0 - variance).max(0.0);
         if known < 1e-3 {
-            return;
+            return 0.0;
         }
         let weight = renewed * known * known;
         self.weight = (self.weight + weight).min(WEIGHT_MAX);
         let seen = (mean * mean / known).min(SEEN_MAX);
         let square = self.std * self.std * (1.0 + (seen - 1.0) * weight / self.weight);
         self.std = square.sqrt().clamp(self.least, self.most);
+        weight / self.weight
+    }
+}
+
+/// How late a brake is, as a share of what the slowest brake would lack.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lateness {
+    /// The mean: the same at every stop, an error that no standard deviation stands for.
+    pub mean: f64,
+    /// Its difference from braking to braking.
+    pub spread: LearnedStd,
+}
+
+impl Lateness {
+    /// Takes in the brake's error over its standard deviation, in the direction of a late one.
+    ///
+    /// No brake acts before its report.
+    fn learn(&mut self, (mean, variance): (f64, f64), renewed: f64) {
+        let std = self.spread.std;
+        let share = self.spread.learn((mean, variance), renewed);
+        if share > 0.0 {
+            let seen = mean / (1.0 - variance);
+            let most = SEEN_MAX.sqrt();
+            self.mean += share * std * seen.clamp(-most, most);
+            self.mean = self.mean.clamp(0.0, self.spread.most);
+        }
     }
 }
 
 /// Learned behaviour of brakes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrakeErrors {
-    /// Of what the slowest brake would lack.
-    pub late: LearnedStd,
+    /// By [`Following`].
+    late: [Lateness; 3],
     /// Of the reported force.
     pub scale: LearnedStd,
 }
@@ -54,7 +84,13 @@ pub struct BrakeErrors {
 impl BrakeErrors {
     /// Before any braking, with the standard deviation of the scale.
     pub fn new(scale_std: f64) -> Self {
-        BrakeErrors { late: LearnedStd::new(1.0, 2.0), scale: LearnedStd::new(scale_std, 1.0) }
+        let late = Lateness { mean: 0.0, spread: LearnedStd::new(1.0, 2.0) };
+        BrakeErrors { late: [late; 3], scale: LearnedStd::new(scale_std, 1.0) }
+    }
+
+    /// Returns how late it is.
+    pub fn late(&self, following: Following) -> &Lateness {
+        &self.late[following as usize]
     }
 
     /// Learns from what is believed after a step.
@@ -66,7 +102,10 @@ impl BrakeErrors {
         let error = (belief.mean[BRAKE_ERROR], belief.covariance[(BRAKE_ERROR, BRAKE_ERROR)]);
         let renewed = step.brake_error.1;
         if step.brake_std > 0.0 {
-            self.late.learn(error, renewed * step.brake_lateness);
+            // A late brake lacks force while it builds up, and has too much while it is released.
+            let sign = if step.following == Following::Building { -1.0 } else { 1.0 };
+            let late = (sign * error.0, error.1);
+            self.late[step.following as usize].learn(late, renewed * step.brake_lateness);
             self.scale.learn(error, renewed * (1.0 - step.brake_lateness));
         }
     }
@@ -92,6 +131,26 @@ mod tests {
         }
         assert!((learned(0.0) - LEAST_SHARE).abs() < 1e-9);
         assert!((learned(9.0) - 1.0 / 0.3).abs() < 1e-9, "not above the whole force");
+    }
+
+    /// Lateness after 200 brakings of a lateness, each known to a variance of 0.1.
+    fn late(lateness: f64) -> Lateness {
+        let mut late = *BrakeErrors::new(0.3).late(Following::Starting);
+        for _ in 0..200 {
+            let error = (lateness - late.mean) / late.spread.std;
+            late.learn((0.9 * error, 0.1), 1.0);
+        }
+        late
+    }
+
+    #[test]
+    fn what_every_braking_lacks_becomes_the_mean_and_no_spread() {
+        for lateness in [0.0, 0.3, 1.0] {
+            let late = late(lateness);
+            assert!((late.mean - lateness).abs() < 0.02, "{lateness}: {late:?}");
+            assert!(late.spread.std < 0.2, "{lateness}: {late:?}");
+        }
+        assert_eq!(late(-0.5).mean, 0.0, "a brake does not act before its report");
     }
 
     #[test]

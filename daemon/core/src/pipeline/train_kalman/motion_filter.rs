@@ -50,6 +50,17 @@ pub fn wind_over(time_s: f64, std_mps: f64) -> (f64, f64) {
     (keep, std_mps * std_mps * (1.0 - keep * keep))
 }
 
+/// Ways in which a brake follows its report: each may take another time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Following {
+    /// It builds up.
+    Building,
+    /// It is released under way.
+    Releasing,
+    /// It held the standing train, and is released for the start: by friction, also where an electric brake does the rest.
+    Starting,
+}
+
 /// Step between two samples, as every behaviour uses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
@@ -63,7 +74,7 @@ pub struct Step {
     pub delay_s: f64,
     /// Impulse of the traction force in N/kN s, if it acts so much later.
     pub traction: f64,
-    /// Impulse of the brake force, retarding, likewise.
+    /// Impulse of the brake force, retarding, likewise, with what it is expected to exert late.
     pub brake: f64,
     /// Impulse of all that is known to retard beyond the basic resistance.
     pub known: f64,
@@ -73,6 +84,8 @@ pub struct Step {
     pub brake_std: f64,
     /// Share of its square by how late it is.
     pub brake_lateness: f64,
+    /// Way in which the brake follows its report.
+    pub following: Following,
     /// Variance in (N/kN s)² of the impulse by gusts, and by where on the line a known force acts.
     pub impulse_variance: f64,
     /// Share of [`jump_variance`] that the forces of this train bring.
@@ -260,6 +273,7 @@ mod tests {
             traction_change: 4.0,
             brake_std: 0.7,
             brake_lateness: 0.0,
+            following: Following::Building,
             impulse_variance: 0.0,
             jump_share: 0.0,
             force_rate: 0.0,

@@ -7,7 +7,7 @@ use super::TrainKalmanSettings;
 use super::acting_forces::ActingForces;
 use super::brake_errors::BrakeErrors;
 use super::learned::{Learned, Resistance};
-use super::motion_filter::{Step, USUAL_MAP_PERMILLE, wind_over};
+use super::motion_filter::{Following, Step, USUAL_MAP_PERMILLE, wind_over};
 use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
@@ -29,8 +29,15 @@ const BRAKE_STD_LEAST: f64 = 1e-3;
 /// Time in s over which a wind is taken for the same: a step of the filters for each sample would cost time.
 const WIND_STEP_S: f64 = 1.0;
 
+/// Force in N/kN below which a brake is taken to have been released.
+const RELEASED: f64 = 0.1;
+
 /// Error of a brake force over a step.
 struct BrakeError {
+    /// Way in which it follows its report.
+    following: Following,
+    /// Expected force beyond its report in N/kN.
+    late: f64,
     /// Standard deviation in N/kN.
     std: f64,
     /// Share of its square by how late the brake is.
@@ -51,6 +58,8 @@ pub struct Steps {
     known_rate: f64,
     /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
     followed: f64,
+    /// True from a standstill until the brake that held the train is released.
+    was_held: bool,
     /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the other.
     brake_angle: f64,
     /// How often the brake's error was renewed since it was used last.
@@ -71,6 +80,7 @@ impl Steps {
             force_rate: 0.0,
             known_rate: 0.0,
             followed: 0.0,
+            was_held: false,
             brake_angle: 0.0,
             renewals: 0.0,
             wind_s: 0.0,
@@ -84,20 +94,36 @@ impl Steps {
         let seen_ns = self.seen_ns.replace(now.time_ns).unwrap_or(i64::MIN);
         let since_s = (now.time_ns.saturating_sub(seen_ns) as f64 * 1e-9).max(0.0);
         let left = (-since_s / self.settings.brake_lag_s).exp();
+        self.was_held |= now.speed_mps < self.settings.speed_min_mps;
         self.followed = now.brake + left * (self.followed - now.brake);
     }
 
     /// Returns how far a reported brake force may be off; its error goes on while no brake acts.
     fn brake_error(&mut self, brake: f64, learned: &BrakeErrors) -> BrakeError {
-        let late = learned.late.std * (brake - self.followed);
+        let lacking = brake - self.followed;
+        self.was_held &= lacking < -RELEASED;
+        let following = match lacking >= 0.0 {
+            true => Following::Building,
+            false if self.was_held => Following::Starting,
+            false => Following::Releasing,
+        };
+        let lateness = learned.late(following);
+        let expected = -lateness.mean * lacking;
+        let late = lateness.spread.std * lacking;
         let scale = learned.scale.std * brake;
         let square = late * late + scale * scale;
         if square < BRAKE_STD_LEAST * BRAKE_STD_LEAST {
-            return BrakeError { std: 0.0, lateness: 0.0, kept: 1.0 };
+            return BrakeError { following, late: expected, std: 0.0, lateness: 0.0, kept: 1.0 };
         }
         let before = std::mem::replace(&mut self.brake_angle, late.atan2(scale));
         let renewals = std::mem::take(&mut self.renewals) + (self.brake_angle - before).abs();
-        BrakeError { std: square.sqrt(), lateness: late * late / square, kept: (-renewals).exp() }
+        BrakeError {
+            following,
+            late: expected,
+            std: square.sqrt(),
+            lateness: late * late / square,
+            kept: (-renewals).exp(),
+        }
     }
 
     /// Standard deviation in ‰ of the gradient beyond what behaviours take into account: as surveyed, or as the settings have it.
@@ -162,11 +188,12 @@ impl Steps {
             inertia: to.inertia,
             delay_s: acting.delay_s,
             traction: acting.impulses[0],
-            brake: acting.impulses[1],
+            brake: acting.impulses[1] + duration_s * brake.late,
             known,
             traction_change: acting.changes[0],
             brake_std: duration_s * brake.std,
             brake_lateness: brake.lateness,
+            following: brake.following,
             jump_share: learned.jumps.share,
             impulse_variance: by_place + by_gusts,
             force_rate: self.force_rate,
