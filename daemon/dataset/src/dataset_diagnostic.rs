@@ -102,7 +102,7 @@ pub fn diagnostics<'r>(
     diagnostics
 }
 
-/// What runs show together that are too short to show it alone, as those from stop to stop.
+/// Sums over all runs: together they show faults that each is too short to show, as one from stop to stop.
 #[derive(Default)]
 struct AllRuns {
     balance: Option<(Balance, Unit)>,

@@ -117,18 +117,17 @@ fn explained<E: From<RunDataError> + Send>(
     progress: Progress,
 ) -> Result<Explanation, E> {
     progress(0.0, "reading the runs");
-    let all = many.as_ref().map_or(&*dataset, |many| many.dataset);
     let density = if many.is_some() { Density::Thinned } else { Density::Recorded };
     let Prepared { estimated_drive, late, preparation, runs } = Prepared::of(&dataset, density)?;
     let track = preparation.track().map(|track| &**track);
-    let diagnostics = diagnostics(preparation.train(), track, &all.runs);
-    let recorded_s = dataset.step_s();
-    let step_s = density.step_s(recorded_s);
+    let all = many.as_ref().map_or(&dataset.runs, |many| &many.dataset.runs);
+    let diagnostics = diagnostics(preparation.train(), track, all);
+    let [recorded_s, step_s] = [Density::Recorded, density].map(|it| it.step_s(dataset.step_s()));
     drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         runs.into_iter().partition(|run| run.role == Role::Fit);
-    let spans_m = many.iter().flat_map(|many| many.dataset.with_role(Role::Fit));
-    let spans_m = spans_m.filter_map(|run| run.span_m);
+    let of_all = many.iter().flat_map(|many| many.dataset.with_role(Role::Fit));
+    let spans_m = of_all.filter_map(|run| run.span_m);
     let problem = FitProblem::new(fit_runs, preparation.train().resistance).reaching(spans_m);
     let search = Search {
         problem: &problem,
@@ -150,14 +149,12 @@ fn explained<E: From<RunDataError> + Send>(
     let scores = match &many {
         Some(many) => {
             let is_joined = many.join(&search, &preparation, &mut outcome)?;
-            let step_s = if is_joined { recorded_s } else { step_s };
-            deviations = selection::deviations_given(&outcome, step_s);
+            if is_joined {
+                deviations = selection::deviations_given(&outcome, recorded_s);
+            }
             many.scores(&holdout, &preparation, &outcome)?
         }
-        None => {
-            let score = |run: &RunData| RunScore::of(run, &outcome.base, &outcome.fit);
-            holdout.iter().map(score).collect()
-        }
+        None => holdout.iter().map(|run| RunScore::of(run, &outcome.base, &outcome.fit)).collect(),
     };
     let score = Score::of(&problem, scores, &outcome.base, &outcome.fit);
     let spans = match &many {

@@ -62,13 +62,13 @@ pub struct Fitted {
 }
 
 impl Fitted {
-    /// True when the motion determines the factor, so many standard deviations away from 0.
+    /// True when the motion determines the factor, at least this number of standard deviations away from 0.
     pub fn is_known(&self, deviations: f64) -> bool {
         self.own_share > OWN_SHARE_MIN && self.factor.abs() > deviations * self.std
     }
 }
 
-/// Sums over windows: those lately, unless it is told to forget nothing.
+/// Sums over the windows lately, or over all of a recorded run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
     /// Share of what stands in the sums that is kept when a window comes in.
