@@ -4,6 +4,7 @@ use dynocar_analysis::explain::answer::ExplainAnswer;
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
+use dynocar_tests::simulator::effects::MassSection;
 use dynocar_tests::simulator::{
     Deviations, Effect, EffectRequest, SimulatorSettings, TrainType, simulate,
 };
@@ -96,4 +97,32 @@ fn a_wind_beside_the_usual_errors_of_the_map_is_no_error_of_the_map() {
     let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
     assert!(kinds.contains(&EffectKind::Wind.name()), "{}", answer.statement);
     assert!(!kinds.contains(&EffectKind::GradientError.name()), "{}", answer.statement);
+}
+
+#[test]
+fn loads_by_stop_stay_right_where_runs_that_are_not_searched_go_on_to_further_stops() {
+    let settings = SimulatorSettings {
+        runs: 128,
+        holdout_runs: 32,
+        deviations: Deviations::ROUGHER,
+        ..SimulatorSettings::new(9_830_003, EffectRequest::LoadsByStop)
+    };
+    let simulated = simulate(&settings);
+    let [Effect::MassChangeSections(truth)] = &simulated.effects[..] else { panic!("no loads") };
+    let answer = explain(&read_files(&dataset_files(&simulated)), &|_, _| ()).unwrap().answer;
+    let at = answer.effects.iter().position(|it| it.kind == EffectKind::MassChange.name());
+    let written = serde_json::to_value(&answer).unwrap();
+    let found = &written["effects"][at.expect("loads")]["parameters"]["sections"];
+    let error = |found: &serde_json::Value| {
+        let of = |key: &str| found[key].as_f64().unwrap();
+        let middle_m = 0.5 * (of("from_m") + of("to_m"));
+        let is_at = |it: &&MassSection| {
+            it.direction == of("direction") && it.from_m < middle_m && middle_m < it.to_m
+        };
+        Some(of("mass_factor") - truth.iter().find(is_at)?.mass_factor)
+    };
+    let errors: Vec<f64> = found.as_array().unwrap().iter().filter_map(error).collect();
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    // Six runs go one stop further, to another load; taken for what is declared, it raises all by 0.04.
+    assert!(errors.len() > 8 && mean.abs() < 0.015, "{mean}: {errors:?}");
 }

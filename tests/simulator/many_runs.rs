@@ -1,10 +1,9 @@
-//! Of many runs the search holds some, thinned, and each other is read once: work and memory grow no faster than the
-//! data.
+//! Of many runs the search holds some, thinned, and each is read once: work and memory grow no faster than the data.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use dynocar_analysis::dataset::{Dataset, Role, Run};
+use dynocar_analysis::dataset::{Dataset, Run};
 use dynocar_analysis::explain::evidence::{RunData, RunDataError};
 use dynocar_analysis::explain::explain_many;
 use dynocar_analysis::explain::many::{Held, Many};
@@ -13,7 +12,7 @@ use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 
 #[test]
-fn of_many_runs_some_are_held_and_each_other_is_read_once() {
+fn of_many_runs_some_are_held_and_each_is_read_once() {
     let settings = SimulatorSettings {
         runs: 64,
         holdout_runs: 16,
@@ -42,10 +41,8 @@ fn of_many_runs_some_are_held_and_each_other_is_read_once() {
         .iter()
         .all(|effect| effect.place.windows.is_none() && effect.place.runs.is_none());
     if is_common {
-        let is_needed =
-            |index: &usize| !held.holds(*index) || all.runs[*index].role == Role::Holdout;
-        let needed: Vec<usize> = (0..all.runs.len()).filter(is_needed).collect();
-        assert_eq!(reads.keys().copied().collect::<Vec<_>>(), needed);
+        // The held ones are read as they were recorded, too.
+        assert_eq!(reads.len(), all.runs.len());
         assert_eq!(explanation.score.holdout_runs.len(), settings.holdout_runs);
     }
     let (fit, holdout) = (&explanation.problem.runs, &explanation.holdout);

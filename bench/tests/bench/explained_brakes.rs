@@ -1,4 +1,4 @@
-//! What `explain` says of a tram whose brake does not act as it reports, from a drive as `scenarios --write` writes it.
+//! `explain` of a tram whose brake does not act as it reports, from a drive as `scenarios --write` writes it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -67,7 +67,7 @@ fn friction_that_exerts_less_than_reported_is_a_weak_brake() {
     assert!((gain.value - 1.0 / 0.88).abs() < 0.02 && gain.std < 0.02, "{gain:?}");
 }
 
-/// At walking pace a late brake, a weak one and a slow hand-over differ too little to be told apart; where the force is
+/// At walking pace a late brake, a weak one and a slow hand-over differ too little to be named; where the force is
 /// amiss shows.
 #[test]
 fn friction_that_takes_over_at_walking_pace_is_placed_there_and_no_load() {

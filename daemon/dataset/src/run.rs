@@ -66,9 +66,6 @@ pub struct Run {
     /// that are missing by the time that passed, so that they count as lost. Rows out of order
     /// or repeated are kept for validation to refuse and count.
     pub samples: Vec<TrainSample>,
-    /// Least and greatest recorded position in m, but for a few that may be wrong; stays when
-    /// [`split_off_samples`](Run::split_off_samples) takes the samples.
-    pub span_m: Option<[f64; 2]>,
     /// Those of [`EXTRAS`] that are recorded.
     pub extras: Vec<(Quantity, Extra)>,
     /// Where the positions come from.
@@ -88,6 +85,9 @@ pub struct Run {
     /// Diagnostics: likely mistakes, or facts to know.
     pub diagnostics: Vec<Diagnostic>,
 }
+
+/// The validity bits of both forces.
+const FORCES: u16 = SampleField::TractionForce.bit() | SampleField::BrakeForce.bit();
 
 impl Run {
     /// The power in W that the traction force comes from, one value for each sample, and whether it
@@ -117,7 +117,7 @@ impl Run {
             let pulls = sample.get(SampleField::TractionForce).is_some_and(|force| force > 0.0);
             let brake_n = sample.get(SampleField::BrakeForce).unwrap_or(0.0);
             if !pulls || brake_n > 0.0 {
-                sample.valid &= !(SampleField::TractionForce.bit() | SampleField::BrakeForce.bit());
+                sample.valid &= !FORCES;
             } else {
                 sample.set(SampleField::BrakeForce, brake_n);
             }
@@ -126,6 +126,16 @@ impl Run {
             it.fault.is_some_and(|(detected, _)| detected.fault == InputFault::BrakeScale)
         };
         self.diagnostics.retain(|it| !of_brake(it));
+    }
+
+    /// Forgets the forces of all samples outside a part of the line, in m of chainage, so that nothing follows from
+    /// them.
+    pub fn forget_forces_beyond(&mut self, [low_m, high_m]: [f64; 2]) {
+        for sample in &mut self.samples {
+            if sample.get(SampleField::Position).is_some_and(|it| it < low_m || it > high_m) {
+                sample.valid &= !FORCES;
+            }
+        }
     }
 
     /// Returns the record of a quantity beyond those of a sample.
@@ -228,27 +238,12 @@ pub(super) fn read(
         gradient_source: resolved.gradient_source,
         traction_source: resolved.forces.traction.source,
         brake_source: resolved.forces.brake.source,
-        span_m: span_m(&samples),
         samples,
         balance: judge.balance(),
         gradient_unit: read_as(context.manifest, InputFault::GradientScale),
         quality,
         diagnostics,
     })
-}
-
-/// Share of a run's positions that may be wrong at either end of its span.
-const WRONG_SHARE: f64 = 0.005;
-
-/// Returns the least and the greatest position of some samples, but for a few that may be wrong; `None` where they
-/// hold none.
-fn span_m(samples: &[TrainSample]) -> Option<[f64; 2]> {
-    let positions = samples.iter().filter_map(|sample| sample.get(SampleField::Position));
-    let mut positions_m: Vec<f64> = positions.collect();
-    let last = positions_m.len().checked_sub(1)?;
-    let wrong = (WRONG_SHARE * last as f64) as usize;
-    let mut at = |index: usize| *positions_m.select_nth_unstable_by(index, f64::total_cmp).1;
-    Some([at(wrong), at(last - wrong)])
 }
 
 /// Reads the rows of the train of a text.

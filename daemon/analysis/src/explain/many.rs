@@ -174,17 +174,16 @@ fn is_common(fit: &Fit) -> bool {
 
 impl<E: From<RunDataError> + Send> Many<'_, E> {
     /// Moves a model that was found in the held runs, thinned, to where all fit it best as they were recorded: beside
-    /// the usual errors, and the one that predicts. Returns false, and moves nothing, where only some runs show its
-    /// effects.
+    /// the usual errors, and the one that predicts. It stays where only some runs show its effects.
     pub(super) fn join(
         &self,
         search: &Search,
         preparation: &Preparation,
         outcome: &mut Outcome,
-    ) -> Result<bool, E> {
+    ) -> Result<(), E> {
         let problem = search.problem;
         let Some(joint) = outcome.beside().filter(|_| is_common(&outcome.fit)) else {
-            return Ok(false);
+            return Ok(());
         };
         (search.progress)(0.95, "reading all runs");
         let fits = [&joint.fit, &outcome.fit, &outcome.base];
@@ -195,10 +194,10 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         outcome.set_beside(Beside { fit, shared: joint.shared });
         outcome.fit = problem.with_davis_joined(&outcome.fit, &own, &moved);
         outcome.base = problem.with_davis_joined(&outcome.base, &base, &[]);
-        Ok(true)
+        Ok(())
     }
 
-    /// Returns the normal equations of the fit runs, by group.
+    /// Returns the normal equations of the fit runs, by group, as far along the line as the searched runs go.
     fn normals<const N: usize>(
         &self,
         problem: &FitProblem,
@@ -208,7 +207,11 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         let mut sums = fits.map(|_| Vec::new());
         for group in self.held.members(Role::Fit) {
             let each = parallel::of_each(&group, |index| -> Result<_, E> {
-                let run = preparation.run((self.read)(*index)?, Density::Recorded)?;
+                let mut run = (self.read)(*index)?;
+                if let Some(reach_m) = problem.reach_m(f64::from(run.direction)) {
+                    run.forget_forces_beyond(reach_m);
+                }
+                let run = preparation.run(run, Density::Recorded)?;
                 Ok(fits.map(|fit| problem.normal_of(&run, fit)))
             });
             let mut sum = fits.map(|fit| RunNormal::none(fit.theta.len()));

@@ -122,13 +122,12 @@ fn explained<E: From<RunDataError> + Send>(
     let track = preparation.track().map(|track| &**track);
     let all = many.as_ref().map_or(&dataset.runs, |many| &many.dataset.runs);
     let diagnostics = diagnostics(preparation.train(), track, all);
-    let [recorded_s, step_s] = [Density::Recorded, density].map(|it| it.step_s(dataset.step_s()));
+    // A dead time and a lag are separated by the shape of the force, which the search saw thinned.
+    let step_s = density.step_s(dataset.step_s());
     drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         runs.into_iter().partition(|run| run.role == Role::Fit);
-    let of_all = many.iter().flat_map(|many| many.dataset.with_role(Role::Fit));
-    let spans_m = of_all.filter_map(|run| run.span_m);
-    let problem = FitProblem::new(fit_runs, preparation.train().resistance).reaching(spans_m);
+    let problem = FitProblem::new(fit_runs, preparation.train().resistance);
     let search = Search {
         problem: &problem,
         holdout: &holdout,
@@ -148,10 +147,8 @@ fn explained<E: From<RunDataError> + Send>(
     progress(0.95, "scoring the holdout runs");
     let scores = match &many {
         Some(many) => {
-            let is_joined = many.join(&search, &preparation, &mut outcome)?;
-            if is_joined {
-                deviations = selection::deviations_given(&outcome, recorded_s);
-            }
+            many.join(&search, &preparation, &mut outcome)?;
+            deviations = selection::deviations_given(&outcome, step_s);
             many.scores(&holdout, &preparation, &outcome)?
         }
         None => holdout.iter().map(|run| RunScore::of(run, &outcome.base, &outcome.fit)).collect(),

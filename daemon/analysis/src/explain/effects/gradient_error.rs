@@ -23,7 +23,7 @@ use super::{
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::gradient_prior::{ErrorScale, MAP, UNSURVEYED};
-use crate::explain::places::{MAP_ERROR_PERMILLE, reach_m};
+use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};
 use crate::explain::scan::Scan;
 use crate::statistics::rms;
 
@@ -56,7 +56,7 @@ pub const POLICY: Policy = Policy {
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let runs = &scan.problem.runs;
-    let span_m = reach_m(scan).filter(|_| scan.problem.distance_ratio.is_some());
+    let span_m = span_m(scan).filter(|_| scan.problem.distance_ratio.is_some());
     let Some(span_m) = span_m.filter(|[low, high]| high > low) else {
         return Err("positions are not measured".into());
     };

@@ -104,11 +104,6 @@ pub fn span_m(scan: &Scan) -> Option<[f64; 2]> {
     span.filter(|[low, high]| high - low > 4.0 * SHORTEST_M)
 }
 
-/// The chainage in m over which all runs move for which the fit speaks, in memory or not.
-pub fn reach_m(scan: &Scan) -> Option<[f64; 2]> {
-    span_m(scan).map(|span_m| scan.problem.with_reach_m(span_m))
-}
-
 fn cells(places: &Places, [low, high]: [f64; 2]) -> Vec<Cell> {
     let shortest_m = SHORTEST_M.max((high - low) / 250.0);
     let mut intervals_m = Vec::new();

@@ -11,7 +11,7 @@ mod runs;
 mod settle;
 mod site;
 
-pub use localise::{MAP_ERROR_PERMILLE, find, reach_m, span_m};
+pub use localise::{MAP_ERROR_PERMILLE, find, span_m};
 pub use runs::{Found, best_of_runs};
 pub use settle::settle;
 pub use site::{Axis, End, Inside, Intervals, Reach, Site};

@@ -23,7 +23,7 @@ use crate::explain::effects::{
 };
 use crate::explain::evidence::Fit;
 use crate::explain::gradient_prior::SURVEYED;
-use crate::explain::places::reach_m;
+use crate::explain::places::span_m;
 
 /// Whether some evidence makes the last effect of a trial certain beside the usual errors.
 pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
@@ -67,7 +67,7 @@ impl Search<'_> {
     fn map_errors(&self, fit: &Fit) -> Vec<Candidate> {
         let is_fitted = fit.model.effects.iter().any(|effect| effect.is_gradient());
         let track = self.track.filter(|_| !is_fitted && self.problem.distance_ratio.is_some());
-        let span_m = self.scan(fit).and_then(|scan| reach_m(&scan));
+        let span_m = self.scan(fit).and_then(|scan| span_m(&scan));
         let (Some(track), Some(span_m)) = (track, span_m.filter(|[low, high]| high > low)) else {
             return Vec::new();
         };

@@ -47,8 +47,6 @@ pub struct FitProblem {
     declared_responses: Vec<Response>,
     /// Measured distance over distance by integrated speed, with its standard deviation.
     pub distance_ratio: Option<(f64, f64)>,
-    /// Least and greatest chainage in m of all runs for which the fit speaks, in memory or not.
-    reach_m: Option<[f64; 2]>,
     /// Seconds by which the speed is late by the position, with their standard deviation.
     speed_late_s: Option<(f64, f64)>,
 }
@@ -234,21 +232,15 @@ impl FitProblem {
             scatter_columns,
             declared_responses,
             distance_ratio,
-            reach_m: None,
             speed_late_s,
         }
     }
 
-    /// Extends the part of the line for which the fit speaks by those of further runs, in m of chainage, so that the
-    /// map is unsure there too.
-    #[must_use]
-    pub fn reaching(self, spans_m: impl Iterator<Item = [f64; 2]>) -> Self {
-        FitProblem { reach_m: spans_m.chain(self.reach_m).reduce(union), ..self }
-    }
-
-    /// Returns an interval of the line with all that the fit speaks for.
-    pub fn with_reach_m(&self, span_m: [f64; 2]) -> [f64; 2] {
-        self.reach_m.map_or(span_m, |reach_m| union(span_m, reach_m))
+    /// Returns the part of the line, in m of chainage, over which the fitted runs of a direction go: effects were
+    /// looked for there alone. `None` where none goes that way or tells its positions.
+    pub fn reach_m(&self, direction: f64) -> Option<[f64; 2]> {
+        let own = self.runs.iter().filter(|run| run.direction == direction);
+        own.filter_map(|run| run.span_m).reduce(union)
     }
 
     /// Whether positions show that the speed is late.
