@@ -81,7 +81,8 @@ pub fn build_c_with(source: &Path, standard: &str, link: Link, out: &Path, optio
         }
         Link::Shared => {
             command.arg("-L").arg(&libraries).arg("-ldynocar_client");
-            command.arg(format!("-Wl,-rpath,{}", libraries.display()));
+            // Cargo's search path has the folder of an earlier build, too; this one goes before it.
+            command.arg(format!("-Wl,--disable-new-dtags,-rpath,{}", libraries.display()));
         }
     }
     must_succeed(&mut command);
