@@ -78,14 +78,14 @@ fn runs_that_are_not_searched_have_winds_of_their_own() {
 }
 
 #[test]
-fn a_map_is_unsure_also_where_only_runs_go_that_are_not_searched() {
+fn a_gain_stays_right_where_a_run_that_is_not_searched_goes_further_than_the_others() {
     let truth = 1.045;
     let effect = Effect::TractionGain { gain: truth };
     let settings = SimulatorSettings::new(9_820_006, EffectRequest::Exactly(vec![effect]));
     let answer =
         explained_of(128, SimulatorSettings { deviations: Deviations::ROUGHER, ..settings });
     let found = parameter(&answer, EffectKind::TractionGain, "gain");
-    // Held at the last value of the map's error, one run of 96 moves the gain by 0.013.
+    // There the map's error is not known: counted, one run of 96 moves the gain by 0.013.
     assert!((found - truth).abs() < 0.008, "{found}: {}", answer.statement);
 }
 

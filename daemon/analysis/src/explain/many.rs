@@ -1,9 +1,10 @@
 //! Many runs: the search looks at some of them, evenly chosen and thinned to a second; then all of them say how large
 //! it is what was found, and how well it predicts.
 //!
-//! Whatever the number of runs, a fixed number is held in memory. All others are read one after the other and reduced to
-//! their normal equations at the finished model, which add up, or to their errors. What acts in some runs only is known
-//! of those that the search looked at: then these alone say how large it is.
+//! Whatever the number of runs, a fixed number is held in memory. Then all are read one after the other, as recorded, and
+//! reduced to their normal equations at the finished model, which add up, or to their errors. What acts in some runs only
+//! is known of those that the search looked at: then these alone say how large it is. Likewise a run counts only as far
+//! along the line as searched ones go: beyond, nobody looked for effects.
 
 use std::sync::Arc;
 
