@@ -7,8 +7,7 @@ use dynocar_analysis::driven::{Beginning, DrivenTrain};
 use dynocar_analysis::explain::explain;
 use dynocar_analysis::identify::{identify, published_samples};
 use dynocar_estimators::EstimatorSettings;
-use dynocar_model::force::ForceResolver;
-use dynocar_model::validation::ValidSample;
+use dynocar_model::force::{ForceResolver, ValidSample};
 use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, TrainSample};
 
 const TRAIN: &str = "[train]\nmass_t = 200\nlength_m = 100\nrotating_mass_factor = 0.06\n\

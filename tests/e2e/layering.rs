@@ -1,9 +1,10 @@
 //! The invariants of `ARCHITECTURE.md` that can be read off the dependency tree and the sources.
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::process::Command;
 
-use dynocar_tests::sources::{rust_files, workspace};
+use dynocar_tests::sources::{is_of_tests, rust_files, without_tests, workspace};
 
 /// Names of all packages that a package is built from.
 fn dependencies(package: &str) -> Vec<String> {
@@ -213,6 +214,26 @@ fn what_is_pure_touches_no_file_thread_clock_or_terminal() {
         let text = std::fs::read_to_string(&file).expect("a source file");
         for word in forbidden {
             assert!(!text.contains(word), "{}: {word}", file.display());
+        }
+    }
+}
+
+#[test]
+fn admission_alone_knows_its_parts_and_writes_a_status() {
+    const ADMISSION: &str = "daemon/core/src/pipeline/admission";
+    let parts =
+        ["Validator", "ForceGate", "GateVerdict", "plausibility::watch", "snapshot.status = "];
+    let own = rust_files(ADMISSION);
+    for part in parts {
+        let named = |file: &PathBuf| std::fs::read_to_string(file).expect("a file").contains(part);
+        assert!(own.iter().any(named), "{part} is there");
+    }
+    let folders = ["daemon", "client/src", "shared", "bench/src", "tests/src"].map(rust_files);
+    for file in folders.into_iter().flatten().filter(|it| !is_of_tests(it) && !own.contains(it)) {
+        let text = std::fs::read_to_string(&file).expect("a source file");
+        for line in without_tests(&text) {
+            let part = parts.iter().find(|part| line.contains(*part));
+            assert_eq!(part, None, "{}: {line}", file.display());
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The simulator's files: reproducible, complete, silent about the truth.
 
-use dynocar_model::validation::Validator;
+use dynocar_core::pipeline::admission::Admission;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{SampleField, TrainSample};
 use dynocar_tests::simulator::dataset_writer::{dataset_files, write_dataset, write_truth};
@@ -195,10 +195,10 @@ fn defects_come_as_often_as_asked_and_validation_sees_them() {
     assert!((0.008..0.03).contains(&lost), "{lost}");
     let (mut rejected, mut missing_cells) = (0, 0);
     for run in &poor.runs {
-        let mass_kg = poor.declared_train().mass_kg;
-        let mut validator = Validator::new(SIMULATED_TRAIN, mass_kg);
+        let train = poor.declared_train().clone();
+        let mut admission = Admission::new(SIMULATED_TRAIN, train.into());
         for sample in &run.samples {
-            rejected += usize::from(validator.check(sample).is_err());
+            rejected += usize::from(admission.validate(sample).is_err());
             missing_cells += usize::from(sample.get(SampleField::Position).is_none());
         }
     }

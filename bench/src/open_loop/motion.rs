@@ -75,18 +75,20 @@ impl DrivenMotion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_model::validation::Validator;
+    use dynocar_core::pipeline::admission::Admission;
+    use dynocar_model::train::{Davis, TrainModel};
 
     #[test]
     fn every_sample_of_the_motion_is_valid() {
         let train = TrainId(3);
         let mut motion = DrivenMotion::of(train, 7);
-        let mut validator = Validator::new(train, MASS_KG);
+        let model = TrainModel::bare("t", MASS_KG, Davis { a: 0.0, b: 0.0, c: 0.0 });
+        let mut admission = Admission::new(train, model.into());
         for number in 1..=200_000_u64 {
             let mut sample = motion.sample(number as i64 * 1_000_000);
             (sample.sequence, sample.run) = (number, 1);
-            validator.check(&sample).unwrap_or_else(|reason| panic!("{number}: {reason}"));
+            admission.validate(&sample).unwrap_or_else(|reason| panic!("{number}: {reason}"));
         }
-        assert_eq!(validator.lost(), 0);
+        assert_eq!(admission.lost(), 0);
     }
 }

@@ -99,7 +99,8 @@ fn spoil(sample: &mut TrainSample, kind: u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_model::validation::Validator;
+    use dynocar_core::pipeline::admission::Admission;
+    use dynocar_model::train::{Davis, TrainModel};
 
     const TRAIN: TrainId = TrainId(2);
 
@@ -128,12 +129,13 @@ mod tests {
     fn the_bad_share_is_refused_and_nothing_else() {
         let mut traffic = LoopTraffic::new(plan(), TRAIN, 1_000_000_000, 1);
         traffic.begin(1_000_000_000, 20_000);
-        let mut validator = Validator::new(TRAIN, 200e3);
+        let train = TrainModel::bare("t", 200e3, Davis { a: 0.0, b: 0.0, c: 0.0 });
+        let mut admission = Admission::new(TRAIN, train.into());
         let mut refused = 0.0;
         for number in 1..=20_000 {
             let (mut sample, _) = take(&mut traffic);
             sample.sequence = number;
-            refused += f64::from(u8::from(validator.check(&sample).is_err()));
+            refused += f64::from(u8::from(admission.validate(&sample).is_err()));
         }
         assert!((refused / 20_000.0 - 0.1).abs() < 0.01, "{refused}");
     }

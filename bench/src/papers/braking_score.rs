@@ -7,6 +7,7 @@ use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
 use dynocar_core::pipeline::braking::settings::{
     BrakeFactor, BrakingSettings, EkfSettings, LawSettings, SmootherSettings,
 };
+use dynocar_core::pipeline::judge::InputState;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::xie::EmSettings;
 use dynocar_model::force::ResolvedSample;
@@ -73,7 +74,7 @@ pub fn run<const LAGS: usize>(
         if estimator.update(&resolved(&train, moment, k == 0)) != Outcome::Updated {
             continue;
         }
-        estimator.write(&mut snapshot);
+        estimator.write(&InputState::default(), &mut snapshot);
         let Some((value, std)) = coefficient(&snapshot) else { continue };
         for (lag_steps, scored) in lags_steps.into_iter().zip(&mut scored) {
             let of = k.checked_sub(lag_steps).map(|i| &moments[i]);

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use dynocar::config::is_slow;
 use dynocar_core::pipeline::Pipeline;
+use dynocar_core::pipeline::admission::Admission;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_model::validation::Validator;
 use dynocar_shared::{PipelineKind, TrainId, TrainSample};
 
 use crate::output::{Failure, named};
@@ -35,9 +35,9 @@ pub fn resolving(
     train: &Arc<TrainModel>,
     track: Option<Arc<Track>>,
 ) -> impl FnMut(&TrainSample) -> Option<ResolvedSample> {
-    let mut validator = Validator::new(id, train.mass_kg);
+    let mut admission = Admission::new(id, Arc::clone(train));
     let mut resolver = ForceResolver::new(Arc::clone(train), track);
-    move |sample| Some(resolver.resolve(&validator.check(sample).ok()?))
+    move |sample| Some(resolver.resolve(&admission.validate(sample).ok()?))
 }
 
 /// Every pipeline that estimates and whose step is short: they may share a thread.

@@ -7,21 +7,26 @@ use super::diagnostic::Diagnostic;
 use super::quantity::Quantity;
 use super::resolved::Resolved;
 
-/// The bounds beyond which [`dynocar_model::validation::Validator`] refuses a sample.
-const PLAUSIBLE: [(Quantity, f64, f64); 7] = [
-    (Quantity::Acceleration, -20.0, 20.0),
-    (Quantity::SpecificForce, -20.0, 20.0),
-    (Quantity::BrakeCylinderPressure, -5e4, 2e6),
-    (Quantity::AmbientTemperature, -80.0, 80.0),
-    (Quantity::Gradient, -150.0, 150.0),
-    (Quantity::Latitude, -90.0, 90.0),
-    (Quantity::Longitude, -180.0, 180.0),
+/// The quantities whose bounds are those of the sample, beyond which validation refuses it.
+const BOUNDED: [Quantity; 5] = [
+    Quantity::Acceleration,
+    Quantity::SpecificForce,
+    Quantity::BrakeCylinderPressure,
+    Quantity::AmbientTemperature,
+    Quantity::Gradient,
 ];
+/// The bounds of places on the earth.
+const EARTH: [(Quantity, f64, f64); 2] =
+    [(Quantity::Latitude, -90.0, 90.0), (Quantity::Longitude, -180.0, 180.0)];
 
 /// Returns a diagnostic for each column with values that are refused.
 pub(super) fn implausible_columns(run: &Resolved) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
-    for (quantity, low, high) in PLAUSIBLE {
+    let bounded = BOUNDED.iter().filter_map(|quantity| {
+        let (low, high) = quantity.field()?.range();
+        Some((*quantity, low, high))
+    });
+    for (quantity, low, high) in bounded.chain(EARTH) {
         let Some(column) = run.table.column(quantity) else { continue };
         let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
         let count = column.iter().filter(is_outside).count();

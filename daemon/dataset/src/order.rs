@@ -1,10 +1,10 @@
 //! The rows' order in time: what is out of order, repeated or missing.
 
+use dynocar_core::pipeline::admission::limits::TIME_STEP;
 use serde::Serialize;
 
-/// A step ahead in time of more than this many s is a clock set, not a gap in the rows; as in
-/// validation.
-const CLOCK_JUMP_S: f64 = dynocar_model::validation::JUMP_MAX_S;
+/// A step ahead in time of more than this many s is a clock set, not a gap in the rows.
+const CLOCK_JUMP_S: f64 = TIME_STEP.high;
 /// A step longer than this many medians is a gap.
 const GAP_STEPS: f64 = 1.5;
 /// In rows without a regular step, a step longer than this many medians is a gap.

@@ -9,7 +9,6 @@
 //!
 //! - [`units`]: the units that quantities may be in
 //! - [`train`], [`track`]: what is declared of the train and the line
-//! - [`validation`]: which samples are fit for use, and why the others are not
 //! - [`terms`]: the physical terms of the model, one law each, that all of the following share
 //! - [`force`]: the known forces on the train at a sample
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
@@ -22,4 +21,3 @@ pub mod terms;
 pub mod track;
 pub mod train;
 pub mod units;
-pub mod validation;

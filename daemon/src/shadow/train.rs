@@ -77,7 +77,7 @@ impl ShadowTrain {
         let ledger = record.of(train.model_hash).map(|it| it.ledger.clone()).unwrap_or_default();
         let evidence = Evidence::new(settings.rule.least_gain);
         let in_force = Rival::new(train.model_hash.0, open_loop, Vec::new(), (evidence, ledger));
-        let trials = Trials::new(train.id, train.model.mass_kg, in_force, Vec::new());
+        let trials = Trials::new(train.id, in_force, Vec::new());
         let standing = Standing { in_force: train.model_hash, before: None, rivals: Vec::new() };
         ShadowTrain {
             train,

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use dynocar_core::pipeline::admission::Admission;
 use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::simulate::{
     ForceModel, Prediction, QuadraticForces, Recording, Restart, STANDING_MPS, SpeedError,
@@ -12,7 +13,6 @@ use dynocar_model::simulate::{
 };
 use dynocar_model::terms::delay::DelayLine;
 use dynocar_model::terms::{gradient, traction};
-use dynocar_model::validation::Validator;
 
 use super::disturbances::{DisturbanceInput, Disturbances};
 use super::sensors::SIMULATED_TRAIN;
@@ -77,14 +77,10 @@ fn error(recording: &Recording, model: &impl ForceModel, restart: Restart) -> Sp
 /// When no sample is usable.
 pub fn record(dataset: &SimulatedDataset, run: &SimulatedRun) -> Recording {
     let train = Arc::new(dataset.train.declared.clone());
-    let mut validator = Validator::new(SIMULATED_TRAIN, train.mass_kg);
+    let mut admission = Admission::new(SIMULATED_TRAIN, Arc::clone(&train));
     let mut resolver = ForceResolver::new(train, Some(Arc::new(dataset.line.track.clone())));
-    let resolved: Vec<ResolvedSample> = run
-        .samples
-        .iter()
-        .filter_map(|sample| validator.check(sample).ok())
-        .map(|valid| resolver.resolve(&valid))
-        .collect();
+    let resolve = |sample| Some(resolver.resolve(&admission.validate(sample).ok()?));
+    let resolved: Vec<ResolvedSample> = run.samples.iter().filter_map(resolve).collect();
     Recording::new(resolved).expect("a simulated run has forces")
 }
 

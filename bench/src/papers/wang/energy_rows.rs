@@ -5,8 +5,6 @@
 //! testers of Table 3 were always on board, or the mass that the filter has learned on the leg
 //! before.
 
-use dynocar_core::pipeline::Estimator;
-
 use super::ride::{kalman, known_resistance, leg, measure};
 use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle, calm};
 use crate::chance::Chance;

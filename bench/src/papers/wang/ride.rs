@@ -1,6 +1,8 @@
 //! Rides on the line: how the train is driven, what acts on it that is not in the model, what the controller measures
 //! of it, and the estimators that learn the mass on a leg.
 
+use dynocar_core::pipeline::Outcome;
+use dynocar_core::pipeline::admission::Admission;
 use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_estimators::wang::{MassKalman, MassKalmanSettings};
 use dynocar_estimators::wang::{MassRegression, StagedDescent, StagedDescentSettings};
@@ -181,10 +183,26 @@ pub fn known_resistance(shuttle: &Shuttle) -> LineResistance {
     LineResistance { basic, curve, tunnel, reference_radius_m: CURVE_RADIUS_M }
 }
 
+/// Our filter behind its admission, as a pipeline has it.
+pub struct AdmittedKalman(Admission, MassKalman);
+
+impl AdmittedKalman {
+    /// Takes the next sample.
+    pub fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.0.pass(&mut self.1, sample)
+    }
+
+    /// Mass in kg and its standard deviation.
+    pub fn mass_kg(&self) -> (f64, f64) {
+        self.1.mass_kg()
+    }
+}
+
 /// Our filter with a resistance.
-pub fn kalman(shuttle: &Shuttle, resistance: &LineResistance) -> MassKalman {
+pub fn kalman(shuttle: &Shuttle, resistance: &LineResistance) -> AdmittedKalman {
     let settings = MassKalmanSettings::default().with_resistance(resistance);
-    MassKalman::new(settings, &shuttle.train).expect("default settings")
+    let kalman = MassKalman::new(settings, &shuttle.train).expect("default settings");
+    AdmittedKalman(Admission::new(TrainId(1), shuttle.train.clone()), kalman)
 }
 
 /// The paper's last stage with a resistance.

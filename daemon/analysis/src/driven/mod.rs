@@ -8,13 +8,12 @@ mod force_parts;
 
 use std::sync::Arc;
 
-use dynocar_model::force::ForceResolver;
+use dynocar_model::force::{ForceResolver, ValidSample};
 use dynocar_model::simulate::is_pulled;
 use dynocar_model::simulate::motion::{Motion, STEP_MAX_S, advance};
 use dynocar_model::terms::delay::DelayLine;
 use dynocar_model::track::Track;
 use dynocar_model::train::{Corrections, TrainModel};
-use dynocar_model::validation::ValidSample;
 use dynocar_shared::{SampleField, TrainSample};
 pub use force_parts::{Balance, ForcePart};
 

@@ -4,10 +4,13 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 
 use super::KeptEstimate;
+use super::judge::{InputState, Judgement};
 
 /// Result of an estimator's update with a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
+    /// The sample shows nothing of what is learned: it waits, or the train stands.
+    Idle,
     /// The sample was taken into account; the estimate stays as it was.
     Used,
     /// The sample was taken into account and the estimate was updated.
@@ -24,6 +27,21 @@ pub trait Estimator: Send {
     /// The kind of estimator, for the snapshot.
     fn kind(&self) -> PipelineKind;
 
+    /// True when samples pass the gate for forces that stand alone before they are taken into account.
+    fn is_gated(&self) -> bool {
+        false
+    }
+
+    /// Sees every sample before the gate.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing, locks nothing, reads no clock.
+    fn observe(&mut self, _sample: &ResolvedSample) {}
+
+    /// Leaves a sample out that the gate refuses; the next one begins anew.
+    fn leave_out(&mut self) {}
+
     /// Takes one sample into account.
     ///
     /// # Real-time
@@ -31,20 +49,14 @@ pub trait Estimator: Send {
     /// Allocates nothing, locks nothing, reads no clock.
     fn update(&mut self, sample: &ResolvedSample) -> Outcome;
 
-    /// Writes the estimate into a snapshot: status and reason, parameters with values and
-    /// covariance, excitation, innovation statistics, unexplained force, speed range. The
-    /// counters and times are the pipeline's.
+    /// Writes the estimate into a snapshot: parameters with values and covariance, excitation,
+    /// innovation statistics, unexplained force, speed range; returns its judgement by the state of the input.
+    /// Status and reason are written by the admission, counters and times by the pipeline.
     ///
     /// # Real-time
     ///
     /// Allocates nothing, locks nothing, reads no clock.
-    fn write(&self, snapshot: &mut ParameterSnapshot);
-
-    /// Of the quantities that it answers, one bit for each that is known well enough under its status:
-    /// all of them while that is estimated. One may be known before the others are.
-    fn known(&self, status: Status) -> u32 {
-        if status == Status::Estimated { u32::MAX } else { 0 }
-    }
+    fn write(&self, input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement;
 
     /// Takes an estimate kept from earlier as its prior, before the first sample; false when
     /// it has no use for one. The status stays unestimated until samples confirm it.
@@ -66,8 +78,7 @@ impl Estimator for Echo {
         Outcome::Used
     }
 
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
-        snapshot.status = Status::Unestimated as u32;
-        snapshot.reason = Reason::None as u32;
+    fn write(&self, _input: &InputState, _snapshot: &mut ParameterSnapshot) -> Judgement {
+        (Status::Unestimated, Reason::None).into()
     }
 }

@@ -3,6 +3,7 @@
 //! A [`Pipeline`] is one estimator for one train with its own validation: the daemon feeds it
 //! from the channel, `dynocar identify` from a file, and both get the same bits.
 
+pub mod admission;
 pub mod braking;
 mod estimator;
 pub mod judge;
@@ -12,7 +13,6 @@ pub mod monitor;
 pub mod motion;
 pub mod output;
 pub mod quantities;
-pub mod sample_gate;
 pub mod settings;
 pub mod train_kalman;
 mod usable;
@@ -27,20 +27,17 @@ use std::sync::Arc;
 use dynocar_model::force::ForceResolver;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_model::validation::Validator;
-use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, RejectionReason, TrainId, TrainSample};
 
+use self::admission::{Admission, WrittenStatus};
 use self::usable::Usable;
-use crate::plausibility::{DetectedFault, Plausibility};
+use crate::plausibility::DetectedFault;
 
 /// One estimator for one train, from [`TrainSample`] to [`ParameterSnapshot`].
 pub struct Pipeline {
-    validator: Validator,
+    admission: Admission,
     resolver: ForceResolver,
     estimator: Box<dyn Estimator>,
-    plausibility: Plausibility,
-    /// Share of the samples lately that validation refused.
-    refused_share: f64,
     usable: Usable,
     /// One bit for each quantity that estimators of this kind answer.
     answerable: u32,
@@ -48,12 +45,6 @@ pub struct Pipeline {
     resets_before: u64,
     snapshot: ParameterSnapshot,
 }
-
-/// Samples over which refusals are remembered.
-const REFUSALS_MEMORY: f64 = 500.0;
-/// Share of refused samples above which no estimate is trusted: where this many are plainly wrong, others are wrong
-/// without being plainly so.
-const REFUSED_SHARE_MAX: f64 = 0.15;
 
 impl Pipeline {
     /// A pipeline around an estimator; `index` is its number in the configuration.
@@ -68,14 +59,13 @@ impl Pipeline {
         snapshot.train_id = train_id.0;
         snapshot.pipeline_index = index;
         snapshot.pipeline_kind = estimator.kind() as u32;
-        estimator.write(&mut snapshot);
+        let admission = Admission::new(train_id, Arc::clone(&train));
+        admission.write(&*estimator, &mut snapshot);
         let answerable = quantities::answerable(estimator.kind());
         Pipeline {
-            validator: Validator::new(train_id, train.mass_kg),
-            plausibility: Plausibility::new(Arc::clone(&train)),
+            admission,
             resolver: ForceResolver::new(train, track),
             estimator,
-            refused_share: 0.0,
             usable: Usable::default(),
             answerable,
             resets_before: 0,
@@ -102,7 +92,7 @@ impl Pipeline {
     ///
     /// Allocates nothing, locks nothing.
     pub fn take_over(&mut self, other: &mut Pipeline) {
-        self.validator.exchange(&mut other.validator);
+        self.admission.exchange_counts(&mut other.admission);
         let (ours, theirs) = (self.snapshot.model_hash, other.snapshot);
         self.resets_before = theirs.generation + 1;
         other.resets_before = 0;
@@ -113,23 +103,24 @@ impl Pipeline {
         other.write_estimate();
     }
 
-    fn write_estimate(&mut self) {
+    fn write_estimate(&mut self) -> WrittenStatus {
         self.snapshot.generation = 0;
-        self.estimator.write(&mut self.snapshot);
+        let written = self.admission.write(&*self.estimator, &mut self.snapshot);
         self.snapshot.generation += self.resets_before;
+        written
     }
 
     /// Counts the samples after this number, taken or lost; to be called before the first sample.
     pub fn count_from(&mut self, sequence: u64) {
-        self.validator.count_from(sequence);
+        self.admission.count_from(sequence);
     }
 
     /// Counts as lost what has not come up to this number and will not any more; true when there
     /// was something.
     pub fn count_up_to(&mut self, sequence: u64) -> bool {
-        self.validator.count_up_to(sequence);
-        let is_news = self.snapshot.samples_lost != self.validator.lost();
-        self.snapshot.samples_lost = self.validator.lost();
+        self.admission.count_up_to(sequence);
+        let is_news = self.snapshot.samples_lost != self.admission.lost();
+        self.snapshot.samples_lost = self.admission.lost();
         self.snapshot.sequence += u64::from(is_news);
         is_news
     }
@@ -144,62 +135,33 @@ impl Pipeline {
     ///
     /// Allocates nothing, locks nothing, reads no clock.
     pub fn process(&mut self, sample: &TrainSample) -> &ParameterSnapshot {
-        let valid = self.validator.check(sample);
-        self.refused_share += (f64::from(valid.is_err()) - self.refused_share) / REFUSALS_MEMORY;
-        let outcome = match valid {
-            Ok(valid) => {
-                let resolved = self.resolver.resolve(&valid);
-                self.plausibility.take(sample, Ok(()), resolved.gradient_permille);
-                self.estimator.update(&resolved)
-            }
-            Err(reason) => {
-                let gradient_permille = self.resolver.stated_gradient_permille(sample);
-                self.plausibility.take(sample, Err(reason), gradient_permille);
-                Outcome::Rejected(reason)
-            }
+        let outcome = match self.admission.admit(sample, &mut self.resolver) {
+            Ok(resolved) => self.admission.pass(&mut *self.estimator, &resolved),
+            Err(reason) => Outcome::Rejected(reason),
         };
         let snapshot = &mut self.snapshot;
         match outcome {
-            Outcome::Used => snapshot.samples_used += 1,
+            Outcome::Idle | Outcome::Used => snapshot.samples_used += 1,
             Outcome::Updated => {
                 snapshot.samples_used += 1;
                 snapshot.updates += 1;
             }
             Outcome::Rejected(reason) => count_rejection(snapshot, reason),
         }
-        snapshot.samples_lost = self.validator.lost();
+        snapshot.samples_lost = self.admission.lost();
         snapshot.sequence += 1;
         snapshot.sample_time_ns = sample.time_ns;
         snapshot.sample_published_ns = sample.published_ns;
         snapshot.sample_sequence = sample.sequence;
-        self.write_estimate();
-        let is_estimated = self.snapshot.status() == Status::Estimated;
-        if let Some(DetectedFault { fault, .. }) = self.implausible() {
-            let snapshot = &mut self.snapshot;
-            snapshot.reason = fault.reason() as u32;
-            if is_estimated {
-                snapshot.status = Status::Degraded as u32;
-            }
-        } else if is_estimated && self.refused_share > REFUSED_SHARE_MAX {
-            output::write_status(&mut self.snapshot, (Status::Degraded, Reason::BadInput));
-        }
-        let is_doubted = self.refused_share > REFUSED_SHARE_MAX || self.implausible().is_some();
-        let known = self.estimator.known(self.snapshot.status()) & self.answerable;
-        let good = if is_doubted { 0 } else { known };
-        let is_awaiting = !is_doubted
-            && matches!(
-                self.snapshot.reason(),
-                Some(Reason::EstimateStale | Reason::OnlyLowerBound | Reason::LoadMayHaveChanged)
-            );
+        let WrittenStatus { known, is_awaiting } = self.write_estimate();
+        let good = known & self.answerable;
         self.snapshot.usable_quantities = self.usable.see(good, is_awaiting, sample.time_ns);
         &self.snapshot
     }
 
     /// Returns the recent implausibility of the samples that spoils the estimate.
     pub fn implausible(&self) -> Option<DetectedFault> {
-        let kind = self.estimator.kind();
-        let mut detected = self.plausibility.detected().iter();
-        detected.find(|detected| detected.fault.concerns(kind)).copied()
+        self.admission.implausible(self.estimator.kind())
     }
 
     /// The snapshot after the last sample.

@@ -1,7 +1,7 @@
 //! Writing an estimate into a snapshot.
 
 use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
-use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot, Reason, Status};
+use dynocar_shared::{Manoeuvre, Parameter, ParameterSnapshot};
 use nalgebra::{SMatrix, SVector};
 
 use super::InnovationMonitor;
@@ -33,12 +33,6 @@ pub fn write_parameters<const N: usize>(
             snapshot.covariance[packed_index(i, j)] = units[i] * units[j] * covariance[(i, j)];
         }
     }
-}
-
-/// Writes status and reason.
-pub fn write_status(snapshot: &mut ParameterSnapshot, (status, reason): (Status, Reason)) {
-    snapshot.status = status as u32;
-    snapshot.reason = reason as u32;
 }
 
 /// Writes the innovation statistics.

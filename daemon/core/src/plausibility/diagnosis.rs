@@ -15,13 +15,12 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use super::input_fault::{DetectedFault, InputFault};
 use super::watch::Figures;
 use super::window_balance::{Balance, Fitted};
+use crate::pipeline::admission::limits::MASS;
 
 /// Factors of forces within these bounds are effects that a train can have.
 const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
 /// Distance by position over distance by speed within these bounds is wear, gaps and drift.
 const DISTANCE_RATIOS: (f64, f64) = (0.8, 1.25);
-/// Masses over the declared one within these bounds are loads, as in validation.
-const MASS_RATIOS: (f64, f64) = (0.2, 5.0);
 /// Factors of traction and brake that differ by less are one factor.
 const SAME_FACTOR: f64 = 1.6;
 /// Steps in s outside these bounds are unusual for a recorder of a train.
@@ -74,7 +73,7 @@ pub fn diagnose(figures: &Figures) -> DetectedFaults {
         add(&mut found, fault, factor);
     }
     let mut forces_by = forces_by;
-    if let Some(ratio) = figures.mass_ratio.filter(|&ratio| is_outside(ratio, MASS_RATIOS)) {
+    if let Some(ratio) = figures.mass_ratio.filter(|&ratio| MASS.is_passed(ratio)) {
         add(&mut found, InputFault::MassScale, ratio);
         forces_by *= ratio;
     }

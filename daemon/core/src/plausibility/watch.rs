@@ -149,6 +149,11 @@ impl Watch {
         self.extend_window(&last, sample, step_s) || is_compared
     }
 
+    /// Passes over a sample that is no measurement.
+    pub fn pass_over(&mut self) {
+        self.ended = None;
+    }
+
     /// Returns the means of the window that the last sample ended; `None` where it ended none.
     pub fn ended(&self) -> Option<&WindowMean> {
         self.ended.as_ref()

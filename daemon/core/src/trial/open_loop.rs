@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use dynocar_model::force::{ForceResolver, ResolvedSample};
+use dynocar_model::force::{ForceResolver, ResolvedSample, ValidSample};
 use dynocar_model::simulate::{Prediction, QuadraticForces, Recording, Restart, SpeedError};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_model::validation::ValidSample;
 
 /// Samples nearer in time, in s, to the last that was kept are not: 20 a second describe a motion.
 const STEP_MIN_S: f64 = 0.05;
@@ -40,6 +39,11 @@ impl OpenLoop {
             samples: Vec::with_capacity(SAMPLES_MAX),
             prediction: Prediction::new(),
         }
+    }
+
+    /// Returns the model of the train.
+    pub fn train(&self) -> Arc<TrainModel> {
+        Arc::clone(&self.train)
     }
 
     /// Takes the next sample of the window.

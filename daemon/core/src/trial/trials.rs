@@ -1,13 +1,14 @@
 //! The model in force and its rivals on the same samples.
 
+use dynocar_model::force::ValidSample;
 use dynocar_model::simulate::{Restart, SpeedError};
-use dynocar_model::validation::{ValidSample, Validator};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::{Evidence, score};
 use super::ledger::Ledger;
 use super::open_loop::{OpenLoop, WindowError};
 use crate::pipeline::Pipeline;
+use crate::pipeline::admission::Admission;
 use crate::pipeline::motion::MOVING_MPS;
 
 /// Moving time in s of which a trip is made that compares models; shorter ones join the next.
@@ -98,7 +99,7 @@ struct Window {
 
 /// One train's models on trial, by the samples of its controller.
 pub struct Trials {
-    validator: Validator,
+    admission: Admission,
     /// The model in force. Its evidence is against itself and stays empty; its pipelines run
     /// elsewhere.
     pub in_force: Rival,
@@ -110,11 +111,11 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// Of a train of a nominal mass in kg.
-    pub fn new(train: TrainId, mass_kg: f64, in_force: Rival, rivals: Vec<Rival>) -> Self {
-        let validator = Validator::new(train, mass_kg);
+    /// Of a train.
+    pub fn new(train: TrainId, in_force: Rival, rivals: Vec<Rival>) -> Self {
+        let admission = Admission::new(train, in_force.open_loop.train());
         let mut trials =
-            Trials { validator, in_force, rivals, window: None, run: None, moved_s: 0.0 };
+            Trials { admission, in_force, rivals, window: None, run: None, moved_s: 0.0 };
         trials.begin_trip();
         trials
     }
@@ -122,7 +123,7 @@ impl Trials {
     /// Takes the next sample; `unix_s` is the time of day, in s since 1970. True when a trip ended
     /// by it, and with it the models were compared.
     pub fn take(&mut self, sample: &TrainSample, unix_s: f64) -> bool {
-        let valid = self.validator.check(sample).ok();
+        let valid = self.admission.validate(sample).ok();
         let mut has_compared = false;
         if let Some(valid) = &valid {
             let ends = self.window.is_some_and(|window| {

@@ -6,6 +6,7 @@
 //! the data are it takes from a least-squares estimator that runs in parallel.
 
 use dynocar_core::filter::Gaussian;
+use dynocar_core::pipeline::judge::{InputState, Judgement};
 use dynocar_core::pipeline::momentum::{
     BRAKE_SCALE, Disturbance, FORCE_DELAY, PARAMETERS, TRACTION_SCALE, UNKNOWNS, UnitSample,
     regressors,
@@ -381,13 +382,13 @@ impl Estimator for ResistanceKalman {
         if outcome == Outcome::Used { Outcome::Updated } else { outcome }
     }
 
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
-        self.least_squares.write_with(&self.report, &self.monitor, snapshot);
+    fn write(&self, _input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
+        let judgement = self.least_squares.write_with(&self.report, &self.monitor, snapshot);
         snapshot.generation += self.resets;
-        let weight_kn = self.least_squares.weight_kn;
-        let (value, std) = self.disturbance();
-        snapshot.unexplained_force_n = value * weight_kn;
-        snapshot.unexplained_force_std_n = std * weight_kn;
+        let forces_n =
+            <[f64; 2]>::from(self.disturbance()).map(|it| it * self.least_squares.weight_kn);
+        [snapshot.unexplained_force_n, snapshot.unexplained_force_std_n] = forces_n;
+        judgement
     }
 
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {

@@ -1,9 +1,9 @@
 //! The pipelines `ls`, `rls`, `regularised_rls`, `mils` and `v_mils`.
 
 use dynocar_core::filter::RunningMedian;
-use dynocar_core::pipeline::judge::missing;
+use dynocar_core::pipeline::judge::{InputState, Judgement, missing};
 use dynocar_core::pipeline::momentum::{DataSettings, PARAMETERS, UnitSample, scaled, unscaling};
-use dynocar_core::pipeline::output::{DAVIS, write_innovations, write_parameters, write_status};
+use dynocar_core::pipeline::output::{DAVIS, write_innovations, write_parameters};
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
@@ -237,19 +237,18 @@ impl ResistanceLeastSquares {
 }
 
 impl ResistanceLeastSquares {
-    /// Writes a report on these samples.
+    /// Writes a report on these samples; returns the judgement.
     pub(super) fn write_with(
         &self,
         report: &Report,
         monitor: &InnovationMonitor,
         snapshot: &mut ParameterSnapshot,
-    ) {
+    ) -> Judgement {
         let reason = match self.obstacle {
             // Without a single row, what is missing says more than that rows are few.
             Some(obstacle) if self.bank.count() == 0.0 => obstacle,
             _ => report.reason,
         };
-        write_status(snapshot, (report.status, reason));
         let factors = unscaling();
         let covariance =
             Matrix3::from_diagonal(&factors) * report.covariance * Matrix3::from_diagonal(&factors);
@@ -262,6 +261,7 @@ impl ResistanceLeastSquares {
         snapshot.unexplained_force_n = self.disturbance.0 * self.weight_kn;
         snapshot.unexplained_force_std_n = self.disturbance.1 * self.weight_kn;
         self.speeds.range.write(snapshot);
+        (report.status, reason).into()
     }
 }
 
@@ -294,8 +294,8 @@ impl Estimator for ResistanceLeastSquares {
         }
     }
 
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
-        self.write_with(&self.report, &self.monitor, snapshot);
+    fn write(&self, _input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
+        self.write_with(&self.report, &self.monitor, snapshot)
     }
 
     /// The kept coefficients take the place of the declared ones, and are known to every noise

@@ -2,6 +2,7 @@
 
 use dynocar_core::filter::bounded_minimum;
 use dynocar_core::pipeline::InnovationMonitor;
+use dynocar_core::pipeline::admission::limits::UNFIT_SHARE;
 use dynocar_core::pipeline::judge::Case;
 use dynocar_core::pipeline::momentum::{PARAMETERS, SPEED_SCALE_MPS, regressors, unscaling};
 use dynocar_core::pipeline::motion::SpeedRange;
@@ -25,8 +26,6 @@ const DISTURBANCE_SHARE_MAX: f64 = 0.1;
 const DISTURBANCE_EVIDENCE_MIN: f64 = 10.0;
 /// Standard deviations beyond which the force now is no chance.
 const DISTURBANCE_STDS_MAX: f64 = 4.0;
-/// Share of refused rows beyond which the input is bad.
-const REFUSED_SHARE_MAX: f64 = 0.3;
 
 /// Mean and range of the speeds behind the rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -159,7 +158,7 @@ fn case(
     let is_too_large = innovations.are_too_large() || is_disturbed;
     Case {
         fault: None,
-        input: (evidence.refused_share > REFUSED_SHARE_MAX).then_some(Reason::BadInput),
+        input: (evidence.refused_share > UNFIT_SHARE.high).then_some(Reason::BadInput),
         is_ready: evidence.rows >= ROWS_MIN,
         // Structure makes the intervals wide, and says why.
         is_known: has_structure || w0_std <= SHARE_STD_MAX * w0,

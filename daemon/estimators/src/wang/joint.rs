@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynocar_core::filter::bank::Bank;
 use dynocar_core::filter::drifting_level::BIAS;
-use dynocar_core::pipeline::judge::{InputHealth, LackOfFit};
+use dynocar_core::pipeline::judge::{InputState, Judgement, LackOfFit};
 use dynocar_core::pipeline::motion::{
     MOVING_MPS, OutlierRow, SpeedNoise, SpeedRange, StopWatch, Trust, kink_variance,
 };
@@ -51,7 +51,6 @@ pub struct JointLeastSquares {
     noise: SpeedNoise,
     outliers: OutlierRow,
     pub(super) monitor: InnovationMonitor,
-    pub(super) health: InputHealth,
     pub(super) fit: LackOfFit,
     pub(super) speed_mps: f64,
     pub(super) speeds: SpeedRange,
@@ -94,7 +93,6 @@ impl JointLeastSquares {
             noise: SpeedNoise::guessed(settings.speed_noise_mps),
             outliers: OutlierRow::default(),
             monitor: InnovationMonitor::new(500),
-            health: InputHealth::default(),
             fit: LackOfFit::default(),
             speed_mps: 0.0,
             speeds: SpeedRange::default(),
@@ -293,19 +291,18 @@ impl Estimator for JointLeastSquares {
         }
         let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
-            Err(outcome) => return self.health.passed(outcome, sample),
+            Err(outcome) => return outcome,
         };
         self.speed_mps = motion.speed_mps;
         let step = self.last.and_then(|last| Some((last, motion.step_from(&last.0)?)));
-        let outcome = match step {
+        match step {
             Some((last, step_s)) => self.advance(last, motion, step_s),
             None => self.begin(motion),
-        };
-        self.health.note(outcome, sample)
+        }
     }
 
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
-        self.write_snapshot(snapshot);
+    fn write(&self, input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
+        self.write_snapshot(input, snapshot).into()
     }
 }
 

@@ -1,9 +1,9 @@
 //! Contents of a snapshot by [`JointLeastSquares`].
 
 use dynocar_core::filter::drifting_level::BIAS;
-use dynocar_core::pipeline::judge::Case;
+use dynocar_core::pipeline::judge::{Case, InputState};
 use dynocar_core::pipeline::output::{
-    DAVIS_AND_MASS, excitation, write_innovations, write_parameters, write_status,
+    DAVIS_AND_MASS, excitation, write_innovations, write_parameters,
 };
 use dynocar_shared::{ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
@@ -18,15 +18,18 @@ const SAMPLES_MIN: u64 = 50;
 const JUDGED_AT: [f64; 3] = [0.1, 0.5, 0.9];
 
 impl JointLeastSquares {
-    /// Writes estimate, excitation, status and unexplained force.
-    pub(super) fn write_snapshot(&self, snapshot: &mut ParameterSnapshot) {
+    /// Writes estimate, excitation and unexplained force; returns status and reason.
+    pub(super) fn write_snapshot(
+        &self,
+        input: &InputState,
+        snapshot: &mut ParameterSnapshot,
+    ) -> (Status, Reason) {
         snapshot.generation = self.generation;
         write_innovations(snapshot, &self.monitor);
         let best = self.bank.likeliest();
         let (Some(solution), Some(root)) = (best.regression.solve(), self.covariance_root()) else {
             snapshot.parameter_count = 0;
-            write_status(snapshot, (Status::Invalid, Reason::NumericalFailure));
-            return;
+            return (Status::Invalid, Reason::NumericalFailure);
         };
         let mass_std = self.write_estimate(&solution, &root, snapshot);
         let is_mass_known = mass_std <= 0.01 * self.settings.usable_std_percent;
@@ -34,7 +37,6 @@ impl JointLeastSquares {
         let known = self.resistance_stds(&root).map(|std| std <= usable);
         (snapshot.excited, snapshot.missing_manoeuvres) =
             excitation([known[0], known[1], known[2], is_mass_known]);
-        write_status(snapshot, self.case(is_mass_known, known[1]).verdict());
         let inertia = &self.regressors.inertia;
         let mass_kg = inertia.reference_mass_kg / solution[INVERSE_MASS];
         let inertia_kg = inertia.inertial_mass_kg(mass_kg);
@@ -42,16 +44,17 @@ impl JointLeastSquares {
         snapshot.unexplained_force_n = -shape * solution[BIAS] * inertia_kg;
         snapshot.unexplained_force_std_n = shape * root.row(BIAS).norm() * inertia_kg;
         self.speeds.write(snapshot);
+        self.case(input, is_mass_known, known[1]).verdict()
     }
 
-    fn case(&self, is_mass_known: bool, is_resistance_known: bool) -> Case {
+    fn case(&self, input: &InputState, is_mass_known: bool, is_resistance_known: bool) -> Case {
         let some = is_mass_known || is_resistance_known;
         let failure = (Status::Invalid, Reason::NumericalFailure);
         let lasting = self.fit.is_lasting().then_some(Reason::InnovationsNotWhite);
         Case {
             fault: (self.is_fresh_reset && !is_mass_known).then_some(failure),
-            input: self.health.input_doubt(),
-            is_ready: self.health.used() >= SAMPLES_MIN,
+            input: input.doubt,
+            is_ready: input.used >= SAMPLES_MIN,
             is_known: is_mass_known && is_resistance_known,
             lacking: if some { Status::Degraded } else { Status::Unestimated },
             contradiction: lasting.or_else(|| self.monitor.contradiction()),

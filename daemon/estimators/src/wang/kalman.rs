@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::judge::{Case, InputHealth};
+use dynocar_core::pipeline::judge::{Case, InputState, Judgement};
 use dynocar_core::pipeline::motion::{SpeedNoise, SpeedRange, StopWatch, jump_variance};
-use dynocar_core::pipeline::output::{write_innovations, write_parameters, write_status};
-use dynocar_core::pipeline::sample_gate::{Gated, SampleGate};
+use dynocar_core::pipeline::output::{write_innovations, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_model::force::ResolvedSample;
@@ -46,7 +45,6 @@ pub struct MassKalman {
     initial_bank: BiasBank,
     bank: BiasBank,
     stops: StopWatch,
-    gate: SampleGate,
     last: Option<Motion>,
     /// Inverse mass as known when force last acted, bias as known now.
     moments: Moments,
@@ -57,7 +55,6 @@ pub struct MassKalman {
     noise: SpeedNoise,
     settling: Settling,
     monitor: InnovationMonitor,
-    health: InputHealth,
     speeds: SpeedRange,
     moved_s: f64,
     was_known: bool,
@@ -90,7 +87,6 @@ impl MassKalman {
             initial_bank: bank.clone(),
             bank,
             stops: StopWatch::new(settings.stop_min_s),
-            gate: SampleGate::default(),
             last: None,
             declared_mass_kg: train.mass_kg,
             is_warm_started: false,
@@ -98,7 +94,6 @@ impl MassKalman {
             noise: SpeedNoise::guessed(settings.speed_noise_mps),
             settling: Settling::default(),
             monitor: InnovationMonitor::new(500),
-            health: InputHealth::default(),
             speeds: SpeedRange::default(),
             moved_s: 0.0,
             was_known: false,
@@ -219,16 +214,16 @@ impl MassKalman {
         std_kg <= 0.01 * self.settings.usable_std_percent * mass_kg
     }
 
-    fn is_ready(&self) -> bool {
-        self.health.used() >= SAMPLES_MIN || self.moved_s >= MOVED_MIN_S
+    fn is_ready(&self, input: &InputState) -> bool {
+        input.used >= SAMPLES_MIN || self.moved_s >= MOVED_MIN_S
     }
 
-    fn case(&self) -> Case {
+    fn case(&self, input: &InputState) -> Case {
         let failure = (Status::Invalid, Reason::NumericalFailure);
         Case {
             fault: self.is_fresh_reset.then_some(failure),
-            input: self.health.input_doubt().or(self.gate.input_doubt()),
-            is_ready: self.is_ready(),
+            input: input.doubt,
+            is_ready: self.is_ready(input),
             is_known: self.is_known(),
             lacking: if self.was_known { Status::Degraded } else { Status::Unestimated },
             contradiction: self.monitor.contradiction(),
@@ -237,48 +232,43 @@ impl MassKalman {
     }
 }
 
-impl Gated for MassKalman {
-    fn gate(&mut self) -> &mut SampleGate {
-        &mut self.gate
-    }
-
-    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
-        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
-            Ok(motion) => motion,
-            Err(outcome) => return self.health.passed(outcome, sample),
-        };
-        self.noise.rounding.see(motion.speed_mps);
-        let last = self.last.filter(|_| sample.step_s > 0.0);
-        let step = last.and_then(|last| Some((last, motion.step_from(&last)?)));
-        let outcome = match step {
-            Some((last, step_s)) => self.advance(last, motion, step_s),
-            None => self.begin(motion),
-        };
-        self.health.note(outcome, sample)
-    }
-
-    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
-        self.last = None;
-        self.health.refuse(reason, sample);
-    }
-}
-
 impl Estimator for MassKalman {
     fn kind(&self) -> PipelineKind {
         PipelineKind::MassKalman
     }
 
-    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+    fn is_gated(&self) -> bool {
+        true
+    }
+
+    fn observe(&mut self, sample: &ResolvedSample) {
         if self.stops.is_first() {
             self.begin_with(sample.mass_kg);
         }
         if self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps) {
             self.reopen(sample.mass_kg);
         }
-        self.pass(sample)
     }
 
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
+    fn leave_out(&mut self) {
+        self.last = None;
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
+            Ok(motion) => motion,
+            Err(outcome) => return outcome,
+        };
+        self.noise.rounding.see(motion.speed_mps);
+        let last = self.last.filter(|_| sample.step_s > 0.0);
+        let step = last.and_then(|last| Some((last, motion.step_from(&last)?)));
+        match step {
+            Some((last, step_s)) => self.advance(last, motion, step_s),
+            None => self.begin(motion),
+        }
+    }
+
+    fn write(&self, input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
         let (mass_kg, mass_std_kg) = self.mass_kg();
         let (bias_mps2, bias_std) = (self.moments.bias_mps2, self.moments.bias_variance.sqrt());
         // The mass falls as its inverse grows.
@@ -290,16 +280,16 @@ impl Estimator for MassKalman {
             &Matrix2::new(mass_std_kg * mass_std_kg, cross, cross, bias_std * bias_std),
         );
         let is_known = self.is_known();
-        let is_bias_known = self.is_ready();
+        let is_bias_known = self.is_ready(input);
         snapshot.excited = u32::from(is_known) | (u32::from(is_bias_known) << 1);
         snapshot.missing_manoeuvres = if is_known { 0 } else { Manoeuvre::Accelerate.bit() };
-        write_status(snapshot, self.case().verdict());
         write_innovations(snapshot, &self.monitor);
         let inertia_kg = self.inertia.inertial_mass_kg(mass_kg);
         snapshot.unexplained_force_n = -bias_mps2 * inertia_kg;
         snapshot.unexplained_force_std_n = bias_std * inertia_kg;
         self.speeds.write(snapshot);
         snapshot.generation = self.generation;
+        self.case(input).verdict().into()
     }
 
     /// Takes up the kept mass, unless the first sample declares another than the train's.

@@ -77,7 +77,7 @@ impl Motion {
     ///
     /// # Errors
     ///
-    /// `Used` for a train that stands, else the refusal with the reason of [`Motion::of`].
+    /// `Idle` for a train that stands, else the refusal with the reason of [`Motion::of`].
     pub fn seen<T>(
         sample: &ResolvedSample,
         speed_min_mps: f64,
@@ -85,7 +85,7 @@ impl Motion {
     ) -> Result<Self, Outcome> {
         if sample.speed_mps < speed_min_mps {
             *last = None;
-            return Err(Outcome::Used);
+            return Err(Outcome::Idle);
         }
         Motion::of(sample).map_err(|reason| {
             if reason == RejectionReason::WheelSlide {

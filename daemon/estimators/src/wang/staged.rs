@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::judge::{Case, InputHealth};
+use dynocar_core::pipeline::judge::{Case, InputState, Judgement};
 use dynocar_core::pipeline::motion::{MOVING_MPS, SpeedRange, StopWatch};
-use dynocar_core::pipeline::output::{DAVIS_AND_MASS, write_parameters, write_status};
+use dynocar_core::pipeline::output::{DAVIS_AND_MASS, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_core::settings;
@@ -60,7 +60,6 @@ pub struct StagedDescent {
     learned: u64,
     stops: StopWatch,
     last: Option<Motion>,
-    health: InputHealth,
     speeds: SpeedRange,
 }
 
@@ -87,7 +86,6 @@ impl StagedDescent {
             learned: 0,
             stops: StopWatch::new(settings.stop_min_s),
             last: None,
-            health: InputHealth::default(),
             speeds: SpeedRange::default(),
         })
     }
@@ -225,12 +223,12 @@ impl StagedDescent {
         1.0 / self.mass.sums.explained_share() - 1.0
     }
 
-    fn case(&self, is_mass_known: bool) -> Case {
+    fn case(&self, input: &InputState, is_mass_known: bool) -> Case {
         let is_begun = self.basic.sums.count >= SAMPLES_MIN || is_mass_known;
         let is_bracketed = self.mass_bracket() <= BRACKET_MAX;
         Case {
             fault: None,
-            input: self.health.input_doubt(),
+            input: input.doubt,
             is_ready: self.learned >= self.settings.resistance_samples,
             is_known: is_mass_known,
             lacking: if is_begun { Status::Degraded } else { Status::Unestimated },
@@ -251,9 +249,8 @@ impl Estimator for StagedDescent {
         }
         let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
-            Err(outcome) => return self.health.passed(outcome, sample),
+            Err(outcome) => return outcome,
         };
-        self.health.accept();
         let step = self.last.and_then(|last| Some((last, motion.step_from(&last)?)));
         self.last = Some(motion);
         match step {
@@ -262,7 +259,7 @@ impl Estimator for StagedDescent {
         }
     }
 
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
+    fn write(&self, input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
         let davis = self.davis(Section::Basic);
         let mass_std_kg = self.mass_std_kg();
         let mut covariance = Matrix4::zeros();
@@ -284,8 +281,8 @@ impl Estimator for StagedDescent {
         snapshot.excited |= u32::from(mass_std_kg.is_some()) << 3;
         snapshot.missing_manoeuvres =
             if mass_std_kg.is_some() { 0 } else { Manoeuvre::Accelerate.bit() };
-        write_status(snapshot, self.case(mass_std_kg.is_some()).verdict());
         self.speeds.write(snapshot);
+        self.case(input, mass_std_kg.is_some()).verdict().into()
     }
 }
 

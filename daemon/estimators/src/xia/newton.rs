@@ -1,17 +1,16 @@
 //! `trajectory_newton`: a trajectory fit over a sliding window, the online scheme of Xia 2023.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-use dynocar_core::pipeline::judge::InputHealth;
+use dynocar_core::pipeline::judge::{InputState, Judgement};
 use dynocar_core::pipeline::motion::SpeedRange;
 use dynocar_core::pipeline::output::{DAVIS, write_parameters};
-use dynocar_core::pipeline::sample_gate::{Gated, SampleGate};
 use dynocar_core::pipeline::settings::{SettingError, require};
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, Outcome};
 use dynocar_core::settings;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
+use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
@@ -49,7 +48,6 @@ pub struct TrajectoryNewton {
     fit: FitSettings,
     speed_noise_mps: f64,
     source: RestartSource,
-    gate: SampleGate,
     tracker: MotionTracker,
     window: Window,
     fitter: TrajectoryFitter,
@@ -66,7 +64,6 @@ pub struct TrajectoryNewton {
     speeds: SpeedRange,
     /// False when the newest window's residuals are larger than the noise accounts for.
     is_consistent: bool,
-    health: InputHealth,
     fault: Option<(Status, Reason)>,
 }
 
@@ -101,7 +98,6 @@ impl TrajectoryNewton {
             },
             speed_noise_mps: settings.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS),
             source: RestartSource::new(settings.seed),
-            gate: SampleGate::default(),
             tracker: MotionTracker::default(),
             window: Window::new(rule, capacity, settings.interval_m),
             fitter: TrajectoryFitter::with_capacity(1, capacity + 1),
@@ -115,7 +111,6 @@ impl TrajectoryNewton {
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
             is_consistent: true,
-            health: InputHealth::default(),
             fault: None,
             prior_std: prior.std,
             disturbance_mps2: settings.disturbance_mps2(train),
@@ -235,13 +230,22 @@ impl TrajectoryNewton {
     }
 }
 
-impl Gated for TrajectoryNewton {
-    fn gate(&mut self) -> &mut SampleGate {
-        &mut self.gate
+impl Estimator for TrajectoryNewton {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrajectoryNewton
     }
 
-    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
-        let outcome = match self.tracker.advance(sample) {
+    fn is_gated(&self) -> bool {
+        true
+    }
+
+    fn leave_out(&mut self) {
+        self.tracker = MotionTracker::default();
+        self.end_window();
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        match self.tracker.advance(sample) {
             MotionUpdate::Continue(motion) => {
                 self.unexplained.push(&motion, sample, &self.davis);
                 self.speeds.push(sample.speed_mps);
@@ -265,27 +269,10 @@ impl Gated for TrajectoryNewton {
                 self.end_window();
                 Outcome::Rejected(reason)
             }
-        };
-        self.health.note(outcome, sample)
+        }
     }
 
-    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
-        self.health.refuse(reason, sample);
-        self.tracker = MotionTracker::default();
-        self.end_window();
-    }
-}
-
-impl Estimator for TrajectoryNewton {
-    fn kind(&self) -> PipelineKind {
-        PipelineKind::TrajectoryNewton
-    }
-
-    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        self.pass(sample)
-    }
-
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
+    fn write(&self, input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
         let Davis { a, b, c } = self.davis;
         let inflation = self.long_run.inflation();
         let covariance = self.covariance * inflation;
@@ -300,11 +287,11 @@ impl Estimator for TrajectoryNewton {
             is_ready: self.windows > 0,
             is_at_bound: self.at_bound,
             fault: self.fault,
-            input: self.health.input_doubt().or(self.gate.input_doubt()),
+            input: input.doubt,
             doubt: (!self.is_consistent).then_some(Reason::InnovationsTooLarge),
         };
-        estimate.write(snapshot);
         self.unexplained.write(snapshot, self.speed_noise_mps.powi(2));
+        estimate.write(snapshot)
     }
 }
 

@@ -2,13 +2,15 @@
 
 #![allow(dead_code)] // Every test file uses a part of it.
 
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-use dynocar_core::pipeline::Estimator;
+use dynocar_core::pipeline::admission::Admission;
+use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::Resistance;
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
-use dynocar_shared::ParameterSnapshot;
+use dynocar_shared::{ParameterSnapshot, TrainId};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -152,17 +154,47 @@ impl Simulation {
     }
 }
 
+/// An estimator behind its admission, as a pipeline has it.
+pub struct Admitted<E> {
+    admission: Admission,
+    estimator: E,
+}
+
+impl<E: Estimator> Admitted<E> {
+    pub fn new(estimator: E) -> Self {
+        Admitted { admission: Admission::new(TrainId(1), train()), estimator }
+    }
+
+    pub fn update(&mut self, sample: &ResolvedSample) -> Outcome {
+        self.admission.pass(&mut self.estimator, sample)
+    }
+}
+
+impl<E> Deref for Admitted<E> {
+    type Target = E;
+
+    fn deref(&self) -> &E {
+        &self.estimator
+    }
+}
+
+impl<E> DerefMut for Admitted<E> {
+    fn deref_mut(&mut self) -> &mut E {
+        &mut self.estimator
+    }
+}
+
 /// Feeds samples to an estimator.
-pub fn feed(estimator: &mut dyn Estimator, samples: &[ResolvedSample]) {
+pub fn feed(estimator: &mut Admitted<impl Estimator>, samples: &[ResolvedSample]) {
     for sample in samples {
         estimator.update(sample);
     }
 }
 
 /// The snapshot of an estimator.
-pub fn snapshot(estimator: &dyn Estimator) -> ParameterSnapshot {
+pub fn snapshot(estimator: &Admitted<impl Estimator>) -> ParameterSnapshot {
     let mut snapshot = ParameterSnapshot::empty();
-    estimator.write(&mut snapshot);
+    estimator.admission.write(&estimator.estimator, &mut snapshot);
     snapshot
 }
 

@@ -1,7 +1,9 @@
 //! Resistance and mass by joint least squares.
 
-use crate::mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
-use dynocar_core::pipeline::{Estimator, Outcome};
+use crate::mass_common::{
+    Admitted, LEG, Simulation, assert_finite, feed, garbage, snapshot, train,
+};
+use dynocar_core::pipeline::Outcome;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::wang::motion::Section;
 use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
@@ -16,8 +18,9 @@ fn badly_declared() -> Arc<TrainModel> {
     Arc::new(TrainModel { resistance, ..(*train()).clone() })
 }
 
-fn estimator() -> JointLeastSquares {
-    JointLeastSquares::new(JointLeastSquaresSettings::default(), &badly_declared()).unwrap()
+fn estimator() -> Admitted<JointLeastSquares> {
+    let settings = JointLeastSquaresSettings::default();
+    Admitted::new(JointLeastSquares::new(settings, &badly_declared()).unwrap())
 }
 
 /// Legs of different loads with stops between them.

@@ -1,14 +1,20 @@
 //! Mass by Kalman filters: what is learned, when, and what bad input does.
 
-use crate::mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
-use dynocar_core::pipeline::{Estimator, Outcome};
+use crate::mass_common::{
+    Admitted, LEG, Simulation, assert_finite, feed, garbage, snapshot, train,
+};
+use dynocar_core::pipeline::Outcome;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::wang::{MassKalman, MassKalmanSettings};
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::{Manoeuvre, Parameter, PipelineKind, Reason, RejectionReason, Status};
 
-fn estimator() -> MassKalman {
-    MassKalman::new(MassKalmanSettings::default(), &train()).unwrap()
+fn estimator() -> Admitted<MassKalman> {
+    with(MassKalmanSettings::default())
+}
+
+fn with(settings: MassKalmanSettings) -> Admitted<MassKalman> {
+    Admitted::new(MassKalman::new(settings, &train()).unwrap())
 }
 
 fn error(estimator: &MassKalman, truth_kg: f64) -> f64 {
@@ -94,7 +100,7 @@ fn a_stop_opens_the_mass_and_the_new_one_is_found_in_thirty_seconds_of_traction(
 fn a_signal_stop_of_seconds_and_a_train_that_is_never_loaded_keep_the_mass() {
     let never = MassKalmanSettings { mass_change_std_percent: 0.0, ..Default::default() };
     for (settings, stop_s) in [(MassKalmanSettings::default(), 3.0), (never, 60.0)] {
-        let mut estimator = MassKalman::new(settings, &train()).unwrap();
+        let mut estimator = with(settings);
         let mut simulation = Simulation::new(100_000.0, 4);
         feed(&mut estimator, &simulation.drive(&LEG));
         let before = estimator.mass_kg();

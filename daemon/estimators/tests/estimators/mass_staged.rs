@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
-use dynocar_core::pipeline::Estimator;
+use crate::mass_common::{
+    Admitted, LEG, Simulation, assert_finite, feed, garbage, snapshot, train,
+};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_estimators::wang::{MassRegression, StagedDescent, StagedDescentSettings};
@@ -11,10 +12,10 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, PipelineKind, Reason, Status};
 
-fn staged(settings: StagedDescentSettings) -> StagedDescent {
+fn staged(settings: StagedDescentSettings) -> Admitted<StagedDescent> {
     let resistance = Davis { a: 1.0, b: 0.01, c: 0.0025 };
     let train = TrainModel { resistance, ..(*train()).clone() };
-    StagedDescent::new(settings, &Arc::new(train)).unwrap()
+    Admitted::new(StagedDescent::new(settings, &Arc::new(train)).unwrap())
 }
 
 fn crossing(mass_kg: f64, seed: u64, legs: usize) -> Vec<ResolvedSample> {

@@ -15,4 +15,4 @@
 pub mod balance;
 mod resolver;
 
-pub use resolver::{ForceResolver, ResolvedSample};
+pub use resolver::{ForceResolver, ResolvedSample, ValidSample};

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 
 use crate::terms::bearings::WarmUp;
@@ -15,7 +16,24 @@ use crate::terms::{
 };
 use crate::track::Track;
 use crate::train::{Corrections, TrainModel};
-use crate::validation::ValidSample;
+
+/// A sample that passed validation, with what its predecessors say about it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ValidSample<'a> {
+    /// The sample as it came.
+    pub sample: &'a TrainSample,
+    /// Time in s since the accepted sample before it; 0 when it starts a segment.
+    pub step_s: f64,
+    /// Number of the motion segment; integrals never cross its change.
+    pub segment: u32,
+}
+
+impl ValidSample<'_> {
+    /// True while the controller's wheel-slide protection is active.
+    pub fn is_sliding(&self) -> bool {
+        self.sample.flags & FLAG_WHEEL_SLIDE != 0
+    }
+}
 
 /// A sample with the forces that the declared model knows.
 ///

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role, Run};
+use dynocar_core::pipeline::admission::Admission;
 use dynocar_model::force::ForceResolver;
 use dynocar_model::simulate::{Prediction, QuadraticForces, Recording, Restart, SpeedError};
-use dynocar_model::validation::Validator;
 use dynocar_shared::TrainId;
 use serde_json::Value;
 
@@ -49,12 +49,12 @@ fn compare(folder: &Path, name: &str, metric: &str, restart: Restart) -> Result<
 fn prediction_error(dataset: &Dataset, run: &Run, restart: Restart) -> Result<SpeedError, String> {
     let train = &dataset.train;
     let train_id = TrainId(run.samples.first().map_or(0, |sample| sample.train_id));
-    let mut validator = Validator::new(train_id, train.mass_kg);
+    let mut admission = Admission::new(train_id, Arc::clone(train));
     let mut resolver = ForceResolver::new(Arc::clone(train), dataset.track.clone());
     let resolved = run
         .samples
         .iter()
-        .filter_map(|sample| Some(resolver.resolve(&validator.check(sample).ok()?)))
+        .filter_map(|sample| Some(resolver.resolve(&admission.validate(sample).ok()?)))
         .collect();
     let recording = Recording::new(resolved).map_err(|error| format!("{}: {error}", run.file))?;
     let model = QuadraticForces::declared(&recording, train.resistance);

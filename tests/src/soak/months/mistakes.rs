@@ -90,7 +90,7 @@ fn scores(seed: u64) -> Vec<Vec<f64>> {
         rival(&|it| it.corrections.traction_gain *= 1.005),
         rival(&|it| it.corrections.wind_plus_mps += 0.5),
     ];
-    let mut trials = Trials::new(TRAIN, declared.mass_kg, rival(&|_| {}), rivals);
+    let mut trials = Trials::new(TRAIN, rival(&|_| {}), rivals);
     let mut scores = vec![Vec::new(); trials.rivals.len()];
     let mut sequence = 0;
     for plan in &world.plans {

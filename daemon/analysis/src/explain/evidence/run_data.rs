@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
+use dynocar_core::pipeline::admission::Admission;
 use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::simulate::{Recording, SimulateError};
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::train::{Corrections, TrainModel};
-use dynocar_model::validation::Validator;
 use dynocar_shared::{SampleField, TrainSample};
 
-use crate::dataset::{Dataset, ForceSource, PositionSource, Role, Run};
+use crate::dataset::{DATASET_TRAIN, Dataset, ForceSource, PositionSource, Role, Run};
 use crate::statistics::span;
 
 use super::bins::{self, Bin};
@@ -170,7 +170,7 @@ pub fn prepare(dataset: &Dataset) -> Result<Vec<RunData>, RunDataError> {
 pub fn prepare_at(dataset: &Dataset, density: Density) -> Result<Vec<RunData>, RunDataError> {
     let train = &dataset.train;
     let reader = |train: Arc<TrainModel>, track| Reader {
-        validator: Validator::new(crate::dataset::DATASET_TRAIN, train.mass_kg),
+        admission: Admission::new(DATASET_TRAIN, Arc::clone(&train)),
         resolver: ForceResolver::new(train, track),
     };
     // An odometer counts by the speed as it was reported, whatever a train's file says of it.
@@ -191,14 +191,14 @@ struct Readers {
 
 /// Takes samples one after the other, as a daemon does.
 struct Reader {
-    validator: Validator,
+    admission: Admission,
     resolver: ForceResolver,
 }
 
 impl Reader {
     /// Those of a run, cleaned, with how many values were replaced.
     fn read(&mut self, rows: &[TrainSample]) -> (Vec<ResolvedSample>, usize) {
-        let resolve = |row| Some(self.resolver.resolve(&self.validator.check(row).ok()?));
+        let resolve = |row| Some(self.resolver.resolve(&self.admission.validate(row).ok()?));
         let mut samples: Vec<ResolvedSample> = rows.iter().filter_map(resolve).collect();
         let first_ns = samples.first().map_or(0, |sample| sample.time_ns);
         let time_s: Vec<f64> =

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_model::force::{ForceResolver, ResolvedSample};
+use dynocar_model::force::{ForceResolver, ResolvedSample, ValidSample};
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_model::validation::Validator;
 use dynocar_shared::{SampleField, TrainSample};
 
 use crate::dataset::DATASET_TRAIN;
@@ -22,7 +21,6 @@ pub fn coasting() -> ResolvedSample {
     ] {
         sample.set(field, value);
     }
-    let mut validator = Validator::new(DATASET_TRAIN, train.mass_kg);
-    let valid = validator.check(&sample).expect("a sound sample");
+    let valid = ValidSample { sample: &sample, step_s: 0.0, segment: 1 };
     ForceResolver::new(Arc::new(train), None).resolve(&valid)
 }

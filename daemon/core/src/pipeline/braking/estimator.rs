@@ -10,9 +10,9 @@ use nalgebra::{Matrix1, Matrix2, SVector};
 use super::engine::{BrakingSettings, Engine, EngineStep, Estimate, Observation};
 use super::intake::{BrakingCoefficient, BrakingIntake, Intake};
 use super::motion::StepInputs;
-use crate::pipeline::judge::Case;
+use crate::pipeline::judge::{Case, InputState, Judgement};
 use crate::pipeline::motion::{PositionNoise, SpeedRange};
-use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::output::{write_innovations, write_parameters};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
 /// Memory of the innovation statistics, in innovations.
@@ -142,7 +142,7 @@ impl<E: Engine> BrakingEstimator<E> {
         estimate: &Estimate,
         is_stale: bool,
         snapshot: &mut ParameterSnapshot,
-    ) {
+    ) -> (Status, Reason) {
         let is_adhesion = self.quantity == BrakingCoefficient::Adhesion;
         let is_number = !is_adhesion || self.is_rail_limited(estimate);
         let parameter = match self.quantity {
@@ -164,7 +164,7 @@ impl<E: Engine> BrakingEstimator<E> {
             let value = SVector::from([coefficient.value]);
             write_parameters(snapshot, [parameter], &value, &Matrix1::new(variance));
         }
-        write_status(snapshot, self.case(estimate, is_stale, is_number).verdict());
+        self.case(estimate, is_stale, is_number).verdict()
     }
 
     fn case(&self, estimate: &Estimate, is_stale: bool, is_number: bool) -> Case {
@@ -227,20 +227,21 @@ impl<E: Engine> Estimator for BrakingEstimator<E> {
         }
     }
 
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
+    fn write(&self, _input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
         let is_stale = self.is_stale();
-        match &self.held {
+        let verdict = match &self.held {
             Some(estimate) => self.write_estimate(estimate, is_stale, snapshot),
             None => {
                 snapshot.parameter_count = 0;
-                write_status(snapshot, (Status::Unestimated, self.reason));
+                (Status::Unestimated, self.reason)
             }
-        }
+        };
         write_innovations(snapshot, &self.innovations);
         snapshot.generation = self.resets;
         snapshot.excited = (1u32 << snapshot.parameter_count) - 1;
         let is_missing = self.held.is_none() || is_stale;
         snapshot.missing_manoeuvres = if is_missing { Manoeuvre::Brake.bit() } else { 0 };
         self.speeds.write(snapshot);
+        verdict.into()
     }
 }

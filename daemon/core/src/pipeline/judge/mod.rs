@@ -1,14 +1,12 @@
 //! One judge of what an estimate may be used for, whichever estimator it is from.
 //!
-//! - [`InputHealth`]: whether the samples serve the estimator
 //! - [`InnovationMonitor`]: whether the innovations are as large and as white as the covariance says
 //! - [`LackOfFit`]: whether a force that no parameter explains stays
 //! - [`Case`]: all that is known of an estimate, and the verdict on it
+//! - [`InputState`], [`Judgement`]: what an estimator is given to judge by, and its answer
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_shared::{Reason, RejectionReason, Status};
-
-use crate::pipeline::Outcome;
+use dynocar_shared::{Reason, Status};
 
 pub use innovations::{
     InnovationMonitor, LONG_RUN_MAX, are_alike, are_too_large, long_run_variance,
@@ -55,11 +53,6 @@ impl Case {
     }
 }
 
-/// Samples over which refusals are counted.
-const MEMORY: f64 = 500.0;
-/// Share of refused samples above which the input is called bad.
-const BAD_SHARE: f64 = 0.3;
-
 /// Returns the reason for a sample that lacks a force or the gradient.
 pub fn missing(sample: &ResolvedSample) -> Reason {
     match sample.gradient_permille {
@@ -68,52 +61,31 @@ pub fn missing(sample: &ResolvedSample) -> Reason {
     }
 }
 
-/// Which samples were refused lately, and for want of what.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct InputHealth {
-    refused_share: f64,
-    want: Option<Reason>,
-    used: u64,
+/// State of the input as an estimator's judgement needs it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct InputState {
+    /// Samples used so far.
+    pub used: u64,
+    /// Recent fault of the samples.
+    pub doubt: Option<Reason>,
 }
 
-impl InputHealth {
-    /// A sample was used.
-    pub fn accept(&mut self) {
-        self.used += 1;
-        self.refused_share -= self.refused_share / MEMORY;
-    }
+/// Judgement of an estimate by its estimator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Judgement {
+    /// Status of the estimate.
+    pub status: Status,
+    /// Reason of the status.
+    pub reason: Reason,
+    /// Quantities that are known well enough, one bit each; some may be known before the others.
+    pub known: u32,
+}
 
-    /// A sample was refused.
-    pub fn refuse(&mut self, reason: RejectionReason, sample: &ResolvedSample) {
-        self.refused_share += (1.0 - self.refused_share) / MEMORY;
-        self.want = (reason == RejectionReason::Missing).then(|| missing(sample));
-    }
-
-    /// Takes in what became of a sample, and gives it back.
-    pub fn note(&mut self, outcome: Outcome, sample: &ResolvedSample) -> Outcome {
-        match outcome {
-            Outcome::Rejected(reason) => self.refuse(reason, sample),
-            Outcome::Used | Outcome::Updated => self.accept(),
-        }
-        outcome
-    }
-
-    /// Takes in what became of a sample that shows nothing, and gives it back: one at a standstill
-    /// counts neither way.
-    pub fn passed(&mut self, outcome: Outcome, sample: &ResolvedSample) -> Outcome {
-        if outcome == Outcome::Used { outcome } else { self.note(outcome, sample) }
-    }
-
-    /// Samples used so far.
-    pub fn used(&self) -> u64 {
-        self.used
-    }
-
-    /// Returns the fault of the input, if there is one.
-    pub fn input_doubt(&self) -> Option<Reason> {
-        let is_starved = self.used == 0 && self.want.is_some();
-        (is_starved || self.refused_share > BAD_SHARE)
-            .then(|| self.want.unwrap_or(Reason::BadInput))
+impl From<(Status, Reason)> for Judgement {
+    /// Everything is known while the status is estimated.
+    fn from((status, reason): (Status, Reason)) -> Self {
+        let known = if status == Status::Estimated { u32::MAX } else { 0 };
+        Judgement { status, reason, known }
     }
 }
 

@@ -16,14 +16,14 @@ use super::suspects::{
 };
 use super::verdict::{ResidualEvidence, Verdict};
 use super::wheel_scale::WheelScale;
-use crate::pipeline::judge::Case;
+use crate::pipeline::judge::{Case, InputState, Judgement};
 use crate::pipeline::momentum::blocks::MomentumBlocks;
 use crate::pipeline::momentum::{
     BRAKE_SCALE, MomentumBlock, PARAMETERS as DAVIS, TRACTION_SCALE, UnitSample, regressors,
     unscaling,
 };
 use crate::pipeline::motion::{STANDING_MPS, SpeedRange, is_same_mass};
-use crate::pipeline::output::{write_innovations, write_parameters, write_status};
+use crate::pipeline::output::{write_innovations, write_parameters};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
@@ -351,7 +351,7 @@ impl Estimator for ResidualMonitor {
         }
     }
 
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
+    fn write(&self, _input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
         let force_n = self.unexplained.0 * self.weight_kn;
         let std_n = self.unexplained.1 * self.weight_kn;
         let (values, covariance) = (Vector1::new(force_n), Vector1::new(std_n * std_n));
@@ -367,7 +367,6 @@ impl Estimator for ResidualMonitor {
             contradiction: named.map(|_| Reason::InnovationsNotWhite),
             caveat: Reason::None,
         };
-        write_status(snapshot, case.verdict());
         write_innovations(snapshot, &self.innovations);
         snapshot.generation = self.resets;
         snapshot.excited = u32::from(has_rows);
@@ -380,5 +379,6 @@ impl Estimator for ResidualMonitor {
         let age_ns = since_ns.map_or(0, |ns| self.newest_ns.saturating_sub(ns));
         snapshot.suspicion_age_s = u32::try_from(age_ns / 1_000_000_000).unwrap_or(0);
         self.speeds.write(snapshot);
+        case.verdict().into()
     }
 }

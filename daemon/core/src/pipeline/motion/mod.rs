@@ -10,6 +10,7 @@
 
 use dynocar_shared::ParameterSnapshot;
 
+use super::admission::limits::{INNOVATION, REPEATED};
 use crate::filter::{Gaussian, Innovation, NotPositiveDefinite};
 
 pub use dynocar_model::terms::wheel::STANDING_MPS;
@@ -22,9 +23,9 @@ mod speed_noise;
 /// Speed in m/s up to which nothing is learned of a train's motion: holding brakes, slack and starting
 /// resistance are no part of the model.
 pub const MOVING_MPS: f64 = 1.0;
-/// The longest time in s between two samples that is integrated over, as in validation: missing forces
-/// are bridged by the mean of those around them, and records at 1 Hz are used.
-pub const BRIDGED_MAX_S: f64 = 2.5;
+/// The longest time in s between two samples that is integrated over: missing forces are bridged by the mean of those
+/// around them, and records at 1 Hz are used.
+pub const BRIDGED_MAX_S: f64 = REPEATED.high;
 
 /// Variance of the impulse per mass that a force brings which changes by so much from one sample to
 /// the next: in (m/s)² for a change in m/s², likewise in other units.
@@ -49,7 +50,7 @@ pub fn kink_variance(second_difference_mps2: f64, step_s: f64) -> f64 {
 }
 
 /// A normalised innovation beyond which a speed is not believed.
-const OUTLIER: f64 = 8.0;
+const OUTLIER: f64 = INNOVATION.high;
 /// A normalised innovation beyond which a speed counts less (Huber 1964).
 const HUBER: f64 = 3.0;
 /// After this many outliers in a row the measured speed is believed and the contradicting estimate is not.

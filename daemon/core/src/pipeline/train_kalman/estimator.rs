@@ -6,9 +6,7 @@ use std::sync::Arc;
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::{
-    Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason, Status,
-};
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason};
 
 use super::TrainKalmanSettings;
 use super::bank::Measured;
@@ -18,11 +16,10 @@ use super::load::{Change, LoadWatch};
 use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
 use super::report::{Report, Systematic};
 use super::steps::Steps;
-use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
+use crate::pipeline::judge::{InputState, Judgement, LONG_RUN_MAX};
 use crate::pipeline::momentum::UnitSample;
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};
-use crate::pipeline::output::{DAVIS, contract_unit, write_innovations, write_status};
-use crate::pipeline::sample_gate::{Gated, SampleGate};
+use crate::pipeline::output::{DAVIS, contract_unit, write_innovations};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, KeptEstimate, Outcome, UseBefore};
 
@@ -43,7 +40,6 @@ pub struct TrainKalman {
     train_kg: f64,
     /// Resistance as declared or kept, scaled, with its covariance.
     first: Resistance,
-    gate: SampleGate,
     learned: Learned,
     load: LoadWatch,
     /// Newest sample of the motion.
@@ -54,7 +50,6 @@ pub struct TrainKalman {
     steps: Steps,
     systematic: Systematic,
     speeds: SpeedRange,
-    health: InputHealth,
     moved_s: f64,
     moved_min_s: f64,
     /// Estimate kept from earlier, until the first sample.
@@ -92,7 +87,6 @@ impl TrainKalman {
             train_kg: train.mass_kg,
             steps: Steps::new(&settings, train.length_m),
             first,
-            gate: SampleGate::default(),
             load: LoadWatch::new(&settings, train),
             last: None,
             last_time_ns: None,
@@ -102,7 +96,6 @@ impl TrainKalman {
                 settings.acceleration_scale_std,
             ),
             speeds: SpeedRange::default(),
-            health: InputHealth::default(),
             moved_s: 0.0,
             moved_min_s: MOVED_MIN_S,
             kept: None,
@@ -256,25 +249,37 @@ impl TrainKalman {
     }
 }
 
-impl Gated for TrainKalman {
-    fn gate(&mut self) -> &mut SampleGate {
-        &mut self.gate
+impl Estimator for TrainKalman {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrainKalman
     }
 
-    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
+    fn is_gated(&self) -> bool {
+        true
+    }
+
+    fn observe(&mut self, sample: &ResolvedSample) {
+        self.follow_load(sample);
+    }
+
+    fn leave_out(&mut self) {
+        self.last = None;
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         let unit = UnitSample::of(sample);
         if let Ok(unit) = unit {
             self.steps.see(&unit);
         }
         if !self.is_under_way(sample) {
             self.last = None;
-            return Outcome::Used;
+            return Outcome::Idle;
         }
         let now = match unit {
             Ok(now) => now,
             Err(reason) => {
                 self.last = None;
-                return self.health.note(Outcome::Rejected(reason), sample);
+                return Outcome::Rejected(reason);
             }
         };
         self.learned.noise.rounding.see(now.speed_mps);
@@ -287,40 +292,16 @@ impl Gated for TrainKalman {
             None => self.begin(now),
         };
         self.last_time_ns = Some(now.time_ns);
-        self.health.note(outcome, sample)
+        outcome
     }
 
-    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
-        self.last = None;
-        self.health.refuse(reason, sample);
-    }
-}
-
-impl Estimator for TrainKalman {
-    fn kind(&self) -> PipelineKind {
-        PipelineKind::TrainKalman
-    }
-
-    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        self.follow_load(sample);
-        self.pass(sample)
-    }
-
-    /// Before all is known, the status does not show what speaks against the part that is.
-    fn known(&self, status: Status) -> u32 {
-        let is_sound = matches!(status, Status::Estimated | Status::Unestimated)
-            && self.input_doubt().is_none()
-            && self.contradiction().is_none();
-        if is_sound { self.known_now() } else { 0 }
-    }
-
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
+    fn write(&self, input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
         let declared_kg = self.load.declared_kg(self.train_kg);
         self.report.write(declared_kg, &self.speeds, snapshot);
-        write_status(snapshot, self.verdict());
         write_innovations(snapshot, &self.learned.monitor);
         snapshot.mass_source = self.mass_source() as u32;
         snapshot.generation = self.resets;
+        self.judgement(input)
     }
 
     /// Takes up the kept resistance, and the mass unless the first sample contradicts it.

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
-use dynocar_shared::{ParameterSnapshot, Quantity, Status};
+use dynocar_shared::{ParameterSnapshot, Quantity, Status, TrainId};
 use rand::{RngExt, SeedableRng};
 
 use super::{TrainKalman, TrainKalmanSettings};
+use crate::pipeline::admission::Admission;
 use crate::pipeline::{Estimator, KeptEstimate};
 
 /// Drives a train of 100 t declared and 110 t true for a time, and returns the answer.
@@ -27,29 +28,38 @@ fn braked(
     let push = |second: f64| -> f64 { [40.0, 0.0, -40.0, 0.0][(second / 15.0) as usize % 4] };
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(u64::from(from_s));
     let mut speed_mps = 20.0;
-    let mut snapshot = ParameterSnapshot::empty();
+    let (mut admission, mut snapshot) = (admission(), ParameterSnapshot::empty());
     for tick in 10 * from_s..10 * (from_s + duration_s) {
         let second = 0.1 * f64::from(tick);
         let force = (push(second).max(0.0) + share * push(second).min(0.0)) / 1.1;
         speed_mps += 0.1 * gain * (force - w0);
         let coasting = ResolvedSample::coasting();
-        estimator.update(&ResolvedSample {
+        let sample = ResolvedSample {
             time_ns: i64::from(tick) * 100_000_000,
             step_s: 0.1,
             speed_mps: speed_mps + 0.07 * (random.random::<f64>() - 0.5),
             traction_force_n: Some(push(second).max(0.0) * coasting.weight_kn),
             brake_force_n: Some((-push(second)).max(0.0) * coasting.weight_kn),
             ..coasting
-        });
-        estimator.write(&mut snapshot);
+        };
+        admission.pass(estimator, &sample);
+        admission.write(estimator, &mut snapshot);
     }
     snapshot
 }
 
-fn estimator() -> TrainKalman {
+fn train() -> Arc<TrainModel> {
     let davis = Davis { a: 1.8, b: 0.0, c: 0.0 };
     let train = TrainModel { rotating_mass_factor: 0.06, ..TrainModel::bare("t", 100e3, davis) };
-    TrainKalman::new(TrainKalmanSettings::default(), &Arc::new(train)).unwrap()
+    Arc::new(train)
+}
+
+fn admission() -> Admission {
+    Admission::new(TrainId(1), train())
+}
+
+fn estimator() -> TrainKalman {
+    TrainKalman::new(TrainKalmanSettings::default(), &train()).unwrap()
 }
 
 #[test]
@@ -83,11 +93,12 @@ fn what_was_in_use_goes_on_with_the_first_sample_unless_minutes_have_passed() {
         let mut warm = estimator();
         assert!(warm.warm_start(&KeptEstimate::of(&before).unwrap().after(elapsed_s)));
         let time_ns = (300 + after_s) * 1_000_000_000;
-        warm.update(&ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() });
-        let mut snapshot = ParameterSnapshot::empty();
-        warm.write(&mut snapshot);
+        let sample = ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() };
+        let (mut admission, mut snapshot) = (admission(), ParameterSnapshot::empty());
+        admission.pass(&mut warm, &sample);
+        let written = admission.write(&warm, &mut snapshot);
         let std_t = snapshot.covariance[packed_index(3, 3)].sqrt();
-        (snapshot.status(), warm.known(snapshot.status()) & BOTH, std_t)
+        (snapshot.status(), written.known & BOTH, std_t)
     };
     let std_t = before.covariance[packed_index(3, 3)].sqrt();
     let (status, known, moving_t) = first(3, 2.5, 15.0);

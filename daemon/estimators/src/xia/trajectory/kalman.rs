@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::judge::InputHealth;
+use dynocar_core::pipeline::judge::{InputState, Judgement};
 use dynocar_core::pipeline::motion::{Rounding, SpeedRange, jump_variance};
 use dynocar_core::pipeline::output::{DAVIS, write_parameters};
-use dynocar_core::pipeline::sample_gate::{Gated, SampleGate};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_core::settings;
@@ -87,7 +86,6 @@ impl TrajectoryKalmanSettings {
 /// distance to pass and no force is averaged away.
 #[derive(Clone, Debug)]
 pub struct TrajectoryKalman {
-    gate: SampleGate,
     tracker: MotionTracker,
     rounding: Rounding,
     filter: OnlineFilter,
@@ -96,7 +94,6 @@ pub struct TrajectoryKalman {
     unexplained: UnexplainedForce,
     speeds: SpeedRange,
     updates: u64,
-    health: InputHealth,
     /// Why there is no estimate, when something else than the samples is to blame.
     fault: Option<(Status, Reason)>,
 }
@@ -113,7 +110,6 @@ impl TrajectoryKalman {
     /// An estimator from checked settings.
     pub fn new(settings: OnlineSettings) -> Self {
         TrajectoryKalman {
-            gate: SampleGate::default(),
             tracker: MotionTracker::default(),
             rounding: Rounding::default(),
             filter: OnlineFilter::new(settings),
@@ -122,7 +118,6 @@ impl TrajectoryKalman {
             unexplained: UnexplainedForce::default(),
             speeds: SpeedRange::default(),
             updates: 0,
-            health: InputHealth::default(),
             fault: None,
         }
     }
@@ -161,14 +156,22 @@ impl TrajectoryKalman {
     }
 }
 
-impl Gated for TrajectoryKalman {
-    fn gate(&mut self) -> &mut SampleGate {
-        &mut self.gate
+impl Estimator for TrajectoryKalman {
+    fn kind(&self) -> PipelineKind {
+        PipelineKind::TrajectoryKalman
     }
 
-    fn take(&mut self, sample: &ResolvedSample) -> Outcome {
+    fn is_gated(&self) -> bool {
+        true
+    }
+
+    fn leave_out(&mut self) {
+        self.tracker = MotionTracker::default();
+    }
+
+    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
         self.rounding.see(sample.speed_mps);
-        let outcome = match self.tracker.advance(sample) {
+        match self.tracker.advance(sample) {
             MotionUpdate::Continue(motion) => self.take_step(&motion, sample),
             MotionUpdate::Begin => {
                 self.filter.begin(sample.speed_mps);
@@ -178,26 +181,10 @@ impl Gated for TrajectoryKalman {
             }
             MotionUpdate::Standstill => Outcome::Used,
             MotionUpdate::Unusable(reason) => Outcome::Rejected(reason),
-        };
-        self.health.note(outcome, sample)
+        }
     }
 
-    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason) {
-        self.health.refuse(reason, sample);
-        self.tracker = MotionTracker::default();
-    }
-}
-
-impl Estimator for TrajectoryKalman {
-    fn kind(&self) -> PipelineKind {
-        PipelineKind::TrajectoryKalman
-    }
-
-    fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        self.pass(sample)
-    }
-
-    fn write(&self, snapshot: &mut ParameterSnapshot) {
+    fn write(&self, input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
         let (davis, covariance) = self.filter.davis();
         write_parameters(snapshot, DAVIS, &Vector3::new(davis.a, davis.b, davis.c), &covariance);
         let is_fresh = self.filter.likeliest().age_s < FRESH_S;
@@ -211,13 +198,14 @@ impl Estimator for TrajectoryKalman {
             is_ready: self.updates >= UPDATES_MIN,
             is_at_bound: false,
             fault: self.fault,
-            input: self.health.input_doubt().or(self.gate.input_doubt()),
+            input: input.doubt,
             doubt: is_fresh.then_some(Reason::InnovationsTooLarge),
         };
-        estimate.write(snapshot);
+        let judgement = estimate.write(snapshot);
         let speed_variance = self.filter.likeliest().noise.speed_variance;
         self.unexplained.write(snapshot, speed_variance);
         snapshot.generation = self.filter.resets;
+        judgement
     }
 
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {

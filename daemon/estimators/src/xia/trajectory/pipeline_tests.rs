@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
+use dynocar_core::pipeline::admission::Admission;
 use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
-use dynocar_shared::{Manoeuvre, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
+use dynocar_shared::{
+    Manoeuvre, ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status, TrainId,
+};
 
 use super::kalman::TrajectoryKalmanSettings;
 use super::motion::tests::sample;
@@ -42,12 +45,25 @@ fn both() -> [EstimatorSettings; 2] {
 }
 
 fn feed(estimator: &mut dyn Estimator, samples: &[ResolvedSample]) -> ParameterSnapshot {
+    fed(estimator, samples, RejectionReason::Missing, |_| {}).0
+}
+
+/// The last snapshot and the number of samples refused for a reason; looks at each snapshot.
+fn fed(
+    estimator: &mut dyn Estimator,
+    samples: &[ResolvedSample],
+    reason: RejectionReason,
+    look: impl Fn(&ParameterSnapshot),
+) -> (ParameterSnapshot, usize) {
+    let mut admission = Admission::new(TrainId(1), train());
+    let (mut snapshot, mut refused) = (ParameterSnapshot::empty(), 0);
+    admission.write(estimator, &mut snapshot);
     for sample in samples {
-        estimator.update(sample);
+        refused += usize::from(admission.pass(estimator, sample) == Outcome::Rejected(reason));
+        admission.write(estimator, &mut snapshot);
+        look(&snapshot);
     }
-    let mut snapshot = ParameterSnapshot::empty();
-    estimator.write(&mut snapshot);
-    snapshot
+    (snapshot, refused)
 }
 
 fn assert_finite(snapshot: &ParameterSnapshot) {
@@ -105,16 +121,12 @@ fn speeds_off_by_half_a_metre_per_second_are_left_out_and_counted() {
     let mut samples = metro(|_| METRO, 1600, 0.02, 5e-4, 3);
     let clean = feed(&mut TrajectoryKalmanSettings::default().build(&train()).unwrap(), &samples);
     let mut estimator = TrajectoryKalmanSettings::default().build(&train()).unwrap();
-    let mut refused = 0;
     for (index, sample) in samples.iter_mut().enumerate() {
         if index % 50 == 25 && sample.speed_mps > 3.0 {
             sample.speed_mps += 0.5;
         }
-        refused +=
-            u32::from(estimator.update(sample) == Outcome::Rejected(RejectionReason::Outlier));
     }
-    let mut snapshot = ParameterSnapshot::empty();
-    estimator.write(&mut snapshot);
+    let (snapshot, refused) = fed(&mut estimator, &samples, RejectionReason::Outlier, |_| {});
     assert!(refused > 60, "{refused}");
     for speed_mps in [5.0, 15.0] {
         let apart = snapshot.resistance_at(speed_mps).unwrap().w0_n_per_kn
@@ -144,19 +156,17 @@ fn missing_forces_and_gradients_are_refused_and_named() {
             [(true, Reason::GradientUnknown), (false, Reason::MissingQuantity)]
         {
             let mut estimator = settings.build(&train()).unwrap();
-            let mut refused = 0;
-            for sample in &samples {
-                let mut sample = *sample;
+            let mut samples = samples.clone();
+            for sample in &mut samples {
                 if without_gradient {
                     sample.gradient_permille = None;
                 } else {
                     sample.brake_force_n = None;
                 }
-                let outcome = estimator.update(&sample);
-                refused += u32::from(outcome == Outcome::Rejected(RejectionReason::Missing));
             }
+            let (snapshot, refused) =
+                fed(&mut *estimator, &samples, RejectionReason::Missing, |_| {});
             assert!(refused > 200, "{refused}");
-            let snapshot = feed(&mut *estimator, &[]);
             assert_eq!(snapshot.status(), Status::Unestimated);
             assert_eq!(snapshot.reason(), Some(reason));
         }
@@ -165,26 +175,22 @@ fn missing_forces_and_gradients_are_refused_and_named() {
 
 #[test]
 fn numbers_that_are_none_never_reach_a_snapshot() {
-    let samples = metro(|_| METRO, 400, 0.02, 5e-4, 5);
+    let mut samples = metro(|_| METRO, 400, 0.02, 5e-4, 5);
+    for (index, sample) in samples.iter_mut().enumerate() {
+        match index % 97 {
+            10 => sample.speed_mps = f64::NAN,
+            20 => sample.traction_force_n = Some(f64::INFINITY),
+            30 => sample.gradient_permille = Some(f64::NAN),
+            40 => sample.inertial_mass_kg = 0.0,
+            50 => sample.step_s = f64::NAN,
+            60 => sample.segment += 1,
+            70 => sample.is_sliding = true,
+            _ => {}
+        }
+    }
     for settings in both() {
         let mut estimator = settings.build(&train()).unwrap();
-        for (index, sample) in samples.iter().enumerate() {
-            let mut sample = *sample;
-            match index % 97 {
-                10 => sample.speed_mps = f64::NAN,
-                20 => sample.traction_force_n = Some(f64::INFINITY),
-                30 => sample.gradient_permille = Some(f64::NAN),
-                40 => sample.inertial_mass_kg = 0.0,
-                50 => sample.step_s = f64::NAN,
-                60 => sample.segment += 1,
-                70 => sample.is_sliding = true,
-                _ => {}
-            }
-            estimator.update(&sample);
-            let mut snapshot = ParameterSnapshot::empty();
-            estimator.write(&mut snapshot);
-            assert_finite(&snapshot);
-        }
+        fed(&mut *estimator, &samples, RejectionReason::Missing, assert_finite);
     }
 }
 

@@ -13,9 +13,9 @@
 //! covariance grows by the same factor (Newey, West 1987, with a flat kernel over blocks).
 
 use dynocar_core::pipeline::InnovationMonitor;
-use dynocar_core::pipeline::judge::{Case, LONG_RUN_MAX};
+use dynocar_core::pipeline::judge::{Case, Judgement, LONG_RUN_MAX};
 use dynocar_core::pipeline::motion::SpeedRange;
-use dynocar_core::pipeline::output::{excitation, write_innovations, write_status};
+use dynocar_core::pipeline::output::{excitation, write_innovations};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
@@ -112,19 +112,19 @@ impl Estimate<'_> {
         })
     }
 
-    /// Writes everything but parameters and unexplained force.
+    /// Writes everything but parameters and unexplained force; returns the judgement.
     ///
     /// # Real-time
     ///
     /// Allocates nothing.
-    pub fn write(&self, snapshot: &mut ParameterSnapshot) {
-        write_status(snapshot, self.case().verdict());
+    pub fn write(&self, snapshot: &mut ParameterSnapshot) -> Judgement {
         write_innovations(snapshot, self.innovations);
         (snapshot.excited, snapshot.missing_manoeuvres) = excitation(self.excited());
         if self.speeds.get().is_none() {
             snapshot.missing_manoeuvres |= Manoeuvre::Move.bit();
         }
         self.speeds.write(snapshot);
+        self.case().verdict().into()
     }
 }
 

@@ -3,7 +3,7 @@
 use dynocar_shared::{MassSource, Quantity, Reason, Status};
 
 use super::{MOVED_MIN_S, TrainKalman};
-use crate::pipeline::judge::{Case, LONG_RUN_MAX, long_run_variance};
+use crate::pipeline::judge::{Case, InputState, Judgement, LONG_RUN_MAX, long_run_variance};
 
 /// Motion in s before the mass is called known.
 const MASS_MOVED_MIN_S: f64 = 3.0;
@@ -55,26 +55,31 @@ impl TrainKalman {
         }
     }
 
-    /// Returns the recent fault of the samples.
-    pub(super) fn input_doubt(&self) -> Option<Reason> {
-        self.health.input_doubt().or(self.gate.input_doubt())
-    }
-
-    /// Status and reason: a mass that only waits for the motion after a stop is called so.
-    pub(super) fn verdict(&self) -> (Status, Reason) {
-        let (status, reason) = self.case().verdict();
+    /// A mass that only waits for the motion after a stop is called so. Before all is known, the status does not show
+    /// what speaks against the part that is.
+    pub(super) fn judgement(&self, input: &InputState) -> Judgement {
+        let (status, reason) = self.case(input).verdict();
+        let contradiction = self.contradiction();
+        let known = self.known_now();
         let is_waiting = reason == Reason::WeakExcitation
-            && self.contradiction().is_none()
+            && contradiction.is_none()
             && self.report.is_load_open()
-            && self.known_now() & Quantity::Resistance.bit() != 0;
-        (status, if is_waiting { Reason::LoadMayHaveChanged } else { reason })
+            && known & Quantity::Resistance.bit() != 0;
+        let is_sound = matches!(status, Status::Estimated | Status::Unestimated)
+            && input.doubt.is_none()
+            && contradiction.is_none();
+        Judgement {
+            status,
+            reason: if is_waiting { Reason::LoadMayHaveChanged } else { reason },
+            known: if is_sound { known } else { 0 },
+        }
     }
 
-    fn case(&self) -> Case {
+    fn case(&self, input: &InputState) -> Case {
         let failure = (Status::Invalid, Reason::NumericalFailure);
         Case {
             fault: self.is_fresh_reset.then_some(failure),
-            input: self.input_doubt(),
+            input: input.doubt,
             is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),
             is_known: self.known_now() == COMPLETE,
             lacking: Status::Unestimated,

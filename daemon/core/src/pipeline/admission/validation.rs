@@ -5,46 +5,16 @@
 //! plainly been moved or the clock set (several samples in a row agree with each other but not
 //! with the past), it starts a new motion segment instead of refusing for ever.
 
+use dynocar_model::force::ValidSample;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
-use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{RejectionReason, SampleField, TrainId, TrainSample};
 
-/// Highest speed in m/s.
-const SPEED_MAX_MPS: f64 = 170.0;
-/// Greatest |dv/dt| in m/s².
-const ACCELERATION_MAX_MPS2: f64 = 4.0;
-/// Change of speed in m/s that is let pass whatever the time step: quantum and noise.
-const SPEED_TOLERANCE_MPS: f64 = 1.0;
-/// Difference in m between position and integrated speed that is let pass: balises.
-const POSITION_TOLERANCE_M: f64 = 60.0;
-/// Greatest force in N per N of train weight.
-const FORCE_MAX_PER_WEIGHT: f64 = 0.6;
-/// Lowest and highest mass over the nominal one.
-const MASS_SHARES: (f64, f64) = (0.2, 5.0);
-/// A longer step in s ends a motion segment.
-pub const GAP_MAX_S: f64 = 2.5;
-/// A longer step ahead in s is not believed within a run.
-pub const JUMP_MAX_S: f64 = 86_400.0;
+use super::limits::{
+    ACCELERATION_MAX_MPS2, FORCE, MASS, POSITION_STEP, REPEATED, SPEED, SPEED_STEP, TIME_STEP,
+};
+
 /// After this many refusals in a row that agree with each other, the past is given up.
 const REFUSALS_BEFORE_RESTART: u32 = 5;
-
-/// A sample that passed, with what its predecessors say about it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ValidSample<'a> {
-    /// The sample as it came.
-    pub sample: &'a TrainSample,
-    /// Time in s since the accepted sample before it; 0 when it starts a segment.
-    pub step_s: f64,
-    /// Number of the motion segment; integrals never cross its change.
-    pub segment: u32,
-}
-
-impl ValidSample<'_> {
-    /// True while the controller's wheel-slide protection is active.
-    pub fn is_sliding(&self) -> bool {
-        self.sample.flags & FLAG_WHEEL_SLIDE != 0
-    }
-}
 
 /// The newest gap of the sequence numbers, which may yet turn out not to be a gap.
 #[derive(Clone, Copy, Debug)]
@@ -205,18 +175,16 @@ impl Validator {
             }
         }
         let speed_mps = sample.get(SampleField::Speed).ok_or(RejectionReason::Missing)?;
-        if !(0.0..=SPEED_MAX_MPS).contains(&speed_mps) {
+        if SPEED.is_passed(speed_mps) {
             return Err(RejectionReason::SpeedOutOfRange);
         }
         let mass_kg = sample.get(SampleField::Mass).unwrap_or(self.nominal_mass_kg);
-        let (low_kg, high_kg) =
-            (MASS_SHARES.0 * self.nominal_mass_kg, MASS_SHARES.1 * self.nominal_mass_kg);
-        if !(low_kg..=high_kg).contains(&mass_kg) {
+        if MASS.is_passed_in(mass_kg, self.nominal_mass_kg) {
             return Err(RejectionReason::MassOutOfRange);
         }
-        let force_max_n = FORCE_MAX_PER_WEIGHT * mass_kg * STANDARD_GRAVITY_MPS2;
+        let weight_n = mass_kg * STANDARD_GRAVITY_MPS2;
         for field in [SampleField::TractionForce, SampleField::BrakeForce] {
-            if sample.get(field).is_some_and(|force| !(0.0..=force_max_n).contains(&force)) {
+            if sample.get(field).is_some_and(|force_n| FORCE.is_passed_in(force_n, weight_n)) {
                 return Err(RejectionReason::ForceOutOfRange);
             }
         }
@@ -237,10 +205,10 @@ impl Validator {
             return Err(RejectionReason::TimeNotIncreasing);
         }
         let step_s = step_s(last, sample);
-        if step_s > JUMP_MAX_S {
+        if TIME_STEP.is_passed(step_s) {
             return Err(RejectionReason::TimeJump);
         }
-        if step_s > GAP_MAX_S || sample.direction != last.direction {
+        if step_s > REPEATED.high || sample.direction != last.direction {
             return Ok(None);
         }
         self.check_continuity(last, sample, step_s)?;
@@ -254,7 +222,7 @@ impl Validator {
         step_s: f64,
     ) -> Result<(), RejectionReason> {
         let speed_change = (sample.speed_mps - last.speed_mps).abs();
-        if speed_change > SPEED_TOLERANCE_MPS + ACCELERATION_MAX_MPS2 * step_s {
+        if speed_change > SPEED_STEP.high + ACCELERATION_MAX_MPS2 * step_s {
             return Err(RejectionReason::SpeedJump);
         }
         if let (Some(from_m), Some(to_m)) =
@@ -262,7 +230,7 @@ impl Validator {
         {
             let travelled_m = 0.5 * (last.speed_mps + sample.speed_mps) * step_s;
             let expected_m = from_m + f64::from(sample.direction) * travelled_m;
-            if (to_m - expected_m).abs() > POSITION_TOLERANCE_M {
+            if POSITION_STEP.is_passed(to_m - expected_m) {
                 return Err(RejectionReason::PositionJump);
             }
         }
@@ -274,7 +242,7 @@ impl Validator {
         let continues = self.last_refused.as_ref().is_some_and(|before| {
             let step_s = step_s(before, sample);
             step_s > 0.0
-                && step_s <= GAP_MAX_S
+                && step_s <= REPEATED.high
                 && sample.direction == before.direction
                 && self.check_continuity(before, sample, step_s).is_ok()
         });

@@ -10,10 +10,10 @@
 //! the forces are steady again.
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_shared::{Reason, RejectionReason};
+use dynocar_shared::RejectionReason;
 
-use super::motion::{BRIDGED_MAX_S, MOVING_MPS};
-use crate::pipeline::Outcome;
+use super::limits::{LONE_FORCE, LONE_MEMORY, LONE_SHARE, REPEATED};
+use crate::pipeline::motion::MOVING_MPS;
 
 /// Number of samples away from the old level that make a new one.
 const AGREEING: usize = 3;
@@ -28,21 +28,14 @@ const ACCELERATION_MAX_MPS2: f64 = 2.0;
 /// The quantile of the changes between samples that measures the noise of the forces. It is low, so
 /// that neither ramps nor failures of half of all samples reach it.
 const NOISE_QUANTILE: f64 = 0.2;
-/// Tolerance over that quantile: 6 standard deviations of the change of a white noise.
-const NOISE_TOLERANCE: f64 = 24.0;
 /// Least quantile in N/kN.
-const CHANGE_MIN: f64 = TOLERANCE_N_PER_KN / NOISE_TOLERANCE;
+const CHANGE_MIN: f64 = TOLERANCE_N_PER_KN / LONE_FORCE.high;
 /// Logarithmic step of the quantile at each sample.
 const NOISE_STEP: f64 = 0.1;
 /// Changes that a new gate waits for before it says what is noise, and what fails.
 const FIRST_CHANGES: usize = 20;
 /// Place of the quantile among the bends of the first changes.
 const FIRST_QUANTILE: usize = 4;
-/// Samples that the share of withdrawn ones looks back over.
-const MEMORY: f64 = 100.0;
-/// Share of withdrawn samples beyond which none is taken: where one in 20 fails, one in 8000 begins
-/// a row that passes for a new level.
-const WITHDRAWN_SHARE_MAX: f64 = 0.05;
 
 /// Verdict on a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +44,7 @@ pub enum GateVerdict {
     Take,
     /// Nothing yet: later samples decide, or it adds nothing new.
     Wait,
-    /// Take this many from [`SampleGate::released`], of which this one is the last.
+    /// Take this many from [`ForceGate::released`], of which this one is the last.
     Release(usize),
     /// Leave it out, and begin anew with the next.
     Refuse(RejectionReason),
@@ -92,7 +85,7 @@ impl Reading {
 
 /// Decides which samples an estimator steps to, and when.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampleGate {
+pub struct ForceGate {
     /// The last sample taken.
     level: Option<Reading>,
     /// The newest sample that added something.
@@ -114,9 +107,9 @@ pub struct SampleGate {
     withdrawn_share: f64,
 }
 
-impl Default for SampleGate {
+impl Default for ForceGate {
     fn default() -> Self {
-        SampleGate {
+        ForceGate {
             level: None,
             newest: None,
             is_confirmed: false,
@@ -133,7 +126,7 @@ impl Default for SampleGate {
     }
 }
 
-impl SampleGate {
+impl ForceGate {
     /// Judges the next sample.
     ///
     /// # Real-time
@@ -166,12 +159,7 @@ impl SampleGate {
 
     /// True while too many samples are withdrawn for any to be taken.
     pub fn is_in_doubt(&self) -> bool {
-        self.first_changes == FIRST_CHANGES && self.withdrawn_share > WITHDRAWN_SHARE_MAX
-    }
-
-    /// Returns the fault of the forces, if there is one.
-    pub fn input_doubt(&self) -> Option<Reason> {
-        self.is_in_doubt().then_some(Reason::BadInput)
+        self.first_changes == FIRST_CHANGES && self.withdrawn_share > LONE_SHARE.high
     }
 
     fn forget(&mut self) {
@@ -192,7 +180,7 @@ impl SampleGate {
     /// A sample that adds nothing new.
     fn pass_over(&mut self, step_s: f64) -> GateVerdict {
         self.skipped_s += step_s;
-        if self.skipped_s <= BRIDGED_MAX_S {
+        if self.skipped_s <= REPEATED.high {
             return GateVerdict::Wait;
         }
         let newest = self.newest;
@@ -213,7 +201,7 @@ impl SampleGate {
     ) -> GateVerdict {
         let step_s = sample.step_s + self.skipped_s;
         let since_level_s = step_s + self.held_s();
-        if since_level_s > BRIDGED_MAX_S {
+        if since_level_s > REPEATED.high {
             let verdict = self.begin(*now);
             self.held[0] = Some(ResolvedSample { step_s: 0.0, ..*sample });
             return if verdict == GateVerdict::Take { GateVerdict::Release(1) } else { verdict };
@@ -241,7 +229,7 @@ impl SampleGate {
         self.level = Some(*now);
         self.is_confirmed = true;
         self.skipped_s = 0.0;
-        self.withdrawn_share -= self.withdrawn_share / MEMORY;
+        self.withdrawn_share -= self.withdrawn_share / LONE_MEMORY;
         if sample.step_s == came_step_s {
             return self.unless_in_doubt(GateVerdict::Take);
         }
@@ -264,13 +252,13 @@ impl SampleGate {
             self.held[0] = self.held[0].map(|first| ResolvedSample { step_s: 0.0, ..first });
         }
         self.is_confirmed = true;
-        self.withdrawn_share *= (1.0 - 1.0 / MEMORY).powi(AGREEING as i32);
+        self.withdrawn_share *= (1.0 - 1.0 / LONE_MEMORY).powi(AGREEING as i32);
         self.unless_in_doubt(GateVerdict::Release(AGREEING))
     }
 
     fn withdraw_held(&mut self) {
         for _ in 0..self.held_count {
-            self.withdrawn_share += (1.0 - self.withdrawn_share) / MEMORY;
+            self.withdrawn_share += (1.0 - self.withdrawn_share) / LONE_MEMORY;
         }
         self.held_count = 0;
     }
@@ -298,7 +286,7 @@ impl SampleGate {
     fn tolerance_n_per_kn(&self, force_n_per_kn: f64) -> f64 {
         TOLERANCE_N_PER_KN
             .max(TOLERANCE_SHARE * force_n_per_kn)
-            .max(NOISE_TOLERANCE * self.change_n_per_kn)
+            .max(LONE_FORCE.high * self.change_n_per_kn)
     }
 
     /// Follows the quantile of the changes (Robbins, Monro 1951).
@@ -334,37 +322,3 @@ impl SampleGate {
 
 #[cfg(test)]
 mod tests;
-
-/// An estimator whose samples pass a gate.
-pub trait Gated {
-    /// The gate.
-    fn gate(&mut self) -> &mut SampleGate;
-
-    /// Takes a sample that has passed.
-    fn take(&mut self, sample: &ResolvedSample) -> Outcome;
-
-    /// Leaves a sample out; the next one begins anew.
-    fn leave_out(&mut self, sample: &ResolvedSample, reason: RejectionReason);
-
-    /// Judges a sample and takes what the verdict sets free.
-    ///
-    /// # Real-time
-    ///
-    /// The work of as many samples as can be held, no allocation.
-    fn pass(&mut self, sample: &ResolvedSample) -> Outcome {
-        match self.gate().judge(sample) {
-            GateVerdict::Take => self.take(sample),
-            GateVerdict::Wait => Outcome::Used,
-            GateVerdict::Release(count) => {
-                (0..count).fold(Outcome::Used, |last, index| match self.gate().released(index) {
-                    Some(released) => self.take(&released),
-                    None => last,
-                })
-            }
-            GateVerdict::Refuse(reason) => {
-                self.leave_out(sample, reason);
-                Outcome::Rejected(reason)
-            }
-        }
-    }
-}

@@ -1,0 +1,284 @@
+//! Admission of samples: one judge of what comes in, and the one writer of a status.
+//!
+//! A sample is *refused* by validation (it cannot be true), by the force gate (its force stands alone, or it only
+//! repeats) or by the estimator (it lacks a force, slides, does not fit). The input is *doubted* while units, signs or
+//! exchanged forces make the samples impossible together, or too many of them are refused. [`limits`] has the bounds.
+//!
+//! - `validation`: a sample by itself and after the ones before it
+//! - `force_gate`: forces that stand alone, for the estimators that step from sample to sample
+//! - [`crate::plausibility`]: units, signs and exchanged forces over many samples
+
+mod force_gate;
+pub mod limits;
+mod validation;
+
+use std::sync::Arc;
+
+use dynocar_model::force::{ForceResolver, ResolvedSample, ValidSample};
+use dynocar_model::train::TrainModel;
+use dynocar_shared::{
+    ParameterSnapshot, PipelineKind, Reason, RejectionReason, SampleField, Status, TrainId,
+    TrainSample,
+};
+
+use self::force_gate::{ForceGate, GateVerdict};
+use self::limits::{INVALID_SHARE, REFUSALS_MEMORY, UNFIT_SHARE};
+use self::validation::Validator;
+use super::estimator::{Estimator, Outcome};
+use super::judge::{InputState, missing};
+use crate::plausibility::watch::Watch;
+use crate::plausibility::window_balance::WindowMean;
+use crate::plausibility::{DetectedFault, DetectedFaults, diagnosis};
+
+/// Judges the samples of one train, in order, for one estimator or for a reader of recorded runs.
+#[derive(Clone, Debug)]
+pub struct Admission {
+    validator: Validator,
+    watch: Watch,
+    /// False for positions that were integrated from the speed, which show nothing about it.
+    is_position_measured: bool,
+    detected: DetectedFaults,
+    gate: ForceGate,
+    /// Shares lately: of all samples, those that validation refused; of those that were to serve, those that did not.
+    invalid_share: f64,
+    unfit_share: f64,
+    /// Quantity that the newest sample that did not serve lacked.
+    wanted: Option<Reason>,
+    used: u64,
+}
+
+/// Outcome of a judgement that was written, for the use of the estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WrittenStatus {
+    /// Quantities that are known well enough, one bit each; none while the input is doubted.
+    pub known: u32,
+    /// True where the estimate merely waits for an event.
+    pub is_awaiting: bool,
+}
+
+impl Admission {
+    /// Returns the admission of a train's samples before the first of them.
+    pub fn new(train_id: TrainId, train: Arc<TrainModel>) -> Self {
+        Admission {
+            validator: Validator::new(train_id, train.mass_kg),
+            watch: Watch::new(train),
+            is_position_measured: true,
+            detected: DetectedFaults::default(),
+            gate: ForceGate::default(),
+            invalid_share: 0.0,
+            unfit_share: 0.0,
+            wanted: None,
+            used: 0,
+        }
+    }
+
+    /// Returns the admission of samples whose position is integrated from their speed.
+    #[must_use]
+    pub fn with_integrated_position(self) -> Self {
+        Admission { is_position_measured: false, ..self }
+    }
+
+    /// Returns the number of samples that never arrived so far.
+    pub fn lost(&self) -> u64 {
+        self.validator.lost()
+    }
+
+    /// Counts from the sample after this number; to be called before the first sample. Without it
+    /// the count begins with the sample of number 1.
+    pub fn count_from(&mut self, sequence: u64) {
+        self.validator.count_from(sequence);
+    }
+
+    /// Counts as lost what has not come up to this number.
+    pub fn count_up_to(&mut self, sequence: u64) {
+        self.validator.count_up_to(sequence);
+    }
+
+    /// Exchanges the counts of samples with the admission of another model of the same train: each goes on where the
+    /// other stopped, by its own limits, and begins a new motion segment.
+    pub fn exchange_counts(&mut self, other: &mut Admission) {
+        self.validator.exchange(&mut other.validator);
+    }
+
+    /// Validates a sample alone, for readers that judge no estimate.
+    ///
+    /// # Errors
+    ///
+    /// The first reason that applies.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn validate<'a>(
+        &mut self,
+        sample: &'a TrainSample,
+    ) -> Result<ValidSample<'a>, RejectionReason> {
+        self.validator.check(sample)
+    }
+
+    /// Validates a sample, resolves its forces and judges the input with it.
+    ///
+    /// Samples that were refused for a value out of range count in that judgement: the range may be what is missed.
+    ///
+    /// # Errors
+    ///
+    /// The first reason of validation that applies.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation: a few sums at a sample, a solution of five equations at the
+    /// end of a window.
+    pub fn admit(
+        &mut self,
+        sample: &TrainSample,
+        resolver: &mut ForceResolver,
+    ) -> Result<ResolvedSample, RejectionReason> {
+        let valid = self.validator.check(sample);
+        follow(&mut self.invalid_share, valid.is_err());
+        match valid {
+            Ok(valid) => {
+                let resolved = resolver.resolve(&valid);
+                self.watch(sample, true, resolved.gradient_permille);
+                Ok(resolved)
+            }
+            Err(reason) => {
+                match is_of_value(reason) {
+                    true => self.watch(sample, false, resolver.stated_gradient_permille(sample)),
+                    false => self.watch.pass_over(),
+                }
+                Err(reason)
+            }
+        }
+    }
+
+    fn watch(&mut self, sample: &TrainSample, is_valid: bool, gradient_permille: Option<f64>) {
+        let without_position;
+        let mut shown = sample;
+        if !self.is_position_measured {
+            let valid = sample.valid & !SampleField::Position.bit();
+            without_position = TrainSample { valid, ..*sample };
+            shown = &without_position;
+        }
+        if self.watch.take(shown, is_valid, gradient_permille) {
+            self.detected = diagnosis::diagnose(&self.watch.figures());
+        }
+    }
+
+    /// Hands a sample to an estimator, through the gate where it is gated.
+    ///
+    /// # Real-time
+    ///
+    /// The work of as many samples as the gate can hold, no allocation.
+    pub fn pass(&mut self, estimator: &mut dyn Estimator, sample: &ResolvedSample) -> Outcome {
+        estimator.observe(sample);
+        if !estimator.is_gated() {
+            return self.hand_over(estimator, sample);
+        }
+        match self.gate.judge(sample) {
+            GateVerdict::Take => self.hand_over(estimator, sample),
+            GateVerdict::Wait => Outcome::Idle,
+            GateVerdict::Release(count) => {
+                (0..count).fold(Outcome::Idle, |last, index| match self.gate.released(index) {
+                    Some(released) => self.hand_over(estimator, &released),
+                    None => last,
+                })
+            }
+            GateVerdict::Refuse(reason) => {
+                estimator.leave_out();
+                self.note(Outcome::Rejected(reason), sample)
+            }
+        }
+    }
+
+    fn hand_over(&mut self, estimator: &mut dyn Estimator, sample: &ResolvedSample) -> Outcome {
+        let outcome = estimator.update(sample);
+        self.note(outcome, sample)
+    }
+
+    /// Counts the outcome of a sample.
+    fn note(&mut self, outcome: Outcome, sample: &ResolvedSample) -> Outcome {
+        match outcome {
+            Outcome::Idle => {}
+            Outcome::Used | Outcome::Updated => {
+                self.used += 1;
+                follow(&mut self.unfit_share, false);
+            }
+            Outcome::Rejected(reason) => {
+                follow(&mut self.unfit_share, true);
+                self.wanted = (reason == RejectionReason::Missing).then(|| missing(sample));
+            }
+        }
+        outcome
+    }
+
+    /// Returns the state of the input for the estimator that the samples were handed to.
+    pub fn input(&self) -> InputState {
+        let is_starved = self.used == 0 && self.wanted.is_some();
+        let is_unfit = is_starved || self.unfit_share > UNFIT_SHARE.high;
+        let of_samples = is_unfit.then(|| self.wanted.unwrap_or(Reason::BadInput));
+        let of_forces = self.gate.is_in_doubt().then_some(Reason::BadInput);
+        InputState { used: self.used, doubt: of_samples.or(of_forces) }
+    }
+
+    /// Writes the estimate with its status and reason into a snapshot.
+    ///
+    /// # Real-time
+    ///
+    /// Allocates nothing.
+    pub fn write(
+        &self,
+        estimator: &dyn Estimator,
+        snapshot: &mut ParameterSnapshot,
+    ) -> WrittenStatus {
+        let mut judgement = estimator.write(&self.input(), snapshot);
+        let implausible = self.implausible(estimator.kind()).map(|it| it.fault.reason());
+        let is_refusing = self.invalid_share > INVALID_SHARE.high;
+        let is_doubted = is_refusing || implausible.is_some();
+        let is_estimated = judgement.status == Status::Estimated;
+        let doubt = implausible.or((is_refusing && is_estimated).then_some(Reason::BadInput));
+        judgement.reason = doubt.unwrap_or(judgement.reason);
+        if is_doubted && is_estimated {
+            judgement.status = Status::Degraded;
+        }
+        snapshot.status = judgement.status as u32;
+        snapshot.reason = judgement.reason as u32;
+        let awaiting = [Reason::EstimateStale, Reason::OnlyLowerBound, Reason::LoadMayHaveChanged];
+        WrittenStatus {
+            known: if is_doubted { 0 } else { judgement.known },
+            is_awaiting: !is_doubted && awaiting.contains(&judgement.reason),
+        }
+    }
+
+    /// Returns the recent impossibility of the samples that spoils what a kind of pipeline estimates.
+    pub fn implausible(&self, kind: PipelineKind) -> Option<DetectedFault> {
+        self.detected.iter().find(|detected| detected.fault.concerns(kind)).copied()
+    }
+
+    /// Returns the recent impossibilities of the samples.
+    pub fn detected(&self) -> &DetectedFaults {
+        &self.detected
+    }
+
+    /// Returns the means of the window of motion that the last sample ended; `None` where it ended none.
+    pub fn ended_window(&self) -> Option<&WindowMean> {
+        self.watch.ended()
+    }
+}
+
+/// Follows a share lately.
+fn follow(share: &mut f64, is_event: bool) {
+    *share += (f64::from(is_event) - *share) / REFUSALS_MEMORY;
+}
+
+/// Returns true for the refusal of a value that may be in another unit.
+fn is_of_value(reason: RejectionReason) -> bool {
+    matches!(
+        reason,
+        RejectionReason::MassOutOfRange
+            | RejectionReason::ForceOutOfRange
+            | RejectionReason::SpeedOutOfRange
+            | RejectionReason::OutOfRange
+            | RejectionReason::PositionJump
+            | RejectionReason::TimeJump
+    )
+}
