@@ -12,7 +12,6 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use dynocar_client::SnapshotReader;
 use dynocar_shared::{Quantity, TrainId};
 use dynocar_transport::channel::SampleCount;
 use dynocar_transport::peer::RoleLock;
@@ -25,6 +24,7 @@ use super::runtime::system::{
 use crate::config::{DaemonConfig, IdleStrategy, ModelsConfig, ThreadConfig};
 use crate::ending::{self, EndingError};
 use crate::models::Store;
+use crate::observing::ObservedTrain;
 use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::exchange::Exchange;
 use crate::runtime::tally::Tally;
@@ -113,7 +113,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let watchdog = Watchdog::new(&supervisor, alive);
     supervisor.notify("READY=1");
     let trains = trains.into_iter().zip(counts).collect();
-    let mut watch = Watch::new(host.clone(), trains, watched);
+    let mut watch = Watch::new(host.clone(), epoch, trains, watched);
     let mut lost_root = None;
     watch.until_stopped(&stop, || {
         watchdog.round(Instant::now());
@@ -194,7 +194,8 @@ fn plan_workers(
             }
             let tally = Arc::new(Tally::default());
             let name = settings.name.clone();
-            watched.push(WatchedPipeline { name, train: train.id, tally: Arc::clone(&tally) });
+            let (index, counted) = (index as u32, Arc::clone(&tally));
+            watched.push(WatchedPipeline { name, train: train.id, index, tally: counted });
             let channels = &mut plans[settings.thread].channels;
             match channels.iter_mut().find(|channel| channel.train == train.id) {
                 Some(channel) => channel.pipelines.push((pipeline, tally)),
@@ -289,10 +290,10 @@ fn start_metrics(
     let names: Vec<String> = config.pipelines.iter().map(|it| it.name.clone()).collect();
     let (host, stop) = (host.clone(), Arc::clone(stop));
     let serve = move || {
-        let readers: Result<Vec<_>, _> =
-            trains.into_iter().map(|train| SnapshotReader::open(&host, train)).collect();
-        match readers {
-            Ok(mut readers) => listener::serve(&socket, &mut readers, &names, &board, &stop),
+        let observed: Result<Vec<_>, _> =
+            trains.into_iter().map(|train| ObservedTrain::open(&host, train)).collect();
+        match observed {
+            Ok(mut trains) => listener::serve(&socket, &mut trains, &names, &board, &stop),
             Err(error) => warn!("no metrics: {error}"),
         }
     };

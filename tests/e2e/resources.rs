@@ -140,8 +140,8 @@ fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
     let mut raised = run("ulimit -Sn 40");
     raised.await_error("serving");
     let open = |_| SnapshotReader::open(&host, TRAIN).unwrap();
-    let mut readers: Vec<SnapshotReader> = (0..11).map(open).collect();
-    await_true(|| read(&mut readers) == 11, || format!("eleven readers: {}", raised.errors()));
+    let mut readers: Vec<SnapshotReader> = (0..10).map(open).collect();
+    await_true(|| read(&mut readers) == 10, || format!("ten readers: {}", raised.errors()));
     assert!(raised.end(Signal::TERM).success());
     drop(readers);
     let mut scarce = run("ulimit -n 40");
@@ -149,7 +149,7 @@ fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
         || scarce.errors().contains("serving") || scarce.try_wait().is_some(),
         || "a start, or its refusal".into(),
     );
-    let mut readers: Vec<SnapshotReader> = (0..11).map(open).collect();
+    let mut readers: Vec<SnapshotReader> = (0..10).map(open).collect();
     await_true(
         || {
             read(&mut readers);

@@ -1,32 +1,28 @@
 //! Columns with values that no train has, which validation refuses sample by sample.
 
 use dynocar_core::plausibility::Severity::Warning;
+use dynocar_shared::SampleField;
 use toml::Value;
 
 use super::diagnostic::Diagnostic;
 use super::quantity::Quantity;
 use super::resolved::Resolved;
 
-/// The quantities whose bounds are those of the sample, beyond which validation refuses it.
-const BOUNDED: [Quantity; 5] = [
-    Quantity::Acceleration,
-    Quantity::SpecificForce,
-    Quantity::BrakeCylinderPressure,
-    Quantity::AmbientTemperature,
-    Quantity::Gradient,
+/// The bounds of the sample, beyond which validation refuses it, and of places on the earth.
+const PLAUSIBLE: [(Quantity, (f64, f64)); 7] = [
+    (Quantity::Acceleration, SampleField::Acceleration.range()),
+    (Quantity::SpecificForce, SampleField::SpecificForce.range()),
+    (Quantity::BrakeCylinderPressure, SampleField::BrakeCylinderPressure.range()),
+    (Quantity::AmbientTemperature, SampleField::AmbientTemperature.range()),
+    (Quantity::Gradient, SampleField::Gradient.range()),
+    (Quantity::Latitude, (-90.0, 90.0)),
+    (Quantity::Longitude, (-180.0, 180.0)),
 ];
-/// The bounds of places on the earth.
-const EARTH: [(Quantity, f64, f64); 2] =
-    [(Quantity::Latitude, -90.0, 90.0), (Quantity::Longitude, -180.0, 180.0)];
 
 /// Returns a diagnostic for each column with values that are refused.
 pub(super) fn implausible_columns(run: &Resolved) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
-    let bounded = BOUNDED.iter().filter_map(|quantity| {
-        let (low, high) = quantity.field()?.range();
-        Some((*quantity, low, high))
-    });
-    for (quantity, low, high) in bounded.chain(EARTH) {
+    for (quantity, (low, high)) in PLAUSIBLE {
         let Some(column) = run.table.column(quantity) else { continue };
         let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
         let count = column.iter().filter(is_outside).count();

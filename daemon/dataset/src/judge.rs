@@ -1,6 +1,7 @@
 //! Judgement of a recorded run by the admission that judges samples live.
 
 use dynocar_core::pipeline::admission::Admission;
+use dynocar_core::pipeline::{Echo, Outcome};
 use dynocar_core::plausibility::DetectedFaults;
 use dynocar_core::plausibility::diagnosis::gradient_fault;
 use dynocar_core::plausibility::window_balance::Balance;
@@ -22,12 +23,10 @@ pub(super) struct Judge {
 impl Judge {
     /// Nothing seen yet of a run.
     pub fn new(context: Context, is_position_recorded: bool) -> Self {
-        let admission = Admission::new(DATASET_TRAIN, context.train.clone());
+        let mut admission = Admission::new(DATASET_TRAIN, context.train.clone());
+        admission.set_position_measured(is_position_recorded);
         Judge {
-            admission: match is_position_recorded {
-                true => admission,
-                false => admission.with_integrated_position(),
-            },
+            admission,
             resolver: ForceResolver::new(context.train.clone(), context.track.cloned()),
             balance: Balance::of_all(),
             rows: 0,
@@ -37,7 +36,8 @@ impl Judge {
 
     /// Takes in the sample of the next row.
     pub fn take(&mut self, sample: &TrainSample) {
-        if let Err(reason) = self.admission.admit(sample, &mut self.resolver) {
+        let outcome = self.admission.take(sample, &mut self.resolver, &mut Echo);
+        if let Outcome::Rejected(reason) = outcome {
             let (count, first_row) = &mut self.refused[reason as usize];
             *first_row = if *count == 0 { self.rows } else { *first_row };
             *count += 1;

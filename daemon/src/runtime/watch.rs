@@ -1,6 +1,5 @@
 //! Work of the main thread while the pipeline threads run.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -9,13 +8,15 @@ use dynocar_core::plausibility::InputFault;
 use dynocar_core::remedy::{of_reason, of_refusal};
 use dynocar_shared::snapshot::REJECTION_REASONS;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
-use dynocar_shared::{Reason, RejectionReason, Status, TrainId};
+use dynocar_shared::{ParameterSnapshot, Reason, RejectionReason, Status, TrainId};
 use dynocar_transport::channel::SampleCount;
-use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role};
+use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role, monotonic_now_ns};
 use tracing::{info, warn};
 
 use super::status_log::{RefusalLog, State, StatusLog};
 use super::tally::{Tally, TallyReading};
+use crate::observing::ObservedTrain;
+use crate::operator::suspicion::Suspicion;
 use crate::operator::{refusals, refused_words};
 use crate::supervision::health::Verdict;
 
@@ -24,31 +25,45 @@ const ROUND: Duration = Duration::from_millis(100);
 /// Rounds between two looks at who drives the trains.
 const ROUNDS_PER_PEER_CHECK: u32 = 4;
 
-/// A tally with the names it is logged under.
+/// A pipeline with the name it is logged under.
 pub struct WatchedPipeline {
     /// The pipeline's name.
     pub name: String,
     /// The train.
     pub train: TrainId,
+    /// Number in the configuration.
+    pub index: u32,
     /// Counters of its thread.
     pub tally: Arc<Tally>,
 }
 
 /// State of the log of one pipeline.
 struct PipelineLog {
+    pipeline: WatchedPipeline,
     statuses: StatusLog,
     suspects: StatusLog,
+    last: TallyReading,
+    lost: u64,
 }
 
-/// Watches signals, peers and tallies, and writes what changes into the log.
+/// State of the log of one train.
+struct TrainLog {
+    id: TrainId,
+    count: Arc<SampleCount>,
+    /// Its snapshots, as soon as there is a place to read them.
+    observed: Option<ObservedTrain>,
+    refusals: RefusalLog,
+    /// The controller of the last look, after the first.
+    controller: Option<Option<Announcement>>,
+}
+
+/// Watches signals, peers, snapshots and tallies, and writes what changes into the log.
 pub struct Watch {
     host: Host,
-    trains: Vec<(TrainId, Arc<SampleCount>)>,
-    pipelines: Vec<WatchedPipeline>,
-    readings: Vec<TallyReading>,
-    logs: Vec<PipelineLog>,
-    refusals: HashMap<TrainId, RefusalLog>,
-    controllers: HashMap<TrainId, Option<Announcement>>,
+    /// Start of the daemon, by which its snapshots differ from those of one before it.
+    epoch: u64,
+    trains: Vec<TrainLog>,
+    pipelines: Vec<PipelineLog>,
     /// Why nobody could be looked up, the last time; said once.
     failure: Option<String>,
 }
@@ -57,14 +72,21 @@ impl Watch {
     /// A watch over the daemon's trains and pipelines.
     pub fn new(
         host: Host,
+        epoch: u64,
         trains: Vec<(TrainId, Arc<SampleCount>)>,
         pipelines: Vec<WatchedPipeline>,
     ) -> Self {
-        let readings = vec![TallyReading::default(); pipelines.len()];
-        let logs = pipelines.iter().map(|_| PipelineLog::new(Instant::now())).collect();
-        let (refusals, controllers) = (HashMap::new(), HashMap::new());
-        let failure = None;
-        Watch { host, trains, pipelines, readings, logs, refusals, controllers, failure }
+        let (now, refusals) = (Instant::now(), RefusalLog::default());
+        let trains = trains.into_iter().map(|(id, count)| {
+            let refusals = refusals.clone();
+            TrainLog { id, count, observed: None, refusals, controller: None }
+        });
+        let pipelines = pipelines.into_iter().map(|pipeline| {
+            let (statuses, suspects) = (StatusLog::new(now), StatusLog::new(now));
+            PipelineLog { pipeline, statuses, suspects, last: TallyReading::default(), lost: 0 }
+        });
+        let (trains, pipelines) = (trains.collect(), pipelines.collect());
+        Watch { host, epoch, trains, pipelines, failure: None }
     }
 
     /// Watches until a signal asks the daemon to stop, or a pipeline thread has ended.
@@ -72,7 +94,7 @@ impl Watch {
         let mut round = 0;
         while !stop.load(Ordering::Relaxed) && !has_ended() {
             if round % ROUNDS_PER_PEER_CHECK == 0 {
-                self.check_controllers();
+                self.check_peers();
             }
             self.report_changes();
             round += 1;
@@ -81,112 +103,142 @@ impl Watch {
     }
 
     /// Logs the final counts.
-    pub fn report_totals(&self) {
-        for (pipeline, log) in self.pipelines.iter().zip(&self.logs) {
-            let reading = pipeline.tally.read();
+    pub fn report_totals(&mut self) {
+        self.poll();
+        for log in &self.pipelines {
+            let PipelineLog { pipeline, statuses, .. } = log;
+            let train = self.trains.iter().find(|it| it.id == pipeline.train);
+            let snapshot = train.and_then(|it| it.snapshot(pipeline.index, self.epoch));
+            let snapshot = snapshot.unwrap_or_else(ParameterSnapshot::empty);
             info!(
                 pipeline = pipeline.name,
                 train = pipeline.train.0,
-                used = reading.used,
-                rejected = reading.rejected,
-                lost = reading.lost,
-                refused = refused_words(&refusals(&reading.refused)),
-                status_changes = log.statuses.changes(),
+                used = snapshot.samples_used,
+                rejected = snapshot.samples_rejected,
+                lost = snapshot.samples_lost,
+                refused = refused_words(&refusals(&snapshot.rejected_by_reason)),
+                status_changes = statuses.changes(),
                 "stopped"
             );
         }
     }
 
-    fn check_controllers(&mut self) {
-        for (train, count) in &self.trains {
-            let train = *train;
-            // Before the look: what was begun by then is over when nobody is there.
-            let begun = count.begun();
-            let seen = match Peer::look_up(&self.host, train, Role::Controller) {
-                Ok(Peer::Absent) => {
-                    count.end(begun);
-                    None
-                }
-                Ok(Peer::Compatible(peer) | Peer::Incompatible(peer)) => Some(peer),
-                Err(error) => {
-                    let error = error.to_string();
-                    if self.failure.as_ref() != Some(&error) {
-                        warn!(train = train.0, "{error}");
-                        self.failure = Some(error);
-                    }
-                    continue;
-                }
-            };
-            if self.controllers.get(&train) != Some(&seen) {
-                report_controller(train, seen.as_ref());
-                self.controllers.insert(train, seen);
+    fn check_peers(&mut self) {
+        for train in &mut self.trains {
+            let Err(error) = train.look(&self.host) else { continue };
+            let error = error.to_string();
+            if self.failure.as_ref() != Some(&error) {
+                warn!(train = train.id.0, "{error}");
+                self.failure = Some(error);
             }
+        }
+    }
+
+    /// Takes the newest snapshots.
+    fn poll(&mut self) {
+        for observed in self.trains.iter_mut().filter_map(|train| train.observed.as_mut()) {
+            observed.poll();
         }
     }
 
     fn report_changes(&mut self) {
+        self.poll();
         // Once for all pipelines of a train.
-        let known = |(pipeline, last): (&WatchedPipeline, &TallyReading)| {
-            Some((pipeline.train.0, last.implausible?.fault))
-        };
-        let mut reported: Vec<(u64, InputFault)> =
-            self.pipelines.iter().zip(&self.readings).filter_map(known).collect();
+        let known = |log: &PipelineLog| Some((log.pipeline.train, log.last.implausible?.fault));
+        let mut reported: Vec<(TrainId, InputFault)> =
+            self.pipelines.iter().filter_map(known).collect();
         let now = Instant::now();
-        let mut refused: HashMap<TrainId, [u32; REJECTION_REASONS]> = HashMap::new();
-        let known = self.readings.iter_mut().zip(&mut self.logs);
-        for (pipeline, (last, log)) in self.pipelines.iter().zip(known) {
-            let reading = pipeline.tally.read();
-            let (name, train) = (pipeline.name.as_str(), pipeline.train.0);
-            log.report(name, train, &reading, now);
-            if let Some(detected) = reading.implausible
-                && !reported.contains(&(train, detected.fault))
-            {
-                reported.push((train, detected.fault));
-                let code = detected.fault.name();
-                warn!(train, code, "the samples cannot be true: {detected}");
+        for train in &mut self.trains {
+            let mut refused = [0; REJECTION_REASONS];
+            for log in self.pipelines.iter_mut().filter(|it| it.pipeline.train == train.id) {
+                log.report_tally(&mut reported);
+                let snapshot = train.snapshot(log.pipeline.index, self.epoch);
+                let Some(snapshot) = snapshot else { continue };
+                log.report(&snapshot, now);
+                let counts = refused.iter_mut().zip(snapshot.rejected_by_reason);
+                counts.for_each(|(most, it)| *most = it.max(*most));
             }
-            if reading.lost > last.lost {
-                let lost = reading.lost - last.lost;
-                warn!(pipeline = name, train, lost, "samples lost");
-            }
-            if reading.unsent > last.unsent {
-                let unsent = reading.unsent - last.unsent;
-                warn!(pipeline = name, train, unsent, "snapshots the transport did not take");
-            }
-            let most = refused.entry(pipeline.train).or_insert([0; REJECTION_REASONS]);
-            most.iter_mut().zip(reading.refused).for_each(|(most, it)| *most = it.max(*most));
-            *last = reading;
-        }
-        for (train, counts) in refused {
-            let new = self.refusals.entry(train).or_default().look(&counts, now);
-            report_refusals(train, &new);
+            let new = train.refusals.look(&refused, now);
+            report_refusals(train.id, &new);
         }
     }
 }
 
-impl PipelineLog {
-    fn new(now: Instant) -> Self {
-        PipelineLog { statuses: StatusLog::new(now), suspects: StatusLog::new(now) }
+impl TrainLog {
+    /// Looks who drives the train, logs a change, and opens the snapshots unless they are read already.
+    fn look(&mut self, host: &Host) -> Result<(), ChannelError> {
+        // Before the look: what was begun by then is over when nobody is there.
+        let begun = self.count.begun();
+        let seen = match Peer::look_up(host, self.id, Role::Controller)? {
+            Peer::Absent => {
+                self.count.end(begun);
+                None
+            }
+            Peer::Compatible(peer) | Peer::Incompatible(peer) => Some(peer),
+        };
+        if self.controller.as_ref() != Some(&seen) {
+            report_controller(self.id, seen.as_ref());
+            self.controller = Some(seen);
+        }
+        if self.observed.is_none() {
+            self.observed = Some(ObservedTrain::open(host, self.id)?);
+        }
+        Ok(())
     }
 
-    /// Logs what is new of a pipeline's status and of what it suspects.
-    fn report(&mut self, pipeline: &str, train: u64, reading: &TallyReading, now: Instant) {
-        if let Some(untold) = self.statuses.look(reading.status, now) {
-            report_status(pipeline, train, reading, &untold);
+    /// Returns the newest snapshot of a pipeline by a daemon.
+    fn snapshot(&self, index: u32, epoch: u64) -> Option<ParameterSnapshot> {
+        let mut snapshots =
+            self.observed.as_ref()?.readings(monotonic_now_ns()).map(|it| it.snapshot);
+        snapshots.find(|it| (it.pipeline_index, it.epoch) == (index, epoch)).copied()
+    }
+}
+
+impl PipelineLog {
+    /// Logs what is new of what no snapshot carries.
+    fn report_tally(&mut self, reported: &mut Vec<(TrainId, InputFault)>) {
+        let reading = self.pipeline.tally.read();
+        let (name, train) = (self.pipeline.name.as_str(), self.pipeline.train);
+        if let Some(detected) = reading.implausible
+            && !reported.contains(&(train, detected.fault))
+        {
+            reported.push((train, detected.fault));
+            let (train, code) = (train.0, detected.fault.name());
+            warn!(train, code, "the samples cannot be true: {detected}");
         }
-        let suspect = reading.suspicion.map_or(0, |it| it.effect.map_or(u32::MAX, |it| it as u32));
+        if reading.unsent > self.last.unsent {
+            let (train, unsent) = (train.0, reading.unsent - self.last.unsent);
+            warn!(pipeline = name, train, unsent, "snapshots the transport did not take");
+        }
+        self.last = reading;
+    }
+
+    /// Logs what is new of a pipeline's status, of what it lost and of what it suspects.
+    fn report(&mut self, snapshot: &ParameterSnapshot, now: Instant) {
+        let (pipeline, train) = (self.pipeline.name.as_str(), self.pipeline.train.0);
+        if let Some(untold) = self.statuses.look((snapshot.status, snapshot.reason), now) {
+            self.report_status(snapshot, &untold);
+        }
+        if snapshot.samples_lost > self.lost {
+            let lost = snapshot.samples_lost - self.lost;
+            warn!(pipeline, train, lost, "samples lost");
+        }
+        self.lost = snapshot.samples_lost;
+        let suspicion = Suspicion::of(snapshot);
+        let suspect = suspicion.map_or(0, |it| it.effect.map_or(u32::MAX, |it| it as u32));
         // Nothing suspected is no news before something is.
         if self.suspects.look((suspect, 0), now).is_none()
             || (suspect == 0 && self.suspects.changes() == 0)
         {
             return;
         }
-        let Some(suspicion) = reading.suspicion else {
+        let Some(suspicion) = suspicion else {
             info!(pipeline, train, "nothing is suspected any more");
             return;
         };
         let (suspect, force) = (suspicion.name(), suspicion.force());
-        let near_km = reading.position_m.is_finite().then_some(1e-3 * reading.position_m);
+        let position_m = self.last.position_m;
+        let near_km = position_m.is_finite().then_some(1e-3 * position_m);
         let near_km = near_km.map(|it| format!("{it:.3}"));
         let remedy = KindRow::of(suspicion.effect.unwrap_or(EffectKind::Unknown)).to_do;
         warn!(
@@ -194,30 +246,31 @@ impl PipelineLog {
             train, suspect, force, near_km, "the model lacks a force: {suspicion}; to do: {remedy}"
         );
     }
-}
 
-/// A status that wants a person is a warning, with what to do; any other is information.
-fn report_status(pipeline: &str, train: u64, reading: &TallyReading, untold: &[(State, u64)]) {
-    let words = |(status, reason): State| {
-        let status = Status::from_number(status).unwrap_or(Status::Invalid);
-        (status, Reason::from_number(reason).unwrap_or(Reason::None))
-    };
-    let (status, reason) = words(reading.status);
-    // Changes to and fro that no line of their own reports.
-    let untold: Vec<String> = untold
-        .iter()
-        .map(|&(state, count)| (words(state), count))
-        .map(|((status, reason), count)| format!("{status} ({reason}) {count}"))
-        .collect();
-    let untold = (!untold.is_empty()).then(|| untold.join(", "));
-    if Verdict::of(status, Some(reason)) == Verdict::Ok {
-        info!(pipeline, train, %status, %reason, untold, "status");
-        return;
+    /// A status that wants a person is a warning, with what to do; any other is information.
+    fn report_status(&self, snapshot: &ParameterSnapshot, untold: &[(State, u64)]) {
+        let (pipeline, train) = (self.pipeline.name.as_str(), self.pipeline.train.0);
+        let words = |(status, reason): State| {
+            let status = Status::from_number(status).unwrap_or(Status::Invalid);
+            (status, Reason::from_number(reason).unwrap_or(Reason::None))
+        };
+        let (status, reason) = words((snapshot.status, snapshot.reason));
+        // Changes to and fro that no line of their own reports.
+        let untold: Vec<String> = untold
+            .iter()
+            .map(|&(state, count)| (words(state), count))
+            .map(|((status, reason), count)| format!("{status} ({reason}) {count}"))
+            .collect();
+        let untold = (!untold.is_empty()).then(|| untold.join(", "));
+        if Verdict::of(status, Some(reason)) == Verdict::Ok {
+            info!(pipeline, train, %status, %reason, untold, "status");
+            return;
+        }
+        let refused = refused_words(&refusals(&snapshot.rejected_by_reason));
+        let refused = (reason == Reason::BadInput && !refused.is_empty()).then_some(refused);
+        let (meaning, remedy) = (reason.meaning().trim().trim_end_matches('.'), of_reason(reason));
+        warn!(pipeline, train, %status, %reason, untold, refused, "not to be relied on: {meaning}; to do: {remedy}");
     }
-    let refused = refused_words(&refusals(&reading.refused));
-    let refused = (reason == Reason::BadInput && !refused.is_empty()).then_some(refused);
-    let (meaning, remedy) = (reason.meaning().trim().trim_end_matches('.'), of_reason(reason));
-    warn!(pipeline, train, %status, %reason, untold, refused, "not to be relied on: {meaning}; to do: {remedy}");
 }
 
 /// Samples of a train that were refused since the last such line.

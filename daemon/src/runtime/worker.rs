@@ -244,7 +244,7 @@ impl Slot {
         if self.sender.send(snapshot).is_err() {
             self.tally.note_unsent();
         }
-        self.tally.note(self.pipeline.snapshot(), self.pipeline.implausible());
+        self.tally.note(self.pipeline.implausible());
     }
 }
 

@@ -1,11 +1,10 @@
-//! The thread that writes the states: a client of the daemon's own snapshots.
+//! The thread that writes the states: an observer of the daemon's own snapshots.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar_client::SnapshotReader;
 use dynocar_core::pipeline::KeptEstimate;
 use dynocar_shared::ParameterSnapshot;
 use dynocar_transport::{ChannelError, Host, monotonic_now_ns};
@@ -14,6 +13,7 @@ use tracing::{info, warn};
 use super::entry::{ModelKey, StateContent, StoredEstimate, settings_hash};
 use super::{StateError, StateProblem, file, path_of};
 use crate::config::DaemonConfig;
+use crate::observing::ObservedTrain;
 use crate::stamp::Stamp;
 
 /// How often the keeper looks whether to stop.
@@ -21,9 +21,9 @@ const ROUND: Duration = Duration::from_millis(50);
 /// How often what a daemon that dies at once leaves is written.
 const LEAVE_EVERY: Duration = Duration::from_secs(1);
 
-/// One train's state with the reader it is kept from.
+/// One train's state with the snapshots that it is kept from.
 struct KeptTrain {
-    reader: SnapshotReader,
+    observed: ObservedTrain,
     content: StateContent,
     /// Whether the file is older than the content: the one on the disk, and the one in the run-time directory.
     is_changed: [bool; 2],
@@ -59,7 +59,7 @@ impl Keeper {
             .zip(stored)
             .map(|(train, estimates)| {
                 Ok(KeptTrain {
-                    reader: SnapshotReader::open(host, train.id)?,
+                    observed: ObservedTrain::open(host, train.id)?,
                     content: StateContent { key: ModelKey::of(train), estimates },
                     is_changed: [false; 2],
                 })
@@ -87,7 +87,7 @@ impl Keeper {
                 self.write(1, file::leave);
             } else {
                 for train in &mut self.trains {
-                    train.reader.poll();
+                    train.observed.poll();
                 }
             }
         }
@@ -103,8 +103,8 @@ impl Keeper {
     fn gather(&mut self) {
         let (now, now_ns) = (Stamp::now(), monotonic_now_ns());
         for train in &mut self.trains {
-            train.reader.poll();
-            for reading in train.reader.readings(now_ns) {
+            train.observed.poll();
+            for reading in train.observed.readings(now_ns) {
                 let index = reading.snapshot.pipeline_index as usize;
                 if reading.snapshot.model_hash != train.content.key.model {
                     // Another model is in force: what was kept of the one before holds no more.

@@ -2,13 +2,14 @@
 
 use std::time::{Duration, Instant};
 
-use dynocar_client::SnapshotReader;
+use dynocar_client::Reading;
 use dynocar_core::remedy::{of_reason, of_refusal};
 use dynocar_model::named;
 use dynocar_shared::vocabulary::KindRow;
 use dynocar_shared::{PipelineKind, Quantity, Reason, RejectionReason, Status, TrainId, UseState};
 use dynocar_transport::{ChannelError, Host, Peer, Role, monotonic_now_ns};
 
+use crate::observing::ObservedTrain;
 use crate::operator::refusals;
 use crate::operator::suspicion::Suspicion;
 
@@ -175,18 +176,18 @@ pub fn look_at(host: &Host, train: TrainId) -> Result<TrainHealth, ChannelError>
     if verdict != Verdict::Ok {
         return Ok(TrainHealth { train, verdict, daemon, pipelines: Vec::new() });
     }
-    let pipelines = pipelines_of(&mut SnapshotReader::open(host, train)?);
+    let pipelines = pipelines_of(&mut ObservedTrain::open(host, train)?);
     let verdict = pipelines.iter().map(PipelineHealth::verdict).max().unwrap_or(Verdict::Stale);
     Ok(TrainHealth { train, verdict, daemon, pipelines })
 }
 
 /// The pipelines that speak up within [`PATIENCE`]; all of them do within a heartbeat.
-fn pipelines_of(reader: &mut SnapshotReader) -> Vec<PipelineHealth> {
+fn pipelines_of(observed: &mut ObservedTrain) -> Vec<PipelineHealth> {
     let start = Instant::now();
     let mut first_heard = None;
     while start.elapsed() < PATIENCE {
-        reader.poll();
-        let is_fresh = reader.readings(monotonic_now_ns()).any(|reading| !reading.is_stale);
+        observed.poll();
+        let is_fresh = observed.readings(monotonic_now_ns()).any(|reading| !reading.is_stale);
         if is_fresh && first_heard.is_none() {
             first_heard = Some(Instant::now());
         }
@@ -196,7 +197,7 @@ fn pipelines_of(reader: &mut SnapshotReader) -> Vec<PipelineHealth> {
         }
         std::thread::sleep(Duration::from_millis(5));
     }
-    let of_reading = |reading: dynocar_client::Reading<'_>| PipelineHealth {
+    let of_reading = |reading: Reading<'_>| PipelineHealth {
         index: reading.snapshot.pipeline_index,
         kind: reading.snapshot.pipeline_kind().map_or("unknown", PipelineKind::name),
         status: reading.status(),
@@ -205,7 +206,7 @@ fn pipelines_of(reader: &mut SnapshotReader) -> Vec<PipelineHealth> {
             .iter()
             .filter(|&&quantity| reading.snapshot.answers(quantity))
             .map(|&quantity| {
-                let asked = dynocar_client::Reading { quantity: Some(quantity), ..reading };
+                let asked = Reading { quantity: Some(quantity), ..reading };
                 (quantity, asked.use_state(), asked.why())
             })
             .collect(),
@@ -214,7 +215,7 @@ fn pipelines_of(reader: &mut SnapshotReader) -> Vec<PipelineHealth> {
         suspicion: Suspicion::of(reading.snapshot),
         refused: refusals(&reading.snapshot.rejected_by_reason),
     };
-    reader.readings(monotonic_now_ns()).map(of_reading).collect()
+    observed.readings(monotonic_now_ns()).map(of_reading).collect()
 }
 
 #[cfg(test)]

@@ -9,11 +9,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use dynocar_client::SnapshotReader;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use tracing::warn;
 
 use super::metrics;
+use crate::observing::ObservedTrain;
 use crate::shadow::Board;
 
 /// The longest request in bytes.
@@ -39,7 +39,7 @@ pub fn open(address: SocketAddr) -> std::io::Result<TcpListener> {
 /// Answers until the daemon stops.
 pub fn serve(
     listener: &TcpListener,
-    readers: &mut [SnapshotReader],
+    trains: &mut [ObservedTrain],
     names: &[String],
     board: &Board,
     stop: &Arc<AtomicBool>,
@@ -48,8 +48,8 @@ pub fn serve(
     while !stop.load(Ordering::Relaxed) {
         wait_for_any(listener, &connections);
         // Keeps the channel empty, so that an answer is up to date at once.
-        readers.iter_mut().for_each(|reader| {
-            reader.poll();
+        trains.iter_mut().for_each(|train| {
+            train.poll();
         });
         for _ in 0..CONNECTIONS_MAX {
             match listener.accept() {
@@ -64,7 +64,7 @@ pub fn serve(
         }
         // A client that goes away or dawdles is its own misfortune.
         connections.retain_mut(|it| {
-            it.advance(&mut || metrics::text(readers, names, &board.read()))
+            it.advance(&mut || metrics::text(trains, names, &board.read()))
                 .is_ok_and(|is_done| !is_done)
         });
         connections.drain(..connections.len().saturating_sub(CONNECTIONS_MAX));

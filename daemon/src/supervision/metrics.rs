@@ -1,6 +1,6 @@
-//! The daemon's numbers as OpenMetrics text, taken from its snapshots as any client takes them.
+//! The daemon's numbers as OpenMetrics text, taken from its snapshots as every observer takes them.
 
-use dynocar_client::{Reading, SnapshotReader};
+use dynocar_client::Reading;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, PipelineKind, Quantity, Reason, RejectionReason, Status};
 use dynocar_transport::monotonic_now_ns;
@@ -12,6 +12,7 @@ use prometheus_client::registry::Registry;
 use std::sync::atomic::AtomicU64;
 
 use super::health::Verdict;
+use crate::observing::ObservedTrain;
 use crate::operator::suspicion::Suspicion;
 use crate::shadow::{Pinned, TrialFigures};
 
@@ -184,16 +185,16 @@ impl Families {
 
 /// The newest snapshots and what models on trial show, as OpenMetrics text; `names` are the
 /// pipelines' by their number.
-pub fn text(readers: &mut [SnapshotReader], names: &[String], pinned: &Pinned) -> String {
+pub fn text(trains: &mut [ObservedTrain], names: &[String], pinned: &Pinned) -> String {
     let families = Families::default();
     pinned.models.iter().for_each(|it| families.take_trial(it));
     for it in &pinned.events {
         let labels: Labels = vec![("train", it.train.to_string()), ("kind", it.kind.clone())];
         families.maintenance.get_or_create(&labels).inc_by(it.count);
     }
-    for reader in readers {
-        reader.poll();
-        for reading in reader.readings(monotonic_now_ns()) {
+    for train in trains {
+        train.poll();
+        for reading in train.readings(monotonic_now_ns()) {
             let index = reading.snapshot.pipeline_index as usize;
             families.take(&reading, names.get(index).map_or("unnamed", String::as_str));
         }

@@ -118,7 +118,6 @@ impl<'a> Watchdog<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_shared::ParameterSnapshot;
 
     struct Listening {
         _folder: tempfile::TempDir,
@@ -153,17 +152,17 @@ mod tests {
         let start = Instant::now();
         let at = |seconds: f64| start + Duration::from_secs_f64(seconds);
         for round in 0..50 {
-            tallies.iter().for_each(|tally| tally.note(&ParameterSnapshot::empty(), None));
+            tallies.iter().for_each(|tally| tally.note(None));
             watchdog.round(at(0.1 * f64::from(round)));
         }
         assert_eq!(heard(&socket), vec!["WATCHDOG=1"; 5]);
         // One of the two falls silent: fed for as long as that may be an accident, then no more.
         for round in 50..120 {
-            tallies[0].note(&ParameterSnapshot::empty(), None);
+            tallies[0].note(None);
             watchdog.round(at(0.1 * f64::from(round)));
         }
         assert_eq!(heard(&socket).len(), 2);
-        tallies[1].note(&ParameterSnapshot::empty(), None);
+        tallies[1].note(None);
         watchdog.round(at(12.0));
         assert_eq!(heard(&socket), ["WATCHDOG=1"], "it lives again");
     }

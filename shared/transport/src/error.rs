@@ -140,7 +140,7 @@ pub enum ChannelError {
     #[error(
         "{channel} of train {train}: all {limit} places are taken. Each reader and each publisher \
          takes one until it is closed or its process ends; the daemon takes one for each of its \
-         threads, for metrics and for kept estimates. Close those you no longer need, or let one \
+         threads, for its log, for metrics and for kept estimates. Close those you no longer need, or let one \
          reader of a process serve all its parts"
     )]
     NoPlaceLeft {

@@ -108,11 +108,11 @@ fn energy_at_time(shuttle: &Shuttle, case: &Case, time_s: f64) -> f64 {
 /// Returns the mass that the filter knows after the leg before.
 fn learned_mass_kg(shuttle: &Shuttle, seed: u64) -> f64 {
     let ride = leg(shuttle, EMPTY_MASS_KG, &mut calm);
-    let mut filter = kalman(shuttle, &known_resistance(shuttle));
+    let mut kalman = kalman(shuttle, &known_resistance(shuttle));
     for sample in measure(shuttle, &ride, &mut Chance::new(seed)) {
-        filter.update(&sample);
+        kalman.update(&sample);
     }
-    filter.mass_kg().0
+    kalman.filter.mass_kg().0
 }
 
 fn drive(shuttle: &Shuttle, case: &Case, cruise_mps: f64) -> Driven {

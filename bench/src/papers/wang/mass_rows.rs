@@ -160,7 +160,7 @@ fn take(
         forward.update(sample);
         reverse.update(sample);
     }
-    let (estimate_kg, std_kg) = kalman.mass_kg();
+    let (estimate_kg, std_kg) = kalman.filter.mass_kg();
     score.paper.push(percent(forward.mass_kg()));
     score.baseline.push(percent(reverse.mass_kg()));
     score.take(percent(estimate_kg), 100.0 * std_kg / mass_kg);
@@ -189,7 +189,7 @@ fn step_row(shuttle: &Shuttle, seeds: Seeds) -> Row {
         let mut kalman = kalman(shuttle, &resistance);
         before.iter().for_each(|sample| _ = kalman.update(sample));
         ours.extend(settling_s(after, loaded_kg, &mut |sample| {
-            (kalman.update(sample) == Outcome::Updated).then(|| kalman.mass_kg().0)
+            (kalman.update(sample) == Outcome::Updated).then(|| kalman.filter.mass_kg().0)
         }));
     }
     // A way that does not settle in every run has no settling time.

@@ -184,25 +184,24 @@ pub fn known_resistance(shuttle: &Shuttle) -> LineResistance {
 }
 
 /// Our filter behind its admission, as a pipeline has it.
-pub struct AdmittedKalman(Admission, MassKalman);
+pub struct AdmittedKalman {
+    admission: Admission,
+    /// The filter.
+    pub filter: MassKalman,
+}
 
 impl AdmittedKalman {
     /// Takes the next sample.
     pub fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        self.0.pass(&mut self.1, sample)
-    }
-
-    /// Mass in kg and its standard deviation.
-    pub fn mass_kg(&self) -> (f64, f64) {
-        self.1.mass_kg()
+        self.admission.pass(&mut self.filter, sample)
     }
 }
 
 /// Our filter with a resistance.
 pub fn kalman(shuttle: &Shuttle, resistance: &LineResistance) -> AdmittedKalman {
     let settings = MassKalmanSettings::default().with_resistance(resistance);
-    let kalman = MassKalman::new(settings, &shuttle.train).expect("default settings");
-    AdmittedKalman(Admission::new(TrainId(1), shuttle.train.clone()), kalman)
+    let filter = MassKalman::new(settings, &shuttle.train).expect("default settings");
+    AdmittedKalman { admission: Admission::new(TrainId(1), shuttle.train.clone()), filter }
 }
 
 /// The paper's last stage with a resistance.

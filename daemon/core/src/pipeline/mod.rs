@@ -27,9 +27,9 @@ use std::sync::Arc;
 use dynocar_model::force::ForceResolver;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
-use dynocar_shared::{ParameterSnapshot, RejectionReason, TrainId, TrainSample};
+use dynocar_shared::{ParameterSnapshot, Reason, TrainId, TrainSample};
 
-use self::admission::{Admission, WrittenStatus};
+use self::admission::Admission;
 use self::usable::Usable;
 use crate::plausibility::DetectedFault;
 
@@ -103,11 +103,11 @@ impl Pipeline {
         other.write_estimate();
     }
 
-    fn write_estimate(&mut self) -> WrittenStatus {
+    fn write_estimate(&mut self) -> Option<u32> {
         self.snapshot.generation = 0;
-        let written = self.admission.write(&*self.estimator, &mut self.snapshot);
+        let known = self.admission.write(&*self.estimator, &mut self.snapshot);
         self.snapshot.generation += self.resets_before;
-        written
+        known
     }
 
     /// Counts the samples after this number, taken or lost; to be called before the first sample.
@@ -135,10 +135,7 @@ impl Pipeline {
     ///
     /// Allocates nothing, locks nothing, reads no clock.
     pub fn process(&mut self, sample: &TrainSample) -> &ParameterSnapshot {
-        let outcome = match self.admission.admit(sample, &mut self.resolver) {
-            Ok(resolved) => self.admission.pass(&mut *self.estimator, &resolved),
-            Err(reason) => Outcome::Rejected(reason),
-        };
+        let outcome = self.admission.take(sample, &mut self.resolver, &mut *self.estimator);
         let snapshot = &mut self.snapshot;
         match outcome {
             Outcome::Idle | Outcome::Used => snapshot.samples_used += 1,
@@ -146,15 +143,22 @@ impl Pipeline {
                 snapshot.samples_used += 1;
                 snapshot.updates += 1;
             }
-            Outcome::Rejected(reason) => count_rejection(snapshot, reason),
+            Outcome::Rejected(reason) => {
+                snapshot.samples_rejected += 1;
+                let count = &mut snapshot.rejected_by_reason[reason as usize];
+                *count = count.saturating_add(1);
+            }
         }
         snapshot.samples_lost = self.admission.lost();
         snapshot.sequence += 1;
         snapshot.sample_time_ns = sample.time_ns;
         snapshot.sample_published_ns = sample.published_ns;
         snapshot.sample_sequence = sample.sequence;
-        let WrittenStatus { known, is_awaiting } = self.write_estimate();
-        let good = known & self.answerable;
+        let known = self.write_estimate();
+        let awaiting = [Reason::EstimateStale, Reason::OnlyLowerBound, Reason::LoadMayHaveChanged];
+        let reason = known.and(self.snapshot.reason());
+        let is_awaiting = reason.is_some_and(|reason| awaiting.contains(&reason));
+        let good = known.unwrap_or(0) & self.answerable;
         self.snapshot.usable_quantities = self.usable.see(good, is_awaiting, sample.time_ns);
         &self.snapshot
     }
@@ -173,10 +177,4 @@ impl Pipeline {
     pub fn snapshot_mut(&mut self) -> &mut ParameterSnapshot {
         &mut self.snapshot
     }
-}
-
-fn count_rejection(snapshot: &mut ParameterSnapshot, reason: RejectionReason) {
-    snapshot.samples_rejected += 1;
-    let count = &mut snapshot.rejected_by_reason[reason as usize];
-    *count = count.saturating_add(1);
 }

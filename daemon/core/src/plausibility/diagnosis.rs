@@ -73,7 +73,7 @@ pub fn diagnose(figures: &Figures) -> DetectedFaults {
         add(&mut found, fault, factor);
     }
     let mut forces_by = forces_by;
-    if let Some(ratio) = figures.mass_ratio.filter(|&ratio| MASS.is_passed(ratio)) {
+    if let Some(ratio) = figures.mass_ratio.filter(|&ratio| MASS.is_passed(ratio, 1.0)) {
         add(&mut found, InputFault::MassScale, ratio);
         forces_by *= ratio;
     }

@@ -75,8 +75,10 @@ pub struct Watch {
     usual_step_s: f64,
     gradient_permille: f64,
     window: Window,
-    /// The window that the last sample ended.
-    ended: Option<WindowMean>,
+    /// False for positions that were integrated from the speed, which show nothing about it.
+    pub is_position_measured: bool,
+    /// Means of the window that the last sample ended.
+    pub ended: Option<WindowMean>,
     distances: Distances,
     balance: Balance,
     distance_ratios: RunningMedian<RATIOS>,
@@ -95,6 +97,7 @@ impl Watch {
             usual_step_s: 0.0,
             gradient_permille: 0.0,
             window: Window::default(),
+            is_position_measured: true,
             ended: None,
             distances: Distances::default(),
             balance: Balance::default(),
@@ -149,16 +152,6 @@ impl Watch {
         self.extend_window(&last, sample, step_s) || is_compared
     }
 
-    /// Passes over a sample that is no measurement.
-    pub fn pass_over(&mut self) {
-        self.ended = None;
-    }
-
-    /// Returns the means of the window that the last sample ended; `None` where it ended none.
-    pub fn ended(&self) -> Option<&WindowMean> {
-        self.ended.as_ref()
-    }
-
     /// Returns the figures of the samples so far.
     pub fn figures(&self) -> Figures {
         let share = |share: f64| (share > 0.0).then_some(share);
@@ -183,9 +176,11 @@ impl Watch {
     }
 
     fn compare_distances(&mut self, last: &TrainSample, now: &TrainSample, step_s: f64) -> bool {
-        let (Some(from_m), Some(to_m)) =
-            (last.get(SampleField::Position), now.get(SampleField::Position))
-        else {
+        let (Some(from_m), Some(to_m), true) = (
+            last.get(SampleField::Position),
+            now.get(SampleField::Position),
+            self.is_position_measured,
+        ) else {
             self.distances = Distances::default();
             return false;
         };

@@ -24,7 +24,7 @@ pub struct WindowError {
 
 /// Predicts by one model what the samples of a window should show.
 pub struct OpenLoop {
-    train: Arc<TrainModel>,
+    pub(super) train: Arc<TrainModel>,
     resolver: ForceResolver,
     samples: Vec<ResolvedSample>,
     prediction: Prediction,
@@ -39,11 +39,6 @@ impl OpenLoop {
             samples: Vec::with_capacity(SAMPLES_MAX),
             prediction: Prediction::new(),
         }
-    }
-
-    /// Returns the model of the train.
-    pub fn train(&self) -> Arc<TrainModel> {
-        Arc::clone(&self.train)
     }
 
     /// Takes the next sample of the window.

@@ -113,7 +113,7 @@ pub struct Trials {
 impl Trials {
     /// Of a train.
     pub fn new(train: TrainId, in_force: Rival, rivals: Vec<Rival>) -> Self {
-        let admission = Admission::new(train, in_force.open_loop.train());
+        let admission = Admission::new(train, in_force.open_loop.train.clone());
         let mut trials =
             Trials { admission, in_force, rivals, window: None, run: None, moved_s: 0.0 };
         trials.begin_trip();

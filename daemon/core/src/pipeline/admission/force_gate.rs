@@ -84,7 +84,7 @@ impl Reading {
 }
 
 /// Decides which samples an estimator steps to, and when.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceGate {
     /// The last sample taken.
     level: Option<Reading>,
@@ -105,25 +105,6 @@ pub struct ForceGate {
     least_bends_n_per_kn: [f64; FIRST_QUANTILE],
     first_changes: usize,
     withdrawn_share: f64,
-}
-
-impl Default for ForceGate {
-    fn default() -> Self {
-        ForceGate {
-            level: None,
-            newest: None,
-            is_confirmed: false,
-            held: [None; AGREEING],
-            held_count: 0,
-            is_above: false,
-            skipped_s: 0.0,
-            change_n_per_kn: CHANGE_MIN,
-            newest_change: 0.0,
-            least_bends_n_per_kn: [f64::INFINITY; FIRST_QUANTILE],
-            first_changes: 0,
-            withdrawn_share: 0.0,
-        }
-    }
 }
 
 impl ForceGate {
@@ -304,7 +285,9 @@ impl ForceGate {
     /// quantile would climb for seconds, and noise would be called a fault until then.
     fn begin_noise(&mut self, change: f64, last: f64) {
         self.first_changes += 1;
-        if self.first_changes > 1 {
+        if self.first_changes == 1 {
+            self.least_bends_n_per_kn = [f64::INFINITY; FIRST_QUANTILE];
+        } else {
             // The bend of a white noise has three times the variance of a change.
             let mut bend = (change - last).abs() / 3_f64.sqrt();
             for least in &mut self.least_bends_n_per_kn {

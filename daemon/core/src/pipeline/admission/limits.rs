@@ -5,6 +5,8 @@
 
 use dynocar_shared::{Reason, RejectionReason};
 
+use self::Consequence::{Doubted, Refused};
+
 /// Consequence of a limit that is passed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Consequence {
@@ -30,100 +32,60 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// Returns true for a figure beyond the bounds, and for one that is not a number.
+    /// Returns true for a figure beyond the bounds, which count in a unit of the figure, and for one that is not a number.
     #[inline]
-    pub fn is_passed(&self, figure: f64) -> bool {
-        self.is_passed_in(figure, 1.0)
-    }
-
-    /// Returns the same for a figure in units of which the bounds have another.
-    #[inline]
-    pub fn is_passed_in(&self, figure: f64, unit: f64) -> bool {
+    pub fn is_passed(&self, figure: f64, unit: f64) -> bool {
         !(self.low * unit..=self.high * unit).contains(&figure)
     }
 }
 
-const fn refused(
-    reason: RejectionReason,
-    of: &'static str,
-    (low, high): (f64, f64),
-    false_alarm: f64,
-) -> Limit {
-    Limit { consequence: Consequence::Refused(reason), of, low, high, false_alarm }
+macro_rules! limits {
+    ($($(#[$doc:meta])* $name:ident = $consequence:expr, $of:literal, $low:literal to $high:literal, $false_alarm:literal;)*) => {
+        $($(#[$doc])* pub const $name: Limit = Limit {
+            consequence: $consequence,
+            of: $of,
+            low: $low,
+            high: $high,
+            false_alarm: $false_alarm,
+        };)*
+
+        /// Every limit.
+        pub const LIMITS: &[Limit] = &[$($name),*];
+    };
 }
 
-const fn doubted(of: &'static str, high: f64, false_alarm: f64) -> Limit {
-    let consequence = Consequence::Doubted(Reason::BadInput);
-    Limit { consequence, of, low: 0.0, high, false_alarm }
+limits! {
+    /// Speed as measured.
+    SPEED = Refused(RejectionReason::SpeedOutOfRange), "speed in m/s", 0.0 to 170.0, 0.0;
+    /// Gross mass; a load, and no wrong unit.
+    MASS = Refused(RejectionReason::MassOutOfRange), "mass over the declared one", 0.2 to 5.0, 0.0;
+    /// Traction and brake force; wheel and rail carry no more.
+    FORCE = Refused(RejectionReason::ForceOutOfRange), "force over the train's weight", 0.0 to 0.6, 0.0;
+    /// Change of speed: quantum and noise, beyond the greatest acceleration of 4 m/s².
+    SPEED_STEP = Refused(RejectionReason::SpeedJump), "change of speed beyond 4 m/s² in m/s", -1.0 to 1.0, 2.8e-11;
+    /// Difference between position and integrated speed; a balise corrects a position by as much.
+    POSITION_STEP = Refused(RejectionReason::PositionJump), "change of position beyond the integrated speed in m", -60.0 to 60.0, 4.7e-16;
+    /// Step ahead in time that is believed within a run.
+    TIME_STEP = Refused(RejectionReason::TimeJump), "step in time in s", 0.0 to 86_400.0, 0.0;
+    /// Time for which a moving train repeats speed, place and forces; longer steps are not integrated over.
+    REPEATED = Refused(RejectionReason::Frozen), "time of repetition in s", 0.0 to 2.5, 0.0;
+    /// Innovation of an estimator; the fifth in a row beyond it is believed.
+    INNOVATION = Refused(RejectionReason::Outlier), "innovation in standard deviations", -8.0 to 8.0, 2.6e-14;
+    /// Change of force from one sample to the next, over the change that 20 % of them stay below: what goes beyond it
+    /// and comes back at once stands alone.
+    LONE_FORCE = Refused(RejectionReason::Outlier), "change of force over its 20 % quantile", -24.0 to 24.0, 1.9e-8;
+    /// Share of samples that validation refuses: where this many are plainly wrong, others are wrong without being
+    /// plainly so.
+    INVALID_SHARE = Doubted(Reason::BadInput), "share refused by validation lately", 0.0 to 0.15, 1e-67;
+    /// Share of valid samples that an estimator refuses: those that lack a force, slide, stand alone or do not fit.
+    UNFIT_SHARE = Doubted(Reason::BadInput), "share refused by the estimator lately", 0.0 to 0.3, 1e-212;
+    /// Share of samples whose force stands alone: where one in 20 fails, one in 8000 begins a row that passes for a
+    /// new level.
+    LONE_SHARE = Doubted(Reason::BadInput), "share of lone forces lately", 0.0 to 0.05, 1e-36;
 }
-
-/// Speed as measured.
-pub const SPEED: Limit =
-    refused(RejectionReason::SpeedOutOfRange, "speed in m/s", (0.0, 170.0), 0.0);
-/// Gross mass; a load, and no wrong unit.
-pub const MASS: Limit =
-    refused(RejectionReason::MassOutOfRange, "mass over the declared one", (0.2, 5.0), 0.0);
-/// Traction and brake force; wheel and rail carry no more.
-pub const FORCE: Limit =
-    refused(RejectionReason::ForceOutOfRange, "force over the train's weight", (0.0, 0.6), 0.0);
-/// Change of speed: quantum and noise, beyond the greatest acceleration of 4 m/s².
-pub const SPEED_STEP: Limit = refused(
-    RejectionReason::SpeedJump,
-    "change of speed beyond 4 m/s² in m/s",
-    (-1.0, 1.0),
-    2.8e-11,
-);
-/// Difference between position and integrated speed; a balise corrects a position by as much.
-pub const POSITION_STEP: Limit = refused(
-    RejectionReason::PositionJump,
-    "change of position beyond the integrated speed in m",
-    (-60.0, 60.0),
-    4.7e-16,
-);
-/// Step ahead in time that is believed within a run.
-pub const TIME_STEP: Limit =
-    refused(RejectionReason::TimeJump, "step in time in s", (0.0, 86_400.0), 0.0);
-/// Time for which a moving train repeats speed, place and forces; longer steps are not integrated over.
-pub const REPEATED: Limit =
-    refused(RejectionReason::Frozen, "time of repetition in s", (0.0, 2.5), 0.0);
-/// Innovation of an estimator; the fifth in a row beyond it is believed.
-pub const INNOVATION: Limit =
-    refused(RejectionReason::Outlier, "innovation in standard deviations", (-8.0, 8.0), 2.6e-14);
-/// Change of force from one sample to the next, over the change that 20 % of them stay below: what goes beyond it and
-/// comes back at once stands alone.
-pub const LONE_FORCE: Limit = refused(
-    RejectionReason::Outlier,
-    "change of force over its 20 % quantile",
-    (-24.0, 24.0),
-    1.9e-8,
-);
-/// Share of samples that validation refuses: where this many are plainly wrong, others are wrong without being
-/// plainly so.
-pub const INVALID_SHARE: Limit = doubted("share refused by validation lately", 0.15, 1e-67);
-/// Share of valid samples that an estimator refuses: those that lack a force, slide, stand alone or do not fit.
-pub const UNFIT_SHARE: Limit = doubted("share refused by the estimator lately", 0.3, 1e-212);
-/// Share of samples whose force stands alone: where one in 20 fails, one in 8000 begins a row that passes for a new
-/// level.
-pub const LONE_SHARE: Limit = doubted("share of lone forces lately", 0.05, 1e-36);
 
 /// Greatest acceleration and deceleration of a train in m/s².
 pub const ACCELERATION_MAX_MPS2: f64 = 4.0;
-
-/// Every limit.
-pub const LIMITS: [&Limit; 12] = [
-    &SPEED,
-    &MASS,
-    &FORCE,
-    &SPEED_STEP,
-    &POSITION_STEP,
-    &TIME_STEP,
-    &REPEATED,
-    &INNOVATION,
-    &LONE_FORCE,
-    &INVALID_SHARE,
-    &UNFIT_SHARE,
-    &LONE_SHARE,
-];
 
 /// Samples over which the shares of refused ones are remembered.
 pub const REFUSALS_MEMORY: f64 = 500.0;

@@ -17,8 +17,7 @@ use std::sync::Arc;
 use dynocar_model::force::{ForceResolver, ResolvedSample, ValidSample};
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{
-    ParameterSnapshot, PipelineKind, Reason, RejectionReason, SampleField, Status, TrainId,
-    TrainSample,
+    ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status, TrainId, TrainSample,
 };
 
 use self::force_gate::{ForceGate, GateVerdict};
@@ -35,8 +34,6 @@ use crate::plausibility::{DetectedFault, DetectedFaults, diagnosis};
 pub struct Admission {
     validator: Validator,
     watch: Watch,
-    /// False for positions that were integrated from the speed, which show nothing about it.
-    is_position_measured: bool,
     detected: DetectedFaults,
     gate: ForceGate,
     /// Shares lately: of all samples, those that validation refused; of those that were to serve, those that did not.
@@ -47,22 +44,12 @@ pub struct Admission {
     used: u64,
 }
 
-/// Outcome of a judgement that was written, for the use of the estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WrittenStatus {
-    /// Quantities that are known well enough, one bit each; none while the input is doubted.
-    pub known: u32,
-    /// True where the estimate merely waits for an event.
-    pub is_awaiting: bool,
-}
-
 impl Admission {
     /// Returns the admission of a train's samples before the first of them.
     pub fn new(train_id: TrainId, train: Arc<TrainModel>) -> Self {
         Admission {
             validator: Validator::new(train_id, train.mass_kg),
             watch: Watch::new(train),
-            is_position_measured: true,
             detected: DetectedFaults::default(),
             gate: ForceGate::default(),
             invalid_share: 0.0,
@@ -72,10 +59,9 @@ impl Admission {
         }
     }
 
-    /// Returns the admission of samples whose position is integrated from their speed.
-    #[must_use]
-    pub fn with_integrated_position(self) -> Self {
-        Admission { is_position_measured: false, ..self }
+    /// Counts positions as measured or not: those that are integrated from the speed show nothing about it.
+    pub fn set_position_measured(&mut self, is_measured: bool) {
+        self.watch.is_position_measured = is_measured;
     }
 
     /// Returns the number of samples that never arrived so far.
@@ -116,50 +102,40 @@ impl Admission {
         self.validator.check(sample)
     }
 
-    /// Validates a sample, resolves its forces and judges the input with it.
+    /// Validates a sample, resolves its forces, judges the input with it and hands it to an estimator.
     ///
-    /// Samples that were refused for a value out of range count in that judgement: the range may be what is missed.
-    ///
-    /// # Errors
-    ///
-    /// The first reason of validation that applies.
+    /// Samples that were refused for a value out of range count in the judgement: the range may be what is missed.
     ///
     /// # Real-time
     ///
     /// Bounded work, no allocation: a few sums at a sample, a solution of five equations at the
-    /// end of a window.
-    pub fn admit(
+    /// end of a window, and the work of [`Self::pass`].
+    pub fn take(
         &mut self,
         sample: &TrainSample,
         resolver: &mut ForceResolver,
-    ) -> Result<ResolvedSample, RejectionReason> {
+        estimator: &mut dyn Estimator,
+    ) -> Outcome {
         let valid = self.validator.check(sample);
-        follow(&mut self.invalid_share, valid.is_err());
+        self.invalid_share += (f64::from(valid.is_err()) - self.invalid_share) / REFUSALS_MEMORY;
         match valid {
             Ok(valid) => {
                 let resolved = resolver.resolve(&valid);
                 self.watch(sample, true, resolved.gradient_permille);
-                Ok(resolved)
+                self.pass(estimator, &resolved)
             }
             Err(reason) => {
                 match is_of_value(reason) {
                     true => self.watch(sample, false, resolver.stated_gradient_permille(sample)),
-                    false => self.watch.pass_over(),
+                    false => self.watch.ended = None,
                 }
-                Err(reason)
+                Outcome::Rejected(reason)
             }
         }
     }
 
     fn watch(&mut self, sample: &TrainSample, is_valid: bool, gradient_permille: Option<f64>) {
-        let without_position;
-        let mut shown = sample;
-        if !self.is_position_measured {
-            let valid = sample.valid & !SampleField::Position.bit();
-            without_position = TrainSample { valid, ..*sample };
-            shown = &without_position;
-        }
-        if self.watch.take(shown, is_valid, gradient_permille) {
+        if self.watch.take(sample, is_valid, gradient_permille) {
             self.detected = diagnosis::diagnose(&self.watch.figures());
         }
     }
@@ -197,16 +173,13 @@ impl Admission {
 
     /// Counts the outcome of a sample.
     fn note(&mut self, outcome: Outcome, sample: &ResolvedSample) -> Outcome {
-        match outcome {
-            Outcome::Idle => {}
-            Outcome::Used | Outcome::Updated => {
-                self.used += 1;
-                follow(&mut self.unfit_share, false);
-            }
-            Outcome::Rejected(reason) => {
-                follow(&mut self.unfit_share, true);
-                self.wanted = (reason == RejectionReason::Missing).then(|| missing(sample));
-            }
+        if outcome != Outcome::Idle {
+            let is_refused = matches!(outcome, Outcome::Rejected(_));
+            self.unfit_share += (f64::from(is_refused) - self.unfit_share) / REFUSALS_MEMORY;
+            self.used += u64::from(!is_refused);
+        }
+        if let Outcome::Rejected(reason) = outcome {
+            self.wanted = (reason == RejectionReason::Missing).then(|| missing(sample));
         }
         outcome
     }
@@ -220,7 +193,8 @@ impl Admission {
         InputState { used: self.used, doubt: of_samples.or(of_forces) }
     }
 
-    /// Writes the estimate with its status and reason into a snapshot.
+    /// Writes the estimate with its status and reason into a snapshot; returns the quantities that are known well
+    /// enough, one bit each, `None` while the input is doubted.
     ///
     /// # Real-time
     ///
@@ -229,7 +203,7 @@ impl Admission {
         &self,
         estimator: &dyn Estimator,
         snapshot: &mut ParameterSnapshot,
-    ) -> WrittenStatus {
+    ) -> Option<u32> {
         let mut judgement = estimator.write(&self.input(), snapshot);
         let implausible = self.implausible(estimator.kind()).map(|it| it.fault.reason());
         let is_refusing = self.invalid_share > INVALID_SHARE.high;
@@ -242,11 +216,7 @@ impl Admission {
         }
         snapshot.status = judgement.status as u32;
         snapshot.reason = judgement.reason as u32;
-        let awaiting = [Reason::EstimateStale, Reason::OnlyLowerBound, Reason::LoadMayHaveChanged];
-        WrittenStatus {
-            known: if is_doubted { 0 } else { judgement.known },
-            is_awaiting: !is_doubted && awaiting.contains(&judgement.reason),
-        }
+        (!is_doubted).then_some(judgement.known)
     }
 
     /// Returns the recent impossibility of the samples that spoils what a kind of pipeline estimates.
@@ -261,13 +231,8 @@ impl Admission {
 
     /// Returns the means of the window of motion that the last sample ended; `None` where it ended none.
     pub fn ended_window(&self) -> Option<&WindowMean> {
-        self.watch.ended()
+        self.watch.ended.as_ref()
     }
-}
-
-/// Follows a share lately.
-fn follow(share: &mut f64, is_event: bool) {
-    *share += (f64::from(is_event) - *share) / REFUSALS_MEMORY;
 }
 
 /// Returns true for the refusal of a value that may be in another unit.

@@ -30,9 +30,9 @@ struct Gap {
 }
 
 /// Checks the samples of one train, in order.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Validator {
-    train: TrainId,
+    train: u64,
     nominal_mass_kg: f64,
     last: Option<TrainSample>,
     /// The run of the newest sample.
@@ -49,18 +49,7 @@ pub struct Validator {
 impl Validator {
     /// A validator for one train of a nominal mass in kg.
     pub fn new(train: TrainId, nominal_mass_kg: f64) -> Self {
-        Validator {
-            train,
-            nominal_mass_kg,
-            last: None,
-            run: None,
-            counted: 0,
-            gap: None,
-            last_refused: None,
-            refusals_in_a_row: 0,
-            segment: 0,
-            lost: 0,
-        }
+        Validator { train: train.0, nominal_mass_kg, ..Validator::default() }
     }
 
     /// Samples that never arrived so far.
@@ -105,7 +94,7 @@ impl Validator {
         &mut self,
         sample: &'a TrainSample,
     ) -> Result<ValidSample<'a>, RejectionReason> {
-        if sample.train_id != self.train.0 {
+        if sample.train_id != self.train {
             return Err(RejectionReason::WrongTrain);
         }
         self.check_sequence(sample)?;
@@ -169,30 +158,28 @@ impl Validator {
         if sample.direction != 1 && sample.direction != -1 {
             return Err(RejectionReason::BadDirection);
         }
-        for field in SampleField::ALL {
-            if sample.get(field).is_some_and(|value| !value.is_finite()) {
-                return Err(RejectionReason::NotFinite);
-            }
+        let mut values = SampleField::ALL.into_iter().filter_map(|field| sample.get(field));
+        if !values.all(f64::is_finite) {
+            return Err(RejectionReason::NotFinite);
         }
         let speed_mps = sample.get(SampleField::Speed).ok_or(RejectionReason::Missing)?;
-        if SPEED.is_passed(speed_mps) {
+        if SPEED.is_passed(speed_mps, 1.0) {
             return Err(RejectionReason::SpeedOutOfRange);
         }
         let mass_kg = sample.get(SampleField::Mass).unwrap_or(self.nominal_mass_kg);
-        if MASS.is_passed_in(mass_kg, self.nominal_mass_kg) {
+        if MASS.is_passed(mass_kg, self.nominal_mass_kg) {
             return Err(RejectionReason::MassOutOfRange);
         }
         let weight_n = mass_kg * STANDARD_GRAVITY_MPS2;
-        for field in [SampleField::TractionForce, SampleField::BrakeForce] {
-            if sample.get(field).is_some_and(|force_n| FORCE.is_passed_in(force_n, weight_n)) {
-                return Err(RejectionReason::ForceOutOfRange);
-            }
+        let forces = [SampleField::TractionForce, SampleField::BrakeForce];
+        let mut forces_n = forces.into_iter().filter_map(|field| sample.get(field));
+        if forces_n.any(|force_n| FORCE.is_passed(force_n, weight_n)) {
+            return Err(RejectionReason::ForceOutOfRange);
         }
-        let plausible = SampleField::ALL.into_iter().all(|field| {
-            let (low, high) = field.range();
-            sample.get(field).is_none_or(|value| (low..=high).contains(&value))
-        });
-        if plausible { Ok(()) } else { Err(RejectionReason::OutOfRange) }
+        let mut known =
+            SampleField::ALL.into_iter().filter_map(|it| Some((it.range(), sample.get(it)?)));
+        let is_plausible = known.all(|((low, high), value)| (low..=high).contains(&value));
+        if is_plausible { Ok(()) } else { Err(RejectionReason::OutOfRange) }
     }
 
     /// The step in s since the last accepted sample, `None` when a new segment starts here.
@@ -205,7 +192,7 @@ impl Validator {
             return Err(RejectionReason::TimeNotIncreasing);
         }
         let step_s = step_s(last, sample);
-        if TIME_STEP.is_passed(step_s) {
+        if TIME_STEP.is_passed(step_s, 1.0) {
             return Err(RejectionReason::TimeJump);
         }
         if step_s > REPEATED.high || sample.direction != last.direction {
@@ -230,7 +217,7 @@ impl Validator {
         {
             let travelled_m = 0.5 * (last.speed_mps + sample.speed_mps) * step_s;
             let expected_m = from_m + f64::from(sample.direction) * travelled_m;
-            if POSITION_STEP.is_passed(to_m - expected_m) {
+            if POSITION_STEP.is_passed(to_m - expected_m, 1.0) {
                 return Err(RejectionReason::PositionJump);
             }
         }

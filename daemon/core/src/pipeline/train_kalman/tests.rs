@@ -96,9 +96,9 @@ fn what_was_in_use_goes_on_with_the_first_sample_unless_minutes_have_passed() {
         let sample = ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() };
         let (mut admission, mut snapshot) = (admission(), ParameterSnapshot::empty());
         admission.pass(&mut warm, &sample);
-        let written = admission.write(&warm, &mut snapshot);
+        let known = admission.write(&warm, &mut snapshot);
         let std_t = snapshot.covariance[packed_index(3, 3)].sqrt();
-        (snapshot.status(), written.known & BOTH, std_t)
+        (snapshot.status(), known.unwrap_or(0) & BOTH, std_t)
     };
     let std_t = before.covariance[packed_index(3, 3)].sqrt();
     let (status, known, moving_t) = first(3, 2.5, 15.0);
