@@ -138,6 +138,11 @@ impl Run {
         }
     }
 
+    /// Whether a sample has a force.
+    pub fn has_forces(&self) -> bool {
+        self.samples.iter().any(|sample| sample.valid & FORCES != 0)
+    }
+
     /// Returns the record of a quantity beyond those of a sample.
     pub fn extra(&self, quantity: Quantity) -> Option<&Extra> {
         self.extras.iter().find(|(other, _)| *other == quantity).map(|(_, values)| values)

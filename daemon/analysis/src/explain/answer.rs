@@ -212,9 +212,25 @@ pub struct EffectAnswer {
     /// Its numbers that are not the same in all runs; empty where all are.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub over_time: Vec<Course>,
+    /// Its numbers by the runs held out alone; absent where these hardly show it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutAnswer>,
     /// For an effect outside the library, forms that explain less of the data, the best first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub runners_up: Vec<RunnerUp>,
+}
+
+/// The numbers of an effect by the runs held out alone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOutAnswer {
+    /// Number of these runs.
+    pub runs: usize,
+    /// Parameters in SI units.
+    pub parameters: BTreeMap<String, ParameterValue>,
+    /// Their standard deviations.
+    pub std: BTreeMap<String, ParameterValue>,
+    /// Probability that they differ as much from the stated ones where the effect is the same in all runs.
+    pub p_value: f64,
 }
 
 /// Another form of an effect outside the library.

@@ -14,7 +14,7 @@
 //! - [`gradient_prior`]: how maps err
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`many`]: some of many runs, and what all of them say
-//! - [`course`], [`over_time`]: what is not the same in all runs
+//! - [`course`], [`over_time`], [`held_out`]: what is not the same in all runs, and what those held out say
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
 //!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
@@ -32,6 +32,7 @@ pub mod effects;
 pub mod evidence;
 pub mod force_time;
 pub mod gradient_prior;
+pub mod held_out;
 pub mod hypothesis;
 pub mod identifiability;
 pub mod many;
@@ -53,12 +54,14 @@ use dynocar_core::plausibility::Severity;
 
 use crate::dataset::dataset_diagnostic::diagnostics;
 use crate::dataset::{Dataset, Role};
+use crate::parallel;
 use answer::ExplainAnswer;
 use answer::WithStd;
 use drive::EstimatedDrive;
 use evidence::{Density, FitProblem, RunData, RunDataError};
+use held_out::HeldOutRun;
 use many::{Held, Many, Preparation};
-use score::{RunScore, Score};
+use score::Score;
 use selection::{Deviations, Outcome, Progress, Search};
 use unexplained::Unexplained;
 
@@ -122,8 +125,7 @@ fn explained<E: From<RunDataError> + Send>(
     let track = preparation.track().map(|track| &**track);
     let all = many.as_ref().map_or(&dataset.runs, |many| &many.dataset.runs);
     let diagnostics = diagnostics(preparation.train(), track, all);
-    // A dead time and a lag are separated by the shape of the force, which the search saw thinned.
-    let step_s = density.step_s(dataset.step_s());
+    let recorded_step_s = dataset.step_s();
     drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         runs.into_iter().partition(|run| run.role == Role::Fit);
@@ -143,16 +145,22 @@ fn explained<E: From<RunDataError> + Send>(
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    let mut deviations = selection::given_usual_errors(&search, &mut outcome, step_s);
-    progress(0.95, "scoring the holdout runs");
-    let scores = match &many {
-        Some(many) => {
-            many.join(&search, &preparation, &mut outcome)?;
-            deviations = selection::deviations_given(&outcome, step_s);
-            many.scores(&holdout, &preparation, &outcome)?
-        }
-        None => holdout.iter().map(|run| RunScore::of(run, &outcome.base, &outcome.fit)).collect(),
+    selection::move_beside_usual_errors(&search, &mut outcome);
+    // A dead time and a lag are separated by the shape of the force, which the search of many runs saw thinned.
+    let is_joined = match &many {
+        Some(many) => many.join(&search, &preparation, &mut outcome)?,
+        None => false,
     };
+    let seen = if is_joined { Density::Recorded } else { density };
+    let deviations = selection::deviations_given(&outcome, seen.step_s(recorded_step_s));
+    progress(0.95, "scoring the holdout runs");
+    let judged = match &many {
+        Some(many) => many.judged(&search, &preparation, &outcome)?,
+        None => {
+            parallel::of_each(&holdout, |run| HeldOutRun::of((&problem, &outcome), run, Some(run)))
+        }
+    };
+    let scores = judged.iter().map(|run| run.score.clone()).collect();
     let score = Score::of(&problem, scores, &outcome.base, &outcome.fit);
     let spans = match &many {
         Some(many) => many.spans(),
@@ -161,7 +169,19 @@ fn explained<E: From<RunDataError> + Send>(
     let beside = outcome.beside();
     let finished = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
     let courses = over_time::courses(&problem, finished, &spans, &deviations.std);
-    let known = caveats::FinishedFit { deviations: &deviations, places: &known, courses: &courses };
+    let held_out = held_out::by_held_out_runs(
+        &problem,
+        finished,
+        &judged,
+        &deviations.covariance,
+        known.len(),
+    );
+    let known = caveats::FinishedFit {
+        deviations: &deviations,
+        places: &known,
+        courses: &courses,
+        held_out: &held_out,
+    };
     let mut answer = verdict::answer(&search, &outcome, &known, &score, diagnostics);
     if let Some(estimated) = estimated_drive {
         answer.add_caveat(&estimated.answer.sentence());

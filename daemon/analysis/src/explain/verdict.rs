@@ -7,8 +7,8 @@ use dynocar_model::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
-    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location, Meaning,
-    Verdict,
+    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, HeldOutAnswer, Location,
+    Meaning, Verdict,
 };
 use super::caveats::{FinishedFit, caveats, told_by_data, trimmed};
 use super::competing::runners_up;
@@ -16,6 +16,7 @@ use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, sepa
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
+use super::hypothesis::Reported;
 use super::identifiability::identifiability;
 use super::score::{self, Score};
 use super::selection::{
@@ -153,7 +154,7 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
             let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
             let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
                 / search.problem.runs.len().max(1) as f64;
-            let reported = effect.report(&ReportContext {
+            let stated = ReportContext {
                 parameters: &fit.theta[range.clone()],
                 deviations: &std[range.clone()],
                 c: *c,
@@ -162,6 +163,19 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
                 first: range.start,
                 weight_kn,
                 few_runs_factor: few_runs_factor(search.problem.runs.len()),
+            };
+            let reported = effect.report(&stated);
+            let held_out = known.held_out[index].as_ref().map(|held_out| {
+                let Reported { values, deviations } = effect.report(&ReportContext {
+                    parameters: &held_out.theta[range.clone()],
+                    deviations: &held_out.std[range.clone()],
+                    c: held_out.theta[2],
+                    c_deviation: held_out.std[2],
+                    covariance: &held_out.covariance,
+                    ..stated
+                });
+                let (runs, p_value) = (held_out.runs, held_out.p_value);
+                HeldOutAnswer { runs, parameters: values, std: deviations, p_value }
             });
             let answer = EffectAnswer {
                 kind: effect.kind().name(),
@@ -175,6 +189,7 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
                     .filter(|_| effect.nature().changes_speed_scale)
                     .map(|sources| sources.sentence()),
                 over_time: known.courses(effect.kind()),
+                held_out,
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
                 } else {

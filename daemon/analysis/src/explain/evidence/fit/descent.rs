@@ -15,6 +15,9 @@ use crate::parallel;
 const STEPS_MAX: usize = 8;
 /// A predicted decrease of the cost below this ends the search.
 const DECREASE_MIN: f64 = 0.02;
+/// Steps of all runs together at most, after the first, and the part of a standard deviation below which one ends them.
+const PASSES_MAX: usize = 6;
+const MOVED_MIN: f64 = 0.3;
 /// Turns in which what sets the runs apart is found.
 const APART_TURNS: usize = 2;
 
@@ -128,21 +131,57 @@ impl FitProblem {
         self.at(model, theta, noise)
     }
 
-    /// A fit where all runs say the same model's parameters, in groups that each have one of its own: a step to
-    /// the least cost of all, with what they say there to first order.
-    pub fn joined_by(&self, fit: &Fit, groups: &[RunNormal]) -> Fit {
-        let mut all = Fit { runs: groups.to_vec(), ..fit.clone() };
-        let Some((theta, _)) = self.bounded_step(&all, &all.score(), 0.0) else { return all };
-        let step = DVector::from_iterator(
-            theta.len(),
-            theta.iter().zip(&all.theta).map(|(to, from)| to - from),
-        );
-        for run in &mut all.runs {
-            run.score -= &run.information * &step;
+    /// A fit where all runs say the same model's parameters, by their normal equations in groups.
+    ///
+    /// One step leads to the least cost of what is linear. How dead time and lag share a lateness is not: `normals_at`
+    /// gives the equations at other parameters, until none of the first `count` effects that looks back moves by more
+    /// than a part of its standard deviation.
+    ///
+    /// # Errors
+    ///
+    /// When the equations cannot be had.
+    pub fn joined<E>(
+        &self,
+        fit: &Fit,
+        groups: Vec<RunNormal>,
+        count: usize,
+        normals_at: impl Fn(&Fit) -> Result<Vec<RunNormal>, E>,
+    ) -> Result<Fit, E> {
+        let (mut share, mut best) = (1.0, Fit { runs: groups, ..fit.clone() });
+        let mut joined = self.stepped(&best, share);
+        for _ in 0..PASSES_MAX {
+            if !is_moved(&best, &joined, count) {
+                break;
+            }
+            let next = Fit { runs: normals_at(&joined)?, ..joined.clone() };
+            if self.joined_cost(&next) < self.joined_cost(&best) {
+                (share, best) = (1.0, next);
+            } else {
+                share *= 0.5;
+            }
+            joined = self.stepped(&best, share);
         }
-        (all.prior_information, all.prior_score, _) = self.prior(&all.model, &theta);
-        all.theta = theta;
-        all
+        Ok(joined)
+    }
+
+    /// A share of the step to where the normal equations of a fit's groups of runs have their least cost, with what
+    /// they say there to first order.
+    fn stepped(&self, fit: &Fit, share: f64) -> Fit {
+        let Some((theta, _)) = self.bounded_step(fit, &fit.score(), 0.0) else {
+            return fit.clone();
+        };
+        let moved = theta.iter().zip(&fit.theta).map(|(to, from)| share * (to - from));
+        let step = DVector::from_iterator(theta.len(), moved);
+        let theta: Vec<f64> = fit.theta.iter().zip(&step).map(|(from, step)| from + step).collect();
+        let runs = fit.runs.iter().map(|run| run.moved_by(&step)).collect();
+        let (prior_information, prior_score, _) = self.prior(&fit.model, &theta);
+        Fit { runs, prior_information, prior_score, theta, ..fit.clone() }
+    }
+
+    /// The cost of all groups of runs at the parameters of a fit, with the prior.
+    fn joined_cost(&self, fit: &Fit) -> f64 {
+        let prior = self.prior(&fit.model, &fit.theta).2;
+        fit.runs.iter().fold(prior, |cost, run| cost + run.cost)
     }
 
     /// A fit where all runs, in groups, say its parameters: a, b and c where all fit best, and the effects moved by
@@ -273,13 +312,25 @@ impl FitProblem {
         for i in 0..fit.theta.len() {
             information[(i, i)] *= 1.0 + damping;
         }
-        let room =
-            fit.theta.iter().zip(&bounds).map(|(at, (lower, upper))| [lower - at, upper - at]);
-        let step = step_within(&information, score, &room.collect::<Vec<_>>())?;
+        let step = self.step_from(fit, &information, score)?;
         let moved = fit.theta.iter().zip(step.iter()).zip(&bounds);
         let theta = moved.map(|((at, step), (lower, upper))| (at + step).clamp(*lower, *upper));
         let curvature = step.dot(&(fit.information() * &step));
         Some((theta.collect(), 2.0 * step.dot(score) - curvature))
+    }
+
+    /// Returns the step from a fit that such information and score lead to, within the bounds of its parameters;
+    /// `None` where the information is singular.
+    pub fn step_from(
+        &self,
+        fit: &Fit,
+        information: &DMatrix<f64>,
+        score: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let bounds = self.bounds(&fit.model);
+        let room =
+            fit.theta.iter().zip(bounds).map(|(at, (lower, upper))| [lower - at, upper - at]);
+        step_within(information, score, &room.collect::<Vec<_>>())
     }
 
     /// Bounds of all parameters.
@@ -291,6 +342,16 @@ impl FitProblem {
             .flat_map(|effect| effect.parameters().iter().map(|spec| (spec.lower, spec.upper)));
         declared.into_iter().chain(of_effects).collect()
     }
+}
+
+/// Whether one of the first `count` effects that looks back moves from one fit to another by more than a part of its
+/// standard deviation.
+fn is_moved(from: &Fit, to: &Fit, count: usize) -> bool {
+    let Some(covariance) = from.factor().map(|factor| factor.inverse()) else { return false };
+    let effects = from.model.effects.iter().zip(from.model.ranges()).take(count);
+    let mut numbers =
+        effects.filter(|(effect, _)| effect.nature().looks_back).flat_map(|(_, range)| range);
+    numbers.any(|i| (to.theta[i] - from.theta[i]).abs() > MOVED_MIN * covariance[(i, i)].sqrt())
 }
 
 /// The step that lowers the cost of a quadratic model: 2 step' score - step' information step grows all the way,
