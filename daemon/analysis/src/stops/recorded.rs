@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::curve::Point;
+use super::curve::DecelerationPoint;
 use super::find::FoundBy;
 use super::friction::FrictionPoint;
 use super::law::StoppingDistance;
@@ -50,7 +50,7 @@ pub struct RecordedStop {
     /// Why it shows no law of the brake; `None` for a stop that does.
     pub no_law: Option<String>,
     /// Deceleration at whole m/s, from fast to slow.
-    pub decelerations: Vec<Point>,
+    pub decelerations: Vec<DecelerationPoint>,
     /// For a stop held out: what the law said of it.
     pub predicted: Option<StoppingDistance>,
     /// The friction behind it.

@@ -29,5 +29,5 @@ pub mod watch;
 
 pub use conclusion::Explained;
 pub use error::LearnError;
-pub use learner::{Learner, LearnerSettings, Round, RoundOutcome, TrainRound};
+pub use learner::{Learner, LearnerRound, LearnerSettings, RoundOutcome, TrainRound};
 pub use pool::Bounds;

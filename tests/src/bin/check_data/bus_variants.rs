@@ -7,7 +7,7 @@ use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::answer::WithStd;
 use dynocar_analysis::explain::{drive, explain};
-use dynocar_model::train::Drive;
+use dynocar_model::train::PowerTrain;
 use dynocar_shared::SampleField;
 use dynocar_workshop::survey::survey_folder;
 
@@ -146,7 +146,7 @@ fn apart(recorded: &Dataset, powered: &Dataset) -> Result<f64, String> {
         let control = |sample: &dynocar_shared::TrainSample| {
             Some(sample.get(SampleField::TractionForce)? - sample.get(SampleField::BrakeForce)?)
         };
-        if one.speed_mps < Drive::USUAL.speed_min_mps {
+        if one.speed_mps < PowerTrain::USUAL.speed_min_mps {
             continue;
         }
         let Some((one_n, other_n)) = control(one).zip(control(other)) else { continue };

@@ -33,7 +33,7 @@ use super::Explanation;
 use crate::dataset::Dataset;
 use candidates::CandidateRow;
 use errors::Errors;
-pub use estimate::Estimate;
+pub use estimate::IntervalEstimate;
 use line::AlongLine;
 use panels::Panel;
 use parameters::{ParameterRow, PlaceTable};
