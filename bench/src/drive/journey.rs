@@ -243,7 +243,7 @@ fn saved_w(planner: &Planner<'_>, due_s: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::line::{CONDITIONS, Condition, ORDINARY, Service};
+    use super::super::deviations::{CONDITIONS, Condition, ORDINARY, Service};
     use super::*;
     use crate::scenarios::world::Traffic;
 

@@ -15,10 +15,10 @@
 
 pub mod answers;
 pub mod braking;
+pub mod deviations;
 pub mod driver;
 pub mod journey;
 pub mod knowledge;
-pub mod line;
 pub mod link;
 pub mod picture;
 pub mod plan;
@@ -32,7 +32,7 @@ use clap::Args;
 use dynocar::output::{report_line, write_file};
 use serde_json::json;
 
-use self::line::{CONDITIONS, ORDINARY, Service};
+use self::deviations::{CONDITIONS, ORDINARY, Service};
 use self::run::{DriveExtent, Informant};
 use self::score::Scored;
 use crate::output::{

@@ -3,7 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::line::traffic_name;
+use super::deviations::traffic_name;
 use super::score::{ENERGY, FigureInterval, LATE, STOP_RMS, Scored};
 use crate::output::BenchError;
 

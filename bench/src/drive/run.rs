@@ -4,8 +4,8 @@ use clap::Args;
 use dynocar_shared::TrainSample;
 
 use super::answers::{self, ASKED, AnswerMemory};
+use super::deviations::Service;
 use super::journey::{DrivenLeg, Journey};
-use super::line::Service;
 use super::link::Link;
 use super::train::Train;
 use crate::ending;

@@ -8,8 +8,8 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
 
+use super::deviations::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::knowledge::{Ability, Knowledge};
-use super::line::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::plan::{Leg, PIECE_M};
 use crate::chance::Chance;
 use crate::scenarios::mistakes::Mistakes;

@@ -3,7 +3,7 @@
 //!
 //! - [`watch`]: one simulated dataset, fed sample by sample
 
-pub mod watch;
+pub mod fed_dataset;
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use clap::Args;
 use dynocar::output::report_line;
 use serde_json::json;
 
-use self::watch::{Watched, watch};
+use self::fed_dataset::{Watched, watch};
 use crate::explain::family::{FamilyArguments, SimulatedCase};
 use crate::explain::scenario::ExplainScenario;
 use crate::output::{BenchError, Record, counts, table};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::sockets::{BLOCK, SocketEnd, Socket};
+use super::sockets::{BLOCK, Socket, SocketEnd};
 use crate::output::BenchError;
 
 /// An end of a pair socket.

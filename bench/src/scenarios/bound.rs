@@ -11,7 +11,7 @@ use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-use super::drive::DriveMoment;
+use super::scenario_train::DriveMoment;
 use super::world::{
     KNOT_M, KNOT_OVER_MEAN, LoadSource, ROOM_KG, WEIGHING_STD, World, knot_std_permille,
 };

@@ -12,9 +12,9 @@
 
 pub mod bound;
 pub mod brake;
-pub mod drive;
 pub mod mistakes;
 pub mod recorded;
+pub mod scenario_train;
 pub mod score;
 pub mod table;
 pub mod world;

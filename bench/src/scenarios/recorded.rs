@@ -8,7 +8,7 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::SampleField;
 use serde_json::json;
 
-use super::drive::ScenarioTrain;
+use super::scenario_train::ScenarioTrain;
 use super::world::World;
 use crate::output::{BenchError, during};
 

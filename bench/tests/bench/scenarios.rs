@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_bench::scenarios::drive::ScenarioTrain;
 use dynocar_bench::scenarios::mistakes::Mistakes;
+use dynocar_bench::scenarios::scenario_train::ScenarioTrain;
 use dynocar_bench::scenarios::table::{self, NamedScenario, Plan};
 use dynocar_bench::scenarios::world::World;
 use dynocar_core::pipeline::Pipeline;

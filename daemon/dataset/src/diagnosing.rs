@@ -8,11 +8,11 @@ use toml::Value;
 use super::diagnostic::{Diagnostic, read_as};
 use super::forces::{Force, ForceSource};
 use super::implausible_columns::implausible_columns;
-use super::motion::PositionSource;
 use super::order::quantile;
 use super::quality::RunQuality;
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
+use super::speed_and_position::PositionSource;
 
 /// Below this distance in m, comparisons of position and speed say nothing.
 const DISTANCE_MIN_M: f64 = 200.0;

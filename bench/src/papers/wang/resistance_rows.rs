@@ -2,9 +2,9 @@
 //! features, one step a sample, learning rate 1e-7).
 
 use dynocar_core::pipeline::Estimator;
+use dynocar_estimators::wang::known_motion::KnownMotion;
+use dynocar_estimators::wang::known_motion::LearningSet;
 use dynocar_estimators::wang::line_resistance::LineResistance;
-use dynocar_estimators::wang::motion::KnownMotion;
-use dynocar_estimators::wang::motion::LearningSet;
 use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_estimators::wang::{StagedDescent, StagedDescentSettings};
 use dynocar_model::force::ResolvedSample;

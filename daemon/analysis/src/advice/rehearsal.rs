@@ -14,8 +14,8 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use nalgebra::{Matrix3, SVector};
 
-use super::drive::{DriveKind, PlannedManoeuvre, Scene};
 use super::known::ANSWERED;
+use super::manoeuvre::{DriveKind, PlannedManoeuvre, Scene};
 use super::noise::RunNoise;
 
 /// Shortest step in s; samples that come faster are taken together.

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use serde::Serialize;
 
 use super::parameters::{BrakeParameters, Correction};
-use super::steps::SpeedSteps;
+use super::speed_steps::SpeedSteps;
 use crate::dataset::DatasetError;
 use crate::dataset::document::Item;
 

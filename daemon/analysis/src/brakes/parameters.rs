@@ -5,7 +5,7 @@ use serde::Serialize;
 use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, StudentsT};
 
 use super::components::weakest;
-use super::steps::SpeedSteps;
+use super::speed_steps::SpeedSteps;
 use crate::stops::{CutOff, DecelerationLaw, Manner, RecordedStop, StopStatistics};
 
 /// Levels of confidence that a balise may ask for (EBCL): all stops but one in 10 to the level reach it.

@@ -27,7 +27,7 @@ mod caveats;
 pub mod competing;
 pub mod course;
 pub mod described;
-pub mod drive;
+pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
@@ -55,7 +55,7 @@ use crate::dataset::dataset_diagnostic::diagnostics;
 use crate::dataset::{Dataset, Role};
 use answer::ExplainAnswer;
 use answer::WithStd;
-use drive::EstimatedDrive;
+use drive_efficiency::EstimatedDrive;
 use evidence::{Density, FitProblem, RunData, RunDataError};
 use many::{Held, Many, Preparation};
 use score::{PredictionScore, RunScore};
@@ -188,7 +188,7 @@ struct Prepared {
 
 impl Prepared {
     fn of(dataset: &Dataset, density: Density) -> Result<Self, RunDataError> {
-        let estimated_drive = drive::estimated(dataset)?;
+        let estimated_drive = drive_efficiency::estimated(dataset)?;
         let (declared, drive) = (dataset, estimated_drive.as_ref().map(|it| it.drive));
         let retaken = drive.map(|drive| dataset.with_drive(drive));
         let dataset = retaken.as_ref().unwrap_or(dataset);

@@ -14,7 +14,7 @@ use dynocar_model::train::{BrakeGear, TrainModel};
 use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, TrainSample};
 use serde::Serialize;
 
-use super::curve::DecelerationCurve;
+use super::deceleration_curve::DecelerationCurve;
 
 /// Friction coefficient that the mean deceleration of the stop is declared to need.
 const DECLARED_FRICTION: f64 = 0.3;

@@ -10,20 +10,22 @@
 //! - [`StopStatistics`]: all stops together, whatever the driver wanted
 //! - [`Study`]: all of it over a dataset
 
-mod curve;
 mod cut_off;
-mod day;
+mod deceleration_curve;
+mod deceleration_law;
 mod find;
 mod friction;
-mod law;
 mod recorded;
+mod stop_statistics;
 mod study;
 
-pub use curve::{DecelerationCurve, DecelerationPoint};
 pub use cut_off::CutOff;
-pub use day::{DecelerationSpread, FromSpeed, QuantileRange, StopStatistics};
+pub use deceleration_curve::{DecelerationCurve, DecelerationPoint};
+pub use deceleration_law::{
+    DecelerationLaw, Gradient, LawPoint, MeasuredResponse, StoppingDistance,
+};
 pub use find::{FindSettings, FoundBy, StopSpan, find};
 pub use friction::{FrictionPoint, friction};
-pub use law::{DecelerationLaw, Gradient, LawPoint, MeasuredResponse, StoppingDistance};
 pub use recorded::{Manner, RecordedStop};
+pub use stop_statistics::{DecelerationSpread, FromSpeed, QuantileRange, StopStatistics};
 pub use study::{Study, StudySettings};

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::curve::DecelerationPoint;
+use super::deceleration_curve::DecelerationPoint;
+use super::deceleration_law::StoppingDistance;
 use super::find::FoundBy;
 use super::friction::FrictionPoint;
-use super::law::StoppingDistance;
 use crate::dataset::Role;
 
 /// How a train was brought to a stand.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::centring::SurveyPass;
 use super::chainage::{Chained, WheelsAndLag, chain};
-use super::line::Alignments;
+use super::driven_line::Alignments;
 use super::recording::SurveyRecording;
 use super::tracking::follow;
 use crate::explain::answer::WithStd;

@@ -11,11 +11,11 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
 use super::noise_bank::NoiseBank;
+use super::observation_source::RowSource;
 use super::regression::{
     AffineMotion, RegressionObservation, RegressionSolution, Unknowns, WhiteRow,
 };
 use super::report::{DrivenSpeeds, ResistanceReport, SolutionEvidence};
-use super::source::RowSource;
 use crate::liu::solver::{Solver, bank_penalty};
 
 /// Rows that the innovation statistics look back over.

@@ -10,8 +10,8 @@ use dynocar_core::pipeline::motion::{OutlierRow, Trust};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::bias_model::{BiasModel, MapError};
+use super::known_motion::{Inertia, KnownMotion};
 use super::line_resistance::LineResistance;
-use super::motion::{Inertia, KnownMotion};
 
 /// Index of the speed in m/s in a filter's state.
 pub const SPEED: usize = 0;

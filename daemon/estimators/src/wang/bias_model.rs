@@ -3,7 +3,7 @@
 use dynocar_core::pipeline::motion::jump_variance;
 use dynocar_model::track::gradient_error_kept;
 
-use super::motion::KnownMotion;
+use super::known_motion::KnownMotion;
 
 /// Speed in m/s at which the bias of a behaviour that grows with speed is stated.
 const GROWTH_REFERENCE_MPS: f64 = 20.0;

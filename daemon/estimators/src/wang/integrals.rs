@@ -19,8 +19,8 @@ use dynocar_model::train::TrainModel;
 use nalgebra::SVector;
 
 use super::bias_model::{BiasModel, MapError};
+use super::known_motion::{Inertia, KnownMotion};
 use super::line_resistance::SpeedBasis;
-use super::motion::{Inertia, KnownMotion};
 
 /// Resistance in N/kN that a curve or a tunnel typically adds.
 const TYPICAL_N_PER_KN: f64 = 5.0;

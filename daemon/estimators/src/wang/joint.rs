@@ -21,8 +21,8 @@ use super::integrals::{
     BiasHypothesis, INVERSE_MASS, IntegralStep, Integrals, POLYNOMIALS, RegressorRow, Regressors,
     UNKNOWNS,
 };
+use super::known_motion::{KnownMotion, LearningSet};
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
-use super::motion::{KnownMotion, LearningSet};
 
 /// Updates between two looks at the slope of the resistance.
 const REFRESH_EVERY: u32 = 50;

@@ -10,7 +10,7 @@ use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 
 use super::integrals::{INVERSE_MASS, POLYNOMIALS, RegressorRow, UNKNOWNS};
 use super::joint::JointLeastSquares;
-use super::motion::LearningSet;
+use super::known_motion::LearningSet;
 
 /// Used samples below which nothing is said.
 const SAMPLES_MIN: u64 = 50;

@@ -17,7 +17,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::bias_bank::{BiasBank, Dynamics, MassBiasMoments, SPEED};
 use super::kalman_settings::MassKalmanSettings;
-use super::motion::{Inertia, KnownMotion};
+use super::known_motion::{Inertia, KnownMotion};
 
 /// Samples over which the evidence for a behaviour of the bias is remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;

@@ -3,7 +3,7 @@
 use dynocar_model::train::{Davis, TrainModel};
 use nalgebra::{Matrix3, Vector3};
 
-use super::motion::KnownMotion;
+use super::known_motion::KnownMotion;
 
 /// Resistance of a train on a line, in N/kN: Wang 2022, eq. (5), (9), (10), each polynomial
 /// weighted by how much of it acts.

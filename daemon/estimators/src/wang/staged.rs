@@ -16,8 +16,8 @@ use nalgebra::{Matrix4, SVector, Vector4};
 use serde::Deserialize;
 
 use super::descent::MeanSquare;
+use super::known_motion::{Inertia, KnownMotion, LearningSet};
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance, SpeedBasis};
-use super::motion::{Inertia, KnownMotion, LearningSet};
 
 /// Used samples below which nothing is said.
 const SAMPLES_MIN: f64 = 50.0;

@@ -3,7 +3,7 @@
 use crate::mass_common::{LEG, Simulation, assert_finite, feed, garbage, snapshot, train};
 use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_estimators::EstimatorSettings;
-use dynocar_estimators::wang::motion::LearningSet;
+use dynocar_estimators::wang::known_motion::LearningSet;
 use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};

@@ -1,11 +1,11 @@
 //! Declared model of a train.
 
 mod corrections;
-mod drive;
+mod power_train;
 
 pub use corrections::Corrections;
-pub use drive::PowerTrain;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+pub use power_train::PowerTrain;
 
 use crate::terms::extra::ExtraResistance;
 use crate::track::along_line;

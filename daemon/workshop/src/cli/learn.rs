@@ -8,7 +8,7 @@ use clap::Args;
 use dynocar_transport::Host;
 
 use super::threads::Threads;
-use crate::learn::watch::{Suspicions, TimeOfDay, watch};
+use crate::learn::round_schedule::{Suspicions, TimeOfDay, watch};
 use crate::learn::{
     Bounds, LearnError, Learner, LearnerRound, LearnerSettings, RoundOutcome, TrainRound, page,
 };

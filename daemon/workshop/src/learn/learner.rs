@@ -12,11 +12,11 @@ use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::TrainId;
 use tracing::warn;
 
+use super::available_runs::{FoundRun, Places, report_unusable, runs_of};
 use super::conclusion::{Conclusion, Explained};
 use super::error::LearnError;
 use super::memory::LearnerMemory;
 use super::pool::{self, Bounds, Declared, Pool};
-use super::source::{FoundRun, Places, report_unusable, runs_of};
 use crate::report::provenance::hex;
 use dynocar::models::{Action, ModelHash, ModelText, Store, TrainModels, UtcSecond};
 use dynocar::storage::{Disk, Storage, StorageError};

@@ -16,6 +16,7 @@
 //! - [`mod@watch`]: when there is one
 //! - [`page`]: the history as a page, with the errors that the daemon's trials measured
 
+pub mod available_runs;
 pub mod conclusion;
 mod error;
 pub mod finding;
@@ -24,8 +25,7 @@ pub mod memory;
 pub mod page;
 pub mod pool;
 pub mod recordings;
-pub mod source;
-pub mod watch;
+pub mod round_schedule;
 
 pub use conclusion::Explained;
 pub use error::LearnError;

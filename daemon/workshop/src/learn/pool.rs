@@ -17,8 +17,8 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use toml::Table;
 
+use super::available_runs::{FoundRun, report_unusable};
 use super::memory::LearnerMemory;
-use super::source::{FoundRun, report_unusable};
 use crate::dataset::FilesOfDataset;
 use crate::updated::name_model;
 

@@ -11,13 +11,13 @@ use dynocar_shared::{
 };
 
 use super::TrainKalmanSettings;
-use super::bank::SpeedLikelihood;
 use super::brake_errors::BrakeErrors;
-use super::learned::{JumpShare, LearnedState, ResistanceBelief};
+use super::learned_state::{JumpShare, LearnedState, ResistanceBelief};
 use super::load::{LoadChange, LoadWatch};
+use super::motion_bank::SpeedLikelihood;
 use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
 use super::report::{Systematic, TrainKalmanReport};
-use super::steps::StepBuilder;
+use super::step_builder::StepBuilder;
 use crate::pipeline::judge::{InputHealth, LONG_RUN_MAX};
 use crate::pipeline::momentum::UnitSample;
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};

@@ -5,7 +5,7 @@ use dynocar_model::track::GRADIENT_ERROR_FREE_M;
 use dynocar_shared::{ParameterSnapshot, Quantity};
 use nalgebra::{Matrix4, Vector4};
 
-use super::bank::Published;
+use super::motion_bank::Published;
 use super::motion_filter::COEFFICIENTS;
 use crate::pipeline::momentum::{regressors, unscaling};
 use crate::pipeline::motion::SpeedRange;

@@ -4,8 +4,8 @@ use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::TrainKalmanSettings;
-use super::bank::{MotionBank, SpeedLikelihood};
 use super::brake_errors::BrakeErrors;
+use super::motion_bank::{MotionBank, SpeedLikelihood};
 use super::motion_filter::{
     BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, MotionState, RESISTANCE, SPEED,
     StateCovariance, TRACTION_SCALE, WIND,

@@ -3,7 +3,7 @@
 use dynocar_shared::{BrakeResponse, EffortPoint, Stop, StoppingEstimate, Uncertain};
 use serde::Serialize;
 
-use super::curve::{DecelerationCurve, DecelerationPoint};
+use super::deceleration_curve::{DecelerationCurve, DecelerationPoint};
 
 /// Step of the speeds in m/s at which the law is reported.
 const GRID_MPS: f64 = 1.0;

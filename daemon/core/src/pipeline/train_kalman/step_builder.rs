@@ -4,9 +4,9 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::wind;
 
 use super::TrainKalmanSettings;
-use super::acting_forces::ForceHistory;
 use super::brake_errors::BrakeErrors;
-use super::learned::{LearnedState, ResistanceBelief};
+use super::force_history::ForceHistory;
+use super::learned_state::{LearnedState, ResistanceBelief};
 use super::motion_filter::{FilterStep, Following, USUAL_MAP_PERMILLE, wind_over};
 use crate::pipeline::momentum::UnitSample;
 
