@@ -2,7 +2,8 @@
 
 use dynocar_model::terms::CORRECTIONS;
 use dynocar_model::terms::extra::{
-    Covariate, Extra, FACTORS, FACTORS_MAX, FORCE, FORCE_MAX_N_PER_KN, Factor, Form, TABLES,
+    Covariate, CovariateFactor, ExtraResistance, FACTORS, FACTORS_MAX, FORCE, FORCE_MAX_N_PER_KN,
+    Form, TABLES,
 };
 use dynocar_model::train::TrainModel;
 
@@ -22,11 +23,11 @@ pub(super) fn read_corrections(section: &Item, train: &mut TrainModel) -> Result
 }
 
 /// Reads the tables of a train file; none where none stand there.
-pub(super) fn read_extra(root: &Item) -> Result<Vec<Extra>, DatasetError> {
+pub(super) fn read_extra(root: &Item) -> Result<Vec<ExtraResistance>, DatasetError> {
     root.tables(TABLES)?.iter().map(extra).collect()
 }
 
-fn extra(section: &Item) -> Result<Extra, DatasetError> {
+fn extra(section: &Item) -> Result<ExtraResistance, DatasetError> {
     section.allow(&[FORCE, FACTORS])?;
     let range = -FORCE_MAX_N_PER_KN..=FORCE_MAX_N_PER_KN;
     let n_per_kn = section.required(FORCE, "N/kN, from -100 to 100", range)?;
@@ -36,10 +37,10 @@ fn extra(section: &Item) -> Result<Extra, DatasetError> {
         return Err(section.key_out_of_range(FACTORS, &found, "one or two tables"));
     }
     let factors = tables.iter().map(factor).collect::<Result<_, _>>()?;
-    Ok(Extra { n_per_kn, factors })
+    Ok(ExtraResistance { n_per_kn, factors })
 }
 
-fn factor(section: &Item) -> Result<Factor, DatasetError> {
+fn factor(section: &Item) -> Result<CovariateFactor, DatasetError> {
     let (covariate, covariates) =
         (("covariate", "a covariate"), Covariate::ALL.map(Covariate::name));
     let of = section.need_named("of", covariate, Covariate::from_name, covariates)?;
@@ -52,7 +53,7 @@ fn factor(section: &Item) -> Result<Factor, DatasetError> {
         *number = section.required(name, "a number", ..)?;
     }
     match form.refusal(numbers) {
-        None => Ok(Factor { of, form, numbers }),
+        None => Ok(CovariateFactor { of, form, numbers }),
         Some(expected) => {
             let named = form.numbers().iter().zip(numbers);
             let found: Vec<String> =
@@ -93,7 +94,7 @@ mod tests {
 #[cfg(test)]
 mod extra_tests {
     use crate::parse_train;
-    use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
+    use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, Form};
 
     const TRAIN: &str = "[train]\nmass_t = 10\nlength_m = 1\nrotating_mass_factor = 0\n\
                          [resistance]\na = 1\nb = 0\nc = 0\n[[extra]]\nn_per_kn = 0.8\n";
@@ -109,9 +110,13 @@ mod extra_tests {
                     form = \"below\"\nuntil = 5\nspan = 10\n";
         let train = parse_train("train.toml", &format!("{TRAIN}{text}")).unwrap();
         let hyperbola =
-            Factor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
-        let below = Factor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
-        assert_eq!(train.extra, [Extra { n_per_kn: 0.8, factors: vec![hyperbola, below] }]);
+            CovariateFactor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
+        let below =
+            CovariateFactor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
+        assert_eq!(
+            train.extra,
+            [ExtraResistance { n_per_kn: 0.8, factors: vec![hyperbola, below] }]
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use dynocar_model::terms::{Key, curve, extra, rotating, tunnel};
-use dynocar_model::train::{BrakeGear, Corrections, Davis, Drive, EffortCurve, TrainModel};
+use dynocar_model::train::{BrakeGear, Corrections, Davis, EffortCurve, PowerTrain, TrainModel};
 
 use super::corrections::{read_corrections, read_extra};
 use super::document::{Item, above_zero};
@@ -121,18 +121,18 @@ fn declared(section: &Item) -> Result<(Davis, f64, f64), DatasetError> {
 }
 
 /// The drive that is known by its electric power; `None` where nothing is declared of it.
-fn drive(section: &Item) -> Result<Option<Drive>, DatasetError> {
+fn drive(section: &Item) -> Result<Option<PowerTrain>, DatasetError> {
     let share = "a share from 0.3 to 1";
-    let efficiency = section.optional("efficiency", share, Drive::EFFICIENCIES)?;
+    let efficiency = section.optional("efficiency", share, PowerTrain::EFFICIENCIES)?;
     let power = "a power in kW from 0 to 2000";
-    let auxiliary_kw = section.optional("auxiliary_power_kw", power, Drive::AUXILIARIES_KW)?;
+    let auxiliary_kw = section.optional("auxiliary_power_kw", power, PowerTrain::AUXILIARIES_KW)?;
     let speed = "a speed in m/s from 0.5 to 20";
     let speed_min = section.optional("power_speed_min_mps", speed, 0.5..=20.0)?;
     if efficiency.or(auxiliary_kw).or(speed_min).is_none() {
         return Ok(None);
     }
-    let usual = Drive::USUAL;
-    Ok(Some(Drive {
+    let usual = PowerTrain::USUAL;
+    Ok(Some(PowerTrain {
         efficiency: efficiency.unwrap_or(usual.efficiency),
         auxiliary_power_w: auxiliary_kw.map_or(usual.auxiliary_power_w, |kw| 1e3 * kw),
         speed_min_mps: speed_min.unwrap_or(usual.speed_min_mps),

@@ -13,12 +13,12 @@ use std::path::{Path, PathBuf};
 
 use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
 use dynocar_analysis::explain::{Explanation, evidence::Fit};
-use dynocar_model::terms::extra::{self, Extra, Factor};
-use dynocar_model::terms::{Entry, Key};
+use dynocar_model::terms::extra::{self, CovariateFactor, ExtraResistance};
+use dynocar_model::terms::{Key, ModelEntry};
 use toml::{Table, Value};
 
 use crate::dataset::open;
-use dynocar::dataset::Source;
+use dynocar::dataset::DatasetSource;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::write_in_folder;
 
@@ -45,7 +45,7 @@ pub struct UpdatedFiles {
 ///
 /// When the declared files cannot be read or the grown ones not written.
 pub fn write_updated<'s>(
-    dataset: impl Into<Source<'s>>,
+    dataset: impl Into<DatasetSource<'s>>,
     explanation: &Explanation,
     folder: &Path,
 ) -> Result<UpdatedFiles, UpdatedModelError> {
@@ -180,32 +180,32 @@ pub fn grow(fit: &Fit, train: &mut Table, track: &mut Table) -> Vec<String> {
 }
 
 /// True for an entry that the files may hold in addition to what they hold already.
-fn can_hold(entry: &Entry, train: &Table, track: &Table) -> bool {
+fn can_hold(entry: &ModelEntry, train: &Table, track: &Table) -> bool {
     match entry {
-        Entry::Number(key, found) => key.allows(joined(key, train, *found)),
-        Entry::Extra(_) | Entry::TrackNumber(..) | Entry::Rows(..) => true,
+        ModelEntry::Number(key, found) => key.allows(joined(key, train, *found)),
+        ModelEntry::Extra(_) | ModelEntry::TrackNumber(..) | ModelEntry::Rows(..) => true,
         // Such a list stands alone.
-        Entry::List(name, _) => track.get("track").and_then(|own| own.get(name)).is_none(),
+        ModelEntry::List(name, _) => track.get("track").and_then(|own| own.get(name)).is_none(),
     }
 }
 
-fn write_entry(entry: Entry, train: &mut Table, track: &mut Table) {
+fn write_entry(entry: ModelEntry, train: &mut Table, track: &mut Table) {
     match entry {
-        Entry::Number(key, found) => {
+        ModelEntry::Number(key, found) => {
             let value = joined(key, train, found);
             set(train, key.table, key.name, value);
         }
-        Entry::Extra(found) => {
+        ModelEntry::Extra(found) => {
             let tables = train.entry(extra::TABLES).or_insert_with(|| Value::Array(Vec::new()));
             if let Some(tables) = tables.as_array_mut() {
                 tables.push(Value::Table(extra_table(&found)));
             }
         }
-        Entry::TrackNumber(name, found) => {
+        ModelEntry::TrackNumber(name, found) => {
             let declared = number(track, "track", name).unwrap_or(0.0);
             set(track, "track", name, declared + found);
         }
-        Entry::Rows(name, rows) | Entry::List(name, rows) => {
+        ModelEntry::Rows(name, rows) | ModelEntry::List(name, rows) => {
             if let Some(list) = track_list(track, name) {
                 list.extend(rows.into_iter().map(Value::from));
             }
@@ -214,8 +214,8 @@ fn write_entry(entry: Entry, train: &mut Table, track: &mut Table) {
 }
 
 /// A table of `[[extra]]`.
-fn extra_table(found: &Extra) -> Table {
-    let factor = |factor: &Factor| {
+fn extra_table(found: &ExtraResistance) -> Table {
+    let factor = |factor: &CovariateFactor| {
         let mut table = Table::new();
         table.insert("of".into(), factor.of.name().into());
         table.insert("form".into(), factor.form.name().into());
@@ -265,8 +265,8 @@ mod tests {
     fn a_finding_joins_what_is_declared_by_the_rule_of_its_key() {
         let declared = "[corrections]\ntraction_gain = 1.1\nwind_plus_mps = 2";
         let (mut train, mut track): (Table, Table) = (declared.parse().unwrap(), Table::new());
-        write_entry(Entry::Number(&traction::GAIN, 0.9), &mut train, &mut track);
-        write_entry(Entry::Number(&wind::WIND_PLUS, 3.0), &mut train, &mut track);
+        write_entry(ModelEntry::Number(&traction::GAIN, 0.9), &mut train, &mut track);
+        write_entry(ModelEntry::Number(&wind::WIND_PLUS, 3.0), &mut train, &mut track);
         assert_eq!(train["corrections"]["traction_gain"], Value::Float(1.1 * 0.9));
         assert_eq!(train["corrections"]["wind_plus_mps"], Value::Float(5.0));
         assert!(track.is_empty());
@@ -275,7 +275,7 @@ mod tests {
     #[test]
     fn what_belongs_to_the_line_makes_its_file_where_there_is_none() {
         let (mut train, mut track) = (Table::new(), Table::new());
-        let entry = Entry::Rows(place::LIST, vec![vec![1000.0, 2000.0, 1.5]]);
+        let entry = ModelEntry::Rows(place::LIST, vec![vec![1000.0, 2000.0, 1.5]]);
         assert!(can_hold(&entry, &train, &track));
         write_entry(entry, &mut train, &mut track);
         let expected: Table = "[track]\nresistance = [[1000.0, 2000.0, 1.5]]".parse().unwrap();
@@ -285,9 +285,9 @@ mod tests {
     #[test]
     fn what_no_file_may_hold_is_not_written() {
         let (train, track) = (Table::new(), Table::new());
-        assert!(can_hold(&Entry::Number(&traction::GAIN, 1.4), &train, &track));
-        assert!(!can_hold(&Entry::Number(&traction::GAIN, 2.4), &train, &track));
-        let list = Entry::List(gradient::ERROR, Vec::new());
+        assert!(can_hold(&ModelEntry::Number(&traction::GAIN, 1.4), &train, &track));
+        assert!(!can_hold(&ModelEntry::Number(&traction::GAIN, 2.4), &train, &track));
+        let list = ModelEntry::List(gradient::ERROR, Vec::new());
         assert!(can_hold(&list, &train, &track));
         let track = "[track]\ngradient_error = [[0.0, 1.0]]".parse().unwrap();
         assert!(!can_hold(&list, &train, &track));

@@ -1,4 +1,4 @@
-//! What the runs held out say of an effect by themselves: whether it acts in them too, and how large it is there.
+//! Confirmation of effects by the runs held out: whether they act in them too, and how large they are there.
 //!
 //! They know a, b, c and the usual errors as the fit runs do, and nothing of the effect: its numbers follow from the
 //! normal equations of the runs held out and from the information of the fit runs on everything else.
@@ -9,7 +9,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::evidence::{Fit, FitProblem, Positions, RunData, RunNormal, RunPositions};
 use super::over_time::is_one_in_all_runs;
 use super::score::RunScore;
-use super::selection::{Outcome, enlarged_by_scatter, std_with_forms};
+use super::selection::{SearchOutcome, enlarged_by_scatter, std_with_forms};
 
 /// Fewer runs say little of each other.
 const RUNS_MIN: usize = 8;
@@ -27,7 +27,7 @@ pub struct HeldOutRun {
 impl HeldOutRun {
     /// Reduces a run; `within` is the part of it that may show effects.
     pub fn of(
-        (problem, outcome): (&FitProblem, &Outcome),
+        (problem, outcome): (&FitProblem, &SearchOutcome),
         run: &RunData,
         within: Option<&RunData>,
     ) -> Self {

@@ -27,7 +27,7 @@ mod caveats;
 pub mod competing;
 pub mod course;
 pub mod described;
-pub mod drive;
+pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
@@ -35,6 +35,7 @@ pub mod gradient_prior;
 pub mod held_out;
 pub mod hypothesis;
 pub mod identifiability;
+mod location;
 pub mod many;
 pub mod meaning;
 pub mod over_time;
@@ -57,12 +58,12 @@ use crate::dataset::{Dataset, Role};
 use crate::parallel;
 use answer::ExplainAnswer;
 use answer::WithStd;
-use drive::EstimatedDrive;
+use drive_efficiency::EstimatedDrive;
 use evidence::{Density, FitProblem, RunData, RunDataError};
 use held_out::HeldOutRun;
 use many::{Held, Many, Preparation};
-use score::Score;
-use selection::{Deviations, Outcome, Progress, Search};
+use score::PredictionScore;
+use selection::{Deviations, Progress, Search, SearchOutcome};
 use unexplained::Unexplained;
 
 /// Fit and holdout runs with the models that were fitted.
@@ -76,9 +77,9 @@ pub struct Explanation {
     /// How surely its parameters are known.
     pub deviations: Deviations,
     /// Open-loop errors.
-    pub score: Score,
+    pub score: PredictionScore,
     /// Result of the search.
-    pub outcome: Outcome,
+    pub outcome: SearchOutcome,
     /// How runs are made ready for its models.
     pub preparation: Preparation,
 }
@@ -121,7 +122,7 @@ fn explained<E: From<RunDataError> + Send>(
 ) -> Result<Explanation, E> {
     progress(0.0, "reading the runs");
     let density = if many.is_some() { Density::Thinned } else { Density::Recorded };
-    let Prepared { estimated_drive, late, preparation, runs } = Prepared::of(&dataset, density)?;
+    let Prepared { forces, preparation, runs } = Prepared::of(&dataset, density)?;
     let track = preparation.track().map(|track| &**track);
     let all = many.as_ref().map_or(&dataset.runs, |many| &many.dataset.runs);
     let diagnostics = diagnostics(preparation.train(), track, all);
@@ -154,14 +155,9 @@ fn explained<E: From<RunDataError> + Send>(
     let seen = if is_joined { Density::Recorded } else { density };
     let deviations = selection::deviations_given(&outcome, seen.step_s(recorded_step_s));
     progress(0.95, "scoring the holdout runs");
-    let judged = match &many {
-        Some(many) => many.judged(&search, &preparation, &outcome)?,
-        None => {
-            parallel::of_each(&holdout, |run| HeldOutRun::of((&problem, &outcome), run, Some(run)))
-        }
-    };
+    let judged = judged(many.as_ref(), &search, &preparation, &outcome)?;
     let scores = judged.iter().map(|run| run.score.clone()).collect();
-    let score = Score::of(&problem, scores, &outcome.base, &outcome.fit);
+    let score = PredictionScore::of(&problem, scores, &outcome.base, &outcome.fit);
     let spans = match &many {
         Some(many) => many.spans(),
         None => problem.runs.iter().map(|run| [run.file.clone(), run.file.clone()]).collect(),
@@ -183,14 +179,7 @@ fn explained<E: From<RunDataError> + Send>(
         held_out: &held_out,
     };
     let mut answer = verdict::answer(&search, &outcome, &known, &score, diagnostics);
-    if let Some(estimated) = estimated_drive {
-        answer.add_caveat(&estimated.answer.sentence());
-        answer.drive = Some(estimated.answer);
-    }
-    if let Some(late) = late {
-        answer.add_caveat(&force_time::sentence(late));
-        answer.force_late_s = Some(late);
-    }
+    forces.add_to(&mut answer);
     if let Some(many) = &many {
         answer.add_caveat(&many.sentence(&outcome));
     }
@@ -198,17 +187,50 @@ fn explained<E: From<RunDataError> + Send>(
     Ok(Explanation { answer, problem, holdout, deviations, score, outcome, preparation })
 }
 
-/// Runs made ready, with what was found of their forces.
-struct Prepared {
+/// Reduces the runs held out to their errors and their evidence on a finished model.
+fn judged<E: From<RunDataError> + Send>(
+    many: Option<&Many<E>>,
+    search: &Search,
+    preparation: &Preparation,
+    outcome: &SearchOutcome,
+) -> Result<Vec<HeldOutRun>, E> {
+    let of = |run: &RunData| HeldOutRun::of((search.problem, outcome), run, Some(run));
+    match many {
+        Some(many) => many.judged(search, preparation, outcome),
+        None => Ok(parallel::of_each(search.holdout, of)),
+    }
+}
+
+/// Corrections of the forces that were found before the search.
+struct FoundForces {
     estimated_drive: Option<EstimatedDrive>,
     late: Option<WithStd>,
+}
+
+impl FoundForces {
+    /// States them in an answer.
+    fn add_to(self, answer: &mut ExplainAnswer) {
+        if let Some(estimated) = self.estimated_drive {
+            answer.add_caveat(&estimated.answer.sentence());
+            answer.drive = Some(estimated.answer);
+        }
+        if let Some(late) = self.late {
+            answer.add_caveat(&force_time::sentence(late));
+            answer.force_late_s = Some(late);
+        }
+    }
+}
+
+/// Runs made ready, with what was found of their forces.
+struct Prepared {
+    forces: FoundForces,
     preparation: Preparation,
     runs: Vec<RunData>,
 }
 
 impl Prepared {
     fn of(dataset: &Dataset, density: Density) -> Result<Self, RunDataError> {
-        let estimated_drive = drive::estimated(dataset)?;
+        let estimated_drive = drive_efficiency::estimated(dataset)?;
         let (declared, drive) = (dataset, estimated_drive.as_ref().map(|it| it.drive));
         let retaken = drive.map(|drive| dataset.with_drive(drive));
         let dataset = retaken.as_ref().unwrap_or(dataset);
@@ -217,6 +239,6 @@ impl Prepared {
         let dataset = moved.as_ref().unwrap_or(dataset);
         let runs = evidence::prepare_at(dataset, density)?;
         let preparation = Preparation::new(declared, drive, late.map(|late| late.value));
-        Ok(Prepared { estimated_drive, late, preparation, runs })
+        Ok(Prepared { forces: FoundForces { estimated_drive, late }, preparation, runs })
     }
 }

@@ -3,7 +3,7 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::extra::Extra;
+use super::extra::ExtraResistance;
 use crate::train::{Davis, TrainModel};
 
 /// How a number that was found comes to one that is declared already.
@@ -36,7 +36,7 @@ pub struct Key {
 
 /// One entry of the files that a finding becomes.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Entry {
+pub enum ModelEntry {
     /// A number of `train.toml`.
     Number(&'static Key, f64),
     /// A number of `[track]` that adds to a declared one.
@@ -46,7 +46,7 @@ pub enum Entry {
     /// Further rows of a list of `[track]`.
     Rows(&'static str, Vec<Vec<f64>>),
     /// A further table of `[[extra]]` of `train.toml`.
-    Extra(Extra),
+    Extra(ExtraResistance),
 }
 
 impl PartialEq for Key {

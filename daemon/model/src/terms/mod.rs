@@ -26,7 +26,7 @@ pub mod tunnel;
 pub mod wheel;
 pub mod wind;
 
-pub use key::{Entry, Joined, Key, Least, Parameter, Suspect, SuspectInput};
+pub use key::{Joined, Key, Least, ModelEntry, Parameter, Suspect, SuspectInput};
 pub use resistance::Resistance;
 
 /// Every number of a term that stands in `[corrections]` of `train.toml`.

@@ -1,13 +1,13 @@
 //! Declared model of a train.
 
 mod corrections;
-mod drive;
+mod power_train;
 
 pub use corrections::Corrections;
-pub use drive::Drive;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
+pub use power_train::PowerTrain;
 
-use crate::terms::extra::Extra;
+use crate::terms::extra::ExtraResistance;
 use crate::track::along_line;
 
 /// Davis coefficients of the unit basic resistance w0(v) = a + b v + c v² in N/kN, v in m/s.
@@ -147,13 +147,13 @@ pub struct TrainModel {
     /// Greatest brake force over speed.
     pub brake: Option<EffortCurve>,
     /// The drive, where it is declared by its electric power.
-    pub drive: Option<Drive>,
+    pub drive: Option<PowerTrain>,
     /// Brake gear, as far as declared.
     pub brake_gear: BrakeGear,
     /// Corrections by measured runs.
     pub corrections: Corrections,
     /// Resistances of forms of their own.
-    pub extra: Vec<Extra>,
+    pub extra: Vec<ExtraResistance>,
 }
 
 impl TrainModel {

@@ -19,7 +19,7 @@ pub use by_run::{
     Deviations, FORM_SHARE, deviations, deviations_beside, enlarged_by_scatter, few_runs_factor,
     std_with_forms, without_each_run,
 };
-pub use outcome::{Beside, Outcome, Trial};
+pub use outcome::{Beside, EffectTrial, SearchOutcome};
 pub use price::{discounted, model_penalty, penalty};
 pub use refusal::Refusal;
 pub use search::{OBSERVATIONS_MIN, Progress, Search};

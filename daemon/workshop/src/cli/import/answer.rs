@@ -8,7 +8,7 @@ use dynocar_analysis::import::{Account, FieldOutcome, ImportedLine, ImportedTrai
 use toml::Value;
 
 use crate::cli::text::{TextTable, comment, diagnostics, entry, on_one_line};
-use crate::cli::train_text::{Found, TrainArguments, TrainText, converted};
+use crate::cli::train_text::{TrainArguments, TrainText, TrainValues, converted};
 use crate::report::provenance::for_shell;
 use crate::track_text::TrackText;
 
@@ -33,7 +33,7 @@ pub fn train(train: &ImportedTrain, arguments: &TrainArguments) -> Result<TrainT
     figures.extend(train.cars.map(|cars| ("cars", Value::Integer(cars.into()), from("cars"))));
     let writer = format!("dynocar import from {}", train.place);
     let (traction, brake_mps2) = (train.traction.clone(), train.brake_mps2.clone());
-    arguments.text(&writer, &Found { figures, traction, brake_mps2 })
+    arguments.text(&writer, &TrainValues { figures, traction, brake_mps2 })
 }
 
 /// From which field a key is.
@@ -70,7 +70,7 @@ pub fn track(line: &ImportedLine) -> String {
     if let Some(curves) = &line.curves {
         let ends =
             |start_m: f64, end_m: f64| format!("{}, {}", converted(start_m), converted(end_m));
-        let entry = |it: &dynocar_model::track::Curve| {
+        let entry = |it: &dynocar_model::track::TrackCurve| {
             format!("{}, {}", ends(it.start_m, it.end_m), converted(it.radius_m))
         };
         text.list("curves", curves.iter().map(entry));

@@ -1,6 +1,7 @@
 //! The joint fit of a, b, c and the parameters of all effects.
 
 mod descent;
+mod joint;
 mod linearised;
 mod memory;
 mod plan;
@@ -16,8 +17,10 @@ use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::{Noise, RunScatter};
 use super::run_data::RunData;
 use super::run_scatter::SharedFilters;
-use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns};
-use super::whitener::Whitener;
+use super::run_scatter::{
+    DeviationColumns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns,
+};
+use super::whitener::BinWhitener;
 use crate::parallel;
 use memory::RunMemory;
 pub use prior::{Positions, RunPositions};
@@ -41,10 +44,10 @@ pub struct FitProblem {
     declared: Davis,
     prior_deviation: [f64; 3],
     /// Columns of the runs' own factors.
-    scatter_columns: Vec<Columns>,
+    scatter_columns: Vec<DeviationColumns>,
     /// Response of the declared model, for each run.
     declared_responses: Vec<Response>,
-    /// What positions say of the speeds.
+    /// Evidence of positions on the speeds.
     pub positions: Positions,
 }
 
@@ -187,7 +190,7 @@ impl Fit {
     }
 
     /// The filter of a run, by number.
-    pub fn whitener(&self, index: usize) -> &Whitener {
+    pub fn whitener(&self, index: usize) -> &BinWhitener {
         &self.run_filters[index].whitener
     }
 
