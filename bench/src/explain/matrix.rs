@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use dynocar_analysis::explain::described::SAME_CHANCE_MIN;
+use dynocar_analysis::explain::over_time::CHANCE_MAX;
 
 use super::grade::{Attained, Grade};
 use super::parameters::ParameterGrade;
@@ -56,7 +56,7 @@ pub fn of(grades: &[(ExplainScenario, Vec<Grade>)]) -> (Value, String) {
         right().flat_map(|grade| grade.held_out_chances.iter().copied()).collect();
     if !held_out.is_empty() {
         let percent = 100.0 * share(held_out.iter().copied());
-        let different = chances.iter().filter(|chance| **chance < SAME_CHANCE_MIN).count();
+        let different = chances.iter().filter(|chance| **chance < CHANCE_MAX).count();
         text += &format!(
             "95 % intervals of the runs held out that hold the truth: {percent:.1} % of {}\n\
              effects said to differ in the runs held out: {different} of {}\n",

@@ -6,6 +6,7 @@ use dynocar_model::terms::place::in_words;
 use dynocar_shared::HALF_95;
 
 use super::answer::{EffectAnswer, HeldOutAnswer, Location, ParameterValue, PlaceUncertainty};
+use super::over_time::CHANCE_MAX;
 use super::selection::{EffectTrial, SearchOutcome};
 
 /// Intervals of a place at most in a sentence.
@@ -41,14 +42,11 @@ fn numbers<'a>(
     })
 }
 
-/// Numbers are said to differ where chance makes as much of a difference less often than this.
-pub const SAME_CHANCE_MIN: f64 = 1e-3;
-
 /// States what the runs held out say of an effect by themselves; `None` where they hardly show it.
 pub(super) fn by_held_out_runs(effect: &EffectAnswer) -> Option<String> {
     let HeldOutAnswer { runs, parameters, std, p_value } = effect.held_out.as_ref()?;
     let numbers: Vec<String> = numbers(parameters, std).collect();
-    let judged = match *p_value < SAME_CHANCE_MIN {
+    let judged = match *p_value < CHANCE_MAX {
         true => format!(
             "which is not what the fit runs say (chance of as much: {p_value:.0e}): it is not the same in all runs, \
              or not what acts"

@@ -59,8 +59,7 @@ pub struct HeldOutEffect {
 /// Returns what the runs held out say of each of the first `count` effects of a model; `None` for one that acts in
 /// some runs only or has more than two numbers, and where they hardly show it.
 pub fn by_held_out_runs(
-    problem: &FitProblem,
-    fit: &Fit,
+    (problem, fit): (&FitProblem, &Fit),
     runs: &[HeldOutRun],
     covariance: &DMatrix<f64>,
     count: usize,

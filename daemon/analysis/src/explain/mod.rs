@@ -166,8 +166,7 @@ fn explained<E: From<RunDataError> + Send>(
     let finished = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
     let courses = over_time::courses(&problem, finished, &spans, &deviations.std);
     let held_out = held_out::by_held_out_runs(
-        &problem,
-        finished,
+        (&problem, finished),
         &judged,
         &deviations.covariance,
         known.len(),

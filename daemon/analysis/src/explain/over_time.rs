@@ -22,8 +22,8 @@ const STEP_RUNS_MIN: usize = 3;
 /// Number of runs of a shown part, at least, and the greatest number of parts.
 const PART_RUNS_MIN: usize = 2;
 const PARTS_MAX: usize = 6;
-/// A course is stated where chance makes as much less often than this, all that were looked for together.
-const CHANCE_MAX: f64 = 1e-3;
+/// A change is stated where chance makes as much less often than this: of a course, all that were looked for together.
+pub const CHANCE_MAX: f64 = 1e-3;
 /// A number of an effect with more is one value of a profile.
 const NUMBERS_MAX: usize = 2;
 
