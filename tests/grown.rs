@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train};
+use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train, written};
 use dynocar_analysis::driven::{Beginning, DrivenTrain};
 use dynocar_analysis::explain::explain;
 use dynocar_analysis::identify::{identify, published_samples};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::force::ForceResolver;
+use dynocar_model::train::numbers::PAD_AREA;
 use dynocar_model::validation::ValidSample;
 use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, TrainSample};
 
@@ -103,6 +104,18 @@ fn the_effect_is_found() {
     let kinds: Vec<&str> = answer.effects.iter().map(|it| it.kind).collect();
     assert_eq!(kinds, ["idle_drag"], "{}", answer.statement);
     println!("{}", answer.statement);
+}
+
+#[test]
+fn the_key_is_read_judged_and_written() {
+    let text = format!("{TRAIN}[brake]\npad_area_cm2 = 350\n");
+    let train = parse_train("train.toml", &text).unwrap();
+    assert_eq!(train.brake_gear.pad_area_cm2, Some(350.0));
+    let refused = parse_train("train.toml", &text.replace("350", "-350")).unwrap_err();
+    assert!(refused.to_string().contains("pad_area_cm2 = -350: expected an area in cm²"));
+    let mut declared = TRAIN.parse().unwrap();
+    written::set(&mut declared, &PAD_AREA, 350.0);
+    assert_eq!(parse_train("train.toml", &declared.to_string()), Ok(train));
 }
 
 #[test]

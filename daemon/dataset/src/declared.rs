@@ -3,8 +3,10 @@
 use dynocar_core::plausibility::Severity;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
+use dynocar_model::train::numbers::LENGTH;
 
 use super::diagnostic::Diagnostic;
+use super::keys::assign;
 use super::unusual_resistance::unusual_resistance;
 
 /// Masses per metre of train in t/m: from a light rail car to a loaded ore train, with room.
@@ -32,7 +34,7 @@ pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Diagnostic>
         &mut found,
         is_length,
         "length_scale",
-        format!("a train of length_m = {length_m}: is the length in m?"),
+        format!("a train of {}: is the length in m?", assign(LENGTH.name, length_m)),
     );
     let per_m = mass_t / length_m;
     say(

@@ -1,6 +1,7 @@
 //! The columns' names: where the mapped ones stand.
 
 use super::cell::lossy;
+use super::keys::dataset::SKIP_ROWS;
 use super::lines::{Row, RowReader};
 use super::manifest::ColumnMapping;
 use super::names::unknown;
@@ -20,7 +21,7 @@ fn elsewhere(text: &str, (layout, mappings): (&TextLayout, &[ColumnMapping])) ->
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let found = text.lines().take(LINES_MAX).position(holds_names);
     found.map_or_else(String::new, |above| {
-        format!("; the names stand in line {}: set skip_rows = {above} in [dataset]", above + 1)
+        format!("; the names stand in line {}: {}", above + 1, SKIP_ROWS.advice(above))
     })
 }
 

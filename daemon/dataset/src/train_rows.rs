@@ -2,9 +2,9 @@
 
 use super::document::Item;
 use super::error::DatasetError;
+use super::keys::rows::{COLUMN, KEYS, VALUE};
+use super::keys::{allow, train_file::ROWS};
 
-/// The key in `[train]`.
-const KEY: &str = "rows";
 /// Its value where all rows are of one train, whatever a column says.
 const ALL: &str = "all";
 
@@ -28,22 +28,21 @@ pub enum TrainRows {
 impl TrainRows {
     /// Reads the key of `[train]`.
     pub(super) fn of(train: &Item) -> Result<Self, DatasetError> {
-        if !train.has(KEY) {
+        let (key, expected) = (ROWS.name, ROWS.rule.allowed);
+        if !train.has(key) {
             return Ok(TrainRows::Unsaid);
         }
-        let expected = "\"all\", or { column = \"…\", value = \"…\" } of the rows of this train";
-        if !train.need(KEY, expected)?.is_map() {
-            return match train.need_quoted(KEY, expected)? {
+        if !train.need(key, expected)?.is_map() {
+            return match ROWS.need_quoted(train)? {
                 ALL => Ok(TrainRows::All),
-                other => Err(train.key_out_of_range(KEY, &format!("{other:?}"), expected)),
+                other => Err(ROWS.refused(train, format_args!("{other:?}"))),
             };
         }
-        let section = train.need_table(KEY)?;
-        section.allow(&["column", "value"])?;
-        let text = |key, expected| Ok(section.need_quoted(key, expected)?.trim().to_owned());
+        let section = train.need_table(key)?;
+        allow(&section, KEYS)?;
         Ok(TrainRows::Of {
-            column: text("column", "the name of a column")?,
-            value: text("value", "the cell of this train's rows, quoted")?,
+            column: COLUMN.need_quoted(&section)?.trim().into(),
+            value: VALUE.need_quoted(&section)?.trim().into(),
         })
     }
 }

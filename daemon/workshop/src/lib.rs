@@ -17,7 +17,6 @@
 //! - [`report`]: an explanation as a page of HTML
 //! - [`run_facts`]: what is shown of a recorded run
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
-//! - [`track_text`]: the text of a line's file
 //! - [`verify`]: every recorded snapshot computed again
 
 pub mod annotation;
@@ -33,6 +32,5 @@ pub mod paths;
 pub mod report;
 pub mod run_facts;
 pub mod survey;
-pub mod track_text;
 pub mod updated;
 pub mod verify;

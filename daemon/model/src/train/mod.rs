@@ -1,115 +1,21 @@
 //! Declared model of a train.
 
-mod corrections;
-mod drive;
+mod effort;
+pub mod numbers;
+mod rule;
 
-pub use corrections::Corrections;
-pub use drive::Drive;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
-use crate::terms::extra::Extra;
-use crate::track::along_line;
-
-/// Davis coefficients of the unit basic resistance w0(v) = a + b v + c v² in N/kN, v in m/s.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Davis {
-    /// Speed-independent part in N/kN.
-    pub a: f64,
-    /// Linear part in N/kN per m/s.
-    pub b: f64,
-    /// Aerodynamic part in N/kN per (m/s)².
-    pub c: f64,
-}
-
+pub use effort::EffortCurve;
+pub use numbers::{
+    BrakeComponents, BrakeGear, Corrections, Davis, Drive, FrictionBrake, TrainModel,
+};
+pub use rule::{Joined, NumberRule};
 impl Davis {
     /// w0 in N/kN at a speed in m/s.
     pub fn w0_n_per_kn(&self, speed_mps: f64) -> f64 {
         self.a + speed_mps * (self.b + speed_mps * self.c)
     }
-}
-
-/// A piecewise linear curve of force over speed, held constant beyond its ends.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EffortCurve {
-    /// Points (speed in m/s, force in N), speeds strictly increasing; never empty.
-    points: Vec<(f64, f64)>,
-}
-
-impl EffortCurve {
-    /// A curve through points of strictly increasing, finite speed and finite force >= 0;
-    /// `None` when there is no point or one breaks the order.
-    pub fn new(points: Vec<(f64, f64)>) -> Option<Self> {
-        let is_finite = points.iter().all(|&(v, f)| v.is_finite() && f.is_finite() && f >= 0.0);
-        let is_ordered = points.windows(2).all(|pair| pair[0].0 < pair[1].0);
-        (!points.is_empty() && is_finite && is_ordered).then_some(EffortCurve { points })
-    }
-
-    /// Force in N at a speed in m/s.
-    pub fn force_n(&self, speed_mps: f64) -> f64 {
-        along_line(&self.points, speed_mps)
-    }
-
-    /// The points (speed in m/s, force in N).
-    pub fn points(&self) -> &[(f64, f64)] {
-        &self.points
-    }
-
-    /// The greatest force in N.
-    pub fn force_max_n(&self) -> f64 {
-        self.points.iter().map(|&(_, force)| force).fold(0.0, f64::max)
-    }
-}
-
-/// Brake gear, for adhesion, disc friction and braking ratio (Xie 2019, Jin 2020).
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BrakeGear {
-    /// Diameter of a brake cylinder in mm.
-    pub cylinder_diameter_mm: Option<f64>,
-    /// Mean friction radius of a brake disc in mm.
-    pub disc_radius_mm: Option<f64>,
-    /// Wheel radius in mm.
-    pub wheel_radius_mm: Option<f64>,
-    /// Efficiency of the brake rigging, 0 to 1.
-    pub efficiency: Option<f64>,
-    /// Braking ratio: lever ratio from cylinder to pad.
-    pub ratio: Option<f64>,
-    /// Friction coefficient between pad and disc.
-    pub friction: Option<f64>,
-    /// Number of brake pads on the train.
-    pub pads: Option<f64>,
-    /// Force of the friction brake from its pressure, where the force is not recorded.
-    pub friction_brake: Option<FrictionBrake>,
-    /// How its units differ and fail, where that is declared.
-    pub components: Option<BrakeComponents>,
-}
-
-/// The units of a brake, each of which gives the same share of its force: how they differ, from one to the
-/// next and from stop to stop, and how often one fails. Standard deviations are relative.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BrakeComponents {
-    /// Number of units that fail one by one.
-    pub units: u32,
-    /// Standard deviation of a unit's friction.
-    pub friction_std: f64,
-    /// Standard deviation of a unit's pressure.
-    pub pressure_std: f64,
-    /// Standard deviation of a unit's efficiency.
-    pub efficiency_std: f64,
-    /// Standard deviation of what all units have in common, as weather and a batch of pads.
-    pub common_std: f64,
-    /// Standard deviation of the train's mass.
-    pub mass_std: f64,
-    /// Probability that a unit gives nothing in a stop.
-    pub failure_probability: f64,
-}
-
-/// A friction brake that is known by its pressure: force = gain * (pressure - release pressure).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrictionBrake {
-    /// Force of the whole train in N for each Pa above the release pressure.
-    pub force_per_pressure_n_per_pa: f64,
-    /// Pressure in Pa up to which the brake is released.
-    pub release_pressure_pa: f64,
 }
 
 impl FrictionBrake {
@@ -119,43 +25,6 @@ impl FrictionBrake {
     }
 }
 
-/// A train as declared: the content of a `train.toml`, in SI units.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrainModel {
-    /// Name for people.
-    pub name: String,
-    /// Nominal gross mass in kg, without the rotating part.
-    pub mass_kg: f64,
-    /// Gross mass in kg with a full load, where it is declared; the nominal mass is the tare then.
-    pub full_mass_kg: Option<f64>,
-    /// Mass of a passenger in kg, where passengers are counted; the nominal mass is empty then.
-    pub passenger_mass_kg: f64,
-    /// Length in m.
-    pub length_m: f64,
-    /// Number of cars.
-    pub cars: u32,
-    /// Rotating-mass factor gamma: inertial mass = mass * (1 + gamma).
-    pub rotating_mass_factor: f64,
-    /// Declared basic resistance.
-    pub resistance: Davis,
-    /// k in the declared curve resistance k/R in N/kN, R in m.
-    pub curve_constant_n_per_kn_m: f64,
-    /// Declared tunnel resistance in N/kN per metre of tunnel length while inside.
-    pub tunnel_constant_n_per_kn_m: f64,
-    /// Greatest traction force over speed.
-    pub traction: Option<EffortCurve>,
-    /// Greatest brake force over speed.
-    pub brake: Option<EffortCurve>,
-    /// The drive, where it is declared by its electric power.
-    pub drive: Option<Drive>,
-    /// Brake gear, as far as declared.
-    pub brake_gear: BrakeGear,
-    /// Corrections by measured runs.
-    pub corrections: Corrections,
-    /// Resistances of forms of their own.
-    pub extra: Vec<Extra>,
-}
-
 impl TrainModel {
     /// A train of which only mass and basic resistance are declared: a point without rotating
     /// mass that nothing else holds back. Simulations set what else they need.
@@ -163,20 +32,9 @@ impl TrainModel {
         TrainModel {
             name: name.into(),
             mass_kg,
-            full_mass_kg: None,
-            passenger_mass_kg: 70.0,
-            length_m: 0.0,
-            cars: 1,
-            rotating_mass_factor: 0.0,
             resistance,
             curve_constant_n_per_kn_m: 0.0,
-            tunnel_constant_n_per_kn_m: 0.0,
-            traction: None,
-            brake: None,
-            drive: None,
-            brake_gear: BrakeGear::default(),
-            corrections: Corrections::default(),
-            extra: Vec::new(),
+            ..TrainModel::UNDECLARED
         }
     }
 
@@ -194,7 +52,8 @@ impl TrainModel {
 
     /// The highest speed in m/s of the effort curves; `None` without curves.
     pub fn speed_max_mps(&self) -> Option<f64> {
-        let last = |curve: &Option<EffortCurve>| curve.as_ref()?.points.last().map(|point| point.0);
+        let last =
+            |curve: &Option<EffortCurve>| curve.as_ref()?.points().last().map(|point| point.0);
         match (last(&self.traction), last(&self.brake)) {
             (Some(traction), Some(brake)) => Some(traction.max(brake)),
             (one, other) => one.or(other),
@@ -202,24 +61,64 @@ impl TrainModel {
     }
 }
 
+impl Drive {
+    /// Standard deviation of an efficiency that nobody declares: from transformers and gears under a light load to
+    /// power that is recorded at the wheels.
+    pub const EFFICIENCY_STD: f64 = 0.1;
+    /// Efficiencies that make sense.
+    pub const EFFICIENCIES: std::ops::RangeInclusive<f64> =
+        numbers::DRIVE_EFFICIENCY.rule.range[0]..=numbers::DRIVE_EFFICIENCY.rule.range[1];
+
+    /// Mechanical power in W at the rims, braking negative, of a recorded power in W.
+    pub fn mechanical_w(&self, recorded_w: f64) -> f64 {
+        let drive_w = recorded_w - self.auxiliary_power_w;
+        if drive_w >= 0.0 { self.efficiency * drive_w } else { drive_w / self.efficiency }
+    }
+
+    /// Traction minus brake force of the drive in N at a speed in m/s; `None` where it turns too
+    /// slowly for its power to determine the force.
+    pub fn force_n(&self, recorded_w: f64, speed_mps: f64) -> Option<f64> {
+        let is_known = recorded_w.is_finite() && speed_mps >= self.speed_min_mps;
+        is_known.then(|| self.mechanical_w(recorded_w) / speed_mps)
+    }
+
+    /// Returns the difference of the traction and the brake force in N, from a recorded power in W at a speed in
+    /// m/s, between this drive and another; `None` where either determines none.
+    pub fn beyond_n(&self, other: Drive, recorded_w: f64, speed_mps: f64) -> Option<[f64; 2]> {
+        let at = |drive: &Drive| drive.force_n(recorded_w, speed_mps);
+        let (own_n, other_n) = at(self).zip(at(&other))?;
+        Some([own_n.max(0.0) - other_n.max(0.0), other_n.min(0.0) - own_n.min(0.0)])
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const DRIVE: Drive = Drive { efficiency: 0.8, auxiliary_power_w: 10e3, speed_min_mps: 2.0 };
+
     #[test]
-    fn effort_is_linear_between_points_and_constant_beyond() {
-        let curve = EffortCurve::new(vec![(0.0, 300.0), (10.0, 300.0), (20.0, 100.0)]).unwrap();
-        assert_eq!(curve.force_n(-1.0), 300.0);
-        assert_eq!(curve.force_n(15.0), 200.0);
-        assert_eq!(curve.force_n(10.0), 300.0);
-        assert_eq!(curve.force_n(99.0), 100.0);
-        assert_eq!(curve.force_max_n(), 300.0);
+    fn a_drive_loses_on_the_way_to_the_wheels_and_on_the_way_back() {
+        // 100 kW for the drive: 80 kW at 10 m/s.
+        assert_eq!(DRIVE.force_n(110e3, 10.0), Some(8000.0));
+        // 80 kW come back of 100 kW that the wheels feed.
+        assert!((DRIVE.force_n(-70e3, 10.0).unwrap() + 10e3).abs() < 1e-9);
+        assert_eq!(DRIVE.force_n(10e3, 10.0), Some(0.0), "auxiliaries alone pull nothing");
     }
 
     #[test]
-    fn an_unordered_or_empty_curve_is_refused() {
-        assert_eq!(EffortCurve::new(vec![]), None);
-        assert_eq!(EffortCurve::new(vec![(1.0, 1.0), (1.0, 2.0)]), None);
-        assert_eq!(EffortCurve::new(vec![(0.0, f64::NAN)]), None);
+    fn a_better_drive_pulls_more_and_brakes_less_for_the_same_power() {
+        let better = Drive { efficiency: 1.0, ..DRIVE };
+        assert_eq!(better.beyond_n(DRIVE, 110e3, 10.0), Some([2000.0, 0.0]));
+        let [traction_n, brake_n] = better.beyond_n(DRIVE, -70e3, 10.0).unwrap();
+        assert!(traction_n == 0.0 && (brake_n + 2000.0).abs() < 1e-9, "{brake_n}");
+        assert_eq!(better.beyond_n(DRIVE, 110e3, 1.0), None);
+    }
+
+    #[test]
+    fn a_drive_that_hardly_turns_shows_no_force() {
+        assert_eq!(DRIVE.force_n(110e3, 1.99), None);
+        assert_eq!(DRIVE.force_n(110e3, f64::NAN), None);
+        assert_eq!(DRIVE.force_n(f64::NAN, 10.0), None);
     }
 }

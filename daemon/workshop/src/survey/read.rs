@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dynocar_analysis::dataset::keys::track::ALIGNMENT;
 use dynocar_analysis::dataset::{Dataset, ForceSource, Quantity, Role, Run};
 use dynocar_analysis::survey::alignment::Alignment;
 use dynocar_analysis::survey::common::Prior;
@@ -116,7 +117,8 @@ pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
     let wrong =
         |path: &Path, problem: String| SurveyFailure::SurveyedLine { path: path.into(), problem };
     let Some(alignment) = &track.survey.alignment else {
-        let problem = "expected alignment = \"…csv\", the line on the map, got none".into();
+        let expected = ALIGNMENT.assign("\"…csv\"");
+        let problem = format!("expected {expected}, the line on the map, got none");
         return Err(wrong(path, problem));
     };
     let folder = path.parent().unwrap_or(Path::new("."));

@@ -6,22 +6,13 @@ use std::path::Path;
 
 use crate::dataset::FilesOfDataset;
 use dynocar::dataset::{LoadError, read_text};
-use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar::models::text::TRAIN_FILE;
 use dynocar::output::{OutputError, require_new, write_in_folder};
 use dynocar_analysis::dataset::DatasetFiles;
-use toml::{Table, Value};
+use dynocar_analysis::dataset::written::{alignment_files, run_files};
+use toml::Table;
 
 use crate::paths::from_folder;
-
-/// Names the grown train and, where there is one, its line.
-pub fn name_model(manifest: &mut Table, has_track: bool) {
-    let file = |name: &str| Value::Table(Table::from_iter([("file".into(), name.into())]));
-    manifest.insert("train".into(), file(TRAIN_FILE));
-    match has_track {
-        true => manifest.insert("track".into(), file(TRACK_FILE)),
-        false => manifest.remove("track"),
-    };
-}
 
 /// Names the runs where they lie; those of a recording are written into the folder.
 ///
@@ -33,9 +24,7 @@ pub fn keep_runs(
     source: &FilesOfDataset,
     folder: &Path,
 ) -> Result<(), UpdatedModelError> {
-    let runs = manifest.get_mut("runs").and_then(Value::as_array_mut);
-    for run in runs.into_iter().flatten() {
-        let Some(Value::String(file)) = run.get_mut("file") else { continue };
+    for file in run_files(manifest) {
         if !source.is_recording() {
             *file = seen_from(folder, &source.path_of(file));
             continue;
@@ -59,11 +48,8 @@ pub fn keep_runs(
 /// Names the ways on the map, which lie beside the declared line's file.
 pub fn keep_alignments(track: &mut Table, declared: &Path, folder: &Path) {
     let beside = declared.parent().unwrap_or(Path::new(""));
-    let section = track.get_mut("track").and_then(Value::as_table_mut);
-    for (key, value) in section.into_iter().flatten() {
-        if let ("alignment" | "alignment_falling", Value::String(file)) = (&key[..], value) {
-            *file = seen_from(folder, &beside.join(&*file));
-        }
+    for file in alignment_files(track) {
+        *file = seen_from(folder, &beside.join(&*file));
     }
 }
 
