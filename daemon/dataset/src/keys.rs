@@ -108,7 +108,7 @@ macro_rules! keys {
     ($( #[doc = $doc:literal] $module:ident $table:literal { $( $key:ident $name:expr, $rule:expr; )* } )*) => { $(
         #[doc = $doc]
         pub mod $module {
-            use super::*;
+            use crate::keys::*;
 
             /// Name of the table.
             pub const TABLE: &str = $table;

@@ -318,11 +318,9 @@ fn runs(root: &Item, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, Dataset
         let run = run(&section)?;
         let has_date = |it: &ColumnMapping| it.format.as_ref().is_some_and(TimeFormat::has_date);
         if run.date_unix_s.is_some() && columns.iter().any(has_date) {
-            let (table, format) = (keys::column::TABLE, FORMAT.name);
-            return Err(section.place_of(DATE.name).problem(format!(
-                "{} and {table}.time.{format} with a date exclude each other: give one of them",
-                section.full(DATE.name)
-            )));
+            let (words, date) = ("exclude each other: give one of them", section.full(DATE.name));
+            let words = format!("{date} and columns.time.format with a date {words}");
+            return Err(section.place_of(DATE.name).problem(words));
         }
         let twin = runs.iter().find(|other| is_same_path(&other.file, &run.file));
         if let Some(first_line) = twin.and_then(|twin| twin.place.line) {
@@ -333,8 +331,7 @@ fn runs(root: &Item, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, Dataset
         runs.push(run);
     }
     if runs.is_empty() {
-        let key = keys::run::TABLE;
-        let words = format!("missing key {key}: expected at least one [[{key}]] table");
+        let words = "missing key runs: expected at least one [[runs]] table";
         return Err(root.place().problem(words));
     }
     Ok(runs)

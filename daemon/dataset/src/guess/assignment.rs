@@ -7,7 +7,6 @@ use super::facts::Facts;
 use super::guessed::{GivenColumn, GuessedColumn, Unmapped};
 use super::matching::{UNKNOWN_UNIT, can_hold, consider};
 use super::name::named_unit;
-use crate::keys::column::SCALE;
 use crate::{DatasetError, Quantity, SourcePosition};
 
 /// Logarithm of the ratio of a position's span and the integrated speed that gaps and wear explain.
@@ -385,10 +384,8 @@ pub fn settle(assignment: &mut Assignment) {
     }
     let turned = assignment.facts(BrakeForce).map(|facts| facts.signs());
     if turned.is_some_and(|(up, down)| down > up) {
-        assignment.turn(
-            BrakeForce,
-            &format!("its values are negative while it brakes: {}", SCALE.assign(-1)),
-        );
+        let scale = crate::keys::column::SCALE.assign(-1);
+        assignment.turn(BrakeForce, &format!("its values are negative while it brakes: {scale}"));
     }
     let has_control = assignment.has(ControlForce);
     for (handle, force) in [(TractionHandle, TractionForce), (BrakeHandle, BrakeForce)] {

@@ -63,7 +63,7 @@ pub struct Asked {
     pub key: &'static str,
     /// The question, with its unit.
     pub question: &'static str,
-    /// What stands beside it in the file.
+    /// Comment beside it in the file.
     note: &'static str,
 }
 
