@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
-use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::reading::{FileEnding, read};
 use dynocar_mcap::recording::Recording;
 use dynocar_shared::TrainId;
 use dynocar_tests::process::{Process, Site, Terminal, Tie, await_true};
@@ -134,7 +134,7 @@ fn has_samples(file: &Path) -> bool {
 
 fn assert_whole(file: &Path) {
     let mut recording = Recording::default();
-    assert_eq!(read(file, &mut recording).unwrap(), Ending::Whole, "{}", file.display());
+    assert_eq!(read(file, &mut recording).unwrap(), FileEnding::Whole, "{}", file.display());
     assert!(!recording.samples.is_empty(), "{}", file.display());
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant, SystemTime};
 
-use dynocar::models::{ModelText, Moment, Store, TrainModels};
+use dynocar::models::{ModelText, Store, TrainModels, UtcSecond};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 use dynocar_tests::process::{Process, Site};
@@ -274,7 +274,7 @@ fn the_time_of_the_day_comes_for_a_learner_whose_clock_is_set_forth_and_back() {
     const DAY_S: u64 = 86_400;
     let work = Workplace::of(&[]);
     let strange = StrangeHost::new(work.site.path(), work.site.path());
-    let now_s = Moment::of(SystemTime::now()).unix_s;
+    let now_s = UtcSecond::of(SystemTime::now()).unix_s;
     // In 5 to 6 hours.
     let at_s = now_s / 3600 * 3600 + 6 * 3600;
     let at = format!("{:02}:00", at_s / 3600 % 24);

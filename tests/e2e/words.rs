@@ -84,22 +84,20 @@ fn three_values_that_go_together_have_a_name() {
 /// Returns the name of the public type that a line declares.
 fn public_type(line: &str) -> Option<&str> {
     let kinds = ["struct ", "enum ", "trait ", "type "];
-    let item = line.strip_prefix("pub ")?;
+    let item = line.trim_start().strip_prefix("pub ")?;
     let name = kinds.iter().find_map(|kind| item.strip_prefix(kind))?;
     name.split(|it: char| !it.is_alphanumeric()).next()
 }
 
 #[test]
-fn a_public_type_has_a_name_of_its_own_in_its_package() {
+fn a_public_type_has_a_name_of_its_own_in_the_workspace() {
     let mut found = Vec::new();
-    for folder in FOLDERS {
-        let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();
-        for path in rust_files(folder).into_iter().filter(|path| !is_of_tests(path)) {
-            let text = std::fs::read_to_string(&path).expect("a source file");
-            for name in without_tests(&text).into_iter().filter_map(public_type) {
-                if let Some(other) = names.insert(name.to_owned(), path.clone()) {
-                    found.push(format!("{name}: {} and {}", other.display(), path.display()));
-                }
+    let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();
+    for path in FOLDERS.into_iter().flat_map(rust_files).filter(|path| !is_of_tests(path)) {
+        let text = std::fs::read_to_string(&path).expect("a source file");
+        for name in without_tests(&text).into_iter().filter_map(public_type) {
+            if let Some(other) = names.insert(name.to_owned(), path.clone()) {
+                found.push(format!("{name}: {} and {}", other.display(), path.display()));
             }
         }
     }
@@ -117,6 +115,7 @@ fn riddles_and_tuples_are_found_wherever_they_stand() {
     assert_eq!(tuple_parameter("    (a, b, c): (f64, f64, f64),"), Some(3));
     assert_eq!(tuple_parameter("fn f(x: u8, (a, mut b): (u8, u8)) {"), Some(2));
     assert_eq!(public_type("pub struct Row<'a> {"), Some("Row"));
+    assert_eq!(public_type("    pub type Row = [f64; 2];"), Some("Row"));
     assert_eq!(public_type("struct Row;"), None);
     assert_eq!(tuple_parameter("    let (a, b, c): (u8, u8, u8) = f();"), None);
 }

@@ -1,7 +1,7 @@
 //! The simulator's parts, each by itself.
 
-use dynocar_model::simulate::motion::Motion;
-use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::simulate::motion::SimulatedMotion;
+use dynocar_model::track::{Track, TrackCurve, Tunnel};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_tests::simulator::Deviations;
 use dynocar_tests::simulator::actuators::LateForces;
@@ -55,7 +55,7 @@ fn track() -> Track {
         "test".into(),
         None,
         Some(&[(0.0, 0.0), (1000.0, 8.0), (2500.0, -12.0)]),
-        Some(vec![Curve { start_m: 1500.0, end_m: 1900.0, radius_m: 300.0 }]),
+        Some(vec![TrackCurve { start_m: 1500.0, end_m: 1900.0, radius_m: 300.0 }]),
         Some(vec![Tunnel { start_m: 2600.0, end_m: 3000.0 }]),
     )
     .unwrap()
@@ -71,7 +71,7 @@ fn the_line_acts_with_the_sign_of_the_direction() {
         start_m,
         direction,
     };
-    let still = Motion { distance_m: 0.0, speed_mps: 10.0 };
+    let still = SimulatedMotion { distance_m: 0.0, speed_mps: 10.0 };
     let n_per_kn = |line: TrainOnLine<'_>| {
         -line.acceleration_mps2(still, Controls::default()) * 1000.0 * 1.08 / 9.81
     };

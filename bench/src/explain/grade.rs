@@ -9,7 +9,7 @@ use dynocar_tests::simulator::{Effect, SimulatedDataset};
 use serde_json::Value;
 
 use super::attainable::attainable_mps;
-use super::family::Case;
+use super::family::SimulatedCase;
 use super::parameters::{ParameterGrade, graded};
 use super::place::{ends_within, place_iou};
 
@@ -38,7 +38,11 @@ pub struct Grade {
 }
 
 /// Grades the explanation of a case.
-pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanation) -> Grade {
+pub fn grade(
+    simulated: &SimulatedDataset,
+    case: &SimulatedCase,
+    explanation: &Explanation,
+) -> Grade {
     let answer = &explanation.answer;
     let named: Vec<String> = answer.effects.iter().map(|effect| effect.kind.into()).collect();
     let verdict = answer.verdict.name();

@@ -10,7 +10,7 @@ use dynocar_shared::{EffortPoint, RailAdhesion, RailCondition, Stop, Uncertain};
 use super::braking::{PRESSURE_PA, STEP_S, XIE_TABLE_2, XIE_TABLE_3, train};
 use super::braking_score::{MIDDLE_STEPS, em, over_seeds, score};
 use super::braking_table::{Table, drawn_rows};
-use super::row::{Row, Seeds};
+use super::row::{PaperRow, Seeds};
 use crate::statistics::{KMH, mean};
 
 /// Initial values of both tables.
@@ -38,7 +38,7 @@ const TABLES: [Table; 2] = [
 ];
 
 /// Tables 2 and 3, the printed forms that fail, and the stopping distances.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = Vec::new();
     for table in &TABLES {
         rows.extend(table.comparison(seeds));
@@ -51,14 +51,14 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 }
 
 /// Returns the rows of the EM with the printed cap and the printed density.
-fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
+fn printed_forms(table: &Table, seeds: Seeds) -> Vec<PaperRow> {
     let capped = |initial, what| {
         let [score] = score(&table.braking, seeds, [MIDDLE_STEPS], |seed| {
             let (e_step, has_printed_cap) = (EStep::Kalman, true);
             let given = EmSettings { initial, seed, e_step, has_printed_cap, ..Default::default() };
             em(BrakingCoefficient::Adhesion, given)
         });
-        Row { paper_method: Some(score.relative_percent), ..table.row(what, "%", seeds) }
+        PaperRow { paper_method: Some(score.relative_percent), ..table.row(what, "%", seeds) }
     };
     let frozen = over_seeds(seeds, |seed| {
         // With the printed density the gradient is zero: the initial value is the estimate.
@@ -69,7 +69,7 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
     vec![
         capped(Some(0.05), "mean relative error, printed cap min(F, B), from 0.05"),
         capped(Some(0.12), "mean relative error, printed cap min(F, B), from 0.12"),
-        Row {
+        PaperRow {
             paper_method: Some(mean(&frozen)),
             ..table.row("mean relative error, printed uniform density", "%", seeds)
         },
@@ -97,7 +97,7 @@ const STOPS: [PublishedStop; 6] = {
 pub const PAPER_GRAVITY_MPS2: f64 = 9.8;
 
 /// Stopping distances and times: the paper's recursion in steps of 0.2 s and ours.
-fn stops() -> Vec<Row> {
+fn stops() -> Vec<PaperRow> {
     let train = train();
     let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");
     let force_n = gear.declared_force_n(PRESSURE_PA);
@@ -131,18 +131,18 @@ pub fn stop_rows(
     published: [f64; 2],
     (train, stop): (&TrainModel, &Stop<'_>),
     brake_n: impl Fn(f64) -> f64,
-) -> [Row; 2] {
+) -> [PaperRow; 2] {
     let ours = stop.estimate(0.95).expect("a stop");
     let (ours, in_steps) = ([ours.distance_m, ours.time_s], stop_in_steps(train, stop, brake_n));
     let quantities = [("distance", "m"), ("time", "s")];
     std::array::from_fn(|which| {
         let (name, unit) = quantities[which];
         let quantity = format!("braking {name}, {what}");
-        Row {
+        PaperRow {
             published: Some(published[which]),
             paper_method: Some(in_steps[which]),
             ours: Some(ours[which]),
-            ..Row::new(paper, table, quantity, unit, Seeds::from_zero(1))
+            ..PaperRow::new(paper, table, quantity, unit, Seeds::from_zero(1))
         }
     })
 }

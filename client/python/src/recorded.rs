@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
 use dynocar::cli::check::refusal;
-use dynocar::dataset::{Source, SourceArguments};
+use dynocar::dataset::{DatasetSource, SourceArguments};
 use dynocar::output::OutputError;
 use dynocar_shared::TrainId;
 use dynocar_workshop::cli::check as checking;
@@ -25,8 +25,8 @@ pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
 }
 
 /// A path and the train that is meant.
-fn of(path: &Path, train: Option<u64>) -> Source<'_> {
-    Source { path, train: train.map(TrainId) }
+fn of(path: &Path, train: Option<u64>) -> DatasetSource<'_> {
+    DatasetSource { path, train: train.map(TrainId) }
 }
 
 /// Returns the description of a path; its errors are part of the answer.

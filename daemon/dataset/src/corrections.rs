@@ -1,6 +1,6 @@
 //! `[corrections]` and `[[extra]]` of a `train.toml`: what measured runs add to the declared model.
 
-use dynocar_model::terms::extra::{Covariate, Extra, FACTORS_MAX, Factor, Form};
+use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, FACTORS_MAX, Form};
 
 use super::document::Item;
 use super::error::DatasetError;
@@ -9,11 +9,11 @@ use super::keys::factor::{FORM, OF};
 use super::keys::{self, extra};
 
 /// Reads the tables of a train file; none where none stand there.
-pub(super) fn read_extra(root: &Item) -> Result<Vec<Extra>, DatasetError> {
+pub(super) fn read_extra(root: &Item) -> Result<Vec<ExtraResistance>, DatasetError> {
     root.tables(extra::TABLE)?.iter().map(extra_of).collect()
 }
 
-fn extra_of(section: &Item) -> Result<Extra, DatasetError> {
+fn extra_of(section: &Item) -> Result<ExtraResistance, DatasetError> {
     keys::allow(section, extra::KEYS)?;
     let n_per_kn = FORCE.number(section)?.unwrap_or(0.0);
     let tables = section.tables(FACTORS.name)?;
@@ -21,10 +21,10 @@ fn extra_of(section: &Item) -> Result<Extra, DatasetError> {
         return Err(FACTORS.refused(section, format_args!("{} of them", tables.len())));
     }
     let factors = tables.iter().map(factor).collect::<Result<_, _>>()?;
-    Ok(Extra { n_per_kn, factors })
+    Ok(ExtraResistance { n_per_kn, factors })
 }
 
-fn factor(section: &Item) -> Result<Factor, DatasetError> {
+fn factor(section: &Item) -> Result<CovariateFactor, DatasetError> {
     let covariates = Covariate::ALL.map(Covariate::name);
     let named = (("covariate", OF.rule.allowed), Covariate::from_name);
     let of = section.need_named(OF.name, named.0, named.1, covariates)?;
@@ -38,7 +38,7 @@ fn factor(section: &Item) -> Result<Factor, DatasetError> {
         *number = section.required(name, "a number", ..)?;
     }
     match form.refusal(numbers) {
-        None => Ok(Factor { of, form, numbers }),
+        None => Ok(CovariateFactor { of, form, numbers }),
         Some(expected) => {
             let named = form.numbers().iter().zip(numbers);
             let found: Vec<String> =
@@ -79,7 +79,7 @@ mod tests {
 #[cfg(test)]
 mod extra_tests {
     use crate::parse_train;
-    use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
+    use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, Form};
 
     const TRAIN: &str = "[train]\nmass_t = 10\nlength_m = 1\nrotating_mass_factor = 0\n\
                          [resistance]\na = 1\nb = 0\nc = 0\n[[extra]]\nn_per_kn = 0.8\n";
@@ -95,9 +95,13 @@ mod extra_tests {
                     form = \"below\"\nuntil = 5\nspan = 10\n";
         let train = parse_train("train.toml", &format!("{TRAIN}{text}")).unwrap();
         let hyperbola =
-            Factor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
-        let below = Factor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
-        assert_eq!(train.extra, [Extra { n_per_kn: 0.8, factors: vec![hyperbola, below] }]);
+            CovariateFactor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
+        let below =
+            CovariateFactor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
+        assert_eq!(
+            train.extra,
+            [ExtraResistance { n_per_kn: 0.8, factors: vec![hyperbola, below] }]
+        );
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::cell::lossy;
 use super::keys::dataset::SKIP_ROWS;
-use super::lines::{Row, RowReader};
+use super::lines::{CellRow, RowReader};
 use super::manifest::ColumnMapping;
 use super::names::unknown;
 use super::text_layout::TextLayout;
@@ -13,7 +13,7 @@ const LINES_MAX: usize = 100;
 /// In which line the names stand instead, where that is found.
 fn elsewhere(text: &str, (layout, mappings): (&TextLayout, &[ColumnMapping])) -> String {
     let holds_names = |line: &str| {
-        let mut row = Row::default();
+        let mut row = CellRow::default();
         let is_read = RowReader::new(line, layout.delimiter, layout.decimal).read(&mut row);
         let cells = names_of(&row);
         is_read && mappings.iter().flat_map(ColumnMapping::names).all(|name| cells.contains(name))
@@ -26,7 +26,7 @@ fn elsewhere(text: &str, (layout, mappings): (&TextLayout, &[ColumnMapping])) ->
 }
 
 /// The names in a row, without spaces around them.
-pub fn names_of(row: &Row) -> Vec<String> {
+pub fn names_of(row: &CellRow) -> Vec<String> {
     row.cells.iter().map(|cell| lossy(&cell.text).trim().to_owned()).collect()
 }
 

@@ -1,7 +1,7 @@
 //! Judgement of a recorded run by validation and the laws that judge samples live.
 
 use dynocar_core::plausibility::diagnosis::gradient_fault;
-use dynocar_core::plausibility::window_balance::Balance;
+use dynocar_core::plausibility::window_balance::WindowBalance;
 use dynocar_core::plausibility::{DetectedFaults, Plausibility};
 use dynocar_model::force::ForceResolver;
 use dynocar_model::validation::Validator;
@@ -14,7 +14,7 @@ pub(super) struct Judge {
     validator: Validator,
     resolver: ForceResolver,
     plausibility: Plausibility,
-    balance: Balance,
+    balance: WindowBalance,
     /// False for positions that were integrated from the speed, which show nothing about it.
     is_position_recorded: bool,
     rows: usize,
@@ -30,7 +30,7 @@ impl Judge {
             validator: Validator::new(DATASET_TRAIN, nominal_mass_kg),
             resolver: ForceResolver::new(context.train.clone(), context.track.cloned()),
             plausibility: Plausibility::new(context.train.clone()),
-            balance: Balance::of_all(),
+            balance: WindowBalance::of_all(),
             is_position_recorded,
             rows: 0,
             refused: [(0, 0); RejectionReason::ALL.len()],
@@ -71,7 +71,7 @@ impl Judge {
     }
 
     /// Returns how forces, gradients and accelerations go together over the whole run.
-    pub fn balance(&self) -> Balance {
+    pub fn balance(&self) -> WindowBalance {
         self.balance
     }
 

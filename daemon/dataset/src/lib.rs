@@ -46,7 +46,6 @@ mod judge;
 pub mod keys;
 mod lines;
 pub mod manifest;
-mod motion;
 mod names;
 pub mod node;
 mod order;
@@ -55,6 +54,7 @@ pub mod quantity;
 mod resolved;
 pub mod run;
 mod run_content;
+mod speed_and_position;
 mod spikes;
 pub mod stamps;
 mod table;
@@ -76,13 +76,13 @@ pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
 pub use forces::ForceSource;
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
-pub use motion::PositionSource;
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use resolved::{DATASET_TRAIN, GradientSource};
-pub use run::{EXTRAS, Extra, Run, is_parquet, recorded_unix_s};
+pub use run::{EXTRAS, QuantitySeries, Run, is_parquet, recorded_unix_s};
 pub use run_content::{RunColumn, RunColumns, RunContent, TrainColumn};
+pub use speed_and_position::PositionSource;
 pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
@@ -92,7 +92,7 @@ pub use unusual_resistance::unusual_resistance;
 use std::sync::Arc;
 
 use dynocar_model::track::Track;
-use dynocar_model::train::{Drive, TrainModel};
+use dynocar_model::train::{PowerTrain, TrainModel};
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
 
@@ -183,9 +183,9 @@ impl Dataset {
     }
 
     /// The same with the forces that come from power taken from another drive.
-    pub fn with_drive(&self, drive: Drive) -> Dataset {
+    pub fn with_drive(&self, drive: PowerTrain) -> Dataset {
         let mut dataset = self.clone();
-        let before = self.train.drive.unwrap_or(Drive::USUAL);
+        let before = self.train.drive.unwrap_or(PowerTrain::USUAL);
         for run in &mut dataset.runs {
             run.retake_forces(before, drive);
         }

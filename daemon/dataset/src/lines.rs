@@ -15,14 +15,14 @@ pub struct Cell<'t> {
 
 /// A row of cells; never blank.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row<'t> {
+pub struct CellRow<'t> {
     /// The cells.
     pub cells: Vec<Cell<'t>>,
     /// The line of the text, from 1, in which it begins.
     pub line: usize,
 }
 
-impl Row<'_> {
+impl CellRow<'_> {
     /// The text of a cell, trimmed of spaces; empty beyond the last one.
     pub fn trimmed(&self, index: usize) -> &[u8] {
         self.cells.get(index).map_or(b"", |cell| cell.text.trim_ascii())
@@ -58,7 +58,7 @@ impl<'t> RowReader<'t> {
     }
 
     /// Reads the next row; false where there is none.
-    pub fn read(&mut self, row: &mut Row<'t>) -> bool {
+    pub fn read(&mut self, row: &mut CellRow<'t>) -> bool {
         row.cells.clear();
         while let [mark @ (b'\n' | b'\r'), rest @ ..] = self.rest {
             self.line += usize::from(*mark == b'\n');
@@ -194,7 +194,7 @@ mod tests {
 
     /// The rows of a text, with their lines.
     fn rows(text: &str, delimiter: u8) -> Vec<(usize, Vec<String>)> {
-        let (mut reader, mut row) = (RowReader::new(text, delimiter, b'.'), Row::default());
+        let (mut reader, mut row) = (RowReader::new(text, delimiter, b'.'), CellRow::default());
         let mut rows = Vec::new();
         while reader.read(&mut row) {
             let cells = row.cells.iter();
@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn plain_numbers_are_those_that_fill_their_cell() {
         let (mut reader, mut row) =
-            (RowReader::new("1.5,-2,3e4,,7 ,9", b',', b'.'), Row::default());
+            (RowReader::new("1.5,-2,3e4,,7 ,9", b',', b'.'), CellRow::default());
         assert!(reader.read(&mut row));
         let plain: Vec<Option<f64>> = row.cells.iter().map(|cell| cell.plain).collect();
         assert_eq!(plain, [Some(1.5), Some(-2.0), None, None, None, Some(9.0)]);

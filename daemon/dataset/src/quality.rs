@@ -41,7 +41,7 @@ pub struct RunQuality {
     pub position_range_m: Option<(f64, f64)>,
     /// The mass in kg that the samples carry; `None` where they carry none, so that the train's nominal
     /// one holds.
-    pub mass_kg: Option<Spread>,
+    pub mass_kg: Option<MeanAndRange>,
     /// Distance in m by integrating the speed.
     pub distance_m: f64,
     /// Phases of the train's motion, and their durations.
@@ -77,7 +77,7 @@ fn by_name<S: Serializer>(reason: &RejectionReason, serializer: S) -> Result<S::
 
 /// Mean and range of a quantity over a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct MeanAndRange {
     /// The mean over the samples.
     pub mean: f64,
     /// The lowest.
@@ -186,12 +186,12 @@ fn noise_below_zero(run: &Resolved) -> Vec<QuantityCount> {
     counts(all)
 }
 
-fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
+fn spread(values: impl Iterator<Item = f64>) -> Option<MeanAndRange> {
     let (mut low, mut high, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
     for value in values {
         (low, high, sum, count) = (low.min(value), high.max(value), sum + value, count + 1.0);
     }
-    (count > 0.0).then_some(Spread { mean: sum / count, low, high })
+    (count > 0.0).then_some(MeanAndRange { mean: sum / count, low, high })
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

@@ -1,8 +1,8 @@
 //! `track.toml`.
 
 use dynocar_model::track::{
-    Curve, GradientError, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackError,
-    TrackSurvey, Tunnel,
+    GradientError, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackCurve,
+    TrackError, TrackSurvey, Tunnel,
 };
 use dynocar_model::train::NumberRule;
 
@@ -44,7 +44,7 @@ pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
     let name = NAME.quoted(&section)?.unwrap_or(UNNAMED).into();
     let profile = gradient.as_ref().map(|(list, _)| &list[..]);
     let to_curve =
-        |&([start_m, end_m, radius_m], _): &([f64; 3], _)| Curve { start_m, end_m, radius_m };
+        |&([start_m, end_m, radius_m], _): &([f64; 3], _)| TrackCurve { start_m, end_m, radius_m };
     let to_tunnel = |&([start_m, end_m], _): &([f64; 2], _)| Tunnel { start_m, end_m };
     let of_curves = curves.as_ref().map(|list| list.iter().map(to_curve).collect());
     let of_tunnels = tunnels.as_ref().map(|list| list.iter().map(to_tunnel).collect());

@@ -3,8 +3,8 @@
 
 use std::fmt::{Display, Write as _};
 
-use dynocar_model::terms::extra::{Extra, Factor};
-use dynocar_model::terms::{Entry, Key};
+use dynocar_model::terms::extra::{CovariateFactor, ExtraResistance};
+use dynocar_model::terms::{Key, ModelEntry};
 use toml::{Table, Value};
 
 use super::keys::{self, FileKey, extra, factor, track};
@@ -86,30 +86,32 @@ impl TomlText {
 }
 
 /// True for an entry that the files may hold in addition to what they hold already.
-pub fn can_hold(entry: &Entry, train: &Table, track: &Table) -> bool {
+pub fn can_hold(entry: &ModelEntry, train: &Table, track: &Table) -> bool {
     match entry {
-        Entry::Number(key, found) => key.rule.allows(joined(key, train, *found)),
-        Entry::Extra(_) | Entry::TrackNumber(..) | Entry::Rows(..) => true,
+        ModelEntry::Number(key, found) => key.rule.allows(joined(key, train, *found)),
+        ModelEntry::Extra(_) | ModelEntry::TrackNumber(..) | ModelEntry::Rows(..) => true,
         // Such a list stands alone.
-        Entry::List(name, _) => track.get(track::TABLE).and_then(|own| own.get(name)).is_none(),
+        ModelEntry::List(name, _) => {
+            track.get(track::TABLE).and_then(|own| own.get(name)).is_none()
+        }
     }
 }
 
 /// Adds an entry to the files.
-pub fn write_entry(entry: Entry, train: &mut Table, track: &mut Table) {
+pub fn write_entry(entry: ModelEntry, train: &mut Table, track: &mut Table) {
     match entry {
-        Entry::Number(key, found) => set(train, key, joined(key, train, found)),
-        Entry::Extra(found) => {
+        ModelEntry::Number(key, found) => set(train, key, joined(key, train, found)),
+        ModelEntry::Extra(found) => {
             let tables = train.entry(extra::TABLE).or_insert_with(|| Value::Array(Vec::new()));
             if let Some(tables) = tables.as_array_mut() {
                 tables.push(Value::Table(extra_table(&found)));
             }
         }
-        Entry::TrackNumber(name, found) => {
+        ModelEntry::TrackNumber(name, found) => {
             let declared = number(track, track::TABLE, name).unwrap_or(0.0);
             insert(track, track::TABLE, name, Value::Float(declared + found));
         }
-        Entry::Rows(name, rows) | Entry::List(name, rows) => {
+        ModelEntry::Rows(name, rows) | ModelEntry::List(name, rows) => {
             if let Some(list) = track_list(track, name) {
                 list.extend(rows.into_iter().map(Value::from));
             }
@@ -118,8 +120,8 @@ pub fn write_entry(entry: Entry, train: &mut Table, track: &mut Table) {
 }
 
 /// A table of `[[extra]]`.
-fn extra_table(found: &Extra) -> Table {
-    let of_factor = |it: &Factor| {
+fn extra_table(found: &ExtraResistance) -> Table {
+    let of_factor = |it: &CovariateFactor| {
         let named = [(factor::OF, it.of.name()), (factor::FORM, it.form.name())];
         let named = named.map(|(key, name)| (key.name.into(), name.into()));
         let numbers = it.form.numbers().iter().zip(it.numbers);
@@ -207,8 +209,8 @@ mod tests {
     fn a_finding_joins_what_is_declared_by_the_rule_of_its_key() {
         let declared = "[corrections]\ntraction_gain = 1.1\nwind_plus_mps = 2";
         let (mut train, mut track): (Table, Table) = (declared.parse().unwrap(), Table::new());
-        write_entry(Entry::Number(&traction::GAIN, 0.9), &mut train, &mut track);
-        write_entry(Entry::Number(&wind::WIND_PLUS, 3.0), &mut train, &mut track);
+        write_entry(ModelEntry::Number(&traction::GAIN, 0.9), &mut train, &mut track);
+        write_entry(ModelEntry::Number(&wind::WIND_PLUS, 3.0), &mut train, &mut track);
         assert_eq!(train["corrections"]["traction_gain"], Value::Float(1.1 * 0.9));
         assert_eq!(train["corrections"]["wind_plus_mps"], Value::Float(5.0));
         assert!(track.is_empty());
@@ -217,7 +219,7 @@ mod tests {
     #[test]
     fn what_belongs_to_the_line_makes_its_file_where_there_is_none() {
         let (mut train, mut track) = (Table::new(), Table::new());
-        let entry = Entry::Rows(place::LIST, vec![vec![1000.0, 2000.0, 1.5]]);
+        let entry = ModelEntry::Rows(place::LIST, vec![vec![1000.0, 2000.0, 1.5]]);
         assert!(can_hold(&entry, &train, &track));
         write_entry(entry, &mut train, &mut track);
         let expected: Table = "[track]\nresistance = [[1000.0, 2000.0, 1.5]]".parse().unwrap();
@@ -227,9 +229,9 @@ mod tests {
     #[test]
     fn what_no_file_may_hold_is_not_written() {
         let (train, track) = (Table::new(), Table::new());
-        assert!(can_hold(&Entry::Number(&traction::GAIN, 1.4), &train, &track));
-        assert!(!can_hold(&Entry::Number(&traction::GAIN, 2.4), &train, &track));
-        let list = Entry::List(gradient::ERROR, Vec::new());
+        assert!(can_hold(&ModelEntry::Number(&traction::GAIN, 1.4), &train, &track));
+        assert!(!can_hold(&ModelEntry::Number(&traction::GAIN, 2.4), &train, &track));
+        let list = ModelEntry::List(gradient::ERROR, Vec::new());
         assert!(can_hold(&list, &train, &track));
         let track = "[track]\ngradient_error = [[0.0, 1.0]]".parse().unwrap();
         assert!(!can_hold(&list, &train, &track));

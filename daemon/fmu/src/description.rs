@@ -8,7 +8,9 @@ use dynocar_shared::{Reason, Status};
 use super::estimators::{self, ESTIMATORS};
 use super::plant::{self, PLANT};
 use super::units;
-use super::variables::{Begins, Interface, Kind, MISSING, Meaning, Variable, Vocabulary};
+use super::variables::{
+    Begins, FmiEnumeration, Interface, MISSING, Variable, VariableMeaning, VariableType,
+};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -43,7 +45,7 @@ pub fn model_description(interface: &Interface, step_s: f64) -> String {
     if interface.guid == ESTIMATORS.guid {
         // Outputs change by a step alone, and at first depend on the files alone.
         push_unknowns(&mut xml, interface, "Outputs", Some(""));
-        let is_file = |variable: &Variable| matches!(variable.meaning, Meaning::File(_));
+        let is_file = |variable: &Variable| matches!(variable.meaning, VariableMeaning::File(_));
         let files = indices(interface, is_file).join(" ");
         push_unknowns(&mut xml, interface, "InitialUnknowns", Some(&files));
     } else {
@@ -55,7 +57,7 @@ pub fn model_description(interface: &Interface, step_s: f64) -> String {
 }
 
 fn has_vocabularies(interface: &Interface) -> bool {
-    interface.variables.iter().any(|it| matches!(it.meaning.kind(), Kind::Enumeration(_)))
+    interface.variables.iter().any(|it| matches!(it.meaning.kind(), VariableType::Enumeration(_)))
 }
 
 fn push_units(xml: &mut String) {
@@ -83,24 +85,29 @@ fn push_types(xml: &mut String) {
 }
 
 /// A vocabulary with the names and numbers of its members.
-type Members = (Vocabulary, Vec<(&'static str, u32)>);
+type Members = (FmiEnumeration, Vec<(&'static str, u32)>);
 
 fn vocabularies() -> [Members; 3] {
     [
-        (Vocabulary::Status, Status::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
-        (Vocabulary::Reason, Reason::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
-        (Vocabulary::Effect, EffectKind::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
+        (FmiEnumeration::Status, Status::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
+        (FmiEnumeration::Reason, Reason::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
+        (
+            FmiEnumeration::Effect,
+            EffectKind::ALL.iter().map(|it| (it.name(), *it as u32)).collect(),
+        ),
     ]
 }
 
 fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_continuous: bool) {
     let Variable { name, meaning, unit, description } = variable;
     let nature = match meaning {
-        Meaning::Driven(_) => r#"variability="continuous" initial="calculated""#,
-        Meaning::File(_) | Meaning::Begins(_) => r#"variability="fixed" initial="exact""#,
-        Meaning::Estimate(..) => r#"variability="discrete" initial="calculated""#,
+        VariableMeaning::Driven(_) => r#"variability="continuous" initial="calculated""#,
+        VariableMeaning::File(_) | VariableMeaning::Begins(_) => {
+            r#"variability="fixed" initial="exact""#
+        }
+        VariableMeaning::Estimate(..) => r#"variability="discrete" initial="calculated""#,
         // An input with a slope is continuous.
-        Meaning::Measured(_) if is_continuous => r#"variability="continuous""#,
+        VariableMeaning::Measured(_) if is_continuous => r#"variability="continuous""#,
         _ => r#"variability="discrete""#,
     };
     let causality = meaning.causality();
@@ -113,7 +120,7 @@ fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_con
         ),
     );
     let mut attributes = String::new();
-    if let Kind::Enumeration(vocabulary) = meaning.kind() {
+    if let VariableType::Enumeration(vocabulary) = meaning.kind() {
         attributes += &format!(" declaredType=\"{}\"", vocabulary.name());
     }
     if *unit != units::NONE {
@@ -127,15 +134,15 @@ fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_con
 }
 
 /// Returns the start value of a variable, unless it is calculated.
-fn start(meaning: Meaning) -> Option<String> {
+fn start(meaning: VariableMeaning) -> Option<String> {
     match meaning {
-        Meaning::File(_) => Some(String::new()),
-        Meaning::Measured(_) => Some(format!("{MISSING:e}")),
-        Meaning::Run | Meaning::Direction => Some("1".into()),
-        Meaning::WheelSlide => Some("false".into()),
-        Meaning::Begins(Begins::HeldAtRest) => Some("true".into()),
-        Meaning::Begins(_) => Some("0".into()),
-        Meaning::Estimate(..) | Meaning::Driven(_) => None,
+        VariableMeaning::File(_) => Some(String::new()),
+        VariableMeaning::Measured(_) => Some(format!("{MISSING:e}")),
+        VariableMeaning::Run | VariableMeaning::Direction => Some("1".into()),
+        VariableMeaning::WheelSlide => Some("false".into()),
+        VariableMeaning::Begins(Begins::HeldAtRest) => Some("true".into()),
+        VariableMeaning::Begins(_) => Some("0".into()),
+        VariableMeaning::Estimate(..) | VariableMeaning::Driven(_) => None,
     }
 }
 
@@ -168,7 +175,7 @@ pub fn documentation(interface: &Interface) -> String {
     );
     for Variable { name, meaning, unit, description } in *variables {
         let kind = match meaning.kind() {
-            Kind::Enumeration(vocabulary) => vocabulary.name(),
+            VariableType::Enumeration(vocabulary) => vocabulary.name(),
             kind => kind.name(),
         };
         let cells = [*name, meaning.causality(), kind, unit.name, *description];

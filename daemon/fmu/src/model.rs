@@ -8,12 +8,12 @@ use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 
 use crate::error::ModelError;
 use crate::estimators::{ESTIMATORS, Estimators};
-use crate::files::Files;
+use crate::files::DescriptionFiles;
 use crate::inputs::{Inputs, nanoseconds};
 use crate::plant::{
     BEGINNING, STEP_MAX_S, least_step_s, reported, require_drivable, with_beginning,
 };
-use crate::variables::{Begins, Interface, Kind, Meaning, SnapshotField, Variable};
+use crate::variables::{Begins, Interface, SnapshotField, Variable, VariableMeaning, VariableType};
 
 /// By so much of the time a point may be off, as sums of steps are rounded.
 const POINT_TOLERANCE: f64 = 1e-9;
@@ -54,7 +54,7 @@ enum Behind {
 pub struct Model {
     interface: &'static Interface,
     phase: Phase,
-    files: Files,
+    files: DescriptionFiles,
     inputs: Inputs,
     /// How the driven train begins, and when in s.
     beginning: Beginning,
@@ -72,7 +72,7 @@ impl Model {
         Model {
             interface,
             phase: Phase::Instantiated,
-            files: Files::of(resources),
+            files: DescriptionFiles::of(resources),
             inputs: Inputs::default(),
             beginning: BEGINNING,
             start_s: 0.0,
@@ -213,14 +213,18 @@ impl Model {
     ///
     /// If there is no such variable of this type, or after a fault.
     pub fn real(&self, reference: u32) -> Result<f64, ModelError> {
-        let variable = self.got(reference, Kind::Real)?;
+        let variable = self.got(reference, VariableType::Real)?;
         Ok(match variable.meaning {
-            Meaning::Measured(field) => self.inputs.get(field),
-            Meaning::Begins(Begins::Speed) => self.beginning.speed_mps,
-            Meaning::Begins(Begins::Position) => self.beginning.position_m,
+            VariableMeaning::Measured(field) => self.inputs.get(field),
+            VariableMeaning::Begins(Begins::Speed) => self.beginning.speed_mps,
+            VariableMeaning::Begins(Begins::Position) => self.beginning.position_m,
             meaning => match (meaning, &self.behind) {
-                (Meaning::Estimate(of, reported), Behind::Estimators(it)) => it.real(of, reported),
-                (Meaning::Driven(what), Behind::Plant(train)) => Some(reported(train, what)),
+                (VariableMeaning::Estimate(of, reported), Behind::Estimators(it)) => {
+                    it.real(of, reported)
+                }
+                (VariableMeaning::Driven(what), Behind::Plant(train)) => {
+                    Some(reported(train, what))
+                }
                 _ => None,
             }
             .unwrap_or(f64::NAN),
@@ -233,11 +237,13 @@ impl Model {
     ///
     /// If there is no such variable of this type, or after a fault.
     pub fn integer(&self, reference: u32) -> Result<i32, ModelError> {
-        let variable = self.got(reference, Kind::Integer)?;
+        let variable = self.got(reference, VariableType::Integer)?;
         let number: u64 = match (variable.meaning, &self.behind) {
-            (Meaning::Direction, _) => return Ok(self.inputs.sample.direction.into()),
-            (Meaning::Run, _) => self.inputs.sample.run.into(),
-            (Meaning::Estimate(of, reported), Behind::Estimators(it)) => it.integer(of, reported),
+            (VariableMeaning::Direction, _) => return Ok(self.inputs.sample.direction.into()),
+            (VariableMeaning::Run, _) => self.inputs.sample.run.into(),
+            (VariableMeaning::Estimate(of, reported), Behind::Estimators(it)) => {
+                it.integer(of, reported)
+            }
             _ => 0,
         };
         Ok(i32::try_from(number).unwrap_or(i32::MAX))
@@ -249,11 +255,12 @@ impl Model {
     ///
     /// If there is no such variable of this type, or after a fault.
     pub fn boolean(&self, reference: u32) -> Result<bool, ModelError> {
-        Ok(match (self.got(reference, Kind::Boolean)?.meaning, &self.behind) {
-            (Meaning::Begins(_), _) => self.beginning.is_held_at_rest,
-            (Meaning::Estimate(of, SnapshotField::Usable(quantity)), Behind::Estimators(it)) => {
-                it.is_usable(of, quantity)
-            }
+        Ok(match (self.got(reference, VariableType::Boolean)?.meaning, &self.behind) {
+            (VariableMeaning::Begins(_), _) => self.beginning.is_held_at_rest,
+            (
+                VariableMeaning::Estimate(of, SnapshotField::Usable(quantity)),
+                Behind::Estimators(it),
+            ) => it.is_usable(of, quantity),
             _ => self.inputs.sample.flags & FLAG_WHEEL_SLIDE != 0,
         })
     }
@@ -264,8 +271,8 @@ impl Model {
     ///
     /// If there is no such variable of this type, or after a fault.
     pub fn string(&self, reference: u32) -> Result<&CStr, ModelError> {
-        let variable = self.got(reference, Kind::String)?;
-        let Meaning::File(file) = variable.meaning else { return Ok(c"") };
+        let variable = self.got(reference, VariableType::String)?;
+        let VariableMeaning::File(file) = variable.meaning else { return Ok(c"") };
         Ok(self.files.path(file))
     }
 
@@ -276,10 +283,10 @@ impl Model {
     ///
     /// When it is no input of this type, a beginning that no train has, or in the wrong order.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<(), ModelError> {
-        let Variable { name, meaning, .. } = *self.to_be_set(reference, Kind::Real)?;
+        let Variable { name, meaning, .. } = *self.to_be_set(reference, VariableType::Real)?;
         match meaning {
-            Meaning::Measured(field) => self.inputs.set(field, value),
-            Meaning::Begins(begins) => {
+            VariableMeaning::Measured(field) => self.inputs.set(field, value),
+            VariableMeaning::Begins(begins) => {
                 self.require_parameter()?;
                 let beginning = with_beginning(self.beginning, begins, value);
                 let expected = "a number, and no negative speed";
@@ -309,7 +316,9 @@ impl Model {
             let (name, value) = ("order of a derivative", order.into());
             return Err(ModelError::BadValue { name, value, expected: "1" });
         }
-        if let Meaning::Measured(field) = self.to_be_set(reference, Kind::Real)?.meaning {
+        if let VariableMeaning::Measured(field) =
+            self.to_be_set(reference, VariableType::Real)?.meaning
+        {
             self.inputs.set_slope(field, value);
         }
         Ok(())
@@ -321,13 +330,13 @@ impl Model {
     ///
     /// When it is no input of this type, a negative run, or in the wrong order.
     pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<(), ModelError> {
-        let Variable { name, meaning, .. } = *self.to_be_set(reference, Kind::Integer)?;
+        let Variable { name, meaning, .. } = *self.to_be_set(reference, VariableType::Integer)?;
         let bad = |expected| ModelError::BadValue { name, value: value.into(), expected };
         match meaning {
-            Meaning::Run => {
+            VariableMeaning::Run => {
                 self.inputs.sample.run = u32::try_from(value).map_err(|_| bad("0 or more"))?;
             }
-            Meaning::Direction => {
+            VariableMeaning::Direction => {
                 self.inputs.sample.direction = i8::try_from(value).map_err(|_| bad("1 or -1"))?;
             }
             _ => {}
@@ -341,7 +350,9 @@ impl Model {
     ///
     /// When it is no input of this type, or in the wrong order.
     pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<(), ModelError> {
-        if let Meaning::Begins(_) = self.to_be_set(reference, Kind::Boolean)?.meaning {
+        if let VariableMeaning::Begins(_) =
+            self.to_be_set(reference, VariableType::Boolean)?.meaning
+        {
             self.require_parameter()?;
             self.beginning.is_held_at_rest = value;
             self.behind = Behind::Nothing;
@@ -357,12 +368,12 @@ impl Model {
     ///
     /// When it is no parameter of this type, or after the initialization.
     pub fn set_string(&mut self, reference: u32, value: &CStr) -> Result<(), ModelError> {
-        let Variable { name, meaning, .. } = *self.to_be_set(reference, Kind::String)?;
+        let Variable { name, meaning, .. } = *self.to_be_set(reference, VariableType::String)?;
         self.require_parameter()?;
         if value.to_str().is_err() {
             return Err(ModelError::NotText(name));
         }
-        if let Meaning::File(file) = meaning {
+        if let VariableMeaning::File(file) = meaning {
             self.files.set(file, value);
             self.behind = Behind::Nothing;
         }
@@ -373,17 +384,21 @@ impl Model {
         self.require(&[Phase::Instantiated, Phase::Initializing], "to set a parameter")
     }
 
-    fn got(&self, reference: u32, expected: Kind) -> Result<&'static Variable, ModelError> {
+    fn got(&self, reference: u32, expected: VariableType) -> Result<&'static Variable, ModelError> {
         let phases = [Phase::Instantiated, Phase::Initializing, Phase::Stepping, Phase::Terminated];
         self.require(&phases, "to get a variable")?;
         self.interface.variable(reference, expected)
     }
 
-    fn to_be_set(&self, reference: u32, expected: Kind) -> Result<&'static Variable, ModelError> {
+    fn to_be_set(
+        &self,
+        reference: u32,
+        expected: VariableType,
+    ) -> Result<&'static Variable, ModelError> {
         let phases = [Phase::Instantiated, Phase::Initializing, Phase::Stepping];
         self.require(&phases, "to set a variable")?;
         let variable = self.interface.variable(reference, expected)?;
-        if matches!(variable.meaning, Meaning::Estimate(..) | Meaning::Driven(_)) {
+        if matches!(variable.meaning, VariableMeaning::Estimate(..) | VariableMeaning::Driven(_)) {
             return Err(ModelError::NotAnInput(variable.name));
         }
         Ok(variable)

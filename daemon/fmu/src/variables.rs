@@ -6,7 +6,7 @@ use dynocar_shared::layout::{FieldLayout, hex_digits, layout_hash};
 use dynocar_shared::{Parameter, PipelineKind, Quantity, SampleField};
 
 use crate::error::ModelError;
-use crate::units::Unit;
+use crate::units::FmiUnit;
 
 /// One of the models in the library, as a simulator sees it.
 #[derive(Clone, Copy, Debug)]
@@ -40,12 +40,12 @@ impl Interface {
     pub fn variable(
         &self,
         reference: u32,
-        expected: Kind,
+        expected: VariableType,
     ) -> Result<&'static Variable, ModelError> {
         let variable = self.variables.get(reference as usize);
         let variable = variable.ok_or(ModelError::UnknownReference(reference))?;
         let is = match variable.meaning.kind() {
-            Kind::Enumeration(_) => Kind::Integer,
+            VariableType::Enumeration(_) => VariableType::Integer,
             kind => kind,
         };
         if is == expected {
@@ -111,7 +111,7 @@ pub enum Begins {
 
 /// Values of the driven train's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Driven {
+pub enum DrivenValue {
     /// True speed.
     Speed,
     /// Speed as the train's own sensor shows it.
@@ -130,7 +130,7 @@ pub enum Driven {
 
 /// Meaning of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Meaning {
+pub enum VariableMeaning {
     /// Parameter: the name of a file.
     File(ModelFile),
     /// Input: a measured quantity of the sample.
@@ -146,12 +146,12 @@ pub enum Meaning {
     /// Parameter: how the driven train begins.
     Begins(Begins),
     /// Output: what the driven train does.
-    Driven(Driven),
+    Driven(DrivenValue),
 }
 
 /// The type of a variable in the standard's sense.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum VariableType {
     /// A number.
     Real,
     /// A whole number.
@@ -161,12 +161,12 @@ pub enum Kind {
     /// A text.
     String,
     /// A member of a vocabulary, by its number.
-    Enumeration(Vocabulary),
+    Enumeration(FmiEnumeration),
 }
 
 /// A vocabulary of the project that is an enumeration of the FMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Vocabulary {
+pub enum FmiEnumeration {
     /// Status of the estimate.
     Status,
     /// Why.
@@ -175,49 +175,51 @@ pub enum Vocabulary {
     Effect,
 }
 
-impl Vocabulary {
+impl FmiEnumeration {
     /// The type's name.
     pub const fn name(self) -> &'static str {
         match self {
-            Vocabulary::Status => "Status",
-            Vocabulary::Reason => "Reason",
-            Vocabulary::Effect => "Effect",
+            FmiEnumeration::Status => "Status",
+            FmiEnumeration::Reason => "Reason",
+            FmiEnumeration::Effect => "Effect",
         }
     }
 }
 
-impl Kind {
+impl VariableType {
     /// The type's name in `modelDescription.xml`.
     pub const fn name(self) -> &'static str {
         match self {
-            Kind::Real => "Real",
-            Kind::Integer => "Integer",
-            Kind::Boolean => "Boolean",
-            Kind::String => "String",
-            Kind::Enumeration(_) => "Enumeration",
+            VariableType::Real => "Real",
+            VariableType::Integer => "Integer",
+            VariableType::Boolean => "Boolean",
+            VariableType::String => "String",
+            VariableType::Enumeration(_) => "Enumeration",
         }
     }
 }
 
-impl Meaning {
+impl VariableMeaning {
     /// The type of the variable.
-    pub const fn kind(self) -> Kind {
+    pub const fn kind(self) -> VariableType {
         match self {
-            Meaning::File(_) => Kind::String,
-            Meaning::Measured(_) => Kind::Real,
-            Meaning::Run | Meaning::Direction => Kind::Integer,
-            Meaning::WheelSlide | Meaning::Begins(Begins::HeldAtRest) => Kind::Boolean,
-            Meaning::Begins(_) | Meaning::Driven(_) => Kind::Real,
-            Meaning::Estimate(_, reported) => match reported {
-                SnapshotField::Status => Kind::Enumeration(Vocabulary::Status),
-                SnapshotField::Reason => Kind::Enumeration(Vocabulary::Reason),
-                SnapshotField::SuspectedEffect => Kind::Enumeration(Vocabulary::Effect),
-                SnapshotField::Usable(_) => Kind::Boolean,
+            VariableMeaning::File(_) => VariableType::String,
+            VariableMeaning::Measured(_) => VariableType::Real,
+            VariableMeaning::Run | VariableMeaning::Direction => VariableType::Integer,
+            VariableMeaning::WheelSlide | VariableMeaning::Begins(Begins::HeldAtRest) => {
+                VariableType::Boolean
+            }
+            VariableMeaning::Begins(_) | VariableMeaning::Driven(_) => VariableType::Real,
+            VariableMeaning::Estimate(_, reported) => match reported {
+                SnapshotField::Status => VariableType::Enumeration(FmiEnumeration::Status),
+                SnapshotField::Reason => VariableType::Enumeration(FmiEnumeration::Reason),
+                SnapshotField::SuspectedEffect => VariableType::Enumeration(FmiEnumeration::Effect),
+                SnapshotField::Usable(_) => VariableType::Boolean,
                 SnapshotField::Rejected
                 | SnapshotField::SuspectedEffectNumber
                 | SnapshotField::StatusNumber
-                | SnapshotField::ReasonNumber => Kind::Integer,
-                _ => Kind::Real,
+                | SnapshotField::ReasonNumber => VariableType::Integer,
+                _ => VariableType::Real,
             },
         }
     }
@@ -225,8 +227,8 @@ impl Meaning {
     /// `parameter`, `input` or `output`.
     pub const fn causality(self) -> &'static str {
         match self {
-            Meaning::File(_) | Meaning::Begins(_) => "parameter",
-            Meaning::Estimate(..) | Meaning::Driven(_) => "output",
+            VariableMeaning::File(_) | VariableMeaning::Begins(_) => "parameter",
+            VariableMeaning::Estimate(..) | VariableMeaning::Driven(_) => "output",
             _ => "input",
         }
     }
@@ -238,9 +240,9 @@ pub struct Variable {
     /// Its name, by the structured convention of the standard.
     pub name: &'static str,
     /// Meaning of the variable.
-    pub meaning: Meaning,
+    pub meaning: VariableMeaning,
     /// Its unit.
-    pub unit: Unit,
+    pub unit: FmiUnit,
     /// Description in words.
     pub description: &'static str,
 }
@@ -248,8 +250,8 @@ pub struct Variable {
 /// A variable.
 pub(crate) const fn row(
     name: &'static str,
-    meaning: Meaning,
-    unit: Unit,
+    meaning: VariableMeaning,
+    unit: FmiUnit,
     description: &'static str,
 ) -> Variable {
     Variable { name, meaning, unit, description }
@@ -259,10 +261,10 @@ pub(crate) const fn row(
 pub(crate) const fn measured(
     name: &'static str,
     field: SampleField,
-    unit: Unit,
+    unit: FmiUnit,
     description: &'static str,
 ) -> Variable {
-    row(name, Meaning::Measured(field), unit, description)
+    row(name, VariableMeaning::Measured(field), unit, description)
 }
 
 /// The digits by which description and library know each other: over the version, the model's

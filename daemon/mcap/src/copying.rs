@@ -11,7 +11,7 @@ use mcap::{Attachment, McapError, WriteOptions, Writer};
 
 use crate::error::{CopyError, WriteError};
 use crate::joining::read_among;
-use crate::reading::{ChannelInfo, Ending, Item, Raw, Visitor};
+use crate::reading::{ChannelInfo, FileEnding, Raw, RecordingItem, Visitor};
 
 type Output = BufWriter<Box<dyn Write + Send>>;
 
@@ -26,7 +26,7 @@ pub struct Copied {
     /// Attached files.
     pub attachments: u64,
     /// How each file ended.
-    pub endings: Vec<Ending>,
+    pub endings: Vec<FileEnding>,
 }
 
 /// Copies what can be read of files, in their order, into a new one, ours or not, and brings it to the disk. A
@@ -75,7 +75,7 @@ pub fn copy<V: Visitor<Error = CopyError>, E: From<CopyError>>(
         watcher,
     };
     let read = from.iter().map(|path| read_among(from.len(), path, &mut copier));
-    let read: Result<Vec<Ending>, CopyError> = read.collect();
+    let read: Result<Vec<FileEnding>, CopyError> = read.collect();
     let Copier { mut writer, messages, attachments, watcher, .. } = copier;
     let filled = read.map_err(E::from).and_then(|endings| {
         add(&mut writer, watcher)?;
@@ -131,13 +131,13 @@ impl<V> Copier<'_, V> {
         self.writer.write_to_known_channel(&MessageHeader { channel_id, ..raw.header }, raw.data)
     }
 
-    fn other(&mut self, item: Item<'_>) -> Result<(), McapError> {
+    fn other(&mut self, item: RecordingItem<'_>) -> Result<(), McapError> {
         match item {
-            Item::Metadata(metadata) => {
+            RecordingItem::Metadata(metadata) => {
                 let key = format!("{metadata:?}").into_bytes();
                 if self.carried.insert(key) { self.writer.write_metadata(metadata) } else { Ok(()) }
             }
-            Item::Attachment { name, log_time, media_type, content } => {
+            RecordingItem::Attachment { name, log_time, media_type, content } => {
                 let key = [name.as_bytes(), &[0], content].concat();
                 if !self.carried.insert(key) {
                     return Ok(());
@@ -159,7 +159,7 @@ impl<V> Copier<'_, V> {
 impl<V: Visitor<Error = CopyError>> Visitor for Copier<'_, V> {
     type Error = CopyError;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), CopyError> {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), CopyError> {
         self.watcher.item(item.clone())?;
         let written = self.other(item);
         self.checked(written)

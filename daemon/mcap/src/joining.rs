@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use mcap::records::Metadata;
 
 use crate::error::{ReadError, ReadProblem};
-use crate::reading::{Ending, Item, Raw, Visitor, read};
+use crate::reading::{FileEnding, Raw, RecordingItem, Visitor, read};
 
 /// Reads the files of a recording that rotated, in order, as if they were one: what each repeats is given
 /// once. Gives how each ends.
@@ -16,7 +16,10 @@ use crate::reading::{Ending, Item, Raw, Visitor, read};
 /// # Errors
 ///
 /// As [`read_among`], and when they are not the files of one recording in its order.
-pub fn read_all<V: Visitor>(paths: &[PathBuf], visitor: &mut V) -> Result<Vec<Ending>, V::Error> {
+pub fn read_all<V: Visitor>(
+    paths: &[PathBuf],
+    visitor: &mut V,
+) -> Result<Vec<FileEnding>, V::Error> {
     let (attached, files_of, seen) = (HashMap::new(), HashMap::new(), Vec::new());
     let path = PathBuf::new();
     let mut joined = Joined { visitor, attached, files_of, seen, path, begins: None };
@@ -46,11 +49,11 @@ pub fn read_among<V: Visitor>(
     count: usize,
     path: &Path,
     visitor: &mut V,
-) -> Result<Ending, V::Error> {
+) -> Result<FileEnding, V::Error> {
     if count > 1 && is_nothing(path) {
         let file_bytes = std::fs::metadata(path).map_or(0, |it| it.len());
         let reason = "nothing of it was brought to the disk".to_owned();
-        return Ok(Ending::Broken { read_bytes: 0, file_bytes, reason });
+        return Ok(FileEnding::Broken { read_bytes: 0, file_bytes, reason });
     }
     read(path, visitor)
 }
@@ -80,9 +83,9 @@ struct Joined<'v, V> {
 impl<V: Visitor> Visitor for Joined<'_, V> {
     type Error = V::Error;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), V::Error> {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), V::Error> {
         match &item {
-            Item::Attachment { name, content, .. } => match self.attached.get(name) {
+            RecordingItem::Attachment { name, content, .. } => match self.attached.get(name) {
                 Some(known) if known == content => return Ok(()),
                 Some(_) => {
                     let name = name.clone();
@@ -99,8 +102,8 @@ impl<V: Visitor> Visitor for Joined<'_, V> {
                     self.files_of.insert(name.clone(), self.path.clone());
                 }
             },
-            Item::Metadata(it) if self.seen.contains(it) => return Ok(()),
-            Item::Metadata(it) => self.seen.push((*it).clone()),
+            RecordingItem::Metadata(it) if self.seen.contains(it) => return Ok(()),
+            RecordingItem::Metadata(it) => self.seen.push((*it).clone()),
             _ => {}
         }
         self.visitor.item(item)

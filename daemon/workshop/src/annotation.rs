@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::from_dataset::from_dataset;
 use dynocar::cli::Failure;
-use dynocar::dataset::Source;
+use dynocar::dataset::DatasetSource;
 use dynocar::output::report_line;
 use dynocar_analysis::explain::report::timeline::Timeline;
 use dynocar_mcap::annotate;
@@ -15,8 +15,8 @@ use tempfile::TempDir;
 /// # Errors
 ///
 /// A recording that cannot be read is an input failure.
-pub fn annotate(from: Source, timeline: &Timeline, to: &Path) -> Result<(), Failure> {
-    let Source { path, train } = from;
+pub fn annotate(from: DatasetSource, timeline: &Timeline, to: &Path) -> Result<(), Failure> {
+    let DatasetSource { path, train } = from;
     let train = train.map(|it| it.0);
     let added = if path.is_dir() || path.extension().is_some_and(|it| it == "toml") {
         let folder = TempDir::with_prefix("dynocar-").map_err(Failure::work)?;

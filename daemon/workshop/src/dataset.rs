@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use dynocar::dataset::{DatasetFolder, LoadError, Source, is_parquet_path};
+use dynocar::dataset::{DatasetFolder, DatasetSource, LoadError, is_parquet_path};
 use dynocar::output::report_line;
 use dynocar::text_file::require_regular;
 use dynocar_analysis::dataset::{
@@ -46,7 +46,7 @@ impl FilesOfDataset {
     /// # Errors
     ///
     /// When there is nothing, or what is no dataset.
-    pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
+    pub fn at<'p>(source: impl Into<DatasetSource<'p>>) -> Result<Self, LoadError> {
         let source = source.into();
         if !is_recording(source.path) {
             return DatasetFolder::at(source).map(FilesOfDataset::Folder);
@@ -124,7 +124,9 @@ impl DatasetFiles for FilesOfDataset {
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(FilesOfDataset, DatasetHead), LoadError> {
+pub fn open<'p>(
+    source: impl Into<DatasetSource<'p>>,
+) -> Result<(FilesOfDataset, DatasetHead), LoadError> {
     let source = source.into();
     if !is_recording(source.path) {
         let (folder, head) = dynocar::dataset::open(source)?;
@@ -140,7 +142,7 @@ pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(FilesOfDataset, Datase
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
+pub fn load<'p>(source: impl Into<DatasetSource<'p>>) -> Result<Dataset, LoadError> {
     load_with_speed_unit(source).map(|(dataset, _)| dataset)
 }
 
@@ -150,7 +152,7 @@ pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
 ///
 /// The first mistake, with file, line and choices.
 pub fn load_with_speed_unit<'p>(
-    source: impl Into<Source<'p>>,
+    source: impl Into<DatasetSource<'p>>,
 ) -> Result<(Dataset, Unit), LoadError> {
     let (files, head) = open(source)?;
     let unit = head.manifest.speed_unit();

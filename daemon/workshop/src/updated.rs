@@ -18,7 +18,7 @@ use dynocar_model::train::numbers::{AUXILIARY_POWER, DAVIS_A, DAVIS_B, DAVIS_C, 
 use toml::Table;
 
 use crate::dataset::open;
-use dynocar::dataset::Source;
+use dynocar::dataset::DatasetSource;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::write_in_folder;
 
@@ -44,7 +44,7 @@ pub struct UpdatedFiles {
 ///
 /// When the declared files cannot be read or the grown ones not written.
 pub fn write_updated<'s>(
-    dataset: impl Into<Source<'s>>,
+    dataset: impl Into<DatasetSource<'s>>,
     explanation: &Explanation,
     folder: &Path,
 ) -> Result<UpdatedFiles, UpdatedModelError> {

@@ -1,6 +1,6 @@
 //! Random lines: gradients, curves, tunnels, stations, speed limits, balises.
 
-use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::track::{Track, TrackCurve, Tunnel};
 
 use super::random::Random;
 use super::settings::{SimulatorSettings, TrainType};
@@ -194,7 +194,7 @@ fn make_gradient(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<(f6
     gradient
 }
 
-fn make_curves(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<Curve> {
+fn make_curves(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<TrackCurve> {
     let mut curves = Vec::new();
     let mut free_m = 0.0;
     loop {
@@ -204,7 +204,7 @@ fn make_curves(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<Curve
         if end_m >= length_m {
             return curves;
         }
-        curves.push(Curve { start_m, end_m, radius_m: random.pick(ranges.radii_m) });
+        curves.push(TrackCurve { start_m, end_m, radius_m: random.pick(ranges.radii_m) });
         free_m = end_m;
     }
 }
@@ -249,7 +249,7 @@ fn make_limits(
     ranges: &Ranges,
     length_m: f64,
     speed_max_mps: f64,
-    curves: &[Curve],
+    curves: &[TrackCurve],
     random: &mut Random,
 ) -> Vec<SpeedLimit> {
     let mut limits = Vec::new();

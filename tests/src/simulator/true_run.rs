@@ -1,6 +1,6 @@
 //! One run as it truly happened.
 
-use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::TrainModel;
 
 use super::actuators::{Actuators, LateForces};
@@ -61,7 +61,7 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
     let mut late_brake = LateForces::new(brake_delay_s, brake_lag_s, TRUE_STEP_S, held);
     let mut slip = WheelSlip::new(settings, stream(Stream::Slip(plan.number)));
     let mut weather = Weather::new(physics, stream(Stream::Gusts(plan.number)));
-    let mut motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
+    let mut motion = SimulatedMotion { distance_m: 0.0, speed_mps: 0.0 };
     let held_steps = (settings.sample_period_s / TRUE_STEP_S).round().max(1.0) as usize;
     let mut held_on = held;
     let steps_max = (DURATION_FACTOR_MAX * settings.duration_s / TRUE_STEP_S) as usize;

@@ -16,12 +16,12 @@ const WITH_START: usize = UNKNOWNS + 1;
 
 /// Information of a drive on mass and resistance.
 #[derive(Clone, Debug)]
-pub struct Information {
+pub struct FisherInformation {
     matrix: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     basis: SpeedBasis,
 }
 
-impl Information {
+impl FisherInformation {
     /// The Fisher information of a drive, every sample of which has white Gaussian noise of the
     /// sensor's variance; the speed at the start of each leg is unknown.
     ///
@@ -32,7 +32,7 @@ impl Information {
         for leg in ride.split(|instant| instant.speed_mps <= 0.0).filter(|leg| leg.len() > 1) {
             total += leg_information(shuttle, leg, &basis);
         }
-        Information { matrix: total, basis }
+        FisherInformation { matrix: total, basis }
     }
 
     /// Least standard deviation of the mass, relative, when all resistances are known.

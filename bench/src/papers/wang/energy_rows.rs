@@ -10,7 +10,7 @@ use dynocar_core::pipeline::Estimator;
 use super::ride::{kalman, known_resistance, leg, measure};
 use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle, calm};
 use crate::chance::Chance;
-use crate::papers::row::{Row, Seeds, WANG};
+use crate::papers::row::{PaperRow, Seeds, WANG};
 use crate::statistics::{mean, straight_line};
 
 /// The fixed mass in kg that the controller assumes without learning.
@@ -42,7 +42,7 @@ struct Driven {
 }
 
 /// The rows for energy.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let shuttle = Shuttle::new(false);
     let seeds = seeds.at_most(20);
     let learned_kg: Vec<f64> =
@@ -68,7 +68,7 @@ fn comparison(
     text: &str,
     fixed: &Case,
     others: impl Iterator<Item = Case>,
-) -> [Row; 2] {
+) -> [PaperRow; 2] {
     let (mut as_it_comes, mut at_equal_time, mut later_s) = (Vec::new(), Vec::new(), Vec::new());
     let before = drive(shuttle, fixed, CRUISE_MPS);
     let equal_before = energy_at_time(shuttle, fixed, before.time_s);
@@ -79,14 +79,14 @@ fn comparison(
         at_equal_time.push(100.0 * (1.0 - equal_after / equal_before));
         later_s.push(after.time_s - before.time_s);
     }
-    let row = |quantity: String, unit, paper_method: &[f64]| Row {
+    let row = |quantity: String, unit, paper_method: &[f64]| PaperRow {
         paper_method: Some(mean(paper_method)),
-        ..Row::new(WANG, "Figure 10", quantity, unit, Seeds::from_zero(at_equal_time.len()))
+        ..PaperRow::new(WANG, "Figure 10", quantity, unit, Seeds::from_zero(at_equal_time.len()))
     };
     let saving = format!("traction energy saved, {text}");
     let later = format!("later arrival, {text}, whatever the running times");
     [
-        Row {
+        PaperRow {
             published: Some(PUBLISHED_SAVING),
             ours: Some(mean(&at_equal_time)),
             ..row(saving, "%", &as_it_comes)

@@ -9,7 +9,8 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::shuttle::{
-    BRAKE_MAX_N, CURVE_RADIUS_M, Disturbance, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle,
+    BRAKE_MAX_N, CURVE_RADIUS_M, DisturbanceLaw, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M,
+    Shuttle,
 };
 use crate::chance::Chance;
 use crate::rig::pipelines::resolving;
@@ -92,7 +93,7 @@ impl Shuttle {
         start: &Instant,
         to_m: f64,
         dwell_s: f64,
-        disturbance: &mut Disturbance<'_>,
+        disturbance: &mut DisturbanceLaw<'_>,
     ) -> Vec<Instant> {
         self.drive_with(&mut limit_driver(), start, to_m, dwell_s, disturbance)
     }
@@ -104,7 +105,7 @@ impl Shuttle {
         start: &Instant,
         to_m: f64,
         dwell_s: f64,
-        disturbance: &mut Disturbance<'_>,
+        disturbance: &mut DisturbanceLaw<'_>,
     ) -> Vec<Instant> {
         let mut now = Instant { speed_mps: 0.0, force_n: 0.0, ..*start };
         now.direction = (to_m - now.position_m).signum();
@@ -130,7 +131,7 @@ impl Shuttle {
     }
 
     /// Drives to and fro until there are `count` samples, the empty train throughout.
-    pub fn crossing(&self, count: usize, disturbance: &mut Disturbance<'_>) -> Vec<Instant> {
+    pub fn crossing(&self, count: usize, disturbance: &mut DisturbanceLaw<'_>) -> Vec<Instant> {
         let mut ride: Vec<Instant> = Vec::with_capacity(count + 8_000);
         let mut now = self.standing_at(STATIONS_M[0], EMPTY_MASS_KG);
         let mut station = 0_usize;
@@ -153,7 +154,7 @@ impl Shuttle {
 }
 
 /// The leg of 3 km from the first station: power, coasting around 80 km/h, braking.
-pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut Disturbance<'_>) -> Vec<Instant> {
+pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut DisturbanceLaw<'_>) -> Vec<Instant> {
     shuttle.drive(&shuttle.standing_at(STATIONS_M[0], mass_kg), STATIONS_M[1], 10.0, disturbance)
 }
 
@@ -164,7 +165,7 @@ pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut Disturbance<'_>) -
 pub fn there_and_back(
     shuttle: &Shuttle,
     mass_kg: f64,
-    disturbance: &mut Disturbance<'_>,
+    disturbance: &mut DisturbanceLaw<'_>,
 ) -> Vec<Instant> {
     let empty = shuttle.standing_at(STATIONS_M[1], EMPTY_MASS_KG);
     let mut ride = shuttle.drive(&empty, STATIONS_M[0], 20.0, disturbance);

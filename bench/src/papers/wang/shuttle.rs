@@ -6,8 +6,8 @@
 
 use std::sync::Arc;
 
-use dynocar_model::simulate::motion::{Motion, advance};
-use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
+use dynocar_model::track::{Track, TrackCurve, Tunnel};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
@@ -66,7 +66,7 @@ pub struct Instant {
 
 /// Disturbance of the train that neither map nor model knows: resistance in N/kN beyond the model's at a speed in
 /// m/s, asked for once a period.
-pub type Disturbance<'a> = dyn FnMut(f64) -> f64 + 'a;
+pub type DisturbanceLaw<'a> = dyn FnMut(f64) -> f64 + 'a;
 
 /// Nothing beyond the model.
 pub fn calm(_speed_mps: f64) -> f64 {
@@ -125,17 +125,22 @@ impl Shuttle {
     }
 
     /// One sampling period further, the force linear between `from.force_n` and `to_n`.
-    pub fn advance(&self, from: &Instant, to_n: f64, disturbance: &mut Disturbance<'_>) -> Instant {
+    pub fn advance(
+        &self,
+        from: &Instant,
+        to_n: f64,
+        disturbance: &mut DisturbanceLaw<'_>,
+    ) -> Instant {
         let extra = disturbance(from.speed_mps);
         let slew_n_per_s = (to_n - from.force_n) / PERIOD_S;
-        let at = |ahead_s: f64, motion: Motion| Instant {
+        let at = |ahead_s: f64, motion: SimulatedMotion| Instant {
             time_s: from.time_s + ahead_s,
             position_m: from.position_m + from.direction * motion.distance_m,
             speed_mps: motion.speed_mps,
             force_n: from.force_n + slew_n_per_s * ahead_s,
             ..*from
         };
-        let start = Motion { distance_m: 0.0, speed_mps: from.speed_mps };
+        let start = SimulatedMotion { distance_m: 0.0, speed_mps: from.speed_mps };
         let end = advance(start, PERIOD_S, |ahead_s, motion| {
             self.acceleration_mps2(&at(ahead_s, motion), extra)
         });
@@ -167,7 +172,7 @@ fn gradients() -> Vec<(f64, f64)> {
 }
 
 /// Curves of 250 to 600 m outside the tunnels; if wanted, two more inside.
-fn curves(curve_in_tunnel: bool) -> Vec<Curve> {
+fn curves(curve_in_tunnel: bool) -> Vec<TrackCurve> {
     let mut random = Chance::new(28_001);
     let mut list = Vec::new();
     let mut start_m = 400.0;
@@ -176,13 +181,13 @@ fn curves(curve_in_tunnel: bool) -> Vec<Curve> {
         let is_near =
             |tunnel: &Tunnel| start_m < tunnel.end_m + 80.0 && end_m > tunnel.start_m - 80.0;
         if !tunnels().iter().any(is_near) {
-            list.push(Curve { start_m, end_m, radius_m: CURVE_RADIUS_M });
+            list.push(TrackCurve { start_m, end_m, radius_m: CURVE_RADIUS_M });
         }
         start_m = end_m + (400.0 + 700.0 * random.uniform()).round();
     }
     if curve_in_tunnel {
-        list.push(Curve { start_m: 11_700.0, end_m: 12_300.0, radius_m: CURVE_RADIUS_M });
-        list.push(Curve { start_m: 23_000.0, end_m: 23_400.0, radius_m: CURVE_RADIUS_M });
+        list.push(TrackCurve { start_m: 11_700.0, end_m: 12_300.0, radius_m: CURVE_RADIUS_M });
+        list.push(TrackCurve { start_m: 23_000.0, end_m: 23_400.0, radius_m: CURVE_RADIUS_M });
     }
     list
 }

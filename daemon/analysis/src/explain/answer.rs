@@ -132,7 +132,7 @@ impl Location {
 
 /// A mass that holds between two places.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MassSection {
+pub struct FoundMassSection {
     /// Lower chainage in m.
     pub from_m: f64,
     /// Upper chainage in m.
@@ -166,7 +166,7 @@ pub enum ParameterValue {
     /// [chainage in m, value] along the line.
     Profile(Vec<[f64; 2]>),
     /// Masses by place.
-    Sections(Vec<MassSection>),
+    Sections(Vec<FoundMassSection>),
     /// Masses by time.
     Windows(Vec<MassWindow>),
     /// A formula.
@@ -175,7 +175,7 @@ pub enum ParameterValue {
 
 /// The work of an effect, and how far off a prediction ends without and with it, both on the fit runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Meaning {
+pub struct EffectMeaning {
     /// Work in kWh that it takes from the train on 100 km; negative where it gives.
     pub energy_kwh_per_100_km: f64,
     /// The same over the work of the traction; absent where nothing pulls.
@@ -205,7 +205,7 @@ pub struct EffectAnswer {
     /// Share of the open-loop error on the fit runs that goes when the effect is added last.
     pub error_reduction: f64,
     /// Meaning in kWh and metres.
-    pub meaning: Meaning,
+    pub meaning: EffectMeaning,
     /// Contradiction between the sources of evidence about it; absent where they agree.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contradiction: Option<String>,

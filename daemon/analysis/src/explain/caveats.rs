@@ -7,8 +7,8 @@ use super::course::Course;
 use super::described::small;
 use super::evidence::{Fit, FitProblem};
 use super::identifiability::not_held;
-use super::score::Score;
-use super::selection::{Deviations, Outcome, Search};
+use super::score::PredictionScore;
+use super::selection::{Deviations, Search, SearchOutcome};
 
 use crate::statistics::share_of;
 
@@ -33,10 +33,10 @@ impl FinishedFit<'_> {
 /// Returns the limits of a verdict.
 pub fn caveats(
     search: &Search,
-    outcome: &Outcome,
+    outcome: &SearchOutcome,
     effects: &[EffectAnswer],
     known: &FinishedFit,
-    score: &Score,
+    score: &PredictionScore,
     identifiability: &[Identifiability],
 ) -> Vec<String> {
     let contradictions = effects.iter().filter_map(|effect| effect.contradiction.clone());
@@ -58,7 +58,7 @@ pub fn trimmed(sentences: &[String]) -> Vec<String> {
 }
 
 /// Describes the certain and small effects beside those that are named; empty without either.
-fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
+fn small_beside(outcome: &SearchOutcome, effects: &[EffectAnswer]) -> String {
     let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();
     if small.is_empty() || effects.is_empty() {
         return String::new();
@@ -67,7 +67,7 @@ fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
 }
 
 /// Returns that the runs held out are predicted worse with what was found; empty when they are not.
-fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
+fn worse_held_out(effects: &[EffectAnswer], score: &PredictionScore) -> String {
     let Some(judged) = score.judged() else { return String::new() };
     let [before, after] = judged.error_mps;
     let [shown_before, shown_after] = [before, after].map(|error| format!("{error:.3}"));

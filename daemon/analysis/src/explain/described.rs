@@ -4,7 +4,7 @@ use dynocar_model::terms::place::in_words;
 use dynocar_shared::HALF_95;
 
 use super::answer::{EffectAnswer, Location, ParameterValue, PlaceUncertainty};
-use super::selection::{Outcome, Trial};
+use super::selection::{EffectTrial, SearchOutcome};
 
 /// Intervals of a place at most in a sentence.
 const PLACES_SHOWN: usize = 4;
@@ -89,7 +89,7 @@ fn mass_factors(value: &ParameterValue) -> Option<String> {
 
 /// Describes a certain and small effect: its kind with its numbers in the model, or in the trial that took it in
 /// where nothing is named.
-pub(super) fn small(outcome: &Outcome, trial: &Trial) -> String {
+pub(super) fn small(outcome: &SearchOutcome, trial: &EffectTrial) -> String {
     let effect = &trial.fit.model.effects[trial.last()];
     let tried = trial.fit.effect_parameters(trial.last());
     let values = outcome.values(trial.kind).unwrap_or(tried);

@@ -9,12 +9,12 @@
 use std::sync::Arc;
 
 use dynocar_model::track::Track;
-use dynocar_model::train::{Drive, TrainModel};
+use dynocar_model::train::{PowerTrain, TrainModel};
 
 use super::evidence::{Density, Fit, FitProblem, RunData, RunDataError, RunNormal, prepare_at};
 use super::over_time::Span;
 use super::score::RunScore;
-use super::selection::{Beside, Outcome, Search};
+use super::selection::{Beside, Search, SearchOutcome};
 use crate::dataset::{Dataset, Role, Run};
 use crate::parallel;
 
@@ -114,14 +114,14 @@ impl Held {
 pub struct Preparation {
     /// Train and line, without runs.
     declared: Dataset,
-    drive: Option<Drive>,
+    drive: Option<PowerTrain>,
     late_s: Option<f64>,
     train: Arc<TrainModel>,
 }
 
 impl Preparation {
     /// With forces from the power of another drive, and moved in time, where that was found.
-    pub fn new(declared: &Dataset, drive: Option<Drive>, late_s: Option<f64>) -> Self {
+    pub fn new(declared: &Dataset, drive: Option<PowerTrain>, late_s: Option<f64>) -> Self {
         let declared = declared.without_runs();
         let train = drive.map_or(declared.train.clone(), |it| declared.with_drive(it).train);
         Preparation { declared, drive, late_s, train }
@@ -180,7 +180,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         &self,
         search: &Search,
         preparation: &Preparation,
-        outcome: &mut Outcome,
+        outcome: &mut SearchOutcome,
     ) -> Result<(), E> {
         let problem = search.problem;
         let Some(joint) = outcome.beside().filter(|_| is_common(&outcome.fit)) else {
@@ -229,7 +229,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         &self,
         holdout: &[RunData],
         preparation: &Preparation,
-        outcome: &Outcome,
+        outcome: &SearchOutcome,
     ) -> Result<Vec<RunScore>, E> {
         let score = |run: &RunData| RunScore::of(run, &outcome.base, &outcome.fit);
         if !is_common(&outcome.fit) {
@@ -250,7 +250,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
     }
 
     /// How many runs say what, as a sentence to follow another.
-    pub(super) fn sentence(&self, outcome: &Outcome) -> String {
+    pub(super) fn sentence(&self, outcome: &SearchOutcome) -> String {
         let fit = self.dataset.with_role(Role::Fit).count();
         let sizes = match is_common(&outcome.fit) {
             true => "all of them say how large it is",

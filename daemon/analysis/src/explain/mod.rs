@@ -27,7 +27,7 @@ mod caveats;
 pub mod competing;
 pub mod course;
 pub mod described;
-pub mod drive;
+pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
@@ -55,11 +55,11 @@ use crate::dataset::dataset_diagnostic::diagnostics;
 use crate::dataset::{Dataset, Role};
 use answer::ExplainAnswer;
 use answer::WithStd;
-use drive::EstimatedDrive;
+use drive_efficiency::EstimatedDrive;
 use evidence::{Density, FitProblem, RunData, RunDataError};
 use many::{Held, Many, Preparation};
-use score::{RunScore, Score};
-use selection::{Deviations, Outcome, Progress, Search};
+use score::{PredictionScore, RunScore};
+use selection::{Deviations, Progress, Search, SearchOutcome};
 use unexplained::Unexplained;
 
 /// Fit and holdout runs with the models that were fitted.
@@ -73,9 +73,9 @@ pub struct Explanation {
     /// How surely its parameters are known.
     pub deviations: Deviations,
     /// Open-loop errors.
-    pub score: Score,
+    pub score: PredictionScore,
     /// Result of the search.
-    pub outcome: Outcome,
+    pub outcome: SearchOutcome,
     /// How runs are made ready for its models.
     pub preparation: Preparation,
 }
@@ -153,7 +153,7 @@ fn explained<E: From<RunDataError> + Send>(
         }
         None => holdout.iter().map(|run| RunScore::of(run, &outcome.base, &outcome.fit)).collect(),
     };
-    let score = Score::of(&problem, scores, &outcome.base, &outcome.fit);
+    let score = PredictionScore::of(&problem, scores, &outcome.base, &outcome.fit);
     let spans = match &many {
         Some(many) => many.spans(),
         None => problem.runs.iter().map(|run| [run.file.clone(), run.file.clone()]).collect(),
@@ -188,7 +188,7 @@ struct Prepared {
 
 impl Prepared {
     fn of(dataset: &Dataset, density: Density) -> Result<Self, RunDataError> {
-        let estimated_drive = drive::estimated(dataset)?;
+        let estimated_drive = drive_efficiency::estimated(dataset)?;
         let (declared, drive) = (dataset, estimated_drive.as_ref().map(|it| it.drive));
         let retaken = drive.map(|drive| dataset.with_drive(drive));
         let dataset = retaken.as_ref().unwrap_or(dataset);

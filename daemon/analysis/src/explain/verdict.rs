@@ -7,7 +7,7 @@ use dynocar_model::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
-    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location, Meaning,
+    BaseAnswer, Considered, DavisDeviations, EffectAnswer, EffectMeaning, ExplainAnswer, Location,
     Verdict,
 };
 use super::caveats::{FinishedFit, caveats, told_by_data, trimmed};
@@ -17,9 +17,10 @@ use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
 use super::identifiability::identifiability;
-use super::score::{self, Score};
+use super::score::{self, PredictionScore};
 use super::selection::{
-    Deviations, Outcome, ScaleSources, Search, deciding_score, discounted, few_runs_factor, penalty,
+    Deviations, ScaleSources, Search, SearchOutcome, deciding_score, discounted, few_runs_factor,
+    penalty,
 };
 use super::unexplained::Unexplained;
 use crate::dataset::DatasetDiagnostic;
@@ -33,9 +34,9 @@ const LIBRARY_SHARE_MIN: f64 = 0.5;
 /// The answer to a finished search.
 pub fn answer(
     search: &Search,
-    outcome: &Outcome,
+    outcome: &SearchOutcome,
     known: &FinishedFit,
-    score: &Score,
+    score: &PredictionScore,
     diagnostics: Vec<DatasetDiagnostic>,
 ) -> ExplainAnswer {
     let (fit, std) = (&outcome.fit, &known.deviations.std);
@@ -106,7 +107,7 @@ fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
 }
 
 /// Why nothing was scored, and what is known instead; `None` when something was.
-fn unscored(search: &Search, score: &Score) -> Option<String> {
+fn unscored(search: &Search, score: &PredictionScore) -> Option<String> {
     if score.holdout_rmse_mps()[0].is_some() {
         return None;
     }
@@ -131,7 +132,11 @@ fn moving_s(search: &Search) -> f64 {
     search.problem.runs.iter().fold(0.0, |sum, run| sum + run.moving_s())
 }
 
-fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Vec<EffectAnswer> {
+fn effect_answers(
+    search: &Search,
+    outcome: &SearchOutcome,
+    known: &FinishedFit,
+) -> Vec<EffectAnswer> {
     let Deviations { std, covariance, c } = known.deviations;
     let fit = &outcome.fit;
     let apart = ScaleSources::of(search.problem, outcome).filter(ScaleSources::are_apart);
@@ -170,7 +175,7 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
                 std: reported.deviations,
                 p_value: p_value(score),
                 error_reduction: reduction,
-                meaning: Meaning::of(search.problem, fit, index, &rest),
+                meaning: EffectMeaning::of(search.problem, fit, index, &rest),
                 contradiction: apart
                     .filter(|_| effect.nature().changes_speed_scale)
                     .map(|sources| sources.sentence()),
@@ -190,7 +195,7 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
 
 fn verdict(
     search: &Search,
-    outcome: &Outcome,
+    outcome: &SearchOutcome,
     competing: &[CompetingHypotheses],
     left: Option<&Unexplained>,
 ) -> Verdict {
@@ -218,7 +223,7 @@ fn verdict(
     if competing.is_empty() { Verdict::Effect } else { Verdict::Ambiguous }
 }
 
-fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Considered> {
+fn considered(outcome: &SearchOutcome, competing: &[CompetingHypotheses]) -> Vec<Considered> {
     let mut list: Vec<Considered> = Vec::new();
     if let Some(last) = outcome.rounds.last() {
         for trial in last.iter() {
@@ -254,7 +259,7 @@ fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Consi
 
 fn statement(
     search: &Search,
-    outcome: &Outcome,
+    outcome: &SearchOutcome,
     verdict: Verdict,
     effects: &[EffectAnswer],
     competing: &[CompetingHypotheses],

@@ -7,7 +7,7 @@ use dynocar_model::train::numbers::{LENGTH, MASS, ROTATING_MASS_FACTOR};
 use dynocar_model::train::{Davis, TrainModel};
 
 use super::imported::{Account, ImportReading, ImportedTrain, force_n};
-use crate::brakes::{Steps, read};
+use crate::brakes::{SpeedSteps, read};
 use crate::dataset::document::{Item, above_zero};
 use crate::dataset::train_file::growing;
 use crate::dataset::{DatasetError, unusual_resistance};
@@ -107,7 +107,7 @@ fn brake(
     prefix: &str,
     account: &mut Account,
 ) -> Result<Vec<(f64, f64)>, DatasetError> {
-    let Steps { boundaries, values } = read(item)?.gamma_emergency;
+    let SpeedSteps { boundaries, values } = read(item)?.gamma_emergency;
     let how = "m/s² times the inertial mass, under [brake]";
     account.taken(&format!("{prefix}gamma_emergency"), "effort", how);
     let others = "gamma_service, gamma_normal_service, k_dry, k_wet, k_n_pos, k_n_neg, \

@@ -2,7 +2,7 @@
 
 use std::ops::{Bound, RangeBounds};
 
-use dynocar_model::track::Curve;
+use dynocar_model::track::TrackCurve;
 use dynocar_model::units::{Dimension, Unit};
 
 use super::imported::{Account, ImportedLine};
@@ -104,7 +104,7 @@ fn pairs(
 }
 
 /// Curves from triples of position and the radius there and before the next.
-fn curves(item: &Item, length_m: f64) -> Result<Vec<Curve>, DatasetError> {
+fn curves(item: &Item, length_m: f64) -> Result<Vec<TrackCurve>, DatasetError> {
     let units = item.need("units", "the units of the values")?;
     let along = unit(&units, "position", Dimension::Length)?;
     let from = unit(&units, "radius at start", Dimension::Length)?;
@@ -131,7 +131,7 @@ fn curves(item: &Item, length_m: f64) -> Result<Vec<Curve>, DatasetError> {
             let piece_start_m = start_m + piece * step_m;
             if curvature.abs() * RADIUS_MAX_M >= 1.0 && piece_end_m > piece_start_m {
                 let radius_m = 1.0 / curvature.abs();
-                curves.push(Curve { start_m: piece_start_m, end_m: piece_end_m, radius_m });
+                curves.push(TrackCurve { start_m: piece_start_m, end_m: piece_end_m, radius_m });
             }
         }
     }

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::centring::Pass;
+use super::centring::SurveyPass;
 use super::chainage::{Chained, WheelsAndLag, chain};
-use super::line::Alignments;
-use super::recording::Recording;
+use super::driven_line::Alignments;
+use super::recording::SurveyRecording;
 use super::tracking::follow;
 use crate::explain::answer::WithStd;
 use crate::parallel;
@@ -58,9 +58,9 @@ pub struct NotUsed {
 
 /// Gives every pass its chainage; what the fit runs show of wheels and lag comes with it.
 pub fn trips(
-    passes: &[Pass],
+    passes: &[SurveyPass],
     alignments: &Alignments,
-    recordings: &[Recording],
+    recordings: &[SurveyRecording],
 ) -> (Vec<Trip>, WheelsAndLag) {
     let placed = parallel::of_each(passes, |pass| {
         let recording = &recordings[pass.recording];
@@ -70,7 +70,7 @@ pub fn trips(
         let alone = chain(recording, rows.clone(), &placed, WheelsAndLag::UNKNOWN)?;
         Some((rows, placed, alone.learned))
     });
-    let is_fit = |pass: &Pass| recordings[pass.recording].raw.is_fit;
+    let is_fit = |pass: &SurveyPass| recordings[pass.recording].raw.is_fit;
     let has_fit = passes.iter().any(is_fit);
     let learned: Vec<WheelsAndLag> = passes
         .iter()
@@ -109,7 +109,10 @@ pub fn trips(
 }
 
 /// The rows with the stands before and after them.
-fn with_stands(recording: &Recording, rows: std::ops::Range<usize>) -> std::ops::Range<usize> {
+fn with_stands(
+    recording: &SurveyRecording,
+    rows: std::ops::Range<usize>,
+) -> std::ops::Range<usize> {
     let near = |row: usize, from: usize| {
         let (travelled_m, time_s) = (&recording.travelled_m, &recording.raw.time_s);
         (travelled_m[row] - travelled_m[from]).abs() < REACH.0
@@ -126,7 +129,7 @@ fn with_stands(recording: &Recording, rows: std::ops::Range<usize>) -> std::ops:
 }
 
 /// Returns the parts of the recordings outside the trips, and the reasons.
-pub fn not_used(trips: &[Trip], recordings: &[Recording]) -> Vec<NotUsed> {
+pub fn not_used(trips: &[Trip], recordings: &[SurveyRecording]) -> Vec<NotUsed> {
     let mut found = Vec::new();
     for (number, recording) in recordings.iter().enumerate() {
         let rows = recording.raw.time_s.len();
@@ -148,7 +151,7 @@ pub fn not_used(trips: &[Trip], recordings: &[Recording]) -> Vec<NotUsed> {
     found
 }
 
-fn reason(recording: &Recording, rows: std::ops::Range<usize>) -> &'static str {
+fn reason(recording: &SurveyRecording, rows: std::ops::Range<usize>) -> &'static str {
     let moved_m = recording.travelled_m[rows.end - 1] - recording.travelled_m[rows.start];
     let fixes = recording.fixes.iter().filter(|fix| rows.contains(&fix.row)).count();
     match (moved_m < 50.0, fixes < 10) {

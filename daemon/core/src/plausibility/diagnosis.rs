@@ -14,7 +14,7 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use super::input_fault::{DetectedFault, InputFault};
 use super::watch::Figures;
-use super::window_balance::{Balance, Fitted};
+use super::window_balance::{FittedFactor, WindowBalance};
 
 /// Factors of forces within these bounds are effects that a train can have.
 const FORCE_FACTORS: (f64, f64) = (0.4, 2.5);
@@ -201,9 +201,9 @@ fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
 
 /// Judges the gradients of a recorded run by all of it, which shows smaller factors than a few windows do: degrees
 /// that were read as per cent.
-pub fn gradient_fault(all: &Balance) -> Option<DetectedFault> {
+pub fn gradient_fault(all: &WindowBalance) -> Option<DetectedFault> {
     let [.., gradient] = all.fit()?;
-    let Fitted { factor, scatter_mps2, .. } = gradient;
+    let FittedFactor { factor, scatter_mps2, .. } = gradient;
     let is_known = all.windows() >= ALL_WINDOWS_MIN && gradient.is_known(ALL_DEVIATIONS_MIN);
     if !is_known || factor < 0.0 || !is_outside(factor, GRADIENT_FACTORS) {
         return None;

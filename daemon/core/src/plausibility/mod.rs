@@ -22,20 +22,20 @@ use dynocar_shared::{RejectionReason, TrainSample};
 pub use diagnosis::DetectedFaults;
 pub use input_fault::{DetectedFault, InputFault, Severity};
 
-use watch::Watch;
+use watch::PlausibilityWatch;
 use window_balance::WindowMean;
 
 /// Judges the samples of one train as they come.
 #[derive(Clone, Debug)]
 pub struct Plausibility {
-    watch: Watch,
+    watch: PlausibilityWatch,
     detected: DetectedFaults,
 }
 
 impl Plausibility {
     /// Nothing seen yet of a train.
     pub fn new(train: Arc<TrainModel>) -> Self {
-        Plausibility { watch: Watch::new(train), detected: DetectedFaults::default() }
+        Plausibility { watch: PlausibilityWatch::new(train), detected: DetectedFaults::default() }
     }
 
     /// Takes in a sample with what validation said of it, and the gradient in ‰ along the travel.

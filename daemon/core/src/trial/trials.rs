@@ -4,7 +4,7 @@ use dynocar_model::simulate::{Restart, SpeedError};
 use dynocar_model::validation::{ValidSample, Validator};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::evidence::{Evidence, score};
+use super::evidence::{RivalEvidence, score};
 use super::ledger::Ledger;
 use super::open_loop::{OpenLoop, WindowError};
 use crate::pipeline::Pipeline;
@@ -22,7 +22,7 @@ pub struct Rival {
     /// The configured pipelines, with this model.
     pub pipelines: Vec<Pipeline>,
     /// Evidence of the trips for it, against the model in force.
-    pub evidence: Evidence,
+    pub evidence: RivalEvidence,
     /// Its errors.
     pub ledger: Ledger,
     /// The score of the newest trip that was compared.
@@ -40,7 +40,7 @@ impl Rival {
         model: u64,
         open_loop: OpenLoop,
         pipelines: Vec<Pipeline>,
-        (evidence, ledger): (Evidence, Ledger),
+        (evidence, ledger): (RivalEvidence, Ledger),
     ) -> Self {
         let trip = TripError::default();
         Rival {
@@ -97,7 +97,7 @@ struct Window {
 }
 
 /// One train's models on trial, by the samples of its controller.
-pub struct Trials {
+pub struct ModelTrials {
     validator: Validator,
     /// The model in force. Its evidence is against itself and stays empty; its pipelines run
     /// elsewhere.
@@ -109,12 +109,12 @@ pub struct Trials {
     moved_s: f64,
 }
 
-impl Trials {
+impl ModelTrials {
     /// Of a train of a nominal mass in kg.
     pub fn new(train: TrainId, mass_kg: f64, in_force: Rival, rivals: Vec<Rival>) -> Self {
         let validator = Validator::new(train, mass_kg);
         let mut trials =
-            Trials { validator, in_force, rivals, window: None, run: None, moved_s: 0.0 };
+            ModelTrials { validator, in_force, rivals, window: None, run: None, moved_s: 0.0 };
         trials.begin_trip();
         trials
     }
@@ -159,7 +159,7 @@ impl Trials {
     pub fn change(&mut self, index: usize) {
         std::mem::swap(&mut self.in_force, &mut self.rivals[index]);
         for model in self.models() {
-            model.evidence = Evidence::new(model.evidence.least_gain());
+            model.evidence = RivalEvidence::new(model.evidence.least_gain());
         }
         self.begin_trip();
     }

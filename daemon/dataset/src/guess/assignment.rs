@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 
-use super::columns::{Column, Columns};
+use super::columns::{InspectedColumn, InspectedColumns};
 use super::facts::Facts;
 use super::guessed::{GivenColumn, GuessedColumn, Unmapped};
 use super::matching::{UNKNOWN_UNIT, can_hold, consider};
@@ -27,7 +27,7 @@ struct Candidate {
 
 /// Assignment of columns to quantities.
 pub struct Assignment<'c> {
-    columns: &'c [Column],
+    columns: &'c [InspectedColumn],
     /// Column and what it is taken for, or rather not: with the reason.
     taken: Vec<(usize, GuessedColumn, bool)>,
     dropped: Vec<(usize, String)>,
@@ -42,7 +42,7 @@ impl<'c> Assignment<'c> {
     ///
     /// Where what is declared cannot be.
     pub fn new(
-        columns: &'c Columns,
+        columns: &'c InspectedColumns,
         given: &[GivenColumn],
         label: &str,
     ) -> Result<Self, DatasetError> {
@@ -82,7 +82,11 @@ impl<'c> Assignment<'c> {
         Ok(assignment)
     }
 
-    fn take_given(&mut self, given: &GivenColumn, columns: &Columns) -> Result<(), String> {
+    fn take_given(
+        &mut self,
+        given: &GivenColumn,
+        columns: &InspectedColumns,
+    ) -> Result<(), String> {
         let (name, quantity) = (&given.column, given.quantity);
         let index = self.columns.iter().position(|column| column.name.text == given.column.trim());
         let Some(index) = index else {
@@ -172,7 +176,7 @@ impl<'c> Assignment<'c> {
     }
 
     /// The first column that would be a quantity that nothing is taken for, were its unit known.
-    pub fn unknown_unit(&self) -> Option<(&'c Column, Quantity, &str)> {
+    pub fn unknown_unit(&self) -> Option<(&'c InspectedColumn, Quantity, &str)> {
         self.refused.iter().find_map(|(index, quantity, reason)| {
             let is_it = reason.starts_with(UNKNOWN_UNIT)
                 && !self.has(*quantity)

@@ -2,7 +2,7 @@
 
 use dynocar_model::units::{Dimension, Unit, is_unit};
 
-use super::facts::{Facts, Text};
+use super::facts::{Facts, TextCell};
 use super::guessed::GuessedColumn;
 use super::name::{Name, readings, scaled_unit};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
@@ -82,7 +82,7 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
     );
     let is_rare = facts.texts * TEXTS_RARE < facts.numbers;
     if let Some(text) = facts.text.as_ref().filter(|_| !(is_needed && is_rare)) {
-        let Text { file, line, cell } = text;
+        let TextCell { file, line, cell } = text;
         return Err(format!("it holds text in {file}line {line}: '{cell}'"));
     }
     let (Some(top), min, max) = (facts.top(), facts.min, facts.max) else {

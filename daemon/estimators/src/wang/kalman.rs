@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::judge::{Case, InputHealth};
+use dynocar_core::pipeline::judge::{InputHealth, StatusInputs};
 use dynocar_core::pipeline::motion::{SpeedNoise, SpeedRange, StopWatch, jump_variance};
 use dynocar_core::pipeline::output::{write_innovations, write_parameters, write_status};
 use dynocar_core::pipeline::sample_gate::{Gated, SampleGate};
@@ -15,9 +15,9 @@ use dynocar_shared::{
 };
 use nalgebra::{Matrix2, Vector2};
 
-use super::bias_bank::{BiasBank, Dynamics, Moments, SPEED};
+use super::bias_bank::{BiasBank, Dynamics, MassBiasMoments, SPEED};
 use super::kalman_settings::MassKalmanSettings;
-use super::motion::{Inertia, Motion};
+use super::known_motion::{Inertia, KnownMotion};
 
 /// Samples over which the evidence for a behaviour of the bias is remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;
@@ -47,9 +47,9 @@ pub struct MassKalman {
     bank: BiasBank,
     stops: StopWatch,
     gate: SampleGate,
-    last: Option<Motion>,
+    last: Option<KnownMotion>,
     /// Inverse mass as known when force last acted, bias as known now.
-    moments: Moments,
+    moments: MassBiasMoments,
     declared_mass_kg: f64,
     is_warm_started: bool,
     /// True until a motion begins after the mass was opened: nothing is known of the bias.
@@ -147,7 +147,7 @@ impl MassKalman {
         self.moments = self.bank.moments();
     }
 
-    fn begin(&mut self, motion: Motion) -> Outcome {
+    fn begin(&mut self, motion: KnownMotion) -> Outcome {
         if std::mem::take(&mut self.is_opened) && motion.gradient_std_permille > 0.0 {
             self.bank.begin_on_map(&motion);
         }
@@ -158,7 +158,7 @@ impl MassKalman {
         Outcome::Used
     }
 
-    fn advance(&mut self, from: Motion, motion: Motion, step_s: f64) -> Outcome {
+    fn advance(&mut self, from: KnownMotion, motion: KnownMotion, step_s: f64) -> Outcome {
         let before_mps = self.bank.best().mean[SPEED];
         self.bank.predict(&from, &motion, step_s);
         let moved_mps = (self.bank.best().mean[SPEED] - before_mps).abs();
@@ -223,9 +223,9 @@ impl MassKalman {
         self.health.used() >= SAMPLES_MIN || self.moved_s >= MOVED_MIN_S
     }
 
-    fn case(&self) -> Case {
+    fn case(&self) -> StatusInputs {
         let failure = (Status::Invalid, Reason::NumericalFailure);
-        Case {
+        StatusInputs {
             fault: self.is_fresh_reset.then_some(failure),
             input: self.health.input_doubt().or(self.gate.input_doubt()),
             is_ready: self.is_ready(),
@@ -243,7 +243,7 @@ impl Gated for MassKalman {
     }
 
     fn take(&mut self, sample: &ResolvedSample) -> Outcome {
-        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
+        let motion = match KnownMotion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
             Err(outcome) => return self.health.passed(outcome, sample),
         };

@@ -15,13 +15,13 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, S
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
-use super::window::Window;
+use super::window::StepWindow;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::xia::trajectory::fit::{
     DavisPrior, FitError, FitSettings, TrajectoryFit, TrajectoryFitter,
 };
 use crate::xia::trajectory::motion::{MotionTracker, MotionUpdate, UnexplainedForce};
-use crate::xia::trajectory::quality::{Estimate, LongRunVariance, prior_std};
+use crate::xia::trajectory::quality::{DavisEstimate, LongRunVariance, prior_std};
 use crate::xia::trajectory::step::StepRule;
 
 /// Speed noise before the first window, in m/s.
@@ -51,7 +51,7 @@ pub struct TrajectoryNewton {
     source: RestartSource,
     gate: SampleGate,
     tracker: MotionTracker,
-    window: Window,
+    window: StepWindow,
     fitter: TrajectoryFitter,
     davis: Davis,
     covariance: Matrix3<f64>,
@@ -103,7 +103,7 @@ impl TrajectoryNewton {
             source: RestartSource::new(settings.seed),
             gate: SampleGate::default(),
             tracker: MotionTracker::default(),
-            window: Window::new(rule, capacity, settings.interval_m),
+            window: StepWindow::new(rule, capacity, settings.interval_m),
             fitter: TrajectoryFitter::with_capacity(1, capacity + 1),
             davis: prior.davis,
             covariance: Matrix3::from_diagonal(&prior.std.component_mul(&prior.std)),
@@ -290,7 +290,7 @@ impl Estimator for TrajectoryNewton {
         let inflation = self.long_run.inflation();
         let covariance = self.covariance * inflation;
         write_parameters(snapshot, DAVIS, &Vector3::new(a, b, c), &covariance);
-        let estimate = Estimate {
+        let estimate = DavisEstimate {
             davis: self.davis,
             covariance,
             prior_std: self.prior_std,

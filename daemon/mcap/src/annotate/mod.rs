@@ -17,7 +17,7 @@ use prost::Message;
 
 use super::copying::{CopyWriter, copy};
 use super::error::{AtPath, CopyError, WriteError};
-use super::reading::{Item, Raw, Visitor};
+use super::reading::{Raw, RecordingItem, Visitor};
 use super::recording::trains_of;
 use messages::{Effect, PredictedSpeed, Residual, Verdict};
 
@@ -77,7 +77,7 @@ pub fn annotate(
     to: &Path,
 ) -> Result<Annotated, AnnotateError> {
     let mut added = Annotated::default();
-    copy(&Disk, &[from.into()], to, &mut Moments::default(), |writer, moments| {
+    copy(&Disk, &[from.into()], to, &mut SampleMoments::default(), |writer, moments| {
         let (train, runs) = runs_of(moments, train, timeline).map_err(AtPath::of(from))?;
         let annotations = Annotations::new(writer, train);
         let written = annotations.and_then(|it| it.write(timeline, &runs));
@@ -89,7 +89,7 @@ pub fn annotate(
 
 /// The train and its runs.
 fn runs_of(
-    moments: &Moments,
+    moments: &SampleMoments,
     train: Option<u64>,
     timeline: &Timeline,
 ) -> Result<(u64, Vec<RunMoments>), OtherRuns> {
@@ -208,7 +208,7 @@ impl<'w> Annotations<'w> {
 
 /// The samples of a recording with their moments, run by run as a dataset of it has them.
 #[derive(Debug, Default)]
-pub struct Moments {
+pub struct SampleMoments {
     /// When the newest message was logged, in ns since 1970.
     logged_ns: u64,
     samples: Vec<Moment>,
@@ -222,11 +222,11 @@ struct Moment {
     logged_ns: u64,
 }
 
-impl Visitor for Moments {
+impl Visitor for SampleMoments {
     type Error = CopyError;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), CopyError> {
-        if let Item::Sample(it) = item {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), CopyError> {
+        if let RecordingItem::Sample(it) = item {
             let (run, logged_ns) = ((it.run, it.direction), self.logged_ns);
             let time_ns = it.time_ns;
             self.samples.push(Moment { train: it.train_id, run, time_ns, logged_ns });
@@ -240,7 +240,7 @@ impl Visitor for Moments {
     }
 }
 
-impl Moments {
+impl SampleMoments {
     /// The trains that there are samples of, in order.
     pub fn trains(&self) -> Vec<u64> {
         trains_of(self.samples.iter().map(|it| it.train))

@@ -3,12 +3,12 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::extra::Extra;
+use super::extra::ExtraResistance;
 use crate::train::numbers::{Davis, Key};
 
 /// One entry of the files that a finding becomes.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Entry {
+pub enum ModelEntry {
     /// A number of `train.toml`.
     Number(&'static Key, f64),
     /// A number of `[track]` that adds to a declared one.
@@ -18,7 +18,7 @@ pub enum Entry {
     /// Further rows of a list of `[track]`.
     Rows(&'static str, Vec<Vec<f64>>),
     /// A further table of `[[extra]]` of `train.toml`.
-    Extra(Extra),
+    Extra(ExtraResistance),
 }
 
 /// A parameter of a term, as a fit knows it.

@@ -27,7 +27,7 @@ pub mod wheel;
 pub mod wind;
 
 pub use crate::train::numbers::Key;
-pub use key::{Entry, Least, Parameter, Suspect, SuspectInput};
+pub use key::{Least, ModelEntry, Parameter, Suspect, SuspectInput};
 pub use resistance::Resistance;
 
 /// Suspects of the monitor, one column of its regression each.

@@ -98,7 +98,7 @@ pub struct Track {
     gradient_permille: Option<StepProfile>,
     curvature_per_m: Option<StepProfile>,
     tunnel: Option<TunnelProfiles>,
-    curves: Vec<Curve>,
+    curves: Vec<TrackCurve>,
     tunnels: Vec<Tunnel>,
     resistance_n_per_kn: Option<StepProfile>,
     /// How far in m the true gradient lies from the profile, towards growing chainage.
@@ -133,7 +133,7 @@ impl Track {
         name: String,
         length_m: Option<f64>,
         gradient: Option<&[(f64, f64)]>,
-        curves: Option<Vec<Curve>>,
+        curves: Option<Vec<TrackCurve>>,
         tunnels: Option<Vec<Tunnel>>,
     ) -> Result<Self, TrackError> {
         let gradient_permille =
@@ -254,7 +254,7 @@ impl Track {
     }
 
     /// The known curves, by chainage as declared.
-    pub fn curves(&self) -> &[Curve] {
+    pub fn curves(&self) -> &[TrackCurve] {
         &self.curves
     }
 
@@ -279,7 +279,7 @@ impl Track {
     }
 }
 
-fn curvature_profile(curves: &[Curve]) -> Result<StepProfile, TrackError> {
+fn curvature_profile(curves: &[TrackCurve]) -> Result<StepProfile, TrackError> {
     for (i, curve) in curves.iter().enumerate() {
         // The reciprocal of a subnormal radius is infinite.
         let is_usable = curve.radius_m.is_finite() && (1.0 / curve.radius_m).is_finite();
@@ -350,7 +350,7 @@ mod tests;
 
 /// A curve of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curve {
+pub struct TrackCurve {
     /// Chainage in m where it starts.
     pub start_m: f64,
     /// Chainage in m where it ends.

@@ -3,7 +3,7 @@
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use super::EffortCurve;
-use super::numbers::{DRIVE_EFFICIENCY, Davis, Drive, FrictionBrake, TrainModel};
+use super::numbers::{DRIVE_EFFICIENCY, Davis, FrictionBrake, PowerTrain, TrainModel};
 
 impl Davis {
     /// w0 in N/kN at a speed in m/s.
@@ -55,7 +55,7 @@ impl TrainModel {
     }
 }
 
-impl Drive {
+impl PowerTrain {
     /// Standard deviation of an efficiency that nobody declares: from transformers and gears under a light load to
     /// power that is recorded at the wheels.
     pub const EFFICIENCY_STD: f64 = 0.1;
@@ -78,8 +78,8 @@ impl Drive {
 
     /// Returns the difference of the traction and the brake force in N, from a recorded power in W at a speed in
     /// m/s, between this drive and another; `None` where either determines none.
-    pub fn beyond_n(&self, other: Drive, recorded_w: f64, speed_mps: f64) -> Option<[f64; 2]> {
-        let at = |drive: &Drive| drive.force_n(recorded_w, speed_mps);
+    pub fn beyond_n(&self, other: PowerTrain, recorded_w: f64, speed_mps: f64) -> Option<[f64; 2]> {
+        let at = |drive: &PowerTrain| drive.force_n(recorded_w, speed_mps);
         let (own_n, other_n) = at(self).zip(at(&other))?;
         Some([own_n.max(0.0) - other_n.max(0.0), other_n.min(0.0) - own_n.min(0.0)])
     }
@@ -89,7 +89,8 @@ impl Drive {
 mod tests {
     use super::*;
 
-    const DRIVE: Drive = Drive { efficiency: 0.8, auxiliary_power_w: 10e3, speed_min_mps: 2.0 };
+    const DRIVE: PowerTrain =
+        PowerTrain { efficiency: 0.8, auxiliary_power_w: 10e3, speed_min_mps: 2.0 };
 
     #[test]
     fn a_drive_loses_on_the_way_to_the_wheels_and_on_the_way_back() {
@@ -102,7 +103,7 @@ mod tests {
 
     #[test]
     fn a_better_drive_pulls_more_and_brakes_less_for_the_same_power() {
-        let better = Drive { efficiency: 1.0, ..DRIVE };
+        let better = PowerTrain { efficiency: 1.0, ..DRIVE };
         assert_eq!(better.beyond_n(DRIVE, 110e3, 10.0), Some([2000.0, 0.0]));
         let [traction_n, brake_n] = better.beyond_n(DRIVE, -70e3, 10.0).unwrap();
         assert!(traction_n == 0.0 && (brake_n + 2000.0).abs() < 1e-9, "{brake_n}");

@@ -5,7 +5,7 @@ pub mod numbers;
 mod rule;
 
 pub use numbers::{
-    BrakeComponents, BrakeGear, Corrections, Davis, Drive, FrictionBrake, TrainModel,
+    BrakeComponents, BrakeGear, Corrections, Davis, FrictionBrake, PowerTrain, TrainModel,
 };
 pub use rule::{Joined, NumberRule};
 

@@ -3,7 +3,7 @@
 
 use super::EffortCurve;
 use super::rule::NumberRule;
-use crate::terms::extra::Extra;
+use crate::terms::extra::ExtraResistance;
 
 /// One number of a train as `train.toml` declares it.
 #[derive(Clone, Copy, Debug)]
@@ -167,13 +167,13 @@ numbers! {
             /// Greatest brake force over speed.
             brake: Option<EffortCurve> = None;
             /// The drive, where it is declared by its electric power.
-            drive: Option<Drive> = None;
+            drive: Option<PowerTrain> = None;
             /// Brake gear, as far as declared.
             brake_gear: BrakeGear = BrakeGear::UNDECLARED;
             /// Corrections by measured runs.
             corrections: Corrections = Corrections::NONE;
             /// Resistances of forms of their own.
-            extra: Vec<Extra> = Vec::new();
+            extra: Vec<ExtraResistance> = Vec::new();
         }
     }
 
@@ -197,7 +197,7 @@ numbers! {
     /// drive gives back the same share of what the wheels feed: force = efficiency P / v for P > 0 and
     /// P / (efficiency v) for P < 0.
     #[derive(Clone, Copy, Debug, PartialEq)]
-    Drive (USUAL) [.drive.get_or_insert(Drive::USUAL)] {
+    PowerTrain (USUAL) [.drive.get_or_insert(PowerTrain::USUAL)] {
         in "traction" {
             /// Mechanical power at the rims over the drive's electric power when it pulls, 0 to 1: unless a train
             /// says otherwise that of motors, converter and gear of the last decades, under load.

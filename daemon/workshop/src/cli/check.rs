@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use crate::dataset;
 use dynocar::cli::Failure;
-use dynocar::dataset::{FileKind, LoadError, Source, kind_of, labelled_text};
+use dynocar::dataset::{DatasetSource, FileKind, LoadError, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
 
 /// Runs `dynocar check`.
@@ -30,7 +30,7 @@ use dynocar::output::{give, require_file, require_folder};
 /// been reported by then.
 pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let (path, json) = (&arguments.path, arguments.json.as_deref());
-    let source = Source { path, train: arguments.train.map(TrainId) };
+    let source = DatasetSource { path, train: arguments.train.map(TrainId) };
     if let Some(file) = json {
         require_file(file, "{")?;
     }
@@ -63,7 +63,7 @@ impl Understood {
 /// # Errors
 ///
 /// When the path leads to nothing known, or a file that everything rests on is wrong.
-pub fn understand(source: Source) -> Result<Understood, Failure> {
+pub fn understand(source: DatasetSource) -> Result<Understood, Failure> {
     let path = source.path;
     if source.train.is_some() || !path.is_file() || dataset::is_recording(path) {
         return read_dataset(source);
@@ -100,7 +100,7 @@ fn found(keys: &[String]) -> String {
     format!("not a file that can be checked: it holds {}{more}", names.join(", "))
 }
 
-fn read_dataset(source: Source) -> Result<Understood, Failure> {
+fn read_dataset(source: DatasetSource) -> Result<Understood, Failure> {
     let (folder, head) = dataset::open(source).map_err(|error| match error {
         LoadError::NotADataset { .. } => {
             let place = SourcePosition::whole(&source.path.display().to_string());

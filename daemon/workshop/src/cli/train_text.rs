@@ -89,7 +89,7 @@ const fn asked(key: &'static str, question: &'static str, note: &'static str) ->
 
 /// Values of the train from files.
 #[derive(Clone, Debug, Default)]
-pub struct Found {
+pub struct TrainValues {
     /// Keys of `[train]` and `[resistance]`, each with its value and where that is from.
     pub figures: Vec<(&'static str, Value, String)>,
     /// Greatest traction force: (m/s, N), by speed.
@@ -98,7 +98,7 @@ pub struct Found {
     pub brake_mps2: Option<Vec<(f64, f64)>>,
 }
 
-impl Found {
+impl TrainValues {
     fn number(&self, key: &str) -> Option<f64> {
         self.figures.iter().find(|figure| figure.0 == key)?.1.as_float()
     }
@@ -149,7 +149,7 @@ impl TrainArguments {
     ///
     /// The values are not those of a train.
     pub fn default_of(&self, key: &str) -> Result<String, Failure> {
-        let defaults = self.text("", &Found::default())?.defaults;
+        let defaults = self.text("", &TrainValues::default())?.defaults;
         let value = defaults.iter().find_map(|it| it.split_once(" = ").filter(|it| it.0 == key));
         Ok(value.map(|(_, value)| value.trim_matches('"').to_owned()).unwrap_or_default())
     }
@@ -183,7 +183,7 @@ impl TrainArguments {
         if let Some(figure) = figure {
             *figure = Some(number().ok_or_else(refused)?);
         }
-        match answered.text("", &Found::default()) {
+        match answered.text("", &TrainValues::default()) {
             Ok(_) => Ok(answered),
             Err(failure) => Err(failure.answer().map(|it| it.message).unwrap_or_default()),
         }
@@ -194,7 +194,7 @@ impl TrainArguments {
     /// # Errors
     ///
     /// A figure that no train has is an input failure.
-    pub fn text(&self, writer: &str, found: &Found) -> Result<TrainText, Failure> {
+    pub fn text(&self, writer: &str, found: &TrainValues) -> Result<TrainText, Failure> {
         let known_length_m = self.length_m.or(found.number(LENGTH.name));
         let mass_t = self.mass_t.or(found.number(MASS.name)).unwrap_or_else(|| {
             let length_m = known_length_m.filter(|length| *length > 0.0);
@@ -271,7 +271,7 @@ pub fn converted(value: f64) -> Value {
 }
 
 /// Adds the curve constant and the efforts, or how they are written.
-fn efforts(text: &mut TomlText, found: &Found, inertial_kg: f64) {
+fn efforts(text: &mut TomlText, found: &TrainValues, inertial_kg: f64) {
     let constant = Value::Float(TrainModel::UNDECLARED.curve_constant_n_per_kn_m);
     let constant = assign(CURVE_CONSTANT.name, constant);
     text.lines(&format!(
@@ -337,7 +337,7 @@ mod tests {
             b: Some(-0.01),
             ..TrainArguments::default()
         };
-        let made = given.text("x", &Found::default()).unwrap();
+        let made = given.text("x", &TrainValues::default()).unwrap();
         let train = parse_train("train.toml", &made.text).unwrap();
         assert_eq!((train.mass_kg, train.resistance.b), (114_500.0, -0.01));
         assert_eq!(train.full_mass_kg, Some(150_000.0));
@@ -354,7 +354,7 @@ mod tests {
         let none = TrainArguments::default();
         let from = "t, the middle of what the recordings hold".to_string();
         let figures = vec![("mass_t", Value::Float(321.5), from)];
-        let found = Found { figures, ..Found::default() };
+        let found = TrainValues { figures, ..TrainValues::default() };
         let made = none.text("x", &found).unwrap();
         assert!(made.text.contains("mass_t = 321.5 ") && made.text.contains("recordings hold"));
         assert!(!made.defaults.iter().any(|it| it.starts_with("mass_t")));
@@ -364,7 +364,7 @@ mod tests {
 
     #[test]
     fn figures_that_no_train_has_are_refused_in_words() {
-        let refused = |given: TrainArguments| match given.text("x", &Found::default()) {
+        let refused = |given: TrainArguments| match given.text("x", &TrainValues::default()) {
             Err(Failure::Input(message)) => message,
             _ => panic!("an input failure"),
         };

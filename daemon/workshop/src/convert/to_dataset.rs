@@ -15,7 +15,7 @@ use dynocar_analysis::dataset::{
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::recorded_dataset::{Content, RecordedDataset};
+use super::recorded_dataset::{FileContent, RecordedDataset};
 use super::rows::WHEEL_SLIDE;
 use dynocar_mcap::error::{AtPath, ReadError};
 use dynocar_mcap::recording::Recording;
@@ -175,7 +175,7 @@ pub fn dataset_of(
                 return Err(refused(NoDataset::Outside { name: name.into() }));
             }
             unpacked.runs += usize::from(!name.ends_with(".toml"));
-            dataset.put(name, Content::Bytes(content.clone()));
+            dataset.put(name, FileContent::Bytes(content.clone()));
         }
         let head = DatasetHead::open(&dataset);
         // Its reader reports its faults.
@@ -189,10 +189,10 @@ pub fn dataset_of(
         Some(models) if files.train.is_none() => models,
         _ => models(path, &recording, train, files)?,
     };
-    dataset.put(TRAIN_FILE, Content::Bytes(train_text));
+    dataset.put(TRAIN_FILE, FileContent::Bytes(train_text));
     let has_track = track_text.is_some();
     if let Some(text) = track_text {
-        dataset.put(TRACK_FILE, Content::Bytes(text));
+        dataset.put(TRACK_FILE, FileContent::Bytes(text));
     }
     let samples: Vec<TrainSample> =
         recording.samples.into_iter().filter(|it| it.train_id == train).collect();
@@ -204,9 +204,9 @@ pub fn dataset_of(
         .chunk_by(|one, next| (one.run, one.direction) == (next.run, next.direction))
         .collect();
     let manifest = manifest(path, &runs, &samples, has_track);
-    dataset.put(MANIFEST_FILE, Content::Bytes(manifest.into_bytes()));
+    dataset.put(MANIFEST_FILE, FileContent::Bytes(manifest.into_bytes()));
     for (index, run) in runs.iter().enumerate() {
-        dataset.put(&run_file(index), Content::Samples(run.to_vec()));
+        dataset.put(&run_file(index), FileContent::Samples(run.to_vec()));
     }
     (unpacked.runs, unpacked.samples) = (runs.len(), samples.len());
     Ok((dataset, unpacked))

@@ -16,6 +16,7 @@
 //! - [`mod@watch`]: when there is one
 //! - [`page`]: the history as a page, with the errors that the daemon's trials measured
 
+pub mod available_runs;
 pub mod conclusion;
 mod error;
 pub mod finding;
@@ -24,10 +25,9 @@ pub mod memory;
 pub mod page;
 pub mod pool;
 pub mod recordings;
-pub mod source;
-pub mod watch;
+pub mod round_schedule;
 
 pub use conclusion::Explained;
 pub use error::LearnError;
-pub use learner::{Learner, LearnerSettings, Round, RoundOutcome, TrainRound};
+pub use learner::{Learner, LearnerRound, LearnerSettings, RoundOutcome, TrainRound};
 pub use pool::Bounds;

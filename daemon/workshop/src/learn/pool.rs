@@ -18,8 +18,8 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use toml::Table;
 
-use super::memory::Memory;
-use super::source::{FoundRun, report_unusable};
+use super::available_runs::{FoundRun, report_unusable};
+use super::memory::LearnerMemory;
 use crate::dataset::FilesOfDataset;
 
 /// Bounds of what is explained together.
@@ -104,7 +104,7 @@ pub fn read(
     chosen: &[FoundRun],
     declared: Declared<'_>,
     bounds: &Bounds,
-    memory: &mut Memory,
+    memory: &mut LearnerMemory,
 ) -> Option<Pool> {
     let Declared { text, train, track } = declared;
     let mut kept: Vec<(FoundRun, Run)> = Vec::new();
@@ -243,7 +243,7 @@ impl DatasetFiles for Overlay<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar::models::Moment;
+    use dynocar::models::UtcSecond;
 
     fn run(day: u64, number: usize) -> FoundRun {
         FoundRun {
@@ -251,7 +251,7 @@ mod tests {
             dataset: PathBuf::new(),
             index: 0,
             path: PathBuf::new(),
-            recorded: Moment { unix_s: 86_400 * (20_000 + day) + number as u64 },
+            recorded: UtcSecond { unix_s: 86_400 * (20_000 + day) + number as u64 },
             sha256: format!("{day}-{number}"),
             described: String::new(),
         }

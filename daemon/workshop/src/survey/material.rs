@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::{Survey, SurveyError, Vehicle};
 
-use dynocar::dataset::{LoadError, Source};
+use dynocar::dataset::{DatasetSource, LoadError};
 use dynocar::output::OutputError;
 
 /// Material of the files.
 pub struct Material<'m> {
     /// Where the raw dataset lies.
-    pub source: Source<'m>,
+    pub source: DatasetSource<'m>,
     /// The raw dataset.
     pub dataset: &'m Dataset,
     /// Declared vehicle.

@@ -18,7 +18,7 @@ pub mod write;
 use std::path::{Path, PathBuf};
 
 use crate::dataset::load;
-use dynocar::dataset::Source;
+use dynocar::dataset::DatasetSource;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, survey};
@@ -51,7 +51,7 @@ pub struct Surveyed {
 ///
 /// When the recordings or the line cannot be read, hold no line, or a file cannot be written.
 pub fn survey_folder<'s>(
-    source: impl Into<Source<'s>>,
+    source: impl Into<DatasetSource<'s>>,
     line: Option<&Path>,
     out: &Path,
 ) -> Result<Surveyed, SurveyFailure> {

@@ -10,7 +10,7 @@ use dynocar_shared::HALF_95;
 
 use super::answer::{SurveyAnswer, TripAnswer};
 use super::write::gradient_entries;
-use crate::report::html::Column::{Names, Numbers, Words};
+use crate::report::html::ColumnAlignment::{Names, Numbers, Words};
 use crate::report::html::{self, TableColumn, escape, table};
 use crate::report::page::document;
 use crate::report::plots::{PlotError, figure, series, wide_and_narrow};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use dynocar::config::{DaemonConfig, TrainConfig};
-use dynocar::models::{ModelHash, ModelText, Moment, NewModel, Origin, Store, TrainModels};
+use dynocar::models::{ModelHash, ModelText, NewModel, Origin, Store, TrainModels, UtcSecond};
 use dynocar::pipelines::build_pipeline;
 use dynocar::runtime::exchange::Exchange;
 use dynocar::shadow::in_force::with_model;
@@ -26,7 +26,7 @@ const TRAIN: TrainId = TrainId(1);
 const FIRST_DAY_S: u64 = 1_798_761_600;
 const DAY_S: u64 = 86_400;
 /// When the models are made that a life begins with.
-const MADE: Moment = Moment { unix_s: FIRST_DAY_S };
+const MADE: UtcSecond = UtcSecond { unix_s: FIRST_DAY_S };
 /// The learner looks at least so often, in days.
 const LEARNS_EVERY: usize = 7;
 /// Days after an adoption over which both models' errors show whether it was right.
@@ -181,13 +181,13 @@ impl<'f> Life<'f> {
         if runs.is_empty() {
             return;
         }
-        let folder = self.folder.join("runs").join(Moment::of(night).day());
+        let folder = self.folder.join("runs").join(UtcSecond::of(night).day());
         write_dataset(&dataset_of(&self.world, runs), &folder).expect("a day's runs");
     }
 
     /// Root mean square in m/s of a model's errors over some days.
     fn error_of(&self, model: ModelHash, from_day: usize, days: i64) -> Option<f64> {
-        let record = record::Trials::read(self.models.folder());
+        let record = record::TrialRecord::read(self.models.folder());
         let from = (FIRST_DAY_S / DAY_S) as i64 + from_day as i64;
         let (mut squares, mut samples) = (0.0, 0);
         for (_, sum) in record.of(model)?.ledger.days.range(from..from + days) {

@@ -6,10 +6,10 @@
 
 use std::sync::Arc;
 
-use dynocar_core::trial::evidence::Evidence;
+use dynocar_core::trial::evidence::RivalEvidence;
 use dynocar_core::trial::ledger::Ledger;
 use dynocar_core::trial::open_loop::OpenLoop;
-use dynocar_core::trial::{Rival, Trials};
+use dynocar_core::trial::{ModelTrials, Rival};
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{TrainId, TrainSample};
 
@@ -51,14 +51,14 @@ pub fn measure(trains: u64, years: usize, seed: u64, trips_between_mistakes: f64
         found.train_years += years as f64;
         let mut random = Random::new(seed, Stream::Effects);
         let level = trips_between_mistakes * all.len() as f64;
-        let mut evidence = vec![Evidence::new(LEAST_GAIN); worse.len()];
+        let mut evidence = vec![RivalEvidence::new(LEAST_GAIN); worse.len()];
         for _ in 0..years * TRIPS_A_YEAR {
             let trip = random.integer(0, all[0].len() - 1);
             for (evidence, scores) in evidence.iter_mut().zip(&worse) {
                 evidence.take(scores[trip]);
                 if evidence.e_value() >= level {
                     found.adopted += 1;
-                    *evidence = Evidence::new(LEAST_GAIN);
+                    *evidence = RivalEvidence::new(LEAST_GAIN);
                 }
             }
         }
@@ -82,7 +82,7 @@ fn scores(seed: u64) -> Vec<Vec<f64>> {
         let mut train = declared.clone();
         change(&mut train);
         let open_loop = OpenLoop::new(Arc::new(train), Some(Arc::clone(&track)));
-        Rival::new(0, open_loop, Vec::new(), (Evidence::new(LEAST_GAIN), Ledger::default()))
+        Rival::new(0, open_loop, Vec::new(), (RivalEvidence::new(LEAST_GAIN), Ledger::default()))
     };
     let rivals = vec![
         rival(&|it| it.resistance.a *= 1.02),
@@ -90,7 +90,7 @@ fn scores(seed: u64) -> Vec<Vec<f64>> {
         rival(&|it| it.corrections.traction_gain *= 1.005),
         rival(&|it| it.corrections.wind_plus_mps += 0.5),
     ];
-    let mut trials = Trials::new(TRAIN, declared.mass_kg, rival(&|_| {}), rivals);
+    let mut trials = ModelTrials::new(TRAIN, declared.mass_kg, rival(&|_| {}), rivals);
     let mut scores = vec![Vec::new(); trials.rivals.len()];
     let mut sequence = 0;
     for plan in &world.plans {

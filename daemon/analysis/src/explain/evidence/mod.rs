@@ -44,4 +44,4 @@ pub use run_scatter::{PRIOR_RUNS, RunFactors, WeightedFilter};
 pub use sample_forces::SampleForces;
 #[cfg(test)]
 pub use test_runs::coasting;
-pub use whitener::Whitener;
+pub use whitener::BinWhitener;

@@ -3,7 +3,7 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{is_accepted, may_be};
-use super::outcome::{Outcome, Round, round_of};
+use super::outcome::{SearchOutcome, SearchRound, round_of};
 use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::Asked;
@@ -15,7 +15,7 @@ impl Search<'_> {
     /// Takes each effect out in turn and looks whether another kind does better in its place; what was
     /// tried in the place of each kind that stands after it: of the last, while the others stay, in the round
     /// that brought it.
-    pub(super) fn swap(&self, outcome: &mut Outcome, brought_last: Round) {
+    pub(super) fn swap(&self, outcome: &mut SearchOutcome, brought_last: SearchRound) {
         let mut tried = Vec::new();
         let kinds = outcome.kinds();
         let mut others_stay = true;
@@ -45,7 +45,7 @@ impl Search<'_> {
 
     /// Replaces an effect by a kind that explains more than it beside the usual errors; returns whether it did.
     /// Without the usual errors an effect that can take their form would win.
-    pub(super) fn give_way(&self, outcome: &mut Outcome) -> bool {
+    pub(super) fn give_way(&self, outcome: &mut SearchOutcome) -> bool {
         let may_give_way = |kind: &EffectKind| {
             !policy_of(*kind).gives_way_to.is_empty() && outcome.is_on_trial(*kind)
         };
@@ -57,7 +57,7 @@ impl Search<'_> {
         let trials = self.round_of(&rest, &mut Vec::new(), asked);
         let Some(best) = self.best(&trials, &outcome.fallen_kinds()) else { return false };
         let own = Self::total(&self.beside_usual_errors(outcome).fit);
-        let mut other = Outcome { fit: best.fit.clone(), ..outcome.clone() };
+        let mut other = SearchOutcome { fit: best.fit.clone(), ..outcome.clone() };
         if Self::total(&self.beside_usual_errors(&mut other).fit) > own - EQUAL {
             return false;
         }
@@ -69,7 +69,7 @@ impl Search<'_> {
 
     /// Drops effects that the others have made needless, and that none of the others stands in for against
     /// what its own kind says: winds that blow ahead of every train instead of a tunnel's drag.
-    pub(super) fn prune(&self, outcome: &mut Outcome) {
+    pub(super) fn prune(&self, outcome: &mut SearchOutcome) {
         let mut index = 0;
         while index < outcome.fit.model.effects.len() && outcome.fit.model.effects.len() > 1 {
             let fit = &outcome.fit;

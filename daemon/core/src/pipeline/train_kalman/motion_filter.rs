@@ -30,7 +30,7 @@ pub const BRAKE_SCALE: usize = 10;
 pub const STATES: usize = 11;
 
 /// A state.
-pub type State = SVector<f64, STATES>;
+pub type MotionState = SVector<f64, STATES>;
 /// Covariance of a state.
 pub type StateCovariance = SMatrix<f64, STATES, STATES>;
 
@@ -63,7 +63,7 @@ pub enum Following {
 
 /// Step between two samples, as every behaviour uses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub struct FilterStep {
     /// Duration in s.
     pub duration_s: f64,
     /// Distance in m.
@@ -126,7 +126,7 @@ impl MotionFilter {
     /// # Real-time
     ///
     /// Work in proportion to the square of [`STATES`], no allocation.
-    pub fn predict(&mut self, step: &Step) {
+    pub fn predict(&mut self, step: &FilterStep) {
         let state = self.belief.mean;
         let (load, later_s) = (state[LOAD], state[FORCE_DELAY] - step.delay_s);
         let by_traction = 1.0 + state[TRACTION_SCALE];
@@ -154,7 +154,7 @@ impl MotionFilter {
 
         let wind = (step.by_wind + step.by_wind_square * state[WIND]) * state[WIND];
         let seconds = step.duration_s * per_inertia;
-        let mut gradient = State::zeros();
+        let mut gradient = MotionState::zeros();
         gradient[SPEED] = 1.0 - seconds * slope;
         gradient[DISTURBANCE] = -seconds;
         gradient[LOAD] = per_inertia * force;
@@ -190,7 +190,7 @@ impl MotionFilter {
 
     /// Variance in (m/s)² of the speed while a force changes that acts by d later than the step has it: its
     /// impulse is taken as d times the change at once, and is off by half d² times the rate until then.
-    pub fn transient_variance(&self, step: &Step) -> f64 {
+    pub fn transient_variance(&self, step: &FilterStep) -> f64 {
         let later_s = self.belief.mean[FORCE_DELAY] - step.delay_s;
         let square = later_s * later_s + self.belief.covariance[(FORCE_DELAY, FORCE_DELAY)];
         (0.5 * square * step.force_rate / step.inertia).powi(2)
@@ -261,8 +261,8 @@ mod tests {
     use super::behaviours;
     use super::*;
 
-    fn step() -> Step {
-        Step {
+    fn step() -> FilterStep {
+        FilterStep {
             duration_s: 0.2,
             travelled_m: 4.0,
             inertia: 108.0,
@@ -288,13 +288,14 @@ mod tests {
     }
 
     fn filter() -> MotionFilter {
-        let mean = State::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1]);
+        let mean =
+            MotionState::from([21.0, 0.3, 0.95, 1.6, 0.4, 0.9, 0.01, -0.02, 0.15, -1.2, 0.1]);
         let belief = Gaussian { mean, covariance: StateCovariance::zeros() };
         MotionFilter { behaviour: behaviours()[0], belief, jump_variance: 0.0 }
     }
 
     /// The speed after a step from a state.
-    fn speed_after(mean: State) -> f64 {
+    fn speed_after(mean: MotionState) -> f64 {
         let mut moved = filter();
         moved.belief.mean = mean;
         moved.predict(&step());
@@ -324,9 +325,9 @@ mod tests {
     #[test]
     fn only_as_much_of_a_jump_is_doubted_as_forces_of_this_train_bring() {
         let mut doubting = filter();
-        doubting.predict(&Step { jump_share: 1.0, ..step() });
+        doubting.predict(&FilterStep { jump_share: 1.0, ..step() });
         let whole = doubting.jump_variance;
-        doubting.predict(&Step { jump_share: 0.25, ..step() });
+        doubting.predict(&FilterStep { jump_share: 0.25, ..step() });
         assert!(whole > 0.0 && (doubting.jump_variance / whole - 0.25).abs() < 0.01);
     }
 }

@@ -5,7 +5,7 @@ use dynocar_model::track::GRADIENT_ERROR_FREE_M;
 use dynocar_shared::{ParameterSnapshot, Quantity};
 use nalgebra::{Matrix4, Vector4};
 
-use super::bank::Published;
+use super::motion_bank::Published;
 use super::motion_filter::COEFFICIENTS;
 use crate::pipeline::momentum::{regressors, unscaling};
 use crate::pipeline::motion::SpeedRange;
@@ -38,7 +38,7 @@ impl Level {
 
 /// The estimate as it is published.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report {
+pub struct TrainKalmanReport {
     /// a, b, c (scaled, N/kN) and the declared mass over the true one.
     mean: Vector4<f64>,
     covariance: Matrix4<f64>,
@@ -59,10 +59,10 @@ const MASS_LEVEL: Level = Level::new(0.025, 0.12);
 /// Share of w0 that a coefficient's standard deviation may reach while it counts as excited.
 const EXCITED_SHARE: f64 = 0.25;
 
-impl Report {
+impl TrainKalmanReport {
     /// Before any sample.
     pub fn new(published: &Published) -> Self {
-        Report {
+        TrainKalmanReport {
             mean: published.mean,
             covariance: published.covariance,
             disturbance: published.disturbance,
@@ -74,7 +74,7 @@ impl Report {
 
     /// Before any sample, where these quantities, one bit each, were known a moment ago.
     pub fn resumed(published: &Published, known: u32) -> Self {
-        let mut report = Report::new(published);
+        let mut report = TrainKalmanReport::new(published);
         report.resistance.is_known = known & Quantity::Resistance.bit() != 0;
         report.mass.is_known = known & Quantity::Mass.bit() != 0;
         report

@@ -12,7 +12,7 @@ mod form;
 mod law;
 
 pub use form::Form;
-pub use law::{Covariate, Extra, Factor};
+pub use law::{Covariate, CovariateFactor, ExtraResistance};
 
 use super::Resistance;
 
@@ -24,7 +24,7 @@ pub const FACTORS_MAX: usize = 2;
 /// Forces of forms of their own resist; by their slope for speeds near this one, too.
 #[inline]
 pub fn act(
-    extras: &[Extra],
+    extras: &[ExtraResistance],
     speed_mps: f64,
     known: impl Fn(Covariate) -> Option<f64>,
     resistance: &mut Resistance,
@@ -43,7 +43,7 @@ mod tests {
 
     /// The force in N/kN at a speed by what is known at another, and at a temperature in °C.
     fn resists_n_per_kn(
-        extra: &Extra,
+        extra: &ExtraResistance,
         (known_mps, degc): (f64, Option<f64>),
         speed_mps: f64,
     ) -> f64 {
@@ -57,11 +57,12 @@ mod tests {
         resistance.extra_n_per_kn(Davis { a: 1.0, b: 0.0, c: 0.0 }, speed_mps)
     }
 
-    fn slow_and_cold() -> Extra {
+    fn slow_and_cold() -> ExtraResistance {
         let hyperbola =
-            Factor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
-        let cold = Factor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
-        Extra { n_per_kn: 0.8, factors: vec![hyperbola, cold] }
+            CovariateFactor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
+        let cold =
+            CovariateFactor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
+        ExtraResistance { n_per_kn: 0.8, factors: vec![hyperbola, cold] }
     }
 
     #[test]

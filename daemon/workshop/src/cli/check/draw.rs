@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_analysis::explain::report::line::AlongLine;
+use dynocar_analysis::explain::report::residual_line::AlongLine;
 
 use super::Understood;
 use crate::report::plots::Width;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dynocar_analysis::dataset::keys::{corrections, numbers_of};
 use dynocar_analysis::dataset::{DatasetError, Manifest, Run, RunEntry, TimeFormat};
-use dynocar_model::terms::extra::Extra;
+use dynocar_model::terms::extra::ExtraResistance;
 use dynocar_model::track::{LinearProfile, Track};
 use dynocar_model::train::{Corrections, EffortCurve, TrainModel};
 use serde::{Serialize, Serializer};
@@ -108,7 +108,7 @@ fn of_run<'a>((entry, run): (&'a RunEntry, &'a Result<Run, DatasetError>)) -> im
 
 fn of_train(train: &TrainModel) -> impl Serialize {
     let corrections = Some(train).filter(|train| train.corrections != Corrections::NONE);
-    let extra: Vec<String> = train.extra.iter().map(Extra::law).collect();
+    let extra: Vec<String> = train.extra.iter().map(ExtraResistance::law).collect();
     object! {
         name: &train.name,
         mass_kg: train.mass_kg,

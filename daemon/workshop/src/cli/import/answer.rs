@@ -14,7 +14,7 @@ use dynocar_model::train::numbers::{
 use toml::Value;
 
 use crate::cli::text::{TextTable, comment, diagnostics, entry, on_one_line};
-use crate::cli::train_text::{Found, TrainArguments, TrainText, converted};
+use crate::cli::train_text::{TrainArguments, TrainText, TrainValues, converted};
 use crate::report::provenance::for_shell;
 
 /// The `train.toml`; what the file does not give and nobody says is a marked default.
@@ -39,7 +39,7 @@ pub fn train(train: &ImportedTrain, arguments: &TrainArguments) -> Result<TrainT
     figures.extend(train.cars.map(count));
     let writer = format!("dynocar import from {}", train.place);
     let (traction, brake_mps2) = (train.traction.clone(), train.brake_mps2.clone());
-    arguments.text(&writer, &Found { figures, traction, brake_mps2 })
+    arguments.text(&writer, &TrainValues { figures, traction, brake_mps2 })
 }
 
 /// From which field a key is.
@@ -76,7 +76,7 @@ pub fn track(line: &ImportedLine) -> String {
     if let Some(curves) = &line.curves {
         let ends =
             |start_m: f64, end_m: f64| format!("{}, {}", converted(start_m), converted(end_m));
-        let entry = |it: &dynocar_model::track::Curve| {
+        let entry = |it: &dynocar_model::track::TrackCurve| {
             format!("{}, {}", ends(it.start_m, it.end_m), converted(it.radius_m))
         };
         text.list(&track::CURVES, curves.iter().map(entry));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar::models::Moment;
+use dynocar::models::UtcSecond;
 use dynocar_analysis::dataset::guess::{Guess, GuessedColumn, GuessedRun};
 use dynocar_analysis::dataset::keys::column::{COLUMN, DOUBTFUL, FORMAT, SCALE, UNIT};
 use dynocar_analysis::dataset::keys::dataset::{
@@ -117,7 +117,7 @@ fn date_text(text: &mut TomlText, guess: &Guess, of: &GuessedRun) {
     match (format, of.day) {
         (Some(format), _) if format.has_date() => {}
         (_, Some(day)) => {
-            let day = Moment { unix_s: 86_400 * u64::try_from(day).unwrap_or(0) }.day();
+            let day = UtcSecond { unix_s: 86_400 * u64::try_from(day).unwrap_or(0) }.day();
             text.noted(&run::DATE, day, "as the column of dates says");
         }
         _ => text.suggested(&run::DATE, "2026-03-18", "where the day is known"),
@@ -205,13 +205,13 @@ pub fn daemon(has_track: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_analysis::dataset::guess::{Recording, guess};
+    use dynocar_analysis::dataset::guess::{RecordingText, guess};
     use dynocar_analysis::dataset::manifest::{Manifest, Role};
 
     #[test]
     fn names_with_any_marks_lead_back_to_their_column() {
         let text = "\"t \"\"s\"\" [s]\";\"v\t\\x [km/h]\";\"a\nb\"\n0;1;2\n1;50;3\n2;90;4\n";
-        let files = [Recording { label: "a.csv", text }];
+        let files = [RecordingText { label: "a.csv", text }];
         let guess = guess(&files, &[]).unwrap_or_else(|error| panic!("{error}"));
         let files = ["da\"y\\1.csv".to_string()];
         let text = dataset(&guess, ("x\n[y]", None), &files, true);
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn of_several_runs_the_last_is_held_out() {
         let text = "t,v\n0,1\n1,2\n";
-        let recording = Recording { label: "a.csv", text };
+        let recording = RecordingText { label: "a.csv", text };
         for count in 1..4 {
             let guess = guess(&vec![recording; count], &[]).unwrap();
             let files: Vec<String> = (0..count).map(|index| format!("{index}.csv")).collect();
@@ -243,7 +243,7 @@ mod tests {
 #[cfg(test)]
 mod daemon_text_tests {
     use super::*;
-    use crate::cli::train_text::{Found, TrainArguments};
+    use crate::cli::train_text::{TrainArguments, TrainValues};
     use dynocar::config::DaemonConfig;
 
     #[test]
@@ -252,7 +252,7 @@ mod daemon_text_tests {
             assert_eq!(SHIPPED.matches(shipped).count(), 1, "{shipped}");
         }
         let folder = tempfile::tempdir().unwrap();
-        let train = TrainArguments::default().text("x", &Found::default()).unwrap();
+        let train = TrainArguments::default().text("x", &TrainValues::default()).unwrap();
         std::fs::write(folder.path().join("train.toml"), train.text).unwrap();
         std::fs::write(folder.path().join("track.toml"), "[track]\n").unwrap();
         let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/daemon.toml");

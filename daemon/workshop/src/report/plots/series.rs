@@ -17,7 +17,7 @@ const RUNS_SIZE: (u32, u32) = (470, 230);
 
 /// The errors of a day in m/s, where they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Day {
+pub struct DailyErrors {
     /// Days since the first.
     pub day: f64,
     /// Of the model that was declared.
@@ -32,7 +32,12 @@ pub struct Day {
 /// # Errors
 ///
 /// When the drawing fails.
-pub fn days(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<Plot, PlotError> {
+pub fn days(
+    days: &[DailyErrors],
+    changes: &[f64],
+    first: &str,
+    width: Width,
+) -> Result<Plot, PlotError> {
     let (nominal, height, _) = width.size();
     let title = format!("Days since {first}");
     let label = format!(
@@ -55,7 +60,7 @@ pub fn days(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<
         line(&mut chart, days, |day| day.in_force_mps, (AFTER, true))?;
         Ok(vec![frame(&chart)])
     })?;
-    let values = |pick: fn(&Day) -> Option<f64>| {
+    let values = |pick: fn(&DailyErrors) -> Option<f64>| {
         days.iter().map(|day| pick(day).unwrap_or(f64::NAN)).collect::<Vec<f64>>()
     };
     let at = days.iter().map(|day| day.day).collect();
@@ -68,8 +73,8 @@ pub fn days(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<
 /// A line from day to day, broken where one is missing, with its points.
 fn line(
     chart: &mut Chart,
-    days: &[Day],
-    pick: fn(&Day) -> Option<f64>,
+    days: &[DailyErrors],
+    pick: fn(&DailyErrors) -> Option<f64>,
     (colour, is_filled): (RGBColor, bool),
 ) -> Result<(), DrawError> {
     let parts = days.chunk_by(|one, next| {
@@ -179,12 +184,12 @@ mod tests {
 
     #[test]
     fn each_known_day_has_its_points_and_each_change_its_line() {
-        let day = |day: f64| Day {
+        let day = |day: f64| DailyErrors {
             day,
             declared_mps: Some(0.8),
             in_force_mps: (day != 3.0).then_some(0.3 + 0.01 * day),
         };
-        let days: Vec<Day> = (0..6).map(|k| day(f64::from(k))).collect();
+        let days: Vec<DailyErrors> = (0..6).map(|k| day(f64::from(k))).collect();
         let plot = super::days(&days, &[2.0], "2026-01-01", Width::Wide).unwrap();
         assert_eq!(plot.svg.matches("<circle").count(), 6 + 5);
         assert!(plot.svg.contains("Days since 2026-01-01") && plot.svg.contains("1 times"));

@@ -17,8 +17,10 @@ use super::noise::{Noise, RunScatter};
 use super::positions::pooled_s;
 use super::run_data::RunData;
 use super::run_scatter::SharedFilters;
-use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns};
-use super::whitener::Whitener;
+use super::run_scatter::{
+    DeviationColumns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns,
+};
+use super::whitener::BinWhitener;
 use crate::parallel;
 use crate::statistics::median;
 use memory::RunMemory;
@@ -42,7 +44,7 @@ pub struct FitProblem {
     declared: Davis,
     prior_deviation: [f64; 3],
     /// Columns of the runs' own factors.
-    scatter_columns: Vec<Columns>,
+    scatter_columns: Vec<DeviationColumns>,
     /// Response of the declared model, for each run.
     declared_responses: Vec<Response>,
     /// Measured distance over distance by integrated speed, with its standard deviation.
@@ -180,7 +182,7 @@ impl Fit {
     }
 
     /// The filter of a run, by number.
-    pub fn whitener(&self, index: usize) -> &Whitener {
+    pub fn whitener(&self, index: usize) -> &BinWhitener {
         &self.run_filters[index].whitener
     }
 

@@ -3,7 +3,7 @@
 use dynocar_shared::{MassSource, Quantity, Reason, Status};
 
 use super::{MOVED_MIN_S, TrainKalman};
-use crate::pipeline::judge::{Case, LONG_RUN_MAX, long_run_variance};
+use crate::pipeline::judge::{LONG_RUN_MAX, StatusInputs, long_run_variance};
 
 /// Motion in s before the mass is called known.
 const MASS_MOVED_MIN_S: f64 = 3.0;
@@ -70,9 +70,9 @@ impl TrainKalman {
         (status, if is_waiting { Reason::LoadMayHaveChanged } else { reason })
     }
 
-    fn case(&self) -> Case {
+    fn case(&self) -> StatusInputs {
         let failure = (Status::Invalid, Reason::NumericalFailure);
-        Case {
+        StatusInputs {
             fault: self.is_fresh_reset.then_some(failure),
             input: self.input_doubt(),
             is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),

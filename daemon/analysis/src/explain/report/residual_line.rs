@@ -7,7 +7,7 @@ use dynocar_shared::HALF_95;
 
 use super::covariates::Covariate;
 use super::panels::{PanelBin, bins, covariance};
-use super::windows::Window;
+use super::windows::FitWindow;
 use super::words;
 use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow, WindowUncertainty};
@@ -47,7 +47,7 @@ pub struct AlongLine {
 
 impl AlongLine {
     /// Returns the effects of an explanation along the line, with these windows.
-    pub fn of(explanation: &Explanation, windows: &[Window]) -> Self {
+    pub fn of(explanation: &Explanation, windows: &[FitWindow]) -> Self {
         let runs = &explanation.problem.runs;
         let covariance = covariance(explanation);
         let towards = |direction: f64| {

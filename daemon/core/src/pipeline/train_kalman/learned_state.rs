@@ -4,10 +4,10 @@ use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
 use super::TrainKalmanSettings;
-use super::bank::{Measured, MotionBank};
 use super::brake_errors::BrakeErrors;
+use super::motion_bank::{MotionBank, SpeedLikelihood};
 use super::motion_filter::{
-    BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, RESISTANCE, SPEED, State,
+    BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, MotionState, RESISTANCE, SPEED,
     StateCovariance, TRACTION_SCALE, WIND,
 };
 use crate::pipeline::InnovationMonitor;
@@ -19,7 +19,7 @@ const INNOVATION_MEMORY: u32 = 1000;
 
 /// State, noise and the record of innovations.
 #[derive(Clone, Debug)]
-pub struct Learned {
+pub struct LearnedState {
     /// The filters.
     pub bank: MotionBank,
     /// Noise of the measured speed.
@@ -32,10 +32,10 @@ pub struct Learned {
     pub monitor: InnovationMonitor,
 }
 
-impl Learned {
+impl LearnedState {
     /// Before any sample.
-    pub fn new(settings: &TrainKalmanSettings, first: &Resistance) -> Self {
-        Learned {
+    pub fn new(settings: &TrainKalmanSettings, first: &ResistanceBelief) -> Self {
+        LearnedState {
             bank: first.bank(settings),
             noise: SpeedNoise::guessed(settings.speed_noise_mps),
             jumps: JumpShare::default(),
@@ -77,7 +77,7 @@ impl JumpShare {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn learn(&mut self, measured: &Measured) {
+    pub fn learn(&mut self, measured: &SpeedLikelihood) {
         let of_variance = measured.jump_variance / measured.variance;
         if !(of_variance > SEEN_SHARE * self.share.min(1.0)) {
             return;
@@ -98,18 +98,18 @@ const FLOOR_SHARE: f64 = 0.2;
 
 /// a, b, c (scaled, N/kN) with their covariance, declared or kept from earlier.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Resistance {
+pub struct ResistanceBelief {
     mean: Vector3<f64>,
     covariance: Matrix3<f64>,
 }
 
-impl Resistance {
+impl ResistanceBelief {
     /// As declared, each coefficient to a share of itself.
     pub fn declared(davis: &Davis, relative_std: f64) -> Self {
         let mean = scaled(davis);
         let floor = FLOOR_SHARE * davis.w0_n_per_kn(20.0).abs();
         let stds = mean.map(|value| relative_std * value.abs().max(floor));
-        Resistance { mean, covariance: Matrix3::from_diagonal(&stds.component_mul(&stds)) }
+        ResistanceBelief { mean, covariance: Matrix3::from_diagonal(&stds.component_mul(&stds)) }
     }
 
     /// Standard deviation of a in N/kN.
@@ -120,7 +120,7 @@ impl Resistance {
     /// As kept from earlier: Davis a, b, c and their covariance.
     pub fn kept(davis: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
         let scale = Matrix3::from_diagonal(&unscaling().map(|factor| 1.0 / factor));
-        Resistance { mean: scale * davis, covariance: scale * covariance * scale }
+        ResistanceBelief { mean: scale * davis, covariance: scale * covariance * scale }
     }
 
     /// c, scaled.
@@ -141,7 +141,7 @@ impl Resistance {
 
     /// Filters that believe this, and forces and load as the settings trust them.
     pub fn bank(&self, settings: &TrainKalmanSettings) -> MotionBank {
-        let mut mean = State::zeros();
+        let mut mean = MotionState::zeros();
         mean[LOAD] = 1.0;
         mean.fixed_rows_mut::<COEFFICIENTS>(RESISTANCE).copy_from(&self.mean);
         let mut all = StateCovariance::zeros();
@@ -161,7 +161,7 @@ impl Resistance {
 /// Standard deviation in N/kN of the declared a before any sample, by default.
 pub fn declared_a_std(train: &dynocar_model::train::TrainModel) -> f64 {
     let relative_std = TrainKalmanSettings::default().prior_relative_std;
-    Resistance::declared(&train.resistance, relative_std).a_std()
+    ResistanceBelief::declared(&train.resistance, relative_std).a_std()
 }
 
 #[cfg(test)]
@@ -175,7 +175,7 @@ mod tests {
             let mut jumps = JumpShare::default();
             for _ in 0..2000 {
                 let jump_variance = 1e-3 * jumps.share;
-                jumps.learn(&Measured {
+                jumps.learn(&SpeedLikelihood {
                     trust: Trust::of(0.0),
                     innovation_mps,
                     variance: 1e-3 + jump_variance,

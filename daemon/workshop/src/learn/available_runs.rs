@@ -11,11 +11,11 @@ use sha2::{Digest, Sha256};
 use tracing::warn;
 
 use super::error::LearnError;
-use super::memory::{KnownFile, Memory};
+use super::memory::{KnownFile, LearnerMemory};
 use super::recordings;
 use crate::report::provenance::hex;
 use dynocar::dataset::read_text;
-use dynocar::models::Moment;
+use dynocar::models::UtcSecond;
 use dynocar::text_file::read_beginning;
 
 /// So much of a file shows when it was recorded.
@@ -36,7 +36,7 @@ pub struct FoundRun {
     pub path: PathBuf,
     /// When it was recorded: by its file or its dataset, else by a day in its path, else when its file was
     /// last changed.
-    pub recorded: Moment,
+    pub recorded: UtcSecond,
     /// SHA-256 of its content.
     pub sha256: String,
     /// SHA-256 of the description of its dataset, without which the content says something else.
@@ -77,8 +77,8 @@ struct Lying {
 pub fn runs_of(
     train: TrainId,
     places: Places,
-    memory: &mut Memory,
-    (now, horizon): (Moment, Duration),
+    memory: &mut LearnerMemory,
+    (now, horizon): (UtcSecond, Duration),
 ) -> Result<Vec<FoundRun>, LearnError> {
     let mut lying = Lying::default();
     look(places.runs, DEPTH_MAX, &mut lying)
@@ -98,7 +98,7 @@ pub fn runs_of(
         runs.extend(runs_in(&folder, &source.name, Some(source.recorded), memory));
     }
     let newest = runs.iter().map(|run| run.recorded).max().unwrap_or(now).min(now);
-    let oldest = Moment { unix_s: newest.unix_s.saturating_sub(horizon.as_secs()) };
+    let oldest = UtcSecond { unix_s: newest.unix_s.saturating_sub(horizon.as_secs()) };
     runs.retain(|run| run.recorded >= oldest);
     runs.sort_by(|one, other| (one.recorded, &one.name).cmp(&(other.recorded, &other.name)));
     let mut seen = std::collections::BTreeSet::new();
@@ -149,8 +149,8 @@ fn is_of(train: TrainId, path: &Path, places: Places) -> bool {
 fn runs_in(
     folder: &Path,
     name: &str,
-    recorded: Option<Moment>,
-    memory: &mut Memory,
+    recorded: Option<UtcSecond>,
+    memory: &mut LearnerMemory,
 ) -> Vec<FoundRun> {
     let path = folder.join(MANIFEST_FILE);
     let label = path.display().to_string();
@@ -182,21 +182,21 @@ fn runs_in(
 }
 
 /// Reports why something is not used, once for each content.
-pub fn report_unusable(memory: &mut Memory, sha256: &str, problem: &str) {
+pub fn report_unusable(memory: &mut LearnerMemory, sha256: &str, problem: &str) {
     if memory.unusable.insert(sha256.to_owned(), problem.to_owned()).is_none() {
         warn!("left out: {problem}");
     }
 }
 
 /// SHA-256 of a file's content, and when it was changed.
-fn hash_of(path: &Path, memory: &mut Memory) -> io::Result<(String, Moment)> {
+fn hash_of(path: &Path, memory: &mut LearnerMemory) -> io::Result<(String, UtcSecond)> {
     let known = std::fs::metadata(path)?;
     let modified = known.modified().unwrap_or(SystemTime::UNIX_EPOCH);
     let since = modified.duration_since(UNIX_EPOCH).unwrap_or_default();
     let (bytes, modified_ns) = (known.len(), since.as_nanos() as u64);
     let is_same = |it: &&KnownFile| it.bytes == bytes && it.modified_ns == modified_ns;
     if let Some(known) = memory.files.get(path).filter(is_same) {
-        return Ok((known.sha256.clone(), Moment::of(modified)));
+        return Ok((known.sha256.clone(), UtcSecond::of(modified)));
     }
     let mut digest = Sha256::new();
     let (mut file, mut part) = (File::open(path)?, vec![0; 1 << 16]);
@@ -209,24 +209,24 @@ fn hash_of(path: &Path, memory: &mut Memory) -> io::Result<(String, Moment)> {
     let sha256: String = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     let file = KnownFile { bytes, modified_ns, sha256: sha256.clone() };
     memory.files.insert(path.into(), file);
-    Ok((sha256, Moment::of(modified)))
+    Ok((sha256, UtcSecond::of(modified)))
 }
 
 /// When a run was recorded by what its file or its dataset says.
-fn by_file(manifest: &Manifest, entry: &RunEntry, path: &Path) -> Option<Moment> {
+fn by_file(manifest: &Manifest, entry: &RunEntry, path: &Path) -> Option<UtcSecond> {
     let beginning = || {
         let bytes = read_beginning(path, BEGINNING_BYTES).ok()?;
         let (text, _) = manifest.layout.encoding.decode_without_bom_handling(&bytes);
         Some(text.into_owned())
     };
     let unix_s = recorded_unix_s(manifest, entry, beginning)?.try_into().ok()?;
-    Some(Moment { unix_s })
+    Some(UtcSecond { unix_s })
 }
 
 /// When a run was recorded: when its file was changed, unless its path names another day, as
 /// `2026-11-23` or `day=2026-11-23`.
-fn by_path(path: &Path, modified: Moment) -> Moment {
-    let day = |part: Component| -> Option<Moment> {
+fn by_path(path: &Path, modified: UtcSecond) -> UtcSecond {
+    let day = |part: Component| -> Option<UtcSecond> {
         let part = part.as_os_str().to_str()?;
         let day = part.strip_prefix("day=").unwrap_or(part).get(..10)?;
         format!("{day}T00:00:00Z").parse().ok()
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn a_day_in_the_path_is_believed_unless_the_file_says_the_time_of_that_day() {
-        let at = |text: &str| text.parse::<Moment>().unwrap();
+        let at = |text: &str| text.parse::<UtcSecond>().unwrap();
         let modified = at("2026-11-23T07:00:00Z");
         let by = |path: &str| by_path(Path::new(path), modified).to_string();
         assert_eq!(by("a/runs/1.csv"), "2026-11-23T07:00:00Z");
@@ -267,7 +267,7 @@ mod tests {
             let text = format!("Logger\nt,v\n,\n{cell},1\n{}", "x".repeat(1 << 17));
             std::fs::write(folder.path().join("1.csv"), text).unwrap();
             std::fs::write(folder.path().join(MANIFEST_FILE), manifest(time, date)).unwrap();
-            let runs = runs_in(folder.path(), "2020-01-02", None, &mut Memory::default());
+            let runs = runs_in(folder.path(), "2020-01-02", None, &mut LearnerMemory::default());
             runs[0].recorded.to_string()
         };
         let (iso, clock) = ("format='iso'", "format='clock'");

@@ -11,7 +11,7 @@ use nalgebra::SVector;
 use serde::Serialize;
 
 use crate::statistics::share_of;
-use crate::stops::{Gradient, Law};
+use crate::stops::{DecelerationLaw, Gradient};
 
 /// Speeds at which the deceleration of a table is free, as shares of the fastest.
 const KNOTS: [f64; 6] = [0.0, 0.08, 0.2, 0.4, 0.7, 1.0];
@@ -27,7 +27,7 @@ const STARTS_S: [(f64, f64); 4] = [(0.5, 1.0), (0.5, 6.0), (1.0, 20.0), (0.5, 60
 
 /// A row of a table: from a speed on a gradient to standstill.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct TableRow {
+pub struct StoppingTableRow {
     /// Speed in m/s at the command.
     pub from_mps: f64,
     /// Gradient in ‰, climbing positive.
@@ -60,7 +60,7 @@ pub struct TableLaw {
 }
 
 struct Fit<'r> {
-    rows: &'r [TableRow],
+    rows: &'r [StoppingTableRow],
     knots_mps: [f64; KNOTS.len()],
     /// The worst row's error over [`ROW_ERROR`], which is pressed down; infinite before there is one.
     worst: f64,
@@ -69,7 +69,7 @@ struct Fit<'r> {
 type Point = SVector<f64, FREE>;
 
 impl Fit<'_> {
-    fn distance_m(&self, point: &Point, row: &TableRow) -> Option<f64> {
+    fn distance_m(&self, point: &Point, row: &StoppingTableRow) -> Option<f64> {
         let inertia = 1.0 + point[2];
         let effort: [EffortPoint; KNOTS.len()] = from_fn(|k| EffortPoint {
             speed_mps: self.knots_mps[k],
@@ -88,7 +88,7 @@ impl Fit<'_> {
         Some(stop.estimate(0.5).ok()?.distance_m)
     }
 
-    fn residual(&self, point: &Point, row: &TableRow) -> Option<f64> {
+    fn residual(&self, point: &Point, row: &StoppingTableRow) -> Option<f64> {
         let error = (self.distance_m(point, row)? / row.distance_m).ln() / ROW_ERROR;
         let pressed = 1.0 + 10.0 * (error / self.worst).powi(8);
         Some(error * (1.0 + error * error).sqrt() * pressed)
@@ -118,7 +118,7 @@ impl LeastSquares<FREE> for Fit<'_> {
 
 impl TableLaw {
     /// The brake behind some rows; `None` for rows that no brake gives.
-    pub fn of(name: &str, rows: &[TableRow]) -> Option<Self> {
+    pub fn of(name: &str, rows: &[StoppingTableRow]) -> Option<Self> {
         let fastest_mps = rows.iter().map(|row| row.from_mps).fold(0.0, f64::max);
         let knots_mps = KNOTS.map(|share| share * fastest_mps);
         let mut fit = Fit { rows, knots_mps, worst: f64::INFINITY };
@@ -174,13 +174,13 @@ impl TableLaw {
 /// # Errors
 ///
 /// Names the row, and what was expected.
-pub fn parse(text: &str) -> Result<Vec<(String, Vec<TableRow>)>, String> {
+pub fn parse(text: &str) -> Result<Vec<(String, Vec<StoppingTableRow>)>, String> {
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let head = lines.next().map(|it| it.1.trim().trim_start_matches('\u{feff}'));
     if head != Some(HEAD) {
         return Err(format!("line 1: expected the head {HEAD}, got {}", head.unwrap_or("nothing")));
     }
-    let mut tables: Vec<(String, Vec<TableRow>)> = Vec::new();
+    let mut tables: Vec<(String, Vec<StoppingTableRow>)> = Vec::new();
     for (index, line) in lines {
         let expects = |what: &str| format!("line {}: {line}: expected {what}", index + 1);
         let cells: Vec<&str> = line.split(',').map(str::trim).collect();
@@ -202,7 +202,7 @@ pub fn parse(text: &str) -> Result<Vec<(String, Vec<TableRow>)>, String> {
         if gradient_permille.abs() > 200.0 {
             return Err(expects("Level or a gradient of 1 in x, x from 5"));
         }
-        let row = TableRow {
+        let row = StoppingTableRow {
             from_mps: positive(speed, "a speed in km/h above 0, at most 700", 700.0)? / 3.6,
             gradient_permille,
             distance_m: positive(distance, "a distance in m above 0", 1e5)?,
@@ -226,7 +226,7 @@ const GRADIENTS: [f64; 14] = [
 
 /// The distances that 95 % of stops of a law keep, as a table of the same form; what a law does not reach or does not
 /// stop on is left out.
-pub fn write(name: &str, law: &Law, rotating_mass_factor: f64) -> String {
+pub fn write(name: &str, law: &DecelerationLaw, rotating_mass_factor: f64) -> String {
     let name: String = name.chars().filter(|it| !matches!(it, ',' | '\n' | '\r' | '"')).collect();
     let mut text = format!("{HEAD}\n");
     for speed_kmh in
@@ -273,7 +273,11 @@ mod tests {
                 ..Stop::level(speed, 1.0, [0.0; 3], &effort)
             };
             let distance_m = stop.estimate(0.5).unwrap().distance_m;
-            rows.push(TableRow { from_mps: speed, gradient_permille: permille, distance_m });
+            rows.push(StoppingTableRow {
+                from_mps: speed,
+                gradient_permille: permille,
+                distance_m,
+            });
         }
         let law = TableLaw::of("true", &rows).unwrap();
         assert!(law.error_max < 0.01, "{law:?}");

@@ -2,9 +2,9 @@
 
 use super::alignment::Alignment;
 use super::both_directions::{Compared, compare};
-use super::centring::{Pass, align};
+use super::centring::{SurveyPass, align};
 use super::geodesy::distance_squared;
-use super::recording::Recording;
+use super::recording::SurveyRecording;
 use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M};
 use super::silence::{TracePoint, filled, trace};
 use super::tracking::follow;
@@ -84,7 +84,10 @@ impl Alignments {
 }
 
 /// Finds the line among the parts of the fit runs; `None` when there is none.
-pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Alignments> {
+pub fn find(
+    recording_parts: &[RecordingPart],
+    recordings: &[SurveyRecording],
+) -> Option<Alignments> {
     let fit: Vec<RecordingPart> =
         recording_parts.iter().filter(|it| recordings[it.recording].raw.is_fit).copied().collect();
     // Both directions of a line come in turns.
@@ -95,7 +98,7 @@ pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
     let growing = along(&template, 1, &fit, recordings);
     let falling = along(&back, 1, &fit, recordings);
     // The line's chainage grows in the direction in which it was first driven.
-    let first = |along: &[(RecordingPart, Pass)]| {
+    let first = |along: &[(RecordingPart, SurveyPass)]| {
         along.iter().map(|(_, pass)| (pass.recording, pass.rows.start)).min()
     };
     let is_backward = match (first(&growing), first(&falling)) {
@@ -134,8 +137,8 @@ pub fn find(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Opti
 /// they know better. A single part cannot say what of it is the line.
 fn alignment_of(
     template: &Alignment,
-    along: &[(RecordingPart, Pass)],
-    recordings: &[Recording],
+    along: &[(RecordingPart, SurveyPass)],
+    recordings: &[SurveyRecording],
 ) -> Alignment {
     let own: Vec<RecordingPart> = along.iter().map(|(part, _)| *part).collect();
     let first = match own.len() {
@@ -151,8 +154,8 @@ fn passes(
     alignment: &Alignment,
     direction: i8,
     recording_parts: &[RecordingPart],
-    recordings: &[Recording],
-) -> Vec<Pass> {
+    recordings: &[SurveyRecording],
+) -> Vec<SurveyPass> {
     let along = along(alignment, direction, recording_parts, recordings).into_iter();
     thinned(&along.map(|(_, pass)| pass).collect::<Vec<_>>(), ALIGNED_MAX)
 }
@@ -162,7 +165,7 @@ fn thinned<T: Clone>(all: &[T], most: usize) -> Vec<T> {
     all.iter().step_by(all.len().div_ceil(most).max(1)).cloned().collect()
 }
 
-fn rows_of(part: &RecordingPart, recordings: &[Recording]) -> std::ops::Range<usize> {
+fn rows_of(part: &RecordingPart, recordings: &[SurveyRecording]) -> std::ops::Range<usize> {
     let recording = &recordings[part.recording];
     let first = recording.travelled_m.partition_point(|&alignment| alignment < part.from_m);
     let end = recording.travelled_m.partition_point(|&alignment| alignment <= part.to_m);
@@ -170,7 +173,10 @@ fn rows_of(part: &RecordingPart, recordings: &[Recording]) -> std::ops::Range<us
 }
 
 /// The part that the others follow furthest, cut to what at least one other drives too.
-fn template(recording_parts: &[RecordingPart], recordings: &[Recording]) -> Option<Alignment> {
+fn template(
+    recording_parts: &[RecordingPart],
+    recordings: &[SurveyRecording],
+) -> Option<Alignment> {
     let mut long = recording_parts.to_vec();
     long.retain(|part| part.to_m - part.from_m > 100.0);
     let thinned = thinned(&long, TRIED_MAX);
@@ -225,8 +231,8 @@ fn along(
     alignment: &Alignment,
     direction: i8,
     recording_parts: &[RecordingPart],
-    recordings: &[Recording],
-) -> Vec<(RecordingPart, Pass)> {
+    recordings: &[SurveyRecording],
+) -> Vec<(RecordingPart, SurveyPass)> {
     let pass =
         |part: &RecordingPart| Some((*part, pass_along(alignment, direction, part, recordings)?));
     parallel::of_each(recording_parts, pass).into_iter().flatten().collect()
@@ -236,14 +242,14 @@ fn pass_along(
     alignment: &Alignment,
     direction: i8,
     part: &RecordingPart,
-    recordings: &[Recording],
-) -> Option<Pass> {
+    recordings: &[SurveyRecording],
+) -> Option<SurveyPass> {
     let rows = rows_of(part, recordings);
     let placed = follow(&recordings[part.recording], rows, alignment);
     let (first, last) = (placed.first()?, placed.last()?);
     let covered_m = last.chainage_m - first.chainage_m;
     let least_m = (PASS_SHARE_MIN * alignment.length_m()).min(PASS_MIN_M);
-    let pass = Pass { recording: part.recording, rows: first.row..last.row + 1, direction };
+    let pass = SurveyPass { recording: part.recording, rows: first.row..last.row + 1, direction };
     (covered_m >= least_m).then_some(pass)
 }
 
@@ -251,8 +257,8 @@ fn pass_along(
 pub fn pass_of(
     alignments: &Alignments,
     part: &RecordingPart,
-    recordings: &[Recording],
-) -> Option<Pass> {
+    recordings: &[SurveyRecording],
+) -> Option<SurveyPass> {
     let along = |direction: i8| pass_along(alignments.of(direction)?, direction, part, recordings);
     [along(1), along(-1)].into_iter().flatten().max_by_key(|pass| pass.rows.len())
 }

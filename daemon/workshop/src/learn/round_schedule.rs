@@ -8,7 +8,7 @@ use dynocar::observing::{EventKind, ObservedTrain};
 use dynocar_shared::vocabulary::EffectKind;
 use tracing::{info, warn};
 
-use super::learner::{Learner, Round};
+use super::learner::{Learner, LearnerRound};
 
 /// How often the process looks whether to stop.
 const TURN: Duration = Duration::from_millis(100);
@@ -108,7 +108,7 @@ pub fn watch<E>(
     suspicions: &mut [Suspicions],
     at: Option<TimeOfDay>,
     stop: &AtomicBool,
-    after_round: &mut dyn FnMut(&Learner, &Round) -> Result<(), E>,
+    after_round: &mut dyn FnMut(&Learner, &LearnerRound) -> Result<(), E>,
 ) -> Result<(), E> {
     let is_stopped = || stop.load(Ordering::Relaxed);
     let mut is_due = true;

@@ -7,17 +7,17 @@ pub const STEPS_MAX: usize = 7;
 
 /// Values over intervals of speed: one more value than boundaries, which grow strictly; the form of OSRD.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Steps {
+pub struct SpeedSteps {
     /// Speeds in m/s at which the value changes.
     pub boundaries: Vec<f64>,
     /// The values, from standstill on.
     pub values: Vec<f64>,
 }
 
-impl Steps {
+impl SpeedSteps {
     /// One value at every speed.
     pub fn constant(value: f64) -> Self {
-        Steps { boundaries: Vec::new(), values: vec![value] }
+        SpeedSteps { boundaries: Vec::new(), values: vec![value] }
     }
 
     /// The value at a speed in m/s.
@@ -34,7 +34,7 @@ impl Steps {
             let to = self.boundaries.partition_point(|it| *it < end_mps);
             self.values[from..=to].iter().copied().fold(f64::INFINITY, f64::min)
         });
-        Steps { values: lowest.collect(), boundaries: boundaries.to_vec() }
+        SpeedSteps { values: lowest.collect(), boundaries: boundaries.to_vec() }
     }
 
     /// Distance in m to standstill from a speed in m/s by these decelerations.
@@ -83,7 +83,7 @@ impl Steps {
         // As few steps as stop nearly as soon.
         let enough_m = best[STEPS_MAX][count].0 * 1.002;
         let mut steps = (1..=STEPS_MAX).find(|&steps| best[steps][count].0 <= enough_m)?;
-        let (mut end, mut found) = (count, Steps::default());
+        let (mut end, mut found) = (count, SpeedSteps::default());
         while end > 0 {
             let from = best[steps][end].1;
             found.values.push((from..end).map(lowest).fold(f64::INFINITY, f64::min));
@@ -106,7 +106,7 @@ mod tests {
     fn steps_lie_below_the_curve_and_stop_hardly_later() {
         let at = |speed: f64| 0.3 + 0.7 / (1.0 + speed / 12.0);
         let curve: Vec<[f64; 2]> = (1..=40).map(|k| [f64::from(k), at(f64::from(k))]).collect();
-        let steps = Steps::below(&curve).unwrap();
+        let steps = SpeedSteps::below(&curve).unwrap();
         assert!(
             steps.values.len() <= STEPS_MAX && steps.values.len() == steps.boundaries.len() + 1
         );
@@ -119,9 +119,9 @@ mod tests {
         }
         let later = steps.distance_m(40.0) / exact_m;
         assert!((1.0..1.06).contains(&later), "{later}");
-        assert_eq!(Steps::below(&[[10.0, 0.8], [20.0, 0.8]]), Some(Steps::constant(0.8)));
-        assert_eq!(Steps::below(&[[10.0, 0.0]]), None);
-        let two = Steps { boundaries: vec![10.0], values: vec![0.9, 0.7] };
+        assert_eq!(SpeedSteps::below(&[[10.0, 0.8], [20.0, 0.8]]), Some(SpeedSteps::constant(0.8)));
+        assert_eq!(SpeedSteps::below(&[[10.0, 0.0]]), None);
+        let two = SpeedSteps { boundaries: vec![10.0], values: vec![0.9, 0.7] };
         assert_eq!(two.between(&[10.0]), two);
         assert_eq!(two.between(&[5.0, 15.0]).values, [0.9, 0.7, 0.7]);
     }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use dynocar_model::train::Davis;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::brake::{Brake, Friction, Reported};
+use super::brake::{Brake, BrakeReport, Friction};
 use super::world::{
     BOARDING_STD_KG, GUST_S, Habits, KNOT_OVER_MEAN, LoadSource, ROOM_KG, WEIGHING_STD, World,
 };
@@ -23,7 +23,7 @@ enum Phase {
 
 /// A moment of the drive: what was written, and the truth.
 #[derive(Clone, Copy, Debug)]
-pub struct Moment {
+pub struct DriveMoment {
     /// As the controller wrote it.
     pub sample: TrainSample,
     /// Mass in kg.
@@ -47,12 +47,12 @@ pub struct Moment {
 }
 
 /// A train on its leg.
-pub struct Drive {
+pub struct ScenarioTrain {
     world: World,
     habits: Habits,
     phase: Phase,
     next_stop: usize,
-    now: Moment,
+    now: DriveMoment,
     weighed_kg: f64,
     target_mps: f64,
     /// Acceleration in m/s² that the force gives, as commanded.
@@ -71,16 +71,16 @@ pub struct Drive {
     gusts_mps: [f64; 2],
 }
 
-impl Drive {
+impl ScenarioTrain {
     /// Begins at the first stop.
     pub fn new(mut world: World) -> Self {
         let acts_at = world.random.within(0..STEPS);
         let mass_kg = world.truth.mass_kg;
-        let mut drive = Drive {
+        let mut drive = ScenarioTrain {
             habits: world.scenario.traffic.habits(),
             phase: Phase::Standing { left_s: 10.0 },
             next_stop: 1,
-            now: Moment {
+            now: DriveMoment {
                 sample: TrainSample::empty(TrainId(1)),
                 mass_kg,
                 w0_n_per_kn: 0.0,
@@ -145,7 +145,7 @@ impl Drive {
     }
 
     /// One cycle on.
-    pub fn advance(&mut self) -> Moment {
+    pub fn advance(&mut self) -> DriveMoment {
         let cycle_s = 1.0 / f64::from(self.world.scenario.rate_hz);
         self.command(cycle_s);
         self.blow(cycle_s);
@@ -313,12 +313,12 @@ impl Drive {
         sample.set(SampleField::TractionForce, force_scale[0] * force_n.max(0.0));
         let brake = &scenario.brake;
         let brake_n = match brake.reported {
-            Reported::Force | Reported::Pressure => -force_n,
-            Reported::Demand => -inertial_kg * self.demanded_mps2,
-            Reported::ElectricForce => -force_n * Friction::electric_share(brake, now.speed_mps),
+            BrakeReport::Force | BrakeReport::Pressure => -force_n,
+            BrakeReport::Demand => -inertial_kg * self.demanded_mps2,
+            BrakeReport::ElectricForce => -force_n * Friction::electric_share(brake, now.speed_mps),
         };
         sample.set(SampleField::BrakeForce, braked * brake_n.max(0.0));
-        if brake.reported == Reported::Pressure {
+        if brake.reported == BrakeReport::Pressure {
             sample.set(SampleField::BrakeCylinderPressure, self.friction.pressure_pa());
         }
         if !matches!(scenario.load, LoadSource::Unknown | LoadSource::Passengers) {

@@ -12,7 +12,7 @@ const SPEEDS_MPS: f64 = 2.0;
 
 /// The middle of some values and what 80 % of them lie within.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct QuantileRange {
     /// A tenth is below.
     pub low: f64,
     /// Half is below.
@@ -21,13 +21,13 @@ pub struct Spread {
     pub high: f64,
 }
 
-impl Spread {
+impl QuantileRange {
     fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
         let last = sorted.len().checked_sub(1)?;
         let at = |share: f64| sorted[(share * last as f64).round() as usize];
-        Some(Spread { low: at(0.1), median: at(0.5), high: at(0.9) })
+        Some(QuantileRange { low: at(0.1), median: at(0.5), high: at(0.9) })
     }
 }
 
@@ -39,11 +39,11 @@ pub struct FromSpeed {
     /// How many stops.
     pub stops: usize,
     /// Their distances in m.
-    pub distance_m: Spread,
+    pub distance_m: QuantileRange,
     /// Their times in s.
-    pub time_s: Spread,
+    pub time_s: QuantileRange,
     /// Their mean decelerations in m/s².
-    pub mean_deceleration_mps2: Spread,
+    pub mean_deceleration_mps2: QuantileRange,
 }
 
 /// Decelerations of all stops at a speed: what drivers choose, and what the brake gives at least.
@@ -54,21 +54,21 @@ pub struct DecelerationSpread {
     /// Stops that passed it.
     pub stops: usize,
     /// Their decelerations in m/s²; the hardest tenth lies above `high`.
-    pub deceleration_mps2: Spread,
+    pub deceleration_mps2: QuantileRange,
 }
 
 /// All stops together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Day {
+pub struct StopStatistics {
     /// By the speed that they began at, from slow to fast.
     pub from_speeds: Vec<FromSpeed>,
     /// Decelerations over speed, from slow to fast.
     pub decelerations: Vec<DecelerationSpread>,
     /// Times in s that the train stood; `None` where it never went on.
-    pub dwell_s: Option<Spread>,
+    pub dwell_s: Option<QuantileRange>,
 }
 
-impl Day {
+impl StopStatistics {
     /// Sums some stops up.
     pub fn of(stops: &[RecordedStop]) -> Self {
         let ends_mps = span(stops.iter().map(|it| it.from_mps)).unwrap_or([0.0; 2]);
@@ -78,7 +78,7 @@ impl Day {
             let within: Vec<&RecordedStop> =
                 stops.iter().filter(|it| (bounds[0]..bounds[1]).contains(&it.from_mps)).collect();
             let spread = |of: fn(&RecordedStop) -> f64| {
-                Spread::of(&within.iter().map(|it| of(it)).collect::<Vec<f64>>())
+                QuantileRange::of(&within.iter().map(|it| of(it)).collect::<Vec<f64>>())
             };
             Some(FromSpeed {
                 from_mps: bounds,
@@ -95,14 +95,14 @@ impl Day {
                 Some(point.deceleration_mps2)
             });
             let values: Vec<f64> = at.collect();
-            let deceleration_mps2 = Spread::of(&values)?;
+            let deceleration_mps2 = QuantileRange::of(&values)?;
             Some(DecelerationSpread { speed_mps, stops: values.len(), deceleration_mps2 })
         });
         let dwells: Vec<f64> = stops.iter().filter_map(|it| it.dwell_s).collect();
-        Day {
+        StopStatistics {
             from_speeds: from_speeds.collect(),
             decelerations: decelerations.collect(),
-            dwell_s: Spread::of(&dwells),
+            dwell_s: QuantileRange::of(&dwells),
         }
     }
 }

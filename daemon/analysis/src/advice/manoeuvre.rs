@@ -63,14 +63,14 @@ impl<'a> Scene<'a> {
     }
 
     /// Every manoeuvre that the train can drive within a time in s.
-    pub fn catalogue(&self, within_s: f64) -> Vec<Drive> {
+    pub fn catalogue(&self, within_s: f64) -> Vec<PlannedManoeuvre> {
         let top_mps = self.speed_max_mps.floor();
         let mut speeds: Vec<f64> =
             SPEED_SHARES.iter().map(|share| (share * top_mps).round()).collect();
         speeds.retain(|&speed_mps| speed_mps > SPEED_LOW_MPS);
         speeds.dedup();
         let has_traction = self.train.traction.is_some();
-        let drive = |kind, from_mps, to_mps| Drive { kind, from_mps, to_mps, within_s };
+        let drive = |kind, from_mps, to_mps| PlannedManoeuvre { kind, from_mps, to_mps, within_s };
         let mut all = Vec::new();
         for &speed_mps in &speeds {
             all.push(drive(DriveKind::Coast, speed_mps, SPEED_LOW_MPS));
@@ -106,7 +106,7 @@ pub enum DriveKind {
 
 /// A manoeuvre: begins at one speed and ends at another or after a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
+pub struct PlannedManoeuvre {
     /// How it is driven.
     pub kind: DriveKind,
     /// Speed in m/s at its start.
@@ -119,15 +119,15 @@ pub struct Drive {
 
 /// A manoeuvre under way.
 #[derive(Clone, Copy, Debug)]
-pub struct Driver {
-    drive: Drive,
+pub struct ManoeuvreDriver {
+    drive: PlannedManoeuvre,
     has_turned: bool,
 }
 
-impl Drive {
+impl PlannedManoeuvre {
     /// Begins it.
-    pub fn begin(self) -> Driver {
-        Driver { drive: self, has_turned: false }
+    pub fn begin(self) -> ManoeuvreDriver {
+        ManoeuvreDriver { drive: self, has_turned: false }
     }
 
     /// In words, with the time in s and the speed in m/s that it ended with.
@@ -150,10 +150,10 @@ impl Drive {
     }
 }
 
-impl Driver {
+impl ManoeuvreDriver {
     /// Traction minus brake in N at a speed; `None` when the manoeuvre is over.
     pub fn force_n(&mut self, scene: &Scene<'_>, speed_mps: f64) -> Option<f64> {
-        let Drive { kind, to_mps, .. } = self.drive;
+        let PlannedManoeuvre { kind, to_mps, .. } = self.drive;
         let full_n = || scene.full_traction_n(speed_mps);
         self.has_turned |= kind == DriveKind::Sweep && speed_mps >= to_mps;
         match kind {
@@ -225,7 +225,7 @@ mod tests {
         let train = train(100_000.0);
         let scene = Scene::new(&train, DAVIS, 100_000.0, 20.0);
         let kind = DriveKind::Sweep;
-        let sweep = Drive { kind, from_mps: 12.0, to_mps: 40.0, within_s: 180.0 };
+        let sweep = PlannedManoeuvre { kind, from_mps: 12.0, to_mps: 40.0, within_s: 180.0 };
         let mut driver = sweep.begin();
         assert_eq!(driver.force_n(&scene, 12.0), Some(100_000.0));
         assert_eq!(driver.force_n(&scene, 40.1), Some(0.0));

@@ -10,7 +10,7 @@ use dynocar_shared::RejectionReason;
 
 /// The known quantities of a moving train at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct KnownMotion {
     /// Measurement time in ns.
     pub time_ns: i64,
     /// Number of the motion segment.
@@ -32,7 +32,7 @@ pub struct Motion {
     pub tunnel_share: f64,
 }
 
-impl Motion {
+impl KnownMotion {
     /// The motion at a sample.
     ///
     /// # Errors
@@ -45,7 +45,7 @@ impl Motion {
         }
         let force_n = sample.control_force_n().ok_or(RejectionReason::Missing)?;
         let known_n_per_kn = sample.known_n_per_kn().ok_or(RejectionReason::Missing)?;
-        let motion = Motion {
+        let motion = KnownMotion {
             time_ns: sample.time_ns,
             segment: sample.segment,
             speed_mps: sample.speed_mps,
@@ -77,7 +77,7 @@ impl Motion {
     ///
     /// # Errors
     ///
-    /// `Used` for a train that stands, else the refusal with the reason of [`Motion::of`].
+    /// `Used` for a train that stands, else the refusal with the reason of [`KnownMotion::of`].
     pub fn seen<T>(
         sample: &ResolvedSample,
         speed_min_mps: f64,
@@ -87,7 +87,7 @@ impl Motion {
             *last = None;
             return Err(Outcome::Used);
         }
-        Motion::of(sample).map_err(|reason| {
+        KnownMotion::of(sample).map_err(|reason| {
             if reason == RejectionReason::WheelSlide {
                 *last = None;
             }
@@ -97,7 +97,7 @@ impl Motion {
 
     /// Time in s since an earlier sample of the same motion segment; `None` when forces and speed
     /// between the two are not known well enough to integrate.
-    pub fn step_from(&self, earlier: &Motion) -> Option<f64> {
+    pub fn step_from(&self, earlier: &KnownMotion) -> Option<f64> {
         let step_s = self.time_ns.saturating_sub(earlier.time_ns) as f64 * 1e-9;
         (self.segment == earlier.segment && step_s > 0.0 && step_s <= BRIDGED_MAX_S)
             .then_some(step_s)
@@ -122,7 +122,7 @@ impl Inertia {
 
     /// Acceleration in m/s² of the force on the reference mass.
     #[inline]
-    pub fn push_mps2(&self, motion: &Motion) -> f64 {
+    pub fn push_mps2(&self, motion: &KnownMotion) -> f64 {
         motion.force_n / self.inertial_mass_kg(self.reference_mass_kg)
     }
 
@@ -144,7 +144,7 @@ const WHOLE: f64 = 0.999;
 
 /// The learning sets of Wang 2022, section 3.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Section {
+pub enum LearningSet {
     /// Neither curve nor tunnel: z1.
     Basic = 0,
     /// In a curve: z2.
@@ -153,21 +153,21 @@ pub enum Section {
     Tunnel = 2,
 }
 
-impl Section {
+impl LearningSet {
     /// Every section, in the order of its number.
-    pub const ALL: [Section; 3] = [Section::Basic, Section::Curve, Section::Tunnel];
+    pub const ALL: [LearningSet; 3] = [LearningSet::Basic, LearningSet::Curve, LearningSet::Tunnel];
 
     /// The set of a step between two samples.
     ///
     /// As in Algorithm 1, a step in a curve inside a tunnel belongs to the curve set. A train has
     /// a length, which the paper's mass point lacks: steps while a part of it is inside belong to
     /// no set.
-    pub fn of(from: &Motion, to: &Motion) -> Option<Section> {
+    pub fn of(from: &KnownMotion, to: &KnownMotion) -> Option<LearningSet> {
         let is_curved = from.curvature_per_m > 0.0 || to.curvature_per_m > 0.0;
         if is_curved {
             let change = (to.curvature_per_m - from.curvature_per_m).abs();
             let is_steady = change <= (1.0 - WHOLE) * to.curvature_per_m;
-            return is_steady.then_some(Section::Curve);
+            return is_steady.then_some(LearningSet::Curve);
         }
         let (low, high) = if from.tunnel_share < to.tunnel_share {
             (from.tunnel_share, to.tunnel_share)
@@ -175,9 +175,9 @@ impl Section {
             (to.tunnel_share, from.tunnel_share)
         };
         if high <= 0.0 {
-            Some(Section::Basic)
+            Some(LearningSet::Basic)
         } else if low >= WHOLE {
-            Some(Section::Tunnel)
+            Some(LearningSet::Tunnel)
         } else {
             None
         }
@@ -193,14 +193,14 @@ mod tests {
     #[test]
     fn a_correction_that_takes_resistance_away_is_no_reason_to_refuse_a_sample() {
         let warm = ResolvedSample { extra_n_per_kn: -1.7, ..ResolvedSample::coasting() };
-        assert_eq!(Motion::of(&warm).unwrap().known_n_per_kn, -1.7);
+        assert_eq!(KnownMotion::of(&warm).unwrap().known_n_per_kn, -1.7);
         let absurd = ResolvedSample { extra_n_per_kn: -501.0, ..warm };
-        assert_eq!(Motion::of(&absurd), Err(RejectionReason::OutOfRange));
+        assert_eq!(KnownMotion::of(&absurd), Err(RejectionReason::OutOfRange));
     }
 
     #[test]
     fn forces_are_bridged_for_seconds_within_a_segment() {
-        let motion = |time_ns, segment| Motion {
+        let motion = |time_ns, segment| KnownMotion {
             time_ns,
             segment,
             speed_mps: 10.0,
@@ -223,8 +223,8 @@ mod tests {
 mod section_tests {
     use super::*;
 
-    fn at(curvature_per_m: f64, tunnel_share: f64) -> Motion {
-        Motion {
+    fn at(curvature_per_m: f64, tunnel_share: f64) -> KnownMotion {
+        KnownMotion {
             time_ns: 0,
             segment: 1,
             speed_mps: 10.0,
@@ -237,23 +237,23 @@ mod section_tests {
         }
     }
 
-    fn steady(curvature_per_m: f64, tunnel_share: f64) -> Option<Section> {
-        Section::of(&at(curvature_per_m, tunnel_share), &at(curvature_per_m, tunnel_share))
+    fn steady(curvature_per_m: f64, tunnel_share: f64) -> Option<LearningSet> {
+        LearningSet::of(&at(curvature_per_m, tunnel_share), &at(curvature_per_m, tunnel_share))
     }
 
     #[test]
     fn a_curve_inside_a_tunnel_belongs_to_the_curve_set() {
-        assert_eq!(steady(0.0, 0.0), Some(Section::Basic));
-        assert_eq!(steady(0.002, 0.0), Some(Section::Curve));
-        assert_eq!(steady(0.002, 1.0), Some(Section::Curve));
-        assert_eq!(steady(0.0, 1.0), Some(Section::Tunnel));
+        assert_eq!(steady(0.0, 0.0), Some(LearningSet::Basic));
+        assert_eq!(steady(0.002, 0.0), Some(LearningSet::Curve));
+        assert_eq!(steady(0.002, 1.0), Some(LearningSet::Curve));
+        assert_eq!(steady(0.0, 1.0), Some(LearningSet::Tunnel));
     }
 
     #[test]
     fn a_train_on_its_way_in_belongs_to_no_set() {
-        assert_eq!(Section::of(&at(0.0, 0.0), &at(0.0005, 0.0)), None);
-        assert_eq!(Section::of(&at(0.0005, 0.0), &at(0.0009, 0.0)), None);
-        assert_eq!(Section::of(&at(0.0, 0.4), &at(0.0, 0.6)), None);
+        assert_eq!(LearningSet::of(&at(0.0, 0.0), &at(0.0005, 0.0)), None);
+        assert_eq!(LearningSet::of(&at(0.0005, 0.0), &at(0.0009, 0.0)), None);
+        assert_eq!(LearningSet::of(&at(0.0, 0.4), &at(0.0, 0.6)), None);
         assert_eq!(steady(0.0, 0.4), None);
     }
 }

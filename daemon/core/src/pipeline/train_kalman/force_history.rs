@@ -13,7 +13,7 @@ struct Report {
 
 /// Traction and brake force of the last moments, joined by straight lines.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ActingForces {
+pub struct ForceHistory {
     reports: [Report; CAPACITY],
     newest: usize,
     count: usize,
@@ -32,9 +32,9 @@ pub struct Acting {
     pub changes: [f64; 2],
 }
 
-impl Default for ActingForces {
+impl Default for ForceHistory {
     fn default() -> Self {
-        ActingForces {
+        ForceHistory {
             reports: [Report::default(); CAPACITY],
             newest: 0,
             count: 0,
@@ -44,7 +44,7 @@ impl Default for ActingForces {
     }
 }
 
-impl ActingForces {
+impl ForceHistory {
     /// Takes in a report of traction and brake force in N/kN; another segment forgets what was before.
     ///
     /// # Real-time
@@ -118,8 +118,8 @@ mod tests {
     const STEP_S: f64 = 0.1;
 
     /// Forces that rise from 1 s on, as reported up to a time in s.
-    fn reported(until_s: f64) -> ActingForces {
-        let mut forces = ActingForces::default();
+    fn reported(until_s: f64) -> ForceHistory {
+        let mut forces = ForceHistory::default();
         for k in 0..=(until_s / STEP_S).round() as i64 {
             let time_s = k as f64 * STEP_S;
             let ramp = (time_s - 1.0).max(0.0);

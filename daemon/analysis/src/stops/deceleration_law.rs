@@ -3,7 +3,7 @@
 use dynocar_shared::{BrakeResponse, EffortPoint, Stop, StoppingEstimate, Uncertain};
 use serde::Serialize;
 
-use super::curve::{Curve, Point};
+use super::deceleration_curve::{DecelerationCurve, DecelerationPoint};
 
 /// Step of the speeds in m/s at which the law is reported.
 const GRID_MPS: f64 = 1.0;
@@ -42,7 +42,7 @@ pub struct MeasuredResponse {
 
 impl MeasuredResponse {
     /// That of some stops, each by the time it loses and the moment of that loss, as a ramp has them.
-    fn of(built: &[(&Curve, &Point)]) -> Self {
+    fn of(built: &[(&DecelerationCurve, &DecelerationPoint)]) -> Self {
         let count = built.len() as f64;
         let losses: Vec<[f64; 2]> = built.iter().map(|(curve, from)| lost(curve, from)).collect();
         let mean = |k: usize| losses.iter().map(|it| it[k]).sum::<f64>() / count;
@@ -72,7 +72,7 @@ impl MeasuredResponse {
 }
 
 /// Time in s that a stop lost until its brake had built up, and the first moment of that loss in s².
-fn lost(curve: &Curve, from: &Point) -> [f64; 2] {
+fn lost(curve: &DecelerationCurve, from: &DecelerationPoint) -> [f64; 2] {
     let lost_s = from.time_s - (curve.from_mps() - from.speed_mps) / from.deceleration_mps2;
     let pairs = curve.points.windows(2).take_while(|it| it[1].time_s <= from.time_s);
     let moment = pairs.map(|it| {
@@ -85,7 +85,7 @@ fn lost(curve: &Curve, from: &Point) -> [f64; 2] {
 
 /// Deceleration over speed, and how much stops differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Law {
+pub struct DecelerationLaw {
     /// The speeds, growing.
     pub points: Vec<LawPoint>,
     /// How the brake comes after its command.
@@ -123,11 +123,11 @@ pub struct Gradient {
     pub rotating_mass_factor: f64,
 }
 
-impl Law {
+impl DecelerationLaw {
     /// The law of some stops, where stops are assumed to repeat within a relative standard
     /// deviation until there are enough to estimate it; `None` without a stop whose brake builds up.
-    pub fn of(curves: &[Curve], assumed_repeatability: f64) -> Option<Self> {
-        let built: Vec<(&Curve, &Point)> = curves
+    pub fn of(curves: &[DecelerationCurve], assumed_repeatability: f64) -> Option<Self> {
+        let built: Vec<(&DecelerationCurve, &DecelerationPoint)> = curves
             .iter()
             .filter_map(|curve| Some((curve, &curve.points[curve.built_up?])))
             .collect();
@@ -172,7 +172,14 @@ impl Law {
             point.next_std_mps2 = next.hypot(point.std_mps2);
         }
         let response = MeasuredResponse::of(&built);
-        Some(Law { points, response, repeatability, freedom, factors, stops: built.len() })
+        Some(DecelerationLaw {
+            points,
+            response,
+            repeatability,
+            freedom,
+            factors,
+            stops: built.len(),
+        })
     }
 
     /// Takes a deceleration in m/s² over speed out of the law, as that by the resistance.

@@ -38,7 +38,7 @@ const TREND_STD_MPS3: f64 = 0.05;
 
 /// A moment of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Point {
+pub struct DecelerationPoint {
     /// Time in s since the brake was applied.
     #[serde(skip)]
     pub time_s: f64,
@@ -56,14 +56,14 @@ pub struct Point {
 /// is, are those with the greatest likelihood of the speeds. While the brake builds up it walks further than later, so that
 /// what follows is smoothed by itself.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Curve {
+pub struct DecelerationCurve {
     /// The moments, in order.
-    pub points: Vec<Point>,
+    pub points: Vec<DecelerationPoint>,
     /// The first moment at which the brake has built up; `None` where it never did.
     pub built_up: Option<usize>,
 }
 
-impl Curve {
+impl DecelerationCurve {
     /// The curve of a stop's samples; `None` for too few.
     pub fn of(samples: &[TrainSample]) -> Option<Self> {
         let mut points = smoothed(samples)?;
@@ -73,19 +73,21 @@ impl Curve {
         {
             let built_s = points[from].time_s;
             points.truncate(from);
-            points.extend(rest.iter().map(|it| Point { time_s: it.time_s + built_s, ..*it }));
+            points.extend(
+                rest.iter().map(|it| DecelerationPoint { time_s: it.time_s + built_s, ..*it }),
+            );
         }
-        Some(Curve { points, built_up })
+        Some(DecelerationCurve { points, built_up })
     }
 
     /// The last moment at which the train was at least so fast in m/s.
-    pub fn at_speed(&self, speed_mps: f64) -> Option<&Point> {
+    pub fn at_speed(&self, speed_mps: f64) -> Option<&DecelerationPoint> {
         self.points.iter().rev().find(|point| point.speed_mps >= speed_mps)
     }
 
     /// The moment of the greatest deceleration and a later one at which the brake had been eased; `None`
     /// where it was not.
-    pub fn eased(&self) -> Option<[Point; 2]> {
+    pub fn eased(&self) -> Option<[DecelerationPoint; 2]> {
         let points = self.points.get(self.built_up?..)?;
         let mut most = points.first()?;
         for point in points.iter().take_while(|it| it.speed_mps >= SOFT_MPS) {
@@ -120,7 +122,7 @@ impl Curve {
 
 /// The moment after which the deceleration goes on as the brake gives it: a while after it first
 /// reached what follows.
-fn built_up(points: &[Point]) -> Option<usize> {
+fn built_up(points: &[DecelerationPoint]) -> Option<usize> {
     let reaches = |from: usize| {
         let point = &points[from];
         let following =
@@ -136,7 +138,7 @@ fn built_up(points: &[Point]) -> Option<usize> {
 }
 
 /// Speed and deceleration at every sample, given all of them; `None` for too few.
-fn smoothed(samples: &[TrainSample]) -> Option<Vec<Point>> {
+fn smoothed(samples: &[TrainSample]) -> Option<Vec<DecelerationPoint>> {
     if samples.len() < SAMPLES_MIN {
         return None;
     }
@@ -150,10 +152,10 @@ fn smoothed(samples: &[TrainSample]) -> Option<Vec<Point>> {
     let mut smoothers = Some([SPEED, DECELERATION].map(|_| FixedLagSmoother::new(samples.len())));
     best.likelihood(samples, &mut smoothers).ok()?;
     let [speeds, decelerations] = smoothers?;
-    let mut points: Vec<Point> = speeds
+    let mut points: Vec<DecelerationPoint> = speeds
         .newest_first()
         .zip(decelerations.newest_first())
-        .map(|(speed, deceleration)| Point {
+        .map(|(speed, deceleration)| DecelerationPoint {
             time_s: speed.tag,
             speed_mps: speed.mean,
             deceleration_mps2: deceleration.mean,

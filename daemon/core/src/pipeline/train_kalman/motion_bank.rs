@@ -3,8 +3,8 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::motion_filter::{
-    BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, LOAD, MotionFilter, RESISTANCE, SPEED, STATES, State,
-    StateCovariance, Step, WIND, behaviours,
+    BEHAVIOURS, BRAKE_ERROR, DISTURBANCE, FilterStep, LOAD, MotionFilter, MotionState, RESISTANCE,
+    SPEED, STATES, StateCovariance, WIND, behaviours,
 };
 use crate::filter::bank::{Bank, Mixture};
 use crate::filter::{Gaussian, NotPositiveDefinite};
@@ -37,7 +37,7 @@ fn consider(belief: &mut Gaussian<STATES>, before: &Gaussian<STATES>) {
 
 /// Likelihood of a measured speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
+pub struct SpeedLikelihood {
     /// How far it is believed by the likeliest filter.
     pub trust: Trust,
     /// Its innovation in m/s.
@@ -73,7 +73,7 @@ pub struct Published {
 
 impl MotionBank {
     /// All behaviours, each believing the same of everything but the disturbance.
-    pub fn new(mean: &State, covariance: &StateCovariance) -> Self {
+    pub fn new(mean: &MotionState, covariance: &StateCovariance) -> Self {
         let behaviours = behaviours();
         let rivals = behaviours.map(|behaviour| {
             let mut belief = Gaussian { mean: *mean, covariance: *covariance };
@@ -112,7 +112,7 @@ impl MotionBank {
     /// # Real-time
     ///
     /// One step for each behaviour, no allocation.
-    pub fn predict(&mut self, step: &Step) {
+    pub fn predict(&mut self, step: &FilterStep) {
         self.rivals.hypotheses_mut().iter_mut().for_each(|it| it.filter.predict(step));
     }
 
@@ -134,8 +134,8 @@ impl MotionBank {
         &mut self,
         speed_mps: f64,
         noise_variance: f64,
-        step: &Step,
-    ) -> Result<Measured, NotPositiveDefinite> {
+        step: &FilterStep,
+    ) -> Result<SpeedLikelihood, NotPositiveDefinite> {
         let forgetting = (-step.duration_s / EVIDENCE_MEMORY_S).exp();
         let likeliest = self.rivals.likeliest_index();
         let late_std = step.brake_std * step.brake_lateness.sqrt();
@@ -156,7 +156,7 @@ impl MotionBank {
             // Forgetting applies to the evidence, not to the prior.
             *weight = log_prior + forgetting * (*weight - log_prior) + evidence;
             if index == likeliest {
-                measured = Some(Measured {
+                measured = Some(SpeedLikelihood {
                     trust,
                     innovation_mps: innovation.value,
                     variance: innovation.variance,
@@ -230,7 +230,7 @@ mod tests {
     fn what_a_wind_leaves_open_grows_with_the_air_resistance_that_is_learned() {
         let c = 0.4;
         let variance_of_a = |learned_c: f64| {
-            let (mut mean, mut covariance) = (State::zeros(), StateCovariance::zeros());
+            let (mut mean, mut covariance) = (MotionState::zeros(), StateCovariance::zeros());
             mean[RESISTANCE + 2] = learned_c;
             for (i, j, value) in [(3, 3, 0.010), (9, 9, 2.0), (3, 9, -0.1), (9, 3, -0.1)] {
                 covariance[(i, j)] = value;

@@ -4,10 +4,10 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::wind;
 
 use super::TrainKalmanSettings;
-use super::acting_forces::ActingForces;
 use super::brake_errors::BrakeErrors;
-use super::learned::{Learned, Resistance};
-use super::motion_filter::{Following, Step, USUAL_MAP_PERMILLE, wind_over};
+use super::force_history::ForceHistory;
+use super::learned_state::{LearnedState, ResistanceBelief};
+use super::motion_filter::{FilterStep, Following, USUAL_MAP_PERMILLE, wind_over};
 use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
@@ -48,10 +48,10 @@ struct BrakeError {
 
 /// Memory of the samples from which steps are made.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Steps {
+pub struct StepBuilder {
     settings: TrainKalmanSettings,
     train_length_m: f64,
-    acting: ActingForces,
+    acting: ForceHistory,
     /// Fastest change of the reported force lately in N/kN per s.
     force_rate: f64,
     /// Change of what is known to retard in N/kN per s.
@@ -69,11 +69,11 @@ pub struct Steps {
     seen_ns: Option<i64>,
 }
 
-impl Steps {
+impl StepBuilder {
     /// Before the first sample of a train of a length in m.
     pub fn new(settings: &TrainKalmanSettings, train_length_m: f64) -> Self {
-        let acting = ActingForces::default();
-        Steps {
+        let acting = ForceHistory::default();
+        StepBuilder {
             settings: *settings,
             train_length_m,
             acting,
@@ -150,9 +150,9 @@ impl Steps {
         &mut self,
         (from, to): (&UnitSample, &UnitSample),
         sample: &ResolvedSample,
-        (delay_s, learned): (f64, &Learned),
-        air: &Resistance,
-    ) -> Step {
+        (delay_s, learned): (f64, &LearnedState),
+        air: &ResistanceBelief,
+    ) -> FilterStep {
         let settings = self.settings;
         let duration_s = to.seconds_since(from);
         let faded = self.force_rate * (-duration_s / FORCE_RATE_MEMORY_S).exp();
@@ -182,7 +182,7 @@ impl Steps {
         } else {
             wind_over(std::mem::take(&mut self.wind_s), settings.wind_std_mps)
         };
-        Step {
+        FilterStep {
             duration_s,
             travelled_m: half_s * (from.speed_mps + to.speed_mps),
             inertia: to.inertia,
@@ -217,9 +217,9 @@ mod tests {
     /// 100 m, which passes it at 20 m/s.
     fn place_variance(rate_hz: i64, position_noise_m: f64) -> f64 {
         let settings = TrainKalmanSettings { wind_std_mps: 0.0, ..Default::default() };
-        let resistance = Resistance::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
-        let learned = Learned::new(&settings, &resistance);
-        let mut steps = Steps::new(&settings, 100.0);
+        let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
+        let learned = LearnedState::new(&settings, &resistance);
+        let mut steps = StepBuilder::new(&settings, 100.0);
         let sample = |k: i64| {
             let time_s = k as f64 / rate_hz as f64;
             let noise_m = if k % 2 == 0 { position_noise_m } else { -position_noise_m };
@@ -250,8 +250,8 @@ mod tests {
     fn gusts_are_noise_in_proportion_to_air_resistance_and_speed() {
         let settings = TrainKalmanSettings { wind_std_mps: 2.0, ..Default::default() };
         let variance = |c: f64, speed_mps: f64| {
-            let resistance = Resistance::declared(&Davis { a: 1.5, b: 0.02, c }, 0.4);
-            let learned = Learned::new(&settings, &resistance);
+            let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c }, 0.4);
+            let learned = LearnedState::new(&settings, &resistance);
             let sample = |time_ns: i64| UnitSample {
                 time_ns,
                 segment: 1,
@@ -262,7 +262,7 @@ mod tests {
                 known: 0.0,
                 inertia: 108.0,
             };
-            let mut steps = Steps::new(&settings, 100.0);
+            let mut steps = StepBuilder::new(&settings, 100.0);
             let (from, to) = (sample(0), sample(100_000_000));
             steps.see(&from);
             steps.see(&to);

@@ -14,7 +14,7 @@ use dynocar_transport::channel::SampleCount;
 use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role};
 use tracing::{info, warn};
 
-use super::status_log::{RefusalLog, State, StatusLog};
+use super::status_log::{RefusalLog, StatusAndReason, StatusLog};
 use super::tally::{Tally, TallyReading};
 use crate::operator::{refusals, refused_words};
 use crate::supervision::health::Verdict;
@@ -41,7 +41,7 @@ struct PipelineLog {
 }
 
 /// Watches signals, peers and tallies, and writes what changes into the log.
-pub struct Watch {
+pub struct RuntimeWatch {
     host: Host,
     trains: Vec<(TrainId, Arc<SampleCount>)>,
     pipelines: Vec<WatchedPipeline>,
@@ -53,7 +53,7 @@ pub struct Watch {
     failure: Option<String>,
 }
 
-impl Watch {
+impl RuntimeWatch {
     /// A watch over the daemon's trains and pipelines.
     pub fn new(
         host: Host,
@@ -64,7 +64,7 @@ impl Watch {
         let logs = pipelines.iter().map(|_| PipelineLog::new(Instant::now())).collect();
         let (refusals, controllers) = (HashMap::new(), HashMap::new());
         let failure = None;
-        Watch { host, trains, pipelines, readings, logs, refusals, controllers, failure }
+        RuntimeWatch { host, trains, pipelines, readings, logs, refusals, controllers, failure }
     }
 
     /// Watches until a signal asks the daemon to stop, or a pipeline thread has ended.
@@ -197,8 +197,13 @@ impl PipelineLog {
 }
 
 /// A status that wants a person is a warning, with what to do; any other is information.
-fn report_status(pipeline: &str, train: u64, reading: &TallyReading, untold: &[(State, u64)]) {
-    let words = |(status, reason): State| {
+fn report_status(
+    pipeline: &str,
+    train: u64,
+    reading: &TallyReading,
+    untold: &[(StatusAndReason, u64)],
+) {
+    let words = |(status, reason): StatusAndReason| {
         let status = Status::from_number(status).unwrap_or(Status::Invalid);
         (status, Reason::from_number(reason).unwrap_or(Reason::None))
     };

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use dynocar_model::terms::Parameter;
-use dynocar_model::train::Drive;
+use dynocar_model::train::PowerTrain;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
@@ -21,7 +21,11 @@ use crate::statistics::{rms, share_of};
 
 /// Efficiency, and what is fed beside the drive in kW beyond what is fed at rest.
 const PARAMETERS: [Parameter; 2] = [
-    Parameter::new("efficiency", (*Drive::EFFICIENCIES.start(), *Drive::EFFICIENCIES.end()), 0.005),
+    Parameter::new(
+        "efficiency",
+        (*PowerTrain::EFFICIENCIES.start(), *PowerTrain::EFFICIENCIES.end()),
+        0.005,
+    ),
     Parameter::new("auxiliary_power_kw", (-2000.0, 2000.0), 0.1),
 ];
 /// Below this speed in m/s a drive takes nothing.
@@ -41,7 +45,7 @@ struct Auxiliaries {
 impl Auxiliaries {
     /// The power at rest of some runs and its scatter; the declared one with a wide one where they
     /// never rest.
-    fn of(powered: &[&RunData], declared: Drive) -> Self {
+    fn of(powered: &[&RunData], declared: PowerTrain) -> Self {
         let rows = powered.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
         let resting_kw: Vec<f64> = rows
             .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
@@ -75,14 +79,14 @@ fn moving_power_kw(problem: &FitProblem) -> f64 {
 /// A drive with an efficiency, and auxiliaries where the power holds them, for unknown.
 #[derive(Debug)]
 struct OpenDrive {
-    declared: Drive,
+    declared: PowerTrain,
     /// Auxiliary power at rest, where the power includes it.
     resting: Option<Auxiliaries>,
     prior: DMatrix<f64>,
 }
 
 impl OpenDrive {
-    fn new(declared: Drive, resting: Option<Auxiliaries>) -> Self {
+    fn new(declared: PowerTrain, resting: Option<Auxiliaries>) -> Self {
         let weights = match resting {
             Some(resting) => vec![0.0, resting.std_kw.powi(-2)],
             None => vec![0.0],
@@ -90,12 +94,12 @@ impl OpenDrive {
         OpenDrive { declared, resting, prior: DMatrix::from_diagonal(&weights.into()) }
     }
 
-    fn at(&self, parameters: &[f64]) -> Drive {
+    fn at(&self, parameters: &[f64]) -> PowerTrain {
         let auxiliary_power_w = match (self.resting, parameters.get(1)) {
             (Some(resting), Some(more_kw)) => 1e3 * (resting.power_kw + more_kw),
             _ => self.declared.auxiliary_power_w,
         };
-        Drive { efficiency: parameters[0], auxiliary_power_w, ..self.declared }
+        PowerTrain { efficiency: parameters[0], auxiliary_power_w, ..self.declared }
     }
 
     fn start(&self) -> Vec<f64> {
@@ -147,7 +151,7 @@ impl Hypothesis for OpenDrive {
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatedDrive {
     /// With what was found.
-    pub drive: Drive,
+    pub drive: PowerTrain,
     /// The same for machines.
     pub answer: DriveAnswer,
 }
@@ -169,7 +173,7 @@ pub fn estimated(dataset: &Dataset) -> Result<Option<EstimatedDrive>, RunDataErr
         return Ok(None);
     }
     let declared = dataset.train.drive;
-    let drive = declared.unwrap_or(Drive::USUAL);
+    let drive = declared.unwrap_or(PowerTrain::USUAL);
     let holds_more = |run: &&RunData| run.power.as_ref().is_some_and(|it| it.has_auxiliaries);
     let resting = powered.iter().any(holds_more).then(|| Auxiliaries::of(&powered, drive));
     let open = OpenDrive::new(drive, resting);
@@ -180,7 +184,7 @@ pub fn estimated(dataset: &Dataset) -> Result<Option<EstimatedDrive>, RunDataErr
 fn reported_by(
     problem: &FitProblem,
     open: OpenDrive,
-    declared: Option<Drive>,
+    declared: Option<PowerTrain>,
 ) -> Option<EstimatedDrive> {
     let (start, open) = (open.start(), Arc::new(open));
     let model = UpdatedModel::default().with(open.clone());
@@ -216,7 +220,7 @@ impl DriveAnswer {
         let WithStd { value, std } = self.efficiency;
         let read = match self.declared_efficiency {
             Some(declared) => format!("declared {declared}"),
-            None => format!("{} is usual", Drive::USUAL.efficiency),
+            None => format!("{} is usual", PowerTrain::USUAL.efficiency),
         };
         if let Some(name) = self.at_bound {
             return format!(

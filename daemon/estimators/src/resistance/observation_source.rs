@@ -6,7 +6,7 @@ use dynocar_core::pipeline::motion::SpeedNoise;
 use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
 
-use super::regression::Observation;
+use super::regression::RegressionObservation;
 use crate::liu::coasting::CoastingSegments;
 
 #[derive(Clone, Debug)]
@@ -46,19 +46,19 @@ impl RowSource {
         &mut self,
         now: &UnitSample,
         known: &Davis,
-    ) -> Result<Option<(Observation, f64)>, RejectionReason> {
+    ) -> Result<Option<(RegressionObservation, f64)>, RejectionReason> {
         if now.speed_mps < self.speed_min_mps {
             // A holding brake may be reported, and static friction is no Davis resistance.
             self.break_chain();
             return Ok(None);
         }
         Ok(match &mut self.builder {
-            Builder::Momentum(blocks) => {
-                blocks.push(now, known)?.map(|block| (Observation::Block(block), block.speed_mps))
-            }
+            Builder::Momentum(blocks) => blocks
+                .push(now, known)?
+                .map(|block| (RegressionObservation::Block(block), block.speed_mps)),
             Builder::Coasting(segments) => segments
                 .push(now, known)?
-                .map(|segment| (Observation::Segment(segment), segment.speed_mps)),
+                .map(|segment| (RegressionObservation::Segment(segment), segment.speed_mps)),
         })
     }
 
