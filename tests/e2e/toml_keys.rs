@@ -12,13 +12,8 @@ const TABLE: [&str; 4] = [
 ];
 
 /// Where the same word is no key of these files, with the file and what it is there.
-const OTHERS: [(&str, &str); 15] = [
-    ("daemon/analysis/src/explain/drive.rs", "a parameter of the answer"),
-    ("daemon/analysis/src/explain/effects/wind.rs", "a parameter of the answer"),
-    ("daemon/analysis/src/explain/report/effect.rs", "a parameter of the answer"),
-    ("daemon/analysis/src/explain/report/parameters.rs", "a parameter of the answer"),
-    ("daemon/analysis/src/explain/report/words.rs", "a parameter of the answer"),
-    ("daemon/analysis/src/explain/verdict.rs", "advice that stands in the answer"),
+const OTHERS: [(&str, &str); 10] = [
+    ("daemon/analysis/src/explain/", "a parameter of the answer, or advice in it"),
     ("daemon/core/src/plausibility/input_fault.rs", "a fault"),
     ("daemon/dataset/src/diagnosing.rs", "a figure of a note"),
     ("daemon/model/src/terms/", "a parameter of the answer"),

@@ -5,9 +5,9 @@ use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
 use dynocar_model::train::PowerTrain;
 use toml::Value;
 
+use super::declared::implausible_columns;
 use super::diagnostic::{Diagnostic, read_as};
 use super::forces::{Force, ForceSource};
-use super::implausible_columns::implausible_columns;
 use super::keys::run::DIRECTION;
 use super::order::quantile;
 use super::quality::RunQuality;

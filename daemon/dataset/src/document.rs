@@ -6,8 +6,8 @@ use dynocar_model::train::NumberRule;
 use dynocar_model::units::Unit;
 use toml::value::Datetime;
 
+use super::error::unknown;
 use super::error::{DatasetError, SourcePosition};
-use super::names::unknown;
 use super::node::{Node, NodeContent};
 
 /// The names of the tables and keys at the top of a TOML file, in the order of the file.

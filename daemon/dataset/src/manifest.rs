@@ -7,16 +7,16 @@ use dynocar_model::units::Unit;
 
 use super::clock::{self, TimeFormat};
 use super::document::Item;
+use super::error::unknown;
 use super::error::{DatasetError, SourcePosition};
 use super::keys::column::{COLUMN, DOUBTFUL, FORMAT, OFFSET, SCALE, UNIT};
 use super::keys::dataset::{DESCRIPTION, NAME, POSITION_REFERENCE};
 use super::keys::run::{DATE, DIRECTION, FILE, MASS, ROLE, START};
 use super::keys::{self, DATASET_TABLES, FileKey, allow};
-use super::names::unknown;
 use super::node::Node;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
-use super::train_rows::TrainRows;
+use super::text_layout::TrainRows;
 
 named! {
     /// Which point of the train the recorded position is of.
@@ -319,8 +319,8 @@ fn runs(root: &Item, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, Dataset
         let has_date = |it: &ColumnMapping| it.format.as_ref().is_some_and(TimeFormat::has_date);
         if run.date_unix_s.is_some() && columns.iter().any(has_date) {
             let (words, date) = ("exclude each other: give one of them", section.full(DATE.name));
-            let words = format!("{date} and columns.time.format with a date {words}");
-            return Err(section.place_of(DATE.name).problem(words));
+            let problem = format!("{date} and columns.time.format with a date {words}");
+            return Err(section.place_of(DATE.name).problem(problem));
         }
         let twin = runs.iter().find(|other| is_same_path(&other.file, &run.file));
         if let Some(first_line) = twin.and_then(|twin| twin.place.line) {

@@ -5,7 +5,10 @@ use encoding_rs::{Encoding, UTF_8};
 use super::document::Item;
 use super::encoding;
 use super::error::DatasetError;
+use super::keys::allow;
 use super::keys::dataset::{DECIMAL, DELIMITER, ENCODING, SKIP_ROWS, THOUSANDS as MARK, UNITS_ROW};
+use super::keys::rows::{COLUMN, KEYS, VALUE};
+use super::keys::train_file::ROWS;
 
 /// Marks of a number: before its fraction, and between groups of three digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,5 +101,47 @@ impl TextLayout {
     /// Lines above the first row of values.
     pub fn lines_above(&self) -> usize {
         self.skip_rows + 1 + usize::from(self.units_row)
+    }
+}
+
+/// Its value where all rows are of one train, whatever a column says.
+const ALL: &str = "all";
+
+/// The rows of the runs' files that are the train's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum TrainRows {
+    /// All, unless a column says that they are of several trains.
+    #[default]
+    Unsaid,
+    /// All.
+    All,
+    /// Those with a value in a column.
+    Of {
+        /// The column's name.
+        column: String,
+        /// The cell of this train.
+        value: String,
+    },
+}
+
+impl TrainRows {
+    /// Reads the key of `[train]`.
+    pub(super) fn of(train: &Item) -> Result<Self, DatasetError> {
+        let (key, expected) = (ROWS.name, ROWS.rule.allowed);
+        if !train.has(key) {
+            return Ok(TrainRows::Unsaid);
+        }
+        if !train.need(key, expected)?.is_map() {
+            return match ROWS.need_quoted(train)? {
+                ALL => Ok(TrainRows::All),
+                other => Err(ROWS.refused(train, format_args!("{other:?}"))),
+            };
+        }
+        let section = train.need_table(key)?;
+        allow(&section, KEYS)?;
+        Ok(TrainRows::Of {
+            column: COLUMN.need_quoted(&section)?.trim().into(),
+            value: VALUE.need_quoted(&section)?.trim().into(),
+        })
     }
 }

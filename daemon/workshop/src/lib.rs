@@ -19,7 +19,6 @@
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
 //! - [`verify`]: every recorded snapshot computed again
 
-pub mod annotation;
 pub mod brakes_page;
 pub mod cli;
 pub mod clock;
@@ -28,7 +27,6 @@ pub mod dataset;
 pub mod fmu;
 pub mod from_dataset;
 pub mod learn;
-pub mod paths;
 pub mod report;
 pub mod run_facts;
 pub mod survey;

@@ -7,22 +7,22 @@
 //! needs one. What belongs to certain runs is an event and no property of a train or a line: it is
 //! listed, so that nobody takes the files for more than they are.
 
-mod runs;
-
 use std::path::{Path, PathBuf};
 
-use dynocar_analysis::dataset::written::{can_hold, name_model, set, write_entry};
+use dynocar::dataset::{DatasetSource, LoadError, read_text};
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar::output::{OutputError, require_new, write_in_folder};
+use dynocar_analysis::dataset::written::{
+    alignment_files, can_hold, name_model, run_files, set, write_entry,
+};
 use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
-use dynocar_analysis::explain::{Explanation, evidence::Fit};
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::evidence::Fit;
 use dynocar_model::train::numbers::{AUXILIARY_POWER, DAVIS_A, DAVIS_B, DAVIS_C, DRIVE_EFFICIENCY};
 use toml::Table;
 
-use crate::dataset::open;
-use dynocar::dataset::DatasetSource;
-use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
-use dynocar::output::write_in_folder;
-
-pub use runs::{UPDATED_MARK, UpdatedModelError};
+use super::dataset::from_folder;
+use super::dataset::{FilesOfDataset, open};
 
 /// The files of an updated model: the train, the line where something is known of it, and the dataset.
 pub const UPDATED_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
@@ -62,16 +62,16 @@ pub fn write_updated<'s>(
     let declared = (&texts.0[..], texts.1.as_deref());
     let mut grown = UpdatedTables::of(explanation, declared, labels)?;
     if let (Some(declared), Some(track)) = (track, &mut grown.track) {
-        runs::keep_alignments(track, &source.path_of(&declared.path), folder);
+        keep_alignments(track, &source.path_of(&declared.path), folder);
     }
     let mut manifest = table(&read(MANIFEST_FILE)?, &source.label(MANIFEST_FILE))?;
-    runs::keep_runs(&mut manifest, &source, folder)?;
+    keep_runs(&mut manifest, &source, folder)?;
     name_model(&mut manifest, TRAIN_FILE, grown.track.as_ref().map(|_| TRACK_FILE));
     let texts = grown.texts(explanation, labels, MANIFEST_FILE);
     let dataset =
         updated_text(explanation, MANIFEST_FILE, &dataset.path.display().to_string(), &manifest);
     if texts.track.is_none() {
-        runs::forget(&folder.join(TRACK_FILE))?;
+        forget(&folder.join(TRACK_FILE))?;
     }
     let all = [Some(texts.train), texts.track, Some(dataset)];
     let named = UPDATED_FILES.into_iter().zip(all).filter_map(|(name, text)| Some((name, text?)));
@@ -177,3 +177,84 @@ pub fn grow(fit: &Fit, train: &mut Table, track: &mut Table) -> Vec<String> {
     }
     not_expressed
 }
+
+/// Names the runs where they lie; those of a recording are written into the folder.
+///
+/// # Errors
+///
+/// When a run cannot be written, or would take the place of another file.
+pub fn keep_runs(
+    manifest: &mut Table,
+    source: &FilesOfDataset,
+    folder: &Path,
+) -> Result<(), UpdatedModelError> {
+    for file in run_files(manifest) {
+        if !source.is_recording() {
+            *file = seen_from(folder, &source.path_of(file));
+            continue;
+        }
+        let target = folder.join(&*file);
+        // Runs have no mark of their own.
+        if !is_updated(&folder.join(TRAIN_FILE)) {
+            require_new(&target)?;
+        }
+        let text = source.read(file).map_err(|problem| UpdatedModelError::Declared {
+            label: source.label(file),
+            problem: problem.to_string(),
+        })?;
+        let (parent, name) = (target.parent().unwrap_or(folder), target.file_name());
+        let name = name.unwrap_or_default().to_string_lossy();
+        write_in_folder(parent, &name, &text)?;
+    }
+    Ok(())
+}
+
+/// Names the ways on the map, which lie beside the declared line's file.
+pub fn keep_alignments(track: &mut Table, declared: &Path, folder: &Path) {
+    let beside = declared.parent().unwrap_or(Path::new(""));
+    for file in alignment_files(track) {
+        *file = seen_from(folder, &beside.join(&*file));
+    }
+}
+
+/// Removes a file that an earlier explanation wrote and this one does not: the model lacks it.
+///
+/// # Errors
+///
+/// When it is there and cannot be removed.
+pub fn forget(file: &Path) -> Result<(), OutputError> {
+    if !is_updated(file) {
+        return Ok(());
+    }
+    std::fs::remove_file(file).map_err(|source| OutputError::File { path: file.into(), source })
+}
+
+fn is_updated(file: &Path) -> bool {
+    read_text(file).is_ok_and(|text| text.starts_with(UPDATED_MARK))
+}
+
+fn seen_from(folder: &Path, file: &Path) -> String {
+    from_folder(folder, file).display().to_string()
+}
+
+/// Why the grown files cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum UpdatedModelError {
+    /// The dataset cannot be read.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// A declared file is not there any more or is no TOML.
+    #[error("{label}: expected a TOML file, got {problem}")]
+    Declared {
+        /// The file.
+        label: String,
+        /// Problem of the run.
+        problem: String,
+    },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// How a grown file begins.
+pub const UPDATED_MARK: &str = "# Grown from ";

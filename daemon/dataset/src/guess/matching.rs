@@ -7,7 +7,7 @@ use super::guessed::GuessedColumn;
 use super::name::{Name, readings, scaled_unit};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
-use crate::names::nearest;
+use crate::error::nearest;
 
 /// Weight of a name that says the quantity and nothing else.
 const SAID: i32 = 100;

@@ -15,7 +15,7 @@ use dynocar_model::train::numbers::{
 };
 use toml::{Table, Value};
 
-use super::material::{Material, SurveyFailure};
+use super::read::{Material, SurveyFailure};
 use super::trip_rows::{TripColumn, columns, run_csv};
 use crate::dataset::open;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};

@@ -10,7 +10,7 @@ use dynocar_analysis::dataset::keys::dataset::{
 };
 use dynocar_analysis::dataset::keys::rows::VALUE;
 use dynocar_analysis::dataset::keys::{self, run};
-use dynocar_analysis::dataset::train_rows::TrainRows;
+use dynocar_analysis::dataset::text_layout::TrainRows;
 use dynocar_analysis::dataset::written::TomlText;
 use dynocar_analysis::dataset::{Quantity, Role, TextLayout};
 use encoding_rs::UTF_8;
