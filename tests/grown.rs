@@ -10,6 +10,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_model::force::ForceResolver;
 use dynocar_model::train::numbers::PAD_AREA;
 use dynocar_model::validation::ValidSample;
+use dynocar_shared::schema::sample_fields;
 use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, TrainSample};
 
 const TRAIN: &str = "[train]\nmass_t = 200\nlength_m = 100\nrotating_mass_factor = 0.06\n\
@@ -136,6 +137,8 @@ fn the_field_comes_from_a_column_and_acts() {
     let field = SampleField::ALL.into_iter().find(|it| it.name() == "headwind_mps").unwrap();
     assert_eq!(sample.get(field), Some(0.0));
     assert_eq!(Quantity::of_field(field).map(Quantity::name), Some("headwind"));
+    // Recordings of every format have their columns from these.
+    assert!(sample_fields().any(|it| it.layout.name == field.name()));
     let train = Arc::new(parse_train("train.toml", TRAIN).unwrap());
     let mut resolver = ForceResolver::new(train, None);
     let mut extra_n_per_kn = |wind_mps: f64| {

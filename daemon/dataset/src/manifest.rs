@@ -362,7 +362,7 @@ fn run(section: &Item) -> Result<RunEntry, DatasetError> {
 /// The second at which a run's date begins.
 fn date(section: &Item) -> Result<Option<i64>, DatasetError> {
     let Some(date) = section.datetime(DATE.name)? else { return Ok(None) };
-    let refused = || DATE.refused(section, &date);
+    let refused = || DATE.refused(section, date);
     clock::unix_s(&date).map(Some).ok_or_else(refused)
 }
 
