@@ -1,7 +1,6 @@
 //! `dynocar check`: reads a dataset, a train, a track or a daemon configuration and says what it
 //! understood.
 
-mod draw;
 mod json;
 mod report;
 mod runs;
@@ -40,7 +39,7 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let understood = or_refused(path, json, understand(source))?;
     give(json, &understood.answer(path), || understood.text())?;
     if let Some(folder) = &arguments.draw {
-        draw::draw(&understood, folder)?;
+        understood::draw(&understood, folder)?;
     }
     let errors: Vec<_> = understood.errors().map(ToString::to_string).collect();
     if errors.is_empty() { Ok(()) } else { Err(Failure::Input(errors.join("\ndynocar: "))) }
