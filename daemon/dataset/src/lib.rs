@@ -235,10 +235,7 @@ impl DatasetHead {
     }
 
     /// Reads all runs, in the order of the manifest, each or the first mistake in its file.
-    pub fn read_each(
-        &self,
-        files: &(impl DatasetFiles + ?Sized),
-    ) -> Vec<Result<Run, DatasetError>> {
+    fn read_each(&self, files: &(impl DatasetFiles + ?Sized)) -> Vec<Result<Run, DatasetError>> {
         let places = 0..self.manifest.runs.len();
         #[cfg(feature = "parallel")]
         let places = places.into_par_iter();

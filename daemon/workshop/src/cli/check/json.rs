@@ -85,7 +85,7 @@ fn of_dataset((manifest, runs): &(Manifest, Vec<Result<Run, DatasetError>>)) -> 
 fn of_run<'a>((entry, run): (&'a RunEntry, &'a Result<Run, DatasetError>)) -> impl Serialize {
     let read = |run: &'a Run| {
         object! {
-            samples: run.samples.len(),
+            samples: run.quality.samples(),
             position_source: run.position_source,
             gradient_source: run.gradient_source,
             traction_source: run.traction_source,
