@@ -80,7 +80,12 @@ pub use unknown::{a_form_explains_more, leaves_a_force};
 
 /// Returns the policy in a kind's row of the library; the usual one for what has no row.
 pub fn policy_of(kind: EffectKind) -> &'static Policy {
-    LIBRARY.iter().find(|effect| effect.kind == kind).map_or(&Policy::USUAL, |it| &it.policy)
+    effect_of(kind).map_or(&Policy::USUAL, |it| &it.policy)
+}
+
+/// Returns a kind's row of the library; `None` for what has none.
+pub fn effect_of(kind: EffectKind) -> Option<&'static Effect> {
+    LIBRARY.iter().find(|effect| effect.kind == kind)
 }
 
 #[cfg(test)]

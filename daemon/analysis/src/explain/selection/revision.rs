@@ -7,7 +7,7 @@ use super::outcome::{SearchOutcome, SearchRound, round_of};
 use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::Asked;
-use crate::explain::effects::policy_of;
+use crate::explain::effects::{effect_of, policy_of};
 use crate::explain::evidence::{EQUAL, Fit};
 use crate::explain::score::reduction;
 
@@ -65,6 +65,32 @@ impl Search<'_> {
         other.instead.push((best.kind, round_of(trials)));
         *outcome = other;
         true
+    }
+
+    /// Moves an effect from places that were chosen back to those that the map has of its kind, where it explains more
+    /// there beside the usual errors; returns whether it did. The errors of the map make places of anything, and the
+    /// more runs pass them, the surer.
+    pub(super) fn return_to_mapped(&self, outcome: &mut SearchOutcome) -> bool {
+        let effects = &outcome.fit.model.effects;
+        let mapped = effects.iter().enumerate().find_map(|(index, effect)| {
+            let kind = effect.kind();
+            let is_chosen = effect.site().is_some_and(|site| site.sections.is_some());
+            if !is_chosen || !outcome.is_on_trial(kind) || outcome.returned.contains(&kind) {
+                return None;
+            }
+            let rest = self.without(&outcome.fit, index);
+            let whole = effect_of(kind)?.whole(&self.scan(&rest)?)?;
+            Some((kind, self.problem.with_own_noise(&self.problem.grown(&rest, [whole.parts()]))))
+        });
+        let Some((kind, fit)) = mapped else { return false };
+        outcome.returned.push(kind);
+        let own = Self::total(&self.beside_usual_errors(outcome).fit);
+        let mut other = SearchOutcome { fit, ..outcome.clone() };
+        let is_better = Self::total(&self.beside_usual_errors(&mut other).fit) < own;
+        if is_better {
+            *outcome = other;
+        }
+        is_better
     }
 
     /// Drops effects that the others have made needless, and that none of the others stands in for against

@@ -82,6 +82,7 @@ impl Search<'_> {
             small: Vec::new(),
             certain: Vec::new(),
             fallen: Vec::new(),
+            returned: Vec::new(),
             beside: None,
         }
     }
@@ -97,6 +98,7 @@ impl Search<'_> {
             while self.take_certain_beside(&mut outcome)
                 || self.drop_fallen(&mut outcome)
                 || self.give_way(&mut outcome)
+                || self.return_to_mapped(&mut outcome)
             {
                 self.take_what_scores(&mut outcome);
             }
