@@ -4,7 +4,7 @@ use dynocar_model::terms::delay;
 use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::disturbances::Disturbances;
 use dynocar_tests::simulator::run_maker::RunPlan;
-use dynocar_tests::simulator::{Effect, SimulatedDataset};
+use dynocar_tests::simulator::{SimulatedDataset, TrueEffect};
 use serde_json::Value;
 
 use crate::statistics::mean;
@@ -28,14 +28,20 @@ impl ParameterGrade {
 }
 
 /// Every number of an effect that the answer has by the same name; the size of an effect is its distance from none.
-pub fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<ParameterGrade> {
+pub fn graded(
+    effect: &TrueEffect,
+    own: &Value,
+    simulated: &SimulatedDataset,
+) -> Vec<ParameterGrade> {
     let declared = simulated.declared_train();
     let mut truths = effect.parameters(0.0);
     match effect {
         // Nobody knows which numbers of a form are those of a law outside the library.
-        Effect::Unlisted(_) => return Vec::new(),
-        Effect::GradientError { profile } => return gradient_errors(profile, own, simulated),
-        Effect::Wind { .. } => truths["wind_plus_mps"] = wind_of_the_days(own, simulated).into(),
+        TrueEffect::Unlisted(_) => return Vec::new(),
+        TrueEffect::GradientError { profile } => return gradient_errors(profile, own, simulated),
+        TrueEffect::Wind { .. } => {
+            truths["wind_plus_mps"] = wind_of_the_days(own, simulated).into()
+        }
         _ => {}
     }
     let one = |name: &str, truth: f64| {

@@ -4,8 +4,8 @@ use std::ops::Bound;
 
 use dynocar_model::terms::{gradient, masses, place};
 use dynocar_model::track::{
-    GradientError, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackCurve,
-    TrackError, TrackSurvey, Tunnel,
+    GradientError, IntervalValue, LinearProfile, MassSection, ProfileError, StepProfile, Track,
+    TrackCurve, TrackError, TrackSurvey, Tunnel,
 };
 
 use super::document::{Entries, Item, above_zero};
@@ -185,8 +185,10 @@ fn with_corrections(mut track: Track, section: &Item) -> Result<Track, DatasetEr
         (None, None) => {}
     }
     if let Some(entries) = section.entries::<3>(place::LIST, "[start_m, end_m, extra N/kN]")? {
-        let places: Vec<_> =
-            entries.iter().map(|([from, to, extra], _)| (*from, *to, *extra)).collect();
+        let places: Vec<IntervalValue> = entries
+            .iter()
+            .map(|&([start_m, end_m, value], _)| IntervalValue { start_m, end_m, value })
+            .collect();
         track = track
             .with_resistance(&places)
             .map_err(|error| section.place_of(place::LIST).problem(error))?;
