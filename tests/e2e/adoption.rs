@@ -13,7 +13,7 @@ use dynocar::shadow::record;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_client::SnapshotReader;
 use dynocar_shared::{ParameterSnapshot, Status, TrainId};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_transport::monotonic_now_ns;
 use rustix::process::Signal;
 
@@ -29,7 +29,7 @@ fn demo_folder() -> PathBuf {
 
 /// A demo's train with a store of models.
 struct Cast {
-    site: Site,
+    site: DaemonSite,
     dataset: Dataset,
     /// The train's file, declared with one a.
     train: String,
@@ -40,7 +40,7 @@ impl Cast {
     fn new(declared: &str) -> Self {
         let text = |file: &str| std::fs::read_to_string(demo_folder().join(file)).expect("a file");
         let (train, track) = (text("train.toml").replace(RIGHT, declared), text("track.toml"));
-        let site = Site::new();
+        let site = DaemonSite::new();
         site.write("train.toml", &train);
         site.write("track.toml", &track);
         std::fs::create_dir(site.path().join("models")).expect("a store");

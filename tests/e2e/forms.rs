@@ -7,13 +7,13 @@ use dynocar_model::terms::extra::{Covariate, ExtraResistance, Form};
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, Unlisted, simulate,
+    EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrueEffect, Unlisted, simulate,
 };
 
 /// A dataset with a force by a law drawn from the seed.
 fn simulated(seed: u64) -> (SimulatedDataset, Law) {
     let simulated = simulate(&SimulatorSettings::new(seed, EffectRequest::AnyLaw));
-    let [Effect::Unlisted(Unlisted { law, .. })] = simulated.effects[..] else {
+    let [TrueEffect::Unlisted(Unlisted { law, .. })] = simulated.effects[..] else {
         panic!("the simulator was asked for a law outside the library");
     };
     (simulated, law)

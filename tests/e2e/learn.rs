@@ -8,7 +8,7 @@ use std::time::{Duration, Instant, SystemTime};
 use dynocar::models::{ModelText, Store, TrainModels, UtcSecond};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 use dynocar_tests::soak::day::strange_host::StrangeHost;
@@ -26,14 +26,14 @@ const PATIENCE: Duration = Duration::from_secs(540);
 
 /// A site with simulated runs, a configuration that declares their train and line, and a store.
 struct Workplace {
-    site: Site,
+    site: DaemonSite,
     files: Vec<(String, String)>,
 }
 
 impl Workplace {
     /// No run lies there yet.
     fn of(kinds: &[EffectKind]) -> Self {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let simulated =
             simulate(&SimulatorSettings::new(SEED, EffectRequest::Kinds(kinds.to_vec())));
         let files = dataset_files(&simulated);

@@ -15,7 +15,7 @@ use dynocar_core::trial::ledger::Ledger;
 use dynocar_model::simulate::SpeedError;
 use dynocar_shared::TrainId;
 use dynocar_tests::browser::Browser;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use serde_json::json;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -70,7 +70,7 @@ fn put(models: &TrainModels, text: ModelText, parent: Option<ModelHash>, day: u6
 }
 
 /// A history: declared, a model adopted, one that grew from it, one rejected, an event.
-fn history(site: &Site) -> (PathBuf, [ModelHash; 4]) {
+fn history(site: &DaemonSite) -> (PathBuf, [ModelHash; 4]) {
     let config = site.write_config(1, "", "[[pipelines]]\nkind = \"residual_monitor\"\n");
     let train = std::fs::read_to_string(site.path().join("train.toml")).unwrap();
     let text = |more: &str| ModelText { train: format!("{train}{more}"), track: None };
@@ -137,7 +137,7 @@ fn history(site: &Site) -> (PathBuf, [ModelHash; 4]) {
 
 #[test]
 fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_narrow_screens() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (page, hashes) = history(&site);
     let [declared, adopted, rejected, candidate] = hashes.map(|hash| hash.to_string());
     let mut browser = Browser::start(1280, false);

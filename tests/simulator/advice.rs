@@ -19,7 +19,7 @@ use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, TrainId, TrainSample,
 };
 use dynocar_tests::simulator::driving::{Controls, TrainOnLine};
-use dynocar_tests::simulator::random::{Random, Stream};
+use dynocar_tests::simulator::random::{SimulatorRandom, Stream};
 
 const STEP_S: f64 = 0.2;
 const SPEED_NOISE_MPS: f64 = 0.03;
@@ -53,7 +53,7 @@ struct Trial {
     truth: TrainModel,
     pipeline: Pipeline,
     noise: NoiseSeen,
-    random: Random,
+    random: SimulatorRandom,
     sample: TrainSample,
     motion: SimulatedMotion,
 }
@@ -68,7 +68,7 @@ impl Trial {
             truth,
             pipeline: Pipeline::new(TrainId(1), 0, declared, None, estimator),
             noise: NoiseSeen::default(),
-            random: Random::new(seed, Stream::Sensors(0)),
+            random: SimulatorRandom::new(seed, Stream::Sensors(0)),
             sample: TrainSample::empty(TrainId(1)).with(SampleField::Gradient, 0.0),
             motion: SimulatedMotion { distance_m: 0.0, speed_mps: 8.0 },
         }

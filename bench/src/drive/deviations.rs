@@ -224,8 +224,9 @@ impl Hidden {
 
     /// Curvature in 1/m at a chainage in m.
     pub fn curvature_per_m(&self, chainage_m: f64) -> f64 {
-        let here = |curve: &&(f64, f64, f64)| (curve.0..curve.1).contains(&chainage_m);
-        self.curves_m.iter().find(here).map_or(0.0, |curve| 1.0 / curve.2)
+        let here =
+            self.curves_m.iter().find(|(from_m, to_m, _)| (*from_m..*to_m).contains(&chainage_m));
+        here.map_or(0.0, |(.., radius_m)| 1.0 / radius_m)
     }
 
     /// Returns the tunnels' addition to the air resistance, as a share of it.

@@ -8,7 +8,7 @@
 
 use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};
-use super::plan::{COASTING_MIN_SHARE, DrivePlan, Leg, Planner};
+use super::plan::{COASTING_MIN_SHARE, DrivePlan, PlannedLeg, Planner};
 
 /// Bandwidth in rad/s of the estimate of speed and of what is not explained, at most.
 const OBSERVER_RAD_PER_S: f64 = 0.8;
@@ -51,7 +51,7 @@ pub struct DriverMeasurements {
 /// A driver on one leg from stop to stop.
 #[derive(Clone, Debug)]
 pub struct LegDriver {
-    leg: Leg,
+    leg: PlannedLeg,
     ability: Ability,
     cycle_s: f64,
     knowledge: Knowledge,
@@ -71,7 +71,7 @@ pub struct LegDriver {
 
 impl LegDriver {
     /// A driver whose train stands at the start of the leg.
-    pub fn new(leg: Leg, ability: Ability, cycle_s: f64, knowledge: Knowledge) -> Self {
+    pub fn new(leg: PlannedLeg, ability: Ability, cycle_s: f64, knowledge: Knowledge) -> Self {
         let planner = Planner { leg: &leg, knowledge: &knowledge, ability: &ability };
         let plan = planner.plan((0.0, 0.0), leg.due_s);
         let curve = BrakingCurve::of(&knowledge, &ability, 0.0);
@@ -103,7 +103,7 @@ impl LegDriver {
     }
 
     /// The leg.
-    pub fn leg(&self) -> &Leg {
+    pub fn leg(&self) -> &PlannedLeg {
         &self.leg
     }
 

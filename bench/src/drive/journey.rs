@@ -8,7 +8,7 @@ use dynocar_shared::{RailCondition, SampleField, TrainSample, Uncertain};
 
 use super::driver::{DriverMeasurements, LegDriver, Phase};
 use super::knowledge::Knowledge;
-use super::plan::{Leg, Planner};
+use super::plan::{PlannedLeg, Planner};
 use super::train::Train;
 
 /// Running time of the timetable over the shortest one with declared parameters, and s on top.
@@ -140,7 +140,7 @@ impl Journey {
         let shortest = Planner { leg: &leg, knowledge: &usual, ability: &ability };
         let shortest_s = shortest.plan(start, 0.0).time_s;
         let due_s = TIMETABLE.0 * shortest_s + TIMETABLE.1;
-        let leg = Leg { due_s, ..leg };
+        let leg = PlannedLeg { due_s, ..leg };
         let truth = self.train.truth();
         self.saved_w = saved_w(&Planner { leg: &leg, knowledge: &truth, ability: &ability }, due_s);
         self.driver = Some(LegDriver::new(leg, ability, cycle_s, *knowledge));

@@ -6,7 +6,7 @@ use dynocar::config::IdleStrategy;
 use dynocar_client::{Reading, SamplePublisher, SnapshotReader};
 use dynocar_model::train::{EffortCurve, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use dynocar_transport::monotonic_now_ns;
 use serde_json::json;
 
@@ -35,7 +35,7 @@ pub struct Link {
     daemon: Option<Process>,
     plan: DaemonPlan,
     /// Last, for it takes the folder away.
-    site: Site,
+    site: DaemonSite,
 }
 
 impl Link {
@@ -45,7 +45,7 @@ impl Link {
     ///
     /// When a process, file or channel cannot be had.
     pub fn open(train: &TrainModel, trains: usize) -> Result<Self, BenchError> {
-        let site = Site::new();
+        let site = DaemonSite::new();
         site.write("train.toml", &train_toml(train)?);
         let fast = ThreadPlan {
             name: "fast",

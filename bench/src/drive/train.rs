@@ -10,7 +10,7 @@ use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
 
 use super::deviations::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::knowledge::{Ability, Knowledge};
-use super::plan::{Leg, PIECE_M};
+use super::plan::{PIECE_M, PlannedLeg};
 use crate::chance::Chance;
 use crate::scenarios::mistakes::Mistakes;
 use crate::scenarios::world::{LoadSource, WEIGHING_STD, World};
@@ -121,7 +121,7 @@ impl Train {
     }
 
     /// The leg ahead by the map, without a time.
-    pub fn leg(&self) -> Leg {
+    pub fn leg(&self) -> PlannedLeg {
         let length_m = self.direction * (self.world.stops_m[self.next_stop] - self.start_m);
         let pieces = (length_m / PIECE_M) as usize + 2;
         let slope = |piece: usize| {
@@ -132,7 +132,7 @@ impl Train {
         };
         let slopes_permille = (0..pieces).map(slope).collect();
         let top_mps = self.service.traffic.habits().top_mps;
-        Leg { length_m, top_mps, due_s: f64::INFINITY, slopes_permille }
+        PlannedLeg { length_m, top_mps, due_s: f64::INFINITY, slopes_permille }
     }
 
     fn chainage_m(&self) -> f64 {

@@ -6,7 +6,7 @@ use dynocar_analysis::explain::answer::ExplainAnswer;
 use dynocar_analysis::explain::selection::Search;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::oracle::score;
-use dynocar_tests::simulator::{Effect, SimulatedDataset};
+use dynocar_tests::simulator::{SimulatedDataset, TrueEffect};
 use serde_json::Value;
 
 use super::attainable::attainable_mps;
@@ -152,7 +152,7 @@ fn details(
         attained.and_then(|attained| attained.attainable_ratio),
         answer.unexplained_n_per_kn
     ));
-    let unlisted = simulated.effects.iter().filter(|it| matches!(it, Effect::Unlisted(_)));
+    let unlisted = simulated.effects.iter().filter(|it| matches!(it, TrueEffect::Unlisted(_)));
     details.extend(unlisted.map(|effect| format!("truth {effect:?}")));
     let considered = answer.considered.iter().enumerate();
     let considered = considered.filter(|(k, it)| *k < 4 || it.kind == "unknown").map(|it| it.1);

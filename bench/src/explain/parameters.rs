@@ -5,7 +5,7 @@ use dynocar_model::terms::delay;
 use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::disturbances::Disturbances;
 use dynocar_tests::simulator::run_maker::RunPlan;
-use dynocar_tests::simulator::{Effect, SimulatedDataset};
+use dynocar_tests::simulator::{SimulatedDataset, TrueEffect};
 use serde_json::Value;
 
 use crate::statistics::mean;
@@ -30,7 +30,7 @@ impl ParameterGrade {
 
 /// Every number of an effect that the answer, or its part about the runs of a role, has by the same name; the size of an effect is its distance from none.
 pub fn graded(
-    effect: &Effect,
+    effect: &TrueEffect,
     own: &Value,
     simulated: &SimulatedDataset,
     role: Role,
@@ -39,9 +39,9 @@ pub fn graded(
     let mut truths = effect.parameters(0.0);
     match effect {
         // Nobody knows which numbers of a form are those of a law outside the library.
-        Effect::Unlisted(_) => return Vec::new(),
-        Effect::GradientError { profile } => return gradient_errors(profile, own, simulated),
-        Effect::Wind { .. } => {
+        TrueEffect::Unlisted(_) => return Vec::new(),
+        TrueEffect::GradientError { profile } => return gradient_errors(profile, own, simulated),
+        TrueEffect::Wind { .. } => {
             truths["wind_plus_mps"] = wind_of_the_days(own, simulated, role).into()
         }
         _ => {}

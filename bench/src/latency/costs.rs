@@ -2,7 +2,7 @@
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use dynocar_transport::channel::{Receiver, Sender, Transport};
 use dynocar_transport::monotonic_now_ns;
 use serde::Serialize;
@@ -39,7 +39,7 @@ struct Ends {
     publisher: SamplePublisher,
     reader: SnapshotReader,
     snapshot: ParameterSnapshot,
-    _site: Site,
+    _site: DaemonSite,
 }
 
 impl Ends {

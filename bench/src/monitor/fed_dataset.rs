@@ -6,7 +6,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
 use dynocar_tests::simulator::true_run::{TRUE_STEP_S, TrueState};
-use dynocar_tests::simulator::{Effect, SimulatedDataset, SimulatedRun};
+use dynocar_tests::simulator::{SimulatedDataset, SimulatedRun, TrueEffect};
 
 use crate::rig::pipelines::default_pipeline;
 
@@ -126,12 +126,12 @@ impl Watched {
 
 /// Whether any effect of a dataset acts in a state of one of its runs.
 fn acts(data: &SimulatedDataset, run: &SimulatedRun, state: &TrueState) -> bool {
-    let one = |effect: &Effect| one_acts(effect, data, run, state);
+    let one = |effect: &TrueEffect| one_acts(effect, data, run, state);
     state.speed_mps > MOVING_MPS && data.effects.iter().any(one)
 }
 
 fn one_acts(
-    effect: &Effect,
+    effect: &TrueEffect,
     data: &SimulatedDataset,
     run: &SimulatedRun,
     state: &TrueState,
@@ -140,19 +140,19 @@ fn one_acts(
     let length_m = data.declared_train().length_m;
     let disturbances = &run.disturbances;
     match effect {
-        Effect::TunnelDrag { .. } => track.tunnel_share(at_m, length_m) > Some(0.0),
-        Effect::CurveResistance { .. } => track.curvature_per_m(at_m, length_m) > Some(0.0),
-        Effect::DraggingBrake { .. } => disturbances.drag_n(state.time_s) > 0.0,
-        Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) => {
+        TrueEffect::TunnelDrag { .. } => track.tunnel_share(at_m, length_m) > Some(0.0),
+        TrueEffect::CurveResistance { .. } => track.curvature_per_m(at_m, length_m) > Some(0.0),
+        TrueEffect::DraggingBrake { .. } => disturbances.drag_n(state.time_s) > 0.0,
+        TrueEffect::MassChangeSections(_) | TrueEffect::MassChangeWindows(_) => {
             disturbances.effect_mass_factor(state.time_s, at_m) != 1.0
         }
-        Effect::LocalResistance { intervals_m, .. } => {
+        TrueEffect::LocalResistance { intervals_m, .. } => {
             let is_near = |&(from_m, to_m): &(f64, f64)| {
                 (from_m - 0.5 * length_m..=to_m + 0.5 * length_m).contains(&at_m)
             };
             disturbances.local.is_some() && intervals_m.iter().any(is_near)
         }
-        Effect::LowAdhesion { .. } => {
+        TrueEffect::LowAdhesion { .. } => {
             let carried_n = CARRIED_SHARE * state.reported.brake_force_n;
             disturbances.adhesion.is_some() && state.acting.brake_force_n < carried_n
         }

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use dynocar::config::IdleStrategy;
 use dynocar::programs::{LIVE, RECORDING, call};
 use dynocar_shared::{PipelineKind, TrainId};
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use dynocar_transport::monotonic_now_ns;
 
 use super::controller::{Controller, TrialOutcome, drive, settle};
@@ -44,7 +44,7 @@ pub enum Companion {
 
 impl Companion {
     /// Starts it on a site, and waits for its first line: by then its channels are open.
-    fn start(self, site: &Site) -> Result<Process, BenchError> {
+    fn start(self, site: &DaemonSite) -> Result<Process, BenchError> {
         let (train, file) = (TRAIN.to_string(), site.path().join("run.mcap"));
         let file = file.to_string_lossy();
         let (package, arguments) = match self {
@@ -215,7 +215,11 @@ impl Setting {
     }
 
     /// The controller's end.
-    fn wire(&self, site: &Site, train: TrainId) -> Result<Box<dyn BenchTransport>, BenchError> {
+    fn wire(
+        &self,
+        site: &DaemonSite,
+        train: TrainId,
+    ) -> Result<Box<dyn BenchTransport>, BenchError> {
         let (folder, blocks) = (site.path(), self.idle == IdleStrategy::Event);
         Ok(match &self.answerer {
             Answerer::Floor if blocks => Box::new(Notifying::open(site, train)?),
@@ -232,7 +236,7 @@ impl Setting {
     }
 
     /// Starts who answers.
-    fn start(&self, site: &Site, extent: &Extent) -> Result<Process, BenchError> {
+    fn start(&self, site: &DaemonSite, extent: &Extent) -> Result<Process, BenchError> {
         let kind = match &self.answerer {
             Answerer::Daemon(pipelines, _) => {
                 let lines = match self.candidates {

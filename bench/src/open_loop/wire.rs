@@ -2,7 +2,7 @@
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use dynocar_transport::channel::{Receiver, Sender, Transport};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::ipc;
@@ -46,7 +46,7 @@ impl Client {
     ///
     /// When a channel cannot be opened.
     pub fn open(
-        site: &Site,
+        site: &DaemonSite,
         train: TrainId,
         polled: Option<PipelineKind>,
     ) -> Result<Self, BenchError> {
@@ -89,7 +89,7 @@ impl Notifying {
     /// # Errors
     ///
     /// When the transport refuses one.
-    pub fn open(site: &Site, train: TrainId) -> Result<Self, BenchError> {
+    pub fn open(site: &DaemonSite, train: TrainId) -> Result<Self, BenchError> {
         let transport = Transport::open(&site.host(), "dynocar-bench")?;
         let service = plain::service(&site.host(), site.path())?;
         Ok(Notifying {

@@ -114,10 +114,10 @@ impl PromiseVerdict {
             true => 1.0 + 3.0 / (2.0 * row.seeds as f64).sqrt(),
             false => 1.0,
         };
-        let matches = |(paper, table, quantity, _): &&(&str, &str, &str, Limit)| {
+        let limits = LIMITS.iter().filter(|(paper, table, quantity, _)| {
             *paper == row.paper && row.table.contains(table) && row.quantity.contains(quantity)
-        };
-        for (_, _, _, limit) in LIMITS.iter().filter(matches) {
+        });
+        for (.., limit) in limits {
             match *limit {
                 Limit::Ratio(most) => {
                     let Some(bound) = row.bound else { continue };

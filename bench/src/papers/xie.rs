@@ -76,20 +76,34 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<PaperRow> {
     ]
 }
 
-/// A stop of the paper: first and last speed in km/h, what the rail carries, in words and numbers, metres and seconds.
-type PublishedStop = ([f64; 2], &'static str, RailAdhesion, [f64; 2]);
+/// A stop of the paper: first and last speed in km/h, what the rail carries in words and numbers, and the published
+/// metres and seconds.
+struct PublishedStop {
+    speeds_kmh: [f64; 2],
+    rail: &'static str,
+    adhesion: RailAdhesion,
+    published: [f64; 2],
+}
 
 const STOPS: [PublishedStop; 6] = {
+    const fn stop(
+        speeds_kmh: [f64; 2],
+        rail: &'static str,
+        adhesion: RailAdhesion,
+        published: [f64; 2],
+    ) -> PublishedStop {
+        PublishedStop { speeds_kmh, rail, adhesion, published }
+    }
     const HIGH: RailAdhesion = RailAdhesion::Coefficient(Uncertain::exact(0.1542));
     const LOW: RailAdhesion = RailAdhesion::Coefficient(Uncertain::exact(0.0726));
     const WET: RailAdhesion = RailAdhesion::Law(RailCondition::Wet, Uncertain::exact(1.0));
     [
-        ([300.0, 100.0], "adhesion 0.1542", HIGH, [3060.7, 56.1]),
-        ([300.0, 100.0], "adhesion 0.0726", LOW, [3946.7, 71.7]),
-        ([300.0, 100.0], "wet rail", WET, [3481.1, 62.8]),
-        ([250.0, 50.0], "adhesion 0.1542", HIGH, [2404.3, 59.3]),
-        ([250.0, 50.0], "adhesion 0.0726", LOW, [2958.9, 72.7]),
-        ([250.0, 50.0], "wet rail", WET, [2614.4, 62.7]),
+        stop([300.0, 100.0], "adhesion 0.1542", HIGH, [3060.7, 56.1]),
+        stop([300.0, 100.0], "adhesion 0.0726", LOW, [3946.7, 71.7]),
+        stop([300.0, 100.0], "wet rail", WET, [3481.1, 62.8]),
+        stop([250.0, 50.0], "adhesion 0.1542", HIGH, [2404.3, 59.3]),
+        stop([250.0, 50.0], "adhesion 0.0726", LOW, [2958.9, 72.7]),
+        stop([250.0, 50.0], "wet rail", WET, [2614.4, 62.7]),
     ]
 };
 
@@ -104,7 +118,8 @@ fn stops() -> Vec<PaperRow> {
     let effort = [EffortPoint { speed_mps: 0.0, force_n }];
     let davis = [train.resistance.a, train.resistance.b, train.resistance.c];
     let weight_n = train.mass_kg * PAPER_GRAVITY_MPS2;
-    let of = |&([from_kmh, to_kmh], what, adhesion, published): &PublishedStop| {
+    let of = |&PublishedStop { speeds_kmh, rail, adhesion, published }: &PublishedStop| {
+        let [from_kmh, to_kmh] = speeds_kmh;
         let stop = Stop {
             to_speed_mps: to_kmh * KMH,
             adhesion,
@@ -118,7 +133,7 @@ fn stops() -> Vec<PaperRow> {
         };
         let brake_n = |speed_mps| force_n.min(weight_n * carried(speed_mps));
         let table = if from_kmh > 275.0 { "figures 10, 11" } else { "figures 20, 21" };
-        let what = format!("{from_kmh} to {to_kmh} km/h, {what}");
+        let what = format!("{from_kmh} to {to_kmh} km/h, {rail}");
         stop_rows(["Xie 2019", table], &what, published, (&train, &stop), brake_n)
     };
     STOPS.iter().flat_map(of).collect()

@@ -6,7 +6,7 @@ use dynocar::config::IdleStrategy;
 use dynocar::models::{ModelText, NewModel, Origin, Store, UtcSecond};
 use dynocar_client::SnapshotReader;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use rustix::process::Signal;
 
 use crate::output::{BenchError, during};
@@ -88,15 +88,15 @@ impl DaemonPlan {
     /// # Errors
     ///
     /// When this program cannot be found.
-    pub fn start(&self, site: &Site) -> Result<Process, BenchError> {
+    pub fn start(&self, site: &DaemonSite) -> Result<Process, BenchError> {
         let config = site.write("daemon.toml", &self.to_toml());
         peer(site, "daemon", &[&config.to_string_lossy()])
     }
 }
 
 /// A new site with the train that latency and load drive.
-pub fn site() -> Site {
-    let site = Site::new();
+pub fn site() -> DaemonSite {
+    let site = DaemonSite::new();
     site.write("train.toml", TRAIN);
     site
 }
@@ -106,7 +106,7 @@ pub fn site() -> Site {
 /// # Errors
 ///
 /// When this program cannot be found.
-pub fn peer(site: &Site, kind: &str, arguments: &[&str]) -> Result<Process, BenchError> {
+pub fn peer(site: &DaemonSite, kind: &str, arguments: &[&str]) -> Result<Process, BenchError> {
     let program = std::env::current_exe().map_err(during("finding this program"))?;
     Ok(site.start_apart(&program.to_string_lossy(), &[&["peer", kind], arguments].concat()))
 }
@@ -174,7 +174,7 @@ pub fn await_all(
 /// # Errors
 ///
 /// When they cannot be written.
-pub fn put_candidates(site: &Site, train: TrainId, count: u32) -> Result<String, BenchError> {
+pub fn put_candidates(site: &DaemonSite, train: TrainId, count: u32) -> Result<String, BenchError> {
     let store = site.path().join("models");
     std::fs::create_dir(&store).map_err(during("making a store of models"))?;
     let parent = Some(ModelText { train: TRAIN.into(), track: None }.hash());

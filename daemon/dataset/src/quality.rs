@@ -121,10 +121,10 @@ pub(super) fn assess(run: &Resolved, samples: &[TrainSample], judge: &Judge) -> 
     let (start_s, end_s) = (time(run.order.rows().next()), time(run.order.rows().next_back()));
     let speeds = run.speeds.speed_mps.iter().zip(&run.speeds.is_spike);
     let speeds = speeds.filter(|(_, is_spike)| !**is_spike).map(|(speed, _)| *speed);
-    let refused = |(reason, count, row): (_, _, usize)| {
+    let refused = judge.refused().map(|(reason, count, row)| {
         let (first_line, first_s) = (run.table.line(row), run.times_s[row]);
         ReasonCount { reason, count, first_line, first_s }
-    };
+    });
     RunQuality {
         lines: run.table.lines,
         rows_without_time: run.rows_without_time,
@@ -134,7 +134,7 @@ pub(super) fn assess(run: &Resolved, samples: &[TrainSample], judge: &Judge) -> 
         missing: missing(run),
         outliers: outliers(run),
         noise_below_zero: noise_below_zero(run),
-        refused: judge.refused().map(refused).collect(),
+        refused: refused.collect(),
         speed_range_mps: range(speeds),
         position_range_m: range(run.position_m.iter().copied()),
         mass_kg: spread(samples.iter().filter_map(|sample| sample.get(SampleField::Mass))),

@@ -1,8 +1,8 @@
 //! `track.toml`.
 
 use dynocar_model::track::{
-    GradientError, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackCurve,
-    TrackError, TrackSurvey, Tunnel,
+    GradientError, IntervalValue, LinearProfile, MassSection, ProfileError, StepProfile, Track,
+    TrackCurve, TrackError, TrackSurvey, Tunnel,
 };
 use dynocar_model::train::NumberRule;
 
@@ -157,8 +157,10 @@ fn with_corrections(mut track: Track, section: &Item) -> Result<Track, DatasetEr
         (None, None) => {}
     }
     if let Some(entries) = RESISTANCE.entries::<3>(section)? {
-        let places: Vec<_> =
-            entries.iter().map(|([from, to, extra], _)| (*from, *to, *extra)).collect();
+        let places: Vec<IntervalValue> = entries
+            .iter()
+            .map(|&([start_m, end_m, value], _)| IntervalValue { start_m, end_m, value })
+            .collect();
         track = track
             .with_resistance(&places)
             .map_err(|error| section.place_of(RESISTANCE.name).problem(error))?;

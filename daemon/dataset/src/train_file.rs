@@ -108,7 +108,7 @@ fn effort<'t>(section: &Item<'t>, key: &FileKey) -> Result<Option<EffortCurve>, 
     let point = |([speed_mps, force_kn], entry): ([f64; 2], Item<'t>)| {
         let speed_mps = entry.within(speed_mps, &SPEED_MPS)?;
         let force_kn = entry.within(force_kn, &keys::FORCE_KN)?;
-        Ok((entry, speed_mps, 1000.0 * force_kn))
+        Ok(EffortEntry { entry, speed_mps, force_n: 1000.0 * force_kn })
     };
     let points = growing(&section.full(key.name), entries.into_iter().map(point))?;
     let none =
@@ -118,22 +118,32 @@ fn effort<'t>(section: &Item<'t>, key: &FileKey) -> Result<Option<EffortCurve>, 
 
 const SPEED_MPS: NumberRule = NumberRule::within(0.0, 200.0, "a speed in m/s from 0 to 200");
 
-/// Points of an effort curve, (m/s, N), whose speeds grow, each from where it stands; `key` names the curve.
+/// A point of an effort curve, and the entry that it stands in.
+pub struct EffortEntry<'t> {
+    /// The entry.
+    pub entry: Item<'t>,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Force in N.
+    pub force_n: f64,
+}
+
+/// Returns the points of an effort curve, (m/s, N), whose speeds must grow; `key` names the curve.
 ///
 /// # Errors
 ///
 /// At the first that does not follow the one before it.
 pub fn growing<'t>(
     key: &str,
-    points: impl Iterator<Item = Result<(Item<'t>, f64, f64), DatasetError>>,
+    points: impl Iterator<Item = Result<EffortEntry<'t>, DatasetError>>,
 ) -> Result<Vec<(f64, f64)>, DatasetError> {
     let mut grown: Vec<(f64, f64)> = Vec::new();
     for (index, point) in points.enumerate() {
-        let (place, speed_mps, force_n) = point?;
+        let EffortEntry { entry, speed_mps, force_n } = point?;
         if let Some(&(before, _)) = grown.last()
             && speed_mps <= before
         {
-            return Err(place.wrong(format!(
+            return Err(entry.wrong(format!(
                 "{key} entry {}: expected a speed above the one before ({before} m/s), got \
                  {speed_mps} m/s",
                 index + 1

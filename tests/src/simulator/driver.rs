@@ -4,8 +4,8 @@ use dynocar_model::simulate::motion::SimulatedMotion;
 
 use super::driving::{Controls, Driver, TrainOnLine};
 use super::line_maker::SimulatedLine;
-use super::permitted_speed::{Leg, PermittedSpeed};
-use super::random::Random;
+use super::permitted_speed::{PermittedLeg, PermittedSpeed};
+use super::random::SimulatorRandom;
 use super::run_maker::RunPlan;
 use super::train_maker::TrueTrain;
 
@@ -36,7 +36,7 @@ pub struct TrainDriver<'a> {
     line: &'a SimulatedLine,
     plan: &'a RunPlan,
     declared: TrainOnLine<'a>,
-    random: Random,
+    random: SimulatorRandom,
     /// Distances travelled in m at the stops.
     stops_m: Vec<f64>,
     next_stop: usize,
@@ -50,7 +50,7 @@ impl<'a> TrainDriver<'a> {
         train: &'a TrueTrain,
         line: &'a SimulatedLine,
         plan: &'a RunPlan,
-        random: Random,
+        random: SimulatorRandom,
     ) -> Self {
         let mut random = random;
         let stops_m: Vec<f64> =
@@ -219,7 +219,7 @@ fn permitted_to(
     from_m: f64,
     to_m: f64,
 ) -> PermittedSpeed {
-    let leg = Leg {
+    let leg = PermittedLeg {
         from_m,
         to_m,
         origin_m: plan.start_m,

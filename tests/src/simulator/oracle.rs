@@ -20,7 +20,7 @@ use super::{SimulatedDataset, SimulatedRun};
 
 /// RMSE in m/s over the pooled holdout runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Errors {
+pub struct OracleErrors {
     /// Of the declared model.
     pub declared_mps: f64,
     /// Of the true Davis coefficients with the true effects.
@@ -31,9 +31,9 @@ pub struct Errors {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleScore {
     /// From start to end.
-    pub full_run: Errors,
+    pub full_run: OracleErrors,
     /// Restarted every 60 s.
-    pub window60: Errors,
+    pub window60: OracleErrors,
 }
 
 /// Scores the declared and the true model on the holdout runs.
@@ -53,7 +53,7 @@ pub fn score(dataset: &SimulatedDataset) -> OracleScore {
             (recording, declared, truth)
         })
         .collect();
-    let errors = |restart: Restart| Errors {
+    let errors = |restart: Restart| OracleErrors {
         declared_mps: pooled_mps(runs.iter().map(|run| error(&run.0, &run.1, restart))),
         true_mps: pooled_mps(runs.iter().map(|run| error(&run.0, &run.2, restart))),
     };

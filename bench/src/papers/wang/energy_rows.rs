@@ -8,7 +8,9 @@
 use dynocar_core::pipeline::Estimator;
 
 use super::ride::{kalman, known_resistance, leg, measure};
-use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle, calm};
+use super::shuttle::{
+    BRAKE_MAX_N, EMPTY_MASS_KG, PERIOD_S, STATIONS_M, Shuttle, ShuttleMoment, calm,
+};
 use crate::chance::Chance;
 use crate::papers::row::{PaperRow, Seeds, WANG};
 use crate::statistics::{mean, straight_line};
@@ -131,8 +133,8 @@ fn drive(shuttle: &Shuttle, case: &Case, cruise_mps: f64) -> Driven {
 
 /// E = ∫ F_t v dt of Wang 2022, eq. (28)-(29), where the paper calls the force F_t a power; force
 /// and speed are linear between two instants, and braking gives nothing back.
-fn traction_energy_j(ride: &[Instant]) -> f64 {
-    let work_j = |pair: &[Instant]| {
+fn traction_energy_j(ride: &[ShuttleMoment]) -> f64 {
+    let work_j = |pair: &[ShuttleMoment]| {
         let [from_n, to_n] = [pair[0].force_n.max(0.0), pair[1].force_n.max(0.0)];
         let [from_mps, to_mps] = [pair[0].speed_mps, pair[1].speed_mps];
         let product = 2.0 * (from_n * from_mps + to_n * to_mps) + from_n * to_mps + to_n * from_mps;
@@ -142,7 +144,7 @@ fn traction_energy_j(ride: &[Instant]) -> f64 {
 }
 
 /// A controller that follows the plan from station to station.
-fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &Instant, f64) -> f64 {
+fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &ShuttleMoment, f64) -> f64 {
     let mut is_stopping = false;
     move |shuttle, now, to_m| {
         let left_m = (to_m - now.position_m).abs();
@@ -159,7 +161,7 @@ fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &Instant, 
         } else {
             (cruise_mps, 0.0)
         };
-        let planned = Instant { speed_mps, mass_kg: case.assumed_kg, force_n: 0.0, ..*now };
+        let planned = ShuttleMoment { speed_mps, mass_kg: case.assumed_kg, force_n: 0.0, ..*now };
         // The force at which the assumed train would just move as planned.
         let drag_mps2 = -shuttle.acceleration_mps2(&planned, 0.0);
         let correction_mps2 = case.gain_per_s * (speed_mps - now.speed_mps);
@@ -176,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_force_and_a_speed_that_both_change_are_integrated_exactly_and_brakes_give_nothing_back() {
-        let at = |time_s: f64, speed_mps: f64, force_n: f64| Instant {
+        let at = |time_s: f64, speed_mps: f64, force_n: f64| ShuttleMoment {
             time_s,
             position_m: 0.0,
             speed_mps,
@@ -185,7 +187,7 @@ mod tests {
             mass_kg: 1e5,
         };
         // F = 1000 t, v = t over 2 s: ∫ 1000 t² dt = 8000/3.
-        let mut ride: Vec<Instant> =
+        let mut ride: Vec<ShuttleMoment> =
             (0..=10).map(|k| 0.2 * f64::from(k)).map(|t| at(t, t, 1000.0 * t)).collect();
         assert!((traction_energy_j(&ride) - 8000.0 / 3.0).abs() < 1e-6);
         ride.extend([at(2.0, 2.0, -5000.0), at(3.0, 1.0, -5000.0)]);

@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 
 use super::bound::FisherInformation;
 use super::ride::measure;
-use super::shuttle::{Instant, Shuttle, calm};
+use super::shuttle::{Shuttle, ShuttleMoment, calm};
 use crate::chance::Chance;
 use crate::papers::row::{PaperRow, Seeds, WANG};
 use crate::papers::score::{PaperScore, w0_errors};
@@ -69,7 +69,7 @@ fn row(what: &str, seeds: Seeds) -> PaperRow {
 
 fn run(
     shuttle: &Shuttle,
-    ride: &[Instant],
+    ride: &[ShuttleMoment],
     speeds: &[Vec<f64>; 3],
     seeds: Seeds,
 ) -> [PaperScore; 3] {
@@ -103,7 +103,7 @@ pub fn joint_least_squares(shuttle: &Shuttle) -> JointLeastSquares {
 }
 
 /// The rows that show the printed learning rate to fail.
-fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [PaperRow; 2] {
+fn printed_rows(shuttle: &Shuttle, ride: &[ShuttleMoment], seeds: Seeds) -> [PaperRow; 2] {
     let (mut until, mut moved) = (Vec::new(), Vec::new());
     for seed in seeds.range() {
         let samples = measure(shuttle, ride, &mut Chance::new(seed));
@@ -137,7 +137,7 @@ fn polynomials(resistance: &LineResistance) -> [Davis; 3] {
 }
 
 /// Twenty speeds in m/s over the middle 90 % of those driven in a section.
-fn driven_speeds(shuttle: &Shuttle, ride: &[Instant], section: LearningSet) -> Vec<f64> {
+fn driven_speeds(shuttle: &Shuttle, ride: &[ShuttleMoment], section: LearningSet) -> Vec<f64> {
     let mut speeds: Vec<f64> = ride
         .iter()
         .filter(|instant| instant.speed_mps > 1.0)

@@ -49,7 +49,7 @@ pub struct Shuttle {
 
 /// A state of the train.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Instant {
+pub struct ShuttleMoment {
     /// Time in s.
     pub time_s: f64,
     /// Chainage of the centre in m.
@@ -116,7 +116,7 @@ impl Shuttle {
     }
 
     /// Acceleration in m/s² with `extra` N/kN of resistance.
-    pub fn acceleration_mps2(&self, at: &Instant, extra_n_per_kn: f64) -> f64 {
+    pub fn acceleration_mps2(&self, at: &ShuttleMoment, extra_n_per_kn: f64) -> f64 {
         let gradient = self.track.gradient_permille(at.position_m, self.train.length_m);
         let w = self.sum(at.position_m, |davis| davis.w0_n_per_kn(at.speed_mps))
             + at.direction * gradient.unwrap_or(0.0)
@@ -127,13 +127,13 @@ impl Shuttle {
     /// One sampling period further, the force linear between `from.force_n` and `to_n`.
     pub fn advance(
         &self,
-        from: &Instant,
+        from: &ShuttleMoment,
         to_n: f64,
         disturbance: &mut DisturbanceLaw<'_>,
-    ) -> Instant {
+    ) -> ShuttleMoment {
         let extra = disturbance(from.speed_mps);
         let slew_n_per_s = (to_n - from.force_n) / PERIOD_S;
-        let at = |ahead_s: f64, motion: SimulatedMotion| Instant {
+        let at = |ahead_s: f64, motion: SimulatedMotion| ShuttleMoment {
             time_s: from.time_s + ahead_s,
             position_m: from.position_m + from.direction * motion.distance_m,
             speed_mps: motion.speed_mps,
@@ -148,8 +148,15 @@ impl Shuttle {
     }
 
     /// The train at rest.
-    pub fn standing_at(&self, position_m: f64, mass_kg: f64) -> Instant {
-        Instant { time_s: 0.0, position_m, speed_mps: 0.0, force_n: 0.0, direction: 1.0, mass_kg }
+    pub fn standing_at(&self, position_m: f64, mass_kg: f64) -> ShuttleMoment {
+        ShuttleMoment {
+            time_s: 0.0,
+            position_m,
+            speed_mps: 0.0,
+            force_n: 0.0,
+            direction: 1.0,
+            mass_kg,
+        }
     }
 }
 

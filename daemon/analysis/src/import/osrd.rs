@@ -9,7 +9,7 @@ use dynocar_model::train::{Davis, TrainModel};
 use super::imported::{Account, ImportReading, ImportedTrain, force_n};
 use crate::brakes::{SpeedSteps, read};
 use crate::dataset::document::{Item, above_zero};
-use crate::dataset::train_file::growing;
+use crate::dataset::train_file::{EffortEntry, growing};
 use crate::dataset::{DatasetError, unusual_resistance};
 
 /// Why fields have no place, and which.
@@ -190,7 +190,7 @@ fn effort(
     }
     let points = speeds.into_iter().zip(forces).map(|(speed, force)| {
         let speed_mps = speed.number("a speed in m/s from 0 to 200", 0.0..=200.0)?;
-        Ok((speed, speed_mps, force_n(&force)?))
+        Ok(EffortEntry { entry: speed, speed_mps, force_n: force_n(&force)? })
     });
     let points = growing(&curve.full("speeds"), points)?;
     let field = format!("effort_curves.modes.{stated}.default_curve");

@@ -55,6 +55,17 @@ pub struct ProfileEvidence {
     pub prior: Prior,
 }
 
+/// Gradient from a chainage on, up to the next entry.
+#[derive(Clone, Copy, Debug)]
+pub struct GradientEntry {
+    /// Chainage in m.
+    pub from_m: f64,
+    /// Gradient in ‰, climbing positive.
+    pub gradient_permille: f64,
+    /// Its standard deviation in ‰.
+    pub std_permille: f64,
+}
+
 /// A fitted profile.
 #[derive(Clone, Debug)]
 pub struct HeightProfile {
@@ -309,15 +320,18 @@ impl HeightProfile {
         (force_n - mass_kg * unit, mass_kg, unit)
     }
 
-    /// Gradient in ‰ along a block with its standard deviation: (from in m, gradient, std).
-    pub fn gradient_permille(&self, block: usize) -> Vec<(f64, f64, f64)> {
+    /// Returns the gradient along a block.
+    pub fn gradient_permille(&self, block: usize) -> Vec<GradientEntry> {
         let (first, count) = self.layout.blocks[block];
         (0..count - 1)
             .map(|node| {
                 let rise = self.heights_m[first + node + 1] - self.heights_m[first + node];
                 let variance = self.gradient_var.get(block).map_or(f64::NAN, |list| list[node]);
-                let at_m = self.layout.start_m + node as f64 * HEIGHT_STEP_M;
-                (at_m, 1000.0 * rise / HEIGHT_STEP_M, 1000.0 * variance.sqrt())
+                GradientEntry {
+                    from_m: self.layout.start_m + node as f64 * HEIGHT_STEP_M,
+                    gradient_permille: 1000.0 * rise / HEIGHT_STEP_M,
+                    std_permille: 1000.0 * variance.sqrt(),
+                }
             })
             .collect()
     }

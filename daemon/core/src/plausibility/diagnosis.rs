@@ -115,17 +115,18 @@ fn kinematic(figures: &Figures) -> Option<DetectedFault> {
         InputFault::PositionScale => !has_usual_step,
         _ => false,
     };
-    let misfit = |(fault, factor, expected): &(InputFault, f64, f64)| {
-        let of_unit = fault.misfit(*factor)?;
+    let misfit = |fault: InputFault, factor: f64, expected: f64| {
+        let of_unit = fault.misfit(factor)?;
         Some(match of_forces {
             Some(of_forces) if of_forces > 0.0 => of_unit + (of_forces / expected).ln().abs(),
             // The forces do not show it: a time in another unit shows in the steps.
-            _ => of_unit + if is_unlikely(*fault) { 1.0 } else { 0.0 },
+            _ => of_unit + if is_unlikely(fault) { 1.0 } else { 0.0 },
         })
     };
-    let known = candidates.iter().filter_map(|candidate| Some((misfit(candidate)?, candidate)));
-    let (_, (fault, factor, _)) = known.min_by(|one, other| one.0.total_cmp(&other.0))?;
-    Some(DetectedFault { fault: *fault, factor: *factor })
+    let known = candidates.into_iter().filter_map(|(fault, factor, expected)| {
+        Some((misfit(fault, factor, expected)?, DetectedFault { fault, factor }))
+    });
+    known.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, fault)| fault)
 }
 
 /// The factor of both forces, when they have one.

@@ -209,12 +209,14 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     if joined.chars().count() < WITHIN_MIN || is_known() {
         return None;
     }
-    let is_named = |(it, weight, term): &(Quantity, TermWeight, &str)| {
-        let is_own = *term == it.name().replace('_', " ");
-        (*weight == TermWeight::Named || is_own) && term.len() >= WITHIN_MIN - 1
+    let is_named = |it: Quantity, weight: TermWeight, term: &str| {
+        let is_own = term == it.name().replace('_', " ");
+        (weight == TermWeight::Named || is_own) && term.len() >= WITHIN_MIN - 1
     };
-    let (of, names): (Vec<Quantity>, Vec<String>) =
-        all().filter(is_named).map(|(it, _, term)| (it, term.replace(' ', ""))).unzip();
+    let (of, names): (Vec<Quantity>, Vec<String>) = all()
+        .filter(|&(it, weight, term)| is_named(it, weight, term))
+        .map(|(it, _, term)| (it, term.replace(' ', "")))
+        .unzip();
     let nearest = nearest(&joined, &names)?;
     let is_meant = of.iter().zip(&names).any(|(of, term)| *of == quantity && term == nearest);
     // Likeness of single letters only: a name's beginning says too little here.

@@ -156,12 +156,12 @@ impl Track {
         })
     }
 
-    /// The same line with further resistance in N/kN at places: (start, end, extra).
+    /// Returns the line with further resistance in N/kN at places.
     ///
     /// # Errors
     ///
     /// When intervals overlap, are reversed or not finite.
-    pub fn with_resistance(mut self, places: &[(f64, f64, f64)]) -> Result<Self, TrackError> {
+    pub fn with_resistance(mut self, places: &[IntervalValue]) -> Result<Self, TrackError> {
         self.resistance_n_per_kn = Some(interval_profile(RESISTANCE, places)?);
         Ok(self)
     }
@@ -287,14 +287,20 @@ fn curvature_profile(curves: &[TrackCurve]) -> Result<StepProfile, TrackError> {
             return Err(TrackError::BadRadius { index: i + 1, radius_m: curve.radius_m });
         }
     }
-    let intervals: Vec<_> =
-        curves.iter().map(|curve| (curve.start_m, curve.end_m, 1.0 / curve.radius_m)).collect();
+    let bend = |it: &TrackCurve| IntervalValue {
+        start_m: it.start_m,
+        end_m: it.end_m,
+        value: 1.0 / it.radius_m,
+    };
+    let intervals: Vec<IntervalValue> = curves.iter().map(bend).collect();
     interval_profile(CURVES, &intervals)
 }
 
 fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
-    let with = |value: fn(&Tunnel) -> f64| -> Vec<(f64, f64, f64)> {
-        tunnels.iter().map(|tunnel| (tunnel.start_m, tunnel.end_m, value(tunnel))).collect()
+    let with = |value: fn(&Tunnel) -> f64| -> Vec<IntervalValue> {
+        let interval =
+            |it: &Tunnel| IntervalValue { start_m: it.start_m, end_m: it.end_m, value: value(it) };
+        tunnels.iter().map(interval).collect()
     };
     Ok(TunnelProfiles {
         inside: interval_profile(TUNNELS, &with(|_| 1.0))?,
@@ -305,25 +311,36 @@ fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
 /// A greater chainage in m cannot be distinguished from its neighbours to the millimetre, nor be meant.
 const CHAINAGE_MAX_M: f64 = 1e9;
 
-/// A profile that is zero outside the given (start, end, value) intervals.
+/// A value between two chainages in m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntervalValue {
+    /// Chainage in m where it starts.
+    pub start_m: f64,
+    /// Chainage in m where it ends.
+    pub end_m: f64,
+    /// The value between them.
+    pub value: f64,
+}
+
+/// Returns the profile that is zero outside the intervals.
 ///
 /// # Errors
 ///
 /// When intervals overlap, are reversed or not finite; `list` names them.
 pub fn interval_profile(
     list: &'static str,
-    intervals: &[(f64, f64, f64)],
+    intervals: &[IntervalValue],
 ) -> Result<StepProfile, TrackError> {
-    for (i, &(start_m, end_m, _)) in intervals.iter().enumerate() {
+    for (i, &IntervalValue { start_m, end_m, .. }) in intervals.iter().enumerate() {
         let is_on_earth = |at_m: f64| at_m.abs() <= CHAINAGE_MAX_M;
         if !(is_on_earth(start_m) && is_on_earth(end_m) && start_m < end_m) {
             return Err(TrackError::BadInterval { list, index: i + 1, start_m, end_m });
         }
     }
     let mut ordered = intervals.to_vec();
-    ordered.sort_by(|one, other| one.0.total_cmp(&other.0));
+    ordered.sort_by(|one, other| one.start_m.total_cmp(&other.start_m));
     let mut steps: Vec<(f64, f64)> = vec![(f64::MIN, 0.0)];
-    for (i, &(start_m, end_m, value)) in ordered.iter().enumerate() {
+    for (i, &IntervalValue { start_m, end_m, value }) in ordered.iter().enumerate() {
         let last = steps.len() - 1;
         let (free_from, _) = steps[last];
         if start_m < free_from {

@@ -20,7 +20,7 @@ fn pipeline(
     index: u32,
     kind: PipelineKind,
     (status, reason): (Status, Reason),
-    parameters: &[(Parameter, f64, f64)],
+    parameters: &[(Parameter, [f64; 2])],
 ) -> PipelineState {
     let mut snapshot = ParameterSnapshot::empty();
     snapshot.pipeline_index = index;
@@ -33,7 +33,7 @@ fn pipeline(
     snapshot.speed_min_mps = 1.0;
     snapshot.speed_max_mps = 23.0;
     snapshot.parameter_count = parameters.len() as u32;
-    for (place, &(parameter, value, std)) in parameters.iter().enumerate() {
+    for (place, &(parameter, [value, std])) in parameters.iter().enumerate() {
         snapshot.parameters[place] = parameter as u32;
         snapshot.values[place] = value;
         snapshot.covariance[packed_index(place, place)] = std * std;
@@ -47,20 +47,20 @@ fn pipeline(
 fn train() -> TrainState {
     let good = (Status::Estimated, Reason::None);
     let davis = [
-        (Parameter::DavisA, 1.498, 0.027),
-        (Parameter::DavisB, 0.0131, 0.0042),
-        (Parameter::DavisC, 0.000_91, 0.000_17),
+        (Parameter::DavisA, [1.498, 0.027]),
+        (Parameter::DavisB, [0.0131, 0.0042]),
+        (Parameter::DavisC, [0.000_91, 0.000_17]),
     ];
     let weak = (Status::Estimated, Reason::WeakExcitation);
     let mut resistance = pipeline(0, PipelineKind::TrajectoryKalman, weak, &davis);
     resistance.snapshot.quantities = Quantity::Resistance.bit();
     resistance.snapshot.usable_quantities = Quantity::Resistance.bit();
-    let mass = [(Parameter::Mass, 1697.4, 6.1), (Parameter::AccelerationBias, 1e-4, 1e-4)];
+    let mass = [(Parameter::Mass, [1697.4, 6.1]), (Parameter::AccelerationBias, [1e-4, 1e-4])];
     let mut mass = pipeline(1, PipelineKind::MassKalman, good, &mass);
     mass.snapshot.quantities = Quantity::Mass.bit();
     mass.snapshot.usable_quantities = Quantity::Mass.bit();
     let bound = (Status::Unestimated, Reason::OnlyLowerBound);
-    let adhesion = [(Parameter::AdhesionLowerBound, 0.0943, 0.0)];
+    let adhesion = [(Parameter::AdhesionLowerBound, [0.0943, 0.0])];
     let mut adhesion = pipeline(2, PipelineKind::AdhesionLaw, bound, &adhesion);
     adhesion.snapshot.quantities = Quantity::Adhesion.bit();
     let mut monitor = pipeline(3, PipelineKind::ResidualMonitor, good, &[]);

@@ -109,12 +109,12 @@ pub fn read(
     let Declared { text, train, track } = declared;
     let mut kept: Vec<(FoundRun, Run)> = Vec::new();
     let (mut time_s, mut samples) = (0.0, 0);
-    let mut head: Option<(PathBuf, Overlay, DatasetHead)> = None;
+    let mut opened = None;
     for found in chosen.iter().rev() {
         if memory.unusable.contains_key(&found.key()) {
             continue;
         }
-        let run = match read_run(found, text, &mut head) {
+        let run = match read_run(found, text, &mut opened) {
             Ok(run) => run,
             Err(problem) => {
                 report_unusable(memory, &found.key(), &problem);
@@ -167,19 +167,26 @@ impl Pool {
     }
 }
 
+/// The dataset whose runs are read.
+struct OpenedDataset<'m> {
+    folder: PathBuf,
+    files: Overlay<'m>,
+    head: DatasetHead,
+}
+
 fn read_run<'m>(
     found: &FoundRun,
     text: &'m ModelText,
-    head: &mut Option<(PathBuf, Overlay<'m>, DatasetHead)>,
+    opened: &mut Option<OpenedDataset<'m>>,
 ) -> Result<Run, String> {
-    if head.as_ref().is_none_or(|(folder, ..)| *folder != found.dataset) {
+    if opened.as_ref().is_none_or(|it| it.folder != found.dataset) {
         let files = Overlay::at(&found.dataset, text).map_err(|error| error.to_string())?;
-        let opened = DatasetHead::open(&files).map_err(|error| error.to_string())?;
-        *head = Some((found.dataset.clone(), files, opened));
+        let head = DatasetHead::open(&files).map_err(|error| error.to_string())?;
+        *opened = Some(OpenedDataset { folder: found.dataset.clone(), files, head });
     }
-    match head {
+    match opened {
         // The description may have changed since the runs were found.
-        Some((_, files, head)) if found.index < head.manifest.runs.len() => {
+        Some(OpenedDataset { files, head, .. }) if found.index < head.manifest.runs.len() => {
             head.read_run(files, found.index).map_err(|error| error.to_string())
         }
         _ => Err(format!("{}: no longer described", found.name)),

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::report::words::number;
+use dynocar_analysis::survey::profile::GradientEntry;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{NotUsed, Survey};
 use dynocar_shared::HALF_95;
@@ -140,7 +141,7 @@ fn scale_bar(span: f64) -> String {
     )
 }
 
-fn profile_plots(entries: &[(f64, f64, f64)], direction: &str) -> Result<String, PlotError> {
+fn profile_plots(entries: &[GradientEntry], direction: &str) -> Result<String, PlotError> {
     let plots = wide_and_narrow(|width| series::gradient(entries, direction, width))?;
     Ok(figure("trace", &format!("For {direction}"), "", &plots))
 }

@@ -8,6 +8,7 @@ use dynocar_analysis::dataset::written::{TomlText, set};
 use dynocar_analysis::dataset::{DatasetFiles, MANIFEST_FILE};
 use dynocar_analysis::survey::alignment::FoundCurve;
 use dynocar_analysis::survey::layout::HEIGHT_STEP_M;
+use dynocar_analysis::survey::profile::GradientEntry;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, SurveyedProfile};
 use dynocar_model::train::numbers::{
@@ -157,22 +158,21 @@ pub fn gradient_entries(
     survey: &Survey,
     profile: &SurveyedProfile,
     direction: i8,
-) -> Vec<(f64, f64, f64)> {
+) -> Vec<GradientEntry> {
     let alignments = &survey.alignments;
     let block = usize::from(direction < 0);
     let length_m = alignments.of(direction).map_or(0.0, |alignment| alignment.length_m());
     let entries = profile.learned.profile.gradient_permille(block);
-    let inside = entries
-        .into_iter()
-        .filter(|(at_m, ..)| (-BEYOND_M - HEIGHT_STEP_M..length_m + BEYOND_M).contains(at_m));
-    let mut list: Vec<(f64, f64, f64)> = inside
-        .map(|(at_m, gradient, std)| match direction {
-            1 => (alignments.chainage_m(1, at_m), gradient, std),
-            // The cell's end along the alignment is its start by chainage.
-            _ => (alignments.chainage_m(-1, at_m + HEIGHT_STEP_M), -gradient, std),
-        })
-        .collect();
-    list.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let driven_m = -BEYOND_M - HEIGHT_STEP_M..length_m + BEYOND_M;
+    let mut list = entries;
+    list.retain(|it| driven_m.contains(&it.from_m));
+    for it in &mut list {
+        // A cell's end along the falling alignment is its start by chainage.
+        let (sign, start_m) = if direction == 1 { (1, 0.0) } else { (-1, HEIGHT_STEP_M) };
+        it.from_m = alignments.chainage_m(sign, it.from_m + start_m);
+        it.gradient_permille *= f64::from(sign);
+    }
+    list.sort_by(|one, other| one.from_m.total_cmp(&other.from_m));
     list
 }
 
@@ -188,10 +188,14 @@ fn track_toml(material: &Material) -> String {
     text.value(&track::ALIGNMENT, "\"alignment.csv\"");
     let growing = gradient_entries(survey, profile, 1);
     let bounded = |gradient: f64| gradient.clamp(-149.0, 149.0);
-    let entry = |it: &(f64, f64, f64)| format!("{:.2}, {:.3}", it.0, bounded(it.1));
+    let entry =
+        |it: &GradientEntry| format!("{:.2}, {:.3}", it.from_m, bounded(it.gradient_permille));
     text.list(&track::GRADIENT, growing.iter().map(entry));
     let stds = growing.iter().step_by(5);
-    text.list(&track::GRADIENT_STD, stds.map(|it| format!("{:.2}, {:.3}", it.0, it.2.min(149.0))));
+    text.list(
+        &track::GRADIENT_STD,
+        stds.map(|it| format!("{:.2}, {:.3}", it.from_m, it.std_permille.min(149.0))),
+    );
     if !alignments.is_one_track() {
         let falling = gradient_entries(survey, profile, -1);
         text.list(&track::GRADIENT_FALLING, falling.iter().map(entry));

@@ -18,7 +18,9 @@ use super::story::{LifeSettings, Story};
 use super::table::{Adoption, LifeOutcome};
 use crate::simulator::dataset_writer::write_dataset;
 use crate::simulator::run_maker::RunPlan;
-use crate::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, World};
+use crate::simulator::{
+    EffectRequest, SimulatedDataset, SimulatedWorld, SimulatorSettings, TrainType,
+};
 
 /// The train of every life.
 const TRAIN: TrainId = TrainId(1);
@@ -36,7 +38,7 @@ const JUDGED_DAYS: i64 = 5;
 pub struct Life<'f> {
     settings: LifeSettings,
     folder: &'f Path,
-    world: World,
+    world: SimulatedWorld,
     train: TrainConfig,
     config: DaemonConfig,
     models: TrainModels,
@@ -62,7 +64,7 @@ impl<'f> Life<'f> {
             train_type: settings.story.kind().is_none().then_some(TrainType::Regional),
             ..SimulatorSettings::new(settings.seed, request)
         };
-        let world = World::of(&simulated);
+        let world = SimulatedWorld::of(&simulated);
         write_declared(&world, folder);
         std::fs::create_dir_all(folder.join("models")).expect("a store");
         std::fs::create_dir_all(folder.join("runs")).expect("a folder of runs");
@@ -224,7 +226,10 @@ fn put_others(models: &TrainModels, train: &TrainConfig, declared: ModelHash) {
 }
 
 /// A dataset of some runs; nothing in it reveals the truth.
-fn dataset_of(world: &World, runs: Vec<crate::simulator::SimulatedRun>) -> SimulatedDataset {
+fn dataset_of(
+    world: &SimulatedWorld,
+    runs: Vec<crate::simulator::SimulatedRun>,
+) -> SimulatedDataset {
     SimulatedDataset {
         settings: world.settings.clone(),
         train: world.train.clone(),
@@ -236,7 +241,7 @@ fn dataset_of(world: &World, runs: Vec<crate::simulator::SimulatedRun>) -> Simul
 }
 
 /// Writes the declared files of a world, as the configuration names them.
-fn write_declared(world: &World, folder: &Path) {
+fn write_declared(world: &SimulatedWorld, folder: &Path) {
     let files = crate::simulator::dataset_writer::dataset_files(&dataset_of(world, Vec::new()));
     for (path, text) in files {
         if path.ends_with("train.toml") || path.ends_with("track.toml") {

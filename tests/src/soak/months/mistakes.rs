@@ -13,8 +13,8 @@ use dynocar_core::trial::{ModelTrials, Rival};
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{TrainId, TrainSample};
 
-use crate::simulator::random::{Random, Stream};
-use crate::simulator::{EffectRequest, SimulatorSettings, TrainType, World};
+use crate::simulator::random::{SimulatorRandom, Stream};
+use crate::simulator::{EffectRequest, SimulatedWorld, SimulatorSettings, TrainType};
 
 const TRAIN: TrainId = TrainId(1);
 /// As in the configuration by default.
@@ -26,7 +26,7 @@ const TRIPS_A_YEAR: usize = 10_000;
 
 /// Counts of mistakes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mistakes {
+pub struct MonthsMistakes {
     /// Years of all trains together.
     pub train_years: f64,
     /// Rivals that take away less than the least gain, whose adoption is a mistake.
@@ -39,8 +39,13 @@ pub struct Mistakes {
 
 /// Trains of seeds from `seed` on, each for some years, while no rival is taken for better before
 /// `trips_between_mistakes` trips on average.
-pub fn measure(trains: u64, years: usize, seed: u64, trips_between_mistakes: f64) -> Mistakes {
-    let mut found = Mistakes::default();
+pub fn measure(
+    trains: u64,
+    years: usize,
+    seed: u64,
+    trips_between_mistakes: f64,
+) -> MonthsMistakes {
+    let mut found = MonthsMistakes::default();
     for seed in seed..seed + trains {
         let all = scores(seed);
         let mean = |scores: &[f64]| scores.iter().sum::<f64>() / scores.len() as f64;
@@ -49,7 +54,7 @@ pub fn measure(trains: u64, years: usize, seed: u64, trips_between_mistakes: f64
         found.better += better.len();
         found.rivals += worse.len();
         found.train_years += years as f64;
-        let mut random = Random::new(seed, Stream::Effects);
+        let mut random = SimulatorRandom::new(seed, Stream::Effects);
         let level = trips_between_mistakes * all.len() as f64;
         let mut evidence = vec![RivalEvidence::new(LEAST_GAIN); worse.len()];
         for _ in 0..years * TRIPS_A_YEAR {
@@ -75,7 +80,7 @@ fn scores(seed: u64) -> Vec<Vec<f64>> {
         train_type: Some(TrainType::ALL[seed as usize % TrainType::ALL.len()]),
         ..SimulatorSettings::new(seed, EffectRequest::none())
     };
-    let world = World::of(&settings);
+    let world = SimulatedWorld::of(&settings);
     let declared = &world.train.declared;
     let track = Arc::new(world.line.track.clone());
     let rival = |change: &dyn Fn(&mut TrainModel)| {

@@ -60,8 +60,8 @@ pub(super) fn best_runs(
     let mut sum = Tuple::zero(scan.fit.theta.len());
     let mut chosen = Vec::new();
     // A chosen run shows the force by itself.
-    let speaks_for_it = |own: &&(usize, f64, f64)| own.1 > EQUAL && own.2 > 0.0;
-    for &(index, _, _) in order.iter().filter(speaks_for_it) {
+    let alone = order.iter().filter(|(_, gain, estimate)| *gain > EQUAL && *estimate > 0.0);
+    for &(index, ..) in alone {
         sum.add(&tuples[index]);
         chosen.push(index);
         let (gain, estimate) = scan.gain(&sum);

@@ -52,17 +52,21 @@ pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
 }
 
 /// A number of an effect: what it means, its value, its standard deviation.
-type Figure = (String, f64, Option<f64>);
+struct Figure {
+    meaning: String,
+    value: f64,
+    std: Option<f64>,
+}
 
 fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
-    let row = |name: &str, unit: &'static str, (meaning, value, deviation): Figure| ParameterRow {
+    let row = |name: &str, unit: &'static str, figure: Figure| ParameterRow {
         group: words::kind_name(effect.kind).into(),
         name: name.into(),
-        meaning,
+        meaning: figure.meaning,
         unit,
         declared: declared(dataset, name),
         before: None,
-        after: IntervalEstimate::normal(value, deviation.unwrap_or(0.0))
+        after: IntervalEstimate::normal(figure.value, figure.std.unwrap_or(0.0))
             .at_least(words::least(name)),
     };
     let rows = effect.parameters.iter().flat_map(|(name, value)| {
@@ -86,15 +90,18 @@ fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) 
         _ => None,
     };
     let each = |figures: &mut dyn Iterator<Item = (String, f64)>| -> Vec<Figure> {
-        figures.enumerate().map(|(i, (meaning, value))| (meaning, value, listed(i))).collect()
+        let figure = |(i, (meaning, value))| Figure { meaning, value, std: listed(i) };
+        figures.enumerate().map(figure).collect()
     };
     match value {
-        ParameterValue::Number(value) => vec![(meaning.into(), *value, listed(0))],
+        ParameterValue::Number(value) => each(&mut std::iter::once((meaning.into(), *value))),
         ParameterValue::ByRun(values) => {
-            let by_run = values.iter();
-            by_run
-                .map(|(run, value)| (format!("{meaning} in {run}"), *value, of_run(run)))
-                .collect()
+            let figure = |(run, value): (&String, &f64)| Figure {
+                meaning: format!("{meaning} in {run}"),
+                value: *value,
+                std: of_run(run),
+            };
+            values.iter().map(figure).collect()
         }
         ParameterValue::Sections(sections) => each(&mut sections.iter().map(|s| {
             let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);

@@ -44,18 +44,12 @@ pub fn texts(
         let bytes = read_bytes(path, if is_wide { begins } else { UTF_8 }).map_err(unread)?;
         files.push((label, given.unwrap_or_else(|| guessed(&bytes)), bytes));
     }
-    if let Some(encoding) = given {
-        let text = |(label, _, bytes): (String, _, Vec<u8>)| {
-            let text = decoded(bytes, encoding).map_err(|problem| problem.of(&label))?;
-            Ok::<NamedText, Failure>((label, text))
-        };
-        return Ok((files.into_iter().map(text).collect::<Result<_, _>>()?, encoding));
-    }
     // A file of plain letters only is valid in any of them.
     let is_plain = |bytes: &[u8]| bytes.is_ascii();
     let special = files.iter().find(|(_, _, bytes)| !is_plain(bytes));
     let (first, encoding) =
         special.map_or((String::new(), UTF_8), |(label, encoding, _)| (label.clone(), *encoding));
+    let encoding = given.unwrap_or(encoding);
     let mut texts = Vec::new();
     for (label, own, bytes) in files {
         if own != encoding && !is_plain(&bytes) {
