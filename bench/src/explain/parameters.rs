@@ -1,5 +1,6 @@
 //! Numbers of an answer against the true ones.
 
+use dynocar_analysis::dataset::Role;
 use dynocar_model::terms::delay;
 use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::disturbances::Disturbances;
@@ -27,11 +28,12 @@ impl ParameterGrade {
     }
 }
 
-/// Every number of an effect that the answer has by the same name; the size of an effect is its distance from none.
+/// Every number of an effect that the answer, or its part about the runs of a role, has by the same name; the size of an effect is its distance from none.
 pub fn graded(
     effect: &TrueEffect,
     own: &Value,
     simulated: &SimulatedDataset,
+    role: Role,
 ) -> Vec<ParameterGrade> {
     let declared = simulated.declared_train();
     let mut truths = effect.parameters(0.0);
@@ -40,7 +42,7 @@ pub fn graded(
         TrueEffect::Unlisted(_) => return Vec::new(),
         TrueEffect::GradientError { profile } => return gradient_errors(profile, own, simulated),
         TrueEffect::Wind { .. } => {
-            truths["wind_plus_mps"] = wind_of_the_days(own, simulated).into()
+            truths["wind_plus_mps"] = wind_of_the_days(own, simulated, role).into()
         }
         _ => {}
     }
@@ -98,12 +100,12 @@ fn disturbances(simulated: &SimulatedDataset, plan: &RunPlan) -> Disturbances {
     Disturbances::of(effects, train, line, plan, settings)
 }
 
-/// Mean wind in m/s towards direction -1 that blew in the runs whose winds the answer gives, else in all that were
-/// fitted: the effect's and each day's own.
-fn wind_of_the_days(own: &Value, simulated: &SimulatedDataset) -> f64 {
+/// Mean wind in m/s towards direction -1 that blew in the runs whose winds the answer gives, else in all of a role: the
+/// effect's and each day's own.
+fn wind_of_the_days(own: &Value, simulated: &SimulatedDataset, role: Role) -> f64 {
     let given = own["parameters"]["headwind_mps"].as_object();
     let is_given = |file: &str| given.is_none_or(|given| given.contains_key(file));
-    let runs = simulated.runs.iter().filter(|run| !run.plan.is_holdout);
+    let runs = simulated.runs.iter().filter(|run| run.plan.is_holdout == (role == Role::Holdout));
     let runs = runs.filter(|run| is_given(&run.plan.file()));
     let winds_mps = runs.map(|run| run.plan.direction * run.disturbances.headwind_mps);
     mean(winds_mps.collect::<Vec<f64>>())

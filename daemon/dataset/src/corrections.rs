@@ -1,52 +1,37 @@
 //! `[corrections]` and `[[extra]]` of a `train.toml`: what measured runs add to the declared model.
 
-use dynocar_model::terms::CORRECTIONS;
-use dynocar_model::terms::extra::{
-    Covariate, CovariateFactor, ExtraResistance, FACTORS, FACTORS_MAX, FORCE, FORCE_MAX_N_PER_KN,
-    Form, TABLES,
-};
-use dynocar_model::train::TrainModel;
+use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, FACTORS_MAX, Form};
 
 use super::document::Item;
 use super::error::DatasetError;
-
-/// Reads the table into a train; what is absent corrects nothing.
-pub(super) fn read_corrections(section: &Item, train: &mut TrainModel) -> Result<(), DatasetError> {
-    section.allow(&CORRECTIONS.map(|key| key.name))?;
-    for key in CORRECTIONS {
-        let value = section.checked_under(key.name, key.allowed, |value| key.allows(value))?;
-        if let Some(value) = value {
-            *(key.of)(train) = value;
-        }
-    }
-    Ok(())
-}
+use super::keys::extra::{FACTORS, FORCE};
+use super::keys::factor::{FORM, OF};
+use super::keys::{self, extra};
 
 /// Reads the tables of a train file; none where none stand there.
 pub(super) fn read_extra(root: &Item) -> Result<Vec<ExtraResistance>, DatasetError> {
-    root.tables(TABLES)?.iter().map(extra).collect()
+    root.tables(extra::TABLE)?.iter().map(extra_of).collect()
 }
 
-fn extra(section: &Item) -> Result<ExtraResistance, DatasetError> {
-    section.allow(&[FORCE, FACTORS])?;
-    let range = -FORCE_MAX_N_PER_KN..=FORCE_MAX_N_PER_KN;
-    let n_per_kn = section.required(FORCE, "N/kN, from -100 to 100", range)?;
-    let tables = section.tables(FACTORS)?;
+fn extra_of(section: &Item) -> Result<ExtraResistance, DatasetError> {
+    keys::allow(section, extra::KEYS)?;
+    let n_per_kn = FORCE.number(section)?.unwrap_or(0.0);
+    let tables = section.tables(FACTORS.name)?;
     if tables.is_empty() || tables.len() > FACTORS_MAX {
-        let found = format!("{} of them", tables.len());
-        return Err(section.key_out_of_range(FACTORS, &found, "one or two tables"));
+        return Err(FACTORS.refused(section, format_args!("{} of them", tables.len())));
     }
     let factors = tables.iter().map(factor).collect::<Result<_, _>>()?;
     Ok(ExtraResistance { n_per_kn, factors })
 }
 
 fn factor(section: &Item) -> Result<CovariateFactor, DatasetError> {
-    let (covariate, covariates) =
-        (("covariate", "a covariate"), Covariate::ALL.map(Covariate::name));
-    let of = section.need_named("of", covariate, Covariate::from_name, covariates)?;
+    let covariates = Covariate::ALL.map(Covariate::name);
+    let named = (("covariate", OF.rule.allowed), Covariate::from_name);
+    let of = section.need_named(OF.name, named.0, named.1, covariates)?;
     let forms = Form::ALL.map(Form::name);
-    let form = section.need_named("form", ("form", "a form"), Form::from_name, forms)?;
-    let keys: Vec<&str> = ["of", "form"].iter().chain(form.numbers()).copied().collect();
+    let named = (("form", FORM.rule.allowed), Form::from_name);
+    let form = section.need_named(FORM.name, named.0, named.1, forms)?;
+    let keys: Vec<&str> = [OF.name, FORM.name].iter().chain(form.numbers()).copied().collect();
     section.allow(&keys)?;
     let mut numbers = [0.0; 2];
     for (number, name) in numbers.iter_mut().zip(form.numbers()) {
@@ -59,7 +44,7 @@ fn factor(section: &Item) -> Result<CovariateFactor, DatasetError> {
             let found: Vec<String> =
                 named.map(|(name, number)| format!("{name} = {number}")).collect();
             let found = format!("{} with {}", form.name(), found.join(", "));
-            Err(section.key_out_of_range("form", &found, expected))
+            Err(section.key_out_of_range(FORM.name, &found, expected))
         }
     }
 }

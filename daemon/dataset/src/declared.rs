@@ -1,10 +1,16 @@
 //! Whether what is declared of a train and a line can be true.
 
 use dynocar_core::plausibility::Severity;
+use dynocar_core::plausibility::Severity::Warning;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
+use dynocar_model::train::numbers::LENGTH;
+use toml::Value;
 
 use super::diagnostic::Diagnostic;
+use super::keys::assign;
+use super::quantity::Quantity;
+use super::resolved::Resolved;
 use super::unusual_resistance::unusual_resistance;
 
 /// Masses per metre of train in t/m: from a light rail car to a loaded ore train, with room.
@@ -32,7 +38,7 @@ pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Diagnostic>
         &mut found,
         is_length,
         "length_scale",
-        format!("a train of length_m = {length_m}: is the length in m?"),
+        format!("a train of {}: is the length in m?", assign(LENGTH.name, length_m)),
     );
     let per_m = mass_t / length_m;
     say(
@@ -86,6 +92,43 @@ pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Diagnostic>
         ),
     );
     found
+}
+
+/// The bounds beyond which [`dynocar_model::validation::Validator`] refuses a sample.
+const PLAUSIBLE: [(Quantity, f64, f64); 7] = [
+    (Quantity::Acceleration, -20.0, 20.0),
+    (Quantity::SpecificForce, -20.0, 20.0),
+    (Quantity::BrakeCylinderPressure, -5e4, 2e6),
+    (Quantity::AmbientTemperature, -80.0, 80.0),
+    (Quantity::Gradient, -150.0, 150.0),
+    (Quantity::Latitude, -90.0, 90.0),
+    (Quantity::Longitude, -180.0, 180.0),
+];
+
+/// Returns a diagnostic for each column with values that are refused.
+pub(super) fn implausible_columns(run: &Resolved) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for (quantity, low, high) in PLAUSIBLE {
+        let Some(column) = run.table.column(quantity) else { continue };
+        let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
+        let count = column.iter().filter(is_outside).count();
+        if count > 0 {
+            let unit = quantity.unit().name();
+            let text = format!(
+                "{quantity} lies outside {low} to {high} {unit} in {count} rows, and those samples \
+                 are refused: is the unit right?"
+            );
+            let figures = [
+                ("quantity", quantity.name().into()),
+                ("count", Value::Integer(count as i64)),
+                ("low", low.into()),
+                ("high", high.into()),
+                ("unit", unit.into()),
+            ];
+            diagnostics.push(Diagnostic::new("implausible", Warning, text, figures));
+        }
+    }
+    diagnostics
 }
 
 #[cfg(test)]

@@ -5,9 +5,10 @@ use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
 use dynocar_model::train::PowerTrain;
 use toml::Value;
 
+use super::declared::implausible_columns;
 use super::diagnostic::{Diagnostic, read_as};
 use super::forces::{Force, ForceSource};
-use super::implausible_columns::implausible_columns;
+use super::keys::run::DIRECTION;
 use super::order::quantile;
 use super::quality::RunQuality;
 use super::quantity::Quantity;
@@ -289,8 +290,8 @@ fn of_position(
     if net_m * f64::from(direction) < -DISTANCE_MIN_M
         && !is_reported(&[InputFault::DirectionReversed])
     {
-        let text =
-            format!("the position changes by {net_m:.0} m in all, against direction = {direction}");
+        let declared = DIRECTION.assign(direction);
+        let text = format!("the position changes by {net_m:.0} m in all, against {declared}");
         let figures = [("direction", Value::from(direction)), ("net_m", net_m.into())];
         diagnostics.push(Diagnostic::new("against_direction", Fundamental, text, figures));
     }

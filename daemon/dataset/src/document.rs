@@ -2,11 +2,12 @@
 
 use std::ops::{Bound, RangeBounds};
 
+use dynocar_model::train::NumberRule;
 use dynocar_model::units::Unit;
 use toml::value::Datetime;
 
+use super::error::unknown;
 use super::error::{DatasetError, SourcePosition};
-use super::names::unknown;
 use super::node::{Node, NodeContent};
 
 /// The names of the tables and keys at the top of a TOML file, in the order of the file.
@@ -301,15 +302,10 @@ impl<'t> Item<'t> {
         Ok(number)
     }
 
-    /// A number that stands here, when it is within a range.
-    pub fn within(
-        &self,
-        number: f64,
-        allowed: &str,
-        range: impl RangeBounds<f64>,
-    ) -> Result<f64, DatasetError> {
-        let refused = || self.out_of_range(&number.to_string(), allowed);
-        Some(number).filter(|it| it.is_finite() && range.contains(it)).ok_or_else(refused)
+    /// A number that stands here, when its rule allows it.
+    pub fn within(&self, number: f64, rule: &NumberRule) -> Result<f64, DatasetError> {
+        let refused = || self.out_of_range(&number.to_string(), rule.allowed);
+        Some(number).filter(|it| it.is_finite() && rule.allows(*it)).ok_or_else(refused)
     }
 
     /// This number, within a range.

@@ -11,6 +11,7 @@
 //! # Layout, in the order of reading
 //!
 //! - [`node`], [`document`], `names`, [`error`]: keys and values with their lines; mistakes with their choices
+//! - [`keys`]: every key of the three TOML files, for readers and writers
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
@@ -22,6 +23,7 @@
 //!   position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], `judge`, [`diagnostic`], `diagnosing`, `declared`: samples,
 //!   counts and warnings
+//! - [`written`]: the three TOML files as they are written, and declared ones that change
 //! - [`guess`]: a description of files that nobody has described yet
 
 mod altitude;
@@ -37,14 +39,11 @@ pub mod document;
 pub mod encoding;
 pub mod error;
 mod forces;
-mod friction_brake;
 pub mod guess;
-mod header;
-mod implausible_columns;
 mod judge;
+pub mod keys;
 mod lines;
 pub mod manifest;
-mod names;
 pub mod node;
 mod order;
 pub mod quality;
@@ -59,9 +58,9 @@ mod table;
 pub mod text_layout;
 pub mod track_file;
 pub mod train_file;
-pub mod train_rows;
 pub mod trains;
 mod unusual_resistance;
+pub mod written;
 
 #[cfg(test)]
 mod tests;
@@ -236,10 +235,7 @@ impl DatasetHead {
     }
 
     /// Reads all runs, in the order of the manifest, each or the first mistake in its file.
-    pub fn read_each(
-        &self,
-        files: &(impl DatasetFiles + ?Sized),
-    ) -> Vec<Result<Run, DatasetError>> {
+    fn read_each(&self, files: &(impl DatasetFiles + ?Sized)) -> Vec<Result<Run, DatasetError>> {
         let places = 0..self.manifest.runs.len();
         #[cfg(feature = "parallel")]
         let places = places.into_par_iter();

@@ -48,6 +48,13 @@ pub struct RunQuality {
     pub phases: Phases,
 }
 
+impl RunQuality {
+    /// Returns the number of samples: one for each row with a time.
+    pub fn samples(&self) -> usize {
+        self.lines.rows - self.rows_without_time
+    }
+}
+
 /// A count for a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct QuantityCount {

@@ -21,7 +21,7 @@ use super::run_content::{RunColumns, RunContent};
 use super::speed_and_position::PositionSource;
 use super::stamps;
 use super::table::Table;
-use super::train_rows::TrainRows;
+use super::text_layout::TrainRows;
 use super::trains::{TrainsColumn, keep_only, only};
 
 const DAY_S: i64 = 86_400;
@@ -136,6 +136,11 @@ impl Run {
                 sample.valid &= !FORCES;
             }
         }
+    }
+
+    /// Whether a sample has a force.
+    pub fn has_forces(&self) -> bool {
+        self.samples.iter().any(|sample| sample.valid & FORCES != 0)
     }
 
     /// Returns the record of a quantity beyond those of a sample.

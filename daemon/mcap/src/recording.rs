@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 pub use mcap::records::Metadata;
 
+use crate::copying::read_all;
 use crate::error::{ReadError, ReadProblem};
 use crate::event::Event;
-use crate::joining::read_all;
 use crate::reading::{Raw, RecordingItem, Visitor};
 
 /// Contents of a recording, each kind in its order.

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::path::Path;
 
 use bytes::Bytes;
-use dynocar_dataset::train_rows::TrainRows;
+use dynocar_dataset::text_layout::TrainRows;
 use dynocar_dataset::trains::names_trains;
 use dynocar_dataset::{ColumnMapping, RunColumn, RunColumns, TrainColumn};
 use dynocar_model::units::{Dimension, Unit};

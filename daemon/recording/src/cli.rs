@@ -14,8 +14,8 @@ use dynocar::programs::{RECORDING, called_as};
 
 use super::page::page;
 use super::record::{KeepError, RecordError};
+use dynocar_mcap::copying::read_all;
 use dynocar_mcap::copying::recover;
-use dynocar_mcap::joining::read_all;
 use dynocar_mcap::reading::FileEnding;
 
 pub use record::WantedArguments;

@@ -6,7 +6,7 @@ use dynocar_shared::schema::Field;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, Reason, Status};
 
-use dynocar_mcap::annotate::messages::MESSAGES;
+use dynocar_mcap::annotate::MESSAGES;
 use dynocar_mcap::columns::{ColumnSource, EVENTS, RecordingColumn, SAMPLES, SNAPSHOTS, STAMPS};
 use dynocar_mcap::event::{Event, EventKind};
 use dynocar_mcap::message::MessageField;

@@ -1,7 +1,7 @@
 //! The dataset at a path, be it a folder or a recording, which is one in memory.
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use dynocar::dataset::{DatasetFolder, DatasetSource, LoadError, is_parquet_path};
 use dynocar::output::report_line;
@@ -9,12 +9,12 @@ use dynocar::text_file::require_regular;
 use dynocar_analysis::dataset::{
     Dataset, DatasetFiles, DatasetHead, FileProblem, Manifest, RunContent, is_parquet,
 };
-use dynocar_model::units::Unit;
-
-use crate::convert::{ModelFiles, RecordedDataset, dataset_of};
 use dynocar_mcap::recording::Recording;
+use dynocar_model::units::Unit;
 use dynocar_parquet::columns::columns_of;
 use dynocar_parquet::reading;
+
+use super::convert::{ModelFiles, RecordedDataset, dataset_of};
 
 /// True for the name of a recording.
 pub fn is_recording(path: &Path) -> bool {
@@ -157,4 +157,30 @@ pub fn load_with_speed_unit<'p>(
     let (files, head) = open(source)?;
     let unit = head.manifest.speed_unit();
     Ok((head.read(&files)?, unit))
+}
+
+/// The way from a folder, which need not be there yet, to a file.
+pub fn from_folder(folder: &Path, file: &Path) -> PathBuf {
+    relative(&real(file), &real(folder))
+}
+
+/// A path without links, as far as it is there.
+pub fn real(path: &Path) -> PathBuf {
+    let full = std::path::absolute(path).unwrap_or_else(|_| path.into());
+    for known in full.ancestors() {
+        if let Ok(start) = known.canonicalize() {
+            let rest = full.strip_prefix(known).unwrap_or(Path::new(""));
+            return start.join(rest).components().collect();
+        }
+    }
+    full
+}
+
+/// The way from a folder to a file, both in full.
+fn relative(file: &Path, folder: &Path) -> PathBuf {
+    let (file, folder): (Vec<Component>, Vec<Component>) =
+        (file.components().collect(), folder.components().collect());
+    let shared = file.iter().zip(&folder).take_while(|(one, other)| one == other).count();
+    let up = folder[shared..].iter().map(|_| Component::ParentDir);
+    up.chain(file[shared..].iter().copied()).collect()
 }

@@ -4,8 +4,9 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{DavisDeviations, EffectAnswer, Identifiability, PlaceUncertainty};
 use super::course::Course;
-use super::described::small;
+use super::described::{by_held_out_runs, small};
 use super::evidence::{Fit, FitProblem};
+use super::held_out::HeldOutEffect;
 use super::identifiability::not_held;
 use super::score::PredictionScore;
 use super::selection::{Deviations, Search, SearchOutcome};
@@ -20,6 +21,8 @@ pub struct FinishedFit<'a> {
     pub places: &'a [Option<PlaceUncertainty>],
     /// The numbers that change over the runs.
     pub courses: &'a [(EffectKind, Vec<Course>)],
+    /// Numbers of each effect by the runs held out alone.
+    pub held_out: &'a [Option<HeldOutEffect>],
 }
 
 impl FinishedFit<'_> {
@@ -45,6 +48,7 @@ pub fn caveats(
         all.iter().map(|course| format!(" {}", course.sentence(kind.name())))
     });
     caveats.extend(courses);
+    caveats.extend(effects.iter().filter_map(by_held_out_runs));
     caveats.extend([worse_held_out(effects, score), small_beside(outcome, effects)]);
     caveats.push(undetermined(search.problem, &outcome.fit, &known.deviations.std));
     caveats.extend(not_held(identifiability));

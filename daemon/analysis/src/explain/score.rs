@@ -114,7 +114,7 @@ impl FitErrors {
         let has_speed_scale = fit.model.effects.iter().any(|it| it.nature().changes_speed_scale);
         FitErrors {
             speed_mps,
-            distance: problem.distance_ratio.map_or(0.0, missed),
+            distance: problem.positions.distance_ratio.map_or(0.0, missed),
             has_speed_scale,
         }
     }

@@ -1,14 +1,15 @@
 //! From the search to the answer.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use dynocar_core::plausibility::Severity;
 use dynocar_model::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
-    BaseAnswer, Considered, DavisDeviations, EffectAnswer, EffectMeaning, ExplainAnswer, Location,
-    Verdict,
+    BaseAnswer, Considered, DavisDeviations, EffectAnswer, EffectMeaning, ExplainAnswer,
+    HeldOutAnswer, Location, Verdict,
 };
 use super::caveats::{FinishedFit, caveats, told_by_data, trimmed};
 use super::competing::runners_up;
@@ -16,6 +17,8 @@ use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, sepa
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
+use super::held_out::HeldOutEffect;
+use super::hypothesis::{Hypothesis, ReportedValues};
 use super::identifiability::identifiability;
 use super::score::{self, PredictionScore};
 use super::selection::{
@@ -158,7 +161,7 @@ fn effect_answers(
             let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
             let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
                 / search.problem.runs.len().max(1) as f64;
-            let reported = effect.report(&ReportContext {
+            let stated = ReportContext {
                 parameters: &fit.theta[range.clone()],
                 deviations: &std[range.clone()],
                 c: *c,
@@ -167,7 +170,10 @@ fn effect_answers(
                 first: range.start,
                 weight_kn,
                 few_runs_factor: few_runs_factor(search.problem.runs.len()),
-            });
+            };
+            let reported = effect.report(&stated);
+            let held_out = known.held_out[index].as_ref();
+            let held_out = held_out.map(|it| held_out_answer(&**effect, it, range.clone(), stated));
             let answer = EffectAnswer {
                 kind: effect.kind().name(),
                 place: Location { uncertainty_95: known.places[index].clone(), ..effect.place() },
@@ -180,6 +186,7 @@ fn effect_answers(
                     .filter(|_| effect.nature().changes_speed_scale)
                     .map(|sources| sources.sentence()),
                 over_time: known.courses(effect.kind()),
+                held_out,
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
                 } else {
@@ -191,6 +198,25 @@ fn effect_answers(
         .collect();
     greatest_first(&mut answers, |it| it.0);
     answers.into_iter().map(|(_, answer)| answer).collect()
+}
+
+/// The numbers of an effect by the runs held out, in the form of those of the fit runs, which are stated in a context.
+fn held_out_answer(
+    effect: &dyn Hypothesis,
+    held_out: &HeldOutEffect,
+    range: Range<usize>,
+    stated: ReportContext,
+) -> HeldOutAnswer {
+    let ReportedValues { values, deviations } = effect.report(&ReportContext {
+        parameters: &held_out.theta[range.clone()],
+        deviations: &held_out.std[range],
+        c: held_out.theta[2],
+        c_deviation: held_out.std[2],
+        covariance: &held_out.covariance,
+        ..stated
+    });
+    let (runs, p_value) = (held_out.runs, held_out.p_value);
+    HeldOutAnswer { runs, parameters: values, std: deviations, p_value }
 }
 
 fn verdict(

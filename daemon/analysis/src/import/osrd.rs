@@ -3,6 +3,7 @@
 //! Some files state A, B and C in N, N/(m/s) and N/(m/s)² for the whole train, others the same for each
 //! kg, and none says which. The two differ by the mass in kg, so that the size distinguishes them.
 
+use dynocar_model::train::numbers::{LENGTH, MASS, ROTATING_MASS_FACTOR};
 use dynocar_model::train::{Davis, TrainModel};
 
 use super::imported::{Account, ImportReading, ImportedTrain, force_n};
@@ -38,10 +39,10 @@ const SPEED_MPS: f64 = 20.0;
 pub(super) fn train(root: &Item, reading: &ImportReading) -> Result<ImportedTrain, DatasetError> {
     let mut account = Account::default();
     let mass_kg = root.required("mass", "a mass in kg from 1000 to 1e8", 1e3..=1e8)?;
-    account.taken("mass", "mass_t", "kg / 1000");
+    account.taken("mass", MASS.name, "kg / 1000");
     let length = root.optional("length", "a length in m from 1 to 10000", 1.0..=1e4)?;
-    let length_m = account.given(length, "length", ("length_m", "m"), "no length");
-    let (field, key) = ("inertia_coefficient", "rotating_mass_factor");
+    let length_m = account.given(length, "length", (LENGTH.name, "m"), "no length");
+    let (field, key) = ("inertia_coefficient", ROTATING_MASS_FACTOR.name);
     let inertia = root.optional(field, "a coefficient from 1 to 2", 1.0..=2.0)?;
     let inertia = account.given(inertia, field, (key, "less 1"), "no inertia_coefficient");
     account.unknown("cars", "the format has none");
@@ -81,7 +82,7 @@ pub(super) fn train(root: &Item, reading: &ImportReading) -> Result<ImportedTrai
 pub(super) fn brake_alone(root: &Item) -> Result<ImportedTrain, DatasetError> {
     let mut account = Account::default();
     let brake_mps2 = Some(brake(root, "", &mut account)?);
-    for key in ["mass_t", "length_m", "rotating_mass_factor", "a, b, c"] {
+    for key in [MASS.name, LENGTH.name, ROTATING_MASS_FACTOR.name, "a, b, c"] {
         account.unknown(key, "the file holds a brake alone");
     }
     account.rest("", root, &[]);

@@ -9,6 +9,7 @@ use super::imported::{Account, ImportedLine};
 use super::ttobench::{id, rest, unit};
 use crate::dataset::DatasetError;
 use crate::dataset::document::{Item, above_zero};
+use crate::dataset::keys::track::{GRADIENT, LENGTH, PERMITTED_SPEED};
 
 const WITHOUT_PLACE: [(&str, &str); 1] =
     [("track.toml holds gradients, no height above the sea", "altitude")];
@@ -27,18 +28,19 @@ pub(super) fn line(root: &Item) -> Result<ImportedLine, DatasetError> {
     let mut account = Account::default();
     let stops = stops(root)?;
     let length_m = stops[stops.len() - 1];
-    account.taken("stops", "length_m", "m, the last stop");
+    account.taken("stops", LENGTH.name, "m, the last stop");
     account.taken("stops", "stops", "m; the format has no names");
     let speeds = root.get("speed limits").map(|item| {
         pairs(&item, ("velocity", Dimension::Speed), "up to 200 m/s", above_zero(200.0))
     });
-    let (field, key) = ("speed limits", ("permitted_speed", "to m/s"));
+    let (field, key) = ("speed limits", (PERMITTED_SPEED.name, "to m/s"));
     let permitted_speed = account.given(speeds.transpose()?, field, key, "no speed limits");
     let slopes = root.get("gradients").map(|item| {
         let list = pairs(&item, ("slope", Dimension::Ratio), "within 0.15", -0.15..=0.15)?;
         Ok(list.into_iter().map(|(at_m, slope)| (at_m, 1000.0 * slope)).collect())
     });
-    let why = "no gradients; the format means a level line: gradient = [[0.0, 0.0]] says so";
+    let level = GRADIENT.assign("[[0.0, 0.0]]");
+    let why = &format!("no gradients; the format means a level line: {level} says so");
     let key = ("gradient", "to ‰, climbing positive");
     let gradient = account.given(slopes.transpose()?, "gradients", key, why);
     let curves = root.get("curvatures").map(|item| curves(&item, length_m)).transpose()?;

@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use super::columns::{InspectedColumn, InspectedColumns};
 use super::facts::Facts;
 use super::guessed::{GivenColumn, GuessedColumn, Unmapped};
-use super::matching::{UNKNOWN_UNIT, can_hold, consider};
+use super::matching::{UNKNOWN_UNIT, are_alike, can_hold, consider, figures};
 use super::name::named_unit;
 use crate::{DatasetError, Quantity, SourcePosition};
 
@@ -345,17 +345,6 @@ impl<'c> Assignment<'c> {
     }
 }
 
-/// Greatest magnitude and mean of a column's values in the base unit, as it is taken.
-fn figures(facts: &Facts, guessed: &GuessedColumn) -> [f64; 2] {
-    let figures = [facts.top(), facts.mean()];
-    figures.map(|it| guessed.unit.to_base(it.unwrap_or(f64::NAN) * guessed.scale))
-}
-
-/// True for the figures of columns that say the same, but for noise.
-fn are_alike(one: [f64; 2], other: [f64; 2]) -> bool {
-    one.iter().zip(other).all(|(one, other)| (one - other).abs() <= 0.02 * one.abs().max(1e-9))
-}
-
 /// A force with more than this share of values below zero is signed.
 const SIGNED_SHARE: f64 = 0.02;
 
@@ -388,7 +377,8 @@ pub fn settle(assignment: &mut Assignment) {
     }
     let turned = assignment.facts(BrakeForce).map(|facts| facts.signs());
     if turned.is_some_and(|(up, down)| down > up) {
-        assignment.turn(BrakeForce, "its values are negative while it brakes: scale = -1");
+        let scale = crate::keys::column::SCALE.assign(-1);
+        assignment.turn(BrakeForce, &format!("its values are negative while it brakes: {scale}"));
     }
     let has_control = assignment.has(ControlForce);
     for (handle, force) in [(TractionHandle, TractionForce), (BrakeHandle, BrakeForce)] {

@@ -7,7 +7,7 @@ use super::guessed::GuessedColumn;
 use super::name::{Name, readings, scaled_unit};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
-use crate::names::nearest;
+use crate::error::nearest;
 
 /// Weight of a name that says the quantity and nothing else.
 const SAID: i32 = 100;
@@ -258,4 +258,15 @@ fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
         }
     }
     None
+}
+
+/// Greatest magnitude and mean of a column's values in the base unit, as it is taken.
+pub fn figures(facts: &Facts, guessed: &GuessedColumn) -> [f64; 2] {
+    let figures = [facts.top(), facts.mean()];
+    figures.map(|it| guessed.unit.to_base(it.unwrap_or(f64::NAN) * guessed.scale))
+}
+
+/// True for the figures of columns that say the same, but for noise.
+pub fn are_alike(one: [f64; 2], other: [f64; 2]) -> bool {
+    one.iter().zip(other).all(|(one, other)| (one - other).abs() <= 0.02 * one.abs().max(1e-9))
 }

@@ -95,7 +95,7 @@ proptest! {
                 return Ok(());
             }
         };
-        prop_assert!(run.samples.len() + run.quality.rows_without_time == run.quality.lines.rows);
+        prop_assert!(run.samples.len() == run.quality.samples());
         for sample in &run.samples {
             for field in SampleField::ALL {
                 prop_assert!(sample.get(field).is_none_or(f64::is_finite), "{field:?}");

@@ -3,10 +3,9 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Least, Parameter, Resistance, Suspect};
+pub use crate::track::RESISTANCE as LIST;
 use crate::track::{IntervalValue, StepProfile, TrackError, interval_profile};
 
-/// The list of `[track]` that holds [start in m, end in m, extra in N/kN].
-pub const LIST: &str = "resistance";
 /// A snow drift or a tight superelevation; a hundred N/kN is a steep hill.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (0.0, 100.0), 0.02)];
 

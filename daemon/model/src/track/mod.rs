@@ -8,6 +8,13 @@ mod profile;
 
 pub use profile::{GradientError, LinearProfile, ProfileError, StepProfile, along_line};
 
+/// The list of `[track]` that holds curves.
+pub const CURVES: &str = "curves";
+/// The list of `[track]` that holds tunnels.
+pub const TUNNELS: &str = "tunnels";
+/// The list of `[track]` that holds [start in m, end in m, extra in N/kN] of places that resist.
+pub const RESISTANCE: &str = "resistance";
+
 /// Errors of a surveyed gradient further apart than this in m are their own: the integral scale of a
 /// process along the chainage.
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
@@ -155,7 +162,7 @@ impl Track {
     ///
     /// When intervals overlap, are reversed or not finite.
     pub fn with_resistance(mut self, places: &[IntervalValue]) -> Result<Self, TrackError> {
-        self.resistance_n_per_kn = Some(interval_profile("resistance", places)?);
+        self.resistance_n_per_kn = Some(interval_profile(RESISTANCE, places)?);
         Ok(self)
     }
 
@@ -286,7 +293,7 @@ fn curvature_profile(curves: &[TrackCurve]) -> Result<StepProfile, TrackError> {
         value: 1.0 / it.radius_m,
     };
     let intervals: Vec<IntervalValue> = curves.iter().map(bend).collect();
-    interval_profile("curves", &intervals)
+    interval_profile(CURVES, &intervals)
 }
 
 fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
@@ -296,8 +303,8 @@ fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
         tunnels.iter().map(interval).collect()
     };
     Ok(TunnelProfiles {
-        inside: interval_profile("tunnels", &with(|_| 1.0))?,
-        length_m: interval_profile("tunnels", &with(|tunnel| tunnel.end_m - tunnel.start_m))?,
+        inside: interval_profile(TUNNELS, &with(|_| 1.0))?,
+        length_m: interval_profile(TUNNELS, &with(|tunnel| tunnel.end_m - tunnel.start_m))?,
     })
 }
 

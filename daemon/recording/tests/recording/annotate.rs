@@ -6,8 +6,8 @@ use dynocar_analysis::explain::answer::Verdict;
 use dynocar_analysis::explain::report::timeline::{
     ActingEffect, ResidualWindow, RunTimeline, SpeedPoint, Timeline,
 };
-use dynocar_mcap::annotate::messages::{Effect, PredictedSpeed, Residual};
 use dynocar_mcap::annotate::{AnnotateError, OtherRuns, annotate};
+use dynocar_mcap::annotate::{Effect, PredictedSpeed, Residual};
 use dynocar_mcap::error::ReadError;
 use dynocar_mcap::reading::{Raw, RecordingItem, Visitor, read};
 use dynocar_mcap::recording::Recording;

@@ -8,6 +8,7 @@ mod texts;
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::guess::{Guess, RecordingText, guess};
 use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity};
+use dynocar_model::train::numbers::MASS;
 use toml::Value;
 
 use super::train_text::{TrainText, TrainValues};
@@ -83,7 +84,7 @@ fn describe(
     };
     if let Some(mass_t) = recorded_mass_t(&guess) {
         let from = "t, the middle of the mass that the recordings hold".into();
-        let figures = vec![("mass_t", Value::Float(mass_t), from)];
+        let figures = vec![(MASS.name, Value::Float(mass_t), from)];
         *train =
             arguments.train.text(WRITER, &TrainValues { figures, ..TrainValues::default() })?;
     }

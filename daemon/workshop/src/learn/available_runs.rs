@@ -10,7 +10,7 @@ use dynocar_shared::TrainId;
 use sha2::{Digest, Sha256};
 use tracing::warn;
 
-use super::error::LearnError;
+use super::LearnError;
 use super::memory::{KnownFile, LearnerMemory};
 use super::recordings;
 use crate::report::provenance::hex;

@@ -7,7 +7,7 @@ use dynocar_analysis::explain::answer::{EffectAnswer, Verdict};
 use dynocar_analysis::explain::evidence::{SCORE_MIN, p_value};
 use tracing::{info, warn};
 
-use super::error::LearnError;
+use super::LearnError;
 use super::finding::{
     event, found_effect, improvement, is_event, is_to_be_reported, question, sentence,
 };

@@ -12,9 +12,9 @@ use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::TrainId;
 use tracing::warn;
 
+use super::LearnError;
 use super::available_runs::{FoundRun, Places, report_unusable, runs_of};
 use super::conclusion::{Conclusion, Explained};
-use super::error::LearnError;
 use super::memory::LearnerMemory;
 use super::pool::{self, Bounds, Declared, Pool};
 use crate::report::provenance::hex;

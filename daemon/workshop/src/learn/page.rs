@@ -14,7 +14,7 @@ use dynocar::models::{Action, Decision, MaintenanceEvent, ModelHash, Origin, Sto
 use dynocar::shadow::record::TrialRecord;
 use dynocar_shared::TrainId;
 
-use super::error::LearnError;
+use super::LearnError;
 use super::learner::Learner;
 use super::memory::OpenQuestion;
 use crate::report::html::ColumnAlignment::{Numbers, Words};

@@ -10,6 +10,7 @@ use std::time::Duration;
 use dynocar::dataset::LoadError;
 use dynocar::models::ModelText;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar_analysis::dataset::written::name_model;
 use dynocar_analysis::dataset::{
     Dataset, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest, Role, Run, RunContent,
 };
@@ -20,7 +21,6 @@ use toml::Table;
 use super::available_runs::{FoundRun, report_unusable};
 use super::memory::LearnerMemory;
 use crate::dataset::FilesOfDataset;
-use crate::updated::name_model;
 
 /// Bounds of what is explained together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -220,7 +220,7 @@ impl<'a> Overlay<'a> {
     /// The description, which names the files of the model.
     fn described(&self, text: String) -> String {
         let Ok(mut table) = text.parse::<Table>() else { return text };
-        name_model(&mut table, self.model.track.is_some());
+        name_model(&mut table, TRAIN_FILE, self.model.track.as_ref().map(|_| TRACK_FILE));
         table.to_string()
     }
 }

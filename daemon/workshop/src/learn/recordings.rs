@@ -8,7 +8,7 @@ use dynocar_shared::TrainId;
 use serde::{Deserialize, Serialize};
 use tracing::info;
 
-use super::error::LearnError;
+use super::LearnError;
 use super::memory::LearnerMemory;
 use crate::convert::{ModelFiles, ToDatasetError, to_dataset};
 use dynocar::models::UtcSecond;

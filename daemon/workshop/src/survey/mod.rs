@@ -9,7 +9,6 @@
 //! A folder of raw recordings, surveyed or mapped, written as a dataset of trips.
 
 pub mod answer;
-pub mod material;
 pub mod page;
 pub mod read;
 pub mod trip_rows;
@@ -24,10 +23,10 @@ use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, survey};
 
 use answer::SurveyAnswer;
-use material::Material;
+use read::Material;
 use write::write;
 
-pub use material::SurveyFailure;
+pub use read::SurveyFailure;
 
 /// Stops nearer than this many m to one of a known line have its name.
 const SAME_STOP_M: f64 = 25.0;

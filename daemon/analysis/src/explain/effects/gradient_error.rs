@@ -56,7 +56,7 @@ pub const POLICY: Policy = Policy {
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let runs = &scan.problem.runs;
-    let span_m = span_m(scan).filter(|_| scan.problem.distance_ratio.is_some());
+    let span_m = span_m(scan).filter(|_| scan.problem.positions.distance_ratio.is_some());
     let Some(span_m) = span_m.filter(|[low, high]| high > low) else {
         return Err("positions are not measured".into());
     };

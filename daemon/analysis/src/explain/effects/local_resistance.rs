@@ -58,7 +58,7 @@ pub const POLICY: Policy = Policy {
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
-    if scan.problem.distance_ratio.is_none() {
+    if scan.problem.positions.distance_ratio.is_none() {
         return Err("positions are not measured".into());
     }
     let shape = |run: &RunData, i: usize| -scan.per_unit_resistance_mps2(&run.samples()[i]);

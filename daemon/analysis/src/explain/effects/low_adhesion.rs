@@ -107,7 +107,7 @@ fn places(
     if everywhere.gain > 0.0 && (form == Form::Cap || everywhere.runs.is_some()) {
         candidates.push(candidate(&everywhere));
     }
-    if scan.problem.distance_ratio.is_some()
+    if scan.problem.positions.distance_ratio.is_some()
         && let Some(found) = find(scan, shape, Inside::Centre)
     {
         candidates.push(candidate(&found));

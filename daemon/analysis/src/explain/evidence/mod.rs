@@ -35,7 +35,7 @@ pub use criterion::{
     acceptance_score, p_value,
 };
 pub use fade::Fade;
-pub use fit::{Fit, FitProblem, RunNormal};
+pub use fit::{Fit, FitProblem, Positions, RunNormal, RunPositions};
 pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RunScatter};
 pub use noise_search::{RUNS_A_TASK, coarse_step};

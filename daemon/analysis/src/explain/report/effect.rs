@@ -274,6 +274,7 @@ mod tests {
             meaning: EffectMeaning::default(),
             contradiction: None,
             over_time: Vec::new(),
+            held_out: None,
             runners_up: Vec::new(),
         };
         assert_eq!(

@@ -91,6 +91,7 @@ mod tests {
             meaning: EffectMeaning::default(),
             contradiction: None,
             over_time: Vec::new(),
+            held_out: None,
             runners_up: Vec::new(),
         }
     }

@@ -66,7 +66,8 @@ impl Search<'_> {
     /// no map or no measured position.
     fn map_errors(&self, fit: &Fit) -> Vec<Candidate> {
         let is_fitted = fit.model.effects.iter().any(|effect| effect.is_gradient());
-        let track = self.track.filter(|_| !is_fitted && self.problem.distance_ratio.is_some());
+        let track =
+            self.track.filter(|_| !is_fitted && self.problem.positions.distance_ratio.is_some());
         let span_m = self.scan(fit).and_then(|scan| span_m(&scan));
         let (Some(track), Some(span_m)) = (track, span_m.filter(|[low, high]| high > low)) else {
             return Vec::new();
@@ -197,9 +198,8 @@ impl Search<'_> {
 }
 
 /// Moves the effects that were found to where they fit best with the usual errors in the model, and a, b and c to
-/// where they fit best with the effects alone: the prediction of runs knows no usual errors. Returns the standard
-/// deviations of the parameters, from samples `step_s` seconds apart.
-pub fn given_usual_errors(search: &Search, outcome: &mut SearchOutcome, step_s: f64) -> Deviations {
+/// where they fit best with the effects alone: the prediction of runs knows no usual errors.
+pub fn move_beside_usual_errors(search: &Search, outcome: &mut SearchOutcome) {
     let joint = search.beside_usual_errors(outcome);
     outcome.likeliest = outcome.fit.clone();
     let fit = &outcome.likeliest;
@@ -208,7 +208,6 @@ pub fn given_usual_errors(search: &Search, outcome: &mut SearchOutcome, step_s: 
         let theta = joint.fit.theta[..count].to_vec();
         outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
     }
-    deviations_given(outcome, step_s)
 }
 
 /// Standard deviations of the parameters of a model that was moved with the usual errors last, from samples some s

@@ -24,7 +24,7 @@ impl ScaleSources {
         let wheel = (0..outcome.fit.model.effects.len()).find(scales)?;
         let i = fit.model.ranges()[wheel].start;
         let variance = Cholesky::new(fit.free_information())?.inverse()[(i, i)];
-        let (ratio, std) = problem.distance_ratio?;
+        let (ratio, std) = problem.positions.distance_ratio?;
         let positions = WithStd { value: ratio.recip(), std: std / (ratio * ratio) };
         Some(ScaleSources {
             positions,

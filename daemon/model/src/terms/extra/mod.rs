@@ -16,12 +16,6 @@ pub use law::{Covariate, CovariateFactor, ExtraResistance};
 
 use super::Resistance;
 
-/// The list of tables of `train.toml`.
-pub const TABLES: &str = "extra";
-/// The key of the force where the factors are 1, in N/kN.
-pub const FORCE: &str = "n_per_kn";
-/// The list of tables within that holds the factors.
-pub const FACTORS: &str = "factor";
 /// The force where all factors are 1 lies within this many N/kN.
 pub const FORCE_MAX_N_PER_KN: f64 = 100.0;
 /// Factors at most.

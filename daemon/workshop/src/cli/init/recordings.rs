@@ -8,7 +8,7 @@ use dynocar::dataset::is_parquet_path;
 use dynocar::text_file::{read_beginning, read_bytes};
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
 use dynocar_analysis::dataset::guess::layout;
-use dynocar_analysis::dataset::train_rows::TrainRows;
+use dynocar_analysis::dataset::text_layout::TrainRows;
 use dynocar_analysis::dataset::trains::{TrainsColumn, only};
 use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, RunColumns,
@@ -17,7 +17,7 @@ use dynocar_analysis::dataset::{
 use dynocar_parquet::columns::columns_of;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
-use crate::paths::{self, real};
+use crate::dataset::{self, real};
 
 /// Name and text of a file.
 pub type NamedText = (String, String);
@@ -200,7 +200,7 @@ pub fn from_folder(folder: &Path, files: &[PathBuf]) -> Result<Vec<String>, Fail
         if seen.contains(&full) {
             return Err(refuse("expected every run once, found the file twice"));
         }
-        let path = paths::from_folder(folder, file);
+        let path = dataset::from_folder(folder, file);
         let text = path.to_str().ok_or_else(|| refuse("expected a name in UTF-8"))?;
         paths.push(text.into());
         seen.push(full);

@@ -46,7 +46,7 @@ fn shape(run: &RunData, index: usize) -> f64 {
 /// Every section between two stations in one direction, with its tuple; none where positions are not
 /// measured, for then the runs share no places.
 fn all_sections(scan: &Scan) -> Vec<(FactorPart, Tuple)> {
-    if scan.problem.distance_ratio.is_none() {
+    if scan.problem.positions.distance_ratio.is_none() {
         return Vec::new();
     }
     let stations = stations(scan);

@@ -1,25 +1,58 @@
-//! Force of a traction drive from its electric power, where the force is not recorded.
+//! Quantities that follow from what a train declares: forces, weights, loads and speeds.
 
-/// Share of the electric power that reaches the wheels' rims unless a train says otherwise: motors,
-/// converter and gear of drives of the last decades, under load.
-pub const EFFICIENCY_DEFAULT: f64 = 0.85;
-/// Speed in m/s below which power determines no force unless a train says otherwise: a drive that hardly
-/// turns turns most of its power into heat.
-pub const POWER_SPEED_MIN_DEFAULT_MPS: f64 = 2.0;
+use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
-/// A drive that is known by its electric power.
-///
-/// Pulling, the wheels have the efficiency's share of what the drive takes; in regeneration the
-/// drive gives back the same share of what the wheels feed: force = efficiency P / v for P > 0 and
-/// P / (efficiency v) for P < 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PowerTrain {
-    /// Mechanical power at the rims over the drive's electric power when it pulls, 0 to 1.
-    pub efficiency: f64,
-    /// Power in W that the vehicle takes in addition to its drive; 0 where the drive's own is recorded.
-    pub auxiliary_power_w: f64,
-    /// Speed in m/s below which no force is estimated.
-    pub speed_min_mps: f64,
+use super::EffortCurve;
+use super::numbers::{DRIVE_EFFICIENCY, Davis, FrictionBrake, PowerTrain, TrainModel};
+
+impl Davis {
+    /// w0 in N/kN at a speed in m/s.
+    pub fn w0_n_per_kn(&self, speed_mps: f64) -> f64 {
+        self.a + speed_mps * (self.b + speed_mps * self.c)
+    }
+}
+
+impl FrictionBrake {
+    /// Retarding force in N at a pressure in Pa.
+    pub fn force_n(&self, pressure_pa: f64) -> f64 {
+        self.force_per_pressure_n_per_pa * (pressure_pa - self.release_pressure_pa).max(0.0)
+    }
+}
+
+impl TrainModel {
+    /// A train of which only mass and basic resistance are declared: a point without rotating
+    /// mass that nothing else holds back. Simulations set what else they need.
+    pub fn bare(name: &str, mass_kg: f64, resistance: Davis) -> Self {
+        TrainModel {
+            name: name.into(),
+            mass_kg,
+            resistance,
+            curve_constant_n_per_kn_m: 0.0,
+            ..TrainModel::UNDECLARED
+        }
+    }
+
+    /// Middle and standard deviation in kg of a mass that is anything between tare and full, where both are
+    /// declared.
+    pub fn load_range(&self) -> Option<(f64, f64)> {
+        let full_kg = self.full_mass_kg?;
+        Some((0.5 * (self.mass_kg + full_kg), (full_kg - self.mass_kg) / 12_f64.sqrt()))
+    }
+
+    /// Weight in kN of a mass in kg.
+    pub fn weight_kn(mass_kg: f64) -> f64 {
+        mass_kg * STANDARD_GRAVITY_MPS2 / 1000.0
+    }
+
+    /// The highest speed in m/s of the effort curves; `None` without curves.
+    pub fn speed_max_mps(&self) -> Option<f64> {
+        let last =
+            |curve: &Option<EffortCurve>| curve.as_ref()?.points().last().map(|point| point.0);
+        match (last(&self.traction), last(&self.brake)) {
+            (Some(traction), Some(brake)) => Some(traction.max(brake)),
+            (one, other) => one.or(other),
+        }
+    }
 }
 
 impl PowerTrain {
@@ -27,16 +60,8 @@ impl PowerTrain {
     /// power that is recorded at the wheels.
     pub const EFFICIENCY_STD: f64 = 0.1;
     /// Efficiencies that make sense.
-    pub const EFFICIENCIES: std::ops::RangeInclusive<f64> = 0.3..=1.0;
-    /// Powers in kW of what is fed in addition to the drive.
-    pub const AUXILIARIES_KW: std::ops::RangeInclusive<f64> = 0.0..=2000.0;
-
-    /// A drive of which nothing is declared.
-    pub const USUAL: PowerTrain = PowerTrain {
-        efficiency: EFFICIENCY_DEFAULT,
-        auxiliary_power_w: 0.0,
-        speed_min_mps: POWER_SPEED_MIN_DEFAULT_MPS,
-    };
+    pub const EFFICIENCIES: std::ops::RangeInclusive<f64> =
+        DRIVE_EFFICIENCY.rule.range[0]..=DRIVE_EFFICIENCY.rule.range[1];
 
     /// Mechanical power in W at the rims, braking negative, of a recorded power in W.
     pub fn mechanical_w(&self, recorded_w: f64) -> f64 {
