@@ -16,7 +16,7 @@ use dynocar_fmu::ffi::life::{
     fmi2SetupExperiment, fmi2Terminate,
 };
 use dynocar_fmu::ffi::values::{fmi2GetReal, fmi2SetReal};
-use dynocar_fmu::variables::{SnapshotField, VariableMeaning, VariableType};
+use dynocar_fmu::variables::{Meaning, SnapshotField, VariableType};
 use dynocar_fmu::{ESTIMATORS, INTERFACES};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::process::DaemonSite;
@@ -84,7 +84,7 @@ fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
     };
     let snapshots = PIPELINES.map(identified);
     for (reference, variable) in ESTIMATORS.variables.iter().enumerate() {
-        let VariableMeaning::Estimate(of, reported) = variable.meaning else { continue };
+        let Meaning::Estimate(of, reported) = variable.meaning else { continue };
         let reference = reference as u32;
         let snapshot = &snapshots[PIPELINES.iter().position(|&kind| kind == of).unwrap()];
         let got = match variable.meaning.kind() {

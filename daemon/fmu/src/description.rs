@@ -9,7 +9,7 @@ use super::estimators::{self, ESTIMATORS};
 use super::plant::{self, PLANT};
 use super::units;
 use super::variables::{
-    Begins, FmiEnumeration, Interface, MISSING, Variable, VariableMeaning, VariableType,
+    Begins, FmiEnumeration, Interface, MISSING, Meaning, Variable, VariableType,
 };
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -45,7 +45,7 @@ pub fn model_description(interface: &Interface, step_s: f64) -> String {
     if interface.guid == ESTIMATORS.guid {
         // Outputs change by a step alone, and at first depend on the files alone.
         push_unknowns(&mut xml, interface, "Outputs", Some(""));
-        let is_file = |variable: &Variable| matches!(variable.meaning, VariableMeaning::File(_));
+        let is_file = |variable: &Variable| matches!(variable.meaning, Meaning::File(_));
         let files = indices(interface, is_file).join(" ");
         push_unknowns(&mut xml, interface, "InitialUnknowns", Some(&files));
     } else {
@@ -101,13 +101,11 @@ fn vocabularies() -> [Members; 3] {
 fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_continuous: bool) {
     let Variable { name, meaning, unit, description } = variable;
     let nature = match meaning {
-        VariableMeaning::Driven(_) => r#"variability="continuous" initial="calculated""#,
-        VariableMeaning::File(_) | VariableMeaning::Begins(_) => {
-            r#"variability="fixed" initial="exact""#
-        }
-        VariableMeaning::Estimate(..) => r#"variability="discrete" initial="calculated""#,
+        Meaning::Driven(_) => r#"variability="continuous" initial="calculated""#,
+        Meaning::File(_) | Meaning::Begins(_) => r#"variability="fixed" initial="exact""#,
+        Meaning::Estimate(..) => r#"variability="discrete" initial="calculated""#,
         // An input with a slope is continuous.
-        VariableMeaning::Measured(_) if is_continuous => r#"variability="continuous""#,
+        Meaning::Measured(_) if is_continuous => r#"variability="continuous""#,
         _ => r#"variability="discrete""#,
     };
     let causality = meaning.causality();
@@ -134,15 +132,15 @@ fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_con
 }
 
 /// Returns the start value of a variable, unless it is calculated.
-fn start(meaning: VariableMeaning) -> Option<String> {
+fn start(meaning: Meaning) -> Option<String> {
     match meaning {
-        VariableMeaning::File(_) => Some(String::new()),
-        VariableMeaning::Measured(_) => Some(format!("{MISSING:e}")),
-        VariableMeaning::Run | VariableMeaning::Direction => Some("1".into()),
-        VariableMeaning::WheelSlide => Some("false".into()),
-        VariableMeaning::Begins(Begins::HeldAtRest) => Some("true".into()),
-        VariableMeaning::Begins(_) => Some("0".into()),
-        VariableMeaning::Estimate(..) | VariableMeaning::Driven(_) => None,
+        Meaning::File(_) => Some(String::new()),
+        Meaning::Measured(_) => Some(format!("{MISSING:e}")),
+        Meaning::Run | Meaning::Direction => Some("1".into()),
+        Meaning::WheelSlide => Some("false".into()),
+        Meaning::Begins(Begins::HeldAtRest) => Some("true".into()),
+        Meaning::Begins(_) => Some("0".into()),
+        Meaning::Estimate(..) | Meaning::Driven(_) => None,
     }
 }
 

@@ -8,7 +8,7 @@ use dynocar_shared::{
 
 use crate::units::{self, FmiUnit};
 use crate::variables::{
-    Interface, ModelFile, SnapshotField, Variable, VariableMeaning, digits, guid, measured, row,
+    Interface, Meaning, ModelFile, SnapshotField, Variable, digits, guid, measured, row,
 };
 
 /// The recommended estimators, which a configuration of the daemon has by default; one for each
@@ -44,7 +44,7 @@ const fn reported(
     unit: FmiUnit,
     description: &'static str,
 ) -> Variable {
-    row(name, VariableMeaning::Estimate(of, reported), unit, description)
+    row(name, Meaning::Estimate(of, reported), unit, description)
 }
 
 const STATUS: &str = "What may be done with it: 2 estimated, may be used";
@@ -56,8 +56,8 @@ const STD: &str = "Its standard deviation";
 /// Every variable, in the order of the value references.
 #[rustfmt::skip]
 const VARIABLES: &[Variable] = &[
-    row("train_file", VariableMeaning::File(ModelFile::Train), units::NONE, "Path of the train's file; empty: the one inside the FMU"),
-    row("track_file", VariableMeaning::File(ModelFile::Track), units::NONE, "Path of the line's file; empty: the one inside the FMU, if any"),
+    row("train_file", Meaning::File(ModelFile::Train), units::NONE, "Path of the train's file; empty: the one inside the FMU"),
+    row("track_file", Meaning::File(ModelFile::Track), units::NONE, "Path of the line's file; empty: the one inside the FMU, if any"),
 
     measured("position_m", SampleField::Position, units::METRE, "Chainage of the train's centre"),
     measured("speed_mps", SampleField::Speed, units::METRE_PER_SECOND, "Speed, never negative"),
@@ -70,9 +70,9 @@ const VARIABLES: &[Variable] = &[
     measured("ambient_temperature_degc", SampleField::AmbientTemperature, units::CELSIUS, "Outside temperature"),
     measured("gradient_permille", SampleField::Gradient, units::PERMILLE, "Gradient, climbing positive as the chainage grows; for lines without a file"),
     measured("curve_radius_m", SampleField::CurveRadius, units::METRE, "Curve radius, 0 on straight track; for lines without a file"),
-    row("direction", VariableMeaning::Direction, units::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
-    row("wheel_slide", VariableMeaning::WheelSlide, units::NONE, "True while wheel-slide protection is active"),
-    row("run", VariableMeaning::Run, units::NONE, "Number of the run (trip); no integral crosses its change"),
+    row("direction", Meaning::Direction, units::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
+    row("wheel_slide", Meaning::WheelSlide, units::NONE, "True while wheel-slide protection is active"),
+    row("run", Meaning::Run, units::NONE, "Number of the run (trip); no integral crosses its change"),
 
     reported("resistance.a", RESISTANCE, SnapshotField::Value(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, "Davis a"),
     reported("resistance.a_std", RESISTANCE, SnapshotField::Std(Parameter::DavisA), units::NEWTON_PER_KILONEWTON, STD),
@@ -207,10 +207,10 @@ mod tests {
         for variable in VARIABLES {
             let name = variable.name;
             let expected = match variable.meaning {
-                VariableMeaning::Estimate(_, SnapshotField::Value(parameter)) => {
+                Meaning::Estimate(_, SnapshotField::Value(parameter)) => {
                     parameter.name().to_owned()
                 }
-                VariableMeaning::Estimate(_, SnapshotField::Std(parameter)) => {
+                Meaning::Estimate(_, SnapshotField::Std(parameter)) => {
                     format!("{}_std", parameter.name())
                 }
                 _ => continue,
@@ -218,10 +218,8 @@ mod tests {
             assert_eq!(name.split_once('.').map(|(_, name)| name), Some(expected.as_str()));
         }
         for field in SampleField::ALL {
-            let count = VARIABLES
-                .iter()
-                .filter(|it| it.meaning == VariableMeaning::Measured(field))
-                .count();
+            let count =
+                VARIABLES.iter().filter(|it| it.meaning == Meaning::Measured(field)).count();
             assert_eq!(count, 1, "{field:?}");
         }
     }
@@ -229,7 +227,8 @@ mod tests {
     #[test]
     fn every_recommended_estimator_shows_status_reason_and_refusals_under_one_name() {
         for kind in PIPELINES {
-            let of_kind = |it: &&Variable| matches!(it.meaning, VariableMeaning::Estimate(of, _) if of == kind);
+            let of_kind =
+                |it: &&Variable| matches!(it.meaning, Meaning::Estimate(of, _) if of == kind);
             let names: Vec<_> = VARIABLES.iter().filter(of_kind).map(|it| it.name).collect();
             for group in names.iter().map(|name| name.split('.').next().unwrap()) {
                 let mut reported =

@@ -13,7 +13,7 @@ use crate::inputs::{Inputs, nanoseconds};
 use crate::plant::{
     BEGINNING, STEP_MAX_S, least_step_s, reported, require_drivable, with_beginning,
 };
-use crate::variables::{Begins, Interface, SnapshotField, Variable, VariableMeaning, VariableType};
+use crate::variables::{Begins, Interface, Meaning, SnapshotField, Variable, VariableType};
 
 /// By so much of the time a point may be off, as sums of steps are rounded.
 const POINT_TOLERANCE: f64 = 1e-9;
@@ -215,16 +215,12 @@ impl Model {
     pub fn real(&self, reference: u32) -> Result<f64, ModelError> {
         let variable = self.got(reference, VariableType::Real)?;
         Ok(match variable.meaning {
-            VariableMeaning::Measured(field) => self.inputs.get(field),
-            VariableMeaning::Begins(Begins::Speed) => self.beginning.speed_mps,
-            VariableMeaning::Begins(Begins::Position) => self.beginning.position_m,
+            Meaning::Measured(field) => self.inputs.get(field),
+            Meaning::Begins(Begins::Speed) => self.beginning.speed_mps,
+            Meaning::Begins(Begins::Position) => self.beginning.position_m,
             meaning => match (meaning, &self.behind) {
-                (VariableMeaning::Estimate(of, reported), Behind::Estimators(it)) => {
-                    it.real(of, reported)
-                }
-                (VariableMeaning::Driven(what), Behind::Plant(train)) => {
-                    Some(reported(train, what))
-                }
+                (Meaning::Estimate(of, reported), Behind::Estimators(it)) => it.real(of, reported),
+                (Meaning::Driven(what), Behind::Plant(train)) => Some(reported(train, what)),
                 _ => None,
             }
             .unwrap_or(f64::NAN),
@@ -239,11 +235,9 @@ impl Model {
     pub fn integer(&self, reference: u32) -> Result<i32, ModelError> {
         let variable = self.got(reference, VariableType::Integer)?;
         let number: u64 = match (variable.meaning, &self.behind) {
-            (VariableMeaning::Direction, _) => return Ok(self.inputs.sample.direction.into()),
-            (VariableMeaning::Run, _) => self.inputs.sample.run.into(),
-            (VariableMeaning::Estimate(of, reported), Behind::Estimators(it)) => {
-                it.integer(of, reported)
-            }
+            (Meaning::Direction, _) => return Ok(self.inputs.sample.direction.into()),
+            (Meaning::Run, _) => self.inputs.sample.run.into(),
+            (Meaning::Estimate(of, reported), Behind::Estimators(it)) => it.integer(of, reported),
             _ => 0,
         };
         Ok(i32::try_from(number).unwrap_or(i32::MAX))
@@ -256,11 +250,10 @@ impl Model {
     /// If there is no such variable of this type, or after a fault.
     pub fn boolean(&self, reference: u32) -> Result<bool, ModelError> {
         Ok(match (self.got(reference, VariableType::Boolean)?.meaning, &self.behind) {
-            (VariableMeaning::Begins(_), _) => self.beginning.is_held_at_rest,
-            (
-                VariableMeaning::Estimate(of, SnapshotField::Usable(quantity)),
-                Behind::Estimators(it),
-            ) => it.is_usable(of, quantity),
+            (Meaning::Begins(_), _) => self.beginning.is_held_at_rest,
+            (Meaning::Estimate(of, SnapshotField::Usable(quantity)), Behind::Estimators(it)) => {
+                it.is_usable(of, quantity)
+            }
             _ => self.inputs.sample.flags & FLAG_WHEEL_SLIDE != 0,
         })
     }
@@ -272,7 +265,7 @@ impl Model {
     /// If there is no such variable of this type, or after a fault.
     pub fn string(&self, reference: u32) -> Result<&CStr, ModelError> {
         let variable = self.got(reference, VariableType::String)?;
-        let VariableMeaning::File(file) = variable.meaning else { return Ok(c"") };
+        let Meaning::File(file) = variable.meaning else { return Ok(c"") };
         Ok(self.files.path(file))
     }
 
@@ -285,8 +278,8 @@ impl Model {
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<(), ModelError> {
         let Variable { name, meaning, .. } = *self.to_be_set(reference, VariableType::Real)?;
         match meaning {
-            VariableMeaning::Measured(field) => self.inputs.set(field, value),
-            VariableMeaning::Begins(begins) => {
+            Meaning::Measured(field) => self.inputs.set(field, value),
+            Meaning::Begins(begins) => {
                 self.require_parameter()?;
                 let beginning = with_beginning(self.beginning, begins, value);
                 let expected = "a number, and no negative speed";
@@ -316,9 +309,7 @@ impl Model {
             let (name, value) = ("order of a derivative", order.into());
             return Err(ModelError::BadValue { name, value, expected: "1" });
         }
-        if let VariableMeaning::Measured(field) =
-            self.to_be_set(reference, VariableType::Real)?.meaning
-        {
+        if let Meaning::Measured(field) = self.to_be_set(reference, VariableType::Real)?.meaning {
             self.inputs.set_slope(field, value);
         }
         Ok(())
@@ -333,10 +324,10 @@ impl Model {
         let Variable { name, meaning, .. } = *self.to_be_set(reference, VariableType::Integer)?;
         let bad = |expected| ModelError::BadValue { name, value: value.into(), expected };
         match meaning {
-            VariableMeaning::Run => {
+            Meaning::Run => {
                 self.inputs.sample.run = u32::try_from(value).map_err(|_| bad("0 or more"))?;
             }
-            VariableMeaning::Direction => {
+            Meaning::Direction => {
                 self.inputs.sample.direction = i8::try_from(value).map_err(|_| bad("1 or -1"))?;
             }
             _ => {}
@@ -350,9 +341,7 @@ impl Model {
     ///
     /// When it is no input of this type, or in the wrong order.
     pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<(), ModelError> {
-        if let VariableMeaning::Begins(_) =
-            self.to_be_set(reference, VariableType::Boolean)?.meaning
-        {
+        if let Meaning::Begins(_) = self.to_be_set(reference, VariableType::Boolean)?.meaning {
             self.require_parameter()?;
             self.beginning.is_held_at_rest = value;
             self.behind = Behind::Nothing;
@@ -373,7 +362,7 @@ impl Model {
         if value.to_str().is_err() {
             return Err(ModelError::NotText(name));
         }
-        if let VariableMeaning::File(file) = meaning {
+        if let Meaning::File(file) = meaning {
             self.files.set(file, value);
             self.behind = Behind::Nothing;
         }
@@ -398,7 +387,7 @@ impl Model {
         let phases = [Phase::Instantiated, Phase::Initializing, Phase::Stepping];
         self.require(&phases, "to set a variable")?;
         let variable = self.interface.variable(reference, expected)?;
-        if matches!(variable.meaning, VariableMeaning::Estimate(..) | VariableMeaning::Driven(_)) {
+        if matches!(variable.meaning, Meaning::Estimate(..) | Meaning::Driven(_)) {
             return Err(ModelError::NotAnInput(variable.name));
         }
         Ok(variable)

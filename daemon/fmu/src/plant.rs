@@ -8,8 +8,7 @@ use crate::error::ModelError;
 use crate::inputs::Inputs;
 use crate::units;
 use crate::variables::{
-    Begins, DrivenValue, Interface, ModelFile, Variable, VariableMeaning, digits, guid, measured,
-    row,
+    Begins, DrivenValue, Interface, Meaning, ModelFile, Variable, digits, guid, measured, row,
 };
 
 /// The train itself.
@@ -28,16 +27,16 @@ pub(crate) const GUID_DIGITS: [u8; 16] =
     guid::<{ VARIABLES.len() }>(concat!("dynocar_train ", env!("CARGO_PKG_VERSION")), VARIABLES);
 
 const fn force(name: &'static str, part: ForcePart, description: &'static str) -> Variable {
-    row(name, VariableMeaning::Driven(DrivenValue::Force(part)), units::NEWTON, description)
+    row(name, Meaning::Driven(DrivenValue::Force(part)), units::NEWTON, description)
 }
 
 #[rustfmt::skip]
 const VARIABLES: &[Variable] = &[
-    row("train_file", VariableMeaning::File(ModelFile::Train), units::NONE, "Path of the train's file; empty: the one inside the FMU"),
-    row("track_file", VariableMeaning::File(ModelFile::Track), units::NONE, "Path of the line's file; empty: the one inside the FMU, if any"),
-    row("initial_speed_mps", VariableMeaning::Begins(Begins::Speed), units::METRE_PER_SECOND, "True speed at the beginning, never negative"),
-    row("initial_position_m", VariableMeaning::Begins(Begins::Position), units::METRE, "Chainage of the train's centre at the beginning"),
-    row("held_at_rest", VariableMeaning::Begins(Begins::HeldAtRest), units::NONE, "Whether a brake, reported or not, holds the train while it stands and is not pulled"),
+    row("train_file", Meaning::File(ModelFile::Train), units::NONE, "Path of the train's file; empty: the one inside the FMU"),
+    row("track_file", Meaning::File(ModelFile::Track), units::NONE, "Path of the line's file; empty: the one inside the FMU, if any"),
+    row("initial_speed_mps", Meaning::Begins(Begins::Speed), units::METRE_PER_SECOND, "True speed at the beginning, never negative"),
+    row("initial_position_m", Meaning::Begins(Begins::Position), units::METRE, "Chainage of the train's centre at the beginning"),
+    row("held_at_rest", Meaning::Begins(Begins::HeldAtRest), units::NONE, "Whether a brake, reported or not, holds the train while it stands and is not pulled"),
 
     measured("traction_force_n", SampleField::TractionForce, units::NEWTON, "Traction force at the wheel rims as the controller reports it; missing: none"),
     measured("brake_force_n", SampleField::BrakeForce, units::NEWTON, "Brake force, retarding, as the controller reports it; missing: none"),
@@ -46,18 +45,18 @@ const VARIABLES: &[Variable] = &[
     measured("position_m", SampleField::Position, units::METRE, "Chainage at which the line is looked up; missing: the train's own, motion.position_m"),
     measured("gradient_permille", SampleField::Gradient, units::PERMILLE, "Gradient, climbing positive as the chainage grows; for lines without a file; missing: level"),
     measured("curve_radius_m", SampleField::CurveRadius, units::METRE, "Curve radius, 0 on straight track; for lines without a file"),
-    row("direction", VariableMeaning::Direction, units::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
+    row("direction", Meaning::Direction, units::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
 
-    row("motion.speed_mps", VariableMeaning::Driven(DrivenValue::Speed), units::METRE_PER_SECOND, "True speed, never negative"),
-    row("motion.measured_speed_mps", VariableMeaning::Driven(DrivenValue::MeasuredSpeed), units::METRE_PER_SECOND, "Speed as the train's own sensor shows it, by the scale of the speed that was found"),
-    row("motion.position_m", VariableMeaning::Driven(DrivenValue::Position), units::METRE, "Chainage of the train's centre by its own motion"),
-    row("motion.acceleration_mps2", VariableMeaning::Driven(DrivenValue::Acceleration), units::METRE_PER_SECOND_2, "dv/dt, 0 at rest"),
-    row("motion.mass_kg", VariableMeaning::Driven(DrivenValue::Mass), units::KILOGRAM, "Gross mass, with what was found of it"),
+    row("motion.speed_mps", Meaning::Driven(DrivenValue::Speed), units::METRE_PER_SECOND, "True speed, never negative"),
+    row("motion.measured_speed_mps", Meaning::Driven(DrivenValue::MeasuredSpeed), units::METRE_PER_SECOND, "Speed as the train's own sensor shows it, by the scale of the speed that was found"),
+    row("motion.position_m", Meaning::Driven(DrivenValue::Position), units::METRE, "Chainage of the train's centre by its own motion"),
+    row("motion.acceleration_mps2", Meaning::Driven(DrivenValue::Acceleration), units::METRE_PER_SECOND_2, "dv/dt, 0 at rest"),
+    row("motion.mass_kg", Meaning::Driven(DrivenValue::Mass), units::KILOGRAM, "Gross mass, with what was found of it"),
 
     force("force.traction_n", ForcePart::Traction, "Traction force that acts, after the gain and the delay that were found"),
     force("force.brake_n", ForcePart::Brake, "Brake force that acts, after the delay that was found, retarding"),
     force("force.gradient_n", ForcePart::Gradient, "Weight along the gradient, retarding"),
-    row("force.resistance_n", VariableMeaning::Driven(DrivenValue::Resistance), units::NEWTON, "Sum of all that follow, retarding"),
+    row("force.resistance_n", Meaning::Driven(DrivenValue::Resistance), units::NEWTON, "Sum of all that follow, retarding"),
     force("force.basic_n", ForcePart::Basic, "Basic resistance by a, b and c"),
     force("force.curve_n", ForcePart::Curve, "Resistance of curves"),
     force("force.tunnel_n", ForcePart::Tunnel, "Resistance of tunnels"),
@@ -91,7 +90,7 @@ pub(crate) fn require_drivable(inputs: &Inputs) -> Result<(), ModelError> {
         return bad("direction", direction.into(), "1 or -1");
     }
     for Variable { name, meaning, .. } in VARIABLES {
-        let VariableMeaning::Measured(field) = *meaning else { continue };
+        let Meaning::Measured(field) = *meaning else { continue };
         match inputs.sample.get(field) {
             Some(value) if !value.is_finite() => return bad(name, value, "a finite number"),
             Some(value) if field == SampleField::Mass && value <= 0.0 => {
@@ -132,8 +131,7 @@ mod tests {
     #[test]
     fn every_force_is_reported_under_one_name() {
         for part in ForcePart::ALL {
-            let is_it =
-                |it: &&Variable| it.meaning == VariableMeaning::Driven(DrivenValue::Force(part));
+            let is_it = |it: &&Variable| it.meaning == Meaning::Driven(DrivenValue::Force(part));
             assert_eq!(VARIABLES.iter().filter(is_it).count(), 1, "{part:?}");
         }
     }

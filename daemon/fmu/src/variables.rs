@@ -130,7 +130,7 @@ pub enum DrivenValue {
 
 /// Meaning of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VariableMeaning {
+pub enum Meaning {
     /// Parameter: the name of a file.
     File(ModelFile),
     /// Input: a measured quantity of the sample.
@@ -199,18 +199,16 @@ impl VariableType {
     }
 }
 
-impl VariableMeaning {
+impl Meaning {
     /// The type of the variable.
     pub const fn kind(self) -> VariableType {
         match self {
-            VariableMeaning::File(_) => VariableType::String,
-            VariableMeaning::Measured(_) => VariableType::Real,
-            VariableMeaning::Run | VariableMeaning::Direction => VariableType::Integer,
-            VariableMeaning::WheelSlide | VariableMeaning::Begins(Begins::HeldAtRest) => {
-                VariableType::Boolean
-            }
-            VariableMeaning::Begins(_) | VariableMeaning::Driven(_) => VariableType::Real,
-            VariableMeaning::Estimate(_, reported) => match reported {
+            Meaning::File(_) => VariableType::String,
+            Meaning::Measured(_) => VariableType::Real,
+            Meaning::Run | Meaning::Direction => VariableType::Integer,
+            Meaning::WheelSlide | Meaning::Begins(Begins::HeldAtRest) => VariableType::Boolean,
+            Meaning::Begins(_) | Meaning::Driven(_) => VariableType::Real,
+            Meaning::Estimate(_, reported) => match reported {
                 SnapshotField::Status => VariableType::Enumeration(FmiEnumeration::Status),
                 SnapshotField::Reason => VariableType::Enumeration(FmiEnumeration::Reason),
                 SnapshotField::SuspectedEffect => VariableType::Enumeration(FmiEnumeration::Effect),
@@ -227,8 +225,8 @@ impl VariableMeaning {
     /// `parameter`, `input` or `output`.
     pub const fn causality(self) -> &'static str {
         match self {
-            VariableMeaning::File(_) | VariableMeaning::Begins(_) => "parameter",
-            VariableMeaning::Estimate(..) | VariableMeaning::Driven(_) => "output",
+            Meaning::File(_) | Meaning::Begins(_) => "parameter",
+            Meaning::Estimate(..) | Meaning::Driven(_) => "output",
             _ => "input",
         }
     }
@@ -240,7 +238,7 @@ pub struct Variable {
     /// Its name, by the structured convention of the standard.
     pub name: &'static str,
     /// Meaning of the variable.
-    pub meaning: VariableMeaning,
+    pub meaning: Meaning,
     /// Its unit.
     pub unit: FmiUnit,
     /// Description in words.
@@ -250,7 +248,7 @@ pub struct Variable {
 /// A variable.
 pub(crate) const fn row(
     name: &'static str,
-    meaning: VariableMeaning,
+    meaning: Meaning,
     unit: FmiUnit,
     description: &'static str,
 ) -> Variable {
@@ -264,7 +262,7 @@ pub(crate) const fn measured(
     unit: FmiUnit,
     description: &'static str,
 ) -> Variable {
-    row(name, VariableMeaning::Measured(field), unit, description)
+    row(name, Meaning::Measured(field), unit, description)
 }
 
 /// The digits by which description and library know each other: over the version, the model's

@@ -6,7 +6,7 @@ use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 
 use dynocar_analysis::dataset::Run;
-use dynocar_fmu::variables::{ModelFile, VariableMeaning};
+use dynocar_fmu::variables::{Meaning, ModelFile};
 use dynocar_fmu::{ESTIMATORS, INTERFACES, Interface, documentation, model_description};
 use dynocar_shared::TrainSample;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
@@ -119,7 +119,7 @@ pub const INPUTS_MARK: &str = "time,position_m,speed_mps,";
 /// A recorded run as a CSV file of the inputs of the estimators' FMU over time in s, `NaN` where
 /// missing; the train's takes its own from there.
 pub fn inputs(run: &Run) -> String {
-    let is_input = |meaning: &VariableMeaning| meaning.causality() == "input";
+    let is_input = |meaning: &Meaning| meaning.causality() == "input";
     let inputs = ESTIMATORS.variables.iter().filter(|variable| is_input(&variable.meaning));
     let mut text = TIME.to_owned();
     for input in inputs.clone() {
@@ -135,12 +135,12 @@ pub fn inputs(run: &Run) -> String {
     text + "\n"
 }
 
-fn cell(sample: &TrainSample, run: u32, input: VariableMeaning) -> f64 {
+fn cell(sample: &TrainSample, run: u32, input: Meaning) -> f64 {
     match input {
-        VariableMeaning::Measured(field) => sample.get(field).unwrap_or(f64::NAN),
-        VariableMeaning::Direction => sample.direction.into(),
-        VariableMeaning::WheelSlide => f64::from(u8::from(sample.flags & FLAG_WHEEL_SLIDE != 0)),
-        VariableMeaning::Run => run.into(),
+        Meaning::Measured(field) => sample.get(field).unwrap_or(f64::NAN),
+        Meaning::Direction => sample.direction.into(),
+        Meaning::WheelSlide => f64::from(u8::from(sample.flags & FLAG_WHEEL_SLIDE != 0)),
+        Meaning::Run => run.into(),
         _ => f64::NAN,
     }
 }

@@ -6,7 +6,9 @@
 
 mod profile;
 
-pub use profile::{GradientError, LinearProfile, ProfileError, StepProfile, along_line};
+pub use profile::{
+    GradientError, IntervalValue, LinearProfile, ProfileError, StepProfile, along_line,
+};
 
 /// The list of `[track]` that holds curves.
 pub const CURVES: &str = "curves";
@@ -315,17 +317,6 @@ fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
 
 /// A greater chainage in m cannot be distinguished from its neighbours to the millimetre, nor be meant.
 const CHAINAGE_MAX_M: f64 = 1e9;
-
-/// A value between two chainages in m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IntervalValue {
-    /// Chainage in m where it starts.
-    pub start_m: f64,
-    /// Chainage in m where it ends.
-    pub end_m: f64,
-    /// The value between them.
-    pub value: f64,
-}
 
 /// Returns the profile that is zero outside the intervals.
 ///
