@@ -16,7 +16,7 @@ use dynocar_fmu::ffi::life::{
     fmi2SetupExperiment, fmi2Terminate,
 };
 use dynocar_fmu::ffi::values::{fmi2GetReal, fmi2SetReal};
-use dynocar_fmu::variables::{Meaning, SnapshotField, VariableType};
+use dynocar_fmu::variables::{Kind, Meaning, SnapshotField};
 use dynocar_fmu::{ESTIMATORS, INTERFACES};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::process::DaemonSite;
@@ -88,8 +88,8 @@ fn assert_as_identified(fmu: &Fmu, dataset: &Dataset, count: usize) {
         let reference = reference as u32;
         let snapshot = &snapshots[PIPELINES.iter().position(|&kind| kind == of).unwrap()];
         let got = match variable.meaning.kind() {
-            VariableType::Real => fmu.real(reference).unwrap().to_bits(),
-            VariableType::Boolean => u64::from(fmu.boolean(reference).unwrap()),
+            Kind::Real => fmu.real(reference).unwrap().to_bits(),
+            Kind::Boolean => u64::from(fmu.boolean(reference).unwrap()),
             _ => fmu.integer(reference).unwrap() as u64,
         };
         let name = variable.name;
@@ -103,8 +103,8 @@ fn take_row(fmu: &Fmu, header: &[&str], (row, next): (&str, Option<&&str>)) {
     for (name, &cell) in header.iter().zip(&cells).skip(1) {
         let reference = reference(name);
         let went = match ESTIMATORS.variables[reference as usize].meaning.kind() {
-            VariableType::Boolean => fmu.set_boolean(reference, cell as i32),
-            VariableType::Integer => fmu.set_integer(reference, cell as i32),
+            Kind::Boolean => fmu.set_boolean(reference, cell as i32),
+            Kind::Integer => fmu.set_integer(reference, cell as i32),
             _ => fmu.set_real(reference, cell),
         };
         assert_eq!(went, Status::Ok, "{name} = {cell}: {}", fmu.said());

@@ -8,9 +8,7 @@ use dynocar_shared::{Reason, Status};
 use super::estimators::{self, ESTIMATORS};
 use super::plant::{self, PLANT};
 use super::units;
-use super::variables::{
-    Begins, FmiEnumeration, Interface, MISSING, Meaning, Variable, VariableType,
-};
+use super::variables::{Begins, FmiEnumeration, Interface, Kind, MISSING, Meaning, Variable};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -57,7 +55,7 @@ pub fn model_description(interface: &Interface, step_s: f64) -> String {
 }
 
 fn has_vocabularies(interface: &Interface) -> bool {
-    interface.variables.iter().any(|it| matches!(it.meaning.kind(), VariableType::Enumeration(_)))
+    interface.variables.iter().any(|it| matches!(it.meaning.kind(), Kind::Enumeration(_)))
 }
 
 fn push_units(xml: &mut String) {
@@ -118,7 +116,7 @@ fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_con
         ),
     );
     let mut attributes = String::new();
-    if let VariableType::Enumeration(vocabulary) = meaning.kind() {
+    if let Kind::Enumeration(vocabulary) = meaning.kind() {
         attributes += &format!(" declaredType=\"{}\"", vocabulary.name());
     }
     if *unit != units::NONE {
@@ -173,7 +171,7 @@ pub fn documentation(interface: &Interface) -> String {
     );
     for Variable { name, meaning, unit, description } in *variables {
         let kind = match meaning.kind() {
-            VariableType::Enumeration(vocabulary) => vocabulary.name(),
+            Kind::Enumeration(vocabulary) => vocabulary.name(),
             kind => kind.name(),
         };
         let cells = [*name, meaning.causality(), kind, unit.name, *description];

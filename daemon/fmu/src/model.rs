@@ -13,7 +13,7 @@ use crate::inputs::{Inputs, nanoseconds};
 use crate::plant::{
     BEGINNING, STEP_MAX_S, least_step_s, reported, require_drivable, with_beginning,
 };
-use crate::variables::{Begins, Interface, Meaning, SnapshotField, Variable, VariableType};
+use crate::variables::{Begins, Interface, Kind, Meaning, SnapshotField, Variable};
 
 /// By so much of the time a point may be off, as sums of steps are rounded.
 const POINT_TOLERANCE: f64 = 1e-9;
@@ -213,7 +213,7 @@ impl Model {
     ///
     /// If there is no such variable of this type, or after a fault.
     pub fn real(&self, reference: u32) -> Result<f64, ModelError> {
-        let variable = self.got(reference, VariableType::Real)?;
+        let variable = self.got(reference, Kind::Real)?;
         Ok(match variable.meaning {
             Meaning::Measured(field) => self.inputs.get(field),
             Meaning::Begins(Begins::Speed) => self.beginning.speed_mps,
@@ -233,7 +233,7 @@ impl Model {
     ///
     /// If there is no such variable of this type, or after a fault.
     pub fn integer(&self, reference: u32) -> Result<i32, ModelError> {
-        let variable = self.got(reference, VariableType::Integer)?;
+        let variable = self.got(reference, Kind::Integer)?;
         let number: u64 = match (variable.meaning, &self.behind) {
             (Meaning::Direction, _) => return Ok(self.inputs.sample.direction.into()),
             (Meaning::Run, _) => self.inputs.sample.run.into(),
@@ -249,7 +249,7 @@ impl Model {
     ///
     /// If there is no such variable of this type, or after a fault.
     pub fn boolean(&self, reference: u32) -> Result<bool, ModelError> {
-        Ok(match (self.got(reference, VariableType::Boolean)?.meaning, &self.behind) {
+        Ok(match (self.got(reference, Kind::Boolean)?.meaning, &self.behind) {
             (Meaning::Begins(_), _) => self.beginning.is_held_at_rest,
             (Meaning::Estimate(of, SnapshotField::Usable(quantity)), Behind::Estimators(it)) => {
                 it.is_usable(of, quantity)
@@ -264,7 +264,7 @@ impl Model {
     ///
     /// If there is no such variable of this type, or after a fault.
     pub fn string(&self, reference: u32) -> Result<&CStr, ModelError> {
-        let variable = self.got(reference, VariableType::String)?;
+        let variable = self.got(reference, Kind::String)?;
         let Meaning::File(file) = variable.meaning else { return Ok(c"") };
         Ok(self.files.path(file))
     }
@@ -276,7 +276,7 @@ impl Model {
     ///
     /// When it is no input of this type, a beginning that no train has, or in the wrong order.
     pub fn set_real(&mut self, reference: u32, value: f64) -> Result<(), ModelError> {
-        let Variable { name, meaning, .. } = *self.to_be_set(reference, VariableType::Real)?;
+        let Variable { name, meaning, .. } = *self.to_be_set(reference, Kind::Real)?;
         match meaning {
             Meaning::Measured(field) => self.inputs.set(field, value),
             Meaning::Begins(begins) => {
@@ -309,7 +309,7 @@ impl Model {
             let (name, value) = ("order of a derivative", order.into());
             return Err(ModelError::BadValue { name, value, expected: "1" });
         }
-        if let Meaning::Measured(field) = self.to_be_set(reference, VariableType::Real)?.meaning {
+        if let Meaning::Measured(field) = self.to_be_set(reference, Kind::Real)?.meaning {
             self.inputs.set_slope(field, value);
         }
         Ok(())
@@ -321,7 +321,7 @@ impl Model {
     ///
     /// When it is no input of this type, a negative run, or in the wrong order.
     pub fn set_integer(&mut self, reference: u32, value: i32) -> Result<(), ModelError> {
-        let Variable { name, meaning, .. } = *self.to_be_set(reference, VariableType::Integer)?;
+        let Variable { name, meaning, .. } = *self.to_be_set(reference, Kind::Integer)?;
         let bad = |expected| ModelError::BadValue { name, value: value.into(), expected };
         match meaning {
             Meaning::Run => {
@@ -341,7 +341,7 @@ impl Model {
     ///
     /// When it is no input of this type, or in the wrong order.
     pub fn set_boolean(&mut self, reference: u32, value: bool) -> Result<(), ModelError> {
-        if let Meaning::Begins(_) = self.to_be_set(reference, VariableType::Boolean)?.meaning {
+        if let Meaning::Begins(_) = self.to_be_set(reference, Kind::Boolean)?.meaning {
             self.require_parameter()?;
             self.beginning.is_held_at_rest = value;
             self.behind = Behind::Nothing;
@@ -357,7 +357,7 @@ impl Model {
     ///
     /// When it is no parameter of this type, or after the initialization.
     pub fn set_string(&mut self, reference: u32, value: &CStr) -> Result<(), ModelError> {
-        let Variable { name, meaning, .. } = *self.to_be_set(reference, VariableType::String)?;
+        let Variable { name, meaning, .. } = *self.to_be_set(reference, Kind::String)?;
         self.require_parameter()?;
         if value.to_str().is_err() {
             return Err(ModelError::NotText(name));
@@ -373,17 +373,13 @@ impl Model {
         self.require(&[Phase::Instantiated, Phase::Initializing], "to set a parameter")
     }
 
-    fn got(&self, reference: u32, expected: VariableType) -> Result<&'static Variable, ModelError> {
+    fn got(&self, reference: u32, expected: Kind) -> Result<&'static Variable, ModelError> {
         let phases = [Phase::Instantiated, Phase::Initializing, Phase::Stepping, Phase::Terminated];
         self.require(&phases, "to get a variable")?;
         self.interface.variable(reference, expected)
     }
 
-    fn to_be_set(
-        &self,
-        reference: u32,
-        expected: VariableType,
-    ) -> Result<&'static Variable, ModelError> {
+    fn to_be_set(&self, reference: u32, expected: Kind) -> Result<&'static Variable, ModelError> {
         let phases = [Phase::Instantiated, Phase::Initializing, Phase::Stepping];
         self.require(&phases, "to set a variable")?;
         let variable = self.interface.variable(reference, expected)?;

@@ -40,12 +40,12 @@ impl Interface {
     pub fn variable(
         &self,
         reference: u32,
-        expected: VariableType,
+        expected: Kind,
     ) -> Result<&'static Variable, ModelError> {
         let variable = self.variables.get(reference as usize);
         let variable = variable.ok_or(ModelError::UnknownReference(reference))?;
         let is = match variable.meaning.kind() {
-            VariableType::Enumeration(_) => VariableType::Integer,
+            Kind::Enumeration(_) => Kind::Integer,
             kind => kind,
         };
         if is == expected {
@@ -151,7 +151,7 @@ pub enum Meaning {
 
 /// The type of a variable in the standard's sense.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VariableType {
+pub enum Kind {
     /// A number.
     Real,
     /// A whole number.
@@ -186,38 +186,38 @@ impl FmiEnumeration {
     }
 }
 
-impl VariableType {
+impl Kind {
     /// The type's name in `modelDescription.xml`.
     pub const fn name(self) -> &'static str {
         match self {
-            VariableType::Real => "Real",
-            VariableType::Integer => "Integer",
-            VariableType::Boolean => "Boolean",
-            VariableType::String => "String",
-            VariableType::Enumeration(_) => "Enumeration",
+            Kind::Real => "Real",
+            Kind::Integer => "Integer",
+            Kind::Boolean => "Boolean",
+            Kind::String => "String",
+            Kind::Enumeration(_) => "Enumeration",
         }
     }
 }
 
 impl Meaning {
     /// The type of the variable.
-    pub const fn kind(self) -> VariableType {
+    pub const fn kind(self) -> Kind {
         match self {
-            Meaning::File(_) => VariableType::String,
-            Meaning::Measured(_) => VariableType::Real,
-            Meaning::Run | Meaning::Direction => VariableType::Integer,
-            Meaning::WheelSlide | Meaning::Begins(Begins::HeldAtRest) => VariableType::Boolean,
-            Meaning::Begins(_) | Meaning::Driven(_) => VariableType::Real,
+            Meaning::File(_) => Kind::String,
+            Meaning::Measured(_) => Kind::Real,
+            Meaning::Run | Meaning::Direction => Kind::Integer,
+            Meaning::WheelSlide | Meaning::Begins(Begins::HeldAtRest) => Kind::Boolean,
+            Meaning::Begins(_) | Meaning::Driven(_) => Kind::Real,
             Meaning::Estimate(_, reported) => match reported {
-                SnapshotField::Status => VariableType::Enumeration(FmiEnumeration::Status),
-                SnapshotField::Reason => VariableType::Enumeration(FmiEnumeration::Reason),
-                SnapshotField::SuspectedEffect => VariableType::Enumeration(FmiEnumeration::Effect),
-                SnapshotField::Usable(_) => VariableType::Boolean,
+                SnapshotField::Status => Kind::Enumeration(FmiEnumeration::Status),
+                SnapshotField::Reason => Kind::Enumeration(FmiEnumeration::Reason),
+                SnapshotField::SuspectedEffect => Kind::Enumeration(FmiEnumeration::Effect),
+                SnapshotField::Usable(_) => Kind::Boolean,
                 SnapshotField::Rejected
                 | SnapshotField::SuspectedEffectNumber
                 | SnapshotField::StatusNumber
-                | SnapshotField::ReasonNumber => VariableType::Integer,
-                _ => VariableType::Real,
+                | SnapshotField::ReasonNumber => Kind::Integer,
+                _ => Kind::Real,
             },
         }
     }
