@@ -69,7 +69,7 @@ fn a_resistance_at_two_places_is_found_in_runs_that_reach_only_the_second() {
 fn the_drag_of_mapped_tunnels_is_found_in_them_whatever_else_the_map_lacks() {
     let tunnels = EffectRequest::Kinds(vec![EffectKind::TunnelDrag]);
     let settings = SimulatorSettings::new(9_900_001, tunnels);
-    let settings = SimulatorSettings { deviations: Deviations::ROUGHER, ..settings };
+    let settings = SimulatorSettings { deviations: TrueDeviations::ROUGHER, ..settings };
     let simulated = simulate(&SimulatorSettings { runs: 24, holdout_runs: 6, ..settings.clone() });
     let truth = simulated.effects[0].parameters(0.0)["c_factor"].as_f64().unwrap();
     let answer = explained_of(24, settings);
