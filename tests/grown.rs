@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train};
+use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train, written};
 use dynocar_analysis::driven::{Beginning, DrivenTrain};
 use dynocar_analysis::explain::explain;
 use dynocar_analysis::identify::{identify, published_samples};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::force::{ForceResolver, ValidSample};
+use dynocar_model::train::numbers::PAD_AREA;
+use dynocar_shared::schema::sample_fields;
 use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, TrainSample};
 
 const TRAIN: &str = "[train]\nmass_t = 200\nlength_m = 100\nrotating_mass_factor = 0.06\n\
@@ -105,6 +107,18 @@ fn the_effect_is_found() {
 }
 
 #[test]
+fn the_key_is_read_judged_and_written() {
+    let text = format!("{TRAIN}[brake]\npad_area_cm2 = 350\n");
+    let train = parse_train("train.toml", &text).unwrap();
+    assert_eq!(train.brake_gear.pad_area_cm2, Some(350.0));
+    let refused = parse_train("train.toml", &text.replace("350", "-350")).unwrap_err();
+    assert!(refused.to_string().contains("pad_area_cm2 = -350: expected an area in cm²"));
+    let mut declared = TRAIN.parse().unwrap();
+    written::set(&mut declared, &PAD_AREA, 350.0);
+    assert_eq!(parse_train("train.toml", &declared.to_string()), Ok(train));
+}
+
+#[test]
 fn the_pipeline_identifies_the_mass() {
     let dataset = dataset();
     let kind = PipelineKind::from_name("mass_impulse").unwrap();
@@ -122,6 +136,8 @@ fn the_field_comes_from_a_column_and_acts() {
     let field = SampleField::ALL.into_iter().find(|it| it.name() == "headwind_mps").unwrap();
     assert_eq!(sample.get(field), Some(0.0));
     assert_eq!(Quantity::of_field(field).map(Quantity::name), Some("headwind"));
+    // Recordings of every format have their columns from these.
+    assert!(sample_fields().any(|it| it.layout.name == field.name()));
     let train = Arc::new(parse_train("train.toml", TRAIN).unwrap());
     let mut resolver = ForceResolver::new(train, None);
     let mut extra_n_per_kn = |wind_mps: f64| {

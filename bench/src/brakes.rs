@@ -8,11 +8,11 @@ use dynocar_model::train::BrakeComponents;
 use dynocar_shared::quantile::normal_quantile;
 
 use crate::ending::until_due;
-use crate::output::{Failure, OutputArguments, Record, expect, table};
+use crate::output::{BenchError, OutputArguments, Record, expect, table};
 
 /// Error and cost of Kdry_rst from components at one stop in a million, by turns with plain Monte Carlo.
 #[derive(Debug, Args)]
-pub struct BrakesArguments {
+pub struct BrakesBenchArguments {
     /// Tilted draws of an answer, as `dynocar brakes` takes them
     #[arg(long, default_value_t = 1 << 14)]
     draws: usize,
@@ -46,13 +46,13 @@ impl Answers {
     }
 }
 
-impl BrakesArguments {
+impl BrakesBenchArguments {
     /// Measures three brakes, two of which have an exact answer.
     ///
     /// # Errors
     ///
     /// When there are fewer than two seeds, or the result cannot be given.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         expect(self.seeds >= 2, || format!("--seeds {}: expected 2 or more", self.seeds))?;
         let quantile = normal_quantile(PROBABILITY).unwrap_or(f64::NAN);
         let of_units = |units| BrakeComponents { units, ..BrakeComponents::default() };

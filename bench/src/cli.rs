@@ -6,19 +6,19 @@ use clap::{CommandFactory, Parser, Subcommand};
 use dynocar::cli::parse;
 use dynocar::output::report_line;
 
-use crate::brakes::BrakesArguments;
+use crate::brakes::BrakesBenchArguments;
 use crate::drive::DriveArguments;
 use crate::ending;
 use crate::estimators::EstimatorsArguments;
-use crate::explain::ExplainArguments;
+use crate::explain::ExplainBenchArguments;
 use crate::latency::LatencyArguments;
 use crate::load::LoadArguments;
 use crate::monitor::MonitorArguments;
 use crate::open_loop::server::{PeerArguments, serve};
-use crate::output::{Failure, Usage};
+use crate::output::{BenchError, Usage};
 use crate::papers::PapersArguments;
 use crate::scenarios::ScenariosArguments;
-use crate::survey::SurveyArguments;
+use crate::survey::SurveyBenchArguments;
 
 /// Measures Dynocar: accuracy against the statistical bound, speed, latency against the floor.
 #[derive(Debug, Parser)]
@@ -30,16 +30,16 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Brakes(BrakesArguments),
+    Brakes(BrakesBenchArguments),
     Drive(DriveArguments),
     Estimators(EstimatorsArguments),
-    Explain(ExplainArguments),
+    Explain(ExplainBenchArguments),
     Latency(LatencyArguments),
     Load(LoadArguments),
     Monitor(MonitorArguments),
     Papers(PapersArguments),
     Scenarios(ScenariosArguments),
-    Survey(SurveyArguments),
+    Survey(SurveyBenchArguments),
     #[command(hide = true)]
     Peer(PeerArguments),
 }
@@ -61,7 +61,7 @@ pub fn main() -> ExitCode {
     status(ending::begin().and_then(|()| run(&arguments.command)))
 }
 
-fn run(command: &Command) -> Result<(), Failure> {
+fn run(command: &Command) -> Result<(), BenchError> {
     match command {
         Command::Brakes(arguments) => arguments.run(),
         Command::Drive(arguments) => arguments.run(),
@@ -77,7 +77,7 @@ fn run(command: &Command) -> Result<(), Failure> {
     }
 }
 
-fn status(result: Result<(), Failure>) -> ExitCode {
+fn status(result: Result<(), BenchError>) -> ExitCode {
     match result {
         Ok(()) if ending::is_due() => {
             report_line("dynocar-bench: ended by a signal: figures of what was done until then");

@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use dynocar::ending;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-use crate::output::Failure;
+use crate::output::BenchError;
 
 /// Exit status of a command that was ended, whatever it gave: that of a program that SIGINT ends.
 pub const STATUS: u8 = 130;
@@ -19,7 +19,7 @@ static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 /// # Errors
 ///
 /// When the system takes no handler.
-pub fn begin() -> Result<(), Failure> {
+pub fn begin() -> Result<(), BenchError> {
     let is_second = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         // Handlers run in the order of their registration.

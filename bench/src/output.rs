@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 /// Why a command fails, in words; exit status 1, or 2 for [`Usage`].
-pub type Failure = Box<dyn Error + Send + Sync>;
+pub type BenchError = Box<dyn Error + Send + Sync>;
 
 /// A mistake on the command line, with the expected form: exit status 2.
 #[derive(Debug, thiserror::Error)]
@@ -22,7 +22,7 @@ pub struct Usage(pub String);
 /// # Errors
 ///
 /// When it does not hold.
-pub fn expect(holds: bool, words: impl FnOnce() -> String) -> Result<(), Failure> {
+pub fn expect(holds: bool, words: impl FnOnce() -> String) -> Result<(), BenchError> {
     if holds { Ok(()) } else { Err(Usage(words()).into()) }
 }
 
@@ -31,7 +31,7 @@ pub fn expect(holds: bool, words: impl FnOnce() -> String) -> Result<(), Failure
 /// # Errors
 ///
 /// If no entry has this name; the message lists the names.
-pub fn named<T: Copy>(option: &str, name: &str, all: &[(&str, T)]) -> Result<T, Failure> {
+pub fn named<T: Copy>(option: &str, name: &str, all: &[(&str, T)]) -> Result<T, BenchError> {
     let found = all.iter().find(|(own, _)| *own == name).map(|(_, it)| *it);
     found.ok_or_else(|| {
         let known: Vec<&str> = all.iter().map(|(own, _)| *own).collect();
@@ -49,7 +49,7 @@ pub fn containing<T>(
     text: &str,
     mut all: Vec<T>,
     name: impl Fn(&T) -> String,
-) -> Result<Vec<T>, Failure> {
+) -> Result<Vec<T>, BenchError> {
     all.retain(|it| name(it).contains(text));
     let what = option.trim_start_matches('-');
     expect(!all.is_empty(), || format!("{option} {text}: expected a part of a {what}'s name"))?;
@@ -57,7 +57,7 @@ pub fn containing<T>(
 }
 
 /// Says during what an error happened.
-pub fn during<E: Display>(what: impl Display) -> impl FnOnce(E) -> Failure {
+pub fn during<E: Display>(what: impl Display) -> impl FnOnce(E) -> BenchError {
     move |error| format!("{what}: {error}").into()
 }
 
@@ -79,7 +79,7 @@ impl OutputArguments {
         &self,
         result: &impl Serialize,
         for_people: impl FnOnce() -> String,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), BenchError> {
         Ok(dynocar::output::give(self.json.as_deref(), result, for_people)?)
     }
 }
@@ -89,7 +89,7 @@ impl OutputArguments {
 /// # Errors
 ///
 /// When there is a line.
-pub fn expect_none(what: &str, lines: Vec<String>) -> Result<(), Failure> {
+pub fn expect_none(what: &str, lines: Vec<String>) -> Result<(), BenchError> {
     match lines.is_empty() {
         true => Ok(()),
         false => Err(format!("{what}:\n{}", lines.join("\n")).into()),
@@ -224,7 +224,7 @@ pub fn table(records: &[Record]) -> String {
 /// # Errors
 ///
 /// When the file cannot be written.
-pub fn write_csv(file: &Path, records: &[Record]) -> Result<(), Failure> {
+pub fn write_csv(file: &Path, records: &[Record]) -> Result<(), BenchError> {
     let write = || -> Result<(), csv::Error> {
         let mut writer = csv::Writer::from_path(file)?;
         if let Some(first) = records.first() {

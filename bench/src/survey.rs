@@ -12,11 +12,11 @@ use dynocar_tests::simulator::{
 use dynocar_workshop::survey::read::{recordings, vehicle};
 
 use crate::ending::until_due;
-use crate::output::{Failure, OutputArguments, Record, table};
+use crate::output::{BenchError, OutputArguments, Record, table};
 
 /// Seconds for each pass of a survey of a simulated line, for growing numbers of passes.
 #[derive(Debug, Args)]
-pub struct SurveyArguments {
+pub struct SurveyBenchArguments {
     /// Numbers of passes
     #[arg(long, value_delimiter = ',', default_values_t = [1, 10, 100, 1000])]
     passes: Vec<usize>,
@@ -32,13 +32,13 @@ const RECORDINGS: usize = 10;
 /// Length in s of a recording.
 const DURATION_S: f64 = 480.0;
 
-impl SurveyArguments {
+impl SurveyBenchArguments {
     /// Surveys ever more passes of one line.
     ///
     /// # Errors
     ///
     /// When a survey fails or the result cannot be given.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let settings = SimulatorSettings {
             train_type: Some(TrainType::Metro),
             runs: RECORDINGS,

@@ -16,16 +16,16 @@ pub use crate::text_file::read_text;
 
 /// A path that leads to a dataset, and the train that is meant where a recording holds several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Source<'p> {
+pub struct DatasetSource<'p> {
     /// The dataset's folder, its `dataset.toml`, or a recording.
     pub path: &'p Path,
     /// The train of a recording; `None` for its only one.
     pub train: Option<TrainId>,
 }
 
-impl<'p, P: AsRef<Path> + ?Sized> From<&'p P> for Source<'p> {
+impl<'p, P: AsRef<Path> + ?Sized> From<&'p P> for DatasetSource<'p> {
     fn from(path: &'p P) -> Self {
-        Source { path: path.as_ref(), train: None }
+        DatasetSource { path: path.as_ref(), train: None }
     }
 }
 
@@ -41,8 +41,8 @@ pub struct SourceArguments {
 
 impl SourceArguments {
     /// The path with the train.
-    pub fn source(&self) -> Source<'_> {
-        Source { path: &self.dataset, train: self.train.map(TrainId) }
+    pub fn source(&self) -> DatasetSource<'_> {
+        DatasetSource { path: &self.dataset, train: self.train.map(TrainId) }
     }
 }
 
@@ -109,8 +109,8 @@ impl DatasetFolder {
     /// # Errors
     ///
     /// When there is nothing, or a folder that is no dataset.
-    pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
-        let Source { path, train } = source.into();
+    pub fn at<'p>(source: impl Into<DatasetSource<'p>>) -> Result<Self, LoadError> {
+        let DatasetSource { path, train } = source.into();
         if train.is_some() && path.exists() {
             return Err(LoadError::NoRecording { path: path.into() });
         }
@@ -177,7 +177,9 @@ fn described(folder: &Path) -> String {
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(DatasetFolder, DatasetHead), LoadError> {
+pub fn open<'p>(
+    source: impl Into<DatasetSource<'p>>,
+) -> Result<(DatasetFolder, DatasetHead), LoadError> {
     let folder = DatasetFolder::at(source)?;
     let head = DatasetHead::open(&folder).map_err(|error| other_kind(&folder.manifest, error))?;
     Ok((folder, head))
@@ -233,7 +235,7 @@ pub fn kind_of(keys: &[String]) -> Option<FileKind> {
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
+pub fn load<'p>(source: impl Into<DatasetSource<'p>>) -> Result<Dataset, LoadError> {
     let (folder, head) = open(source)?;
     Ok(head.read(&folder)?)
 }

@@ -27,7 +27,7 @@ pub enum EndingError {
 const STACK_BYTES: usize = 64 * 1024;
 
 /// When the program ends.
-pub struct Ending {
+pub struct ProgramEnding {
     /// Set when it is to end: by SIGTERM, SIGINT or SIGHUP, or when its terminal is gone.
     pub flag: Arc<AtomicBool>,
     /// The terminals that it was started on.
@@ -40,10 +40,10 @@ pub struct Ending {
 ///
 /// When the system takes no handler, or gives no thread.
 pub fn flag() -> Result<Arc<AtomicBool>, EndingError> {
-    Ok(Ending::begin()?.flag)
+    Ok(ProgramEnding::begin()?.flag)
 }
 
-impl Ending {
+impl ProgramEnding {
     /// Begins to listen for signals, and to watch the terminal.
     ///
     /// # Errors
@@ -62,7 +62,7 @@ impl Ending {
         for signal in signals {
             signal_hook::flag::register(signal, Arc::clone(&flag)).map_err(EndingError::Signal)?;
         }
-        Ok(Ending { flag, terminals })
+        Ok(ProgramEnding { flag, terminals })
     }
 
     /// True when the program is to end.

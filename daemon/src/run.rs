@@ -27,14 +27,14 @@ use crate::models::Store;
 use crate::observing::ObservedTrain;
 use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::exchange::Exchange;
+use crate::runtime::main_thread::{RuntimeWatch, WatchedPipeline};
 use crate::runtime::tally::Tally;
-use crate::runtime::watch::{Watch, WatchedPipeline};
 use crate::runtime::worker::{ChannelPlan, Worker, WorkerPlan};
-use crate::shadow::train::Placed;
+use crate::shadow::train::PlacedPipeline;
 use crate::shadow::{self, Board, ShadowTrain};
 use crate::stamp::Stamp;
 use crate::state;
-use crate::state::keeper::Keeper;
+use crate::state::keeper::StateKeeper;
 use crate::supervision::listener;
 use crate::supervision::notify::{Supervisor, Watchdog};
 
@@ -113,7 +113,7 @@ pub fn run(config: &DaemonConfig) -> Result<(), RunError> {
     let watchdog = Watchdog::new(&supervisor, alive);
     supervisor.notify("READY=1");
     let trains = trains.into_iter().zip(counts).collect();
-    let mut watch = Watch::new(host.clone(), epoch, trains, watched);
+    let mut watch = RuntimeWatch::new(host.clone(), epoch, trains, watched);
     let mut lost_root = None;
     watch.until_stopped(&stop, || {
         watchdog.round(Instant::now());
@@ -232,7 +232,7 @@ fn plan_shadow(
         for channel in channels {
             channel.exchange = Some(Arc::clone(&exchange));
             let indices = channel.pipelines.iter().map(|(it, _)| it.snapshot().pipeline_index);
-            placed.extend(indices.map(|index| Placed {
+            placed.extend(indices.map(|index| PlacedPipeline {
                 settings: config.pipelines[index as usize].clone(),
                 index,
                 seat: channel.index,
@@ -315,9 +315,11 @@ fn start_keeper(
     let (directory, stored) = (state.directory, state.stored);
     std::thread::Builder::new()
         .name("state".into())
-        .spawn(move || match Keeper::new(&config, (directory, interval), &host, stored, stop) {
-            Ok(mut keeper) => keeper.run(),
-            Err(error) => warn!("no state is kept: {error}"),
+        .spawn(move || {
+            match StateKeeper::new(&config, (directory, interval), &host, stored, stop) {
+                Ok(mut keeper) => keeper.run(),
+                Err(error) => warn!("no state is kept: {error}"),
+            }
         })
         .map_err(|source| RunError::System { what: "state thread", source })
 }

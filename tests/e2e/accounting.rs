@@ -9,7 +9,7 @@ use dynocar::config::is_slow;
 use dynocar_analysis::identify::default_estimators;
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_transport::Host;
 use dynocar_transport::channel::SampleCount;
 use rustix::process::Signal;
@@ -19,7 +19,7 @@ const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 const TRAIN: TrainId = TrainId(1);
 
-fn daemon(site: &Site, pipelines: &str) -> Process {
+fn daemon(site: &DaemonSite, pipelines: &str) -> Process {
     let config = site.write_config(1, "", pipelines);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);
     daemon.await_error("serving");
@@ -69,7 +69,7 @@ fn await_accounts(reader: &mut SnapshotReader, pipelines: usize, offered: u64, d
 
 #[test]
 fn a_burst_to_a_fresh_daemon_is_counted_by_every_pipeline() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (text, pipelines) = all_pipelines();
     let mut publisher = SamplePublisher::open(&site.host(), TRAIN).unwrap();
     // Samples that no daemon could see are in no account.
@@ -82,7 +82,7 @@ fn a_burst_to_a_fresh_daemon_is_counted_by_every_pipeline() {
 
 #[test]
 fn a_close_waits_until_every_pipeline_has_taken_what_is_on_its_way() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let mut daemon = daemon(&site, ECHO);
     let mut reader = SnapshotReader::open(&site.host(), TRAIN).unwrap();
     for round in 1..=5 {
@@ -102,7 +102,7 @@ fn a_close_waits_until_every_pipeline_has_taken_what_is_on_its_way() {
 
 #[test]
 fn what_a_close_gives_up_is_counted_as_lost() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = daemon(&site, ECHO);
     let mut reader = SnapshotReader::open(&site.host(), TRAIN).unwrap();
     let mut offered = 0;
@@ -120,7 +120,7 @@ fn what_a_close_gives_up_is_counted_as_lost() {
 
 #[test]
 fn a_controller_that_was_killed_leaves_no_sample_uncounted() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = daemon(&site, ECHO);
     let mut reader = SnapshotReader::open(&site.host(), TRAIN).unwrap();
     let count = SampleCount::open(&site.host(), TRAIN).unwrap();
@@ -159,7 +159,7 @@ fn counted_from(it: &ParameterSnapshot) -> u64 {
 
 #[test]
 fn a_restarted_daemon_counts_every_sample_from_the_one_it_could_have_seen() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (text, pipelines) = all_pipelines();
     let count = SampleCount::open(&site.host(), TRAIN).unwrap();
     for rate_hz in [5_000, 20_000] {

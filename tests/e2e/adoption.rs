@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use dynocar::dataset;
-use dynocar::models::decision::Choice;
+use dynocar::models::decision::ModelChoice;
 use dynocar::models::{
-    ModelHash, ModelText, Moment, NewDecision, NewModel, Origin, Store, TrainModels,
+    ModelHash, ModelText, NewDecision, NewModel, Origin, Store, TrainModels, UtcSecond,
 };
 use dynocar::replay::{Rate, ReplayReport, Replayer};
 use dynocar::shadow::record;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_client::SnapshotReader;
 use dynocar_shared::{ParameterSnapshot, Status, TrainId};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_transport::monotonic_now_ns;
 use rustix::process::Signal;
 
@@ -29,7 +29,7 @@ fn demo_folder() -> PathBuf {
 
 /// A demo's train with a store of models.
 struct Cast {
-    site: Site,
+    site: DaemonSite,
     dataset: Dataset,
     /// The train's file, declared with one a.
     train: String,
@@ -40,7 +40,7 @@ impl Cast {
     fn new(declared: &str) -> Self {
         let text = |file: &str| std::fs::read_to_string(demo_folder().join(file)).expect("a file");
         let (train, track) = (text("train.toml").replace(RIGHT, declared), text("track.toml"));
-        let site = Site::new();
+        let site = DaemonSite::new();
         site.write("train.toml", &train);
         site.write("track.toml", &track);
         std::fs::create_dir(site.path().join("models")).expect("a store");
@@ -77,14 +77,14 @@ impl Cast {
     fn put(&self, declared: &str, a: &str) -> ModelHash {
         let text = |train: String| ModelText { train, track: Some(self.track.clone()) };
         let parent = Some(text(self.train.clone()).hash());
-        let origin = Origin::written("Another a.", parent, Moment::of(SystemTime::now()));
+        let origin = Origin::written("Another a.", parent, UtcSecond::of(SystemTime::now()));
         let text = text(self.train.replace(declared, a));
         let new = NewModel { text, origin, answer_json: None, report_html: None };
         self.models().put(&new).expect("a model is put")
     }
 
-    fn decide(&self, what: Choice) {
-        let at = Moment::of(SystemTime::now());
+    fn decide(&self, what: ModelChoice) {
+        let at = UtcSecond::of(SystemTime::now());
         let new = NewDecision { what, by: "test".into(), reason: String::new(), at };
         self.models().decide(&new).expect("a decision");
     }
@@ -135,7 +135,7 @@ fn an_adopted_model_goes_to_work_at_standstill_without_a_lost_sample_and_so_does
     daemon.await_error("on trial");
     let driven = cast.drive();
     assert!(driven.snapshots.iter().all(|it| it.model_hash == declared.0));
-    cast.decide(Choice::Adopt(better));
+    cast.decide(ModelChoice::Adopt(better));
     let changed = cast.snapshots_of(better);
     // On a busy machine samples may be lost while it drives; the change loses none.
     let (offered, before_change) = (driven.published, accounted(&driven.snapshots));
@@ -153,7 +153,7 @@ fn an_adopted_model_goes_to_work_at_standstill_without_a_lost_sample_and_so_does
     let driven = cast.drive();
     let before_rollback = accounted(&driven.snapshots);
     assert!(before_rollback.iter().all(|it| it.0 == 2 * offered), "{before_rollback:?}");
-    cast.decide(Choice::RollBack);
+    cast.decide(ModelChoice::RollBack);
     let back = cast.snapshots_of(declared);
     assert_eq!(accounted(&back), before_rollback);
     let changes = || daemon.errors().matches("in force from now on").count();
@@ -168,7 +168,7 @@ fn decided_by_rule(declared: &str, rival: &str, adopted_by_hand: bool) {
     let rival = cast.put(declared, rival);
     daemon.await_error("on trial");
     if adopted_by_hand {
-        cast.decide(Choice::Adopt(rival));
+        cast.decide(ModelChoice::Adopt(rival));
         cast.snapshots_of(rival);
     }
     let wanted = if adopted_by_hand { None } else { Some(rival) };
@@ -189,7 +189,7 @@ fn decided_by_rule(declared: &str, rival: &str, adopted_by_hand: bool) {
     let log = stop(daemon);
     assert!(log.contains("decided by rule"), "{log}");
     // The measurements are there for the next daemon.
-    let record = record::Trials::read(cast.models().folder());
+    let record = record::TrialRecord::read(cast.models().folder());
     let error = |model| record.of(model).and_then(|it| it.error_mps).unwrap();
     let (better, worse) = if adopted_by_hand { (declared, rival) } else { (rival, declared) };
     assert!(error(better) < 0.5 * error(worse), "{} {}", error(better), error(worse));
@@ -221,7 +221,7 @@ fn not_adopted(rule: &str, expected: &str) {
     assert_eq!(cast.models().in_force().unwrap(), None);
     if rule.contains("bounds") {
         // Nor by a person.
-        cast.decide(Choice::Adopt(better));
+        cast.decide(ModelChoice::Adopt(better));
         daemon.await_error("what was decided is not done");
         stop(daemon);
         let daemon = cast.daemon(&format!("trips_between_mistakes = 20\n{rule}"));
@@ -249,8 +249,8 @@ fn a_daemon_killed_at_any_moment_of_a_change_serves_what_was_decided() {
     for round in 0..6_u32 {
         let daemon = cast.daemon("");
         let (what, expected) = match round % 2 {
-            0 => (Choice::Adopt(better), better),
-            _ => (Choice::RollBack, declared),
+            0 => (ModelChoice::Adopt(better), better),
+            _ => (ModelChoice::RollBack, declared),
         };
         daemon.await_error("models are tried");
         cast.decide(what);
@@ -268,7 +268,7 @@ fn a_store_that_cannot_be_read_leaves_the_declared_model_in_force() {
     let cast = Cast::new(RIGHT);
     let declared = ModelText { train: cast.train.clone(), track: Some(cast.track.clone()) }.hash();
     let other = cast.put(RIGHT, WRONG);
-    cast.decide(Choice::Adopt(other));
+    cast.decide(ModelChoice::Adopt(other));
     let file = cast.models().folder().join(other.to_string()).join("train.toml");
     std::fs::write(&file, "[train]\n").unwrap();
     let daemon = cast.daemon("");

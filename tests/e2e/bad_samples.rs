@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use dynocar_tests::estimators::frugal_estimators;
 use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
-use dynocar_tests::soak::bad_samples::{Scene, Tally};
+use dynocar_tests::soak::bad_samples::{SoakScene, SoakTally};
 
 /// The estimators that fit motion to the forces sample by sample.
 const BY_SINGLE_FORCES: [&str; 3] = ["trajectory_kalman", "trajectory_newton", "mass_kalman"];
@@ -13,7 +13,7 @@ const BY_SINGLE_FORCES: [&str; 3] = ["trajectory_kalman", "trajectory_newton", "
 #[test]
 fn bad_samples_are_refused_or_survived_counted_and_never_trusted() {
     let scenes = [(1, TrainType::Freight), (2, TrainType::Regional)]
-        .map(|(seed, train_type)| Scene::new(seed, train_type).before(frugal_estimators()));
+        .map(|(seed, train_type)| SoakScene::new(seed, train_type).before(frugal_estimators()));
     let cases: Vec<(usize, SensorFailure, f64)> = (0..scenes.len())
         .flat_map(|scene| {
             // Half of all samples in the first scene, one of three smaller rates in the second.
@@ -43,15 +43,15 @@ fn bad_samples_are_refused_or_survived_counted_and_never_trusted() {
 
 #[test]
 fn good_samples_mislead_nobody() {
-    let misled = Scene::new(2, TrainType::Regional).run(None, 0.0, 0);
+    let misled = SoakScene::new(2, TrainType::Regional).run(None, 0.0, 0);
     assert!(misled.is_empty(), "{misled:#?}");
 }
 
 /// Looks every 40 s of three estimators over scenes of all trains, summed over plausible failures
 /// of their speeds and forces at a rate.
-fn tally_at(scenes: &[Scene], rate: f64) -> Tally {
+fn tally_at(scenes: &[SoakScene], rate: f64) -> SoakTally {
     use SensorFailure::{Frozen, Quantised, Saturated, SignFlip, Spikes, Thousandfold};
-    let mut tally = Tally::default();
+    let mut tally = SoakTally::default();
     for (seed, scene) in (1..).zip(scenes) {
         for failure in [Frozen, Quantised, Saturated, SignFlip, Spikes, Thousandfold] {
             let is_wanted = |kind: &str| BY_SINGLE_FORCES.contains(&kind);
@@ -67,11 +67,11 @@ fn tally_at(scenes: &[Scene], rate: f64) -> Tally {
 
 #[test]
 fn plausible_wrong_forces_mislead_no_estimator_that_fits_motion_to_them() {
-    let scenes: Vec<Scene> = (201..)
+    let scenes: Vec<SoakScene> = (201..)
         .zip(TrainType::ALL.into_iter().cycle().take(4))
-        .map(|(seed, train_type)| Scene::new(seed, train_type))
+        .map(|(seed, train_type)| SoakScene::new(seed, train_type))
         .collect();
-    let mut all = Tally::default();
+    let mut all = SoakTally::default();
     let mut trusted_shares = Vec::new();
     for rate in [0.001, 0.01, 0.03, 0.1, 0.25, 0.5] {
         let tally = tally_at(&scenes, rate);

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::{Command, Output};
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use serde_json::Value;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -48,8 +48,8 @@ fn recording(handle: f64, slides: bool) -> String {
     text
 }
 
-fn site(handle: f64, slides: bool, train: &str) -> Site {
-    let site = Site::new();
+fn site(handle: f64, slides: bool, train: &str) -> DaemonSite {
+    let site = DaemonSite::new();
     let manifest = "[dataset]\nname = \"brake\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
         time = { column = \"t\", unit = \"s\" }\nspeed = { column = \"v\", unit = \"m/s\" }\n\
         brake_handle = { column = \"b\", unit = \"1\" }\nwheel_slide = { column = \"s\", unit = \"1\" }\n\

@@ -7,7 +7,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use serde_json::Value;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -36,7 +36,7 @@ fn run() -> String {
     text
 }
 
-fn dataset(site: &Site, manifest: &str, run: &[u8]) -> String {
+fn dataset(site: &DaemonSite, manifest: &str, run: &[u8]) -> String {
     site.write("dataset.toml", manifest);
     site.write("train.toml", TRAIN);
     std::fs::write(site.path().join("1.csv"), run).unwrap();
@@ -44,7 +44,7 @@ fn dataset(site: &Site, manifest: &str, run: &[u8]) -> String {
 }
 
 /// Standard error of a command that must end with status 2 within the watchdog's time.
-fn refusal(site: &Site, arguments: &[&str]) -> String {
+fn refusal(site: &DaemonSite, arguments: &[&str]) -> String {
     let mut process = site.start(DYNOCAR, arguments);
     let status = process.wait();
     assert_eq!(status.code(), Some(2), "{arguments:?}: {}", process.errors());
@@ -57,7 +57,7 @@ fn finished(arguments: &[&OsStr]) -> Output {
 
 #[test]
 fn a_pipe_or_device_in_the_place_of_a_file_is_refused_by_every_command() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = dataset(&site, MANIFEST, b"");
     let (run, manifest) = (site.path().join("1.csv"), site.path().join("dataset.toml"));
     std::fs::remove_file(&run).unwrap();
@@ -93,7 +93,7 @@ fn a_pipe_or_device_in_the_place_of_a_file_is_refused_by_every_command() {
 
 #[test]
 fn a_file_of_another_format_is_named_with_what_to_do() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let utf16: Vec<u8> = run().encode_utf16().flat_map(u16::to_le_bytes).collect();
     let with_mark = [&[0xff, 0xfe], &utf16[..]].concat();
     let cases: [(&[u8], &str); 6] = [
@@ -116,7 +116,7 @@ fn a_file_of_another_format_is_named_with_what_to_do() {
 
 #[test]
 fn a_file_longer_than_memory_is_refused_before_it_is_read() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = dataset(&site, MANIFEST, run().as_bytes());
     let file = std::fs::OpenOptions::new().write(true).open(site.path().join("1.csv")).unwrap();
     file.set_len(1 << 40).unwrap();
@@ -129,7 +129,7 @@ fn a_file_longer_than_memory_is_refused_before_it_is_read() {
 
 #[test]
 fn what_is_no_dataset_is_named_by_every_command_that_wants_one() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     dataset(&site, MANIFEST, run().as_bytes());
     let at = |name: &str| site.path().join(name).display().to_string();
     for verb in ["identify", "explain", "replay"] {
@@ -145,7 +145,7 @@ fn what_is_no_dataset_is_named_by_every_command_that_wants_one() {
 
 #[test]
 fn a_recording_that_lacks_what_makes_a_run_is_refused_by_every_command() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let one_column_is = |column: usize, value: &str| {
         let mut text = String::new();
         for (row, line) in run().lines().enumerate() {
@@ -186,7 +186,7 @@ fn a_recording_that_lacks_what_makes_a_run_is_refused_by_every_command() {
 
 #[test]
 fn common_spellings_of_one_recording_give_one_answer() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let plain = run();
     let quoted: String = plain
         .lines()
@@ -220,7 +220,7 @@ fn common_spellings_of_one_recording_give_one_answer() {
 
 #[test]
 fn a_lone_run_is_reported_as_one_of_which_nothing_was_scored_everywhere() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = dataset(&site, MANIFEST, run().as_bytes());
     let (json, page) = (site.path().join("a.json"), site.path().join("a.html"));
     let arguments =
@@ -242,7 +242,7 @@ fn a_lone_run_is_reported_as_one_of_which_nothing_was_scored_everywhere() {
 
 #[test]
 fn a_dataset_of_holdout_runs_only_is_called_so() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = dataset(&site, &format!("{MANIFEST}role = \"holdout\"\n"), run().as_bytes());
     let output = finished(&["explain", &folder].map(OsStr::new));
     let printed = String::from_utf8(output.stdout).unwrap();
@@ -251,7 +251,7 @@ fn a_dataset_of_holdout_runs_only_is_called_so() {
 
 #[test]
 fn paths_that_are_no_text_work_for_input_and_results() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = site.path().join(OsStr::from_bytes(b"gr\xf6\xdfe"));
     std::fs::create_dir(&folder).unwrap();
     for (name, text) in [("dataset.toml", MANIFEST), ("train.toml", TRAIN), ("1.csv", &run())] {
@@ -269,7 +269,7 @@ fn paths_that_are_no_text_work_for_input_and_results() {
 
 #[test]
 fn rights_that_are_lacking_are_reported_in_words() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = dataset(&site, MANIFEST, run().as_bytes());
     let without_privileges = |arguments: &[&str]| {
         let mut command = Command::new(DYNOCAR);
@@ -303,7 +303,7 @@ fn rights_that_are_lacking_are_reported_in_words() {
 
 #[test]
 fn holdout_runs_of_one_name_in_different_folders_each_keep_their_predictions() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let holdout = "[[runs]]\nfile = \"a/1.csv\"\nrole = \"holdout\"\n\
                    [[runs]]\nfile = \"b/1.csv\"\nrole = \"holdout\"\n";
     let folder = dataset(&site, &format!("{MANIFEST}{holdout}"), run().as_bytes());

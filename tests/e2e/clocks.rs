@@ -12,7 +12,7 @@ use dynocar_client::{Host, SamplePublisher, SnapshotReader};
 use dynocar_mcap::copying::recover;
 use dynocar_mcap::recording::Recording;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_tests::soak::day::strange_host::StrangeHost;
 use dynocar_transport::monotonic_now_ns;
 use rustix::process::Signal;
@@ -63,7 +63,7 @@ struct Ring {
 }
 
 impl Ring {
-    fn start(&self, site: &Site) -> Process {
+    fn start(&self, site: &DaemonSite) -> Process {
         let folder = self.folder.to_str().unwrap();
         let limits = ["--before-s", "3600", "--after-s", "10", "--train", "1", "--ring-mib", "15"];
         let arguments = [&["flight-recorder", folder][..], &limits].concat();
@@ -85,7 +85,7 @@ impl Ring {
     }
 
     /// Asks to keep this moment; returns the one event that was not there before.
-    fn keep(&self, site: &Site) -> PathBuf {
+    fn keep(&self, site: &DaemonSite) -> PathBuf {
         let before = self.events();
         let mut keep = site.start(RECORDING, &["keep", self.folder.to_str().unwrap()]);
         assert!(keep.wait().success(), "{}", keep.errors());
@@ -122,7 +122,7 @@ fn names(files: &[PathBuf]) -> Vec<String> {
 }
 
 /// The numbers of the samples in files that belong together.
-fn sequences(site: &Site, files: &[PathBuf]) -> Vec<u64> {
+fn sequences(site: &DaemonSite, files: &[PathBuf]) -> Vec<u64> {
     let whole = site.path().join("whole.mcap");
     let _ = std::fs::remove_file(&whole);
     recover(files, &whole).unwrap();
@@ -131,7 +131,7 @@ fn sequences(site: &Site, files: &[PathBuf]) -> Vec<u64> {
 
 #[test]
 fn a_ring_loses_nothing_and_an_event_ends_whatever_the_wall_clock_does() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let ring = Ring {
         folder: site.path().join("ring"),
         strange: StrangeHost::new(site.path(), site.path()),
@@ -201,7 +201,7 @@ fn a_daemon_serves_and_its_state_is_taken_up_whatever_the_wall_clock_does() {
 }
 
 /// Samples that a pipeline used or rejected, and lost ones.
-fn count(site: &Site) -> (u64, u64) {
+fn count(site: &DaemonSite) -> (u64, u64) {
     let mut reader = SnapshotReader::open(&site.host(), TRAIN).unwrap();
     let mut counts = None;
     await_true(

@@ -2,14 +2,14 @@
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_transport::{Announcement, Role};
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 
-fn daemon(site: &Site, daemon_lines: &str, pipelines: &str) -> Process {
+fn daemon(site: &DaemonSite, daemon_lines: &str, pipelines: &str) -> Process {
     let config = site.write_config(1, daemon_lines, pipelines);
     site.start(DYNOCAR, &["run", "--config", config.to_str().expect("a UTF-8 path")])
 }
@@ -17,7 +17,7 @@ fn daemon(site: &Site, daemon_lines: &str, pipelines: &str) -> Process {
 #[test]
 fn sigterm_and_sigint_stop_the_daemon_cleanly() {
     for signal in [Signal::TERM, Signal::INT] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let mut daemon = daemon(&site, "", ECHO);
         daemon.await_error("serving");
         daemon.signal(signal);
@@ -29,7 +29,7 @@ fn sigterm_and_sigint_stop_the_daemon_cleanly() {
 #[test]
 fn every_idle_strategy_serves() {
     for idle in ["busy", "adaptive", "event"] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let daemon = daemon(&site, &format!("idle = \"{idle}\""), ECHO);
         daemon.await_error("serving");
         let host = site.host();
@@ -54,7 +54,7 @@ fn every_idle_strategy_serves() {
 #[test]
 fn a_sample_published_as_soon_as_the_first_snapshot_is_there_is_not_lost() {
     const PIPELINES: usize = 32;
-    let site = Site::new();
+    let site = DaemonSite::new();
     let host = site.host();
     let mut publisher = SamplePublisher::open(&host, TrainId(1)).unwrap();
     let mut reader = SnapshotReader::open(&host, TrainId(1)).unwrap();
@@ -83,7 +83,7 @@ fn a_sample_published_as_soon_as_the_first_snapshot_is_there_is_not_lost() {
 
 #[test]
 fn a_second_daemon_on_a_train_refuses_in_words() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let first = daemon(&site, "", ECHO);
     first.await_error("serving");
     let mut second = daemon(&site, "", ECHO);
@@ -94,7 +94,7 @@ fn a_second_daemon_on_a_train_refuses_in_words() {
 
 #[test]
 fn a_controller_of_another_schema_is_named_in_the_log() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let ours = Announcement::of_this_process(Role::Controller);
     let path = site.host().trains_directory().join("1.controller");
     let text = format!(
@@ -140,7 +140,7 @@ fn a_wrong_configuration_is_refused_with_key_value_and_range() {
         ),
     ];
     for (daemon_lines, pipelines, expected) in cases {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let mut daemon = daemon(&site, daemon_lines, pipelines);
         assert_eq!(daemon.wait().code(), Some(2), "{}", daemon.errors());
         let message = daemon.errors();
@@ -152,7 +152,7 @@ fn a_wrong_configuration_is_refused_with_key_value_and_range() {
 #[test]
 fn several_trains_on_one_thread_are_kept_apart() {
     const TRAINS: u64 = 5;
-    let site = Site::new();
+    let site = DaemonSite::new();
     let pipelines = "[[threads]]\nname = \"all\"\n\
                      [[pipelines]]\nkind = \"echo\"\nname = \"one\"\nthread = \"all\"\n\
                      [[pipelines]]\nkind = \"echo\"\nname = \"two\"\nthread = \"all\"\ntrains = [2, 4]\n";

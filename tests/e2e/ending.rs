@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
-use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::reading::{FileEnding, read};
 use dynocar_mcap::recording::Recording;
 use dynocar_shared::TrainId;
-use dynocar_tests::process::{Process, Site, Terminal, Tie, await_true};
+use dynocar_tests::process::{DaemonSite, Process, Terminal, Tie, await_true};
 use dynocar_transport::{Peer, Role};
 use rustix::process::Signal;
 
@@ -42,14 +42,14 @@ const ENDS: [End; 6] = [
 
 /// A program at work on a site of its own, beside a controller.
 struct TestSite {
-    site: Site,
+    site: DaemonSite,
     controller: Process,
     port: u16,
 }
 
 impl TestSite {
     fn new() -> Self {
-        let site = Site::new();
+        let site = DaemonSite::new();
         site.write_config(1, "", "[[pipelines]]\nkind = \"mass_kalman\"\n");
         std::fs::create_dir(site.path().join("runs")).unwrap();
         let controller = site.start(PEER, &["controller", "1", "5000"]);
@@ -134,7 +134,7 @@ fn has_samples(file: &Path) -> bool {
 
 fn assert_whole(file: &Path) {
     let mut recording = Recording::default();
-    assert_eq!(read(file, &mut recording).unwrap(), Ending::Whole, "{}", file.display());
+    assert_eq!(read(file, &mut recording).unwrap(), FileEnding::Whole, "{}", file.display());
     assert!(!recording.samples.is_empty(), "{}", file.display());
 }
 
@@ -207,7 +207,7 @@ fn the_live_view_ends_by_signals_and_with_its_terminal() {
 }
 
 /// The screen or the lines of `dynocar watch` on a terminal, once they are there.
-fn watching(site: &Site, terminal: &mut Terminal, tie: Tie, arguments: &[&str]) -> Process {
+fn watching(site: &DaemonSite, terminal: &mut Terminal, tie: Tie, arguments: &[&str]) -> Process {
     let process = terminal.start(site.command(WATCH, arguments), tie);
     // A screen is drawn by cells: words may stand apart.
     terminal.see(if arguments.is_empty() { "quit" } else { "no daemon serves any train" });
@@ -217,7 +217,7 @@ fn watching(site: &Site, terminal: &mut Terminal, tie: Tie, arguments: &[&str]) 
 #[test]
 fn a_watcher_ends_by_signals_and_with_its_terminal_as_screen_and_as_lines() {
     for arguments in [&[][..], &["--plain"]] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         for signal in [Signal::TERM, Signal::HUP, Signal::INT] {
             let mut terminal = Terminal::open();
             let mut watch = watching(&site, &mut terminal, Tie::Leader, arguments);
@@ -238,14 +238,14 @@ fn a_watcher_ends_by_signals_and_with_its_terminal_as_screen_and_as_lines() {
 
 #[test]
 fn a_watcher_whose_lines_nobody_reads_any_more_ends() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let mut watch = site.start_into(WATCH, &[], [closed_pipe(), closed_pipe()]);
     assert_eq!(watch.wait().code(), Some(0));
 }
 
 #[test]
 fn a_watcher_ends_though_its_terminal_takes_nothing_more() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     for arguments in [&[][..], &["--plain"]] {
         let mut terminal = Terminal::open();
         let mut watch = watching(&site, &mut terminal, Tie::Leader, arguments);

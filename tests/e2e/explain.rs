@@ -13,7 +13,8 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrainType, Unlisted, simulate,
+    EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrainType, TrueEffect, Unlisted,
+    simulate,
 };
 use dynocar_workshop::updated::write_updated;
 
@@ -71,7 +72,7 @@ fn a_curve_resistance_is_found_and_the_updated_files_leave_nothing() {
     let answer = &explanation.answer;
     assert_eq!(answer.verdict, Verdict::Effect, "{}", answer.statement);
     assert_eq!(answer.effects[0].kind, "curve_resistance");
-    let [Effect::CurveResistance { k_n_per_kn_m: truth }] = simulated.effects[..] else {
+    let [TrueEffect::CurveResistance { k_n_per_kn_m: truth }] = simulated.effects[..] else {
         panic!("the simulator was asked for a curve resistance");
     };
     let ParameterValue::Number(found) = answer.effects[0].parameters["k_n_per_kn_m"] else {
@@ -115,7 +116,7 @@ fn a_dragging_brake_is_found_in_its_runs_from_its_onset() {
     let Explained { simulated, explanation } = explained_once(EffectKind::DraggingBrake);
     let effect = &explanation.answer.effects[0];
     assert_eq!(effect.kind, "dragging_brake", "{}", explanation.answer.statement);
-    let [Effect::DraggingBrake { ref windows, .. }] = simulated.effects[..] else {
+    let [TrueEffect::DraggingBrake { ref windows, .. }] = simulated.effects[..] else {
         panic!("the simulator was asked for a dragging brake");
     };
     let found = effect.place.windows.as_ref().expect("windows");
@@ -132,7 +133,7 @@ fn the_intervals_of_the_ends_of_places_hold_the_true_ends() {
     for seed in SEED..SEED + 6 {
         let kinds = EffectRequest::Kinds(vec![EffectKind::LocalResistance]);
         let simulated = simulate(&SimulatorSettings::new(seed, kinds));
-        let Effect::LocalResistance { intervals_m: truth, .. } = &simulated.effects[0] else {
+        let TrueEffect::LocalResistance { intervals_m: truth, .. } = &simulated.effects[0] else {
             panic!("the simulator was asked for a local resistance");
         };
         let folder = tempfile::tempdir().unwrap();
@@ -165,7 +166,7 @@ fn an_effect_outside_the_library_is_called_unknown_and_placed() {
     let Explained { simulated, explanation } = explained_once(EffectKind::Unknown);
     let answer = &explanation.answer;
     assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
-    let [Effect::Unlisted(Unlisted { law: Law::Band { centre_mps, .. }, .. })] =
+    let [TrueEffect::Unlisted(Unlisted { law: Law::Band { centre_mps, .. }, .. })] =
         simulated.effects[..]
     else {
         panic!("the simulator was asked for something unknown");
@@ -179,7 +180,7 @@ fn an_effect_outside_the_library_is_called_unknown_and_placed() {
 fn a_slow_trains_force_is_unknown_and_swallowed_by_no_impossible_resistance() {
     let folder = tempfile::tempdir().unwrap();
     let law = Law::Slow { below_mps: 15.0, least_mps: 3.0 };
-    let slow = Effect::Unlisted(Unlisted { law, n_per_kn: 1.0 });
+    let slow = TrueEffect::Unlisted(Unlisted { law, n_per_kn: 1.0 });
     let simulated = simulate(&SimulatorSettings::new(SEED, EffectRequest::Exactly(vec![slow])));
     let answer = explained(&simulated, folder.path()).answer;
     assert_eq!(answer.verdict, Verdict::Unknown, "{}", answer.statement);
@@ -193,7 +194,7 @@ fn a_slow_trains_force_is_unknown_and_swallowed_by_no_impossible_resistance() {
 fn a_force_outside_the_library_gets_its_form_and_goes_into_the_updated_model() {
     let folder = tempfile::tempdir().unwrap();
     let law = Law::Slow { below_mps: 15.0, least_mps: 3.0 };
-    let slow = Effect::Unlisted(Unlisted { law, n_per_kn: 1.2 });
+    let slow = TrueEffect::Unlisted(Unlisted { law, n_per_kn: 1.2 });
     let settings = SimulatorSettings {
         train_type: Some(TrainType::Regional),
         ..SimulatorSettings::new(SEED, EffectRequest::Exactly(vec![slow]))
@@ -232,7 +233,7 @@ fn a_force_outside_the_library_gets_its_form_and_goes_into_the_updated_model() {
 fn nothing_at_a_bound_of_what_is_looked_for_is_found() {
     let folder = tempfile::tempdir().unwrap();
     // No train is so: what asks for it is something else.
-    let beyond = Effect::RotatingMass { rotating_mass_factor: 0.6 };
+    let beyond = TrueEffect::RotatingMass { rotating_mass_factor: 0.6 };
     let settings = SimulatorSettings {
         runs: 4,
         holdout_runs: 1,
@@ -265,7 +266,7 @@ fn a_tunnel_that_the_map_lacks_is_named_alone_or_next_to_a_resistance_there() {
 #[test]
 fn a_place_in_one_run_is_found_with_its_time_and_may_be_a_brake() {
     let folder = tempfile::tempdir().unwrap();
-    let two_runs = |effects: Vec<Effect>| SimulatorSettings {
+    let two_runs = |effects: Vec<TrueEffect>| SimulatorSettings {
         runs: 2,
         holdout_runs: 1,
         train_type: Some(TrainType::Freight),
@@ -274,7 +275,7 @@ fn a_place_in_one_run_is_found_with_its_time_and_may_be_a_brake() {
     let declared = simulate(&two_runs(Vec::new()));
     let fitted = declared.runs.iter().find(|run| !run.plan.is_holdout).expect("a run to fit");
     let middle_m = fitted.states[fitted.states.len() / 2].position_m.round();
-    let place = Effect::LocalResistance {
+    let place = TrueEffect::LocalResistance {
         extra_n_per_kn: 3.0,
         intervals_m: vec![(middle_m - 1000.0, middle_m + 1000.0)],
         runs: Vec::new(),
@@ -293,7 +294,7 @@ fn an_effect_that_predicts_the_runs_held_out_worse_is_reported_as_that() {
     let declared = simulate(&SimulatorSettings::new(SEED, EffectRequest::none()));
     let fitted = declared.runs.iter().filter(|run| !run.plan.is_holdout);
     // A brush that hangs into the line on the days of the fit runs, and on no other.
-    let place = Effect::LocalResistance {
+    let place = TrueEffect::LocalResistance {
         extra_n_per_kn: 2.0,
         intervals_m: vec![(4000.0, 8000.0)],
         runs: fitted.map(|run| run.plan.number).collect(),

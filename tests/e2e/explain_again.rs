@@ -4,10 +4,10 @@ use std::path::Path;
 
 use dynocar::dataset::{load, open};
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
-    Defects, Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    Defects, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, TrueEffect, simulate,
 };
 
 use super::commands::{dynocar, said};
@@ -40,7 +40,7 @@ fn shown_command(words: &str) -> Vec<String> {
 }
 
 /// A poor recording of places that resist in every run, on a line that nobody wrote down.
-fn recorded(site: &Site) {
+fn recorded(site: &DaemonSite) {
     let settings = |seed| SimulatorSettings {
         train_type: Some(TrainType::Regional),
         is_level_and_straight: true,
@@ -48,7 +48,7 @@ fn recorded(site: &Site) {
         ..SimulatorSettings::new(seed, EffectRequest::Kinds(vec![EffectKind::LocalResistance]))
     };
     let is_in_every_run = |simulated: &SimulatedDataset| match &simulated.effects[..] {
-        [Effect::LocalResistance { runs, .. }] => runs.is_empty(),
+        [TrueEffect::LocalResistance { runs, .. }] => runs.is_empty(),
         _ => false,
     };
     let mut drawn = (SEED..).map(|seed| simulate(&settings(seed)));
@@ -60,7 +60,7 @@ fn recorded(site: &Site) {
 
 #[test]
 fn a_place_that_resists_is_explained_once_where_no_line_was_declared() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     recorded(&site);
     let first = dynocar(&site, &["explain", "day", "--grown", "found/grown", "--json", "a.json"]);
     let words = said(&first);
@@ -90,7 +90,7 @@ fn a_place_that_resists_is_explained_once_where_no_line_was_declared() {
 
 #[test]
 fn an_updated_dataset_names_runs_and_ways_where_they_lie_and_forgets_an_older_line() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo");
     let old = "# Grown from track.toml of dataset.toml by `dynocar explain`.\n[track]\n";
     std::fs::create_dir_all(site.path().join("grown")).unwrap();

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_tests::soak::{Programs, faults};
 use rustix::process::Signal;
 
@@ -14,7 +14,7 @@ const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 const TRAIN: TrainId = TrainId(1);
 
-fn daemon(site: &Site) -> Process {
+fn daemon(site: &DaemonSite) -> Process {
     let config = site.write_config(1, "", ECHO);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);
     daemon.await_error("serving");
@@ -30,7 +30,7 @@ fn random_kills_stops_and_restarts_mislead_nobody_and_leave_nothing() {
 #[test]
 fn a_client_that_never_polls_and_a_controller_that_floods_hold_nobody_up() {
     const SAMPLES: u64 = 200_000;
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = daemon(&site);
     let _sleeping = site.start(PEER, &["client", "1", "3600000000"]);
     let host = site.host();
@@ -59,7 +59,7 @@ fn a_client_that_never_polls_and_a_controller_that_floods_hold_nobody_up() {
 #[test]
 fn a_stopped_daemon_holds_no_controller_up_and_catches_up_with_what_is_left() {
     const SAMPLES: u64 = 5_000;
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = daemon(&site);
     let host = site.host();
     let mut publisher = SamplePublisher::open(&host, TRAIN).unwrap();
@@ -93,7 +93,7 @@ fn a_stopped_daemon_holds_no_controller_up_and_catches_up_with_what_is_left() {
 
 #[test]
 fn what_dead_processes_of_another_directory_left_is_not_touched() {
-    let (ours, others) = (Site::new(), Site::new());
+    let (ours, others) = (DaemonSite::new(), DaemonSite::new());
     let other_client = others.start(PEER, &["client", "1", "5000"]);
     other_client.await_line("a first poll", |line| !line.is_empty());
     other_client.kill();
@@ -107,7 +107,7 @@ fn what_dead_processes_of_another_directory_left_is_not_touched() {
 
 #[test]
 fn a_directory_that_cannot_be_used_is_named_by_everybody() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", ECHO);
     let file = site.write("a-file", "");
     // Not even root can make a directory in /proc.
@@ -143,7 +143,7 @@ fn with_small_memory(size: &str, command: &str) -> Result<Command, String> {
 
 #[test]
 fn a_full_shared_memory_is_reported_in_words_and_ends_nobody_by_a_signal() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", ECHO);
     let daemon = format!("exec {DYNOCAR} run --config {}", config.display());
     let client = format!("exec {PEER} client 1 1000");

@@ -19,7 +19,7 @@ use dynocar_fmu::ffi::values::{fmi2GetReal, fmi2SetReal};
 use dynocar_fmu::variables::{Kind, Meaning, SnapshotField};
 use dynocar_fmu::{ESTIMATORS, INTERFACES};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 #[path = "fmu/plant.rs"]
 mod plant;
@@ -38,7 +38,7 @@ fn demo() -> PathBuf {
 }
 
 /// A copy of the demo's dataset with a brake gear.
-fn demo_with_brake_gear(site: &Site) -> PathBuf {
+fn demo_with_brake_gear(site: &DaemonSite) -> PathBuf {
     let folder = site.path().join("demo data #1");
     std::fs::create_dir_all(folder.join("runs")).unwrap();
     let runs = ["01", "02", "03", "06"].map(|number| format!("runs/{number}.csv"));
@@ -116,7 +116,7 @@ fn take_row(fmu: &Fmu, header: &[&str], (row, next): (&str, Option<&&str>)) {
 
 #[test]
 fn every_output_has_the_bits_of_the_pipelines_at_every_moment_looked_at() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = demo_with_brake_gear(&site);
     let folder_name = folder.to_str().unwrap();
     done(&site, &["fmu", "-o", "a.fmu", "--dataset", folder_name, "--inputs", "inputs"]);
@@ -148,7 +148,7 @@ fn every_output_has_the_bits_of_the_pipelines_at_every_moment_looked_at() {
 }
 
 /// Unpacks an FMU beside it, as a simulator does.
-fn unpacked(site: &Site, fmu: &str) -> PathBuf {
+fn unpacked(site: &DaemonSite, fmu: &str) -> PathBuf {
     let folder = site.path().join("unpacked #1");
     let file = std::fs::File::open(site.path().join(fmu)).unwrap();
     zip::ZipArchive::new(file).unwrap().extract(&folder).unwrap();
@@ -157,7 +157,7 @@ fn unpacked(site: &Site, fmu: &str) -> PathBuf {
 
 #[test]
 fn the_fmu_holds_what_the_standard_asks_for_and_is_the_same_twice() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let file = |name: &str| demo().join(name).display().to_string();
     let (train, track) = (file("train.toml"), file("track.toml"));
     for out in ["a.fmu", "b.fmu"] {
@@ -268,7 +268,7 @@ fn another_kind_or_another_release_of_an_fmu_is_refused_in_words() {
 
 #[test]
 fn a_library_that_is_not_there_or_another_is_refused_in_words() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     site.write("other.so", "\x7fELF and nothing else");
     let refusal = |library: &str, words: &str| {
         let output = dynocar(&site, &["fmu", "-o", "a.fmu", "--library", library]);
@@ -286,7 +286,7 @@ fn a_library_that_is_not_there_or_another_is_refused_in_words() {
 
 #[test]
 fn files_that_are_wrong_or_would_be_lost_are_refused_before_anything_is_written() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     site.write("train.toml", "[train]\nmass_t = -1\n");
     let refusal = |arguments: &[&str], words: &str| {
         let output = dynocar(&site, arguments);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dynocar::dataset::load;
 use dynocar_shared::SampleField;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 use crate::foreign_files::{DYNOCAR, described};
 
@@ -83,7 +83,7 @@ fn a_gradient_in_a_unit_that_its_name_hides_is_corrected_and_one_that_it_denies_
 }
 
 /// The estimated mass and its standard deviation in t.
-fn mass_t(site: &Site) -> (f64, f64) {
+fn mass_t(site: &DaemonSite) -> (f64, f64) {
     let at = |name: &str| site.path().join(name).display().to_string();
     let mut process = site.start(DYNOCAR, &["identify", &at("ds"), "--json", &at("a.json")]);
     assert!(process.wait().success(), "{}", process.errors());

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use dynocar::dataset::load;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::dataset::encoding::by_name;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 pub const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 pub const NAMES: [&str; 6] =
@@ -43,8 +43,8 @@ pub fn plain(row: u32, column: usize) -> String {
 pub fn described(
     files: &[(&str, &[u8])],
     more: &[&str],
-) -> (Site, Result<Dataset, String>, String) {
-    let site = Site::new();
+) -> (DaemonSite, Result<Dataset, String>, String) {
+    let site = DaemonSite::new();
     let mut arguments: Vec<String> =
         vec!["init".into(), site.path().join("ds").display().to_string(), "--csv".into()];
     for (name, bytes) in files {

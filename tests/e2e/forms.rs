@@ -2,25 +2,25 @@
 
 use dynocar_analysis::explain::answer::{ExplainAnswer, Verdict};
 use dynocar_analysis::explain::explain;
-use dynocar_model::terms::Entry;
-use dynocar_model::terms::extra::{Covariate, Extra, Form};
+use dynocar_model::terms::ModelEntry;
+use dynocar_model::terms::extra::{Covariate, ExtraResistance, Form};
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, Unlisted, simulate,
+    EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrueEffect, Unlisted, simulate,
 };
 
 /// A dataset with a force by a law drawn from the seed.
 fn simulated(seed: u64) -> (SimulatedDataset, Law) {
     let simulated = simulate(&SimulatorSettings::new(seed, EffectRequest::AnyLaw));
-    let [Effect::Unlisted(Unlisted { law, .. })] = simulated.effects[..] else {
+    let [TrueEffect::Unlisted(Unlisted { law, .. })] = simulated.effects[..] else {
         panic!("the simulator was asked for a law outside the library");
     };
     (simulated, law)
 }
 
 /// Returns the answer on a force that must be called unknown, and the error over the true model's.
-fn explained(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<Extra>, f64) {
+fn explained(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<ExtraResistance>, f64) {
     let dataset = read_files(&dataset_files(simulated));
     let explanation = explain(&dataset, &|_, _| {}).expect("usable runs");
     let answer = explanation.answer;
@@ -30,7 +30,7 @@ fn explained(simulated: &SimulatedDataset) -> (ExplainAnswer, Vec<Extra>, f64) {
         effect.entries(grown.effect_parameters(index)).expect("a form that files can hold")
     });
     let extra = entries.filter_map(|entry| match entry {
-        Entry::Extra(extra) => Some(extra),
+        ModelEntry::Extra(extra) => Some(extra),
         _ => None,
     });
     let left = answer.rmse_after.expect("runs are held out") / score(simulated).full_run.true_mps;
@@ -42,7 +42,9 @@ fn the_edge_of_a_force_is_reported_with_an_interval_and_a_whole_exponent_as_one(
     let (simulated, law) = simulated(51_007);
     let Law::FastLater { from_s, .. } = law else { panic!("{law:?}") };
     let (answer, extra, left) = explained(&simulated);
-    let [Extra { n_per_kn, factors }] = &extra[..] else { panic!("{}", answer.statement) };
+    let [ExtraResistance { n_per_kn, factors }] = &extra[..] else {
+        panic!("{}", answer.statement)
+    };
     let [speed, time] = factors[..] else { panic!("{}", answer.statement) };
     assert_eq!((speed.of, speed.form, speed.numbers[1]), (Covariate::Speed, Form::Power, 1.0));
     assert_eq!(time.of, Covariate::TimeSinceStart);
@@ -64,7 +66,7 @@ fn a_force_in_the_cold_is_reported_where_a_library_kind_runs_to_its_bound() {
     let (simulated, law) = simulated(41_014);
     assert!(matches!(law, Law::FastInCold { .. }), "{law:?}");
     let (answer, extra, left) = explained(&simulated);
-    let [Extra { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
+    let [ExtraResistance { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
     let of: Vec<Covariate> = factors.iter().map(|factor| factor.of).collect();
     assert_eq!(of, [Covariate::Speed, Covariate::Temperature], "{}", answer.statement);
     assert!(left < 1.3, "{left} of the true model's error");
@@ -75,7 +77,7 @@ fn a_force_that_rises_to_a_level_is_reported_though_no_basic_resistance_may_hold
     let (simulated, law) = simulated(51_006);
     assert!(matches!(law, Law::Levelling { .. }), "{law:?}");
     let (answer, extra, left) = explained(&simulated);
-    let [Extra { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
+    let [ExtraResistance { factors, .. }] = &extra[..] else { panic!("{}", answer.statement) };
     assert_eq!((factors[0].of, factors[0].form), (Covariate::Speed, Form::Rise));
     assert!(left < 1.2, "{left} of the true model's error");
 }

@@ -11,7 +11,7 @@ use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::identify::{default_estimators, published_samples, snapshot_after};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
 use dynocar_tests::golden::{self, Golden, TOLERANCE, without_stamps};
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const TRAIN: TrainId = TrainId(1);
@@ -62,7 +62,7 @@ fn the_golden_files_form_leads_back_to_the_same_bits() {
 /// The snapshot of `v_mils` after a replay to a daemon with these pipelines.
 fn online(dataset: &Dataset, rate: Rate, kinds: &[PipelineKind]) -> ParameterSnapshot {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
-    let site = Site::new();
+    let site = DaemonSite::new();
     for file in ["train.toml", "track.toml"] {
         site.write(file, &std::fs::read_to_string(folder.join(file)).expect("a demo file"));
     }

@@ -6,7 +6,7 @@ use dynocar_analysis::explain::explain;
 use dynocar_model::track::{LinearProfile, StepProfile};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
-use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, TrainType, simulate};
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrainType, TrueEffect, simulate};
 
 #[test]
 fn a_wrong_gradient_is_found_with_its_profile_and_ambiguous_where_all_runs_go_one_way() {
@@ -17,7 +17,7 @@ fn a_wrong_gradient_is_found_with_its_profile_and_ambiguous_where_all_runs_go_on
         holdout_runs: 4,
         ..SimulatorSettings::new(9001, EffectRequest::Kinds(vec![EffectKind::GradientError]))
     });
-    let [Effect::GradientError { profile }] = &simulated.effects[..] else {
+    let [TrueEffect::GradientError { profile }] = &simulated.effects[..] else {
         panic!("{:?}", simulated.effects)
     };
     let truth = LinearProfile::new(profile.clone()).expect("a profile");

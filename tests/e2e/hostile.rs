@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_tests::soak::hostile::{SegmentKind, vandalise};
 use rand::{RngExt, SeedableRng};
 
@@ -15,14 +15,14 @@ const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n[state]\ndirectory = \"state\"\n";
 
 struct Cast {
-    site: Site,
+    site: DaemonSite,
     daemon: Process,
     controller: Process,
     client: Process,
 }
 
 fn cast() -> Cast {
-    let site = Site::new();
+    let site = DaemonSite::new();
     std::fs::create_dir(site.path().join("state")).unwrap();
     let config = site.write_config(1, "", ECHO);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
@@ -38,7 +38,7 @@ fn used(line: &str) -> u64 {
     line.split(' ').nth(3).and_then(|word| word.parse().ok()).unwrap_or(0)
 }
 
-fn segment_paths(site: &Site) -> Vec<PathBuf> {
+fn segment_paths(site: &DaemonSite) -> Vec<PathBuf> {
     site.segments().into_iter().map(|name| Path::new("/dev/shm").join(name)).collect()
 }
 
@@ -133,7 +133,7 @@ fn garbage_harms_nobody(kind: SegmentKind) {
 
 #[test]
 fn announcements_full_of_garbage_are_passed_over() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let path = site.host().trains_directory().join("1.controller");
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
     let garbage: Vec<u8> = (0..100_000).map(|_| random.random()).collect();

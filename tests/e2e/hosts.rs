@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 use dynocar_client::{Host, SamplePublisher, SnapshotReader};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_tests::soak::{Programs, starts};
 use rustix::process::Signal;
 
@@ -17,7 +17,7 @@ const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 const TRAIN: TrainId = TrainId(1);
 
-fn daemon_at(site: &Site, root: &Path) -> Process {
+fn daemon_at(site: &DaemonSite, root: &Path) -> Process {
     let config = site.write_config(1, "", ECHO);
     let run = ["run", "--config", config.to_str().expect("UTF-8")];
     site.start_with(DYNOCAR, &run, &[("DYNOCAR_ROOT", root.to_str().expect("UTF-8"))])
@@ -62,7 +62,7 @@ pub(super) fn in_namespace(script: &str) -> Result<Command, String> {
 
 #[test]
 fn a_root_of_any_length_serves_and_one_beyond_the_systems_limit_is_refused_with_its_length() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     for length in [28, 31, 36, 64, 108, 140, 150, 255, 1000, 3900] {
         let mut root = site.path().to_path_buf();
         while root.as_os_str().len() < length {
@@ -89,7 +89,7 @@ fn processes_that_are_killed_while_they_start_leave_every_root_servable() {
 
 #[test]
 fn every_spelling_of_a_directory_is_one_root() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let root = site.path().join("spelled");
     let mut daemon = daemon_at(&site, &root);
     daemon.await_error("serving");
@@ -102,7 +102,7 @@ fn every_spelling_of_a_directory_is_one_root() {
 
 #[test]
 fn two_installations_of_one_path_that_share_memory_count_nothing_of_each_other() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", ECHO);
     let (root, config) = (site.path().join("root"), config.display().to_string());
     let root = root.display();
@@ -135,7 +135,7 @@ fn two_installations_of_one_path_that_share_memory_count_nothing_of_each_other()
 #[test]
 fn a_root_in_use_is_locked_as_cleaners_honour_it_and_one_that_was_removed_ends_the_daemon_in_words()
 {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let root = site.path().join("aged");
     let mut daemon = daemon_at(&site, &root);
     daemon.await_error("serving");
@@ -156,7 +156,7 @@ fn a_root_in_use_is_locked_as_cleaners_honour_it_and_one_that_was_removed_ends_t
 
 #[test]
 fn a_daemon_whose_announcement_was_removed_ends_in_words() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let root = site.path().join("aged");
     let mut daemon = daemon_at(&site, &root);
     daemon.await_error("serving");
@@ -167,7 +167,7 @@ fn a_daemon_whose_announcement_was_removed_ends_in_words() {
 
 #[test]
 fn separate_shared_memories_are_named_with_what_containers_need() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = daemon_at(&site, site.host().root());
     daemon.await_error("serving");
     let script = format!(
@@ -186,7 +186,7 @@ fn separate_shared_memories_are_named_with_what_containers_need() {
 
 #[test]
 fn shared_memory_that_cannot_be_used_is_named_by_everybody() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", ECHO);
     let root = site.path().join("root");
     let everybody = format!(
@@ -227,7 +227,7 @@ fn shared_memory_that_cannot_be_used_is_named_by_everybody() {
 
 #[test]
 fn a_root_of_another_user_says_how_to_ask_and_one_of_the_system_keeps_its_mode() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let root = site.path().join("of-another");
     std::fs::create_dir(&root).unwrap();
     if std::os::unix::fs::chown(&root, Some(65534), Some(65534)).is_ok() {

@@ -9,7 +9,7 @@ use dynocar::replay::{Rate, ReplayReport, Replayer};
 use dynocar_analysis::identify::{default_estimators, published_samples, snapshot_after};
 use dynocar_shared::{ParameterSnapshot, TrainId};
 use dynocar_tests::golden::without_stamps;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use rustix::process::Signal;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -27,7 +27,7 @@ fn every_pipeline_gives_the_same_bits_online_and_offline() {
     let samples = published_samples(&dataset, train);
     let estimators = default_estimators();
 
-    let site = Site::new();
+    let site = DaemonSite::new();
     let pipelines: String = estimators
         .iter()
         .map(|it| {

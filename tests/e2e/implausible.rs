@@ -3,7 +3,7 @@
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{PipelineKind, Reason, SampleField, Status, TrainId, TrainSample};
-use dynocar_tests::process::{Site, await_true};
+use dynocar_tests::process::{DaemonSite, await_true};
 use dynocar_transport::monotonic_now_ns;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -31,7 +31,7 @@ fn sample(speed_mps: &mut f64, index: u64) -> TrainSample {
 
 #[test]
 fn kilonewtons_for_newtons_are_degraded_logged_once_in_words_and_seen_by_health() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let pipelines = "[[pipelines]]\nkind = \"rls\"\n[[pipelines]]\nkind = \"mass_kalman\"\n";
     let config = site.write_config(1, "", pipelines);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);

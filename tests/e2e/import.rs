@@ -8,7 +8,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_tests::browser::Browser;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 use crate::commands::{done, dynocar, said};
 use crate::guide::{blocks, guide, install, run};
@@ -20,16 +20,16 @@ fn corpus(name: &str) -> String {
 }
 
 /// Imports a file of the corpus into the folder `made`; gives what was printed.
-fn import(site: &Site, name: &str, more: &[&str]) -> String {
+fn import(site: &DaemonSite, name: &str, more: &[&str]) -> String {
     let file = corpus(name);
     done(site, &[&["import", &file, "-o", "made"], more].concat())
 }
 
-fn train(site: &Site) -> TrainModel {
+fn train(site: &DaemonSite) -> TrainModel {
     load_train(&site.path().join("made/train.toml")).unwrap()
 }
 
-fn track(site: &Site) -> Track {
+fn track(site: &DaemonSite) -> Track {
     load_track(&site.path().join("made/track.toml")).unwrap()
 }
 
@@ -39,7 +39,7 @@ fn assert_close(found: f64, expected: f64) {
 
 #[test]
 fn an_imported_train_is_read_back_with_the_numbers_of_its_source() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let printed = import(&site, "rolling_stock.yaml", &["--train", "ore", "--load", "0.5"]);
     let ore = train(&site);
     assert_eq!((ore.name.as_str(), ore.cars), ("Ore train", 3));
@@ -62,18 +62,18 @@ fn an_imported_train_is_read_back_with_the_numbers_of_its_source() {
     assert!(!text.contains("# DEFAULT") && !printed.contains("defaults"), "{text}");
     assert!(done(&site, &["check", "made/train.toml"]).contains("180 t"));
 
-    let site = Site::new();
+    let site = DaemonSite::new();
     let printed = import(&site, "osrd_each_kg.json", &[]);
     assert_close(train(&site).resistance.a, 8.0 / STANDARD_GRAVITY_MPS2);
     assert!(printed.contains("for each kg: 4.49 N/kN at 40.0 m/s"), "{printed}");
-    let site = Site::new();
+    let site = DaemonSite::new();
     import(&site, "osrd_whole.json", &["--mode", "1500V", "--format", "osrd"]);
     assert_eq!(train(&site).traction.unwrap().points(), [(0.0, 100e3), (25.0, 40e3)]);
 }
 
 #[test]
 fn an_imported_line_is_read_back_with_the_numbers_of_its_source() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let printed = import(&site, "ttobench_track.json", &[]);
     let line = track(&site);
     assert_eq!(line.length_m, Some(6000.0));
@@ -85,7 +85,7 @@ fn an_imported_line_is_read_back_with_the_numbers_of_its_source() {
     assert!(printed.contains("not taken: 'altitude': track.toml holds gradients"), "{printed}");
     assert!(printed.contains("not in the file: tunnels: the format has none"), "{printed}");
 
-    let site = Site::new();
+    let site = DaemonSite::new();
     import(&site, "running_path_2022.yaml", &[]);
     let line = track(&site);
     assert_eq!(line.gradient_permille(2000.0, 0.0), Some(12.5));
@@ -97,7 +97,7 @@ fn an_imported_line_is_read_back_with_the_numbers_of_its_source() {
 
 #[test]
 fn what_a_file_does_not_show_is_a_marked_default_unless_somebody_says_it() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let printed = import(&site, "ttobench_train.json", &[]);
     let text = read_to_string(site.path().join("made/train.toml")).unwrap();
     assert!(text.contains("length_m = 75.0 ") && text.contains("# DEFAULT; m, over"), "{text}");
@@ -106,7 +106,7 @@ fn what_a_file_does_not_show_is_a_marked_default_unless_somebody_says_it() {
         "{printed}"
     );
     assert!(printed.contains("not in the file: length_m: the format has none"), "{printed}");
-    let site = Site::new();
+    let site = DaemonSite::new();
     let printed = import(&site, "ttobench_train.json", &["--length-m", "74.08", "--name", "T 1"]);
     assert!(!printed.contains("defaults"), "{printed}");
     let model = train(&site);
@@ -116,7 +116,7 @@ fn what_a_file_does_not_show_is_a_marked_default_unless_somebody_says_it() {
 
 #[test]
 fn a_train_and_a_line_of_several_files_go_into_one_folder() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (stock, path) = (corpus("rolling_stock.yaml"), corpus("running_path_2024.yaml"));
     let both = ["import", &stock, &path, "--out", "made"];
     let refused = |more: &[&str]| {
@@ -141,7 +141,7 @@ fn a_train_and_a_line_of_several_files_go_into_one_folder() {
 
 #[test]
 fn nothing_is_overwritten_and_nothing_is_written_of_bad_input() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     create_dir_all(site.path().join("made")).unwrap();
     let mine = site.write("made/train.toml", "mine");
     let (tram, track) = (corpus("osrd_whole.json"), corpus("ttobench_track.json"));
@@ -190,7 +190,7 @@ fn look(browser: &mut Browser, file: &Path) -> (String, u64, String) {
 
 #[test]
 fn check_draws_the_line_and_the_effort_as_pictures_that_a_browser_opens() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     import(&site, "ttobench_track.json", &[]);
     import(&site, "osrd_whole.json", &[]);
     let output = dynocar(&site, &["check", "made/track.toml", "--draw", "drawn"]);
@@ -217,7 +217,7 @@ fn check_draws_the_line_and_the_effort_as_pictures_that_a_browser_opens() {
 
 #[test]
 fn what_cannot_be_drawn_is_said() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     site.write("track.toml", "[track]\n");
     let output = dynocar(&site, &["check", "track.toml", "--draw", "drawn"]);
     assert_eq!(output.status.code(), Some(0));
@@ -233,7 +233,7 @@ fn what_cannot_be_drawn_is_said() {
 
 #[test]
 fn every_command_of_the_guide_of_imports_succeeds_on_files_of_that_kind() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     install(&site);
     for (name, source) in [
         ("rolling_stock.yaml", "rolling_stock.yaml"),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dynocar::dataset::open;
 use dynocar_analysis::dataset::manifest::Manifest;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 use serde_json::Value;
@@ -26,7 +26,7 @@ fn columns(manifest: &Manifest) -> Vec<(String, String, &'static str, f64)> {
 
 #[test]
 fn the_demos_recordings_are_described_as_they_are_by_hand() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let runs = ["01", "02", "03", "06"].map(|name| format!("{DEMO}/runs/{name}.csv"));
     let mut arguments = vec!["init", "train", "--mass-t", "1755", "--csv"];
     arguments.extend(runs.iter().map(String::as_str));
@@ -62,7 +62,7 @@ fn recordings_of_five_houses_in_any_unit_are_described_as_they_were_written() {
             ..SimulatorSettings::new(seed, EffectRequest::none())
         };
         let dataset = simulate(&settings);
-        let site = Site::new();
+        let site = DaemonSite::new();
         create_dir_all(site.path().join("runs")).unwrap();
         let mut arguments = vec!["init".to_string(), "made".into()];
         let files = dataset_files(&dataset);
@@ -104,7 +104,7 @@ fn recordings_of_five_houses_in_any_unit_are_described_as_they_were_written() {
 
 #[test]
 fn a_unit_that_no_name_gives_is_set_right_by_how_the_train_moves() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     // Up to 40 km/h: by their range alone these speeds would be m/s.
     let mut position_m = 0.0;
     let slow: String = run("t,v,s")
@@ -133,7 +133,7 @@ fn a_unit_that_no_name_gives_is_set_right_by_how_the_train_moves() {
 
 #[test]
 fn without_recordings_train_and_configuration_are_written_and_pass_the_check() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let printed = done(&site, &["init", "a new/train", "--name", "S 7", "--mass-t", "114.5"]);
     assert!(
         printed.contains("defaults in train.toml, nobody's figures: length_m = 57.25"),
@@ -148,7 +148,7 @@ fn without_recordings_train_and_configuration_are_written_and_pass_the_check() {
 
 #[test]
 fn a_line_that_is_there_is_taken_up() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     create_dir_all(site.path().join("made")).unwrap();
     site.write("made/track.toml", "[track]\ngradient = [[0.0, 3.0]]\n");
     site.write("a.csv", &run("t,v [km/h],F [kN],x"));
@@ -157,7 +157,7 @@ fn a_line_that_is_there_is_taken_up() {
     let answer: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(answer["track"]["gradients"], 1, "{}", answer["track"]);
     assert!(done(&site, &["check", "made/daemon.toml"]).contains("unnamed line"));
-    let broken = Site::new();
+    let broken = DaemonSite::new();
     create_dir_all(broken.path().join("made")).unwrap();
     broken.write("made/track.toml", "[track]\nlength = 3\n");
     broken.write("a.csv", &run("t,v [km/h],F [kN],x"));

@@ -3,12 +3,12 @@
 use std::fs::{create_dir_all, read_to_string, write};
 use std::process::{Command, Stdio};
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 use crate::commands::{DYNOCAR, done, dynocar, run, said};
 
 /// Standard error of a command that must end with status 2 and write nothing into the folder `new`.
-fn refusal(site: &Site, arguments: &[&str]) -> String {
+fn refusal(site: &DaemonSite, arguments: &[&str]) -> String {
     let mut process = site.start(DYNOCAR, arguments);
     let status = process.wait();
     assert_eq!(status.code(), Some(2), "{arguments:?}: {}", process.errors());
@@ -19,7 +19,7 @@ fn refusal(site: &Site, arguments: &[&str]) -> String {
 #[test]
 fn nothing_that_is_there_is_overwritten() {
     for name in ["train.toml", "daemon.toml", "dataset.toml"] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         create_dir_all(site.path().join("made")).unwrap();
         let there = site.write(&format!("made/{name}"), "mine");
         site.write("a.csv", &run("t,v [km/h],F [kN],x"));
@@ -30,7 +30,7 @@ fn nothing_that_is_there_is_overwritten() {
         assert_eq!(read_to_string(&there).unwrap(), "mine");
         assert_eq!(std::fs::read_dir(site.path().join("made")).unwrap().count(), 1, "{name}");
     }
-    let site = Site::new();
+    let site = DaemonSite::new();
     done(&site, &["init", "made"]);
     assert_eq!(dynocar(&site, &["init", "made"]).status.code(), Some(2));
     site.write("file", "");
@@ -41,7 +41,7 @@ fn nothing_that_is_there_is_overwritten() {
 
 #[test]
 fn what_is_no_recording_is_refused_in_words() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let pipe = site.path().join("pipe.csv");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     write(site.path().join("binary.csv"), [0u8; 5000]).unwrap();
@@ -88,7 +88,7 @@ fn what_is_no_recording_is_refused_in_words() {
 
 #[test]
 fn a_wrong_command_line_is_refused_with_what_helps() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let csv = site.write("a.csv", &run("A,B,C,D")).display().to_string();
     let new = site.path().join("new").display().to_string();
     let with = |more: &[&str]| {
@@ -118,7 +118,7 @@ fn a_wrong_command_line_is_refused_with_what_helps() {
 
 #[test]
 fn nobody_is_asked_and_a_closed_pipe_or_a_full_disk_changes_no_file() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     site.write("a.csv", &run("t,v [km/h],F [kN],x"));
     let command = |folder: &str| {
         let mut command = Command::new(DYNOCAR);

@@ -6,7 +6,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{FileText, dataset_files, read_files};
 use dynocar_tests::simulator::oracle::score;
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, TrueEffect, simulate,
 };
 
 fn answer(files: &[FileText]) -> ExplainAnswer {
@@ -28,7 +28,7 @@ fn number_of(answer: &ExplainAnswer, name: &str) -> [f64; 2] {
     })
 }
 
-fn simulated(seed: u64, effect: Effect, is_level_and_straight: bool) -> SimulatedDataset {
+fn simulated(seed: u64, effect: TrueEffect, is_level_and_straight: bool) -> SimulatedDataset {
     simulate(&SimulatorSettings {
         train_type: Some(if seed.is_multiple_of(2) {
             TrainType::Metro
@@ -44,7 +44,7 @@ fn simulated(seed: u64, effect: Effect, is_level_and_straight: bool) -> Simulate
 fn a_late_speed_is_named_whether_dead_time_or_lag_and_no_place_is_made_up() {
     let cases = [(9201, 0.4, 0.0), (9202, 0.8, 0.0), (9203, 0.0, 0.8), (9204, 0.5, 0.5)];
     for (seed, delay_s, lag_s) in cases {
-        let dataset = simulated(seed, Effect::SpeedDelay { delay_s, lag_s }, false);
+        let dataset = simulated(seed, TrueEffect::SpeedDelay { delay_s, lag_s }, false);
         let answer = answer(&dataset_files(&dataset));
         let named = named(&answer);
         assert!(named.contains(&"speed_delay"), "{seed}: {}", answer.statement);
@@ -66,12 +66,12 @@ fn a_late_speed_is_named_whether_dead_time_or_lag_and_no_place_is_made_up() {
 
 #[test]
 fn on_a_level_line_a_position_of_its_own_shows_and_forces_that_act_late_stay_ambiguous() {
-    let late_speed = Effect::SpeedDelay { delay_s: 0.8, lag_s: 0.0 };
+    let late_speed = TrueEffect::SpeedDelay { delay_s: 0.8, lag_s: 0.0 };
     let explained = answer(&dataset_files(&simulated(9202, late_speed, true)));
     assert_eq!(explained.verdict, Verdict::Effect, "{}", explained.statement);
     assert_eq!(named(&explained), ["speed_delay"], "{}", explained.statement);
 
-    let late_force = Effect::ActuatorDelay { delay_s: 0.8, lag_s: 0.0 };
+    let late_force = TrueEffect::ActuatorDelay { delay_s: 0.8, lag_s: 0.0 };
     let open = answer(&dataset_files(&simulated(9202, late_force, true)));
     assert_eq!(open.verdict, Verdict::Ambiguous, "{}", open.statement);
     let mut kinds = named(&open);
@@ -82,7 +82,7 @@ fn on_a_level_line_a_position_of_its_own_shows_and_forces_that_act_late_stay_amb
 
 #[test]
 fn without_a_position_nothing_shows_a_late_speed_from_late_forces() {
-    let late_speed = Effect::SpeedDelay { delay_s: 0.8, lag_s: 0.0 };
+    let late_speed = TrueEffect::SpeedDelay { delay_s: 0.8, lag_s: 0.0 };
     let mut files = dataset_files(&simulated(9202, late_speed, true));
     let (_, manifest) = files.iter_mut().find(|(path, _)| path == "dataset.toml").unwrap();
     let kept = manifest.lines().filter(|line| !line.starts_with("position"));

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant, SystemTime};
 
-use dynocar::models::{ModelText, Moment, Store, TrainModels};
+use dynocar::models::{ModelText, Store, TrainModels, UtcSecond};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 use dynocar_tests::soak::day::strange_host::StrangeHost;
@@ -26,14 +26,14 @@ const PATIENCE: Duration = Duration::from_secs(540);
 
 /// A site with simulated runs, a configuration that declares their train and line, and a store.
 struct Workplace {
-    site: Site,
+    site: DaemonSite,
     files: Vec<(String, String)>,
 }
 
 impl Workplace {
     /// No run lies there yet.
     fn of(kinds: &[EffectKind]) -> Self {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let simulated =
             simulate(&SimulatorSettings::new(SEED, EffectRequest::Kinds(kinds.to_vec())));
         let files = dataset_files(&simulated);
@@ -274,7 +274,7 @@ fn the_time_of_the_day_comes_for_a_learner_whose_clock_is_set_forth_and_back() {
     const DAY_S: u64 = 86_400;
     let work = Workplace::of(&[]);
     let strange = StrangeHost::new(work.site.path(), work.site.path());
-    let now_s = Moment::of(SystemTime::now()).unix_s;
+    let now_s = UtcSecond::of(SystemTime::now()).unix_s;
     // In 5 to 6 hours.
     let at_s = now_s / 3600 * 3600 + 6 * 3600;
     let at = format!("{:02}:00", at_s / 3600 % 24);

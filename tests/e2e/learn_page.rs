@@ -3,19 +3,19 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use dynocar::models::decision::Choice;
+use dynocar::models::decision::ModelChoice;
 use dynocar::models::origin::{EventWindow, HeldOutError};
 use dynocar::models::{
-    Figure, FoundEffect, MaintenanceEvent, ModelHash, ModelText, Moment, NewDecision, NewModel,
-    Origin, Store, TrainModels,
+    FoundEffect, MaintenanceEvent, ModelFigure, ModelHash, ModelText, NewDecision, NewModel,
+    Origin, Store, TrainModels, UtcSecond,
 };
-use dynocar::shadow::record::{Trials, Tried};
-use dynocar_core::trial::evidence::Evidence;
+use dynocar::shadow::record::{TrialRecord, TriedModel};
+use dynocar_core::trial::evidence::RivalEvidence;
 use dynocar_core::trial::ledger::Ledger;
 use dynocar_model::simulate::SpeedError;
 use dynocar_shared::TrainId;
 use dynocar_tests::browser::Browser;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use serde_json::json;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -48,14 +48,14 @@ const LOOK: &str = r##"(() => {
 
 fn put(models: &TrainModels, text: ModelText, parent: Option<ModelHash>, day: u64) -> ModelHash {
     let learned = parent.is_some();
-    let figure = Figure { value: 2.4e-4, std: 0.2e-4 };
+    let figure = ModelFigure { value: 2.4e-4, std: 0.2e-4 };
     let effect = FoundEffect {
         kind: "tunnel_drag".into(),
         intervals_m: vec![[12_400.0, 13_650.0]],
         parameters: [("dc_n_per_kn".to_owned(), figure)].into(),
     };
     let origin = Origin {
-        made: Moment { unix_s: 1_767_225_600 + 86_400 * day },
+        made: UtcSecond { unix_s: 1_767_225_600 + 86_400 * day },
         version: "0.1.0".into(),
         command: "dynocar learn".into(),
         parent,
@@ -70,7 +70,7 @@ fn put(models: &TrainModels, text: ModelText, parent: Option<ModelHash>, day: u6
 }
 
 /// A history: declared, a model adopted, one that grew from it, one rejected, an event.
-fn history(site: &Site) -> (PathBuf, [ModelHash; 4]) {
+fn history(site: &DaemonSite) -> (PathBuf, [ModelHash; 4]) {
     let config = site.write_config(1, "", "[[pipelines]]\nkind = \"residual_monitor\"\n");
     let train = std::fs::read_to_string(site.path().join("train.toml")).unwrap();
     let text = |more: &str| ModelText { train: format!("{train}{more}"), track: None };
@@ -79,8 +79,8 @@ fn history(site: &Site) -> (PathBuf, [ModelHash; 4]) {
     let adopted = put(&models, text("# 1\n"), Some(declared), 3);
     let rejected = put(&models, text("# 2\n"), Some(declared), 5);
     let candidate = put(&models, text("# 3\n"), Some(adopted), 40);
-    for (what, day) in [(Choice::Adopt(adopted), 6), (Choice::Reject(rejected), 7)] {
-        let at = Moment { unix_s: 1_767_225_600 + 86_400 * day };
+    for (what, day) in [(ModelChoice::Adopt(adopted), 6), (ModelChoice::Reject(rejected), 7)] {
+        let at = UtcSecond { unix_s: 1_767_225_600 + 86_400 * day };
         let (by, reason) = ("Anna".into(), WORDS.into());
         models.decide(&NewDecision { what, by, reason, at }).unwrap();
     }
@@ -92,12 +92,12 @@ fn history(site: &Site) -> (PathBuf, [ModelHash; 4]) {
     };
     let event = MaintenanceEvent {
         kind: "dragging_brake".into(),
-        found: Moment { unix_s: 1_768_953_600 },
-        acted: Some([Moment { unix_s: 1_768_900_000 }; 2]),
+        found: UtcSecond { unix_s: 1_768_953_600 },
+        acted: Some([UtcSecond { unix_s: 1_768_900_000 }; 2]),
         model: adopted,
         intervals_m: Vec::new(),
         sentence: "dragging brake in run 2026-01-20/runs/3.csv: n_per_kn = 2.10 ± 0.12".into(),
-        size: [("n_per_kn".to_owned(), Figure { value: 2.1, std: 0.06 })].into(),
+        size: [("n_per_kn".to_owned(), ModelFigure { value: 2.1, std: 0.06 })].into(),
         p_value: 1e-9,
         windows: vec![window],
     };
@@ -109,14 +109,14 @@ fn history(site: &Site) -> (PathBuf, [ModelHash; 4]) {
             let error = SpeedError { sum_of_squares, count: 100 };
             ledger.book(error, f64::from(1_767_225_600 + 86_400 * day), None);
         }
-        let last = Moment { unix_s: 1_767_225_600 + 86_400 * 12 };
+        let last = UtcSecond { unix_s: 1_767_225_600 + 86_400 * 12 };
         let (error_ratio, estimates) = (Some([0.35, 0.44]), Vec::new());
-        let (evidence, against) = (Evidence::new(0.1), Some(adopted));
+        let (evidence, against) = (RivalEvidence::new(0.1), Some(adopted));
         let error_mps = Some(error_mps);
-        Tried { model, last, against, error_mps, error_ratio, evidence, ledger, estimates }
+        TriedModel { model, last, against, error_mps, error_ratio, evidence, ledger, estimates }
     };
     let models_tried = vec![tried(declared, 0.61), tried(adopted, 0.24)];
-    let trials = Trials { in_force: Some(adopted), models: models_tried };
+    let trials = TrialRecord { in_force: Some(adopted), models: models_tried };
     trials.write(models.folder()).unwrap();
     std::fs::create_dir(site.path().join("runs")).unwrap();
     let page = site.path().join("history.html");
@@ -137,7 +137,7 @@ fn history(site: &Site) -> (PathBuf, [ModelHash; 4]) {
 
 #[test]
 fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_narrow_screens() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (page, hashes) = history(&site);
     let [declared, adopted, rejected, candidate] = hashes.map(|hash| hash.to_string());
     let mut browser = Browser::start(1280, false);

@@ -6,7 +6,7 @@ use std::fs::{read_to_string, write};
 
 use dynocar::dataset::load;
 use dynocar_shared::SampleField;
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 use super::commands::{done, dynocar, said};
 
@@ -48,7 +48,7 @@ fn dated(second: u32) -> String {
 
 #[test]
 fn a_german_loggers_file_that_passes_midnight_is_described_and_read() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     write(site.path().join("a.csv"), logged(clock)).unwrap();
     let shown = done(&site, &["init", "zug", "--mass-t", "100", "--csv", "a.csv"]);
     for words in
@@ -83,7 +83,7 @@ fn a_german_loggers_file_that_passes_midnight_is_described_and_read() {
 
 #[test]
 fn times_with_a_date_give_the_day_of_answers_and_reports() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     write(site.path().join("a.csv"), logged(dated)).unwrap();
     write(site.path().join("b.csv"), logged(dated)).unwrap();
     done(&site, &["init", "zug", "--mass-t", "100", "--csv", "a.csv", "b.csv"]);
@@ -100,7 +100,7 @@ fn times_with_a_date_give_the_day_of_answers_and_reports() {
 
 #[test]
 fn a_wrong_description_of_a_loggers_file_is_named_with_line_and_what_helps() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     write(site.path().join("a.csv"), logged(clock)).unwrap();
     done(&site, &["init", "zug", "--mass-t", "100", "--csv", "a.csv"]);
     let path = site.path().join("zug/dataset.toml");

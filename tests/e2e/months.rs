@@ -1,13 +1,13 @@
 //! Days of one train in accelerated time: what is undeclared is found, tried, adopted, and taken back.
 
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::soak::months::story::Span;
+use dynocar_tests::soak::months::story::StorySpan;
 use dynocar_tests::soak::months::table::{HEADER, line};
 use dynocar_tests::soak::months::{Life, LifeOutcome, LifeSettings, Story, mistakes};
 
 /// A life of some days of twelve trips; a mistake in a thousand trips is let pass, so that a day or
 /// two of them are evidence enough.
-fn lived(story: Story, span: Span, days: usize) -> LifeOutcome {
+fn lived(story: Story, span: StorySpan, days: usize) -> LifeOutcome {
     let settings = LifeSettings {
         story,
         span,
@@ -23,7 +23,7 @@ fn lived(story: Story, span: Span, days: usize) -> LifeOutcome {
 
 #[test]
 fn an_undeclared_tunnel_is_adopted_within_days_and_the_error_falls() {
-    let span = Span { onset: 2, end: 12 };
+    let span = StorySpan { onset: 2, end: 12 };
     let outcome = lived(Story::Appears(EffectKind::TunnelDrag), span, 12);
     let printed = format!("{HEADER}{}", line(&outcome));
     let adopted = outcome.first_change(span.onset..span.end, false);
@@ -36,7 +36,7 @@ fn an_undeclared_tunnel_is_adopted_within_days_and_the_error_falls() {
 
 #[test]
 fn what_is_over_is_taken_back() {
-    let span = Span { onset: 2, end: 10 };
+    let span = StorySpan { onset: 2, end: 10 };
     let outcome = lived(Story::Winter, span, 16);
     let printed = format!("{HEADER}{}", line(&outcome));
     assert!(outcome.first_change(span.onset..span.end, false).is_some(), "{printed}");
@@ -46,7 +46,7 @@ fn what_is_over_is_taken_back() {
 
 #[test]
 fn a_brake_that_drags_for_a_day_is_a_maintenance_event_and_no_model() {
-    let outcome = lived(Story::BrakeDrags, Span { onset: 2, end: 3 }, 6);
+    let outcome = lived(Story::BrakeDrags, StorySpan { onset: 2, end: 3 }, 6);
     let printed = format!("{HEADER}{}", line(&outcome));
     assert!(outcome.events.iter().any(|kind| kind == "dragging_brake"), "{printed}");
     assert!(outcome.adoptions.is_empty(), "{printed}");

@@ -15,7 +15,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{
     ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainId, TrainSample,
 };
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use dynocar_transport::channel::{Sender, Transport};
 use dynocar_transport::monotonic_now_ns;
 
@@ -101,7 +101,7 @@ fn another_models_pipelines_go_to_work_without_an_allocation() {
 fn receiving_and_polling_allocate_nothing_and_sending_only_the_transports_reference_count() {
     const TRAIN: TrainId = TrainId(1);
     const CYCLES: u64 = 10_000;
-    let site = Site::new();
+    let site = DaemonSite::new();
     let host = site.host();
     let transport = Transport::open(&host, "test-daemon").unwrap();
     let samples = transport.receiver::<TrainSample>(TRAIN).unwrap();

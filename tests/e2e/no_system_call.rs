@@ -1,7 +1,7 @@
 //! A controller's cycle makes no system call while the pipelines are awake: the kernel itself
 //! watches, and kills who makes one.
 
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 
 use crate::hold_the_cores;
 
@@ -14,7 +14,7 @@ const ADAPTIVE: &str = "idle = \"adaptive\"\nspin_us = 1000000";
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 
 /// A daemon that is awake, and a sealed controller doing something.
-fn sealed(site: &Site, idle: &str, what: &str) -> (Process, Process) {
+fn sealed(site: &DaemonSite, idle: &str, what: &str) -> (Process, Process) {
     let config = site.write_config(1, idle, ECHO);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);
     daemon.await_error("serving");
@@ -31,7 +31,7 @@ fn news(peer: &mut Process) -> u64 {
 fn the_seal_kills_at_a_system_call() {
     use std::os::unix::process::ExitStatusExt;
     let _cores = hold_the_cores();
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (_daemon, mut peer) = sealed(&site, BUSY, "call");
     assert_eq!(peer.wait().signal(), Some(libc::SIGSYS), "{}", peer.errors());
 }
@@ -39,7 +39,7 @@ fn the_seal_kills_at_a_system_call() {
 #[test]
 fn a_poll_without_news_makes_no_system_call() {
     let _cores = hold_the_cores();
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (_daemon, mut peer) = sealed(&site, BUSY, "poll");
     // Nothing is published meanwhile, and all that was published before is answered.
     assert_eq!(news(&mut peer), 0);
@@ -49,7 +49,7 @@ fn a_poll_without_news_makes_no_system_call() {
 fn publish_and_poll_make_no_system_call_while_the_daemon_is_awake() {
     let _cores = hold_the_cores();
     for idle in [BUSY, ADAPTIVE] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let (_daemon, mut peer) = sealed(&site, idle, "cycle");
         assert!(news(&mut peer) >= 50, "{idle}");
     }

@@ -68,6 +68,7 @@ mod layering;
 mod pages;
 mod promises;
 mod sizes;
+mod toml_keys;
 mod troubles;
 mod unrun;
 mod words;

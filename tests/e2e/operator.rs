@@ -5,7 +5,7 @@ use std::time::Duration;
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 use dynocar_transport::monotonic_now_ns;
@@ -16,21 +16,21 @@ const TRAIN: TrainId = TrainId(1);
 /// Of the simulated train with its brake.
 const SEED: u64 = 315;
 
-fn daemon(site: &Site, config: &str) -> Process {
+fn daemon(site: &DaemonSite, config: &str) -> Process {
     let config = site.write("daemon.toml", config);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
     daemon.await_error("serving");
     daemon
 }
 
-fn health(site: &Site) -> (Option<i32>, String) {
+fn health(site: &DaemonSite) -> (Option<i32>, String) {
     let mut process = site.start(DYNOCAR, &["health", "--train", "1"]);
     (process.wait().code(), process.output())
 }
 
 #[test]
 fn a_dragging_brake_is_named_with_its_force_its_place_and_what_to_do() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let kinds = EffectRequest::Kinds(vec![EffectKind::DraggingBrake]);
     let simulated = simulate(&SimulatorSettings::new(SEED, kinds));
     for (name, text) in dataset_files(&simulated) {
@@ -93,7 +93,7 @@ fn a_dragging_brake_is_named_with_its_force_its_place_and_what_to_do() {
 
 #[test]
 fn refused_samples_are_named_with_their_reasons_and_what_to_do() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", "[[pipelines]]\nkind = \"echo\"\n");
     let config = std::fs::read_to_string(config).unwrap();
     let mut daemon = daemon(&site, &config);

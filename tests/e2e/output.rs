@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-use dynocar_tests::process::{Site, await_true};
+use dynocar_tests::process::{DaemonSite, await_true};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -34,7 +34,7 @@ const COMMANDS: [(&str, &[&str]); 16] = [
     (SOAK, &["fuzz", "--rounds", "1"]),
 ];
 
-fn command(site: &Site, (program, arguments): (&str, &[&str])) -> Command {
+fn command(site: &DaemonSite, (program, arguments): (&str, &[&str])) -> Command {
     let mut command = site.command(program, arguments);
     command.stdin(Stdio::null());
     command
@@ -56,7 +56,7 @@ fn said(output: &Output) -> String {
 
 #[test]
 fn a_closed_pipe_ends_every_command_quietly() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     for it in COMMANDS {
         let output = command(&site, it).stdout(closed_pipe()).output().unwrap();
         assert_eq!((output.status.code(), said(&output).as_str()), (Some(0), ""), "{it:?}");
@@ -67,7 +67,7 @@ fn a_closed_pipe_ends_every_command_quietly() {
 
 #[test]
 fn a_full_disk_under_standard_output_is_reported_by_every_command() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     for it in COMMANDS {
         let output = command(&site, it).stdout(full_disk()).output().unwrap();
         let words = "standard output: cannot be written: No space left on device";
@@ -85,7 +85,7 @@ fn what_people_read_on_standard_error_survives_its_loss() {
     for it in [replay, wrong] {
         // Side by side, for a replay waits for a daemon.
         let start = |stderr: Stdio| {
-            let site = Site::new();
+            let site = DaemonSite::new();
             let child = command(&site, it).stdout(Stdio::null()).stderr(stderr).spawn();
             (child.unwrap(), site)
         };
@@ -93,7 +93,7 @@ fn what_people_read_on_standard_error_survives_its_loss() {
         let [kept, lost @ ..] = started.map(|(mut child, _site)| child.wait().unwrap());
         assert_eq!(lost, [kept; 2], "{it:?}");
     }
-    let site = Site::new();
+    let site = DaemonSite::new();
     let stock = concat!(env!("CARGO_MANIFEST_DIR"), "/corpus/import/rolling_stock.yaml");
     for (number, lost) in [closed_pipe(), full_disk()].into_iter().enumerate() {
         let out = format!("imported{number}");
@@ -118,7 +118,7 @@ fn what_people_read_on_standard_error_survives_its_loss() {
 
 #[test]
 fn a_daemon_whose_log_cannot_be_written_serves_and_health_keeps_its_verdict() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", "[[pipelines]]\nkind = \"echo\"\n");
     let config = config.to_str().unwrap();
     let health = (DYNOCAR, &["health", "--config", config][..]);
@@ -144,7 +144,7 @@ fn a_daemon_whose_log_cannot_be_written_serves_and_health_keeps_its_verdict() {
 
 #[test]
 fn a_full_disk_under_a_file_is_reported_with_its_name() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let full = |name: &str| {
         let path = site.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -169,7 +169,7 @@ fn a_full_disk_under_a_file_is_reported_with_its_name() {
 
 #[test]
 fn a_file_is_whole_or_as_it_was_when_a_write_fails_or_is_interrupted() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = site.path().join("results");
     std::fs::create_dir(&folder).unwrap();
     let file = folder.join("a.html");
@@ -201,7 +201,7 @@ fn a_file_is_whole_or_as_it_was_when_a_write_fails_or_is_interrupted() {
 
 #[test]
 fn names_of_results_that_would_cost_data_are_refused_before_the_work() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     for entry in std::fs::read_dir(DEMO).unwrap().flatten().filter(|it| it.path().is_file()) {
         std::fs::copy(entry.path(), site.path().join(entry.file_name())).unwrap();
     }
@@ -242,7 +242,7 @@ fn names_of_results_that_would_cost_data_are_refused_before_the_work() {
 
 #[test]
 fn people_get_results_unless_standard_output_is_for_machines() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let file = site.path().join("a.json").display().to_string();
     let cases: [(&[&str], &str); 3] = [
         (&["check", DEMO], "dataset  "),
@@ -263,7 +263,7 @@ fn people_get_results_unless_standard_output_is_for_machines() {
 
 #[test]
 fn machines_get_errors_as_json_with_the_same_exit_status() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let train = site.write("train.toml", "[train]\nmass_t = -1\nlength_m = 50\nrotating_mass_factor = 0.05\n[resistance]\na = 1\nb = 0\nc = 0\n").display().to_string();
     let manifest = "[dataset]\nname = \"x\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
                     time = { column = \"t\", unit = \"s\" }\n\

@@ -6,7 +6,7 @@ use std::path::Path;
 use dynocar::dataset::load;
 use dynocar_analysis::dataset::Run;
 use dynocar_shared::SampleField;
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use rustix::process::Signal;
 
 use crate::commands::DYNOCAR;
@@ -45,7 +45,7 @@ fn gradient_permille(chainage_m: f64) -> f64 {
 }
 
 /// Starts the daemon of a command line that ends in `&`, from the site's folder.
-fn daemon(site: &Site, line: &str) -> Process {
+fn daemon(site: &DaemonSite, line: &str) -> Process {
     let config = line.split_whitespace().nth(3).expect("a configuration").to_owned();
     let config = site.path().join(config).display().to_string();
     let process = site.start(DYNOCAR, &["run", "--config", &config]);
@@ -56,7 +56,7 @@ fn daemon(site: &Site, line: &str) -> Process {
 #[test]
 fn every_command_of_the_guide_succeeds_in_an_empty_folder() {
     let guide = guide("own_train.md");
-    let site = Site::new();
+    let site = DaemonSite::new();
     install(&site);
     let shown = blocks(&guide, "text");
     let demo = load(&Path::new(ROOT).join("config/demo")).unwrap();

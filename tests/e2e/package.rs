@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 use crate::commands::{DYNOCAR, done, dynocar, said};
 use crate::support::{compiler, library_directory, must_succeed, require};
@@ -169,7 +169,7 @@ fn a_package_without_its_parts_is_refused_in_words() {
 
 #[test]
 fn completions_and_manual_list_every_command() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let help = done(&site, &["--help"]);
     let commands: Vec<&str> = help
         .lines()

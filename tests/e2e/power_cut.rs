@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar::models::{ModelText, Moment, NewModel, Origin, numbered, store};
+use dynocar::models::{ModelText, NewModel, Origin, UtcSecond, numbered, store};
 use dynocar::state::file;
 use dynocar::storage::{Disk, Rights, replace};
 use dynocar_tests::power_cut::{LossyDisk, Neglect};
@@ -97,7 +97,7 @@ fn what_half_a_renaming_left_is_not_written_over() {
 
 fn new_model() -> NewModel {
     let origin = Origin {
-        made: Moment { unix_s: 1 },
+        made: UtcSecond { unix_s: 1 },
         version: "1".into(),
         command: "x".into(),
         parent: None,

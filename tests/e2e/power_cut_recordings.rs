@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 use dynocar::storage::{Disk, Rights, Storage};
 use dynocar_mcap::copying::recover_on;
 use dynocar_mcap::event::{Event, EventKind};
-use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::reading::{FileEnding, read};
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::topic::Message;
-use dynocar_recording::record::{Files, Keeper, Keeping, Rotation};
+use dynocar_recording::record::{EventKeeper, Keeping, RecordingFiles, Rotation};
 use dynocar_shared::{TrainId, TrainSample};
 use dynocar_tests::power_cut::{Left, LossyDisk, Neglect, NotedDisk};
 
@@ -61,9 +61,10 @@ impl Run {
         let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
         let rotation =
             Rotation { bytes: Some(4_500), keep_bytes: Some(14_000), ..Rotation::default() };
-        let keeper = Keeper::begin(disk.clone(), folder.path(), keeping).unwrap();
+        let keeper = EventKeeper::begin(disk.clone(), folder.path(), keeping).unwrap();
         let output = folder.path().join("ring.mcap");
-        let begun = Files::begin(disk, &output, rotation, Some(Duration::ZERO), Some(keeper));
+        let begun =
+            RecordingFiles::begin(disk, &output, rotation, Some(Duration::ZERO), Some(keeper));
         let mut files = begun.unwrap();
         let mut run = Run { folder, notes, marks: Vec::new() };
         let mut firsts = BTreeMap::from([(files.path().to_path_buf(), 1)]);
@@ -194,7 +195,7 @@ fn recovered(contents: &[Vec<u8>]) -> Vec<u64> {
         return Vec::new();
     }
     let mut recording = Recording::default();
-    assert_eq!(read(&path, &mut recording).unwrap(), Ending::Whole);
+    assert_eq!(read(&path, &mut recording).unwrap(), FileEnding::Whole);
     recording.samples.iter().map(|it| it.sequence).collect()
 }
 
@@ -221,10 +222,10 @@ fn go_on(left: &Left) -> Result<(), String> {
     }
     let keeping = Keeping { before: HOUR, after: HOUR, most_bytes: 1 << 30 };
     let disk = Arc::new(NotedDisk { notes: LossyDisk::new(Neglect::Nothing) });
-    let keeper = Keeper::begin(disk.clone(), ring, keeping).map_err(|it| it.to_string())?;
+    let keeper = EventKeeper::begin(disk.clone(), ring, keeping).map_err(|it| it.to_string())?;
     let rotation = Rotation { bytes: Some(4_500), ..Rotation::default() };
     let (output, sync) = (ring.join("ring.mcap"), Some(Duration::ZERO));
-    let begun = Files::begin(disk, &output, rotation, sync, Some(keeper));
+    let begun = RecordingFiles::begin(disk, &output, rotation, sync, Some(keeper));
     let mut files = begun.map_err(|it| it.to_string())?;
     files.write(Message::Sample(&sample(1_000_000))).map_err(|it| it.to_string())?;
     files.finish().map(|_| ()).map_err(|it| it.to_string())
@@ -253,7 +254,8 @@ fn a_disk_that_keeps_bytes_or_names_of_recordings_back_is_noticed() {
 fn cut_recovery(neglect: Neglect) -> Option<String> {
     let folder = place();
     let (from, to) = (folder.path().join("run.mcap"), folder.path().join("whole.mcap"));
-    let mut files = Files::begin(Arc::new(Disk), &from, Rotation::default(), None, None).unwrap();
+    let mut files =
+        RecordingFiles::begin(Arc::new(Disk), &from, Rotation::default(), None, None).unwrap();
     for sequence in 1..=200 {
         files.write(Message::Sample(&sample(sequence))).unwrap();
     }
@@ -270,7 +272,7 @@ fn cut_recovery(neglect: Neglect) -> Option<String> {
             let Some(content) = there.filter(|it| **it != whole) else { continue };
             std::fs::write(folder.path().join("left.mcap"), content).unwrap();
             let ending = read(&folder.path().join("left.mcap"), &mut ());
-            if matches!(ending, Ok(Ending::Whole)) {
+            if matches!(ending, Ok(FileEnding::Whole)) {
                 return Some(format!("after {count} steps a part looks whole"));
             }
         }
@@ -346,7 +348,7 @@ fn whoever_records_does_not_wait_for_a_disk_that_stalls() {
     let disk = Arc::new(Stalled::default());
     let output = folder.path().join("run.mcap");
     let rotation = Rotation { bytes: Some(50_000), ..Rotation::default() };
-    let begun = Files::begin(disk.clone(), &output, rotation, Some(Duration::ZERO), None);
+    let begun = RecordingFiles::begin(disk.clone(), &output, rotation, Some(Duration::ZERO), None);
     let mut files = begun.unwrap().keep_house_in_parallel().unwrap();
     for sequence in 1..=5000 {
         files.write(Message::Sample(&sample(sequence))).unwrap();

@@ -9,7 +9,7 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, Status, TrainId, TrainSample,
 };
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use dynocar_transport::channel::Transport;
 use dynocar_transport::monotonic_now_ns;
 use proptest::prelude::*;
@@ -158,7 +158,7 @@ fn spoiled(word: usize, bits: u64) -> ParameterSnapshot {
 #[test]
 fn whatever_a_daemon_sends_a_reader_gives_only_finite_numbers_that_grow_old() {
     use proptest::test_runner::{Config, TestRunner};
-    let site = Site::new();
+    let site = DaemonSite::new();
     let host = site.host();
     let transport = Transport::open(&host, "test-daemon").unwrap();
     let sender = transport.sender::<ParameterSnapshot>(TRAIN).unwrap();

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_transport::monotonic_now_ns;
 
 use crate::hold_the_cores;
@@ -45,7 +45,7 @@ struct Controller {
 }
 
 impl Controller {
-    fn connect(site: &Site) -> Self {
+    fn connect(site: &DaemonSite) -> Self {
         let host = site.host();
         Controller {
             publisher: SamplePublisher::open(&host, TRAIN).unwrap(),
@@ -80,7 +80,7 @@ impl Controller {
 #[test]
 fn a_thread_at_work_neither_faults_nor_waits_once_it_is_warm() {
     let _cores = hold_the_cores();
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "lock_memory = true", PIPELINES);
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
     daemon.await_error("serving");
@@ -102,7 +102,7 @@ fn a_thread_at_work_neither_faults_nor_waits_once_it_is_warm() {
 #[test]
 fn missing_privileges_are_named_with_their_price_and_the_daemon_serves() {
     let _cores = hold_the_cores();
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "lock_memory = true", PIPELINES);
     let arguments = ["run", "--config", config.to_str().unwrap()];
     let daemon = site.start_without_real_time(DYNOCAR, &arguments);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const PIPELINES: &str = "[[threads]]\nname = \"all\"\n\
@@ -10,7 +10,7 @@ const PIPELINES: &str = "[[threads]]\nname = \"all\"\n\
                          [[pipelines]]\nkind = \"rls\"\nthread = \"all\"\n";
 
 /// Exit status and standard error of a replay of the demo's first run.
-fn replay(site: &Site, more: &[&str]) -> (Option<i32>, String) {
+fn replay(site: &DaemonSite, more: &[&str]) -> (Option<i32>, String) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
     let mut arguments =
         vec!["replay", folder.to_str().expect("UTF-8"), "--run", "1", "--rate", "max"];
@@ -28,7 +28,7 @@ fn number_before(words: &str, said: &str) -> u64 {
 
 #[test]
 fn a_replay_counts_its_own_samples_and_waits_for_the_daemon() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
     for file in ["train.toml", "track.toml"] {
         site.write(file, &std::fs::read_to_string(folder.join(file)).expect("a demo file"));
@@ -57,7 +57,7 @@ fn a_replay_counts_its_own_samples_and_waits_for_the_daemon() {
 
 #[test]
 fn a_replay_of_which_everything_was_refused_says_why_and_fails() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     // A train of 200 t: the demo's weighs nine times as much.
     let config = site.write_config(1, "", PIPELINES);
     let _daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().expect("UTF-8")]);
@@ -71,7 +71,7 @@ fn a_replay_of_which_everything_was_refused_says_why_and_fails() {
 
 #[test]
 fn a_replay_to_nobody_says_so_and_fails() {
-    let (code, said) = replay(&Site::new(), &["--wait", "0.01"]);
+    let (code, said) = replay(&DaemonSite::new(), &["--wait", "0.01"]);
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("nobody took the samples: no daemon serves train 1"), "{said}");
 }

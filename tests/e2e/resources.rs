@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::TrainId;
 use dynocar_shared::services::PIPELINES_MAX;
-use dynocar_tests::process::{Site, await_true};
+use dynocar_tests::process::{DaemonSite, await_true};
 use dynocar_transport::peer::RoleLock;
 use dynocar_transport::{Peer, Role};
 use rustix::process::Signal;
@@ -29,7 +29,7 @@ fn full_pipe() -> (PipeReader, PipeWriter) {
 
 #[test]
 fn a_log_that_nobody_takes_holds_neither_work_nor_end_up() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "log = \"trace\"", ECHO);
     let socket = site.path().join("notify");
     let supervisor = std::os::unix::net::UnixDatagram::bind(&socket).unwrap();
@@ -72,7 +72,7 @@ fn a_log_that_nobody_takes_holds_neither_work_nor_end_up() {
 #[test]
 fn lines_that_nobody_takes_are_dropped_counted_and_said() {
     const TRAINS: u64 = 60;
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(TRAINS, "", ECHO);
     let (reader, writer) = full_pipe();
     let run = ["run", "--config", config.to_str().unwrap()];
@@ -109,7 +109,7 @@ fn lines_that_nobody_takes_are_dropped_counted_and_said() {
 #[test]
 fn what_many_pipelines_say_at_once_is_taken_as_a_whole() {
     const TRAINS: u64 = 40;
-    let site = Site::new();
+    let site = DaemonSite::new();
     let echo = |it| format!("[[pipelines]]\nkind = \"echo\"\nname = \"{it}\"\nthread = \"all\"\n");
     let pipelines: String = (0..PIPELINES_MAX).map(echo).collect();
     let threads = "[[threads]]\nname = \"all\"\n";
@@ -124,7 +124,7 @@ fn what_many_pipelines_say_at_once_is_taken_as_a_whole() {
 
 #[test]
 fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", ECHO);
     let run = |limits: &str| {
         let script = format!("{limits} && exec {DYNOCAR} run --config {}", config.display());
@@ -163,7 +163,7 @@ fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
 
 #[test]
 fn a_limit_of_open_files_is_named_wherever_it_ends_a_start() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", ECHO);
     for limit in [7, 10, 16, 20, 24, 28, 32] {
         let script =
@@ -178,7 +178,7 @@ fn a_limit_of_open_files_is_named_wherever_it_ends_a_start() {
 
 #[test]
 fn metrics_are_answered_beside_slow_peers_with_head_slash_and_query() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let lines = format!("[metrics]\nlisten = \"{port}\"");
     let config = site.write_config(1, "", &format!("{ECHO}{lines}\n"));
@@ -233,7 +233,7 @@ fn whoever_starts_processes_takes_them_along_however_it_ends() {
         (SOAK, &["faults", "--rounds", "100"], Signal::TERM),
         (SOAK, &["faults", "--rounds", "100"], Signal::KILL),
     ] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let mut process = site.start(program, arguments);
         let mut children = Vec::new();
         await_true(

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const PEER: &str = env!("CARGO_BIN_EXE_dynocar-test-peer");
@@ -41,13 +41,13 @@ fn await_seen(client: &Process, what: &str, condition: impl Fn(&ClientLine) -> b
 }
 
 struct Cast {
-    site: Site,
+    site: DaemonSite,
     config: String,
 }
 
 impl Cast {
     fn new() -> Self {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let config = site.write_config(1, "idle = \"adaptive\"", ECHO);
         Cast { site, config: config.to_str().expect("a UTF-8 path").to_owned() }
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use dynocar_shared::services::ROOT_VARIABLE;
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 
 use crate::support::{self, Link, Program};
 
@@ -19,7 +19,7 @@ fn shipped(path: &str) -> String {
 }
 
 /// The daemon as shipped, once it has seen the demo's recording.
-fn daemon_that_has_learned(site: &Site) -> Process {
+fn daemon_that_has_learned(site: &DaemonSite) -> Process {
     let daemon = site.start(DYNOCAR, &["run", "--config", &shipped("config/daemon.toml")]);
     daemon.await_error("serving");
     let mut replay = site.start(DYNOCAR, &["replay", &shipped("config/demo"), "--rate", "1000"]);
@@ -48,7 +48,7 @@ fn examples(folder: &Path) -> Vec<(&'static str, Command)> {
 
 #[test]
 fn every_shipped_example_comes_to_a_usable_resistance_from_the_shipped_daemon() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = daemon_that_has_learned(&site);
     let folder = tempfile::tempdir().expect("a folder for programs");
     for (name, mut command) in examples(folder.path()) {
@@ -94,7 +94,7 @@ fn telegraf_reads_the_metrics_where_the_shipped_configuration_puts_them() {
 
 #[test]
 fn the_driver_example_keeps_the_timetable_once_the_shipped_daemon_has_learned() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = site.start(DYNOCAR, &["run", "--config", &shipped("config/daemon.toml")]);
     daemon.await_error("serving");
     let folder = tempfile::tempdir().expect("a folder for programs");

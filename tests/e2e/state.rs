@@ -15,7 +15,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, Quantity, Status, TrainId, TrainSample,
 };
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_tests::soak::state_kills::kill_writers;
 use dynocar_tests::tram;
 use dynocar_transport::monotonic_now_ns;
@@ -30,13 +30,13 @@ fn demo_folder() -> PathBuf {
 }
 
 pub(super) struct Cast {
-    pub(super) site: Site,
+    pub(super) site: DaemonSite,
     dataset: Dataset,
 }
 
 impl Cast {
     pub(super) fn new() -> Self {
-        let site = Site::new();
+        let site = DaemonSite::new();
         for file in ["train.toml", "track.toml"] {
             let text = std::fs::read_to_string(demo_folder().join(file)).expect("a demo file");
             site.write(file, &text);

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::{Command, Output};
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use serde_json::Value;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
@@ -32,8 +32,8 @@ fn recording(factor: f64, from_mps: f64) -> (String, f64) {
     (text, distance_m)
 }
 
-fn site(runs: &[(&str, String)], columns: &str) -> Site {
-    let site = Site::new();
+fn site(runs: &[(&str, String)], columns: &str) -> DaemonSite {
+    let site = DaemonSite::new();
     let mut manifest = format!(
         "[dataset]\nname = \"stops\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
          time = {{ column = \"t\", unit = \"s\" }}\n{columns}"
@@ -50,7 +50,7 @@ fn site(runs: &[(&str, String)], columns: &str) -> Site {
 const COLUMNS: &str = "speed = { column = \"v\", unit = \"km/h\" }\n\
     brake_handle = { column = \"b\", unit = \"1\" }\n";
 
-fn stops(site: &Site, options: &[&str]) -> Output {
+fn stops(site: &DaemonSite, options: &[&str]) -> Output {
     let folder = site.path().display().to_string();
     Command::new(DYNOCAR).arg("stops").arg(folder).args(options).output().unwrap()
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use dynocar_client::SamplePublisher;
 use dynocar_shared::{ParameterSnapshot, SampleField, Status, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, await_true};
+use dynocar_tests::process::{DaemonSite, Process, await_true};
 use dynocar_transport::channel::Transport;
 use dynocar_transport::peer::RoleLock;
 use dynocar_transport::{Announcement, Role, monotonic_now_ns};
@@ -20,7 +20,7 @@ const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const ECHO: &str = "[[pipelines]]\nkind = \"echo\"\n";
 const TRAIN: TrainId = TrainId(1);
 
-fn daemon(site: &Site, pipelines: &str, variables: &[(&str, &str)]) -> Process {
+fn daemon(site: &DaemonSite, pipelines: &str, variables: &[(&str, &str)]) -> Process {
     let config = site.write_config(1, "", pipelines);
     let arguments = ["run", "--config", config.to_str().expect("a UTF-8 path")];
     let daemon = site.start_with(DYNOCAR, &arguments, variables);
@@ -30,7 +30,7 @@ fn daemon(site: &Site, pipelines: &str, variables: &[(&str, &str)]) -> Process {
 
 #[test]
 fn the_supervisor_hears_of_readiness_of_life_and_of_the_end() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let path = site.path().join("notify");
     let socket = UnixDatagram::bind(&path).unwrap();
     socket.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
@@ -52,7 +52,7 @@ fn the_supervisor_hears_of_readiness_of_life_and_of_the_end() {
 
 #[test]
 fn a_stopped_daemon_no_longer_feeds_the_watchdog() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let path = site.path().join("notify");
     let socket = UnixDatagram::bind(&path).unwrap();
     let variables = [("NOTIFY_SOCKET", path.to_str().unwrap()), ("WATCHDOG_USEC", "400000")];
@@ -72,7 +72,7 @@ fn a_stopped_daemon_no_longer_feeds_the_watchdog() {
 }
 
 /// Exit status and output of `dynocar health`.
-fn health(site: &Site) -> (Option<i32>, String) {
+fn health(site: &DaemonSite) -> (Option<i32>, String) {
     let mut process = site.start(DYNOCAR, &["health", "--train", "1"]);
     let status = process.wait();
     (status.code(), process.output())
@@ -80,7 +80,7 @@ fn health(site: &Site) -> (Option<i32>, String) {
 
 #[test]
 fn health_shows_no_daemon_from_ok_from_stale_by_exit_status_and_words() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (code, words) = health(&site);
     assert_eq!(code, Some(6), "{words}");
     assert!(
@@ -106,7 +106,7 @@ fn health_shows_no_daemon_from_ok_from_stale_by_exit_status_and_words() {
 
 #[test]
 fn health_without_options_lists_every_train_and_ends_with_the_worst_verdict() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let health = || {
         let mut process = site.start(DYNOCAR, &["health"]);
         (process.wait().code(), process.output())
@@ -137,7 +137,7 @@ fn health_without_options_lists_every_train_and_ends_with_the_worst_verdict() {
 
 #[test]
 fn health_shows_a_degraded_pipeline_and_an_incompatible_daemon() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let host = site.host();
     let role = RoleLock::claim(&host, TRAIN, Role::Daemon).unwrap();
     let transport = Transport::open(&host, "test-daemon").unwrap();
@@ -195,7 +195,7 @@ fn value(text: &str, name: &str, label: &str) -> Option<f64> {
 
 #[test]
 fn metrics_are_open_metrics_text_and_nothing_else_is_answered() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let port = free_port();
     let pipelines = format!("{ECHO}name = \"floor\"\n[metrics]\nlisten = \"127.0.0.1:{port}\"\n");
     let daemon = daemon(&site, &pipelines, &[]);
@@ -244,7 +244,7 @@ fn metrics_are_open_metrics_text_and_nothing_else_is_answered() {
 #[test]
 fn metrics_are_off_by_default_and_refused_beyond_loopback() {
     for address in ["0.0.0.0:9464", "192.168.0.1:9464", "localhost", "9464"] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let pipelines = format!("{ECHO}[metrics]\nlisten = \"{address}\"\n");
         let config = site.write_config(1, "", &pipelines);
         let mut daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
@@ -252,7 +252,7 @@ fn metrics_are_off_by_default_and_refused_beyond_loopback() {
         let expected = format!("metrics.listen = {address}: expected a loopback address");
         assert!(daemon.errors().contains(&expected), "{}", daemon.errors());
     }
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = daemon(&site, ECHO, &[]);
     let sockets = std::fs::read_to_string("/proc/net/tcp").unwrap();
     let listening: Vec<&str> = sockets

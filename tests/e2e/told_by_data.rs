@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dynocar::dataset::load;
 use dynocar_analysis::explain::{Explanation, explain};
-use dynocar_tests::simulator::random::{Random, Stream};
+use dynocar_tests::simulator::random::{SimulatorRandom, Stream};
 
 const MASS_T: f64 = 100.0;
 const MANIFEST: &str = "[dataset]\nname = \"steady\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
@@ -21,7 +21,7 @@ const TRAIN: &str = "[train]\nmass_t = 100\nlength_m = 80\nrotating_mass_factor 
 fn explained(folder: &Path, speeds_mps: &[f64]) -> Explanation {
     let mut manifest = String::from(MANIFEST);
     for run in 0..3_u64 {
-        let mut random = Random::new(run, Stream::Sensors(run as usize));
+        let mut random = SimulatorRandom::new(run, Stream::Sensors(run as usize));
         let name = format!("run{run}.csv");
         let mut rows = String::from("time_s,speed_mps,traction_n,brake_n,gradient_permille\n");
         let (mut speed_mps, mut time_s) = (speeds_mps[0], 0.0);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 const WORKSHOP: &str = env!("CARGO_BIN_EXE_dynocar-workshop-under-test");
@@ -11,7 +11,7 @@ const CONFIG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/daemon.toml
 const TRAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo/train.toml");
 
 /// A program as it is installed, in a folder of the site.
-fn installed(site: &Site, program: &str, place: &str) -> PathBuf {
+fn installed(site: &DaemonSite, program: &str, place: &str) -> PathBuf {
     let path = site.path().join(place);
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
     // Not from this process: a test beside this one that forks would hold the file open for writing.
@@ -52,7 +52,7 @@ fn one_help_lists_every_command_as_its_own_program_says_it() {
 
 #[test]
 fn the_workshop_is_found_next_to_the_program_else_on_the_search_path() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let nowhere = site.path().join("nowhere");
     let beside = installed(&site, DYNOCAR, "both/dynocar");
     installed(&site, WORKSHOP, "both/dynocar-workshop");
@@ -83,7 +83,7 @@ fn the_workshop_is_found_next_to_the_program_else_on_the_search_path() {
 
 #[test]
 fn a_configuration_is_checked_without_the_workshop_and_alike_with_it() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let nowhere = site.path().join("nowhere");
     let alone = installed(&site, DYNOCAR, "alone/dynocar");
     for options in [&["check", CONFIG][..], &["check", CONFIG, "--json", "-"]] {

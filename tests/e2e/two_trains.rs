@@ -6,12 +6,12 @@ use dynocar_analysis::identify::published_samples;
 use dynocar_mcap::topic::Message;
 use dynocar_mcap::writing::{RecordingWriter, WallClock};
 use dynocar_shared::{TrainId, TrainSample};
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 
 /// Records the demo's train as train 1, and one of half its mass and forces as train 2.
-fn record(site: &Site) -> String {
+fn record(site: &DaemonSite) -> String {
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo");
     let path = site.path().join("two.mcap");
     let file = std::fs::File::create_new(&path).expect("a new file");
@@ -45,7 +45,7 @@ fn record(site: &Site) -> String {
     path.display().to_string()
 }
 
-fn run(site: &Site, arguments: &[&str]) -> (Option<i32>, String, String) {
+fn run(site: &DaemonSite, arguments: &[&str]) -> (Option<i32>, String, String) {
     let mut process = site.start(DYNOCAR, arguments);
     let status = process.wait();
     (status.code(), process.output(), process.errors())
@@ -53,7 +53,7 @@ fn run(site: &Site, arguments: &[&str]) -> (Option<i32>, String, String) {
 
 #[test]
 fn every_command_takes_the_train_that_is_named() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let path = record(&site);
     let mut masses = Vec::new();
     for train in ["1", "2"] {
@@ -91,7 +91,7 @@ fn every_command_takes_the_train_that_is_named() {
 
 #[test]
 fn explain_grows_the_model_of_the_train_that_is_named() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let path = record(&site);
     let at = |name: &str| site.path().join(name).display().to_string();
     let (grown, annotated, report) = (at("grown"), at("annotated.mcap"), at("report.html"));
@@ -119,7 +119,7 @@ fn explain_grows_the_model_of_the_train_that_is_named() {
 
 #[test]
 fn a_replay_plays_the_train_that_is_named() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let path = record(&site);
     let config = site.write_config(
         2,
@@ -136,7 +136,7 @@ fn a_replay_plays_the_train_that_is_named() {
 
 #[test]
 fn a_dataset_of_one_train_has_none_to_choose() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/demo").display().to_string();
     for command in ["check", "identify", "explain", "stops"] {
         let (code, _, errors) = run(&site, &[command, &demo, "--train", "1"]);

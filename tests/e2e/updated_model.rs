@@ -11,15 +11,15 @@ use dynocar_model::terms::wheel;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, TrueEffect, simulate,
 };
 use dynocar_workshop::updated::grow;
 
 /// A dataset on which every kind can be tried, without wheel slip and outliers.
 fn simulated() -> SimulatedDataset {
     let effects = vec![
-        Effect::TunnelDrag { c_factor: 2.2 },
-        Effect::LocalResistance {
+        TrueEffect::TunnelDrag { c_factor: 2.2 },
+        TrueEffect::LocalResistance {
             extra_n_per_kn: 3.0,
             intervals_m: vec![(2000.0, 3500.0)],
             runs: Vec::new(),

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use dynocar_client::SamplePublisher;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site, Terminal, Tie, await_true};
+use dynocar_tests::process::{DaemonSite, Process, Terminal, Tie, await_true};
 use dynocar_transport::peer::RoleLock;
 use dynocar_transport::{Announcement, Role, monotonic_now_ns};
 use rustix::process::Signal;
@@ -24,11 +24,11 @@ const PIPELINES: &str = "[[pipelines]]\nkind = \"trajectory_kalman\"\n\
                          [[pipelines]]\nkind = \"residual_monitor\"\n";
 const TRAIN: TrainId = TrainId(1);
 
-fn config(site: &Site) -> PathBuf {
+fn config(site: &DaemonSite) -> PathBuf {
     site.write_config(1, "", PIPELINES)
 }
 
-fn daemon(site: &Site) -> Process {
+fn daemon(site: &DaemonSite) -> Process {
     let daemon = site.start(DYNOCAR, &["run", "--config", config(site).to_str().unwrap()]);
     daemon.await_error("serving");
     daemon
@@ -41,7 +41,7 @@ struct Controller {
 }
 
 impl Controller {
-    fn of(site: &Site) -> Controller {
+    fn of(site: &DaemonSite) -> Controller {
         let host = site.host();
         let must_end = Arc::new(AtomicBool::new(false));
         let is_ended = Arc::clone(&must_end);
@@ -74,7 +74,7 @@ impl Drop for Controller {
 
 #[test]
 fn lines_list_a_daemon_that_comes_goes_and_is_back_and_a_signal_ends_them() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = config(&site);
     let mut watch = site.start(WATCH, &["--config", config.to_str().unwrap()]);
     let await_words = |words: &str| watch.await_line(words, |line| line.contains(words));
@@ -99,7 +99,7 @@ fn lines_list_a_daemon_that_comes_goes_and_is_back_and_a_signal_ends_them() {
 
 #[test]
 fn an_incompatible_daemon_is_named_and_waited_out() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let lock = RoleLock::claim(&site.host(), TRAIN, Role::Daemon).unwrap();
     let path = std::fs::read_dir(site.host().trains_directory()).unwrap();
     let path = path
@@ -120,7 +120,7 @@ fn an_incompatible_daemon_is_named_and_waited_out() {
 
 #[test]
 fn wrong_words_are_refused_with_what_was_expected() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = config(&site);
     let config = config.to_str().unwrap();
     for (arguments, words) in [
@@ -137,7 +137,7 @@ fn wrong_words_are_refused_with_what_was_expected() {
 
 #[test]
 fn a_reader_of_lines_that_goes_away_ends_them_quietly() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let script = format!("{WATCH} --plain | head -n 1; echo ended ${{PIPESTATUS[0]}}");
     let mut shell = site.start("bash", &["-c", &script]);
     assert!(shell.wait().success());
@@ -152,7 +152,7 @@ struct Screen {
 }
 
 impl Screen {
-    fn open(site: &Site, width: u16, height: u16) -> Screen {
+    fn open(site: &DaemonSite, width: u16, height: u16) -> Screen {
         support::require("tmux", "tmux");
         let screen = Screen { socket: site.path().join("tmux") };
         let size = [width.to_string(), height.to_string()];
@@ -204,7 +204,7 @@ impl Drop for Screen {
 }
 
 /// `dynocar` and `dynocar-watch` side by side, as they are installed.
-fn installed(site: &Site) -> PathBuf {
+fn installed(site: &DaemonSite) -> PathBuf {
     for (program, name) in [(DYNOCAR, "dynocar"), (WATCH, "dynocar-watch")] {
         std::fs::copy(Path::new(program), site.path().join(name)).unwrap();
     }
@@ -213,7 +213,7 @@ fn installed(site: &Site) -> PathBuf {
 
 #[test]
 fn in_a_terminal_it_shows_all_resizes_and_leaves_the_terminal_as_it_was() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let dynocar = installed(&site);
     let config = config(&site);
     let _daemon = daemon(&site);
@@ -243,7 +243,7 @@ fn in_a_terminal_it_shows_all_resizes_and_leaves_the_terminal_as_it_was() {
 
 #[test]
 fn signals_and_control_c_leave_the_terminal_as_it_was() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let screen = Screen::open(&site, 100, 30);
     for (index, end) in ["C-c", "TERM", "HUP"].into_iter().enumerate() {
         let file = site.path().join(format!("pid{index}"));
@@ -267,7 +267,7 @@ fn signals_and_control_c_leave_the_terminal_as_it_was() {
 
 #[test]
 fn a_terminal_that_cannot_draw_gets_plain_lines_in_its_letters() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let _daemon = daemon(&site);
     for (term, locale) in [("dumb", "C.UTF-8"), ("xterm", "C"), ("", "C.UTF-8")] {
         let mut terminal = Terminal::open();

@@ -38,15 +38,46 @@ fn fault(paragraph: &str) -> Option<String> {
     RIDDLES.iter().find(|word| text.contains(**word)).map(|word| format!("holds \"{word}\""))
 }
 
-/// Returns the number of values of a parameter that is a tuple pattern, such as `(a, b, c): (f64, f64, f64)`.
-fn tuple_parameter(line: &str) -> Option<usize> {
-    let (pattern, _) = line.split_once("): ")?;
-    let names = pattern.rsplit_once('(')?.1;
-    let is_name = |name: &str| name.chars().all(|it| it.is_ascii_lowercase() || it == '_');
-    let names: Vec<&str> = names.split(", ").map(|it| it.trim_start_matches("mut ")).collect();
-    let is_code = !line.contains("let ") && !line.trim_start().starts_with("//");
-    let is_parameter = is_code && names.iter().all(|name| is_name(name));
-    is_parameter.then_some(names.len())
+/// Returns the place past the bracket that closes the one at `open`, a round or an angular one.
+fn closed(code: &str, open: usize) -> usize {
+    let (one, other) = if code[open..].starts_with('<') { ('<', '>') } else { ('(', ')') };
+    let (mut depth, mut before) = (0, ' ');
+    let end = code[open..].find(|it| {
+        depth += i32::from(it == one) - i32::from(it == other && !"-=".contains(before));
+        before = it;
+        depth == 0
+    });
+    end.map_or(code.len(), |end| open + end + 1)
+}
+
+/// Returns the parameters of each function, and of each closure whose parameters have types.
+fn parameters(code: &str) -> impl Iterator<Item = &str> {
+    let of_functions = code.match_indices("fn ").filter_map(|(at, _)| {
+        let bracket = |from: usize| Some(from + code[from..].find(['(', '<'])?);
+        let first = bracket(at)?;
+        let is_generic = code[first..].starts_with('<');
+        let open = if is_generic { bracket(closed(code, first))? } else { first };
+        Some(&code[open + 1..closed(code, open) - 1])
+    });
+    let is_typed = |it: &&str| it.contains(": ") && !it.contains([';', '\n', '"', '{']);
+    of_functions.chain(code.split('|').filter(is_typed))
+}
+
+/// Returns the number of elements of the largest tuple in parameters, in their patterns and their types.
+fn largest_tuple(parameters: &str) -> usize {
+    let opens = parameters.match_indices('(').map(|(open, _)| open);
+    let tuples = opens.filter(|open| !parameters[..*open].ends_with(char::is_alphanumeric));
+    let elements = tuples.map(|open| {
+        let tuple = &parameters[open + 1..closed(parameters, open)];
+        let tuple = tuple.trim_end_matches(|it: char| it.is_whitespace() || it == ',' || it == ')');
+        let mut depth = 0;
+        let commas = tuple.chars().filter(|it| {
+            depth += i32::from("([<".contains(*it)) - i32::from(")]>".contains(*it));
+            *it == ',' && depth == 0
+        });
+        1 + commas.count()
+    });
+    elements.max().unwrap_or(0)
 }
 
 fn sources() -> impl Iterator<Item = (PathBuf, String)> {
@@ -72,10 +103,10 @@ fn comments_say_what_they_mean_with_a_noun_or_a_verb() {
 fn three_values_that_go_together_have_a_name() {
     let mut found = Vec::new();
     for (path, text) in sources() {
-        for line in without_tests(&text) {
-            if tuple_parameter(line).is_some_and(|count| count > 2) {
-                found.push(format!("{}: {}", path.display(), line.trim()));
-            }
+        let lines = without_tests(&text).into_iter();
+        let code: Vec<&str> = lines.filter(|line| !line.trim_start().starts_with("//")).collect();
+        for it in parameters(&code.join("\n")).filter(|it| largest_tuple(it) > 2) {
+            found.push(format!("{}: {}", path.display(), it.trim()));
         }
     }
     assert!(found.is_empty(), "{found:#?}");
@@ -84,22 +115,20 @@ fn three_values_that_go_together_have_a_name() {
 /// Returns the name of the public type that a line declares.
 fn public_type(line: &str) -> Option<&str> {
     let kinds = ["struct ", "enum ", "trait ", "type "];
-    let item = line.strip_prefix("pub ")?;
+    let item = line.trim_start().strip_prefix("pub ")?;
     let name = kinds.iter().find_map(|kind| item.strip_prefix(kind))?;
-    name.split(|it: char| !it.is_alphanumeric()).next()
+    name.split(|it: char| !it.is_alphanumeric()).next().filter(|name| !name.is_empty())
 }
 
 #[test]
-fn a_public_type_has_a_name_of_its_own_in_its_package() {
+fn a_public_type_has_a_name_of_its_own_in_the_workspace() {
     let mut found = Vec::new();
-    for folder in FOLDERS {
-        let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();
-        for path in rust_files(folder).into_iter().filter(|path| !is_of_tests(path)) {
-            let text = std::fs::read_to_string(&path).expect("a source file");
-            for name in without_tests(&text).into_iter().filter_map(public_type) {
-                if let Some(other) = names.insert(name.to_owned(), path.clone()) {
-                    found.push(format!("{name}: {} and {}", other.display(), path.display()));
-                }
+    let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();
+    for path in FOLDERS.into_iter().flat_map(rust_files).filter(|path| !is_of_tests(path)) {
+        let text = std::fs::read_to_string(&path).expect("a source file");
+        for name in without_tests(&text).into_iter().filter_map(public_type) {
+            if let Some(other) = names.insert(name.to_owned(), path.clone()) {
+                found.push(format!("{name}: {} and {}", other.display(), path.display()));
             }
         }
     }
@@ -114,9 +143,15 @@ fn riddles_and_tuples_are_found_wherever_they_stand() {
     );
     assert!(fault("What it does.").is_some() && fault("Values beyond so many m.").is_some());
     assert!(fault("Returns the speed in m/s.").is_none());
-    assert_eq!(tuple_parameter("    (a, b, c): (f64, f64, f64),"), Some(3));
-    assert_eq!(tuple_parameter("fn f(x: u8, (a, mut b): (u8, u8)) {"), Some(2));
+    let largest = |code| parameters(code).map(largest_tuple).max();
+    assert_eq!(largest("fn f(a: f64, (b, c, d): (f64, f64, f64)) {"), Some(3));
+    assert_eq!(largest("fn f<T: Fn(u8, u8, u8)>(a: &[(f64, Vec<(u8, u8)>, f64, f64)]) {"), Some(4));
+    assert_eq!(largest("let f = |at: f64, all: &[(u8, u8, u8)]| 1;"), Some(3));
+    assert_eq!(
+        largest("fn f(x: u8, (a, mut b): (u8, u8)) {\n    g(|(a, b, c)| (a, b, c))"),
+        Some(2)
+    );
     assert_eq!(public_type("pub struct Row<'a> {"), Some("Row"));
+    assert_eq!(public_type("    pub type Row = [f64; 2];"), Some("Row"));
     assert_eq!(public_type("struct Row;"), None);
-    assert_eq!(tuple_parameter("    let (a, b, c): (u8, u8, u8) = f();"), None);
 }

@@ -6,20 +6,20 @@
 
 use std::sync::Arc;
 
-use dynocar_analysis::advice::drive::{Drive, DriveKind, Scene};
 use dynocar_analysis::advice::known::davis_of;
+use dynocar_analysis::advice::manoeuvre::{DriveKind, PlannedManoeuvre, Scene};
 use dynocar_analysis::advice::noise::NoiseSeen;
 use dynocar_analysis::advice::rehearsal::{KnownBefore, MASS, forecast};
 use dynocar_analysis::advice::{best, forecasts};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
-use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, SampleField, TrainId, TrainSample,
 };
 use dynocar_tests::simulator::driving::{Controls, TrainOnLine};
-use dynocar_tests::simulator::random::{Random, Stream};
+use dynocar_tests::simulator::random::{SimulatorRandom, Stream};
 
 const STEP_S: f64 = 0.2;
 const SPEED_NOISE_MPS: f64 = 0.03;
@@ -53,9 +53,9 @@ struct Trial {
     truth: TrainModel,
     pipeline: Pipeline,
     noise: NoiseSeen,
-    random: Random,
+    random: SimulatorRandom,
     sample: TrainSample,
-    motion: Motion,
+    motion: SimulatedMotion,
 }
 
 impl Trial {
@@ -68,9 +68,9 @@ impl Trial {
             truth,
             pipeline: Pipeline::new(TrainId(1), 0, declared, None, estimator),
             noise: NoiseSeen::default(),
-            random: Random::new(seed, Stream::Sensors(0)),
+            random: SimulatorRandom::new(seed, Stream::Sensors(0)),
             sample: TrainSample::empty(TrainId(1)).with(SampleField::Gradient, 0.0),
-            motion: Motion { distance_m: 0.0, speed_mps: 8.0 },
+            motion: SimulatedMotion { distance_m: 0.0, speed_mps: 8.0 },
         }
     }
 
@@ -147,7 +147,7 @@ impl Trial {
         Scene::new(train, davis, MASS_KG, self.snapshot().speed_max_mps)
     }
 
-    fn drive(&mut self, drive: Drive) {
+    fn drive(&mut self, drive: PlannedManoeuvre) {
         let train = declared();
         let mut driver = drive.begin();
         for _ in 0..(drive.within_s / STEP_S) as usize {
@@ -211,7 +211,7 @@ fn the_advised_manoeuvre_shows_more_than_most_and_about_as_much_as_the_best() {
         let noise = first.noise.noise(first.snapshot(), &train).unwrap();
         let all = forecasts(first.snapshot(), &train, first.mass_t(), &noise, 60.0);
         let advised = best(&all, worst).unwrap().drive;
-        let left = |drive: Drive| {
+        let left = |drive: PlannedManoeuvre| {
             let mut trial = Trial::new(seed);
             trial.drive_about();
             trial.begin_at(drive.from_mps);
@@ -245,7 +245,7 @@ fn the_deviation_of_the_mass_after_traction_is_the_one_predicted() {
         trial.begin_at(3.0);
         let noise = trial.noise.noise(trial.snapshot(), &train).unwrap();
         let kind = DriveKind::Accelerate;
-        let drive = Drive { kind, from_mps: 3.0, to_mps: 38.0, within_s: 20.0 };
+        let drive = PlannedManoeuvre { kind, from_mps: 3.0, to_mps: 38.0, within_s: 20.0 };
         let scene = Scene::new(&train, train.resistance, MASS_KG, 20.0);
         let expected_by_advice = forecast(&scene, &trial.known(), &noise, drive).unwrap();
         trial.drive(drive);

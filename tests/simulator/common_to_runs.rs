@@ -4,9 +4,9 @@ use dynocar_analysis::explain::answer::ExplainAnswer;
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
-use dynocar_tests::simulator::effects::MassSection;
+use dynocar_tests::simulator::effects::TrueMassSection;
 use dynocar_tests::simulator::{
-    Deviations, Effect, EffectRequest, SimulatorSettings, TrainType, simulate,
+    EffectRequest, SimulatorSettings, TrainType, TrueDeviations, TrueEffect, simulate,
 };
 
 /// Returns the answer to a dataset of a number of runs, a quarter of them held out.
@@ -31,10 +31,10 @@ fn parameter(answer: &ExplainAnswer, kind: EffectKind, name: &str) -> f64 {
 
 #[test]
 fn a_rotating_mass_stays_right_where_the_line_rounds_its_steps_over_an_unusual_length() {
-    let deviations = Deviations { vertical_curve_m: 120.0, ..Deviations::PLAIN };
+    let deviations = TrueDeviations { vertical_curve_m: 120.0, ..TrueDeviations::PLAIN };
     let truth = 0.12;
     for seed in [9_820_001, 9_820_007] {
-        let effect = Effect::RotatingMass { rotating_mass_factor: truth };
+        let effect = TrueEffect::RotatingMass { rotating_mass_factor: truth };
         let settings = SimulatorSettings::new(seed, EffectRequest::Exactly(vec![effect]));
         let answer = explained(SimulatorSettings { deviations, ..settings });
         let found = parameter(&answer, EffectKind::RotatingMass, "rotating_mass_factor");
@@ -48,7 +48,7 @@ fn a_resistance_at_two_places_is_found_in_runs_that_reach_only_the_second() {
     let settings = SimulatorSettings::new(9_700_001, EffectRequest::none());
     let settings = SimulatorSettings { train_type: Some(TrainType::Freight), ..settings };
     let places = [(13_720.0, 15_598.0), (18_300.0, 20_178.0)];
-    let place = Effect::LocalResistance {
+    let place = TrueEffect::LocalResistance {
         extra_n_per_kn: 1.8,
         intervals_m: places.to_vec(),
         runs: (1..=16).filter(|number| number % 4 < 2).collect(),
@@ -66,12 +66,29 @@ fn a_resistance_at_two_places_is_found_in_runs_that_reach_only_the_second() {
 }
 
 #[test]
+fn the_drag_of_mapped_tunnels_is_found_in_them_whatever_else_the_map_lacks() {
+    let tunnels = EffectRequest::Kinds(vec![EffectKind::TunnelDrag]);
+    let settings = SimulatorSettings::new(9_900_001, tunnels);
+    let settings = SimulatorSettings { deviations: TrueDeviations::ROUGHER, ..settings };
+    let simulated = simulate(&SimulatorSettings { runs: 24, holdout_runs: 6, ..settings.clone() });
+    let truth = simulated.effects[0].parameters(0.0)["c_factor"].as_f64().unwrap();
+    let answer = explained_of(24, settings);
+    let found = parameter(&answer, EffectKind::TunnelDrag, "c_factor");
+    // At five places of its own, which errors of the map make, it was half of the truth.
+    assert!((found - truth).abs() < 0.2 * (truth - 1.0), "{found} for {truth}");
+    let effect = answer.effects.iter().find(|it| it.kind == EffectKind::TunnelDrag.name());
+    let mapped = simulated.track().tunnels().len();
+    assert_eq!(effect.unwrap().place.intervals_m.as_ref().unwrap().len(), mapped);
+}
+
+#[test]
 fn runs_that_are_not_searched_have_winds_of_their_own() {
     let truth_mps = -7.5;
-    let effect = Effect::Wind { wind_plus_mps: truth_mps, run_sd_mps: 1.3, gust_sd_mps: 0.7 };
+    let effect = TrueEffect::Wind { wind_plus_mps: truth_mps, run_sd_mps: 1.3, gust_sd_mps: 0.7 };
     let settings = SimulatorSettings::new(9_600_002, EffectRequest::Exactly(vec![effect]));
     let settings = SimulatorSettings { train_type: Some(TrainType::HighSpeed), ..settings };
-    let answer = explained_of(64, SimulatorSettings { deviations: Deviations::ROUGH, ..settings });
+    let answer =
+        explained_of(64, SimulatorSettings { deviations: TrueDeviations::ROUGH, ..settings });
     let found_mps = parameter(&answer, EffectKind::Wind, "wind_plus_mps");
     // The days' winds scatter by 1.3 m/s; with one wind in all the others half of it is taken for the map's error.
     assert!((found_mps - truth_mps).abs() < 1.5, "{found_mps}: {}", answer.statement);
@@ -80,10 +97,10 @@ fn runs_that_are_not_searched_have_winds_of_their_own() {
 #[test]
 fn a_gain_stays_right_where_a_run_that_is_not_searched_goes_further_than_the_others() {
     let truth = 1.045;
-    let effect = Effect::TractionGain { gain: truth };
+    let effect = TrueEffect::TractionGain { gain: truth };
     let settings = SimulatorSettings::new(9_820_006, EffectRequest::Exactly(vec![effect]));
     let answer =
-        explained_of(128, SimulatorSettings { deviations: Deviations::ROUGHER, ..settings });
+        explained_of(128, SimulatorSettings { deviations: TrueDeviations::ROUGHER, ..settings });
     let found = parameter(&answer, EffectKind::TractionGain, "gain");
     // There the map's error is not known: counted, one run of 96 moves the gain by 0.013.
     assert!((found - truth).abs() < 0.008, "{found}: {}", answer.statement);
@@ -93,7 +110,7 @@ fn a_gain_stays_right_where_a_run_that_is_not_searched_goes_further_than_the_oth
 fn a_wind_beside_the_usual_errors_of_the_map_is_no_error_of_the_map() {
     let settings = SimulatorSettings::new(9_600_003, EffectRequest::Kinds(vec![EffectKind::Wind]));
     let answer =
-        explained_of(32, SimulatorSettings { deviations: Deviations::ROUGHER, ..settings });
+        explained_of(32, SimulatorSettings { deviations: TrueDeviations::ROUGHER, ..settings });
     let kinds: Vec<&str> = answer.effects.iter().map(|effect| effect.kind).collect();
     assert!(kinds.contains(&EffectKind::Wind.name()), "{}", answer.statement);
     assert!(!kinds.contains(&EffectKind::GradientError.name()), "{}", answer.statement);
@@ -104,11 +121,13 @@ fn loads_by_stop_stay_right_where_runs_that_are_not_searched_go_on_to_further_st
     let settings = SimulatorSettings {
         runs: 128,
         holdout_runs: 32,
-        deviations: Deviations::ROUGHER,
+        deviations: TrueDeviations::ROUGHER,
         ..SimulatorSettings::new(9_830_003, EffectRequest::LoadsByStop)
     };
     let simulated = simulate(&settings);
-    let [Effect::MassChangeSections(truth)] = &simulated.effects[..] else { panic!("no loads") };
+    let [TrueEffect::MassChangeSections(truth)] = &simulated.effects[..] else {
+        panic!("no loads")
+    };
     let answer = explain(&read_files(&dataset_files(&simulated)), &|_, _| ()).unwrap().answer;
     let at = answer.effects.iter().position(|it| it.kind == EffectKind::MassChange.name());
     let written = serde_json::to_value(&answer).unwrap();
@@ -116,7 +135,7 @@ fn loads_by_stop_stay_right_where_runs_that_are_not_searched_go_on_to_further_st
     let error = |found: &serde_json::Value| {
         let of = |key: &str| found[key].as_f64().unwrap();
         let middle_m = 0.5 * (of("from_m") + of("to_m"));
-        let is_at = |it: &&MassSection| {
+        let is_at = |it: &&TrueMassSection| {
             it.direction == of("direction") && it.from_m < middle_m && middle_m < it.to_m
         };
         Some(of("mass_factor") - truth.iter().find(is_at)?.mass_factor)

@@ -10,7 +10,8 @@ use dynocar_tests::simulator::dynamics::TruePhysics;
 use dynocar_tests::simulator::train_maker::Car;
 use dynocar_tests::simulator::true_run::{TRUE_STEP_S, TrueState};
 use dynocar_tests::simulator::{
-    Deviations, Effect, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, TrueDeviations, TrueEffect,
+    simulate,
 };
 
 /// Largest error of a gain as share of the force, as a root mean square.
@@ -24,10 +25,10 @@ fn a_locomotive_that_leaps_ahead_of_its_wagons_does_not_pull_harder() {
         .map(|seed| {
             let simulated = simulate(&SimulatorSettings {
                 train_type: Some(TrainType::Freight),
-                deviations: Deviations { has_couplings: true, ..Deviations::PLAIN },
+                deviations: TrueDeviations { has_couplings: true, ..TrueDeviations::PLAIN },
                 ..SimulatorSettings::new(seed, EffectRequest::Kinds(vec![EffectKind::TractionGain]))
             });
-            let [Effect::TractionGain { gain: truth }] = simulated.effects[..] else {
+            let [TrueEffect::TractionGain { gain: truth }] = simulated.effects[..] else {
                 panic!("another effect")
             };
             let dataset = read_files(&dataset_files(&simulated));

@@ -2,7 +2,7 @@
 //! estimated, its interval, and what is explained with it.
 
 use dynocar_analysis::dataset::{Dataset, ForceSource};
-use dynocar_analysis::explain::{drive, explain};
+use dynocar_analysis::explain::{drive_efficiency, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::read_files;
 use dynocar_tests::simulator::power::{TrueDrive, power_files};
@@ -43,8 +43,9 @@ fn held_and_errors(has_auxiliaries: bool) -> (usize, Vec<f64>) {
     let (mut held, mut errors) = (0, Vec::new());
     for seed in SEEDS {
         let truth = true_drive(seed, has_auxiliaries);
-        let estimated =
-            drive::estimated(&dataset(seed, &truth, EffectRequest::none())).unwrap().unwrap();
+        let estimated = drive_efficiency::estimated(&dataset(seed, &truth, EffectRequest::none()))
+            .unwrap()
+            .unwrap();
         let found = estimated.answer.efficiency;
         let error = found.value - truth.efficiency;
         eprintln!(
@@ -111,7 +112,7 @@ fn power_at_the_wheels_is_an_efficiency_of_one_and_others_are_estimated_as_they_
     for (seed, efficiency) in (61_200..).zip([1.0, 0.985, 0.93, 0.97, 1.0, 0.6, 1.0]) {
         let truth = TrueDrive { efficiency, auxiliary_power_w: None, noise: 0.0 };
         let dataset = dataset(seed, &truth, EffectRequest::none());
-        let found = drive::estimated(&dataset).unwrap().unwrap().answer.efficiency;
+        let found = drive_efficiency::estimated(&dataset).unwrap().unwrap().answer.efficiency;
         eprintln!(
             "seed {seed}: {efficiency} estimated as {:.4} ± {:.4}",
             found.value,

@@ -177,7 +177,7 @@ fn two_effects_act_together() {
     let pair = [EffectKind::CurveResistance, EffectKind::TractionGain];
     let both = ideal(&pair, SEED);
     assert_eq!(both.effects.iter().map(|effect| effect.kind()).collect::<Vec<_>>(), pair);
-    let only = |effects: &[dynocar_tests::simulator::Effect]| {
+    let only = |effects: &[dynocar_tests::simulator::TrueEffect]| {
         let settings = SimulatorSettings {
             train_type: Some(both.train.train_type),
             effects: EffectRequest::Exactly(effects.to_vec()),

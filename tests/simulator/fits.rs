@@ -8,12 +8,12 @@ use dynocar_analysis::explain::selection::Search;
 use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
-use dynocar_tests::simulator::{Deviations, EffectRequest, SimulatorSettings, simulate};
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrueDeviations, simulate};
 
 /// Shows the proposals of the library for a train with late forces beside a, b and c alone.
 fn proposed(look: impl Fn(&Explanation, &Scan, Vec<Candidate>)) {
     let simulated = simulate(&SimulatorSettings {
-        deviations: Deviations::ROUGH,
+        deviations: TrueDeviations::ROUGH,
         ..SimulatorSettings::new(77_001, EffectRequest::Kinds(vec![EffectKind::ActuatorDelay]))
     });
     let dataset = read_files(&dataset_files(&simulated));

@@ -3,22 +3,103 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use dynocar_analysis::dataset::{Dataset, Run};
+use dynocar_analysis::dataset::{Dataset, Role, Run};
+use dynocar_analysis::explain::answer::{EffectAnswer, ParameterValue};
 use dynocar_analysis::explain::evidence::{RunData, RunDataError};
-use dynocar_analysis::explain::explain_many;
 use dynocar_analysis::explain::many::{Held, Many};
+use dynocar_analysis::explain::{explain, explain_many};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, simulate};
 
-#[test]
-fn of_many_runs_some_are_held_and_each_is_read_once() {
-    let settings = SimulatorSettings {
+/// Many runs with a kind of effect.
+fn months_of(seed: u64, kinds: Vec<EffectKind>) -> SimulatorSettings {
+    SimulatorSettings {
         runs: 64,
         holdout_runs: 16,
         duration_s: 300.0,
-        ..SimulatorSettings::new(9101, EffectRequest::Kinds(vec![EffectKind::TunnelDrag]))
-    };
+        ..SimulatorSettings::new(seed, EffectRequest::Kinds(kinds))
+    }
+}
+
+fn number(values: &BTreeMap<String, ParameterValue>, name: &str) -> f64 {
+    match values.get(name) {
+        Some(ParameterValue::Number(value)) => *value,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+fn found(effects: &[EffectAnswer], kind: EffectKind) -> &EffectAnswer {
+    effects.iter().find(|effect| effect.kind == kind.name()).expect("it is found")
+}
+
+#[test]
+fn a_dead_time_and_a_lag_of_many_runs_are_separated_as_recorded() {
+    for seed in 9201..9204 {
+        let simulated = simulate(&months_of(seed, vec![EffectKind::ActuatorDelay]));
+        let truth = simulated.effects[0].parameters(0.0);
+        let explained = explain(&read_files(&dataset_files(&simulated)), &|_, _| ()).unwrap();
+        let effect = found(&explained.answer.effects, EffectKind::ActuatorDelay);
+        for name in ["delay_s", "lag_s"] {
+            let away_s = number(&effect.parameters, name) - truth[name].as_f64().unwrap();
+            assert!(away_s.abs() < 0.1, "{seed}: {name} {away_s:+.3} s off, {truth}");
+            assert!(number(&effect.std, name) < 0.2, "{seed}: {name} {:?}", effect.std);
+        }
+    }
+}
+
+#[test]
+fn runs_held_out_confirm_an_effect_or_say_that_it_is_not_in_them() {
+    let tunnel = EffectKind::TunnelDrag;
+    let simulated = simulate(&months_of(9101, vec![tunnel]));
+    let dataset = read_files(&dataset_files(&simulated));
+    let explained = explain(&dataset, &|_, _| ()).unwrap().answer;
+    let effect = found(&explained.effects, tunnel);
+    let held_out = effect.held_out.as_ref().expect("16 runs go through tunnels");
+    assert_eq!(held_out.runs, 16);
+    let truth = simulated.effects[0].parameters(0.0)["c_factor"].as_f64().unwrap();
+    let away = number(&held_out.parameters, "c_factor") - truth;
+    let std = number(&held_out.std, "c_factor");
+    assert!(away.abs() < 3.0 * std && std < 0.2 * (truth - 1.0), "{away} of {truth} ± {std}");
+    assert!(explained.statement.contains("which agrees with the fit runs"));
+
+    // The same days without the effect are held out.
+    let without = read_files(&dataset_files(&simulate(&months_of(9101, Vec::new()))));
+    let runs = dataset.runs.iter().zip(without.runs);
+    let runs = runs.map(|(with, without)| match with.role {
+        Role::Fit => with.clone(),
+        Role::Holdout => without,
+    });
+    let mixed = Dataset { runs: runs.collect(), ..dataset.without_runs() };
+    let explained = explain(&mixed, &|_, _| ()).unwrap().answer;
+    let held_out = found(&explained.effects, tunnel).held_out.as_ref().unwrap();
+    assert!(held_out.p_value < 1e-6, "{held_out:?}");
+    assert!((number(&held_out.parameters, "c_factor") - 1.0).abs() < 0.2 * (truth - 1.0));
+    assert!(explained.statement.contains("which is not what the fit runs say"));
+}
+
+#[test]
+fn of_many_runs_one_on_another_line_counts_for_nothing() {
+    let all = read_files(&dataset_files(&simulate(&months_of(9101, vec![EffectKind::TunnelDrag]))));
+    let held = Held::of(all.runs.iter().map(|run| run.role)).expect("many runs");
+    let mut elsewhere = all.clone();
+    for role in [Role::Fit, Role::Holdout] {
+        let mut own = elsewhere.runs.iter_mut().enumerate();
+        let other = own.find(|(index, run)| run.role == role && !held.holds(*index)).unwrap().1;
+        for sample in &mut other.samples {
+            sample.position_m += 1e6;
+        }
+    }
+    let [kinds, moved] = [all, elsewhere].map(|dataset| {
+        let effects = explain(&dataset, &|_, _| ()).expect("usable runs").answer.effects;
+        effects.iter().map(|effect| effect.kind).collect::<Vec<_>>()
+    });
+    assert_eq!(kinds, moved);
+}
+
+#[test]
+fn of_many_runs_some_are_held_and_each_is_read_once() {
+    let settings = months_of(9101, vec![EffectKind::TunnelDrag]);
     let all = read_files(&dataset_files(&simulate(&settings)));
     let held = Held::of(all.runs.iter().map(|run| run.role)).expect("many runs");
     let mut known = all.clone();

@@ -1,13 +1,13 @@
 //! The simulator's parts, each by itself.
 
-use dynocar_model::simulate::motion::Motion;
-use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::simulate::motion::SimulatedMotion;
+use dynocar_model::track::{Track, TrackCurve, Tunnel};
 use dynocar_model::train::{Davis, TrainModel};
-use dynocar_tests::simulator::Deviations;
+use dynocar_tests::simulator::TrueDeviations;
 use dynocar_tests::simulator::actuators::LateForces;
 use dynocar_tests::simulator::common_deviations::CommonDeviations;
 use dynocar_tests::simulator::driving::{Controls, TrainOnLine, drive};
-use dynocar_tests::simulator::random::{Random, Stream};
+use dynocar_tests::simulator::random::{SimulatorRandom, Stream};
 
 #[test]
 fn late_forces_arrive_after_the_delay_and_approach_by_the_lag() {
@@ -24,7 +24,7 @@ fn late_forces_arrive_after_the_delay_and_approach_by_the_lag() {
 #[test]
 fn a_map_is_off_by_as_much_as_was_asked() {
     let squares = |seed: u64| {
-        let error = CommonDeviations::draw(&Deviations::ROUGH, seed).map_error(30e3);
+        let error = CommonDeviations::draw(&TrueDeviations::ROUGH, seed).map_error(30e3);
         error.iter().map(|(_, permille)| permille * permille).sum::<f64>() / error.len() as f64
     };
     let rms = ((0..20).map(squares).sum::<f64>() / 20.0).sqrt();
@@ -33,7 +33,7 @@ fn a_map_is_off_by_as_much_as_was_asked() {
 
 #[test]
 fn nothing_is_off_where_nothing_is_asked() {
-    let none = CommonDeviations::draw(&Deviations::NONE, 7);
+    let none = CommonDeviations::draw(&TrueDeviations::NONE, 7);
     assert_eq!((none.curve_constant, none.force_gains, none.speed_scale), (1.0, [1.0; 2], 1.0));
     assert_eq!((none.force_late_s, none.warming.0), (0.0, 0.0));
     assert!(none.map_error(20e3).is_empty());
@@ -55,7 +55,7 @@ fn track() -> Track {
         "test".into(),
         None,
         Some(&[(0.0, 0.0), (1000.0, 8.0), (2500.0, -12.0)]),
-        Some(vec![Curve { start_m: 1500.0, end_m: 1900.0, radius_m: 300.0 }]),
+        Some(vec![TrackCurve { start_m: 1500.0, end_m: 1900.0, radius_m: 300.0 }]),
         Some(vec![Tunnel { start_m: 2600.0, end_m: 3000.0 }]),
     )
     .unwrap()
@@ -71,7 +71,7 @@ fn the_line_acts_with_the_sign_of_the_direction() {
         start_m,
         direction,
     };
-    let still = Motion { distance_m: 0.0, speed_mps: 10.0 };
+    let still = SimulatedMotion { distance_m: 0.0, speed_mps: 10.0 };
     let n_per_kn = |line: TrainOnLine<'_>| {
         -line.acceleration_mps2(still, Controls::default()) * 1000.0 * 1.08 / 9.81
     };
@@ -120,7 +120,7 @@ fn a_train_on_a_slope_starts_only_with_enough_force_and_gains_its_work_as_energy
 #[test]
 fn streams_differ_and_repeat() {
     let draw = |seed, stream| {
-        let mut random = Random::new(seed, stream);
+        let mut random = SimulatorRandom::new(seed, stream);
         (0..4).map(|_| random.uniform(0.0, 1.0)).collect::<Vec<_>>()
     };
     assert_eq!(draw(7, Stream::Driver(2)), draw(7, Stream::Driver(2)));
@@ -130,7 +130,7 @@ fn streams_differ_and_repeat() {
 
 #[test]
 fn gaussians_have_unit_variance() {
-    let mut random = Random::new(1, Stream::Train);
+    let mut random = SimulatorRandom::new(1, Stream::Train);
     let draws: Vec<f64> = (0..20_000).map(|_| random.gaussian()).collect();
     let mean = draws.iter().sum::<f64>() / draws.len() as f64;
     let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64;

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use dynocar_shared::SampleField;
 use dynocar_tests::simulator::true_run::{TRUE_STEP_S, TrueState};
 use dynocar_tests::simulator::{
-    Deviations, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, oracle, simulate,
+    EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, TrueDeviations, oracle, simulate,
 };
 
 /// One dataset per type of train with ideal sensors.
@@ -164,7 +164,7 @@ fn cars_feel_the_line_one_after_the_other() {
 #[test]
 fn couplings_move_the_leading_car_and_not_the_train() {
     for (rigid, train_type) in IDEAL.iter().zip(TrainType::ALL) {
-        let deviations = Deviations { has_couplings: true, ..rigid.settings.deviations };
+        let deviations = TrueDeviations { has_couplings: true, ..rigid.settings.deviations };
         let coupled = SimulatorSettings { deviations, ..rigid.settings.clone() };
         let coupled = simulate(&coupled);
         for (one, other) in rigid.runs.iter().zip(&coupled.runs) {

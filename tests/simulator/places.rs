@@ -3,7 +3,7 @@
 use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
-use dynocar_tests::simulator::{Effect, EffectRequest, SimulatorSettings, simulate};
+use dynocar_tests::simulator::{EffectRequest, SimulatorSettings, TrueEffect, simulate};
 
 /// Of a fast train on 60 km: 2.7 km each, 1.1 km apart, so that the end of one and the start of the other
 /// are felt together.
@@ -15,7 +15,7 @@ const END_ERROR_MAX_M: f64 = 30.0;
 fn two_places_felt_together_are_reported_with_their_ends_and_are_no_tunnels() {
     let effects = EffectRequest::Kinds(vec![EffectKind::LocalResistance]);
     let simulated = simulate(&SimulatorSettings::new(SEED, effects));
-    let [Effect::LocalResistance { intervals_m: truth, .. }] = &simulated.effects[..] else {
+    let [TrueEffect::LocalResistance { intervals_m: truth, .. }] = &simulated.effects[..] else {
         panic!("another effect")
     };
     assert_eq!(truth.len(), 2);

@@ -12,7 +12,7 @@ use dynocar_shared::{Reason, Status, TrainId};
 use dynocar_tests::estimators::frugal_estimators;
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{
-    Defects, Effect, EffectRequest, SimulatorSettings, TrainType, simulate,
+    Defects, EffectRequest, SimulatorSettings, TrainType, TrueEffect, simulate,
 };
 use serde_json::Value;
 
@@ -328,13 +328,14 @@ fn no_effect_however_large_and_no_poor_recording_is_taken_for_an_input_fault() {
         .map(|&kind| EffectRequest::Kinds(vec![kind]))
         .collect();
     let heavier = |run| {
-        let window = dynocar_tests::simulator::effects::RunWindow { run, start_s: 0.0, end_s: 1e4 };
+        let window =
+            dynocar_tests::simulator::effects::TrueRunWindow { run, start_s: 0.0, end_s: 1e4 };
         (window, 1.4)
     };
     cases.push(EffectRequest::Exactly(vec![
-        Effect::TractionGain { gain: 0.85 },
-        Effect::WheelDiameter { speed_scale: 1.04 },
-        Effect::MassChangeWindows((0..3).map(heavier).collect()),
+        TrueEffect::TractionGain { gain: 0.85 },
+        TrueEffect::WheelDiameter { speed_scale: 1.04 },
+        TrueEffect::MassChangeWindows((0..3).map(heavier).collect()),
     ]));
     cases.push(EffectRequest::none());
     for (seed, effects) in (500..).zip(cases) {

@@ -10,8 +10,8 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, SampleField, TrainSample};
 use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
 use dynocar_tests::simulator::{
-    Defects, Deviations, Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings,
-    TrainType, Unlisted, simulate,
+    Defects, EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrainType, TrueDeviations,
+    TrueEffect, Unlisted, simulate,
 };
 
 fn dataset(seed: u64, train_type: Option<TrainType>, effects: EffectRequest) -> SimulatedDataset {
@@ -69,7 +69,7 @@ fn nothing_undeclared_raises_no_alarm_on_any_type_of_train() {
 
 /// Weights, map, curve constant, winds, forces, their lateness and wheels, all a little wrong.
 fn rough(seed: u64, effects: EffectRequest) -> SimulatorSettings {
-    SimulatorSettings { deviations: Deviations::ROUGH, ..SimulatorSettings::new(seed, effects) }
+    SimulatorSettings { deviations: TrueDeviations::ROUGH, ..SimulatorSettings::new(seed, effects) }
 }
 
 #[test]
@@ -175,7 +175,7 @@ fn a_force_by_a_law_of_the_speed_that_no_term_follows_is_said_to_be_unknown() {
         (330, Law::Slow { below_mps: 15.0, least_mps: 3.0 }),
         (331, Law::Band { centre_mps: 14.0, width_mps: 3.0 }),
     ] {
-        let unlisted = Effect::Unlisted(Unlisted { law, n_per_kn: 1.0 });
+        let unlisted = TrueEffect::Unlisted(Unlisted { law, n_per_kn: 1.0 });
         let data = dataset(seed, None, EffectRequest::Exactly(vec![unlisted]));
         let (mut unknown, mut others) = (0, 0);
         watch(&data, |_, _, snapshot| match suspect(snapshot) {
@@ -209,7 +209,7 @@ fn metro_whose_brake_drags() -> SimulatedDataset {
     let is_strong = |data: &SimulatedDataset| {
         let weight_kn = TrainModel::weight_kn(data.train.declared.mass_kg);
         let share = |force_n: f64| force_n / (data.train.resistance.a * weight_kn);
-        matches!(data.effects[0], Effect::DraggingBrake { force_n, .. } if share(force_n) >= 0.5)
+        matches!(data.effects[0], TrueEffect::DraggingBrake { force_n, .. } if share(force_n) >= 0.5)
     };
     let mut all = (200..260).map(|seed| dataset(seed, Some(TrainType::Metro), kinds()));
     all.find(is_strong).expect("a strong one of sixty")
@@ -218,7 +218,7 @@ fn metro_whose_brake_drags() -> SimulatedDataset {
 #[test]
 fn a_suspicion_ends_with_its_cause() {
     let data = metro_whose_brake_drags();
-    let Effect::DraggingBrake { windows, .. } = &data.effects[0] else {
+    let TrueEffect::DraggingBrake { windows, .. } = &data.effects[0] else {
         panic!("expected a dragging brake, got {:?}", data.effects);
     };
     let drags_in = |run: usize| windows.iter().any(|window| window.run == run);
@@ -237,7 +237,7 @@ fn a_suspicion_ends_with_its_cause() {
 #[test]
 fn a_dragging_brake_is_suspected_soon_after_its_onset_and_not_before() {
     let data = metro_whose_brake_drags();
-    let Effect::DraggingBrake { windows, .. } = &data.effects[0] else {
+    let TrueEffect::DraggingBrake { windows, .. } = &data.effects[0] else {
         panic!("expected a dragging brake, got {:?}", data.effects);
     };
     let window = windows[0];

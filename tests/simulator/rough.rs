@@ -5,7 +5,8 @@ use dynocar_analysis::explain::explain;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::{dataset_files, read_files};
 use dynocar_tests::simulator::{
-    Deviations, Effect, EffectRequest, Law, SimulatedDataset, SimulatorSettings, Unlisted, simulate,
+    EffectRequest, Law, SimulatedDataset, SimulatorSettings, TrueDeviations, TrueEffect, Unlisted,
+    simulate,
 };
 
 /// Kinds that no ordinary error of a declared figure looks like.
@@ -29,7 +30,7 @@ fn explained_with(effects: EffectRequest, seed: u64) -> (SimulatedDataset, Expla
 
 fn explained_of(settings: &SimulatorSettings) -> (SimulatedDataset, ExplainAnswer) {
     let simulated =
-        simulate(&SimulatorSettings { deviations: Deviations::ROUGH, ..settings.clone() });
+        simulate(&SimulatorSettings { deviations: TrueDeviations::ROUGH, ..settings.clone() });
     let dataset = read_files(&dataset_files(&simulated));
     let answer = explain(&dataset, &|_, _| ()).unwrap().answer;
     (simulated, answer)
@@ -52,7 +53,7 @@ fn found(answer: &ExplainAnswer, kind: EffectKind, parameter: &str) -> Option<[f
 fn a_dragging_brake_is_found_although_loads_winds_and_the_map_are_off() {
     for seed in 1_500_002..1_500_004 {
         let (simulated, answer) = explained(Some(EffectKind::DraggingBrake), seed);
-        let Effect::DraggingBrake { force_n: truth, .. } = simulated.effects[0] else {
+        let TrueEffect::DraggingBrake { force_n: truth, .. } = simulated.effects[0] else {
             panic!("another effect")
         };
         let [force_n, std] = found(&answer, EffectKind::DraggingBrake, "force_n")
@@ -82,7 +83,7 @@ fn a_law_without_a_name_is_found_although_loads_and_winds_make_most_of_the_error
 #[test]
 fn a_law_at_low_speed_stays_found_when_small_errors_leave_it_little_to_take() {
     let law = Law::Slow { below_mps: 15.0, least_mps: 3.0 };
-    let slow = Effect::Unlisted(Unlisted { law, n_per_kn: 1.1 });
+    let slow = TrueEffect::Unlisted(Unlisted { law, n_per_kn: 1.1 });
     let (_, answer) = explained_with(EffectRequest::Exactly(vec![slow]), 5_000_001);
     assert!(kinds(&answer).contains(&EffectKind::Unknown.name()), "{}", answer.statement);
 }

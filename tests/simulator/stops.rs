@@ -1,6 +1,6 @@
 //! The law of simulated stops against the true one, and the next stop against its bound.
 
-use dynocar_analysis::stops::{Curve, Gradient, Law};
+use dynocar_analysis::stops::{DecelerationCurve, DecelerationLaw, Gradient};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -46,7 +46,7 @@ fn the_law_of_one_stop_holds_the_true_one_and_the_next_stop_keeps_its_bound() {
         let mut random = StdRng::seed_from_u64(seed);
         let factors = [1.0 + 0.03 * normal(&mut random), 1.0 + 0.03 * normal(&mut random)];
         let (samples, _) = stop(factors[0], 30.0, &mut random);
-        let law = Law::of(&[Curve::of(&samples).unwrap()], 0.03).unwrap();
+        let law = DecelerationLaw::of(&[DecelerationCurve::of(&samples).unwrap()], 0.03).unwrap();
         for point in law.points.iter().filter(|it| (2.0..27.0).contains(&it.speed_mps)) {
             let truth = factors[0] * true_mps2(point.speed_mps);
             let off = (point.deceleration_mps2 - truth).abs();
@@ -69,14 +69,14 @@ fn the_law_of_one_stop_holds_the_true_one_and_the_next_stop_keeps_its_bound() {
 #[test]
 fn many_stops_show_their_own_repeatability_and_slower_ones_say_nothing_of_faster_speeds() {
     let mut random = StdRng::seed_from_u64(7);
-    let curves: Vec<Curve> = (0..30)
+    let curves: Vec<DecelerationCurve> = (0..30)
         .map(|k| {
             let factor = 1.0 + 0.08 * normal(&mut random);
             let from_mps = if k % 2 == 0 { 28.0 } else { 14.0 };
-            Curve::of(&stop(factor, from_mps, &mut random).0).unwrap()
+            DecelerationCurve::of(&stop(factor, from_mps, &mut random).0).unwrap()
         })
         .collect();
-    let law = Law::of(&curves, 0.03).unwrap();
+    let law = DecelerationLaw::of(&curves, 0.03).unwrap();
     assert!((0.05..0.11).contains(&law.repeatability), "{}", law.repeatability);
     assert!((law.response.lost_s() - 1.0).abs() < 0.3, "{:?}", law.response);
     assert_eq!((law.points[4].stops, law.points[19].stops), (30, 15));

@@ -6,7 +6,8 @@ use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::dataset_writer::write_dataset;
 use dynocar_tests::simulator::{
-    Effect, EffectRequest, GnssReceiver, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    EffectRequest, GnssReceiver, SimulatedDataset, SimulatorSettings, TrainType, TrueEffect,
+    simulate,
 };
 use dynocar_workshop::survey::answer::SurveyAnswer;
 use dynocar_workshop::survey::survey_folder;
@@ -81,7 +82,7 @@ fn six_passes_in_one_direction_give_a_line_that_predicts_as_a_null() {
 
 #[test]
 fn a_wheel_that_is_one_percent_off_is_found() {
-    let effect = Effect::WheelDiameter { speed_scale: 1.01 };
+    let effect = TrueEffect::WheelDiameter { speed_scale: 1.01 };
     let case = Case::of(&railway(13, EffectRequest::Exactly(vec![effect])));
     let scale = &case.answer.learned.as_ref().unwrap().speed_scale;
     assert!((scale.value - 1.01).abs() < 3.0 * scale.std + 5e-4, "{scale:?}");

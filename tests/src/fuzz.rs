@@ -11,9 +11,9 @@ use std::sync::Arc;
 use dynocar::config::DaemonConfig;
 use dynocar::state::{entry::StateContent, file};
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
-use dynocar_analysis::dataset::guess::{Recording, guess};
+use dynocar_analysis::dataset::guess::{RecordingText, guess};
 use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train};
-use dynocar_analysis::import::{ImportReading, Source, import};
+use dynocar_analysis::import::{ImportReading, ImportSource, import};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_model::train::TrainModel;
@@ -121,7 +121,7 @@ impl Target {
             }),
             Target::Track => parse_track("track.toml", &text).is_ok(),
             Target::Import => {
-                let source = [Source { label: "file", text: &text }];
+                let source = [ImportSource { label: "file", text: &text }];
                 import(&source, None, &ImportReading::default()).is_ok()
             }
             // Names of files in the text lead into the corpus.
@@ -186,7 +186,7 @@ fn feed_dataset(manifest: &str, csv: &str) -> bool {
 fn feed_logger(bytes: &[u8]) -> bool {
     let Ok(text) = decoded(bytes.to_vec(), guessed(bytes)) else { return false };
     let is_read = feed_dataset(LOGGER, &text);
-    let recording = [Recording { label: "run.csv", text: &text }];
+    let recording = [RecordingText { label: "run.csv", text: &text }];
     let is_guessed = guess(&recording, &[]).is_ok_and(|guess| {
         assert!(guess.column(Quantity::Speed).is_some(), "{guess:?}");
         true

@@ -4,7 +4,7 @@
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use crate::simulator::random::{Random, Stream};
+use crate::simulator::random::{SimulatorRandom, Stream};
 
 /// Samples per second.
 pub const RATE_HZ: u32 = 20;
@@ -58,7 +58,7 @@ fn gradient_permille(place_m: f64) -> f64 {
 
 /// Returns the samples of the tram over a duration.
 pub fn samples(seed: u64, duration_s: u32) -> Vec<TrainSample> {
-    let mut random = Random::new(seed, Stream::Train);
+    let mut random = SimulatorRandom::new(seed, Stream::Train);
     let step_s = 0.1 / f64::from(RATE_HZ);
     let (mut place_m, mut speed_mps, mut left_s) = (0.0, 0.0, 5.0);
     // Electric force, and friction as reported and as it acts, in N.

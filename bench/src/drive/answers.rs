@@ -7,7 +7,7 @@ use dynocar_shared::{Parameter, ParameterSnapshot, Quantity, Uncertain};
 
 use super::knowledge::Knowledge;
 use super::train::Train;
-use crate::scenarios::score::{Answer, COUNTS_MPS, Score};
+use crate::scenarios::score::{Answer, COUNTS_MPS, QuantityScore};
 
 /// Quantities that the driver asks for.
 pub const ASKED: [Quantity; 4] =
@@ -57,14 +57,14 @@ pub fn learned<'a>(
 /// Answers of the last braking that a driver keeps for the next one: the daemon calls them stale once the train no
 /// longer brakes, which is when the next braking is planned. No stop is bounded by them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory {
+pub struct AnswerMemory {
     brake_scale: Option<Uncertain>,
     rail: Option<RailAdhesion>,
     was_braking: bool,
     saw_rail: bool,
 }
 
-impl Memory {
+impl AnswerMemory {
     /// Returns the parameters by which the driver drives, from the answers usable now, by [`ASKED`].
     pub fn recall(
         &mut self,
@@ -98,7 +98,7 @@ impl Memory {
 /// Takes in a cycle of the moving train: what is declared and what was learned, in the order of [`ASKED`]; brake and
 /// adhesion count while the train brakes.
 pub fn count(
-    scores: &mut [Score; 4],
+    scores: &mut [QuantityScore; 4],
     train: &Train,
     is_braking: bool,
     declared: &Knowledge,

@@ -8,7 +8,7 @@
 
 use super::braking::BrakingCurve;
 use super::knowledge::{Ability, Knowledge};
-use super::plan::{COASTING_MIN_SHARE, DrivePlan, Leg, Planner};
+use super::plan::{COASTING_MIN_SHARE, DrivePlan, PlannedLeg, Planner};
 
 /// Bandwidth in rad/s of the estimate of speed and of what is not explained, at most.
 const OBSERVER_RAD_PER_S: f64 = 0.8;
@@ -37,7 +37,7 @@ pub enum Phase {
 
 /// Measurements available to the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
+pub struct DriverMeasurements {
     /// Time in s since the train may start.
     pub time_s: f64,
     /// Distance in m from where it started.
@@ -50,8 +50,8 @@ pub struct Measured {
 
 /// A driver on one leg from stop to stop.
 #[derive(Clone, Debug)]
-pub struct Driver {
-    leg: Leg,
+pub struct LegDriver {
+    leg: PlannedLeg,
     ability: Ability,
     cycle_s: f64,
     knowledge: Knowledge,
@@ -69,13 +69,13 @@ pub struct Driver {
     commanded_mps2: f64,
 }
 
-impl Driver {
+impl LegDriver {
     /// A driver whose train stands at the start of the leg.
-    pub fn new(leg: Leg, ability: Ability, cycle_s: f64, knowledge: Knowledge) -> Self {
+    pub fn new(leg: PlannedLeg, ability: Ability, cycle_s: f64, knowledge: Knowledge) -> Self {
         let planner = Planner { leg: &leg, knowledge: &knowledge, ability: &ability };
         let plan = planner.plan((0.0, 0.0), leg.due_s);
         let curve = BrakingCurve::of(&knowledge, &ability, 0.0);
-        Driver {
+        LegDriver {
             leg,
             ability,
             cycle_s,
@@ -103,12 +103,12 @@ impl Driver {
     }
 
     /// The leg.
-    pub fn leg(&self) -> &Leg {
+    pub fn leg(&self) -> &PlannedLeg {
         &self.leg
     }
 
     /// The force in N, braking negative, for what is measured and known.
-    pub fn force_n(&mut self, measured: &Measured, knowledge: &Knowledge) -> f64 {
+    pub fn force_n(&mut self, measured: &DriverMeasurements, knowledge: &Knowledge) -> f64 {
         self.take_over(measured, knowledge);
         self.observe(measured);
         if self.phase != Phase::Braking && measured.time_s >= self.next_plan_s {
@@ -134,7 +134,7 @@ impl Driver {
     }
 
     /// Other parameters explain more or less of the same motion.
-    fn take_over(&mut self, measured: &Measured, knowledge: &Knowledge) {
+    fn take_over(&mut self, measured: &DriverMeasurements, knowledge: &Knowledge) {
         let slope = self.leg.slope_permille(self.at_m);
         let by = |it: &Knowledge| it.acceleration_mps2(measured.force_n, self.speed_mps, slope);
         if measured.speed_mps > 0.0 {
@@ -143,7 +143,7 @@ impl Driver {
         self.knowledge = *knowledge;
     }
 
-    fn observe(&mut self, measured: &Measured) {
+    fn observe(&mut self, measured: &DriverMeasurements) {
         if measured.speed_mps <= 0.0 && self.phase != Phase::Braking {
             (self.at_m, self.speed_mps) = (measured.at_m, 0.0);
             return;

@@ -6,9 +6,9 @@ use dynocar_model::train::Davis;
 use dynocar_shared::stopping::RailAdhesion;
 use dynocar_shared::{RailCondition, SampleField, TrainSample, Uncertain};
 
-use super::driver::{Driver, Measured, Phase};
+use super::driver::{DriverMeasurements, LegDriver, Phase};
 use super::knowledge::Knowledge;
-use super::plan::{Leg, Planner};
+use super::plan::{PlannedLeg, Planner};
 use super::train::Train;
 
 /// Running time of the timetable over the shortest one with declared parameters, and s on top.
@@ -58,7 +58,7 @@ pub struct Journey {
     /// The train.
     pub train: Train,
     /// None while the train stands at a stop.
-    driver: Option<Driver>,
+    driver: Option<LegDriver>,
     /// Time in s until it leaves.
     standing_s: f64,
     running_s: f64,
@@ -140,10 +140,10 @@ impl Journey {
         let shortest = Planner { leg: &leg, knowledge: &usual, ability: &ability };
         let shortest_s = shortest.plan(start, 0.0).time_s;
         let due_s = TIMETABLE.0 * shortest_s + TIMETABLE.1;
-        let leg = Leg { due_s, ..leg };
+        let leg = PlannedLeg { due_s, ..leg };
         let truth = self.train.truth();
         self.saved_w = saved_w(&Planner { leg: &leg, knowledge: &truth, ability: &ability }, due_s);
-        self.driver = Some(Driver::new(leg, ability, cycle_s, *knowledge));
+        self.driver = Some(LegDriver::new(leg, ability, cycle_s, *knowledge));
         (self.running_s, self.braking_s) = (0.0, 0.0);
         self.accelerations.clear();
     }
@@ -156,7 +156,7 @@ impl Journey {
     ) {
         let Some(driver) = &mut self.driver else { return };
         self.running_s += cycle_s;
-        let measured = Measured {
+        let measured = DriverMeasurements {
             time_s: self.running_s,
             at_m: self.train.along_m(sample),
             speed_mps: sample.speed_mps,
@@ -183,7 +183,7 @@ impl Journey {
         let speed_mps = self.train.speed_mps().max(STANDING_MPS);
         let at_m = self.driver.as_ref().map_or(0.0, |driver| driver.estimate().0);
         let slope = |within_m: f64| {
-            let leg = self.driver.as_ref().map(Driver::leg);
+            let leg = self.driver.as_ref().map(LegDriver::leg);
             leg.map_or(0.0, |leg| leg.mean_slope_permille(at_m, at_m + within_m))
         };
         let true_m = self.train.full_braking_m();
@@ -243,7 +243,7 @@ fn saved_w(planner: &Planner<'_>, due_s: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::line::{CONDITIONS, Condition, ORDINARY, Service};
+    use super::super::deviations::{CONDITIONS, Condition, ORDINARY, Service};
     use super::*;
     use crate::scenarios::world::Traffic;
 

@@ -6,11 +6,11 @@ use dynocar::config::IdleStrategy;
 use dynocar_client::{Reading, SamplePublisher, SnapshotReader};
 use dynocar_model::train::{EffortCurve, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Quantity, TrainId, TrainSample};
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use dynocar_transport::monotonic_now_ns;
 use serde_json::json;
 
-use crate::output::Failure;
+use crate::output::BenchError;
 use crate::rig::site::{DaemonPlan, ThreadPlan, await_all};
 
 /// Pipelines recommended by config/daemon.toml, with the friction of the brake, which these trains can provide.
@@ -35,7 +35,7 @@ pub struct Link {
     daemon: Option<Process>,
     plan: DaemonPlan,
     /// Last, for it takes the folder away.
-    site: Site,
+    site: DaemonSite,
 }
 
 impl Link {
@@ -44,8 +44,8 @@ impl Link {
     /// # Errors
     ///
     /// When a process, file or channel cannot be had.
-    pub fn open(train: &TrainModel, trains: usize) -> Result<Self, Failure> {
-        let site = Site::new();
+    pub fn open(train: &TrainModel, trains: usize) -> Result<Self, BenchError> {
+        let site = DaemonSite::new();
         site.write("train.toml", &train_toml(train)?);
         let fast = ThreadPlan {
             name: "fast",
@@ -71,7 +71,7 @@ impl Link {
     /// # Errors
     ///
     /// When it does not come to it.
-    pub fn start_daemon(&mut self) -> Result<(), Failure> {
+    pub fn start_daemon(&mut self) -> Result<(), BenchError> {
         let begin_ns = monotonic_now_ns();
         let mut daemon = self.plan.start(&self.site)?;
         for ends in &mut self.ends {
@@ -101,7 +101,7 @@ impl Link {
     /// # Errors
     ///
     /// When a sample is not taken, or the daemon ends or does not answer.
-    pub fn exchange(&mut self, samples: &mut [(usize, TrainSample)]) -> Result<(), Failure> {
+    pub fn exchange(&mut self, samples: &mut [(usize, TrainSample)]) -> Result<(), BenchError> {
         for (train, sample) in samples.iter_mut() {
             self.ends[*train].publisher.publish(sample)?;
         }
@@ -128,7 +128,7 @@ impl Link {
 }
 
 /// The train's file.
-fn train_toml(train: &TrainModel) -> Result<String, Failure> {
+fn train_toml(train: &TrainModel) -> Result<String, BenchError> {
     let effort = |curve: &EffortCurve| -> Vec<[f64; 2]> {
         curve.points().iter().map(|(speed_mps, force_n)| [*speed_mps, 1e-3 * force_n]).collect()
     };

@@ -15,10 +15,10 @@
 
 pub mod answers;
 pub mod braking;
+pub mod deviations;
 pub mod driver;
 pub mod journey;
 pub mod knowledge;
-pub mod line;
 pub mod link;
 pub mod picture;
 pub mod plan;
@@ -32,11 +32,11 @@ use clap::Args;
 use dynocar::output::{report_line, write_file};
 use serde_json::json;
 
-use self::line::{CONDITIONS, ORDINARY, Service};
+use self::deviations::{CONDITIONS, ORDINARY, Service};
 use self::run::{DriveExtent, Informant};
 use self::score::Scored;
 use crate::output::{
-    Failure, OutputArguments, Record, containing, expect, expect_none, table, write_csv,
+    BenchError, OutputArguments, Record, containing, expect, expect_none, table, write_csv,
 };
 use crate::scenarios::world::Traffic;
 use crate::{ending, parallel};
@@ -86,7 +86,7 @@ impl DriveArguments {
     /// # Errors
     ///
     /// When the command line is wrong, a process fails, or the driver with Dynocar is worse.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let extent = self.extent;
         let all = services(self.cycle_ms);
         let chosen = containing("--scenario", &self.scenario, all, Service::name)?;
@@ -134,7 +134,7 @@ fn ordinary(scored: &[Scored]) -> Vec<&Scored> {
     first
 }
 
-fn measure(service: Service, extent: DriveExtent) -> Result<Scored, Failure> {
+fn measure(service: Service, extent: DriveExtent) -> Result<Scored, BenchError> {
     let mut all = [Vec::new(), Vec::new(), Vec::new()];
     for (driven, (informant, _)) in all.iter_mut().zip(Informant::ALL) {
         *driven = run::drive(service, informant, extent)?;

@@ -3,9 +3,9 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::line::traffic_name;
-use super::score::{ENERGY, Figure, LATE, STOP_RMS, Scored};
-use crate::output::Failure;
+use super::deviations::traffic_name;
+use super::score::{ENERGY, FigureInterval, LATE, STOP_RMS, Scored};
+use crate::output::BenchError;
 
 const SIZE: (u32, u32) = (1_080, 400);
 const COLORS: [RGBColor; 3] =
@@ -24,7 +24,7 @@ const PANELS: [(&str, usize, f64, f64); 3] = [
 /// # Errors
 ///
 /// When it cannot be drawn.
-pub fn svg(scored: &[&Scored]) -> Result<String, Failure> {
+pub fn svg(scored: &[&Scored]) -> Result<String, BenchError> {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
@@ -33,9 +33,9 @@ pub fn svg(scored: &[&Scored]) -> Result<String, Failure> {
         for (index, (area, (title, which, factor, shift))) in panels.iter().zip(PANELS).enumerate()
         {
             let of = |value: f64| factor * value + shift;
-            let figure = |all: &[Figure]| {
-                let Figure { value, low, high } = all[which];
-                Figure { value: of(value), low: of(low), high: of(high) }
+            let figure = |all: &[FigureInterval]| {
+                let FigureInterval { value, low, high } = all[which];
+                FigureInterval { value: of(value), low: of(low), high: of(high) }
             };
             panel(area, title, scored, figure, index == 0)?;
         }
@@ -49,9 +49,9 @@ fn panel(
     area: &DrawingArea<SVGBackend<'_>, Shift>,
     title: &str,
     scored: &[&Scored],
-    figure: impl Fn(&[Figure]) -> Figure,
+    figure: impl Fn(&[FigureInterval]) -> FigureInterval,
     has_legend: bool,
-) -> Result<(), Failure> {
+) -> Result<(), BenchError> {
     let figures = scored.iter().flat_map(|it| &it.lines).map(|line| figure(&line.figures));
     let most = figures.map(|it| it.high).fold(0.0, f64::max).max(1e-3);
     let right = 4.0 * scored.len() as f64;

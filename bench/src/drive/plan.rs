@@ -11,7 +11,7 @@ pub const PIECE_M: f64 = 10.0;
 
 /// A way from stop to stop; distances count from where the train starts.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Leg {
+pub struct PlannedLeg {
     /// Distance to the stopping point in m.
     pub length_m: f64,
     /// Highest speed in m/s.
@@ -22,7 +22,7 @@ pub struct Leg {
     pub slopes_permille: Vec<f64>,
 }
 
-impl Leg {
+impl PlannedLeg {
     /// Gradient and curve resistance in ‰ at a distance in m.
     pub fn slope_permille(&self, at_m: f64) -> f64 {
         let Some(last) = self.slopes_permille.len().checked_sub(1) else { return 0.0 };
@@ -70,7 +70,7 @@ pub struct DrivePlan {
 #[derive(Clone, Copy, Debug)]
 pub struct Planner<'a> {
     /// The leg.
-    pub leg: &'a Leg,
+    pub leg: &'a PlannedLeg,
     /// The train.
     pub knowledge: &'a Knowledge,
     /// Abilities of the train.
@@ -213,9 +213,9 @@ mod tests {
     use super::super::knowledge::tests::metro;
     use super::*;
 
-    fn leg() -> Leg {
+    fn leg() -> PlannedLeg {
         let slopes = (0..140).map(|piece| if piece < 70 { 4.0 } else { -4.0 }).collect();
-        Leg { length_m: 1400.0, top_mps: 20.0, due_s: 0.0, slopes_permille: slopes }
+        PlannedLeg { length_m: 1400.0, top_mps: 20.0, due_s: 0.0, slopes_permille: slopes }
     }
 
     fn with<T>(knowledge: &Knowledge, ability: &Ability, look: impl FnOnce(Planner) -> T) -> T {
@@ -274,8 +274,12 @@ mod tests {
 
     #[test]
     fn a_slope_is_linear_between_pieces_and_constant_beyond() {
-        let leg =
-            Leg { length_m: 20.0, top_mps: 9.0, due_s: 9.0, slopes_permille: vec![0.0, 10.0, 4.0] };
+        let leg = PlannedLeg {
+            length_m: 20.0,
+            top_mps: 9.0,
+            due_s: 9.0,
+            slopes_permille: vec![0.0, 10.0, 4.0],
+        };
         assert_eq!([-5.0, 5.0, 10.0, 99.0].map(|at| leg.slope_permille(at)), [0.0, 5.0, 10.0, 4.0]);
         assert!((leg.mean_slope_permille(0.0, 10.0) - 5.0).abs() < 1e-12);
     }

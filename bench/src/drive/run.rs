@@ -3,14 +3,14 @@
 use clap::Args;
 use dynocar_shared::TrainSample;
 
-use super::answers::{self, ASKED, Memory};
+use super::answers::{self, ASKED, AnswerMemory};
+use super::deviations::Service;
 use super::journey::{DrivenLeg, Journey};
-use super::line::Service;
 use super::link::Link;
 use super::train::Train;
 use crate::ending;
-use crate::output::Failure;
-use crate::scenarios::score::Score;
+use crate::output::BenchError;
+use crate::scenarios::score::QuantityScore;
 
 /// By which parameters the driver drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,18 +48,18 @@ pub struct DriveExtent {
 
 /// Record of a driven train.
 #[derive(Clone, Debug)]
-pub struct Driven {
+pub struct DrivenRecord {
     /// Its legs.
     pub legs: Vec<DrivenLeg>,
     /// Scores of the daemon's answers, by [`ASKED`].
-    pub scores: [Score; 4],
+    pub scores: [QuantityScore; 4],
 }
 
 /// A train on its way, with what its driver keeps of the daemon's answers.
 struct Driving {
     journey: Journey,
-    memory: Memory,
-    scores: [Score; 4],
+    memory: AnswerMemory,
+    scores: [QuantityScore; 4],
 }
 
 impl Driving {
@@ -88,7 +88,7 @@ pub fn drive(
     service: Service,
     informant: Informant,
     extent: DriveExtent,
-) -> Result<Vec<Driven>, Failure> {
+) -> Result<Vec<DrivenRecord>, BenchError> {
     let DriveExtent { trains, stops, first_seed } = extent;
     let mut link = match informant {
         Informant::Dynocar => Some(Link::open(&service.declared(), trains)?),
@@ -97,7 +97,7 @@ pub fn drive(
     let mut all: Vec<Driving> = (first_seed..first_seed + trains as u64)
         .map(|seed| Driving {
             journey: Journey::new(Train::new(service, seed)),
-            memory: Memory::default(),
+            memory: AnswerMemory::default(),
             scores: Default::default(),
         })
         .collect();
@@ -138,7 +138,10 @@ pub fn drive(
     if lost > 0 && !dies {
         return Err(format!("daemon: {lost} samples were lost in lock-step").into());
     }
-    Ok(all.into_iter().map(|it| Driven { legs: it.journey.legs, scores: it.scores }).collect())
+    Ok(all
+        .into_iter()
+        .map(|it| DrivenRecord { legs: it.journey.legs, scores: it.scores })
+        .collect())
 }
 
 /// Time in s on a leg at which the daemon dies, or another comes.
@@ -158,7 +161,12 @@ enum Death {
 }
 
 impl Death {
-    fn come(&mut self, service: &Service, first: &Journey, link: &mut Link) -> Result<(), Failure> {
+    fn come(
+        &mut self,
+        service: &Service,
+        first: &Journey,
+        link: &mut Link,
+    ) -> Result<(), BenchError> {
         let (legs, running_s) = (first.legs.len(), first.running_s());
         let is_midway = |leg: usize| legs > leg || (legs == leg && running_s >= MIDWAY_S);
         match *self {

@@ -1,12 +1,12 @@
 //! Statistics of the legs of all trains, with intervals.
 
 use super::answers::ASKED;
+use super::deviations::Service;
 use super::journey::DrivenLeg;
-use super::line::Service;
-use super::run::{Driven, Informant};
+use super::run::{DrivenRecord, Informant};
 use crate::chance::Chance;
 use crate::output::Record;
-use crate::scenarios::score::{Score, Scores};
+use crate::scenarios::score::{QuantityScore, Scores};
 use crate::statistics::{mean, quantiles};
 
 /// Draws of the trains behind an interval.
@@ -34,7 +34,7 @@ const EXCEEDED_MAX: f64 = 0.01;
 
 /// A figure with its 95 % interval over trains.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figure {
+pub struct FigureInterval {
     /// The figure.
     pub value: f64,
     /// Lower end.
@@ -47,7 +47,7 @@ pub struct Figure {
 fn figures<const N: usize>(
     trains: usize,
     statistics: impl Fn(&[usize]) -> [f64; N],
-) -> [Figure; N] {
+) -> [FigureInterval; N] {
     let all: Vec<usize> = (0..trains).collect();
     let mut random = Chance::new(95);
     let mut draw = || -> Vec<usize> { all.iter().map(|_| random.within(0..trains)).collect() };
@@ -56,7 +56,7 @@ fn figures<const N: usize>(
     std::array::from_fn(|which| {
         let drawn = draws.iter().map(|it| it[which]).collect();
         let [low, high] = quantiles(drawn, [0.025, 0.975]).unwrap_or([f64::NAN; 2]);
-        Figure { value: values[which], low, high }
+        FigureInterval { value: values[which], low, high }
     })
 }
 
@@ -66,7 +66,7 @@ pub struct Line {
     /// The row of the table.
     pub record: Record,
     /// Every statistic.
-    pub figures: [Figure; STATISTICS],
+    pub figures: [FigureInterval; STATISTICS],
     /// Bounds that were looked at, and those that the true braking distance exceeded or that could not be given.
     bounds: [usize; 2],
 }
@@ -89,8 +89,8 @@ pub struct Scored {
 
 /// The legs of one kind of parameters beside all kinds, for the energy of the same stops.
 struct Drives<'a> {
-    own: &'a [Driven],
-    all: &'a [Vec<Driven>; 3],
+    own: &'a [DrivenRecord],
+    all: &'a [Vec<DrivenRecord>; 3],
 }
 
 impl Drives<'_> {
@@ -133,7 +133,7 @@ impl Drives<'_> {
 }
 
 /// Scores a service's drives with declared, learned and true parameters.
-pub fn score(service: Service, all: &[Vec<Driven>; 3]) -> Scored {
+pub fn score(service: Service, all: &[Vec<DrivenRecord>; 3]) -> Scored {
     let drives = all.each_ref().map(|own| Drives { own, all });
     let lines: Vec<Line> =
         Informant::ALL.iter().zip(&drives).map(|(it, own)| line(&service, *it, own)).collect();
@@ -144,7 +144,13 @@ pub fn score(service: Service, all: &[Vec<Driven>; 3]) -> Scored {
 }
 
 /// A figure under three names: value, lower and upper end of its interval.
-fn ranged(record: Record, name: &str, figure: Figure, factor: f64, decimals: usize) -> Record {
+fn ranged(
+    record: Record,
+    name: &str,
+    figure: FigureInterval,
+    factor: f64,
+    decimals: usize,
+) -> Record {
     record
         .number(name, factor * figure.value, decimals)
         .number(format!("{name}_low"), factor * figure.low, decimals)
@@ -187,8 +193,8 @@ fn line(service: &Service, (informant, name): (Informant, &str), drives: &Drives
 }
 
 /// Returns the record of the score of one answer.
-fn answer(service: &Service, index: usize, driven: &[Driven], stops: usize) -> Record {
-    let scores: Vec<Score> = driven.iter().map(|it| it.scores[index].clone()).collect();
+fn answer(service: &Service, index: usize, driven: &[DrivenRecord], stops: usize) -> Record {
+    let scores: Vec<QuantityScore> = driven.iter().map(|it| it.scores[index].clone()).collect();
     let all = Scores(&scores);
     let record = all
         .usable(service.record().with("quantity", ASKED[index].name()))
@@ -212,7 +218,7 @@ fn comparison(
         MEASURES.map(|(_, which, _)| with[which] - without[which])
     });
     for ((measure, which, unnoticed), figure) in MEASURES.into_iter().zip(differences) {
-        let Figure { value, low, high } = figure;
+        let FigureInterval { value, low, high } = figure;
         let (is_better, is_worse) = (high < 0.0, low > unnoticed);
         if !is_better && !is_worse {
             continue;

@@ -3,14 +3,14 @@
 use std::collections::VecDeque;
 
 use dynocar_core::pipeline::braking::intake::DeclaredGear;
-use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample, Uncertain};
 
+use super::deviations::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::knowledge::{Ability, Knowledge};
-use super::line::{Hidden, Service, ability, declared_gear, next_load_kg};
-use super::plan::{Leg, PIECE_M};
+use super::plan::{PIECE_M, PlannedLeg};
 use crate::chance::Chance;
 use crate::scenarios::mistakes::Mistakes;
 use crate::scenarios::world::{LoadSource, WEIGHING_STD, World};
@@ -39,7 +39,7 @@ pub struct Train {
     next_stop: usize,
     direction: f64,
     start_m: f64,
-    motion: Motion,
+    motion: SimulatedMotion,
     /// True gross mass in kg.
     pub mass_kg: f64,
     weighed_kg: f64,
@@ -71,7 +71,7 @@ impl Train {
             next_stop: 1,
             direction: 1.0,
             start_m,
-            motion: Motion { distance_m: 0.0, speed_mps: 0.0 },
+            motion: SimulatedMotion { distance_m: 0.0, speed_mps: 0.0 },
             mass_kg: world.truth.mass_kg,
             weighed_kg: 0.0,
             brake_scale: 1.0,
@@ -115,13 +115,13 @@ impl Train {
     /// The train stands at a stop: what lies ahead is the next leg.
     pub fn turn_to_next(&mut self) {
         self.start_m = self.chainage_m();
-        self.motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
+        self.motion = SimulatedMotion { distance_m: 0.0, speed_mps: 0.0 };
         (self.next_stop, self.direction) = self.world.after_stop(self.next_stop, self.direction);
         self.load();
     }
 
     /// The leg ahead by the map, without a time.
-    pub fn leg(&self) -> Leg {
+    pub fn leg(&self) -> PlannedLeg {
         let length_m = self.direction * (self.world.stops_m[self.next_stop] - self.start_m);
         let pieces = (length_m / PIECE_M) as usize + 2;
         let slope = |piece: usize| {
@@ -132,7 +132,7 @@ impl Train {
         };
         let slopes_permille = (0..pieces).map(slope).collect();
         let top_mps = self.service.traffic.habits().top_mps;
-        Leg { length_m, top_mps, due_s: f64::INFINITY, slopes_permille }
+        PlannedLeg { length_m, top_mps, due_s: f64::INFINITY, slopes_permille }
     }
 
     fn chainage_m(&self) -> f64 {
@@ -182,7 +182,7 @@ impl Train {
     }
 
     /// Acceleration in m/s² under a reported force in N at a distance and speed.
-    fn acceleration_mps2(&self, reported_n: f64, at: Motion) -> f64 {
+    fn acceleration_mps2(&self, reported_n: f64, at: SimulatedMotion) -> f64 {
         let weight_n = self.mass_kg * STANDARD_GRAVITY_MPS2;
         let force_n = match reported_n < 0.0 {
             true => {

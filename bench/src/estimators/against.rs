@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::measure::quartiles;
 use crate::ending::{is_due, until_due};
-use crate::output::{Failure, Record};
+use crate::output::{BenchError, Record};
 
 /// Rounds of both programs.
 const ROUNDS: usize = 31;
@@ -21,7 +21,7 @@ const ROUNDS: usize = 31;
 /// # Errors
 ///
 /// When one of them cannot be run, or has no such case.
-pub fn measure(other: &Path, case: &str) -> Result<Vec<Record>, Failure> {
+pub fn measure(other: &Path, case: &str) -> Result<Vec<Record>, BenchError> {
     let ours = std::env::current_exe()?;
     let mut rounds: Vec<[Vec<(String, f64)>; 2]> = Vec::with_capacity(ROUNDS);
     for round in until_due(0..ROUNDS) {
@@ -64,8 +64,8 @@ fn record(name: &str, pairs: &[(f64, f64)]) -> Record {
 }
 
 /// One measurement of a program: cases by name with the time of an update in ns.
-fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, Failure> {
-    let failed = |came: String| -> Failure {
+fn times(program: &Path, case: &str) -> Result<Vec<(String, f64)>, BenchError> {
+    let failed = |came: String| -> BenchError {
         let program = program.display();
         format!("{program}: expected the times of the cases as JSON, {came}").into()
     };

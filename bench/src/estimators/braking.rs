@@ -3,8 +3,8 @@
 
 use std::rc::Rc;
 
-use dynocar_core::pipeline::braking::engine::{Engine, Observation};
-use dynocar_core::pipeline::braking::law::Law;
+use dynocar_core::pipeline::braking::engine::{BrakingObservation, Engine};
+use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{MotionNoise, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::BrakingSettings;
 use dynocar_core::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};
@@ -43,8 +43,8 @@ const INPUTS: StepInputs = StepInputs {
 };
 
 /// The first observations of a braking on a wet rail.
-fn braking(samples: usize, seed: u64) -> Vec<Observation> {
-    let observation = |it: &BrakingMoment| Observation {
+fn braking(samples: usize, seed: u64) -> Vec<BrakingObservation> {
+    let observation = |it: &BrakingMoment| BrakingObservation {
         distance_m: it.measured_m,
         speed_mps: it.speed_mps,
         is_speed_valid: false,
@@ -56,7 +56,7 @@ fn braking(samples: usize, seed: u64) -> Vec<Observation> {
 /// Measures an engine over some brakings, each from a fresh start and of a fixed number of updates.
 fn case(
     name: &str,
-    brakings: &Rc<[Vec<Observation>]>,
+    brakings: &Rc<[Vec<BrakingObservation>]>,
     updates: usize,
     mut engine: impl Engine + 'static,
 ) -> EstimatorCase {
@@ -77,7 +77,8 @@ fn case(
 fn tracker(walk: Walk, lag: usize) -> Tracker {
     let prior = PriorScale::OfLaw(Uncertain::new(INITIAL, 0.05));
     let first_speed_std_mps = FIRST_SPEED_STD_MPS;
-    let model = TrackerModel { law: Law::Constant, noise: NOISE, walk, first_speed_std_mps, prior };
+    let model =
+        TrackerModel { law: BrakingLaw::Constant, noise: NOISE, walk, first_speed_std_mps, prior };
     Tracker::new(model, lag as f64 * INPUTS.step_s, lag, false)
 }
 

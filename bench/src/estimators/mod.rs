@@ -19,7 +19,7 @@ use dynocar_analysis::dataset::DatasetError;
 use serde_json::json;
 
 use crate::ending::until_due;
-use crate::output::{Failure, OutputArguments, Record, containing, table};
+use crate::output::{BenchError, OutputArguments, Record, containing, table};
 use measure::{Effort, EstimatorCase};
 
 /// Time of an update of every estimator and every pipeline.
@@ -44,7 +44,7 @@ impl EstimatorsArguments {
     /// # Errors
     ///
     /// When there is no such case, or the other build does not measure.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let text = self.case.as_deref().unwrap_or_default();
         if let Some(other) = &self.beside {
             let cases = against::measure(other, text)?;

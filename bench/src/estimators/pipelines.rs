@@ -9,9 +9,9 @@ use dynocar_analysis::dataset::{DATASET_TRAIN, DatasetError, DatasetHead};
 use dynocar_estimators::EstimatorSettings;
 use dynocar_estimators::wang::MassKalmanSettings;
 use dynocar_estimators::wang::bias_bank::{BiasBank, Dynamics};
+use dynocar_estimators::wang::known_motion::Inertia;
+use dynocar_estimators::wang::known_motion::KnownMotion;
 use dynocar_estimators::wang::line_resistance::LineResistance;
-use dynocar_estimators::wang::motion::Inertia;
-use dynocar_estimators::wang::motion::Motion;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
@@ -59,9 +59,9 @@ impl DemoRun {
     }
 
     /// The motion at every sample that has one.
-    fn motions(&self) -> Vec<Motion> {
+    fn motions(&self) -> Vec<KnownMotion> {
         let mut resolve = resolving(DATASET_TRAIN, &self.train, self.track.clone());
-        let motion = |sample| Motion::of(&resolve(sample)?).ok();
+        let motion = |sample| KnownMotion::of(&resolve(sample)?).ok();
         self.samples.iter().filter_map(motion).collect()
     }
 }

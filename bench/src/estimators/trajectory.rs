@@ -5,10 +5,10 @@ use std::rc::Rc;
 use dynocar_estimators::xia::trajectory::fit::{
     DavisPrior, FitSettings, MotionSegment, TrajectoryFitter,
 };
-use dynocar_estimators::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
+use dynocar_estimators::xia::trajectory::hypothesis::{JumpHypothesis, OutlierModel};
 use dynocar_estimators::xia::trajectory::noise::{LearnedNoise, NoiseModel};
 use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings, StepDoubt};
-use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
+use dynocar_estimators::xia::trajectory::step::{StepRule, TrajectoryStep};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
@@ -28,7 +28,7 @@ const DAVIS_STD: Vector3<f64> = Vector3::new(0.8, 0.03, 0.001);
 const NO_OUTLIERS: OutlierModel = OutlierModel { share: 0.0, density: 0.5 };
 
 /// Steps, and speeds in m/s before, between and after them.
-type Run = (Vec<Step>, Vec<f64>);
+type Run = (Vec<TrajectoryStep>, Vec<f64>);
 
 /// A run of steps of a size, whose drive in m/s² and resistance follow from the number of a step.
 fn run(
@@ -44,7 +44,7 @@ fn run(
     for index in 0..count {
         let (drive_mps2, davis) = at(index);
         let resistance_gain = mps2_per_n_per_kn(ROTATING_MASS_FACTOR);
-        let step = Step { size, drive_mps2, resistance_gain };
+        let step = TrajectoryStep { size, drive_mps2, resistance_gain };
         speed_mps = rule.advance(&step, &davis, speed_mps).expect("the train rolls").speed_mps;
         steps.push(step);
         speeds_mps.push(speed_mps + noise_mps());
@@ -90,8 +90,8 @@ fn noise(learns: bool) -> NoiseModel {
     }
 }
 
-fn first_hypothesis(noise: &NoiseModel) -> Hypothesis {
-    let mut first = Hypothesis::new(&DECLARED, &DAVIS_STD, LearnedNoise::new(noise));
+fn first_hypothesis(noise: &NoiseModel) -> JumpHypothesis {
+    let mut first = JumpHypothesis::new(&DECLARED, &DAVIS_STD, LearnedNoise::new(noise));
     first.anchor(FIRST_MPS);
     first
 }

@@ -9,7 +9,7 @@ use dynocar_analysis::explain::score::run_error;
 use dynocar_model::simulate::{Restart, SpeedError};
 use dynocar_model::terms::Parameter;
 use dynocar_shared::vocabulary::EffectKind;
-use dynocar_tests::simulator::{Around, Effect, Law, SimulatedDataset, Unlisted};
+use dynocar_tests::simulator::{Around, Law, SimulatedDataset, TrueEffect, Unlisted};
 
 /// Half the difference of speeds in m/s that a law's slope is taken over.
 const SLOPE_OVER_MPS: f64 = 0.01;
@@ -84,7 +84,7 @@ impl Hypothesis for TrueLaw {
 /// no law of the simulator's own acts.
 pub fn attainable_mps(simulated: &SimulatedDataset, explanation: &Explanation) -> Option<f64> {
     let unlisted = simulated.effects.iter().find_map(|effect| match effect {
-        Effect::Unlisted(unlisted) => Some(*unlisted),
+        TrueEffect::Unlisted(unlisted) => Some(*unlisted),
         _ => None,
     })?;
     let davis = simulated.train.resistance;

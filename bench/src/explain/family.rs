@@ -13,12 +13,12 @@ use dynocar_tests::simulator::dataset_writer::{
 use dynocar_tests::simulator::{SimulatedDataset, SimulatorSettings, simulate};
 
 use super::scenario::{ExplainScenario, ExplainWorld};
-use crate::output::{Failure, OutputArguments, named};
+use crate::output::{BenchError, OutputArguments, named};
 use crate::parallel;
 
 /// A simulated case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Case {
+pub struct SimulatedCase {
     /// The family.
     pub scenario: ExplainScenario,
     /// The seed.
@@ -29,7 +29,7 @@ pub struct Case {
     pub runs: usize,
 }
 
-impl Case {
+impl SimulatedCase {
     /// Simulates the case.
     pub fn simulate(&self) -> SimulatedDataset {
         simulate(&self.settings())
@@ -89,17 +89,20 @@ impl FamilyArguments {
     /// # Errors
     ///
     /// When there is no such kind.
-    pub fn scenarios(&self, usual: Vec<ExplainScenario>) -> Result<Vec<ExplainScenario>, Failure> {
+    pub fn scenarios(
+        &self,
+        usual: Vec<ExplainScenario>,
+    ) -> Result<Vec<ExplainScenario>, BenchError> {
         let all: Vec<_> = ExplainScenario::all().into_iter().map(|it| (it.name(), it)).collect();
         let chosen = self.kinds.iter().map(|name| named("--kind", name, &all));
         if self.kinds.is_empty() { Ok(usual) } else { chosen.collect() }
     }
 
     /// Every scenario with every seed, scenario by scenario.
-    pub fn cases(&self, scenarios: &[ExplainScenario]) -> Vec<Case> {
+    pub fn cases(&self, scenarios: &[ExplainScenario]) -> Vec<SimulatedCase> {
         let (first, world, runs) = (self.first_seed, self.world, self.runs);
         let seeds = move || first..first + self.seeds as u64;
-        let of = |&scenario| seeds().map(move |seed| Case { scenario, seed, world, runs });
+        let of = |&scenario| seeds().map(move |seed| SimulatedCase { scenario, seed, world, runs });
         scenarios.iter().flat_map(of).collect()
     }
 
@@ -107,7 +110,7 @@ impl FamilyArguments {
     pub fn over<R: Clone + Send>(
         &self,
         scenarios: &[ExplainScenario],
-        work: impl Fn(&Case) -> R + Sync,
+        work: impl Fn(&SimulatedCase) -> R + Sync,
     ) -> Vec<(ExplainScenario, Vec<R>)> {
         let results = parallel::until_due(&self.cases(scenarios), self.threads, work);
         let by_scenario = results.chunks(self.seeds.max(1)).map(<[R]>::to_vec);

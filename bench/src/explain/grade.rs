@@ -1,15 +1,16 @@
 //! An answer against the truth.
 
+use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::ExplainAnswer;
 use dynocar_analysis::explain::selection::Search;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::oracle::score;
-use dynocar_tests::simulator::{Effect, SimulatedDataset};
+use dynocar_tests::simulator::{SimulatedDataset, TrueEffect};
 use serde_json::Value;
 
 use super::attainable::attainable_mps;
-use super::family::Case;
+use super::family::SimulatedCase;
 use super::parameters::{ParameterGrade, graded};
 use super::place::{ends_within, place_iou};
 
@@ -29,6 +30,10 @@ pub struct Grade {
     pub ends_held: Vec<bool>,
     /// Relative errors of the parameters and whether their 95 % intervals hold the truth.
     pub parameters: Vec<ParameterGrade>,
+    /// The same of what the runs held out say by themselves.
+    pub held_out: Vec<ParameterGrade>,
+    /// Of every effect that they show, the probability of another size in them where it is the same.
+    pub held_out_chances: Vec<f64>,
     /// Evidence, error reduction and parameters of the named effects, for people.
     pub details: Vec<String>,
     /// The answer against the true model; `None` where nothing acts or nothing moves.
@@ -38,7 +43,11 @@ pub struct Grade {
 }
 
 /// Grades the explanation of a case.
-pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanation) -> Grade {
+pub fn grade(
+    simulated: &SimulatedDataset,
+    case: &SimulatedCase,
+    explanation: &Explanation,
+) -> Grade {
     let answer = &explanation.answer;
     let named: Vec<String> = answer.effects.iter().map(|effect| effect.kind.into()).collect();
     let verdict = answer.verdict.name();
@@ -62,13 +71,16 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
     let json = serde_json::to_value(answer).unwrap_or(Value::Null);
     let details = details(simulated, answer, attained);
     let (mut iou, mut ends_held, mut parameters) = (None, Vec::new(), Vec::new());
+    let (mut held_out, mut held_out_chances) = (Vec::new(), Vec::new());
     for effect in &simulated.effects {
         let own = json["effects"].as_array().into_iter().flatten();
         let own = own.clone().find(|answer| answer["kind"] == effect.kind().name());
         if let Some(own) = own {
             iou = place_iou(effect, own, simulated).or(iou);
             ends_held.extend(ends_within(effect, own));
-            parameters.extend(graded(effect, own, simulated));
+            parameters.extend(graded(effect, own, simulated, Role::Fit));
+            held_out.extend(graded(effect, &own["held_out"], simulated, Role::Holdout));
+            held_out_chances.extend(own["held_out"]["p_value"].as_f64());
         }
     }
     Grade {
@@ -79,6 +91,8 @@ pub fn grade(simulated: &SimulatedDataset, case: &Case, explanation: &Explanatio
         iou,
         ends_held,
         parameters,
+        held_out,
+        held_out_chances,
         attained,
         acceptance_score: Search::greatest_score(&explanation.outcome),
     }
@@ -138,7 +152,7 @@ fn details(
         attained.and_then(|attained| attained.attainable_ratio),
         answer.unexplained_n_per_kn
     ));
-    let unlisted = simulated.effects.iter().filter(|it| matches!(it, Effect::Unlisted(_)));
+    let unlisted = simulated.effects.iter().filter(|it| matches!(it, TrueEffect::Unlisted(_)));
     details.extend(unlisted.map(|effect| format!("truth {effect:?}")));
     let considered = answer.considered.iter().enumerate();
     let considered = considered.filter(|(k, it)| *k < 4 || it.kind == "unknown").map(|it| it.1);

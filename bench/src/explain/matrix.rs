@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
+use dynocar_analysis::explain::over_time::CHANCE_MAX;
+
 use super::grade::{Attained, Grade};
 use super::parameters::ParameterGrade;
 use super::scenario::ExplainScenario;
@@ -45,6 +47,21 @@ pub fn of(grades: &[(ExplainScenario, Vec<Grade>)]) -> (Value, String) {
             "the same, every value of a profile or list by itself: {:.1} % of {}\n",
             100.0 * share(every.iter().copied()),
             every.len()
+        );
+    }
+    let right = || all().filter(|grade| grade.is_right);
+    let held_out: Vec<bool> =
+        right().flat_map(|grade| grade.held_out.iter().map(ParameterGrade::is_held)).collect();
+    let chances: Vec<f64> =
+        right().flat_map(|grade| grade.held_out_chances.iter().copied()).collect();
+    if !held_out.is_empty() {
+        let percent = 100.0 * share(held_out.iter().copied());
+        let different = chances.iter().filter(|chance| **chance < CHANCE_MAX).count();
+        text += &format!(
+            "95 % intervals of the runs held out that hold the truth: {percent:.1} % of {}\n\
+             effects said to differ in the runs held out: {different} of {}\n",
+            held_out.len(),
+            chances.len()
         );
     }
     text += &format!("false alarms: {raised} of {runs}\n");

@@ -24,15 +24,15 @@ use clap::Args;
 use dynocar::output::report_line;
 use dynocar_shared::vocabulary::EffectKind;
 
-use self::family::{Case, FamilyArguments, explained, read};
+use self::family::{FamilyArguments, SimulatedCase, explained, read};
 use self::grade::{Grade, grade};
 use self::scenario::ExplainScenario;
-use crate::output::{Failure, during, table};
+use crate::output::{BenchError, during, table};
 
 /// Every kind of undeclared effect, and nulls, over simulated datasets: power, false alarms,
 /// confusions, localisation, parameters and their coverage.
 #[derive(Debug, Args)]
-pub struct ExplainArguments {
+pub struct ExplainBenchArguments {
     #[command(flatten)]
     family: FamilyArguments,
     /// Instead of the matrix, the time for 1, 4 and 16 times the data: one dataset of each kind
@@ -44,13 +44,13 @@ pub struct ExplainArguments {
     write: Option<PathBuf>,
 }
 
-impl ExplainArguments {
+impl ExplainBenchArguments {
     /// Runs the command.
     ///
     /// # Errors
     ///
     /// When there is no such kind, or a file cannot be written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let family = &self.family;
         if self.growth {
             use EffectKind::{DraggingBrake, None, TunnelDrag, Wind};
@@ -78,7 +78,7 @@ impl ExplainArguments {
 }
 
 /// One dataset's outcome on standard error.
-fn print_case(case: &Case, grade: &Grade) {
+fn print_case(case: &SimulatedCase, grade: &Grade) {
     let kinds: Vec<_> = case.scenario.kinds(case.seed).iter().map(|kind| kind.name()).collect();
     let parameters: Vec<String> = grade
         .parameters

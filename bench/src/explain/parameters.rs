@@ -1,10 +1,11 @@
 //! Numbers of an answer against the true ones.
 
+use dynocar_analysis::dataset::Role;
 use dynocar_model::terms::delay;
 use dynocar_shared::HALF_95;
 use dynocar_tests::simulator::disturbances::Disturbances;
 use dynocar_tests::simulator::run_maker::RunPlan;
-use dynocar_tests::simulator::{Effect, SimulatedDataset};
+use dynocar_tests::simulator::{SimulatedDataset, TrueEffect};
 use serde_json::Value;
 
 use crate::statistics::mean;
@@ -27,15 +28,22 @@ impl ParameterGrade {
     }
 }
 
-/// Every number of an effect that the answer has by the same name; the size of an effect is its distance from none.
-pub fn graded(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Vec<ParameterGrade> {
+/// Every number of an effect that the answer, or its part about the runs of a role, has by the same name; the size of an effect is its distance from none.
+pub fn graded(
+    effect: &TrueEffect,
+    own: &Value,
+    simulated: &SimulatedDataset,
+    role: Role,
+) -> Vec<ParameterGrade> {
     let declared = simulated.declared_train();
     let mut truths = effect.parameters(0.0);
     match effect {
         // Nobody knows which numbers of a form are those of a law outside the library.
-        Effect::Unlisted(_) => return Vec::new(),
-        Effect::GradientError { profile } => return gradient_errors(profile, own, simulated),
-        Effect::Wind { .. } => truths["wind_plus_mps"] = wind_of_the_days(own, simulated).into(),
+        TrueEffect::Unlisted(_) => return Vec::new(),
+        TrueEffect::GradientError { profile } => return gradient_errors(profile, own, simulated),
+        TrueEffect::Wind { .. } => {
+            truths["wind_plus_mps"] = wind_of_the_days(own, simulated, role).into()
+        }
         _ => {}
     }
     let one = |name: &str, truth: f64| {
@@ -92,12 +100,12 @@ fn disturbances(simulated: &SimulatedDataset, plan: &RunPlan) -> Disturbances {
     Disturbances::of(effects, train, line, plan, settings)
 }
 
-/// Mean wind in m/s towards direction -1 that blew in the runs whose winds the answer gives, else in all that were
-/// fitted: the effect's and each day's own.
-fn wind_of_the_days(own: &Value, simulated: &SimulatedDataset) -> f64 {
+/// Mean wind in m/s towards direction -1 that blew in the runs whose winds the answer gives, else in all of a role: the
+/// effect's and each day's own.
+fn wind_of_the_days(own: &Value, simulated: &SimulatedDataset, role: Role) -> f64 {
     let given = own["parameters"]["headwind_mps"].as_object();
     let is_given = |file: &str| given.is_none_or(|given| given.contains_key(file));
-    let runs = simulated.runs.iter().filter(|run| !run.plan.is_holdout);
+    let runs = simulated.runs.iter().filter(|run| run.plan.is_holdout == (role == Role::Holdout));
     let runs = runs.filter(|run| is_given(&run.plan.file()));
     let winds_mps = runs.map(|run| run.plan.direction * run.disturbances.headwind_mps);
     mean(winds_mps.collect::<Vec<f64>>())

@@ -1,6 +1,6 @@
 //! The place of an answer against the truth.
 
-use dynocar_tests::simulator::{Effect, SimulatedDataset, SimulatedRun};
+use dynocar_tests::simulator::{SimulatedDataset, SimulatedRun, TrueEffect};
 use serde_json::Value;
 
 fn pairs(value: &Value) -> Vec<[f64; 2]> {
@@ -19,7 +19,7 @@ fn windows(place: &Value, simulated: &SimulatedDataset) -> Vec<[f64; 2]> {
 }
 
 /// Intersection over union of the true and the found place, where the effect has one.
-pub fn place_iou(effect: &Effect, own: &Value, simulated: &SimulatedDataset) -> Option<f64> {
+pub fn place_iou(effect: &TrueEffect, own: &Value, simulated: &SimulatedDataset) -> Option<f64> {
     let (truth, found) = (effect.place(0.0), &own["where"]);
     if truth["windows"].is_array() {
         return Some(iou(&windows(&truth, simulated), &windows(found, simulated)));
@@ -42,7 +42,7 @@ fn iou(truth: &[[f64; 2]], found: &[[f64; 2]]) -> f64 {
 
 /// Whether the 95 % intervals of the ends of a place hold the true ends. An end of an interval is
 /// compared with that of the true one which it overlaps most.
-pub fn ends_within(effect: &Effect, own: &Value) -> Vec<bool> {
+pub fn ends_within(effect: &TrueEffect, own: &Value) -> Vec<bool> {
     let known = &own["where"]["uncertainty_95"];
     let holds = |interval: &Value, truth: f64| {
         let [low, high] = [interval[0].as_f64(), interval[1].as_f64()];

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_tests::simulator::{
-    Defects, Deviations, Effect, EffectRequest, Law, SimulatorSettings, TrainType, Unlisted,
+    Defects, EffectRequest, Law, SimulatorSettings, TrainType, TrueDeviations, TrueEffect, Unlisted,
 };
 
 /// A world that effects happen in.
@@ -21,12 +21,12 @@ pub enum ExplainWorld {
 
 impl ExplainWorld {
     /// By how much things are wrong in it.
-    pub fn deviations(self) -> Deviations {
+    pub fn deviations(self) -> TrueDeviations {
         match self {
-            ExplainWorld::Plain => Deviations::PLAIN,
-            ExplainWorld::Coupled => Deviations::COUPLED,
-            ExplainWorld::Rough => Deviations::ROUGH,
-            ExplainWorld::Rougher => Deviations::ROUGHER,
+            ExplainWorld::Plain => TrueDeviations::PLAIN,
+            ExplainWorld::Coupled => TrueDeviations::COUPLED,
+            ExplainWorld::Rough => TrueDeviations::ROUGH,
+            ExplainWorld::Rougher => TrueDeviations::ROUGHER,
         }
     }
 
@@ -163,7 +163,7 @@ impl ExplainScenario {
         let effects = match self {
             // 0.5 to 1.1 N/kN at half the speed below which it acts.
             ExplainScenario::SlowForce => {
-                EffectRequest::Exactly(vec![Effect::Unlisted(Unlisted {
+                EffectRequest::Exactly(vec![TrueEffect::Unlisted(Unlisted {
                     law: Law::Slow { below_mps: 15.0, least_mps: 3.0 },
                     n_per_kn: 0.5 + 0.1 * (seed % 7) as f64,
                 })])
@@ -176,7 +176,7 @@ impl ExplainScenario {
         let is_poor = matches!(self, ExplainScenario::PoorNull | ExplainScenario::Poor);
         let by_stop = self == ExplainScenario::LoadsByStop;
         let load_share = if by_stop { LOAD_SCATTER } else { 0.0 };
-        let deviations = Deviations { load_share, ..world.deviations() };
+        let deviations = TrueDeviations { load_share, ..world.deviations() };
         // Trains that stop often; elsewhere there are hardly any loads.
         let stopping = [TrainType::Regional, TrainType::Metro][(seed % 2) as usize];
         let train_type = by_stop.then_some(stopping);

@@ -2,12 +2,12 @@
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use dynocar_transport::channel::{Receiver, Sender, Transport};
 use dynocar_transport::monotonic_now_ns;
 use serde::Serialize;
 
-use crate::output::Failure;
+use crate::output::BenchError;
 use crate::rig::site::site;
 use crate::statistics::median;
 
@@ -39,12 +39,12 @@ struct Ends {
     publisher: SamplePublisher,
     reader: SnapshotReader,
     snapshot: ParameterSnapshot,
-    _site: Site,
+    _site: DaemonSite,
 }
 
 impl Ends {
     /// Opens a train with `pipelines` pipelines, each of which has answered.
-    fn open(pipelines: u32) -> Result<Self, Failure> {
+    fn open(pipelines: u32) -> Result<Self, BenchError> {
         let site = site();
         let transport = Transport::open(&site.host(), "dynocar-bench-costs")?;
         let mut snapshot = ParameterSnapshot::empty();
@@ -66,7 +66,7 @@ impl Ends {
         Ok(ends)
     }
 
-    fn send_snapshot(&mut self) -> Result<(), Failure> {
+    fn send_snapshot(&mut self) -> Result<(), BenchError> {
         self.snapshot.sequence += 1;
         Ok(self.snapshots[0].send(&self.snapshot)?)
     }
@@ -77,7 +77,7 @@ impl Ends {
 /// # Errors
 ///
 /// When a channel cannot be used.
-pub fn measure(batches: usize) -> Result<Costs, Failure> {
+pub fn measure(batches: usize) -> Result<Costs, BenchError> {
     let (mut ends, mut of_many) = (Ends::open(1)?, Ends::open(MANY)?);
     let mut sample = TrainSample::empty(TRAIN);
     for _ in 0..100 {

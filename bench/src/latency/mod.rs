@@ -26,7 +26,7 @@ use crate::chance::Chance;
 use crate::ending;
 use crate::open_loop::traffic::TrafficPlan;
 use crate::open_loop::trial::{Extent, run};
-use crate::output::{Failure, OutputArguments, expect};
+use crate::output::{BenchError, OutputArguments, expect};
 use crate::rig::cores::{CoreArguments, Cores, bind, in_thread, prioritise};
 
 /// Sample → snapshot through real processes, compared with the floor and what a user would pick else.
@@ -68,7 +68,7 @@ impl LatencyArguments {
     /// # Errors
     ///
     /// When the command line is wrong, or a process or a transport fails; never because of a time.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let rate = self.rate;
         expect((0.1..=1e6).contains(&rate), || {
             format!("--rate {rate}: expected 0.1 to 1000000 Hz")
@@ -84,7 +84,7 @@ impl LatencyArguments {
         self.output.give(&all, || text)
     }
 
-    fn measure(&self) -> Result<MeasuredCase, Failure> {
+    fn measure(&self) -> Result<MeasuredCase, BenchError> {
         let choose = |quick: f64, usual: f64| if self.quick { quick } else { usual };
         let cores = Cores::choose(&self.place);
         let extent = Extent {
@@ -123,13 +123,13 @@ impl LatencyArguments {
                 in_thread(|| run(&LatencyCase::all_fast(idle).setting, &resting, ending::flag()))?;
             Ok((idle.to_string(), trial.cpu_percent))
         });
-        let at_rest = at_rest.into_iter().collect::<Result<_, Failure>>()?;
+        let at_rest = at_rest.into_iter().collect::<Result<_, BenchError>>()?;
         Ok(MeasuredCase { cases, costs, at_rest, extent })
     }
 }
 
 /// Adds a trial of every round to each case; once the program is to end, of the rounds that were whole.
-fn run_rounds(cases: &mut [Rounds], rounds: usize, extent: &Extent) -> Result<(), Failure> {
+fn run_rounds(cases: &mut [Rounds], rounds: usize, extent: &Extent) -> Result<(), BenchError> {
     let mut random = Chance::new(extent.seed);
     for round in 1..=rounds {
         report_line(&format!("round {round} of {rounds}"));

@@ -10,7 +10,7 @@ use super::case::LatencyCase;
 use super::report::{MeasuredCase, pooled};
 use crate::open_loop::sockets::COMPARED;
 use crate::open_loop::trial::Answerer;
-use crate::output::{Failure, during};
+use crate::output::{BenchError, during};
 
 const SIZE: (u32, u32) = (1_240, 640);
 /// Width in px of the curves; their names stand beside them.
@@ -27,13 +27,13 @@ const NINES: f64 = 4.5;
 /// # Errors
 ///
 /// When the file cannot be written.
-pub fn draw(measured: &MeasuredCase, file: &Path) -> Result<(), Failure> {
+pub fn draw(measured: &MeasuredCase, file: &Path) -> Result<(), BenchError> {
     let mut svg = String::new();
     draw_into(measured, &mut svg).map_err(during(file.display()))?;
     Ok(write_file(file, &svg)?)
 }
 
-fn draw_into(measured: &MeasuredCase, svg: &mut String) -> Result<(), Failure> {
+fn draw_into(measured: &MeasuredCase, svg: &mut String) -> Result<(), BenchError> {
     let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let caption = format!("Sample → snapshot polled at {} Hz", measured.extent.traffic.rate_hz);

@@ -6,13 +6,13 @@ use serde_json::{Value, json};
 use super::case::LatencyCase;
 use super::costs::{Costs, MANY};
 use crate::open_loop::controller::TrialOutcome;
-use crate::open_loop::trial::{Answerer, Extent, Trial};
+use crate::open_loop::trial::{Answerer, Extent, OpenLoopTrial};
 use crate::output::{Record, table};
 use crate::rig::quantiles::{self, cells};
 use crate::statistics::median;
 
 /// A case with its trial of every round.
-pub type Rounds = (LatencyCase, Vec<Trial>);
+pub type Rounds = (LatencyCase, Vec<OpenLoopTrial>);
 
 /// Measured latencies.
 #[derive(Clone, Debug)]
@@ -28,7 +28,10 @@ pub struct MeasuredCase {
 }
 
 /// All latencies of a case.
-pub fn pooled(trials: &[Trial], of: fn(&TrialOutcome) -> &Histogram<u64>) -> Histogram<u64> {
+pub fn pooled(
+    trials: &[OpenLoopTrial],
+    of: fn(&TrialOutcome) -> &Histogram<u64>,
+) -> Histogram<u64> {
     quantiles::pooled(trials.iter().flat_map(|it| &it.pipelines).map(of))
 }
 
@@ -84,7 +87,8 @@ fn record((case, trials): &Rounds, all: &[Rounds]) -> Record {
     let floor =
         all.iter().find(|(it, _)| it.name == "floor" && it.setting.idle == case.floor_idle());
     let ratio = |quantile: f64| {
-        let of = |it: &Trial| it.pipelines[0].from_appointed.value_at_quantile(quantile) as f64;
+        let of =
+            |it: &OpenLoopTrial| it.pipelines[0].from_appointed.value_at_quantile(quantile) as f64;
         let rounds = floor.into_iter().flat_map(|(_, floors)| trials.iter().zip(floors));
         median(rounds.map(|(ours, floor)| of(ours) / of(floor)).collect())
     };

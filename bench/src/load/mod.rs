@@ -19,7 +19,7 @@ use self::plan::Load;
 use crate::ending::is_due;
 use crate::open_loop::traffic::TrafficPlan;
 use crate::open_loop::trial::Extent;
-use crate::output::{Failure, OutputArguments, expect, named, table};
+use crate::output::{BenchError, OutputArguments, expect, named, table};
 use crate::rig::cores::{CoreArguments, Cores};
 use crate::rig::pipelines;
 
@@ -81,7 +81,7 @@ impl LoadArguments {
     ///
     /// When the command line is wrong, or a process or channel fails; never because of a time or a
     /// loss.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let load = self.load()?;
         let (mut all, mut text) = report::of(&load, &load.run()?);
         let seconds = load.extent.seconds.min(TRIAL_SECONDS);
@@ -102,7 +102,7 @@ impl LoadArguments {
         self.output.give(&all, || text)
     }
 
-    fn load(&self) -> Result<Load, Failure> {
+    fn load(&self) -> Result<Load, BenchError> {
         let LoadArguments { trains, rate, burst, bad, .. } = *self;
         let seconds = self.duration.unwrap_or(if self.quick { 1.0 } else { 10.0 });
         expect((1..=256).contains(&trains), || format!("--trains {trains}: expected 1 to 256"))?;

@@ -4,8 +4,8 @@ use dynocar::config::IdleStrategy;
 use dynocar_shared::PipelineKind;
 
 use crate::ending;
-use crate::open_loop::trial::{Answerer, Extent, Setting, Trial, run};
-use crate::output::Failure;
+use crate::open_loop::trial::{Answerer, Extent, OpenLoopTrial, Setting, run};
+use crate::output::BenchError;
 use crate::rig::cores::in_thread;
 
 /// Several trains with some pipelines.
@@ -25,7 +25,7 @@ impl Load {
     /// # Errors
     ///
     /// When a process or channel fails.
-    pub fn run(&self) -> Result<Trial, Failure> {
+    pub fn run(&self) -> Result<OpenLoopTrial, BenchError> {
         let answerer = Answerer::Daemon(self.pipelines.clone(), None);
         let setting = Setting { answerer, idle: self.idle, companions: &[], candidates: 0 };
         in_thread(|| run(&setting, &self.extent, ending::flag()))

@@ -5,14 +5,14 @@ use serde_json::{Value, json};
 
 use super::plan::Load;
 use crate::open_loop::controller::TrialOutcome;
-use crate::open_loop::trial::Trial;
+use crate::open_loop::trial::OpenLoopTrial;
 use crate::output::{Record, table};
 use crate::rig::quantiles::{cells, for_people, pooled};
 
 const MEBIBYTE: f64 = 1024.0 * 1024.0;
 
 /// A trial, for machines and for people.
-pub fn of(load: &Load, trial: &Trial) -> (Value, String) {
+pub fn of(load: &Load, trial: &OpenLoopTrial) -> (Value, String) {
     let of = |since| load.pipelines.iter().zip(&trial.pipelines).map(move |it| pipeline(it, since));
     let records: Vec<Record> = of("appointed").chain(of("leaving")).collect();
     let (trains, rate_hz) = (load.extent.trains, load.extent.traffic.rate_hz);
@@ -57,7 +57,7 @@ fn pipeline((kind, it): (&PipelineKind, &TrialOutcome), since: &str) -> Record {
 }
 
 /// One size of the daemon's task, with the latency over all pipelines.
-pub fn size(load: &Load, trial: &Trial) -> Record {
+pub fn size(load: &Load, trial: &OpenLoopTrial) -> Record {
     let counts = Record::default()
         .with("trains", load.extent.trains)
         .with("pipelines", load.pipelines.len())

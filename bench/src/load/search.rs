@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::plan::Load;
 use super::report;
 use crate::ending::is_due;
-use crate::output::{Failure, Record};
+use crate::output::{BenchError, Record};
 
 /// Controllers that are later than this have themselves reached their limit, in ns.
 const LAG_MAX_NS: i64 = 50_000_000;
@@ -17,7 +17,7 @@ const RATE_MAX_HZ: f64 = 2e6;
 
 /// The outcome of a search.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct Found {
+pub struct HighestRate {
     /// Highest rate of each train at which nothing was lost, in Hz; 0 when the first was too high.
     pub rate_hz: f64,
     /// The same over all trains.
@@ -31,8 +31,8 @@ pub struct Found {
 /// # Errors
 ///
 /// When a process or channel fails.
-pub fn highest_rate(load: &Load) -> Result<Found, Failure> {
-    let mut found = Found::default();
+pub fn highest_rate(load: &Load) -> Result<HighestRate, BenchError> {
+    let mut found = HighestRate::default();
     let mut steps = STEPS;
     let mut load = load.clone();
     while steps > 0 && load.extent.traffic.rate_hz < RATE_MAX_HZ && !is_due() {
@@ -69,7 +69,7 @@ pub fn highest_rate(load: &Load) -> Result<Found, Failure> {
 /// # Errors
 ///
 /// When a process or channel fails.
-pub fn growth(load: &Load) -> Result<Vec<Record>, Failure> {
+pub fn growth(load: &Load) -> Result<Vec<Record>, BenchError> {
     let most = load.extent.trains;
     let fours = std::iter::successors(Some(1), |trains| Some(4 * trains));
     let mut counts: Vec<u64> = fours.take_while(|&trains| trains < most).collect();

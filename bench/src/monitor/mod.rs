@@ -3,7 +3,7 @@
 //!
 //! - [`watch`]: one simulated dataset, fed sample by sample
 
-pub mod watch;
+pub mod fed_dataset;
 
 use std::collections::BTreeMap;
 
@@ -11,10 +11,10 @@ use clap::Args;
 use dynocar::output::report_line;
 use serde_json::json;
 
-use self::watch::{Watched, watch};
-use crate::explain::family::{Case, FamilyArguments};
+use self::fed_dataset::{Watched, watch};
+use crate::explain::family::{FamilyArguments, SimulatedCase};
 use crate::explain::scenario::ExplainScenario;
-use crate::output::{Failure, Record, counts, table};
+use crate::output::{BenchError, Record, counts, table};
 use crate::statistics::median;
 
 /// The live monitor on every kind of undeclared effect, and on nulls: seconds of motion from onset
@@ -31,7 +31,7 @@ impl MonitorArguments {
     /// # Errors
     ///
     /// When there is no such kind, or the result cannot be written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let family = &self.family;
         let watched = family.over(&family.scenarios(ExplainScenario::all())?, |case| {
             let watched = watch(&case.simulate());
@@ -90,7 +90,7 @@ fn record(scenario: ExplainScenario, all: &[Watched]) -> Record {
 }
 
 /// One dataset's suspicions on standard error.
-fn print_case(case: &Case, watched: &Watched) {
+fn print_case(case: &SimulatedCase, watched: &Watched) {
     let raised = watched.raised.iter().map(|(kind, s)| format!("{kind} at {s:.0} s"));
     let raised: Vec<String> = raised.collect();
     report_line(&format!(

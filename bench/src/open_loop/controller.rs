@@ -9,8 +9,8 @@ use dynocar_transport::monotonic_now_ns;
 use hdrhistogram::Histogram;
 
 use super::traffic::LoopTraffic;
-use super::wire::Wire;
-use crate::output::Failure;
+use super::wire::BenchTransport;
+use crate::output::BenchError;
 use crate::rig::quantiles::{histogram, record};
 use crate::rig::site::require;
 
@@ -62,7 +62,7 @@ struct Answer {
 
 /// A controller that numbers its samples.
 pub struct Controller {
-    wire: Box<dyn Wire>,
+    wire: Box<dyn BenchTransport>,
     traffic: LoopTraffic,
     /// Appointed and actual time in ns of the samples in flight, by number.
     in_flight: Box<[(i64, i64)]>,
@@ -74,7 +74,7 @@ pub struct Controller {
 
 impl Controller {
     /// A controller that has sent nothing, and receives from `pipelines` pipelines.
-    pub fn new(wire: Box<dyn Wire>, traffic: LoopTraffic, pipelines: usize) -> Self {
+    pub fn new(wire: Box<dyn BenchTransport>, traffic: LoopTraffic, pipelines: usize) -> Self {
         let in_flight = vec![(0, 0); IN_FLIGHT].into();
         let answers = vec![[Answer::default(); 2]; pipelines];
         Controller { wire, traffic, in_flight, sent: 0, answers, sent_before: 0 }
@@ -85,7 +85,7 @@ impl Controller {
     /// # Errors
     ///
     /// When one stays silent, or the peer has ended.
-    pub fn await_ready(&mut self, peer: &mut Process) -> Result<(), Failure> {
+    pub fn await_ready(&mut self, peer: &mut Process) -> Result<(), BenchError> {
         let mut uncounted: Vec<TrialOutcome> =
             self.answers.iter().map(|_| TrialOutcome::empty()).collect();
         let (start, mut next_ns) = (Instant::now(), 0);
@@ -126,7 +126,7 @@ impl Controller {
     }
 
     /// Gives how late in ns a sample left.
-    fn publish(&mut self, mut sample: TrainSample, appointed_ns: i64) -> Result<i64, Failure> {
+    fn publish(&mut self, mut sample: TrainSample, appointed_ns: i64) -> Result<i64, BenchError> {
         let left_ns = monotonic_now_ns();
         (sample.sequence, sample.published_ns) = (self.sent + 1, left_ns);
         self.wire.send(&mut sample)?;
@@ -136,7 +136,7 @@ impl Controller {
     }
 
     /// Publishes what is due; gives how late the latest was, in ns.
-    fn publish_due(&mut self, now_ns: i64) -> Result<i64, Failure> {
+    fn publish_due(&mut self, now_ns: i64) -> Result<i64, BenchError> {
         let mut lag_ns = 0;
         while let Some(&(sample, appointed_ns)) =
             self.traffic.upcoming().filter(|it| it.1 <= now_ns)
@@ -153,7 +153,7 @@ impl Controller {
 
     /// Takes what has come, unless nothing can; true where it brought anything new. An answer to a sample answers those
     /// before it too, for a snapshot stands on all of them.
-    fn poll(&mut self, outcomes: &mut [TrialOutcome]) -> Result<bool, Failure> {
+    fn poll(&mut self, outcomes: &mut [TrialOutcome]) -> Result<bool, BenchError> {
         if !self.wire.carries_others() && self.is_answered() {
             std::hint::spin_loop();
             return Ok(false);
@@ -194,7 +194,7 @@ pub fn drive(
     outcomes: &mut [TrialOutcome],
     until_ns: i64,
     is_over: &AtomicBool,
-) -> Result<i64, Failure> {
+) -> Result<i64, BenchError> {
     let (mut lag_ns, mut turn) = (0, 0);
     loop {
         let now_ns = monotonic_now_ns();
@@ -214,7 +214,7 @@ pub fn drive(
 /// # Errors
 ///
 /// When a transport fails.
-pub fn settle(trains: &mut [Controller], outcomes: &mut [TrialOutcome]) -> Result<(), Failure> {
+pub fn settle(trains: &mut [Controller], outcomes: &mut [TrialOutcome]) -> Result<(), BenchError> {
     let mut last_news = Instant::now();
     while !trains.iter().all(Controller::is_answered) && last_news.elapsed() < SETTLED_AFTER {
         for train in trains.iter_mut() {

@@ -10,10 +10,10 @@
 //! - `zeromq`: ZeroMQ, with the feature of that name
 
 pub mod controller;
-pub mod motion;
 pub mod plain;
 pub mod server;
 pub mod sockets;
+pub mod swinging_train;
 pub mod traffic;
 pub mod trial;
 pub mod wire;

@@ -9,10 +9,10 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::service::port_factory::event::PortFactory;
 
-use crate::output::Failure;
+use crate::output::BenchError;
 
 /// Returns the failure for a refusal of the transport.
-pub fn refused<E: std::fmt::Debug>(what: &'static str) -> impl FnOnce(E) -> Failure {
+pub fn refused<E: std::fmt::Debug>(what: &'static str) -> impl FnOnce(E) -> BenchError {
     move |error| format!("iceoryx2 refused a {what}: {error:?}").into()
 }
 
@@ -21,7 +21,7 @@ pub fn refused<E: std::fmt::Debug>(what: &'static str) -> impl FnOnce(E) -> Fail
 /// # Errors
 ///
 /// When the transport refuses.
-pub fn service(host: &Host, folder: &Path) -> Result<PortFactory<ipc::Service>, Failure> {
+pub fn service(host: &Host, folder: &Path) -> Result<PortFactory<ipc::Service>, BenchError> {
     let mut config = Config::default();
     let own = host.segment_prefix();
     config.global.prefix = FileName::new(own.as_bytes()).map_err(refused("name"))?;

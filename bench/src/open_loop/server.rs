@@ -9,8 +9,8 @@ use dynocar_transport::channel::Transport;
 use dynocar_transport::{Host, monotonic_now_ns};
 
 use super::plain;
-use super::sockets::{self, Datagrams, End, TRAIN};
-use crate::output::Failure;
+use super::sockets::{self, Datagrams, SocketEnd, TRAIN};
+use crate::output::BenchError;
 use crate::rig::cores::{bind, prioritise};
 
 /// A process of a measurement; started by the measuring commands, not by people.
@@ -51,7 +51,7 @@ enum PeerKind {
 /// # Errors
 ///
 /// When a channel, socket or configuration cannot be used.
-pub fn serve(arguments: &PeerArguments) -> Result<(), Failure> {
+pub fn serve(arguments: &PeerArguments) -> Result<(), BenchError> {
     let PeerArguments { kind, place, core, priority, blocks } = arguments;
     prioritise(*priority);
     let pin = || core.iter().copied().for_each(bind);
@@ -62,14 +62,14 @@ pub fn serve(arguments: &PeerArguments) -> Result<(), Failure> {
             echo(place, *blocks)
         }
         PeerKind::UnixDatagram => {
-            let socket = Datagrams::open(place, End::Server, *blocks)?;
+            let socket = Datagrams::open(place, SocketEnd::Server, *blocks)?;
             pin();
             sockets::serve(place, socket)
         }
         #[cfg(feature = "zeromq")]
         PeerKind::Zeromq => {
             // The library's threads are not bound.
-            let socket = super::zeromq::ZeroMq::open(place, End::Server, *blocks)?;
+            let socket = super::zeromq::ZeroMq::open(place, SocketEnd::Server, *blocks)?;
             pin();
             sockets::serve(place, socket)
         }
@@ -78,7 +78,7 @@ pub fn serve(arguments: &PeerArguments) -> Result<(), Failure> {
 
 /// Copies the number of a sample into a snapshot on the daemon's channels; `blocks` is woken by a listener of the plain
 /// transport instead of looking without pause.
-fn echo(place: &Path, blocks: bool) -> Result<(), Failure> {
+fn echo(place: &Path, blocks: bool) -> Result<(), BenchError> {
     let host = Host::from_environment()?;
     let transport = Transport::open(&host, "dynocar-bench-echo")?;
     let (snapshots, samples) = (transport.sender(TRAIN)?, transport.receiver(TRAIN)?);

@@ -11,8 +11,8 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 use dynocar_transport::channel::Payload;
 use dynocar_transport::monotonic_now_ns;
 
-use super::wire::Wire;
-use crate::output::{Failure, during};
+use super::wire::BenchTransport;
+use crate::output::{BenchError, during};
 use crate::rig::pipelines::default_pipeline;
 
 /// The train of every latency case.
@@ -24,7 +24,7 @@ pub(super) const BLOCK: Duration = Duration::from_millis(1);
 
 /// Which end of a socket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum SocketEnd {
     /// Sends samples.
     Controller,
     /// Answers them.
@@ -38,22 +38,22 @@ pub trait Socket {
     /// # Errors
     ///
     /// When the socket fails for good.
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Failure>;
+    fn send(&mut self, bytes: &[u8]) -> Result<(), BenchError>;
 
     /// The length of a message that has come.
     ///
     /// # Errors
     ///
     /// When the socket fails for good.
-    fn receive(&mut self, bytes: &mut [u8]) -> Result<Option<usize>, Failure>;
+    fn receive(&mut self, bytes: &mut [u8]) -> Result<Option<usize>, BenchError>;
 }
 
-impl<S: Socket> Wire for S {
-    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
+impl<S: Socket> BenchTransport for S {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), BenchError> {
         Socket::send(self, as_bytes(sample))
     }
 
-    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure> {
+    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), BenchError> {
         take::<ParameterSnapshot>(self)?.iter().for_each(hear);
         Ok(())
     }
@@ -64,7 +64,7 @@ impl<S: Socket> Wire for S {
 /// # Errors
 ///
 /// When the socket fails for good, or the train's file is wrong.
-pub fn serve(folder: &Path, mut socket: impl Socket) -> Result<(), Failure> {
+pub fn serve(folder: &Path, mut socket: impl Socket) -> Result<(), BenchError> {
     let train = Arc::new(load_train(&folder.join("train.toml"))?);
     let mut pipeline = default_pipeline(COMPARED, TRAIN, &train, None);
     loop {
@@ -80,7 +80,7 @@ pub fn serve(folder: &Path, mut socket: impl Socket) -> Result<(), Failure> {
 }
 
 /// The payload of a message that has come, if it is as long as one.
-fn take<T: Payload>(socket: &mut impl Socket) -> Result<Option<T>, Failure> {
+fn take<T: Payload>(socket: &mut impl Socket) -> Result<Option<T>, BenchError> {
     // No payload is longer.
     let mut bytes = [0; size_of::<ParameterSnapshot>()];
     let count = Socket::receive(socket, &mut bytes[..size_of::<T>()])?;
@@ -116,9 +116,9 @@ impl Datagrams {
     /// # Errors
     ///
     /// When the system refuses it.
-    pub fn open(folder: &Path, end: End, blocks: bool) -> Result<Self, Failure> {
+    pub fn open(folder: &Path, end: SocketEnd, blocks: bool) -> Result<Self, BenchError> {
         let mut names = ["controller.socket", "server.socket"].map(|name| folder.join(name));
-        if end == End::Server {
+        if end == SocketEnd::Server {
             names.reverse();
         }
         let [own, peer] = names;
@@ -130,18 +130,18 @@ impl Datagrams {
 }
 
 impl Socket for Datagrams {
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), BenchError> {
         // Full, or the peer does not listen yet: lost.
         unless_passing(self.socket.send_to(bytes, &self.peer)).map(|_| ())
     }
 
-    fn receive(&mut self, bytes: &mut [u8]) -> Result<Option<usize>, Failure> {
+    fn receive(&mut self, bytes: &mut [u8]) -> Result<Option<usize>, BenchError> {
         unless_passing(self.socket.recv(bytes))
     }
 }
 
 /// Returns the result of a call, or `None` for errors that a receiver or sender has to tolerate.
-fn unless_passing(result: std::io::Result<usize>) -> Result<Option<usize>, Failure> {
+fn unless_passing(result: std::io::Result<usize>) -> Result<Option<usize>, BenchError> {
     use ErrorKind::{ConnectionRefused, Interrupted, NotFound, TimedOut, WouldBlock};
     match result.map_err(|error| (error.kind(), error)) {
         Ok(count) => Ok(Some(count)),

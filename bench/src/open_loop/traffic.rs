@@ -2,7 +2,7 @@
 
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::motion::DrivenMotion;
+use super::swinging_train::DrivenMotion;
 use crate::chance::Chance;
 
 /// The traffic of every train.

@@ -6,14 +6,14 @@ use std::sync::atomic::AtomicBool;
 use dynocar::config::IdleStrategy;
 use dynocar::programs::{LIVE, RECORDING, call};
 use dynocar_shared::{PipelineKind, TrainId};
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use dynocar_transport::monotonic_now_ns;
 
 use super::controller::{Controller, TrialOutcome, drive, settle};
-use super::sockets::{Datagrams, End, TRAIN};
+use super::sockets::{Datagrams, SocketEnd, TRAIN};
 use super::traffic::{LoopTraffic, TrafficPlan};
-use super::wire::{Client, Notifying, Wire};
-use crate::output::{Failure, during};
+use super::wire::{BenchTransport, Client, Notifying};
+use crate::output::{BenchError, during};
 use crate::rig::cores::{Cores, bind, prioritise};
 use crate::rig::pipelines;
 use crate::rig::site::{DaemonPlan, ThreadPlan, peer, put_candidates, require, site, stop};
@@ -44,7 +44,7 @@ pub enum Companion {
 
 impl Companion {
     /// Starts it on a site, and waits for its first line: by then its channels are open.
-    fn start(self, site: &Site) -> Result<Process, Failure> {
+    fn start(self, site: &DaemonSite) -> Result<Process, BenchError> {
         let (train, file) = (TRAIN.to_string(), site.path().join("run.mcap"));
         let file = file.to_string_lossy();
         let (package, arguments) = match self {
@@ -96,7 +96,7 @@ pub struct Extent {
 
 /// Result of one trial.
 #[derive(Clone, Debug)]
-pub struct Trial {
+pub struct OpenLoopTrial {
     /// By pipeline that is polled.
     pub pipelines: Vec<TrialOutcome>,
     /// Processor time of the answering process over wall time, in %; 100 is one core.
@@ -114,7 +114,7 @@ pub struct Trial {
     pub preempted: u64,
 }
 
-impl Trial {
+impl OpenLoopTrial {
     /// Samples of which some pipeline gave no account.
     pub fn missing(&self) -> u64 {
         self.pipelines.iter().map(TrialOutcome::missing).sum()
@@ -133,11 +133,15 @@ const FAST: &str = "fast";
 /// # Errors
 ///
 /// When a process or a transport fails.
-pub fn run(setting: &Setting, extent: &Extent, is_over: &AtomicBool) -> Result<Trial, Failure> {
+pub fn run(
+    setting: &Setting,
+    extent: &Extent,
+    is_over: &AtomicBool,
+) -> Result<OpenLoopTrial, BenchError> {
     let Extent { trains, traffic, cores, seed, .. } = *extent;
     let site = site();
     let mut peer = setting.start(&site, extent)?;
-    let started: Result<Vec<Process>, Failure> =
+    let started: Result<Vec<Process>, BenchError> =
         setting.companions.iter().map(|it| it.start(&site)).collect();
     // They end with the trial.
     let _companions = started?;
@@ -147,7 +151,7 @@ pub fn run(setting: &Setting, extent: &Extent, is_over: &AtomicBool) -> Result<T
             let traffic = LoopTraffic::new(traffic, TrainId(id), monotonic_now_ns(), seed);
             Ok(Controller::new(setting.wire(&site, TrainId(id))?, traffic, setting.polled()))
         })
-        .collect::<Result<Vec<_>, Failure>>()?;
+        .collect::<Result<Vec<_>, BenchError>>()?;
     bind(cores.controller);
     for controller in &mut controllers {
         controller.await_ready(&mut peer)?;
@@ -164,7 +168,7 @@ fn measure(
     polled: usize,
     peer: &mut Process,
     (extent, is_over): (&Extent, &AtomicBool),
-) -> Result<Trial, Failure> {
+) -> Result<OpenLoopTrial, BenchError> {
     let (rate_hz, trains) = (extent.traffic.rate_hz, controllers.len() as f64);
     let outcomes = || -> Vec<TrialOutcome> { (0..polled).map(|_| TrialOutcome::empty()).collect() };
     // Trains start evenly spread over the first period.
@@ -190,7 +194,7 @@ fn measure(
     let (late, late_ns) = usage();
     settle(controllers, &mut counted)?;
     controllers.iter().for_each(|it| it.account(&mut counted));
-    Ok(Trial {
+    Ok(OpenLoopTrial {
         pipelines: counted,
         cpu_percent: 1e11 * (late.cpu_s - early.cpu_s) / (late_ns - early_ns) as f64,
         rss_start_bytes: early.rss_bytes,
@@ -211,22 +215,28 @@ impl Setting {
     }
 
     /// The controller's end.
-    fn wire(&self, site: &Site, train: TrainId) -> Result<Box<dyn Wire>, Failure> {
+    fn wire(
+        &self,
+        site: &DaemonSite,
+        train: TrainId,
+    ) -> Result<Box<dyn BenchTransport>, BenchError> {
         let (folder, blocks) = (site.path(), self.idle == IdleStrategy::Event);
         Ok(match &self.answerer {
             Answerer::Floor if blocks => Box::new(Notifying::open(site, train)?),
             Answerer::Floor => Box::new(Client::open(site, train, Some(PipelineKind::Echo))?),
             Answerer::Daemon(_, polled) => Box::new(Client::open(site, train, *polled)?),
-            Answerer::UnixDatagram => Box::new(Datagrams::open(folder, End::Controller, blocks)?),
+            Answerer::UnixDatagram => {
+                Box::new(Datagrams::open(folder, SocketEnd::Controller, blocks)?)
+            }
             #[cfg(feature = "zeromq")]
             Answerer::ZeroMq => {
-                Box::new(super::zeromq::ZeroMq::open(folder, End::Controller, blocks)?)
+                Box::new(super::zeromq::ZeroMq::open(folder, SocketEnd::Controller, blocks)?)
             }
         })
     }
 
     /// Starts who answers.
-    fn start(&self, site: &Site, extent: &Extent) -> Result<Process, Failure> {
+    fn start(&self, site: &DaemonSite, extent: &Extent) -> Result<Process, BenchError> {
         let kind = match &self.answerer {
             Answerer::Daemon(pipelines, _) => {
                 let lines = match self.candidates {

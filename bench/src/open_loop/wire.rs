@@ -2,29 +2,29 @@
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use dynocar_transport::channel::{Receiver, Sender, Transport};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::prelude::ipc;
 
 use super::plain::{self, refused};
-use crate::output::Failure;
+use crate::output::BenchError;
 
 /// A transport of samples to an estimator and of its answers back.
-pub trait Wire {
+pub trait BenchTransport {
     /// Sends a numbered sample; a sample that a full queue refuses is lost.
     ///
     /// # Errors
     ///
     /// When the transport fails for good.
-    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure>;
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), BenchError>;
 
     /// Receives the answers that have come, and passes each to `hear`.
     ///
     /// # Errors
     ///
     /// When the transport fails for good.
-    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure>;
+    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), BenchError>;
 
     /// Returns whether snapshots of other pipelines come too, which a controller's next poll takes first.
     fn carries_others(&self) -> bool {
@@ -46,22 +46,22 @@ impl Client {
     ///
     /// When a channel cannot be opened.
     pub fn open(
-        site: &Site,
+        site: &DaemonSite,
         train: TrainId,
         polled: Option<PipelineKind>,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, BenchError> {
         let publisher = SamplePublisher::open(&site.host(), train)?;
         Ok(Client { publisher, reader: SnapshotReader::open(&site.host(), train)?, polled })
     }
 }
 
-impl Wire for Client {
-    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
+impl BenchTransport for Client {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), BenchError> {
         // It numbers by itself.
         Ok(self.publisher.publish(sample).map(|_| ())?)
     }
 
-    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure> {
+    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), BenchError> {
         if self.reader.poll() > 0 {
             match self.polled {
                 Some(kind) => self.reader.latest(kind, 0).iter().for_each(|it| hear(it.snapshot)),
@@ -89,7 +89,7 @@ impl Notifying {
     /// # Errors
     ///
     /// When the transport refuses one.
-    pub fn open(site: &Site, train: TrainId) -> Result<Self, Failure> {
+    pub fn open(site: &DaemonSite, train: TrainId) -> Result<Self, BenchError> {
         let transport = Transport::open(&site.host(), "dynocar-bench")?;
         let service = plain::service(&site.host(), site.path())?;
         Ok(Notifying {
@@ -100,13 +100,13 @@ impl Notifying {
     }
 }
 
-impl Wire for Notifying {
-    fn send(&mut self, sample: &mut TrainSample) -> Result<(), Failure> {
+impl BenchTransport for Notifying {
+    fn send(&mut self, sample: &mut TrainSample) -> Result<(), BenchError> {
         self.sender.send(sample)?;
         self.notifier.notify().map(|_| ()).map_err(refused("notification"))
     }
 
-    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), Failure> {
+    fn receive(&mut self, hear: &mut dyn FnMut(&ParameterSnapshot)) -> Result<(), BenchError> {
         self.receiver.receive().iter().for_each(hear);
         Ok(())
     }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::sockets::{BLOCK, End, Socket};
-use crate::output::Failure;
+use super::sockets::{BLOCK, Socket, SocketEnd};
+use crate::output::BenchError;
 
 /// An end of a pair socket.
 pub struct ZeroMq {
@@ -17,32 +17,32 @@ impl ZeroMq {
     /// # Errors
     ///
     /// When the library fails.
-    pub fn open(folder: &Path, end: End, blocks: bool) -> Result<Self, Failure> {
+    pub fn open(folder: &Path, end: SocketEnd, blocks: bool) -> Result<Self, BenchError> {
         let socket = zmq::Context::new().socket(zmq::PAIR)?;
         socket.set_linger(0)?;
         socket.set_rcvtimeo(BLOCK.as_millis() as i32)?;
         let address = format!("ipc://{}/zeromq.socket", folder.display());
         match end {
-            End::Controller => socket.connect(&address)?,
-            End::Server => socket.bind(&address)?,
+            SocketEnd::Controller => socket.connect(&address)?,
+            SocketEnd::Server => socket.bind(&address)?,
         }
         Ok(ZeroMq { socket, flags: if blocks { 0 } else { zmq::DONTWAIT } })
     }
 }
 
 impl Socket for ZeroMq {
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), BenchError> {
         unless_passing(self.socket.send(bytes, zmq::DONTWAIT)).map(|_| ())
     }
 
-    fn receive(&mut self, bytes: &mut [u8]) -> Result<Option<usize>, Failure> {
+    fn receive(&mut self, bytes: &mut [u8]) -> Result<Option<usize>, BenchError> {
         let count = unless_passing(self.socket.recv_into(bytes, self.flags))?;
         Ok(count.filter(|count| *count <= bytes.len()))
     }
 }
 
 /// Returns the result of a call, or `None` for errors that a receiver or sender has to tolerate.
-fn unless_passing<T>(result: zmq::Result<T>) -> Result<Option<T>, Failure> {
+fn unless_passing<T>(result: zmq::Result<T>) -> Result<Option<T>, BenchError> {
     match result {
         Ok(given) => Ok(Some(given)),
         Err(zmq::Error::EAGAIN | zmq::Error::EINTR) => Ok(None),

@@ -18,7 +18,7 @@ use super::braking::{
     Braking, BrakingMoment, PRESSURE_PA, SPEED_NOISE_MPS, STEP_S, ShareStep, WINDOW, disc_friction,
     train,
 };
-use super::row::{Row, Seeds};
+use super::row::{PaperRow, Seeds};
 use super::score;
 use crate::parallel;
 use crate::statistics::{mean, root_mean_square};
@@ -144,8 +144,8 @@ impl BrakingScore {
     }
 
     /// Returns a row with coverage and consistency, with `freedom` degrees of freedom.
-    pub fn row(&self, freedom: f64, row: Row) -> Row {
-        Row { nees_freedom: Some(freedom), ..self.errors.row(row) }
+    pub fn row(&self, freedom: f64, row: PaperRow) -> PaperRow {
+        PaperRow { nees_freedom: Some(freedom), ..self.errors.row(row) }
     }
 
     /// The errors of runs, pooled.

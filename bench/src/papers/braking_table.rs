@@ -9,7 +9,7 @@ use super::braking_score::{
     BrakingScore, LAG_S, LAG_STEPS, MIDDLE_STEPS, drawn_braking, ekf, em, known_law, presumed,
     score, smoother,
 };
-use super::row::{Row, Seeds};
+use super::row::{PaperRow, Seeds};
 
 /// One of the papers' tables, and what is measured for it.
 pub struct Table {
@@ -48,12 +48,12 @@ impl Table {
     }
 
     /// A row without figures.
-    pub fn row(&self, what: &str, unit: &'static str, seeds: Seeds) -> Row {
-        Row::new(self.paper, self.table, format!("{}, {what}", self.name), unit, seeds)
+    pub fn row(&self, what: &str, unit: &'static str, seeds: Seeds) -> PaperRow {
+        PaperRow::new(self.paper, self.table, format!("{}, {what}", self.name), unit, seeds)
     }
 
     /// The rows that every table has: the present, 5 s back, and the baseline on its own.
-    pub fn comparison(&self, seeds: Seeds) -> Vec<Row> {
+    pub fn comparison(&self, seeds: Seeds) -> Vec<PaperRow> {
         let sought = self.braking.sought;
         let lags = [0, MIDDLE_STEPS];
         let em_by = |e_step| {
@@ -87,11 +87,11 @@ impl Table {
             seeds,
         );
         rows.extend(back.into_iter().map(|row| row.noted("EM: middle of the window")));
-        rows.push(Row {
+        rows.push(PaperRow {
             paper_method: Some(exact_middle.relative_percent),
             ..self.row("EM with exact E-step, middle of the window", "%", seeds)
         });
-        rows.push(Row {
+        rows.push(PaperRow {
             published: Some(self.published_baseline_percent),
             baseline: Some(ekf.relative_percent),
             ..self.row("the present, the baseline's figure", "%", seeds)
@@ -100,7 +100,7 @@ impl Table {
     }
 
     /// The rows where the curve over speed is known but for its scale.
-    pub fn known_law(&self, scale_std: f64, seeds: Seeds) -> Vec<Row> {
+    pub fn known_law(&self, scale_std: f64, seeds: Seeds) -> Vec<PaperRow> {
         let sought = self.braking.sought;
         let [score] = score(&self.braking, seeds, [0], |_| known_law(sought));
         let bounds = bound(&self.braking, PriorKnowledge::Law(scale_std), 0);
@@ -119,11 +119,11 @@ impl Table {
         compared: Compared<'_>,
         bounds: &[BoundAt],
         seeds: Seeds,
-    ) -> Vec<Row> {
+    ) -> Vec<PaperRow> {
         let Compared { em, ekf, ours, freedom } = compared;
         let row = |what: &str, unit| ours.row(freedom, self.row(what, unit, seeds));
         vec![
-            Row {
+            PaperRow {
                 published: Some(self.published_percent),
                 paper_method: em.map(|score| score.relative_percent),
                 baseline: ekf.map(|score| score.relative_percent),
@@ -131,7 +131,7 @@ impl Table {
                 bound: Some(mean_relative_percent(bounds)),
                 ..row(&format!("mean relative error, {what}"), "%")
             },
-            Row {
+            PaperRow {
                 paper_method: em.map(|score| score.rmse()),
                 baseline: ekf.map(|score| score.rmse()),
                 ours: Some(ours.rmse()),
@@ -160,17 +160,17 @@ pub fn drawn_rows(
     sought: BrakingCoefficient,
     name: &'static str,
     seeds: Seeds,
-) -> Vec<Row> {
+) -> Vec<PaperRow> {
     let braking = drawn_braking(sought);
     let knowledge = PriorKnowledge::Share(presumed(sought));
     let row = |(what, lag_s, lag_steps)| {
         let score = drawn_score(sought, lag_s, lag_steps, seeds);
         let quantity = format!("{name}, root mean square error, {what}");
-        Row {
+        PaperRow {
             bound: Some(deviation(&bound(&braking, knowledge, lag_steps))),
             ..score.row(
                 score.nees_freedom(),
-                Row::new(paper, "drawn coefficients", quantity, "1", seeds),
+                PaperRow::new(paper, "drawn coefficients", quantity, "1", seeds),
             )
         }
     };

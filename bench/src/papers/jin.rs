@@ -7,7 +7,7 @@ use dynocar_shared::{EffortPoint, Stop};
 use super::braking::{JIN_TABLE_3, JIN_TABLE_4, PRESSURE_PA, declared, disc_friction, train};
 use super::braking_score::{over_seeds, score, smoother};
 use super::braking_table::{Table, drawn_rows, drawn_score};
-use super::row::{Row, Seeds};
+use super::row::{PaperRow, Seeds};
 use super::xie::{PAPER_GRAVITY_MPS2, stop_rows};
 use crate::statistics::{KMH, mean};
 
@@ -35,7 +35,7 @@ const RATIO: Table = Table {
 const SCALE_STD: f64 = 1.0;
 
 /// Tables 3 and 4, and the stop of figure 8.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = FRICTION.comparison(seeds);
     rows.extend(FRICTION.known_law(SCALE_STD, seeds));
     rows.extend(RATIO.comparison(seeds));
@@ -47,7 +47,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 }
 
 /// A ratio that hardly moves gains from a window of 40 s, and the declared value is hard to beat.
-fn ratio_extras(seeds: Seeds) -> Vec<Row> {
+fn ratio_extras(seeds: Seeds) -> Vec<PaperRow> {
     // 10 s back, the random walk of 0.4 % after 1 s remembers about as long on either side.
     let [back] = score(&RATIO.braking, seeds, [50], |_| smoother(BrakingCoefficient::Ratio, 10.0));
     let drawn = drawn_score(BrakingCoefficient::Ratio, 10.0, 50, seeds);
@@ -60,7 +60,7 @@ fn ratio_extras(seeds: Seeds) -> Vec<Row> {
     let row = RATIO
         .row("mean relative error, 10 s back", "%", seeds)
         .noted("baseline: always the declared 2.55");
-    vec![Row {
+    vec![PaperRow {
         published: Some(RATIO.published_percent),
         baseline: Some(mean(&nominal)),
         ours: Some(back.relative_percent),
@@ -69,7 +69,7 @@ fn ratio_extras(seeds: Seeds) -> Vec<Row> {
 }
 
 /// The stop from 350 km/h of figure 8.
-fn stop() -> [Row; 2] {
+fn stop() -> [PaperRow; 2] {
     let train = train();
     let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");
     let force_n = |speed_mps: f64| gear.force_n(PRESSURE_PA, disc_friction(speed_mps), gear.ratio);

@@ -10,7 +10,7 @@ use std::cell::Cell;
 
 use dynocar_core::filter::particle::{ParticleError, ParticleModel, ParticleSmoother};
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::braking::law::Law;
+use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{self, StepInputs};
 use dynocar_model::train::TrainModel;
 
@@ -56,7 +56,8 @@ impl ParticleModel<2> for UniformWindow<'_> {
 
     fn advance(&self, _step: usize) -> impl Fn([f64; 2]) -> [f64; 2] {
         |[distance_m, speed_mps]| {
-            let moved = motion::advance(&self.inputs, &Law::Constant, speed_mps, self.adhesion);
+            let moved =
+                motion::advance(&self.inputs, &BrakingLaw::Constant, speed_mps, self.adhesion);
             [distance_m + moved.travelled_m, moved.speed_mps]
         }
     }

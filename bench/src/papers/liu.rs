@@ -10,7 +10,7 @@ pub mod scenario;
 use std::sync::Arc;
 
 use dynocar_estimators::xia::trajectory::fit::{FitSettings, MotionSegment, TrajectoryFitter};
-use dynocar_estimators::xia::trajectory::step::{Step, StepRule};
+use dynocar_estimators::xia::trajectory::step::{StepRule, TrajectoryStep};
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
@@ -22,7 +22,7 @@ use self::scenario::{
     CLEAN, CONDITIONS, MeasuredRun, ROTATING_MASS_FACTOR, RunCondition, compared_speeds_mps, davis,
     truth,
 };
-use super::row::{Row, Seeds};
+use super::row::{PaperRow, Seeds};
 use super::score::{PaperScore, w0_errors};
 use crate::rig::pipelines::default_pipeline;
 use crate::statistics::mean;
@@ -40,7 +40,7 @@ const PUBLISHED_VARIANCES: [f64; 5] = [0.5632, 0.5632, 0.5623, 0.5618, 0.5613];
 type Estimate = (Davis, Matrix3<f64>);
 
 /// Rows for every method under every condition, over seeded runs.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let (mut rows, mut table_1) = (Vec::new(), Vec::new());
     for condition in CONDITIONS {
         let (accuracy, variances) = of_condition(condition, seeds);
@@ -55,7 +55,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 
 /// Errors of w0 under a condition; and Table 1's last column, the variance of the segments' residuals, of which the
 /// paper's are of its own recorded data, so that only the order of the methods compares.
-fn of_condition(condition: RunCondition, seeds: Seeds) -> (Vec<Row>, Vec<Row>) {
+fn of_condition(condition: RunCondition, seeds: Seeds) -> (Vec<PaperRow>, Vec<PaperRow>) {
     let mut of_methods = vec![(Vec::new(), Vec::new()); METHODS.len()];
     let (mut ours, mut online, mut our_variances) =
         (PaperScore::default(), PaperScore::default(), Vec::new());
@@ -85,20 +85,20 @@ fn of_condition(condition: RunCondition, seeds: Seeds) -> (Vec<Row>, Vec<Row>) {
         let quantity = format!("w0 over 40-72 km/h, {quantity}, {}", condition.name);
         let mut score = score.clone();
         (score.paper, score.baseline) = (paper.to_vec(), of_methods[0].0.clone());
-        score.row(Row::new(PAPER, "Table 1, section 4.2", quantity, "N/kN", seeds))
+        score.row(PaperRow::new(PAPER, "Table 1, section 4.2", quantity, "N/kN", seeds))
     };
     let methods = || METHODS.iter().zip(&of_methods);
-    let mut rows: Vec<Row> =
+    let mut rows: Vec<PaperRow> =
         methods().map(|(method, (errors, _))| row(method.name, errors, &ours)).collect();
     rows.push(row("online: resistance_kalman", &[], &online));
     let table_1 =
         methods().zip(PUBLISHED_VARIANCES).map(|((method, (_, variances)), published)| {
             let quantity = format!("variance of the segments' residuals, {}", method.name);
-            Row {
+            PaperRow {
                 published: Some(published),
                 paper_method: Some(mean(variances)),
                 ours: Some(mean(&our_variances)),
-                ..Row::new(PAPER, "Table 1", quantity, "(N/kN)^2", seeds)
+                ..PaperRow::new(PAPER, "Table 1", quantity, "(N/kN)^2", seeds)
             }
         });
     (rows, table_1.collect())
@@ -106,12 +106,13 @@ fn of_condition(condition: RunCondition, seeds: Seeds) -> (Vec<Row>, Vec<Row>) {
 
 /// Our fit of whole runs: the computed speed against the measured one, all along each run.
 fn whole_runs(runs: &[Vec<MeasuredRun>]) -> Option<Estimate> {
-    let step = |pair: &[MeasuredRun]| Step {
+    let step = |pair: &[MeasuredRun]| TrajectoryStep {
         size: pair[1].time_s - pair[0].time_s,
         drive_mps2: 0.0,
         resistance_gain: mps2_per_n_per_kn(ROTATING_MASS_FACTOR),
     };
-    let steps: Vec<Vec<Step>> = runs.iter().map(|run| run.windows(2).map(step).collect()).collect();
+    let steps: Vec<Vec<TrajectoryStep>> =
+        runs.iter().map(|run| run.windows(2).map(step).collect()).collect();
     let speed_mps = |sample: &MeasuredRun| sample.speed_kmh / 3.6;
     let speeds: Vec<Vec<f64>> =
         runs.iter().map(|run| run.iter().map(speed_mps).collect()).collect();

@@ -22,9 +22,9 @@ use dynocar::output::report_line;
 use serde_json::json;
 
 use crate::ending::until_due;
-use crate::output::{Failure, OutputArguments, Record, expect_none, named, table, write_csv};
-use promise::Verdict;
-use row::{Row, Seeds};
+use crate::output::{BenchError, OutputArguments, Record, expect_none, named, table, write_csv};
+use promise::PromiseVerdict;
+use row::{PaperRow, Seeds};
 
 /// Every table of the five papers over seeded runs: the paper's figure, its method, ours, the bound.
 ///
@@ -51,7 +51,7 @@ pub struct PapersArguments {
 }
 
 /// Function that measures the rows of a paper.
-type Measure = fn(Seeds) -> Vec<Row>;
+type Measure = fn(Seeds) -> Vec<PaperRow>;
 
 /// Every paper, by year.
 const SOURCES: [(&str, Measure); 5] = [
@@ -68,7 +68,7 @@ impl PapersArguments {
     /// # Errors
     ///
     /// When there is no such paper, a result cannot be written, or a row breaks a promise.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let seeds =
             Seeds { first: self.first_seed, count: if self.quick { 8 } else { self.seeds } };
         let chosen: Vec<(&str, Measure)> = match &self.paper {
@@ -80,7 +80,7 @@ impl PapersArguments {
             report_line(&format!("{name}: {} seeds from {}", seeds.count, seeds.first));
             rows.extend(measure(seeds));
         }
-        let verdicts: Vec<Verdict> = rows.iter().map(Verdict::of).collect();
+        let verdicts: Vec<PromiseVerdict> = rows.iter().map(PromiseVerdict::of).collect();
         let judged = || rows.iter().zip(&verdicts);
         let records: Vec<Record> = judged().map(|(row, verdict)| record(row, verdict)).collect();
         let promised: usize = verdicts.iter().map(|it| it.promised.len()).sum();
@@ -99,7 +99,7 @@ impl PapersArguments {
 }
 
 /// A row for people and for a file of CSV.
-fn record(row: &Row, verdict: &Verdict) -> Record {
+fn record(row: &PaperRow, verdict: &PromiseVerdict) -> Record {
     let mut notes: Vec<String> =
         Some(row.note.clone()).filter(|it| !it.is_empty()).into_iter().collect();
     if !verdict.broken.is_empty() {
@@ -145,13 +145,13 @@ fn figure(value: Option<f64>) -> String {
 mod tests {
     use super::*;
 
-    fn row() -> Row {
-        Row {
+    fn row() -> PaperRow {
+        PaperRow {
             published: Some(0.04),
             ours: Some(0.0297),
             bound: Some(0.027),
             coverage: Some(0.951),
-            ..Row::new(
+            ..PaperRow::new(
                 "Xia 2023",
                 "Table 3",
                 "w0 over driven speeds",
@@ -163,8 +163,9 @@ mod tests {
 
     #[test]
     fn figures_stand_apart_from_notes() {
-        let row = Row { quantity: "mass, 3 km".into(), ..row() }.noted("paper's method: by hand");
-        let record = record(&row, &Verdict::of(&row));
+        let row =
+            PaperRow { quantity: "mass, 3 km".into(), ..row() }.noted("paper's method: by hand");
+        let record = record(&row, &PromiseVerdict::of(&row));
         let of = |name: &str| record.cell(name).unwrap();
         assert_eq!((of("quantity"), of("note")), ("mass, 3 km", "paper's method: by hand"));
         assert_eq!((of("ours_over_bound"), of("coverage_percent")), ("1.10", "95.1"));

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::row::Row;
+use super::row::PaperRow;
 
 /// Limit that a row's own figure has to obey.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +63,7 @@ const BAND_PROBABILITY: f64 = 0.99;
 
 /// The measurement of a row against what is promised of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Verdict {
+pub struct PromiseVerdict {
     /// The 99 % chi-square band of the mean NEES per degree of freedom.
     pub nees_band: Option<(f64, f64)>,
     /// Promises in words; empty where nothing is promised.
@@ -74,10 +74,10 @@ pub struct Verdict {
     pub may_be_wider: Option<&'static str>,
 }
 
-impl Verdict {
+impl PromiseVerdict {
     /// Judges a row.
-    pub fn of(row: &Row) -> Self {
-        let mut verdict = Verdict {
+    pub fn of(row: &PaperRow) -> Self {
+        let mut verdict = PromiseVerdict {
             nees_band: row.nees_freedom.filter(|freedom| *freedom > 0.0).map(nees_band),
             promised: Vec::new(),
             broken: Vec::new(),
@@ -93,7 +93,7 @@ impl Verdict {
         verdict
     }
 
-    fn intervals(&mut self, row: &Row) {
+    fn intervals(&mut self, row: &PaperRow) {
         let may_be_wider = self.may_be_wider.is_some();
         if let Some(coverage) = row.coverage {
             let is_kept = coverage >= COVERAGE.0 && (may_be_wider || coverage <= COVERAGE.1);
@@ -107,17 +107,17 @@ impl Verdict {
         }
     }
 
-    fn limits(&mut self, row: &Row) {
+    fn limits(&mut self, row: &PaperRow) {
         let Some(ours) = row.ours else { return };
         // A root mean square of n runs scatters by 1 / sqrt(2 n).
         let margin = match row.seeds < SEEDS_MIN {
             true => 1.0 + 3.0 / (2.0 * row.seeds as f64).sqrt(),
             false => 1.0,
         };
-        let matches = |(paper, table, quantity, _): &&(&str, &str, &str, Limit)| {
+        let limits = LIMITS.iter().filter(|(paper, table, quantity, _)| {
             *paper == row.paper && row.table.contains(table) && row.quantity.contains(quantity)
-        };
-        for (_, _, _, limit) in LIMITS.iter().filter(matches) {
+        });
+        for (.., limit) in limits {
             match *limit {
                 Limit::Ratio(most) => {
                     let Some(bound) = row.bound else { continue };
@@ -153,15 +153,15 @@ mod tests {
     use super::*;
     use crate::papers::row::Seeds;
 
-    fn row(quantity: &str, ours: f64, seeds: usize) -> Row {
+    fn row(quantity: &str, ours: f64, seeds: usize) -> PaperRow {
         let seeds = Seeds::from_zero(seeds);
-        Row {
+        PaperRow {
             ours: Some(ours),
             bound: Some(1.0),
             coverage: Some(0.95),
             nees: Some(1.0),
             nees_freedom: Some(3.0 * seeds.count as f64),
-            ..Row::new("Liu 2018", "Table 1, section 4.2", quantity, "N/kN", seeds)
+            ..PaperRow::new("Liu 2018", "Table 1, section 4.2", quantity, "N/kN", seeds)
         }
     }
 
@@ -176,25 +176,25 @@ mod tests {
 
     #[test]
     fn a_promise_is_broken_beyond_its_limit_and_few_runs_have_a_margin() {
-        assert!(Verdict::of(&row("w0, clean", 1.09, 200)).broken.is_empty());
-        assert_eq!(Verdict::of(&row("w0, clean", 1.2, 200)).broken, ["at most 1.1 bounds"]);
-        assert!(Verdict::of(&row("w0, 5 % outliers", 1.2, 200)).broken.is_empty());
-        assert!(Verdict::of(&row("w0, clean", 1.2, 8)).broken.is_empty());
-        assert!(!Verdict::of(&row("w0, clean", 3.0, 8)).broken.is_empty());
+        assert!(PromiseVerdict::of(&row("w0, clean", 1.09, 200)).broken.is_empty());
+        assert_eq!(PromiseVerdict::of(&row("w0, clean", 1.2, 200)).broken, ["at most 1.1 bounds"]);
+        assert!(PromiseVerdict::of(&row("w0, 5 % outliers", 1.2, 200)).broken.is_empty());
+        assert!(PromiseVerdict::of(&row("w0, clean", 1.2, 8)).broken.is_empty());
+        assert!(!PromiseVerdict::of(&row("w0, clean", 3.0, 8)).broken.is_empty());
     }
 
     #[test]
     fn intervals_that_lie_are_named() {
-        let wide = Row { coverage: Some(0.99), nees: Some(0.5), ..row("w0, clean", 1.0, 200) };
-        assert_eq!(Verdict::of(&wide).broken, ["coverage 93-97 %", "NEES in its band"]);
-        let few = Row { seeds: 8, ..wide.clone() };
-        assert!(Verdict::of(&few).broken.is_empty());
-        let named = Row { paper: "Wang 2022", quantity: "in a headwind".into(), ..wide };
-        assert!(Verdict::of(&named).broken.is_empty());
-        assert!(Verdict::of(&named).may_be_wider.is_some());
-        let narrow = Row { coverage: Some(0.9), nees: Some(1.5), ..named };
+        let wide = PaperRow { coverage: Some(0.99), nees: Some(0.5), ..row("w0, clean", 1.0, 200) };
+        assert_eq!(PromiseVerdict::of(&wide).broken, ["coverage 93-97 %", "NEES in its band"]);
+        let few = PaperRow { seeds: 8, ..wide.clone() };
+        assert!(PromiseVerdict::of(&few).broken.is_empty());
+        let named = PaperRow { paper: "Wang 2022", quantity: "in a headwind".into(), ..wide };
+        assert!(PromiseVerdict::of(&named).broken.is_empty());
+        assert!(PromiseVerdict::of(&named).may_be_wider.is_some());
+        let narrow = PaperRow { coverage: Some(0.9), nees: Some(1.5), ..named };
         assert_eq!(
-            Verdict::of(&narrow).broken,
+            PromiseVerdict::of(&narrow).broken,
             ["coverage from 93 % on", "NEES not above its band"]
         );
     }

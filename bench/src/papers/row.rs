@@ -11,7 +11,7 @@ pub const WANG: &str = "Wang 2022";
 ///
 /// Errors are in `unit`; a method that a table does not have is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
+pub struct PaperRow {
     /// Short name of the paper, as `Xia 2023`.
     pub paper: &'static str,
     /// Table or figure of the paper.
@@ -42,7 +42,7 @@ pub struct Row {
     pub nees_freedom: Option<f64>,
 }
 
-impl Row {
+impl PaperRow {
     /// A row without figures.
     pub fn new(
         paper: &'static str,
@@ -52,13 +52,13 @@ impl Row {
         seeds: Seeds,
     ) -> Self {
         let (quantity, seeds) = (quantity.into(), seeds.count);
-        Row { paper, table, quantity, unit, seeds, ..Row::default() }
+        PaperRow { paper, table, quantity, unit, seeds, ..PaperRow::default() }
     }
 
     /// With a note.
     #[must_use]
     pub fn noted(self, note: impl Into<String>) -> Self {
-        Row { note: note.into(), ..self }
+        PaperRow { note: note.into(), ..self }
     }
 }
 

@@ -4,7 +4,7 @@ use dynocar_model::train::Davis;
 use dynocar_shared::HALF_95;
 use nalgebra::{Matrix3, Vector3};
 
-use super::row::Row;
+use super::row::PaperRow;
 use crate::statistics::{mean, root_mean_square, share};
 
 /// Errors, coverage and consistency of our method beside the errors of others on the same runs.
@@ -64,10 +64,10 @@ impl PaperScore {
 
     /// A row of root mean square errors, with coverage and consistency of ours; the row's own figures stay where there is
     /// none.
-    pub fn row(&self, row: Row) -> Row {
+    pub fn row(&self, row: PaperRow) -> PaperRow {
         let rms = |of: &[f64]| (!of.is_empty()).then(|| root_mean_square(of));
         let is_judged = !self.covered.is_empty();
-        Row {
+        PaperRow {
             paper_method: rms(&self.paper).or(row.paper_method),
             baseline: rms(&self.baseline).or(row.baseline),
             ours: rms(&self.errors),
@@ -80,8 +80,8 @@ impl PaperScore {
     }
 
     /// A row of mean errors with their sign; intervals say nothing of a bias.
-    pub fn bias(&self, row: Row) -> Row {
-        Row {
+    pub fn bias(&self, row: PaperRow) -> PaperRow {
+        PaperRow {
             paper_method: Some(mean(&self.paper)),
             baseline: Some(mean(&self.baseline)),
             ours: Some(mean(&self.errors)),
@@ -111,7 +111,7 @@ mod tests {
         let mut score = PaperScore::default();
         score.take(0.5, 0.5);
         score.take(-3.0, 1.0);
-        let row = score.row(Row::new("a", "b", "c", "1", Seeds::from_zero(2)));
+        let row = score.row(PaperRow::new("a", "b", "c", "1", Seeds::from_zero(2)));
         assert_eq!((row.coverage, row.nees, row.nees_freedom), (Some(0.5), Some(5.0), Some(2.0)));
         assert_eq!((row.ours, row.bound), (Some(4.625_f64.sqrt()), None));
     }
@@ -124,7 +124,7 @@ mod tests {
         let mut score = PaperScore::default();
         score.take_resistance((&found, &covariance), &truth, &[0.0, 100.0]);
         score.take_bound(&covariance, &[0.0]);
-        let row = score.row(Row::new("a", "b", "c", "N/kN", Seeds::from_zero(1)));
+        let row = score.row(PaperRow::new("a", "b", "c", "N/kN", Seeds::from_zero(1)));
         assert!(
             (row.ours.unwrap() - 0.3).abs() < 1e-12 && (row.bound.unwrap() - 0.1).abs() < 1e-12
         );

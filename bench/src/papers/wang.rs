@@ -11,13 +11,13 @@ mod resistance_rows;
 mod ride;
 mod shuttle;
 
-use super::row::{Row, Seeds};
+use super::row::{PaperRow, Seeds};
 
 /// Every row of the paper over a number of seeded runs.
 ///
 /// Rows that take a whole crossing at once, or that hardly scatter, take 20 runs at most;
 /// each row says how many.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = resistance_rows::rows(seeds);
     rows.extend(mass_rows::rows(seeds));
     rows.extend(energy_rows::rows(seeds));
@@ -28,7 +28,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 mod tests {
     use super::*;
 
-    fn row<'a>(rows: &'a [Row], beginning: &str) -> &'a Row {
+    fn row<'a>(rows: &'a [PaperRow], beginning: &str) -> &'a PaperRow {
         rows.iter().find(|row| row.quantity.starts_with(beginning)).expect(beginning)
     }
 

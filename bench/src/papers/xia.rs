@@ -8,13 +8,13 @@ mod offline;
 mod online;
 mod scenario;
 
-use super::row::{Row, Seeds};
+use super::row::{PaperRow, Seeds};
 
 /// Every line of the comparison for this paper.
 ///
 /// `seeds` runs each; where the paper's method goes over a whole line of 120 km window by window
 /// it gets a tenth of them, as the line says.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = offline::convergence_rows(seeds);
     rows.extend(offline::noise_free_rows(seeds));
     rows.extend(offline::noise_rows(seeds));
@@ -25,14 +25,15 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::papers::xia::scenario::{CASES, Profile, drive};
+    use crate::papers::xia::scenario::{CASES, DrivingProfile, drive};
     use crate::statistics::KMH;
 
     #[test]
     fn the_scenarios_keep_to_their_speeds_and_forces() {
-        for (profile, length_m, low_kmh, high_kmh) in
-            [(Profile::Cruise, 120e3, 268.0, 306.0), (Profile::Full, 40e3, 6.9, 301.0)]
-        {
+        for (profile, length_m, low_kmh, high_kmh) in [
+            (DrivingProfile::Cruise, 120e3, 268.0, 306.0),
+            (DrivingProfile::Full, 40e3, 6.9, 301.0),
+        ] {
             for seed in 0..5 {
                 let run = drive(profile, length_m, seed, |_| CASES[0]);
                 assert_eq!(run.speeds_mps.len(), run.steps.len() + 1);
@@ -50,7 +51,7 @@ mod tests {
             FitSettings, MotionSegment, TrajectoryFitter,
         };
         use dynocar_estimators::xia::trajectory::step::StepRule;
-        let run = drive(Profile::Full, 25e3, 1, |_| CASES[0]);
+        let run = drive(DrivingProfile::Full, 25e3, 1, |_| CASES[0]);
         let numerical = scenario::davis_covariance(&run, &CASES[0]);
         let settings = FitSettings {
             speed_noise_mps: Some(scenario::SPEED_NOISE_MPS),
@@ -66,7 +67,7 @@ mod tests {
 
     #[test]
     fn a_few_runs_already_show_what_the_full_comparison_does() {
-        let by = |rows: Vec<Row>, unit: &str| -> Vec<f64> {
+        let by = |rows: Vec<PaperRow>, unit: &str| -> Vec<f64> {
             let of_unit = rows.into_iter().filter(|row| row.unit == unit);
             of_unit.map(|row| row.ours.expect("every line has our figure")).collect()
         };

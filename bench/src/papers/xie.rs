@@ -10,7 +10,7 @@ use dynocar_shared::{EffortPoint, RailAdhesion, RailCondition, Stop, Uncertain};
 use super::braking::{PRESSURE_PA, STEP_S, XIE_TABLE_2, XIE_TABLE_3, train};
 use super::braking_score::{MIDDLE_STEPS, em, over_seeds, score};
 use super::braking_table::{Table, drawn_rows};
-use super::row::{Row, Seeds};
+use super::row::{PaperRow, Seeds};
 use crate::statistics::{KMH, mean};
 
 /// Initial values of both tables.
@@ -38,7 +38,7 @@ const TABLES: [Table; 2] = [
 ];
 
 /// Tables 2 and 3, the printed forms that fail, and the stopping distances.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = Vec::new();
     for table in &TABLES {
         rows.extend(table.comparison(seeds));
@@ -51,14 +51,14 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 }
 
 /// Returns the rows of the EM with the printed cap and the printed density.
-fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
+fn printed_forms(table: &Table, seeds: Seeds) -> Vec<PaperRow> {
     let capped = |initial, what| {
         let [score] = score(&table.braking, seeds, [MIDDLE_STEPS], |seed| {
             let (e_step, has_printed_cap) = (EStep::Kalman, true);
             let given = EmSettings { initial, seed, e_step, has_printed_cap, ..Default::default() };
             em(BrakingCoefficient::Adhesion, given)
         });
-        Row { paper_method: Some(score.relative_percent), ..table.row(what, "%", seeds) }
+        PaperRow { paper_method: Some(score.relative_percent), ..table.row(what, "%", seeds) }
     };
     let frozen = over_seeds(seeds, |seed| {
         // With the printed density the gradient is zero: the initial value is the estimate.
@@ -69,27 +69,41 @@ fn printed_forms(table: &Table, seeds: Seeds) -> Vec<Row> {
     vec![
         capped(Some(0.05), "mean relative error, printed cap min(F, B), from 0.05"),
         capped(Some(0.12), "mean relative error, printed cap min(F, B), from 0.12"),
-        Row {
+        PaperRow {
             paper_method: Some(mean(&frozen)),
             ..table.row("mean relative error, printed uniform density", "%", seeds)
         },
     ]
 }
 
-/// A stop of the paper: first and last speed in km/h, what the rail carries, in words and numbers, metres and seconds.
-type PublishedStop = ([f64; 2], &'static str, RailAdhesion, [f64; 2]);
+/// A stop of the paper: first and last speed in km/h, what the rail carries in words and numbers, and the published
+/// metres and seconds.
+struct PublishedStop {
+    speeds_kmh: [f64; 2],
+    rail: &'static str,
+    adhesion: RailAdhesion,
+    published: [f64; 2],
+}
 
 const STOPS: [PublishedStop; 6] = {
+    const fn stop(
+        speeds_kmh: [f64; 2],
+        rail: &'static str,
+        adhesion: RailAdhesion,
+        published: [f64; 2],
+    ) -> PublishedStop {
+        PublishedStop { speeds_kmh, rail, adhesion, published }
+    }
     const HIGH: RailAdhesion = RailAdhesion::Coefficient(Uncertain::exact(0.1542));
     const LOW: RailAdhesion = RailAdhesion::Coefficient(Uncertain::exact(0.0726));
     const WET: RailAdhesion = RailAdhesion::Law(RailCondition::Wet, Uncertain::exact(1.0));
     [
-        ([300.0, 100.0], "adhesion 0.1542", HIGH, [3060.7, 56.1]),
-        ([300.0, 100.0], "adhesion 0.0726", LOW, [3946.7, 71.7]),
-        ([300.0, 100.0], "wet rail", WET, [3481.1, 62.8]),
-        ([250.0, 50.0], "adhesion 0.1542", HIGH, [2404.3, 59.3]),
-        ([250.0, 50.0], "adhesion 0.0726", LOW, [2958.9, 72.7]),
-        ([250.0, 50.0], "wet rail", WET, [2614.4, 62.7]),
+        stop([300.0, 100.0], "adhesion 0.1542", HIGH, [3060.7, 56.1]),
+        stop([300.0, 100.0], "adhesion 0.0726", LOW, [3946.7, 71.7]),
+        stop([300.0, 100.0], "wet rail", WET, [3481.1, 62.8]),
+        stop([250.0, 50.0], "adhesion 0.1542", HIGH, [2404.3, 59.3]),
+        stop([250.0, 50.0], "adhesion 0.0726", LOW, [2958.9, 72.7]),
+        stop([250.0, 50.0], "wet rail", WET, [2614.4, 62.7]),
     ]
 };
 
@@ -97,14 +111,15 @@ const STOPS: [PublishedStop; 6] = {
 pub const PAPER_GRAVITY_MPS2: f64 = 9.8;
 
 /// Stopping distances and times: the paper's recursion in steps of 0.2 s and ours.
-fn stops() -> Vec<Row> {
+fn stops() -> Vec<PaperRow> {
     let train = train();
     let gear = DeclaredGear::of(&train.brake_gear).expect("a declared gear");
     let force_n = gear.declared_force_n(PRESSURE_PA);
     let effort = [EffortPoint { speed_mps: 0.0, force_n }];
     let davis = [train.resistance.a, train.resistance.b, train.resistance.c];
     let weight_n = train.mass_kg * PAPER_GRAVITY_MPS2;
-    let of = |&([from_kmh, to_kmh], what, adhesion, published): &PublishedStop| {
+    let of = |&PublishedStop { speeds_kmh, rail, adhesion, published }: &PublishedStop| {
+        let [from_kmh, to_kmh] = speeds_kmh;
         let stop = Stop {
             to_speed_mps: to_kmh * KMH,
             adhesion,
@@ -118,7 +133,7 @@ fn stops() -> Vec<Row> {
         };
         let brake_n = |speed_mps| force_n.min(weight_n * carried(speed_mps));
         let table = if from_kmh > 275.0 { "figures 10, 11" } else { "figures 20, 21" };
-        let what = format!("{from_kmh} to {to_kmh} km/h, {what}");
+        let what = format!("{from_kmh} to {to_kmh} km/h, {rail}");
         stop_rows(["Xie 2019", table], &what, published, (&train, &stop), brake_n)
     };
     STOPS.iter().flat_map(of).collect()
@@ -131,18 +146,18 @@ pub fn stop_rows(
     published: [f64; 2],
     (train, stop): (&TrainModel, &Stop<'_>),
     brake_n: impl Fn(f64) -> f64,
-) -> [Row; 2] {
+) -> [PaperRow; 2] {
     let ours = stop.estimate(0.95).expect("a stop");
     let (ours, in_steps) = ([ours.distance_m, ours.time_s], stop_in_steps(train, stop, brake_n));
     let quantities = [("distance", "m"), ("time", "s")];
     std::array::from_fn(|which| {
         let (name, unit) = quantities[which];
         let quantity = format!("braking {name}, {what}");
-        Row {
+        PaperRow {
             published: Some(published[which]),
             paper_method: Some(in_steps[which]),
             ours: Some(ours[which]),
-            ..Row::new(paper, table, quantity, unit, Seeds::from_zero(1))
+            ..PaperRow::new(paper, table, quantity, unit, Seeds::from_zero(1))
         }
     })
 }

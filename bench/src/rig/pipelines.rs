@@ -11,7 +11,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{PipelineKind, TrainId, TrainSample};
 
-use crate::output::{Failure, named};
+use crate::output::{BenchError, named};
 
 /// A pipeline of a kind with its default settings.
 ///
@@ -62,7 +62,7 @@ fn estimating() -> impl Iterator<Item = PipelineKind> {
 /// # Errors
 ///
 /// In words, with the names there are.
-pub fn by_names(names: &[String]) -> Result<Vec<PipelineKind>, Failure> {
+pub fn by_names(names: &[String]) -> Result<Vec<PipelineKind>, BenchError> {
     let all: Vec<_> = estimating().map(|kind| (kind.name(), kind)).collect();
     match names {
         [name] if name == "all" => Ok([fast(), slow()].concat()),

@@ -3,13 +3,13 @@
 use std::time::{Duration, SystemTime};
 
 use dynocar::config::IdleStrategy;
-use dynocar::models::{ModelText, Moment, NewModel, Origin, Store};
+use dynocar::models::{ModelText, NewModel, Origin, Store, UtcSecond};
 use dynocar_client::SnapshotReader;
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId};
-use dynocar_tests::process::{Process, Site};
+use dynocar_tests::process::{DaemonSite, Process};
 use rustix::process::Signal;
 
-use crate::output::{Failure, during};
+use crate::output::{BenchError, during};
 
 /// The train that latency and load drive; its brake gear is declared, so that every pipeline
 /// has what it needs.
@@ -88,15 +88,15 @@ impl DaemonPlan {
     /// # Errors
     ///
     /// When this program cannot be found.
-    pub fn start(&self, site: &Site) -> Result<Process, Failure> {
+    pub fn start(&self, site: &DaemonSite) -> Result<Process, BenchError> {
         let config = site.write("daemon.toml", &self.to_toml());
         peer(site, "daemon", &[&config.to_string_lossy()])
     }
 }
 
 /// A new site with the train that latency and load drive.
-pub fn site() -> Site {
-    let site = Site::new();
+pub fn site() -> DaemonSite {
+    let site = DaemonSite::new();
     site.write("train.toml", TRAIN);
     site
 }
@@ -106,7 +106,7 @@ pub fn site() -> Site {
 /// # Errors
 ///
 /// When this program cannot be found.
-pub fn peer(site: &Site, kind: &str, arguments: &[&str]) -> Result<Process, Failure> {
+pub fn peer(site: &DaemonSite, kind: &str, arguments: &[&str]) -> Result<Process, BenchError> {
     let program = std::env::current_exe().map_err(during("finding this program"))?;
     Ok(site.start_apart(&program.to_string_lossy(), &[&["peer", kind], arguments].concat()))
 }
@@ -116,7 +116,7 @@ pub fn peer(site: &Site, kind: &str, arguments: &[&str]) -> Result<Process, Fail
 /// # Errors
 ///
 /// When it has, with what it said.
-pub fn require(process: &mut Process) -> Result<(), Failure> {
+pub fn require(process: &mut Process) -> Result<(), BenchError> {
     match process.try_wait() {
         None => Ok(()),
         Some(status) => {
@@ -131,7 +131,7 @@ pub fn require(process: &mut Process) -> Result<(), Failure> {
 /// # Errors
 ///
 /// When it ended before, or badly.
-pub fn stop(mut process: Process) -> Result<(), Failure> {
+pub fn stop(mut process: Process) -> Result<(), BenchError> {
     require(&mut process)?;
     let status = process.end(Signal::TERM);
     // Peers without a handler of their own end by the signal.
@@ -149,7 +149,7 @@ pub fn await_all(
     daemon: &mut Process,
     pipelines: usize,
     is_wanted: impl Fn(&ParameterSnapshot) -> bool,
-) -> Result<(), Failure> {
+) -> Result<(), BenchError> {
     // A daemon answers within some of these looks, unless it shares its core with this thread.
     for look in 1..3_000_000 {
         reader.poll();
@@ -174,14 +174,14 @@ pub fn await_all(
 /// # Errors
 ///
 /// When they cannot be written.
-pub fn put_candidates(site: &Site, train: TrainId, count: u32) -> Result<String, Failure> {
+pub fn put_candidates(site: &DaemonSite, train: TrainId, count: u32) -> Result<String, BenchError> {
     let store = site.path().join("models");
     std::fs::create_dir(&store).map_err(during("making a store of models"))?;
     let parent = Some(ModelText { train: TRAIN.into(), track: None }.hash());
     for number in 1..=count {
         let a = format!("[resistance]\na = 2.{number}");
         let text = ModelText { train: TRAIN.replace("[resistance]\na = 1.9", &a), track: None };
-        let origin = Origin::written("Of a measurement.", parent, Moment::of(SystemTime::now()));
+        let origin = Origin::written("Of a measurement.", parent, UtcSecond::of(SystemTime::now()));
         let new = NewModel { text, origin, answer_json: None, report_html: None };
         Store::at(&store).train(train).put(&new)?;
     }

@@ -11,7 +11,7 @@ use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
 use dynocar_model::force::balance::mps2_per_n_per_kn;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
-use super::drive::Moment;
+use super::scenario_train::DriveMoment;
 use super::world::{
     KNOT_M, KNOT_OVER_MEAN, LoadSource, ROOM_KG, WEIGHING_STD, World, knot_std_permille,
 };
@@ -96,17 +96,17 @@ pub struct Bound {
     stops: usize,
     runs: usize,
     block_s: f64,
-    last: Option<Moment>,
+    last: Option<DriveMoment>,
 }
 
 impl Bound {
     /// Takes in a cycle of a drive.
-    pub fn see(&mut self, world: &World, truth: &Moment, cycle_s: f64) {
+    pub fn see(&mut self, world: &World, truth: &DriveMoment, cycle_s: f64) {
         let last = self.last.replace(*truth);
         let was_standing = last.is_none_or(|last| last.is_standing);
         self.stops += usize::from(truth.is_standing && !was_standing);
         let least_mps = TrainKalmanSettings::default().speed_min_mps;
-        let counts = |at: &Moment| !at.is_standing && at.speed_mps >= least_mps;
+        let counts = |at: &DriveMoment| !at.is_standing && at.speed_mps >= least_mps;
         let Some(last) = last.filter(|last| counts(last) && counts(truth)) else {
             return self.begin();
         };
@@ -160,7 +160,7 @@ impl Bound {
     }
 
     /// Adds the change of the speed by each unknown over a step.
-    fn move_on(&mut self, world: &World, last: &Moment, truth: &Moment, step_s: f64) {
+    fn move_on(&mut self, world: &World, last: &DriveMoment, truth: &DriveMoment, step_s: f64) {
         let resistance = &world.truth.resistance;
         let gain = mps2_per_n_per_kn(world.truth.rotating_mass_factor);
         let speed_mps = truth.speed_mps;
@@ -197,7 +197,7 @@ impl Bound {
         }
     }
 
-    fn pass_knots(&mut self, world: &World, truth: &Moment, seconds_gain: f64) {
+    fn pass_knots(&mut self, world: &World, truth: &DriveMoment, seconds_gain: f64) {
         let length_m = world.declared.length_m;
         let places = (length_m / UNDER_TRAIN_M).ceil() as usize + 1;
         let change_mps = -truth.direction * seconds_gain / places as f64;

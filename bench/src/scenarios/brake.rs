@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// Report of the brake by the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reported {
+pub enum BrakeReport {
     /// The force demanded of electric and friction brake.
     Force,
     /// The driver's demand, before any limit of jerk.
@@ -26,7 +26,7 @@ pub struct Brake {
     /// Speeds in m/s between which friction takes over; infinite where it brakes alone.
     pub hand_over_mps: (f64, f64),
     /// Its report.
-    pub reported: Reported,
+    pub reported: BrakeReport,
     /// Greatest change of acceleration in m/s³.
     pub jerk_mps3: f64,
 }
@@ -37,7 +37,7 @@ impl Brake {
         lag_s: 0.0,
         strength: 1.0,
         hand_over_mps: (0.0, 0.0),
-        reported: Reported::Force,
+        reported: BrakeReport::Force,
         jerk_mps3: 0.6,
     };
 
@@ -63,9 +63,9 @@ impl Brake {
             ("friction, weak", alone(0.1, 0.88)),
             ("friction, strong", alone(0.1, 1.1)),
             ("friction, late and weak", alone(0.5, 0.88)),
-            ("as demand", told(Reported::Demand, blended(0.25, 1.0))),
-            ("with pressure", told(Reported::Pressure, alone(0.5, 0.88))),
-            ("electric force alone", told(Reported::ElectricForce, blended(0.25, 1.0))),
+            ("as demand", told(BrakeReport::Demand, blended(0.25, 1.0))),
+            ("with pressure", told(BrakeReport::Pressure, alone(0.5, 0.88))),
+            ("electric force alone", told(BrakeReport::ElectricForce, blended(0.25, 1.0))),
             ("jerk 0.4 m/s³", Brake { jerk_mps3: 0.4, ..blended(0.25, 1.0) }),
         ]
     }

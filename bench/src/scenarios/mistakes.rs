@@ -2,7 +2,7 @@
 
 use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
 use dynocar_model::terms::{adhesion, wind};
-use dynocar_tests::simulator::Deviations;
+use dynocar_tests::simulator::TrueDeviations;
 
 /// Standard deviations of the ordinary mistakes, all at once; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,15 +33,15 @@ impl Mistakes {
     /// Those of careful declarations.
     pub const USUAL: Mistakes = Mistakes {
         coefficient_share: 0.3,
-        force_share: Deviations::ROUGH.force_share,
+        force_share: TrueDeviations::ROUGH.force_share,
         brake_share: 0.02,
         stop_to_stop_share: 0.015,
         delay_s: 0.05,
         mean_delay_s: 0.1,
-        wheel_share: Deviations::ROUGH.wheel_share,
+        wheel_share: TrueDeviations::ROUGH.wheel_share,
         rotating_mass: 0.002,
-        wind_mps: Deviations::ROUGH.day_wind_mps,
-        gust_mps: Deviations::ROUGH.gust_mps,
+        wind_mps: TrueDeviations::ROUGH.day_wind_mps,
+        gust_mps: TrueDeviations::ROUGH.gust_mps,
     };
 
     /// Returns the mistakes that the estimator's default settings assume.

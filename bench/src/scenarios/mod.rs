@@ -12,9 +12,9 @@
 
 pub mod bound;
 pub mod brake;
-pub mod drive;
 pub mod mistakes;
 pub mod recorded;
+pub mod scenario_train;
 pub mod score;
 pub mod table;
 pub mod world;
@@ -27,7 +27,7 @@ use dynocar_shared::PipelineKind;
 use self::mistakes::Mistakes;
 use self::table::NamedScenario;
 use self::world::World;
-use crate::output::{self, Failure, OutputArguments, containing, expect, named, write_csv};
+use crate::output::{self, BenchError, OutputArguments, containing, expect, named, write_csv};
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
 /// changes, and whether its intervals hold.
@@ -89,7 +89,7 @@ impl ScenariosArguments {
     /// # Errors
     ///
     /// When the command line is wrong, or the result cannot be written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), BenchError> {
         let all = if self.brakes { table::brakes() } else { table::scenarios() };
         let chosen = containing("--scenario", &self.scenario, all, |(it, _)| it.join(", "))?;
         let all: Vec<_> = PipelineKind::ALL.iter().map(|kind| (kind.name(), *kind)).collect();
@@ -116,7 +116,7 @@ impl ScenariosArguments {
     }
 
     /// Writes every drive of the rows as a dataset.
-    fn write(&self, rows: &[NamedScenario], folder: &Path) -> Result<(), Failure> {
+    fn write(&self, rows: &[NamedScenario], folder: &Path) -> Result<(), BenchError> {
         for (name, scenario) in rows {
             for seed in self.first_seed..self.first_seed + self.seeds {
                 let world = World::draw(*scenario, self.mistakes.mistakes(), seed);

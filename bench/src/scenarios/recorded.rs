@@ -8,9 +8,9 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::SampleField;
 use serde_json::json;
 
-use super::drive::Drive;
+use super::scenario_train::ScenarioTrain;
 use super::world::World;
-use crate::output::{Failure, during};
+use crate::output::{BenchError, during};
 
 /// A run ends at the first stop after this time in s, or where the train turns.
 const RUN_S: f64 = 900.0;
@@ -40,10 +40,10 @@ struct Run {
 /// # Errors
 ///
 /// When a file cannot be written.
-pub fn write(world: World, hours: f64, folder: &Path) -> Result<(), Failure> {
+pub fn write(world: World, hours: f64, folder: &Path) -> Result<(), BenchError> {
     let train = train_toml(&world.declared)?;
     let cycle_s = 1.0 / f64::from(world.scenario.rate_hz);
-    let mut drive = Drive::new(world);
+    let mut drive = ScenarioTrain::new(world);
     let first = drive.advance();
     let fields = FIELDS.iter().zip(UNITS).filter(|((_, it), _)| first.sample.get(*it).is_some());
     let fields: Vec<_> = fields.collect();
@@ -92,7 +92,7 @@ pub fn write(world: World, hours: f64, folder: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-fn train_toml(train: &TrainModel) -> Result<String, Failure> {
+fn train_toml(train: &TrainModel) -> Result<String, BenchError> {
     let davis = &train.resistance;
     let mut declared = json!({
         "name": train.name,

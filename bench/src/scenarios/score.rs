@@ -37,7 +37,7 @@ const KNOWN: f64 = 0.025;
 
 /// One quantity of one pipeline over one drive.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Score {
+pub struct QuantityScore {
     /// Cycles of the moving train.
     pub cycles: u64,
     /// Those in which the answer was called usable.
@@ -73,7 +73,7 @@ pub struct Score {
     moving_s: Option<f64>,
 }
 
-impl Score {
+impl QuantityScore {
     /// Scores a cycle of `cycle_s` seconds.
     pub fn push(&mut self, time_s: f64, cycle_s: f64, answer: Option<Answer>) {
         self.cycles += 1;
@@ -122,30 +122,30 @@ impl Score {
 }
 
 /// A quantity over several drives.
-pub struct Scores<'a>(pub &'a [Score]);
+pub struct Scores<'a>(pub &'a [QuantityScore]);
 
 impl Scores<'_> {
     /// The sum of a count over all drives.
-    pub fn count(&self, of: fn(&Score) -> u64) -> u64 {
+    pub fn count(&self, of: fn(&QuantityScore) -> u64) -> u64 {
         self.0.iter().map(of).sum()
     }
 
     /// A count as a share of the cycles with a usable answer, in %.
-    pub fn percent(&self, of: fn(&Score) -> u64) -> f64 {
+    pub fn percent(&self, of: fn(&QuantityScore) -> u64) -> f64 {
         100.0 * self.count(of) as f64 / self.count(|it| it.usable).max(1) as f64
     }
 
     /// Root of a mean square over the usable answers, in % of the truth; no number where none was usable.
-    pub fn rms_percent(&self, of: fn(&Score) -> f64) -> f64 {
+    pub fn rms_percent(&self, of: fn(&QuantityScore) -> f64) -> f64 {
         100.0 * (self.sum(of) / self.count(|it| it.usable) as f64).sqrt()
     }
 
     /// Returns the root of one sum over another; NaN where the other is zero.
-    pub fn ratio(&self, of: fn(&Score) -> f64, over: fn(&Score) -> f64) -> f64 {
+    pub fn ratio(&self, of: fn(&QuantityScore) -> f64, over: fn(&QuantityScore) -> f64) -> f64 {
         (self.sum(of) / self.sum(over)).sqrt()
     }
 
-    fn sum(&self, of: fn(&Score) -> f64) -> f64 {
+    fn sum(&self, of: fn(&QuantityScore) -> f64) -> f64 {
         self.0.iter().map(of).sum()
     }
 

@@ -10,9 +10,9 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::bound::Bound;
 use super::brake::Brake;
-use super::drive::{Drive, Moment};
 use super::mistakes::Mistakes;
-use super::score::{Answer, COUNTS_MPS, Score, Scores};
+use super::scenario_train::{DriveMoment, ScenarioTrain};
+use super::score::{Answer, COUNTS_MPS, QuantityScore, Scores};
 use super::world::{LoadSource, Scenario, Traffic, World};
 use crate::ending::until_due;
 use crate::output::Record;
@@ -164,12 +164,12 @@ fn measure(
 }
 
 /// One drive.
-fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
+fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [QuantityScore; 2] {
     let cycle_s = 1.0 / f64::from(world.scenario.rate_hz);
     let mut bound = (world.scenario.speed_noise_mps > 0.0).then(Bound::default);
     let mut next_s = COMPARED_FIRST_S;
-    let mut drive = Drive::new(world);
-    let mut scores = QUANTITIES.map(|_| Score::default());
+    let mut drive = ScenarioTrain::new(world);
+    let mut scores = QUANTITIES.map(|_| QuantityScore::default());
     for cycle in 0..(3600.0 * hours / cycle_s) as u64 {
         let (time_s, moment) = (cycle as f64 * cycle_s, drive.advance());
         if let Some(bound) = &mut bound {
@@ -204,7 +204,11 @@ fn driven(mut pipeline: Pipeline, world: World, hours: f64) -> [Score; 2] {
 }
 
 /// The resistance at the speed driven or the mass, if a snapshot may be used for it.
-fn answer(snapshot: &ParameterSnapshot, quantity: Quantity, moment: &Moment) -> Option<Answer> {
+fn answer(
+    snapshot: &ParameterSnapshot,
+    quantity: Quantity,
+    moment: &DriveMoment,
+) -> Option<Answer> {
     if !snapshot.is_usable_for(quantity) {
         return None;
     }
@@ -219,7 +223,7 @@ fn answer(snapshot: &ParameterSnapshot, quantity: Quantity, moment: &Moment) -> 
 }
 
 /// The least relative deviation of a quantity by the bound of the drive.
-fn least_deviation(bound: &Matrix4<f64>, quantity: Quantity, moment: &Moment) -> f64 {
+fn least_deviation(bound: &Matrix4<f64>, quantity: Quantity, moment: &DriveMoment) -> f64 {
     let v = moment.speed_mps;
     let row = match quantity {
         Quantity::Resistance => Vector4::new(1.0, v, v * v, 0.0) / moment.w0_n_per_kn,
@@ -234,7 +238,7 @@ fn record(
     [traffic, condition]: &[String; 2],
     kind: PipelineKind,
     quantity: Quantity,
-    scores: &[Score],
+    scores: &[QuantityScore],
 ) -> Record {
     let all = Scores(scores);
     let coverage = Some(all.percent(|it| it.covered)).filter(|_| all.count(|it| it.usable) > 0);

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -14,7 +14,7 @@ fn an_ended_command_gives_what_it_has_and_leaves_no_folder() {
         (&["load", "--quick", "--trains", "1", "--search"], "Hz: ", "search"),
         (&["latency", "--quick", "--case", "floor", "--rounds", "9999"], "round 3 of", "cases"),
     ] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let folder = site.path().join("left");
         fs::create_dir(&folder).unwrap();
         let json = site.path().join("result.json");

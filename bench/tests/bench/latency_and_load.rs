@@ -4,7 +4,7 @@ use std::process::{Command, Output};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use dynocar::runtime::system::pin_to_core;
-use dynocar_tests::process::{Site, await_true};
+use dynocar_tests::process::{DaemonSite, await_true};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -128,7 +128,7 @@ fn a_benchmark_that_is_ended_or_killed_takes_its_peers_along() {
         &["latency", "--quick", "--seconds", "600", "--case", "dynocar"],
     ] {
         for signal in [Signal::TERM, Signal::INT, Signal::KILL] {
-            let site = Site::new();
+            let site = DaemonSite::new();
             // Files that a killed one leaves go with the site.
             let variables = [("TMPDIR", site.path().to_str().unwrap())];
             let program = env!("CARGO_BIN_EXE_dynocar-bench");

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_bench::scenarios::drive::Drive;
 use dynocar_bench::scenarios::mistakes::Mistakes;
+use dynocar_bench::scenarios::scenario_train::ScenarioTrain;
 use dynocar_bench::scenarios::table::{self, NamedScenario, Plan};
 use dynocar_bench::scenarios::world::World;
 use dynocar_core::pipeline::Pipeline;
@@ -87,7 +87,7 @@ fn each_snapshot(mut look: impl FnMut(f64, &ParameterSnapshot)) {
         let estimator = EstimatorSettings::default_of(kind).unwrap().build(&train).unwrap();
         Pipeline::new(TrainId(1), 0, Arc::clone(&train), None, estimator)
     });
-    let mut drive = Drive::new(world);
+    let mut drive = ScenarioTrain::new(world);
     for cycle in 0..36_000_u32 {
         let moment = drive.advance();
         for pipeline in &mut pipelines {

@@ -194,7 +194,7 @@ class FoundEffect(Record):
     """An effect that the declared model lacks."""
 
     _kinds = {"where": Place, "meaning": Meaning}
-    _optional = ("runners_up", "contradiction", "over_time")
+    _optional = ("runners_up", "contradiction", "over_time", "held_out")
 
     kind: str
     where: Place
@@ -205,6 +205,7 @@ class FoundEffect(Record):
     meaning: Meaning
     contradiction: str | None  # what positions and motion say against each other
     over_time: list[Record] | None  # numbers that change over the runs, in parts of them
+    held_out: Record | None  # its numbers by the runs held out alone
     runners_up: list[Record] | None
 
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use dynocar::cli::Failure;
-use dynocar::dataset::Source;
+use dynocar::dataset::DatasetSource;
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::score::predicted;
@@ -38,7 +38,7 @@ pub(crate) fn explain(
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Explained> {
     let explained = in_background(py, progress.as_ref(), move |progress| {
-        let source = Source { path: &path, train: train.map(TrainId) };
+        let source = DatasetSource { path: &path, train: train.map(TrainId) };
         command::answer(source, traction_only, progress)
     })?;
     let (runs, explanation) = explained.map_err(|failure| of_failure(py, &failure))?;
@@ -57,7 +57,7 @@ impl Explained {
 
     /// The report, one page of HTML.
     fn page(&self, py: Python<'_>) -> PyResult<String> {
-        let Source { path, train } = self.runs.source();
+        let DatasetSource { path, train } = self.runs.source();
         let mut arguments = vec!["explain".to_owned(), path.display().to_string()];
         arguments.extend(train.iter().flat_map(|it| ["--train".to_owned(), it.0.to_string()]));
         arguments.extend(self.traction_only.then(|| "--traction-only".to_owned()));

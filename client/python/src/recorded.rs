@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar::cli::Failure;
 use dynocar::cli::check::refusal;
-use dynocar::dataset::{Source, SourceArguments};
+use dynocar::dataset::{DatasetSource, SourceArguments};
 use dynocar::output::OutputError;
 use dynocar_shared::TrainId;
 use dynocar_workshop::cli::check as checking;
@@ -25,22 +25,24 @@ pub(crate) fn json(answer: &impl Serialize) -> Result<String, Failure> {
 }
 
 /// A path and the train that is meant.
-fn of(path: &Path, train: Option<u64>) -> Source<'_> {
-    Source { path, train: train.map(TrainId) }
+fn of(path: &Path, train: Option<u64>) -> DatasetSource<'_> {
+    DatasetSource { path, train: train.map(TrainId) }
 }
 
 /// Returns the description of a path; its errors are part of the answer.
 #[pyfunction]
 pub(crate) fn check(py: Python<'_>, path: PathBuf, train: Option<u64>) -> PyResult<JsonAndText> {
-    let answer = in_background(py, None, move |_| match checking::understand(of(&path, train)) {
-        Ok(understood) => Ok((json(&understood.answer(&path))?, understood.text())),
-        Err(failure) => match failure.answer() {
-            Some(error) => {
-                let words = error.message.clone();
-                Ok((json(&refusal(&path, error))?, words))
-            }
-            None => Err(failure),
-        },
+    let answer = in_background(py, None, move |_| {
+        match checking::understand(of(&path, train), checking::SamplesOfRuns::Dropped) {
+            Ok(understood) => Ok((json(&understood.answer(&path))?, understood.text())),
+            Err(failure) => match failure.answer() {
+                Some(error) => {
+                    let words = error.message.clone();
+                    Ok((json(&refusal(&path, error))?, words))
+                }
+                None => Err(failure),
+            },
+        }
     })?;
     answer.map_err(|failure: Failure| of_failure(py, &failure))
 }
@@ -53,7 +55,7 @@ pub(crate) fn read(
     train: Option<u64>,
 ) -> PyResult<(JsonAndText, Vec<Table>, Table)> {
     let read = in_background(py, None, move |_| {
-        let understood = checking::understand(of(&path, train))?;
+        let understood = checking::understand(of(&path, train), checking::SamplesOfRuns::Kept)?;
         let wrong: Option<Failure> = understood.errors().next().map(|it| it.clone().into());
         let answer = (json(&understood.answer(&path))?, understood.text());
         match (understood, wrong) {

@@ -33,5 +33,5 @@ pub mod stopping;
 
 pub use error::Code;
 pub use reader::ReadingCopy;
-pub use snapshot::Resistance;
+pub use snapshot::ResistanceAtSpeed;
 pub use stopping::{EffortPlace, Rail, StopRequest, Stopping};

@@ -9,7 +9,7 @@ use super::error::{Code, guard};
 wire_struct! {
     /// Basic resistance at a speed, with its uncertainty; `dynocar_resistance` in C.
     #[derive(Default)]
-    pub struct Resistance {
+    pub struct ResistanceAtSpeed {
         /// Unit basic resistance w0 in N per kN of train weight.
         pub w0_n_per_kn: f64,
         /// Standard deviation of `w0_n_per_kn`.
@@ -23,10 +23,10 @@ wire_struct! {
     }
 }
 
-impl Resistance {
+impl ResistanceAtSpeed {
     fn new(estimate: ResistanceEstimate, mass_kg: f64) -> Self {
         let (force_n, force_std_n) = estimate.force_n(mass_kg);
-        Resistance {
+        ResistanceAtSpeed {
             w0_n_per_kn: estimate.w0_n_per_kn,
             w0_std_n_per_kn: estimate.w0_std_n_per_kn,
             force_n,
@@ -50,7 +50,7 @@ pub unsafe extern "C" fn dynocar_snapshot_resistance(
     snapshot: *const ParameterSnapshot,
     speed_mps: f64,
     mass_kg: f64,
-    resistance: *mut Resistance,
+    resistance: *mut ResistanceAtSpeed,
 ) -> i32 {
     guard(|| {
         // SAFETY: promised by the caller; every bit pattern is a snapshot.
@@ -62,7 +62,7 @@ pub unsafe extern "C" fn dynocar_snapshot_resistance(
             return Err(Code::BadNumber);
         }
         let estimate = snapshot.resistance_at(speed_mps).ok_or(Code::NotInSnapshot)?;
-        *place = Resistance::new(estimate, mass_kg);
+        *place = ResistanceAtSpeed::new(estimate, mass_kg);
         Ok(())
     })
 }

@@ -12,7 +12,7 @@ use std::ptr::null_mut;
 use dynocar_client::ffi::publisher::*;
 use dynocar_client::ffi::reader::*;
 use dynocar_client::ffi::snapshot::*;
-use dynocar_client::ffi::{ReadingCopy, Resistance, about, error};
+use dynocar_client::ffi::{ReadingCopy, ResistanceAtSpeed, about, error};
 use dynocar_shared::{PipelineKind, Quantity, TrainSample};
 
 use crate::support::{Link, PlayedDaemon, Program, TRAIN, client_directory};
@@ -75,7 +75,7 @@ fn open() -> Ends {
 fn cycle(ends: &Ends) -> ((u64, usize), [(u64, usize); 6]) {
     let mut sample = TrainSample::empty(TRAIN);
     let mut reading = ReadingCopy::none();
-    let mut resistance = Resistance::default();
+    let mut resistance = ResistanceAtSpeed::default();
     let kind = PipelineKind::ResistanceKalman as u32;
     let quantity = Quantity::Resistance as u32;
     // SAFETY: the handles are open and of this thread, all other pointers of living objects.

@@ -10,7 +10,7 @@ use dynocar_client::ffi::about::*;
 use dynocar_client::ffi::publisher::*;
 use dynocar_client::ffi::reader::*;
 use dynocar_client::ffi::snapshot::*;
-use dynocar_client::ffi::{Code, ReadingCopy, Resistance};
+use dynocar_client::ffi::{Code, ReadingCopy, ResistanceAtSpeed};
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainId, TrainSample};
 use dynocar_transport::peer::RoleLock;
 use dynocar_transport::{Announcement, Role};
@@ -56,7 +56,7 @@ fn close(publisher: *mut PublisherHandle, reader: *mut ReaderHandle) {
 fn every_null_is_answered_with_a_code() {
     let expected = Code::NullArgument as i32;
     let snapshot = ParameterSnapshot::empty();
-    let (mut number, mut resistance) = (0.0, Resistance::default());
+    let (mut number, mut resistance) = (0.0, ResistanceAtSpeed::default());
     // SAFETY: every pointer is NULL or of a living object.
     unsafe {
         assert_eq!(dynocar_publisher_open(null(), TRAIN, null_mut(), null_mut(), 0), expected);
@@ -229,7 +229,7 @@ fn a_snapshot_answers_only_for_the_parameters_it_holds() {
     snapshot.parameter_count = 4_000_000;
     snapshot.parameters[5] = Parameter::Mass as u32;
     snapshot.values[5] = 114.5;
-    let (mut value, mut std, mut resistance) = (0.0, 0.0, Resistance::default());
+    let (mut value, mut std, mut resistance) = (0.0, 0.0, ResistanceAtSpeed::default());
     let (mass, davis_a) = (Parameter::Mass as u32, Parameter::DavisA as u32);
     // SAFETY: all pointers are of living objects.
     let codes = unsafe {
@@ -245,5 +245,5 @@ fn a_snapshot_answers_only_for_the_parameters_it_holds() {
     };
     let [missing, bad] = [Code::NotInSnapshot as i32, Code::BadNumber as i32];
     assert_eq!(codes, [0, missing, bad, missing, missing, bad, bad]);
-    assert_eq!((value, resistance), (114.5, Resistance::default()));
+    assert_eq!((value, resistance), (114.5, ResistanceAtSpeed::default()));
 }

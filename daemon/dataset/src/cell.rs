@@ -5,6 +5,8 @@ use std::borrow::Cow;
 use dynocar_model::units::Unit;
 
 use super::clock::TimeFormat;
+use super::keys::column::FORMAT;
+use super::keys::dataset::{DECIMAL, THOUSANDS as GROUPS, UNITS_ROW};
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
 use super::text_layout::{Marks, THOUSANDS, TextLayout};
@@ -119,16 +121,16 @@ pub fn not_a_value(
     let is_time = mapping.quantity == Quantity::Time;
     let hint = if let Some(format) = of_time.first().filter(|_| is_time) {
         let instead = if mapping.format.is_some() { "" } else { " in place of unit" };
-        format!("; for such times set format = \"{}\"{instead}", format.name())
+        format!("; for such times set {}{instead}", FORMAT.assign(format!("\"{}\"", format.name())))
     } else if mapping.format.is_none()
         && layout.decimal == b'.'
         && parse_cell(&with_point, Marks::plain(b'.')).is_some()
     {
-        "; for decimal commas set decimal = \",\" in [dataset]".into()
+        format!("; for decimal commas {}", DECIMAL.advice("\",\""))
     } else if let Some(mark) = grouping(cell, layout) {
-        format!("; for marks of thousands set thousands = {mark:?} in [dataset]")
+        format!("; for marks of thousands {}", GROUPS.advice(format!("{mark:?}")))
     } else if is_below_names && !layout.units_row {
-        "; for a line of units below the names set units_row = true in [dataset]".into()
+        format!("; for a line of units below the names {}", UNITS_ROW.advice(true))
     } else {
         String::new()
     };
@@ -137,9 +139,9 @@ pub fn not_a_value(
             format!("column '{column}': expected a number or an empty cell, got '{text}'{hint}")
         }
         Some(format) => format!(
-            "column '{column}': expected a time as {} (format = \"{}\"), got '{text}'{hint}",
+            "column '{column}': expected a time as {} ({}), got '{text}'{hint}",
             format.example(),
-            format.name()
+            FORMAT.assign(format!("\"{}\"", format.name()))
         ),
     }
 }

@@ -1,64 +1,50 @@
 //! `[corrections]` and `[[extra]]` of a `train.toml`: what measured runs add to the declared model.
 
-use dynocar_model::terms::CORRECTIONS;
-use dynocar_model::terms::extra::{
-    Covariate, Extra, FACTORS, FACTORS_MAX, FORCE, FORCE_MAX_N_PER_KN, Factor, Form, TABLES,
-};
-use dynocar_model::train::TrainModel;
+use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, FACTORS_MAX, Form};
 
 use super::document::Item;
 use super::error::DatasetError;
-
-/// Reads the table into a train; what is absent corrects nothing.
-pub(super) fn read_corrections(section: &Item, train: &mut TrainModel) -> Result<(), DatasetError> {
-    section.allow(&CORRECTIONS.map(|key| key.name))?;
-    for key in CORRECTIONS {
-        let value = section.checked_under(key.name, key.allowed, |value| key.allows(value))?;
-        if let Some(value) = value {
-            *(key.of)(train) = value;
-        }
-    }
-    Ok(())
-}
+use super::keys::extra::{FACTORS, FORCE};
+use super::keys::factor::{FORM, OF};
+use super::keys::{self, extra};
 
 /// Reads the tables of a train file; none where none stand there.
-pub(super) fn read_extra(root: &Item) -> Result<Vec<Extra>, DatasetError> {
-    root.tables(TABLES)?.iter().map(extra).collect()
+pub(super) fn read_extra(root: &Item) -> Result<Vec<ExtraResistance>, DatasetError> {
+    root.tables(extra::TABLE)?.iter().map(extra_of).collect()
 }
 
-fn extra(section: &Item) -> Result<Extra, DatasetError> {
-    section.allow(&[FORCE, FACTORS])?;
-    let range = -FORCE_MAX_N_PER_KN..=FORCE_MAX_N_PER_KN;
-    let n_per_kn = section.required(FORCE, "N/kN, from -100 to 100", range)?;
-    let tables = section.tables(FACTORS)?;
+fn extra_of(section: &Item) -> Result<ExtraResistance, DatasetError> {
+    keys::allow(section, extra::KEYS)?;
+    let n_per_kn = FORCE.number(section)?.unwrap_or(0.0);
+    let tables = section.tables(FACTORS.name)?;
     if tables.is_empty() || tables.len() > FACTORS_MAX {
-        let found = format!("{} of them", tables.len());
-        return Err(section.key_out_of_range(FACTORS, &found, "one or two tables"));
+        return Err(FACTORS.refused(section, format_args!("{} of them", tables.len())));
     }
     let factors = tables.iter().map(factor).collect::<Result<_, _>>()?;
-    Ok(Extra { n_per_kn, factors })
+    Ok(ExtraResistance { n_per_kn, factors })
 }
 
-fn factor(section: &Item) -> Result<Factor, DatasetError> {
-    let (covariate, covariates) =
-        (("covariate", "a covariate"), Covariate::ALL.map(Covariate::name));
-    let of = section.need_named("of", covariate, Covariate::from_name, covariates)?;
+fn factor(section: &Item) -> Result<CovariateFactor, DatasetError> {
+    let covariates = Covariate::ALL.map(Covariate::name);
+    let named = (("covariate", OF.rule.allowed), Covariate::from_name);
+    let of = section.need_named(OF.name, named.0, named.1, covariates)?;
     let forms = Form::ALL.map(Form::name);
-    let form = section.need_named("form", ("form", "a form"), Form::from_name, forms)?;
-    let keys: Vec<&str> = ["of", "form"].iter().chain(form.numbers()).copied().collect();
+    let named = (("form", FORM.rule.allowed), Form::from_name);
+    let form = section.need_named(FORM.name, named.0, named.1, forms)?;
+    let keys: Vec<&str> = [OF.name, FORM.name].iter().chain(form.numbers()).copied().collect();
     section.allow(&keys)?;
     let mut numbers = [0.0; 2];
     for (number, name) in numbers.iter_mut().zip(form.numbers()) {
         *number = section.required(name, "a number", ..)?;
     }
     match form.refusal(numbers) {
-        None => Ok(Factor { of, form, numbers }),
+        None => Ok(CovariateFactor { of, form, numbers }),
         Some(expected) => {
             let named = form.numbers().iter().zip(numbers);
             let found: Vec<String> =
                 named.map(|(name, number)| format!("{name} = {number}")).collect();
             let found = format!("{} with {}", form.name(), found.join(", "));
-            Err(section.key_out_of_range("form", &found, expected))
+            Err(section.key_out_of_range(FORM.name, &found, expected))
         }
     }
 }
@@ -93,7 +79,7 @@ mod tests {
 #[cfg(test)]
 mod extra_tests {
     use crate::parse_train;
-    use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
+    use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, Form};
 
     const TRAIN: &str = "[train]\nmass_t = 10\nlength_m = 1\nrotating_mass_factor = 0\n\
                          [resistance]\na = 1\nb = 0\nc = 0\n[[extra]]\nn_per_kn = 0.8\n";
@@ -109,9 +95,13 @@ mod extra_tests {
                     form = \"below\"\nuntil = 5\nspan = 10\n";
         let train = parse_train("train.toml", &format!("{TRAIN}{text}")).unwrap();
         let hyperbola =
-            Factor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
-        let below = Factor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
-        assert_eq!(train.extra, [Extra { n_per_kn: 0.8, factors: vec![hyperbola, below] }]);
+            CovariateFactor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
+        let below =
+            CovariateFactor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
+        assert_eq!(
+            train.extra,
+            [ExtraResistance { n_per_kn: 0.8, factors: vec![hyperbola, below] }]
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Diagnostics to know before results from a dataset are believed, each once.
 
 use dynocar_core::plausibility::diagnosis::gradient_fault;
-use dynocar_core::plausibility::window_balance::Balance;
+use dynocar_core::plausibility::window_balance::WindowBalance;
 use dynocar_core::plausibility::{DetectedFault, Severity};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
@@ -105,14 +105,14 @@ pub fn diagnostics<'r>(
 /// Sums over all runs: together they show faults that each is too short to show, as one from stop to stop.
 #[derive(Default)]
 struct AllRuns {
-    balance: Option<(Balance, Unit)>,
+    balance: Option<(WindowBalance, Unit)>,
     files: Vec<String>,
     has_fault: bool,
 }
 
 impl AllRuns {
     fn push(&mut self, run: &Run) {
-        let of_all = || (Balance::of_all(), run.gradient_unit);
+        let of_all = || (WindowBalance::of_all(), run.gradient_unit);
         self.balance.get_or_insert_with(of_all).0.add(&run.balance);
         self.files.push(run.file.clone());
         self.has_fault |= run.diagnostics.iter().any(|it| it.fault.is_some());

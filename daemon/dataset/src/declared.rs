@@ -1,10 +1,17 @@
 //! Whether what is declared of a train and a line can be true.
 
 use dynocar_core::plausibility::Severity;
+use dynocar_core::plausibility::Severity::Warning;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
+use dynocar_model::train::numbers::LENGTH;
+use dynocar_shared::SampleField;
+use toml::Value;
 
 use super::diagnostic::Diagnostic;
+use super::keys::assign;
+use super::quantity::Quantity;
+use super::resolved::Resolved;
 use super::unusual_resistance::unusual_resistance;
 
 /// Masses per metre of train in t/m: from a light rail car to a loaded ore train, with room.
@@ -32,7 +39,7 @@ pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Diagnostic>
         &mut found,
         is_length,
         "length_scale",
-        format!("a train of length_m = {length_m}: is the length in m?"),
+        format!("a train of {}: is the length in m?", assign(LENGTH.name, length_m)),
     );
     let per_m = mass_t / length_m;
     say(
@@ -86,6 +93,43 @@ pub fn misdeclared(train: &TrainModel, track: Option<&Track>) -> Vec<Diagnostic>
         ),
     );
     found
+}
+
+/// The bounds of the sample, beyond which validation refuses it, and of places on the earth.
+const PLAUSIBLE: [(Quantity, (f64, f64)); 7] = [
+    (Quantity::Acceleration, SampleField::Acceleration.range()),
+    (Quantity::SpecificForce, SampleField::SpecificForce.range()),
+    (Quantity::BrakeCylinderPressure, SampleField::BrakeCylinderPressure.range()),
+    (Quantity::AmbientTemperature, SampleField::AmbientTemperature.range()),
+    (Quantity::Gradient, SampleField::Gradient.range()),
+    (Quantity::Latitude, (-90.0, 90.0)),
+    (Quantity::Longitude, (-180.0, 180.0)),
+];
+
+/// Returns a diagnostic for each column with values that are refused.
+pub(super) fn implausible_columns(run: &Resolved) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for (quantity, (low, high)) in PLAUSIBLE {
+        let Some(column) = run.table.column(quantity) else { continue };
+        let is_outside = |value: &&f64| !value.is_nan() && !(low..=high).contains(*value);
+        let count = column.iter().filter(is_outside).count();
+        if count > 0 {
+            let unit = quantity.unit().name();
+            let text = format!(
+                "{quantity} lies outside {low} to {high} {unit} in {count} rows, and those samples \
+                 are refused: is the unit right?"
+            );
+            let figures = [
+                ("quantity", quantity.name().into()),
+                ("count", Value::Integer(count as i64)),
+                ("low", low.into()),
+                ("high", high.into()),
+                ("unit", unit.into()),
+            ];
+            diagnostics.push(Diagnostic::new("implausible", Warning, text, figures));
+        }
+    }
+    diagnostics
 }
 
 #[cfg(test)]

@@ -2,17 +2,18 @@
 
 use dynocar_core::plausibility::Severity::{Fundamental, Info, Warning};
 use dynocar_core::plausibility::{DetectedFault, DetectedFaults, InputFault};
-use dynocar_model::train::Drive;
+use dynocar_model::train::PowerTrain;
 use toml::Value;
 
+use super::declared::implausible_columns;
 use super::diagnostic::{Diagnostic, read_as};
 use super::forces::{Force, ForceSource};
-use super::implausible_columns::implausible_columns;
-use super::motion::PositionSource;
+use super::keys::run::DIRECTION;
 use super::order::quantile;
 use super::quality::RunQuality;
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
+use super::speed_and_position::PositionSource;
 
 /// Below this distance in m, comparisons of position and speed say nothing.
 const DISTANCE_MIN_M: f64 = 200.0;
@@ -83,11 +84,11 @@ fn of_power(context: Context, run: &Resolved, diagnostics: &mut Vec<Diagnostic>)
         return;
     }
     let declared = context.train.drive;
-    let drive = declared.unwrap_or(Drive::USUAL);
+    let drive = declared.unwrap_or(PowerTrain::USUAL);
     let has_friction = context.train.brake_gear.friction_brake.is_some()
         && run.table.filled(Quantity::BrakeCylinderPressure).is_some();
     let is_brake = run.forces.brake.source == ForceSource::Power && !has_friction;
-    let Drive { efficiency, speed_min_mps, .. } = drive;
+    let PowerTrain { efficiency, speed_min_mps, .. } = drive;
     let (of_drive, severity) = match declared {
         Some(_) => ("", Info),
         None => (
@@ -289,8 +290,8 @@ fn of_position(
     if net_m * f64::from(direction) < -DISTANCE_MIN_M
         && !is_reported(&[InputFault::DirectionReversed])
     {
-        let text =
-            format!("the position changes by {net_m:.0} m in all, against direction = {direction}");
+        let declared = DIRECTION.assign(direction);
+        let text = format!("the position changes by {net_m:.0} m in all, against {declared}");
         let figures = [("direction", Value::from(direction)), ("net_m", net_m.into())];
         diagnostics.push(Diagnostic::new("against_direction", Fundamental, text, figures));
     }

@@ -2,12 +2,13 @@
 
 use std::ops::{Bound, RangeBounds};
 
+use dynocar_model::train::NumberRule;
 use dynocar_model::units::Unit;
 use toml::value::Datetime;
 
+use super::error::unknown;
 use super::error::{DatasetError, SourcePosition};
-use super::names::unknown;
-use super::node::{Content, Node};
+use super::node::{Node, NodeContent};
 
 /// The names of the tables and keys at the top of a TOML file, in the order of the file.
 ///
@@ -96,7 +97,7 @@ impl<'t> Item<'t> {
 
     fn entries_of_map(&self) -> &'t [(String, Node)] {
         match &self.node.content {
-            Content::Map(entries) => entries,
+            NodeContent::Map(entries) => entries,
             _ => &[],
         }
     }
@@ -175,7 +176,7 @@ impl<'t> Item<'t> {
 
     /// The items of this list, `least` or more.
     pub fn list(&self, expected: &str, least: usize) -> Result<Vec<Item<'t>>, DatasetError> {
-        let Content::List(nodes) = &self.node.content else {
+        let NodeContent::List(nodes) = &self.node.content else {
             return Err(self.wrong_type(expected));
         };
         if nodes.len() < least {
@@ -196,18 +197,18 @@ impl<'t> Item<'t> {
 
     /// True for a list.
     pub fn is_list(&self) -> bool {
-        matches!(self.node.content, Content::List(_))
+        matches!(self.node.content, NodeContent::List(_))
     }
 
     /// True for a map.
     pub fn is_map(&self) -> bool {
-        matches!(self.node.content, Content::Map(_))
+        matches!(self.node.content, NodeContent::Map(_))
     }
 
     /// This text, or number as it is written.
     pub fn text(&self, expected: &str) -> Result<&'t str, DatasetError> {
         match &self.node.content {
-            Content::Text(text) | Content::Plain(text)
+            NodeContent::Text(text) | NodeContent::Plain(text)
                 if !self.node.is_null() && !text.trim().is_empty() =>
             {
                 Ok(text)
@@ -230,7 +231,7 @@ impl<'t> Item<'t> {
     /// This text, where it stands in quotes.
     pub fn as_quoted(&self) -> Option<&'t str> {
         match &self.node.content {
-            Content::Text(text) => Some(text),
+            NodeContent::Text(text) => Some(text),
             _ => None,
         }
     }
@@ -271,7 +272,9 @@ impl<'t> Item<'t> {
     pub fn truth(&self, key: &str) -> Result<Option<bool>, DatasetError> {
         let Some(item) = self.get(key) else { return Ok(None) };
         match &item.node.content {
-            Content::Plain(text) if text == "true" || text == "false" => Ok(Some(text == "true")),
+            NodeContent::Plain(text) if text == "true" || text == "false" => {
+                Ok(Some(text == "true"))
+            }
             _ => Err(item.wrong_type("true or false")),
         }
     }
@@ -280,7 +283,7 @@ impl<'t> Item<'t> {
     pub fn datetime(&self, key: &str) -> Result<Option<Datetime>, DatasetError> {
         let Some(item) = self.get(key) else { return Ok(None) };
         let datetime = match &item.node.content {
-            Content::Text(text) | Content::Plain(text) => text.trim().parse().ok(),
+            NodeContent::Text(text) | NodeContent::Plain(text) => text.trim().parse().ok(),
             _ => None,
         };
         datetime.map(Some).ok_or_else(|| item.wrong_type("a date, as 2026-03-18"))
@@ -299,15 +302,10 @@ impl<'t> Item<'t> {
         Ok(number)
     }
 
-    /// A number that stands here, when it is within a range.
-    pub fn within(
-        &self,
-        number: f64,
-        allowed: &str,
-        range: impl RangeBounds<f64>,
-    ) -> Result<f64, DatasetError> {
-        let refused = || self.out_of_range(&number.to_string(), allowed);
-        Some(number).filter(|it| it.is_finite() && range.contains(it)).ok_or_else(refused)
+    /// A number that stands here, when its rule allows it.
+    pub fn within(&self, number: f64, rule: &NumberRule) -> Result<f64, DatasetError> {
+        let refused = || self.out_of_range(&number.to_string(), rule.allowed);
+        Some(number).filter(|it| it.is_finite() && rule.allows(*it)).ok_or_else(refused)
     }
 
     /// This number, within a range.

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use dynocar_model::train::{Drive, EffortCurve, TrainModel};
+use dynocar_model::train::{EffortCurve, PowerTrain, TrainModel};
 use serde::Serialize;
 
 use super::order::{TimeOrder, quantile};
@@ -170,7 +170,7 @@ fn by_power(
     (traction, brake): (&mut Force, &mut Force),
 ) {
     let Some(power_w) = recorded_w(table) else { return };
-    let drive = train.drive.unwrap_or(Drive::USUAL);
+    let drive = train.drive.unwrap_or(PowerTrain::USUAL);
     let control = power_w.iter().zip(speed_mps);
     let control: Vec<f64> =
         control.map(|(&w, &mps)| drive.force_n(w, mps).unwrap_or(f64::NAN)).collect();

@@ -4,7 +4,7 @@ use dynocar_core::pipeline::admission::Admission;
 use dynocar_core::pipeline::{Echo, Outcome};
 use dynocar_core::plausibility::DetectedFaults;
 use dynocar_core::plausibility::diagnosis::gradient_fault;
-use dynocar_core::plausibility::window_balance::Balance;
+use dynocar_core::plausibility::window_balance::WindowBalance;
 use dynocar_model::force::ForceResolver;
 use dynocar_shared::{RejectionReason, TrainSample};
 
@@ -14,7 +14,7 @@ use super::resolved::{Context, DATASET_TRAIN};
 pub(super) struct Judge {
     admission: Admission,
     resolver: ForceResolver,
-    balance: Balance,
+    balance: WindowBalance,
     rows: usize,
     /// How many samples are refused for each reason, and the row of the first.
     refused: [(usize, usize); RejectionReason::ALL.len()],
@@ -28,7 +28,7 @@ impl Judge {
         Judge {
             admission,
             resolver: ForceResolver::new(context.train.clone(), context.track.cloned()),
-            balance: Balance::of_all(),
+            balance: WindowBalance::of_all(),
             rows: 0,
             refused: [(0, 0); RejectionReason::ALL.len()],
         }
@@ -59,7 +59,7 @@ impl Judge {
     }
 
     /// Returns how forces, gradients and accelerations go together over the whole run.
-    pub fn balance(&self) -> Balance {
+    pub fn balance(&self) -> WindowBalance {
         self.balance
     }
 

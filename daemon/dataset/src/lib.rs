@@ -11,6 +11,7 @@
 //! # Layout, in the order of reading
 //!
 //! - [`node`], [`document`], `names`, [`error`]: keys and values with their lines; mistakes with their choices
+//! - [`keys`]: every key of the three TOML files, for readers and writers
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
@@ -22,6 +23,7 @@
 //!   position, forces and gradient
 //! - `resolved`, [`run`], [`quality`], `judge`, [`diagnostic`], `diagnosing`, `declared`: samples,
 //!   counts and warnings
+//! - [`written`]: the three TOML files as they are written, and declared ones that change
 //! - [`guess`]: a description of files that nobody has described yet
 
 mod altitude;
@@ -37,15 +39,11 @@ pub mod document;
 pub mod encoding;
 pub mod error;
 mod forces;
-mod friction_brake;
 pub mod guess;
-mod header;
-mod implausible_columns;
 mod judge;
+pub mod keys;
 mod lines;
 pub mod manifest;
-mod motion;
-mod names;
 pub mod node;
 mod order;
 pub mod quality;
@@ -53,15 +51,16 @@ pub mod quantity;
 mod resolved;
 pub mod run;
 mod run_content;
+mod speed_and_position;
 mod spikes;
 pub mod stamps;
 mod table;
 pub mod text_layout;
 pub mod track_file;
 pub mod train_file;
-pub mod train_rows;
 pub mod trains;
 mod unusual_resistance;
+pub mod written;
 
 #[cfg(test)]
 mod tests;
@@ -73,13 +72,13 @@ pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
 pub use forces::ForceSource;
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
-pub use motion::PositionSource;
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
 pub use quantity::Quantity;
 pub use resolved::{DATASET_TRAIN, GradientSource};
-pub use run::{EXTRAS, Extra, Run, is_parquet, recorded_unix_s};
+pub use run::{EXTRAS, QuantitySeries, Run, is_parquet, recorded_unix_s};
 pub use run_content::{RunColumn, RunColumns, RunContent, TrainColumn};
+pub use speed_and_position::PositionSource;
 pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
@@ -89,7 +88,7 @@ pub use unusual_resistance::unusual_resistance;
 use std::sync::Arc;
 
 use dynocar_model::track::Track;
-use dynocar_model::train::{Drive, TrainModel};
+use dynocar_model::train::{PowerTrain, TrainModel};
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
 
@@ -180,9 +179,9 @@ impl Dataset {
     }
 
     /// The same with the forces that come from power taken from another drive.
-    pub fn with_drive(&self, drive: Drive) -> Dataset {
+    pub fn with_drive(&self, drive: PowerTrain) -> Dataset {
         let mut dataset = self.clone();
-        let before = self.train.drive.unwrap_or(Drive::USUAL);
+        let before = self.train.drive.unwrap_or(PowerTrain::USUAL);
         for run in &mut dataset.runs {
             run.retake_forces(before, drive);
         }
@@ -236,10 +235,7 @@ impl DatasetHead {
     }
 
     /// Reads all runs, in the order of the manifest, each or the first mistake in its file.
-    pub fn read_each(
-        &self,
-        files: &(impl DatasetFiles + ?Sized),
-    ) -> Vec<Result<Run, DatasetError>> {
+    fn read_each(&self, files: &(impl DatasetFiles + ?Sized)) -> Vec<Result<Run, DatasetError>> {
         let places = 0..self.manifest.runs.len();
         #[cfg(feature = "parallel")]
         let places = places.into_par_iter();

@@ -2,7 +2,11 @@
 
 use std::borrow::Cow;
 
-use super::error::{DatasetError, SourcePosition};
+use super::cell::lossy;
+use super::error::{DatasetError, SourcePosition, unknown};
+use super::keys::dataset::SKIP_ROWS;
+use super::manifest::ColumnMapping;
+use super::text_layout::TextLayout;
 
 /// A cell of a row.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,14 +19,14 @@ pub struct Cell<'t> {
 
 /// A row of cells; never blank.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row<'t> {
+pub struct CellRow<'t> {
     /// The cells.
     pub cells: Vec<Cell<'t>>,
     /// The line of the text, from 1, in which it begins.
     pub line: usize,
 }
 
-impl Row<'_> {
+impl CellRow<'_> {
     /// The text of a cell, trimmed of spaces; empty beyond the last one.
     pub fn trimmed(&self, index: usize) -> &[u8] {
         self.cells.get(index).map_or(b"", |cell| cell.text.trim_ascii())
@@ -58,7 +62,7 @@ impl<'t> RowReader<'t> {
     }
 
     /// Reads the next row; false where there is none.
-    pub fn read(&mut self, row: &mut Row<'t>) -> bool {
+    pub fn read(&mut self, row: &mut CellRow<'t>) -> bool {
         row.cells.clear();
         while let [mark @ (b'\n' | b'\r'), rest @ ..] = self.rest {
             self.line += usize::from(*mark == b'\n');
@@ -185,6 +189,66 @@ pub(super) fn plain_number(text: &[u8], decimal: u8) -> (usize, Option<f64>) {
     (at, Some(if is_negative { -size } else { size }))
 }
 
+/// Number of lines that are searched for names that stand elsewhere than declared.
+const LINES_MAX: usize = 100;
+
+/// In which line the names stand instead, where that is found.
+fn elsewhere(text: &str, (layout, mappings): (&TextLayout, &[ColumnMapping])) -> String {
+    let holds_names = |line: &str| {
+        let mut row = CellRow::default();
+        let is_read = RowReader::new(line, layout.delimiter, layout.decimal).read(&mut row);
+        let cells = names_of(&row);
+        is_read && mappings.iter().flat_map(ColumnMapping::names).all(|name| cells.contains(name))
+    };
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let found = text.lines().take(LINES_MAX).position(holds_names);
+    found.map_or_else(String::new, |above| {
+        format!("; the names stand in line {}: {}", above + 1, SKIP_ROWS.advice(above))
+    })
+}
+
+/// The names in a row, without spaces around them.
+pub fn names_of(row: &CellRow) -> Vec<String> {
+    row.cells.iter().map(|cell| lossy(&cell.text).trim().to_owned()).collect()
+}
+
+/// The indices of every mapping's columns among the names of a text that is laid out so; or what is wrong with the names.
+pub fn find_columns(
+    header: &[String],
+    text: &str,
+    (layout, mappings): (&TextLayout, &[ColumnMapping]),
+) -> Result<Vec<Vec<usize>>, String> {
+    let index = |mapping: &ColumnMapping, name: &String| {
+        let mut found = (0..header.len()).filter(|&index| header[index] == *name);
+        match (found.next(), found.count()) {
+            (Some(index), 0) => Ok(index),
+            (Some(_), more) => {
+                Err(format!("column '{name}' occurs {} times in the header", 1 + more))
+            }
+            (None, _) => {
+                let other =
+                    [';', ',', '\t', '|'].into_iter().find(|mark| header[0].contains(*mark));
+                if let (1, Some(other)) = (header.len(), other) {
+                    return Err(format!(
+                        "expected columns separated by {:?}, found {other:?} in the header: set \
+                         delimiter = \"{}\" in [dataset]",
+                        char::from(layout.delimiter),
+                        other.escape_default()
+                    ));
+                }
+                let instead = elsewhere(text, (layout, mappings));
+                let context = format!(" (for {} in {}{instead})", mapping.quantity, mapping.place);
+                let named = header.iter().filter(|other| !other.is_empty());
+                Err(unknown("column", name, &context, named.cloned()))
+            }
+        }
+    };
+    let indices = |mapping: &ColumnMapping| {
+        mapping.names().map(|name| index(mapping, name)).collect::<Result<Vec<usize>, String>>()
+    };
+    mappings.iter().map(indices).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use csv::{ByteRecord, ReaderBuilder};
@@ -194,7 +258,7 @@ mod tests {
 
     /// The rows of a text, with their lines.
     fn rows(text: &str, delimiter: u8) -> Vec<(usize, Vec<String>)> {
-        let (mut reader, mut row) = (RowReader::new(text, delimiter, b'.'), Row::default());
+        let (mut reader, mut row) = (RowReader::new(text, delimiter, b'.'), CellRow::default());
         let mut rows = Vec::new();
         while reader.read(&mut row) {
             let cells = row.cells.iter();
@@ -242,7 +306,7 @@ mod tests {
     #[test]
     fn plain_numbers_are_those_that_fill_their_cell() {
         let (mut reader, mut row) =
-            (RowReader::new("1.5,-2,3e4,,7 ,9", b',', b'.'), Row::default());
+            (RowReader::new("1.5,-2,3e4,,7 ,9", b',', b'.'), CellRow::default());
         assert!(reader.read(&mut row));
         let plain: Vec<Option<f64>> = row.cells.iter().map(|cell| cell.plain).collect();
         assert_eq!(plain, [Some(1.5), Some(-2.0), None, None, None, Some(9.0)]);

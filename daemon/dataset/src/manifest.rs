@@ -6,14 +6,17 @@ use dynocar_model::named;
 use dynocar_model::units::Unit;
 
 use super::clock::{self, TimeFormat};
-use super::document::{Item, above_zero};
+use super::document::Item;
+use super::error::unknown;
 use super::error::{DatasetError, SourcePosition};
-use super::names::unknown;
+use super::keys::column::{COLUMN, DOUBTFUL, FORMAT, OFFSET, SCALE, UNIT};
+use super::keys::dataset::{DESCRIPTION, NAME, POSITION_REFERENCE};
+use super::keys::run::{DATE, DIRECTION, FILE, MASS, ROLE, START};
+use super::keys::{self, DATASET_TABLES, FileKey, allow};
 use super::node::Node;
 use super::quantity::Quantity;
 use super::text_layout::TextLayout;
-use super::train_file::MASS;
-use super::train_rows::TrainRows;
+use super::text_layout::TrainRows;
 
 named! {
     /// Which point of the train the recorded position is of.
@@ -157,27 +160,27 @@ impl Manifest {
     pub fn parse(label: &str, text: &str) -> Result<Self, DatasetError> {
         let document = Node::of_toml(label, text)?;
         let root = Item::root(label, &document);
-        root.allow(&["dataset", "train", "track", "columns", "runs"])?;
-        let dataset = root.need_table("dataset")?;
-        let own = ["name", "description", "position_reference"];
-        dataset.allow(&[&own[..], &TextLayout::KEYS[..]].concat())?;
-        let columns = columns(&root.need_table("columns")?)?;
-        let train = root.need_table("train")?;
-        let reference = dataset.named_under(
-            "position_reference",
-            ("reference", "centre or head"),
-            PositionReference::from_name,
-            PositionReference::ALL.map(PositionReference::name),
-        )?;
+        root.allow(&DATASET_TABLES)?;
+        let dataset = root.need_table(keys::dataset::TABLE)?;
+        allow(&dataset, keys::dataset::KEYS)?;
+        let columns = columns(&root.need_table(keys::column::TABLE)?)?;
+        let train = root.need_table(keys::train_file::TABLE)?;
+        allow(&train, keys::train_file::KEYS)?;
+        let references = PositionReference::ALL.map(PositionReference::name);
+        let named = PositionReference::from_name;
+        let reference = POSITION_REFERENCE.named(&dataset, "reference", named, references)?;
         Ok(Manifest {
-            name: dataset.need_quoted("name", "the dataset's name")?.into(),
-            description: dataset.quoted("description")?.map(Into::into),
+            name: NAME.need_quoted(&dataset)?.into(),
+            description: DESCRIPTION.quoted(&dataset)?.map(Into::into),
             position_reference: reference.unwrap_or(PositionReference::Centre),
             layout: TextLayout::of(&dataset)?,
-            train_file: file_of(&train, &["file", "rows"], "the path of a train.toml")?,
+            train_file: file_of(&train, &keys::train_file::FILE)?,
             train_rows: TrainRows::of(&train)?,
-            track_file: match root.table("track")? {
-                Some(section) => Some(file_of(&section, &["file"], "the path of a track.toml")?),
+            track_file: match root.table(keys::track_file::TABLE)? {
+                Some(section) => {
+                    allow(&section, keys::track_file::KEYS)?;
+                    Some(file_of(&section, &keys::track_file::FILE)?)
+                }
                 None => None,
             },
             runs: runs(&root, &columns)?,
@@ -197,10 +200,8 @@ impl Manifest {
     }
 }
 
-fn file_of(section: &Item, keys: &[&str], expected: &str) -> Result<FileEntry, DatasetError> {
-    section.allow(keys)?;
-    let path = section.need_quoted("file", expected)?.into();
-    Ok(FileEntry { path, place: section.place_of("file") })
+fn file_of(section: &Item, key: &FileKey) -> Result<FileEntry, DatasetError> {
+    Ok(FileEntry { path: key.need_quoted(section)?.into(), place: section.place_of(key.name) })
 }
 
 fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
@@ -216,13 +217,12 @@ fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
     mappings.sort_by_key(|mapping| mapping.quantity);
     for quantity in [Quantity::Time, Quantity::Speed] {
         if mappings.iter().all(|mapping| mapping.quantity != quantity) {
-            let expected = match quantity {
-                Quantity::Time => {
-                    "{ column = \"…\", unit = \"…\" } or { column = \"…\", format = \"…\" }"
-                }
-                _ => "{ column = \"…\", unit = \"…\" }",
+            let either = match quantity {
+                Quantity::Time => format!(" or {}", keys::inline([COLUMN, FORMAT].map(of_any))),
+                _ => String::new(),
             };
-            section.need(quantity.name(), expected)?;
+            let expected = keys::inline([COLUMN, UNIT].map(of_any)) + &either;
+            section.need(quantity.name(), &expected)?;
         }
     }
     let is_mapped =
@@ -242,52 +242,46 @@ fn columns(section: &Item) -> Result<Vec<ColumnMapping>, DatasetError> {
 
 fn mapping(columns: &Item, quantity: Quantity) -> Result<ColumnMapping, DatasetError> {
     let section = columns.need_table(quantity.name())?;
-    let format = match quantity {
-        Quantity::Time => {
-            section.allow(&["column", "unit", "scale", "offset", "format", DOUBTFUL])?;
-            time_format(&section)?
-        }
-        _ => {
-            section.allow(&["column", "unit", "scale", "offset", DOUBTFUL])?;
-            None
-        }
-    };
+    let is_time = quantity == Quantity::Time;
+    let known = keys::column::KEYS.iter().filter(|it| is_time || it.name != FORMAT.name);
+    allow(&section, &known.copied().collect::<Vec<_>>())?;
+    let format = if is_time { time_format(&section)? } else { None };
     let unit = match format {
         Some(_) => Unit::base_of(quantity.dimension()),
         None => unit(&section, quantity)?,
     };
     let mut names = columns_of(&section, quantity)?.into_iter();
-    let scale = section.checked_under("scale", "a number other than 0", |it| it != 0.0)?;
+    let scale = section.checked_under(SCALE.name, SCALE.rule.allowed, |it| it != 0.0)?;
     Ok(ColumnMapping {
         quantity,
         column: names.next().unwrap_or_default(),
         parts: names.collect(),
-        is_doubtful: section.truth(DOUBTFUL)?.unwrap_or(false),
+        is_doubtful: section.truth(DOUBTFUL.name)?.unwrap_or(false),
         unit,
         format,
         scale: scale.unwrap_or(1.0),
-        offset: section.optional("offset", "a finite number", ..)?.unwrap_or(0.0),
+        offset: OFFSET.number(&section)?.unwrap_or(0.0),
         place: section.place(),
     })
 }
 
-/// The key that says of a column that nobody has confirmed what it was taken for.
-pub const DOUBTFUL: &str = "doubtful";
+/// An assignment of any value, for messages.
+fn of_any(key: FileKey) -> String {
+    key.assign("\"…\"")
+}
 
 /// The columns of a quantity: one, or several that add up.
 fn columns_of(section: &Item, quantity: Quantity) -> Result<Vec<String>, DatasetError> {
-    const KEY: &str = "column";
     let expected = match quantity.adds_up() {
-        true => {
-            "the name of a column in the runs' files, or a list of names of columns that add up"
-        }
-        false => "the name of a column in the runs' files",
+        true => format!("{}, or a list of names of columns that add up", COLUMN.rule.allowed),
+        false => COLUMN.rule.allowed.into(),
     };
-    let item = section.need(KEY, expected)?;
+    let (key, expected) = (COLUMN.name, &expected[..]);
+    let item = section.need(key, expected)?;
     if !(quantity.adds_up() && item.is_list()) {
         // Tables of pandas have an index without a name.
-        section.need(KEY, expected)?;
-        return Ok(vec![section.quoted(KEY)?.unwrap_or_default().trim().into()]);
+        section.need(key, expected)?;
+        return Ok(vec![section.quoted(key)?.unwrap_or_default().trim().into()]);
     }
     let names =
         item.list(expected, 1)?.into_iter().map(|name| Ok(name.text(expected)?.trim().into()));
@@ -301,43 +295,38 @@ fn columns_of(section: &Item, quantity: Quantity) -> Result<Vec<String>, Dataset
 fn unit(section: &Item, quantity: Quantity) -> Result<Unit, DatasetError> {
     let units: Vec<_> = Unit::of(quantity.dimension()).map(|unit| unit.name()).collect();
     let or_format = if quantity == Quantity::Time { "; or a format" } else { "" };
-    let expected = format!("a unit: {}{or_format}", units.join(", "));
+    let expected = format!("{}: {}{or_format}", UNIT.rule.allowed, units.join(", "));
     let find = |name: &str| Unit::find(quantity.dimension(), name);
-    section.need_named("unit", ("unit", &expected), find, units)
+    section.need_named(UNIT.name, ("unit", &expected), find, units)
 }
 
 /// How times are written that are no numbers.
 fn time_format(section: &Item) -> Result<Option<TimeFormat>, DatasetError> {
-    const KEY: &str = "format";
-    let Some(name) = section.quoted(KEY)? else { return Ok(None) };
-    for other in ["unit", "scale", "offset"] {
-        if section.has(other) {
-            return Err(section.exclusive(KEY, other));
+    let Some(name) = FORMAT.quoted(section)? else { return Ok(None) };
+    for other in [UNIT, SCALE, OFFSET] {
+        if section.has(other.name) {
+            return Err(section.exclusive(FORMAT.name, other.name));
         }
     }
-    let allowed = "\"iso\" (2026-03-18T07:13:20.2), \"clock\" (07:13:20.2) or a pattern of strftime \
-                   with the hour, and with the whole date or none of it (%d.%m.%Y %H:%M:%S); a \
-                   fraction of the second is read in any case";
-    let refused = || section.key_out_of_range(KEY, &format!("{name:?}"), allowed);
+    let refused = || FORMAT.refused(section, format_args!("{name:?}"));
     TimeFormat::from_name(name).map(Some).ok_or_else(refused)
 }
 
 fn runs(root: &Item, columns: &[ColumnMapping]) -> Result<Vec<RunEntry>, DatasetError> {
     let mut runs: Vec<RunEntry> = Vec::new();
-    for section in root.tables("runs")? {
+    for section in root.tables(keys::run::TABLE)? {
         let run = run(&section)?;
         let has_date = |it: &ColumnMapping| it.format.as_ref().is_some_and(TimeFormat::has_date);
         if run.date_unix_s.is_some() && columns.iter().any(has_date) {
-            let words = "exclude each other: give one of them";
-            let words =
-                format!("{} and columns.time.format with a date {words}", section.full("date"));
-            return Err(section.place_of("date").problem(words));
+            let (words, date) = ("exclude each other: give one of them", section.full(DATE.name));
+            let problem = format!("{date} and columns.time.format with a date {words}");
+            return Err(section.place_of(DATE.name).problem(problem));
         }
         let twin = runs.iter().find(|other| is_same_path(&other.file, &run.file));
         if let Some(first_line) = twin.and_then(|twin| twin.place.line) {
-            let key = section.full("file");
+            let key = section.full(FILE.name);
             let words = format!("{key}: {} is listed in line {first_line} already", run.file);
-            return Err(section.place_of("file").problem(words));
+            return Err(section.place_of(FILE.name).problem(words));
         }
         runs.push(run);
     }
@@ -355,17 +344,16 @@ fn is_same_path(one: &str, other: &str) -> bool {
 }
 
 fn run(section: &Item) -> Result<RunEntry, DatasetError> {
-    section.allow(&["file", "role", "direction", "mass_t", "start_m", "date"])?;
-    let (roles, role) = (Role::ALL.map(Role::name), ("role", "a role"));
-    let role = section.named_under("role", role, Role::from_name, roles)?;
-    let direction = section.checked_under("direction", "1 or -1", |it| it.abs() == 1.0)?;
-    let mass_t = section.optional("mass_t", MASS, above_zero(1e5))?;
+    allow(section, keys::run::KEYS)?;
+    let role = ROLE.named(section, "role", Role::from_name, Role::ALL.map(Role::name))?;
+    let (key, allowed) = (DIRECTION.name, DIRECTION.rule.allowed);
+    let direction = section.checked_under(key, allowed, |it| it.abs() == 1.0)?;
     Ok(RunEntry {
-        file: section.need_quoted("file", "the path of a CSV or Parquet file")?.into(),
+        file: FILE.need_quoted(section)?.into(),
         role: role.unwrap_or(Role::Fit),
         direction: if direction == Some(-1.0) { -1 } else { 1 },
-        mass_kg: mass_t.map(|mass| mass * 1000.0),
-        start_m: section.optional("start_m", "a chainage in m", -1e9..=1e9)?,
+        mass_kg: MASS.number(section)?.map(|mass_t| mass_t * MASS.rule.factor),
+        start_m: START.number(section)?,
         date_unix_s: date(section)?,
         place: section.place(),
     })
@@ -373,9 +361,8 @@ fn run(section: &Item) -> Result<RunEntry, DatasetError> {
 
 /// The second at which a run's date begins.
 fn date(section: &Item) -> Result<Option<i64>, DatasetError> {
-    let Some(date) = section.datetime("date")? else { return Ok(None) };
-    let allowed = "a day of the calendar, as 2026-03-18 or 2026-03-18T07:13:20";
-    let refused = || section.key_out_of_range("date", &date.to_string(), allowed);
+    let Some(date) = section.datetime(DATE.name)? else { return Ok(None) };
+    let refused = || DATE.refused(section, date);
     clock::unix_s(&date).map(Some).ok_or_else(refused)
 }
 

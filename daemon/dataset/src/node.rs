@@ -13,14 +13,14 @@ pub struct Node {
     /// Line, from 1; `None` for a file as a whole.
     pub line: Option<usize>,
     /// Content of the value.
-    pub content: Content,
+    pub content: NodeContent,
     /// True once somebody has asked for it.
     pub(super) is_read: Cell<bool>,
 }
 
 /// Content of a value.
 #[derive(Debug)]
-pub enum Content {
+pub enum NodeContent {
     /// A text in quotes.
     Text(String),
     /// Unquoted text, as it is written: a number, a date, a word of YAML.
@@ -33,7 +33,7 @@ pub enum Content {
 
 impl Node {
     /// A value that nobody has asked for yet.
-    pub fn new(line: Option<usize>, content: Content) -> Self {
+    pub fn new(line: Option<usize>, content: NodeContent) -> Self {
         Node { line, content, is_read: Cell::new(false) }
     }
 
@@ -57,13 +57,13 @@ impl Node {
     }
 
     pub(super) fn is_null(&self) -> bool {
-        let Content::Plain(text) = &self.content else { return false };
+        let NodeContent::Plain(text) = &self.content else { return false };
         matches!(text.as_str(), "" | "~" | "null" | "Null" | "NULL")
     }
 
     /// This number, be it finite or not; `None` for anything else.
     pub(super) fn number(&self) -> Option<f64> {
-        let Content::Plain(text) = &self.content else { return None };
+        let NodeContent::Plain(text) = &self.content else { return None };
         match text.trim_start_matches(['+', '-']) {
             // As YAML, TOML, and programs that write invalid JSON write them.
             ".nan" | ".NaN" | ".NAN" => Some(f64::NAN),
@@ -79,29 +79,29 @@ impl Node {
     /// A value in few words.
     pub(super) fn shown(&self) -> String {
         match &self.content {
-            Content::Plain(_) if self.is_null() => "nothing".into(),
-            Content::Text(text) | Content::Plain(text) if text.chars().count() > 40 => {
+            NodeContent::Plain(_) if self.is_null() => "nothing".into(),
+            NodeContent::Text(text) | NodeContent::Plain(text) if text.chars().count() > 40 => {
                 "a long text".into()
             }
-            Content::Text(text) => format!("the text \"{text}\""),
-            Content::Plain(text)
+            NodeContent::Text(text) => format!("the text \"{text}\""),
+            NodeContent::Plain(text)
                 if self.number().is_some() || matches!(&text[..], "true" | "false") =>
             {
                 text.clone()
             }
-            Content::Plain(word) => format!("'{word}'"),
-            Content::List(items) if items.len() <= 4 => {
+            NodeContent::Plain(word) => format!("'{word}'"),
+            NodeContent::List(items) if items.len() <= 4 => {
                 let items: Vec<String> = items.iter().map(Node::shown).collect();
                 format!("[{}]", items.join(", "))
             }
-            Content::List(items) => format!("a list of {} items", items.len()),
-            Content::Map(_) => "keys and values".into(),
+            NodeContent::List(items) => format!("a list of {} items", items.len()),
+            NodeContent::Map(_) => "keys and values".into(),
         }
     }
 }
 
 /// The order of a parsed table is that of the names; a user meets the first in the file first.
-fn map_of(table: &DeTable, line: &dyn Fn(usize) -> usize) -> Content {
+fn map_of(table: &DeTable, line: &dyn Fn(usize) -> usize) -> NodeContent {
     let mut entries: Vec<_> = table.iter().collect();
     entries.sort_by_key(|(key, _)| key.span().start);
     // A table's own span may cover the first key only; its name is where the eye looks.
@@ -109,22 +109,22 @@ fn map_of(table: &DeTable, line: &dyn Fn(usize) -> usize) -> Content {
         let name: &std::borrow::Cow<str> = key.get_ref();
         (name.to_string(), node_of(value.get_ref(), key.span().start, line))
     };
-    Content::Map(entries.into_iter().map(entry).collect())
+    NodeContent::Map(entries.into_iter().map(entry).collect())
 }
 
 fn node_of(value: &DeValue, at: usize, line: &dyn Fn(usize) -> usize) -> Node {
     let content = match value {
-        DeValue::String(text) => Content::Text(text.to_string()),
+        DeValue::String(text) => NodeContent::Text(text.to_string()),
         DeValue::Integer(integer) => {
             let decimal = i64::from_str_radix(integer.as_str(), integer.radix());
-            Content::Plain(decimal.map_or_else(|_| integer.to_string(), |it| it.to_string()))
+            NodeContent::Plain(decimal.map_or_else(|_| integer.to_string(), |it| it.to_string()))
         }
-        DeValue::Float(float) => Content::Plain(float.as_str().into()),
-        DeValue::Boolean(truth) => Content::Plain(truth.to_string()),
-        DeValue::Datetime(datetime) => Content::Plain(datetime.to_string()),
+        DeValue::Float(float) => NodeContent::Plain(float.as_str().into()),
+        DeValue::Boolean(truth) => NodeContent::Plain(truth.to_string()),
+        DeValue::Datetime(datetime) => NodeContent::Plain(datetime.to_string()),
         DeValue::Array(items) => {
             let item = |it: &toml::Spanned<DeValue>| node_of(it.get_ref(), it.span().start, line);
-            Content::List(items.iter().map(item).collect())
+            NodeContent::List(items.iter().map(item).collect())
         }
         DeValue::Table(table) => map_of(table, line),
     };

@@ -41,11 +41,18 @@ pub struct RunQuality {
     pub position_range_m: Option<(f64, f64)>,
     /// The mass in kg that the samples carry; `None` where they carry none, so that the train's nominal
     /// one holds.
-    pub mass_kg: Option<Spread>,
+    pub mass_kg: Option<MeanAndRange>,
     /// Distance in m by integrating the speed.
     pub distance_m: f64,
     /// Phases of the train's motion, and their durations.
     pub phases: Phases,
+}
+
+impl RunQuality {
+    /// Returns the number of samples: one for each row with a time.
+    pub fn samples(&self) -> usize {
+        self.lines.rows - self.rows_without_time
+    }
 }
 
 /// A count for a quantity.
@@ -77,7 +84,7 @@ fn by_name<S: Serializer>(reason: &RejectionReason, serializer: S) -> Result<S::
 
 /// Mean and range of a quantity over a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct MeanAndRange {
     /// The mean over the samples.
     pub mean: f64,
     /// The lowest.
@@ -114,10 +121,10 @@ pub(super) fn assess(run: &Resolved, samples: &[TrainSample], judge: &Judge) -> 
     let (start_s, end_s) = (time(run.order.rows().next()), time(run.order.rows().next_back()));
     let speeds = run.speeds.speed_mps.iter().zip(&run.speeds.is_spike);
     let speeds = speeds.filter(|(_, is_spike)| !**is_spike).map(|(speed, _)| *speed);
-    let refused = |(reason, count, row): (_, _, usize)| {
+    let refused = judge.refused().map(|(reason, count, row)| {
         let (first_line, first_s) = (run.table.line(row), run.times_s[row]);
         ReasonCount { reason, count, first_line, first_s }
-    };
+    });
     RunQuality {
         lines: run.table.lines,
         rows_without_time: run.rows_without_time,
@@ -127,7 +134,7 @@ pub(super) fn assess(run: &Resolved, samples: &[TrainSample], judge: &Judge) -> 
         missing: missing(run),
         outliers: outliers(run),
         noise_below_zero: noise_below_zero(run),
-        refused: judge.refused().map(refused).collect(),
+        refused: refused.collect(),
         speed_range_mps: range(speeds),
         position_range_m: range(run.position_m.iter().copied()),
         mass_kg: spread(samples.iter().filter_map(|sample| sample.get(SampleField::Mass))),
@@ -186,12 +193,12 @@ fn noise_below_zero(run: &Resolved) -> Vec<QuantityCount> {
     counts(all)
 }
 
-fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
+fn spread(values: impl Iterator<Item = f64>) -> Option<MeanAndRange> {
     let (mut low, mut high, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
     for value in values {
         (low, high, sum, count) = (low.min(value), high.max(value), sum + value, count + 1.0);
     }
-    (count > 0.0).then_some(Spread { mean: sum / count, low, high })
+    (count > 0.0).then_some(MeanAndRange { mean: sum / count, low, high })
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {

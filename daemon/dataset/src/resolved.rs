@@ -12,9 +12,9 @@ use super::altitude::{self, Recorded};
 use super::clock_faults::{self, ClockFaults};
 use super::forces::Forces;
 use super::manifest::{Manifest, RunEntry};
-use super::motion::{Placement, PositionSource, Speeds};
 use super::order::TimeOrder;
 use super::quantity::Quantity;
+use super::speed_and_position::{Placement, PositionSource, Speeds};
 use super::table::Table;
 
 /// The train's id in the samples of a dataset; a replay may set another.

@@ -3,8 +3,8 @@
 use std::mem::take;
 
 use dynocar_core::plausibility::InputFault;
-use dynocar_core::plausibility::window_balance::Balance;
-use dynocar_model::train::Drive;
+use dynocar_core::plausibility::window_balance::WindowBalance;
+use dynocar_model::train::PowerTrain;
 use dynocar_model::units::Unit;
 use dynocar_shared::{SampleField, TrainSample};
 
@@ -14,14 +14,14 @@ use super::error::{DatasetError, SourcePosition};
 use super::forces::{self, ForceSource};
 use super::judge::Judge;
 use super::manifest::{Manifest, Role, RunEntry};
-use super::motion::PositionSource;
 use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
 use super::run_content::{RunColumns, RunContent};
+use super::speed_and_position::PositionSource;
 use super::stamps;
 use super::table::Table;
-use super::train_rows::TrainRows;
+use super::text_layout::TrainRows;
 use super::trains::{TrainsColumn, keep_only, only};
 
 const DAY_S: i64 = 86_400;
@@ -43,7 +43,7 @@ pub const EXTRAS: [(Quantity, &str); 11] = [
 ];
 
 /// Values of a quantity, one for each sample, `None` where missing.
-pub type Extra = Vec<Option<f64>>;
+pub type QuantitySeries = Vec<Option<f64>>;
 
 /// A recorded run.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +67,7 @@ pub struct Run {
     /// or repeated are kept for validation to refuse and count.
     pub samples: Vec<TrainSample>,
     /// Those of [`EXTRAS`] that are recorded.
-    pub extras: Vec<(Quantity, Extra)>,
+    pub extras: Vec<(Quantity, QuantitySeries)>,
     /// Where the positions come from.
     pub position_source: PositionSource,
     /// Where the gradient comes from.
@@ -77,7 +77,7 @@ pub struct Run {
     /// Where the brake force comes from.
     pub brake_source: ForceSource,
     /// How forces, gradients and accelerations go together over all of it.
-    pub balance: Balance,
+    pub balance: WindowBalance,
     /// The unit in which its gradients were read.
     pub gradient_unit: Unit,
     /// Quality of the data.
@@ -138,8 +138,13 @@ impl Run {
         }
     }
 
+    /// Whether a sample has a force.
+    pub fn has_forces(&self) -> bool {
+        self.samples.iter().any(|sample| sample.valid & FORCES != 0)
+    }
+
     /// Returns the record of a quantity beyond those of a sample.
-    pub fn extra(&self, quantity: Quantity) -> Option<&Extra> {
+    pub fn extra(&self, quantity: Quantity) -> Option<&QuantitySeries> {
         self.extras.iter().find(|(other, _)| *other == quantity).map(|(_, values)| values)
     }
 
@@ -166,7 +171,7 @@ impl Run {
     }
 
     /// Takes a force that comes from power anew: by another drive than it was read with.
-    pub(super) fn retake_forces(&mut self, before: Drive, after: Drive) {
+    pub(super) fn retake_forces(&mut self, before: PowerTrain, after: PowerTrain) {
         let Some((power_w, _)) = self.power() else { return };
         let power_w = power_w.to_vec();
         let is_brake = self.brake_source == ForceSource::Power;
@@ -321,7 +326,7 @@ fn recorded(
     Some(first_day.or_else(declared)? * DAY_S + first_s.floor() as i64)
 }
 
-fn extras(table: &Table) -> Vec<(Quantity, Extra)> {
+fn extras(table: &Table) -> Vec<(Quantity, QuantitySeries)> {
     let held = |&it: &f64| (!it.is_nan()).then_some(it);
     let extra = |(quantity, _): (Quantity, _)| {
         let values = match quantity {

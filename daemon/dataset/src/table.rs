@@ -5,8 +5,8 @@ use dynocar_model::units::{Dimension, Unit};
 use super::cell::{held, is_word, lossy, not_a_value, parse_cell, truth};
 use super::clock::DayClock;
 use super::error::{DatasetError, NO_HEADER, NO_ROWS, SourcePosition};
-use super::header::{find_columns, names_of};
-use super::lines::{Row, RowReader, below};
+use super::lines::{CellRow, RowReader, below};
+use super::lines::{find_columns, names_of};
 use super::manifest::ColumnMapping;
 use super::quantity::Quantity;
 use super::run_content::RunColumn;
@@ -153,7 +153,7 @@ impl Table {
         let text = below(label, text, layout.skip_rows)?;
         let is_closed = text.ends_with(['\n', '\r']);
         let mut reader = RowReader::new(text, layout.delimiter, layout.decimal);
-        let mut row = Row::default();
+        let mut row = CellRow::default();
         if !reader.read(&mut row) {
             return Err(SourcePosition::whole(label).problem(NO_HEADER));
         }
@@ -236,7 +236,7 @@ impl Rows<'_> {
 
     /// True for a row in which words stand where values are expected and no value does: a footer, the names again,
     /// what a power cut leaves.
-    fn is_note(&self, row: &Row) -> bool {
+    fn is_note(&self, row: &CellRow) -> bool {
         let mut cells = self.columns.iter().flat_map(|column| &column.indices);
         let first = cells.clone().next().map_or(&b""[..], |&index| row.trimmed(index));
         // Most rows hold a number there.
@@ -250,7 +250,7 @@ impl Rows<'_> {
     }
 
     /// Refuses a row of values in the place of that of units, which would be lost.
-    fn require_units(&self, row: &Row) -> Result<(), DatasetError> {
+    fn require_units(&self, row: &CellRow) -> Result<(), DatasetError> {
         for column in &self.columns {
             let cell = row.trimmed(column.indices[0]);
             let is_number = parse_cell(cell, self.layout.marks()).is_some_and(|it| !it.is_nan());
@@ -269,7 +269,7 @@ impl Rows<'_> {
     }
 
     /// Takes in a row; what is wrong with it stays pending.
-    fn push(&mut self, row: &Row) -> Result<(), DatasetError> {
+    fn push(&mut self, row: &CellRow) -> Result<(), DatasetError> {
         let line = self.layout.skip_rows + row.line;
         let place = || SourcePosition::line(self.label, line);
         if line > self.layout.lines_above() + 1 && self.is_note(row) {

@@ -21,8 +21,8 @@ struct Example {
 }
 
 impl Example {
-    fn new(columns: &[(&str, &str, &str)], csv: &str) -> Self {
-        let line = |(quantity, column, unit): &(&str, &str, &str)| {
+    fn new(columns: &[[&str; 3]], csv: &str) -> Self {
+        let line = |[quantity, column, unit]: &[&str; 3]| {
             format!("{quantity} = {{ column = \"{column}\", unit = \"{unit}\" }}\n")
         };
         Example {
@@ -64,15 +64,15 @@ fn field(run: &Run, field: SampleField) -> Vec<Option<f64>> {
 fn rows_become_samples_as_a_controller_would_publish_them() {
     let mut example = Example::new(
         &[
-            ("position", "s", "km"),
-            ("traction_force", "F", "kN"),
-            ("brake_force", "B", "kN"),
-            ("brake_cylinder_pressure", "p", "bar"),
-            ("ambient_temperature", "T", "K"),
-            ("acceleration", "a", "m/s2"),
-            ("specific_force", "f", "m/s2"),
-            ("curve_radius", "R", "m"),
-            ("wheel_slide", "slide", "1"),
+            ["position", "s", "km"],
+            ["traction_force", "F", "kN"],
+            ["brake_force", "B", "kN"],
+            ["brake_cylinder_pressure", "p", "bar"],
+            ["ambient_temperature", "T", "K"],
+            ["acceleration", "a", "m/s2"],
+            ["specific_force", "f", "m/s2"],
+            ["curve_radius", "R", "m"],
+            ["wheel_slide", "slide", "1"],
         ],
         "t,s,v,F,B,p,T,a,f,R,slide\n1000.2,1.5,20,35.5,0,1.2,293.15,0.1,0.2,-400,1\n\
          1000.4,1.504,20,,,,,,,inf,0\n",
@@ -107,7 +107,7 @@ fn rows_become_samples_as_a_controller_would_publish_them() {
 
 #[test]
 fn the_mass_is_the_rows_then_the_runs_then_the_trains() {
-    let mut example = Example::new(&[("train_mass", "m", "t")], "t,v,m\n0,1,120\n1,1,\n");
+    let mut example = Example::new(&[["train_mass", "m", "t"]], "t,v,m\n0,1,120\n1,1,\n");
     assert_eq!(field(&example.run(), SampleField::Mass), [Some(120e3), None]);
     assert_eq!(example.run().mass_kg, 100e3);
     example.run = "mass_t = 110".into();
@@ -117,10 +117,10 @@ fn the_mass_is_the_rows_then_the_runs_then_the_trains() {
 #[test]
 fn what_a_sample_does_not_carry_is_kept_next_to_it() {
     let columns = [
-        ("relative_humidity", "rh", "%"),
-        ("wind_speed", "w", "km/h"),
-        ("passengers", "n", "1"),
-        ("altitude", "h", "m"),
+        ["relative_humidity", "rh", "%"],
+        ["wind_speed", "w", "km/h"],
+        ["passengers", "n", "1"],
+        ["altitude", "h", "m"],
     ];
     let run = Example::new(&columns, "t,v,rh,w,n,h\n0,1,93,36,250,512\n,,,,,\n2,1,,,,\n").run();
     assert_eq!(run.extra(Quantity::RelativeHumidity), Some(&vec![Some(0.93), None]));
@@ -133,7 +133,7 @@ fn what_a_sample_does_not_carry_is_kept_next_to_it() {
 
 #[test]
 fn the_head_is_half_a_train_ahead_of_the_centre_in_either_direction() {
-    let mut example = Example::new(&[("position", "s", "m")], "t,v,s\n0,1,1000\n");
+    let mut example = Example::new(&[["position", "s", "m"]], "t,v,s\n0,1,1000\n");
     example.dataset = "position_reference = 'head'".into();
     assert_eq!(field(&example.run(), SampleField::Position), [Some(960.0)]);
     example.run = "direction = -1".into();
@@ -162,8 +162,8 @@ fn the_gradients_source_goes_from_track_to_unknown() {
         .collect();
     let csv = format!("t,v,f,h,i\n{csv}");
     let all =
-        [("gradient", "i", "permille"), ("specific_force", "f", "m/s2"), ("altitude", "h", "m")];
-    let source = |columns: &[(&str, &str, &str)], track: bool| {
+        [["gradient", "i", "permille"], ["specific_force", "f", "m/s2"], ["altitude", "h", "m"]];
+    let source = |columns: &[[&str; 3]], track: bool| {
         let mut example = Example::new(columns, &csv);
         example.track = track;
         example.run()
@@ -188,7 +188,7 @@ fn the_gradients_source_goes_from_track_to_unknown() {
 fn an_altitude_climbs_with_the_chainage_also_when_the_train_runs_back() {
     let csv: String =
         (0..200).map(|i| format!("{i},10,{}\n", 0.02 * 10.0 * f64::from(i))).collect();
-    let mut example = Example::new(&[("altitude", "h", "m")], &format!("t,v,h\n{csv}"));
+    let mut example = Example::new(&[["altitude", "h", "m"]], &format!("t,v,h\n{csv}"));
     example.run = "direction = -1".into();
     let slope = field(&example.run(), SampleField::Gradient)[50].unwrap();
     assert!(
@@ -229,7 +229,7 @@ fn missing_values_and_outliers_are_counted_by_quantity() {
             format!("{},{speed},{force},0\n", 0.2 * f64::from(i))
         })
         .collect();
-    let columns = [("traction_force", "F", "kN"), ("brake_force", "B", "kN")];
+    let columns = [["traction_force", "F", "kN"], ["brake_force", "B", "kN"]];
     let run = Example::new(&columns, &format!("t,v,F,B\n{csv}")).run();
     let quality = &run.quality;
     assert_eq!(count_of(&quality.missing, Quantity::TractionForce), 10);
@@ -245,7 +245,7 @@ fn missing_values_and_outliers_are_counted_by_quantity() {
 fn the_phases_add_up_to_the_duration() {
     let csv = "t,v,F,B\n0,0,0,50\n1,0,0,50\n2,1,60,0\n3,2,60,0\n4,3,0.1,0\n5,3,0,0\n6,3,,\n7,2,0,80\n\
                8,1,0,80\n9,0,0,80\n10,0,0,80\n15,0,0,80\n16,0,0,80\n";
-    let columns = [("traction_force", "F", "kN"), ("brake_force", "B", "kN")];
+    let columns = [["traction_force", "F", "kN"], ["brake_force", "B", "kN"]];
     let phases = Example::new(&columns, csv).run().quality.phases;
     let expected = Phases {
         standstill_s: 4.0,
@@ -261,7 +261,7 @@ fn the_phases_add_up_to_the_duration() {
 fn likely_mistakes_are_diagnosed() {
     let csv: String =
         (0..100).map(|i| format!("{i},36,{},-80\n", 5000.0 - 10.0 * f64::from(i))).collect();
-    let columns = [("position", "s", "m"), ("brake_force", "B", "kN")];
+    let columns = [["position", "s", "m"], ["brake_force", "B", "kN"]];
     let mut example = Example::new(&columns, &format!("t,v,s,B\n{csv}"));
     example.track = true;
     let diagnostics: Vec<String> =
@@ -300,7 +300,7 @@ fn a_recorder_that_hangs_while_the_train_moves_is_diagnosed() {
             let shown = if stands { 0.0 } else { speed_mps };
             csv += &format!("{},{shown},{force_kn},0\n", 0.1 * f64::from(row));
         }
-        let columns = [("traction_force", "F", "kN"), ("brake_force", "B", "kN")];
+        let columns = [["traction_force", "F", "kN"], ["brake_force", "B", "kN"]];
         let run = Example::new(&columns, &csv).run();
         let diagnostics = run.diagnostics.iter().map(ToString::to_string);
         diagnostics.filter(|diagnostic| diagnostic.contains("every column")).collect()
@@ -319,13 +319,13 @@ fn a_recorder_that_hangs_while_the_train_moves_is_diagnosed() {
 
 #[test]
 fn a_handle_without_its_curve_is_refused_where_it_is_mapped() {
-    let example = Example::new(&[("brake_handle", "h", "1")], "t,v,h\n0,1,0\n");
+    let example = Example::new(&[["brake_handle", "h", "1"]], "t,v,h\n0,1,0\n");
     assert_eq!(
         example.load().unwrap_err().to_string(),
         "dataset.toml:9: brake_handle is a share of the effort curve, but train.toml has no \
          [brake] max_force_kn or effort"
     );
-    let run = Example::new(&[("traction_handle", "h", "%")], "t,v,h\n0,15,50\n").run();
+    let run = Example::new(&[["traction_handle", "h", "%"]], "t,v,h\n0,15,50\n").run();
     assert_eq!(field(&run, SampleField::TractionForce), [Some(35_000.0)]);
     assert_eq!(run.traction_source, ForceSource::Handle);
 }

@@ -5,9 +5,10 @@ use encoding_rs::{Encoding, UTF_8};
 use super::document::Item;
 use super::encoding;
 use super::error::DatasetError;
-
-/// More lines above the names than any recorder writes.
-const SKIP_ROWS_MAX: f64 = 10_000.0;
+use super::keys::allow;
+use super::keys::dataset::{DECIMAL, DELIMITER, ENCODING, SKIP_ROWS, THOUSANDS as MARK, UNITS_ROW};
+use super::keys::rows::{COLUMN, KEYS, VALUE};
+use super::keys::train_file::ROWS;
 
 /// Marks of a number: before its fraction, and between groups of three digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,10 +47,6 @@ pub struct TextLayout {
 }
 
 impl TextLayout {
-    /// The keys that declare it, in `[dataset]`.
-    pub const KEYS: [&str; 6] =
-        ["encoding", "delimiter", "decimal", "thousands", "skip_rows", "units_row"];
-
     /// CSV as programs write it: names, then rows, with commas between the cells and points in numbers.
     pub const PLAIN: TextLayout = TextLayout {
         encoding: UTF_8,
@@ -62,53 +59,36 @@ impl TextLayout {
 
     /// Reads the keys of `[dataset]`; what is left out is plain.
     pub(super) fn of(section: &Item) -> Result<Self, DatasetError> {
-        let mut layout =
-            TextLayout { units_row: section.truth("units_row")?.unwrap_or(false), ..Self::PLAIN };
-        let (words, usual) = (("encoding", "the name of an encoding"), encoding::USUAL);
-        let encoding = section.named_under("encoding", words, encoding::by_name, usual)?;
+        let units_row = section.truth(UNITS_ROW.name)?.unwrap_or(false);
+        let mut layout = TextLayout { units_row, ..Self::PLAIN };
+        let encoding = ENCODING.named(section, "encoding", encoding::by_name, encoding::USUAL)?;
         layout.encoding = encoding.unwrap_or(UTF_8);
-        if let Some(mark) = section.quoted("delimiter")? {
+        if let Some(mark) = DELIMITER.quoted(section)? {
             layout.delimiter = match mark.as_bytes() {
                 &[mark] if mark.is_ascii() && !b"\"\r\n".contains(&mark) => mark,
-                _ => {
-                    let allowed = "one ASCII character, as \",\" \";\" or \"\\t\"";
-                    return Err(section.key_out_of_range(
-                        "delimiter",
-                        &format!("{mark:?}"),
-                        allowed,
-                    ));
-                }
+                _ => return Err(DELIMITER.refused(section, format_args!("{mark:?}"))),
             };
         }
-        if let Some(mark) = section.quoted("decimal")? {
+        if let Some(mark) = DECIMAL.quoted(section)? {
             layout.decimal = match mark {
                 "." => b'.',
                 "," => b',',
-                _ => {
-                    let found = format!("{mark:?}");
-                    return Err(section.key_out_of_range("decimal", &found, "\".\" or \",\""));
-                }
+                _ => return Err(DECIMAL.refused(section, format_args!("{mark:?}"))),
             };
         }
-        if let Some(text) = section.quoted("thousands")? {
+        if let Some(text) = MARK.quoted(section)? {
             let mark =
                 Some(text).filter(|it| it.chars().count() == 1).and_then(|it| it.chars().next());
             let is_other =
                 |mark: &char| *mark != char::from(layout.decimal) && THOUSANDS.contains(mark);
-            layout.thousands = Some(mark.filter(is_other).ok_or_else(|| {
-                let allowed =
-                    "a point, a comma, an apostrophe or a space, other than the decimal mark";
-                section.key_out_of_range("thousands", &format!("{text:?}"), allowed)
-            })?);
+            let refused = || MARK.refused(section, format_args!("{text:?}"));
+            layout.thousands = Some(mark.filter(is_other).ok_or_else(refused)?);
         }
-        let is_allowed = |rows: f64| (0.0..=SKIP_ROWS_MAX).contains(&rows) && rows.fract() == 0.0;
-        let rows =
-            section.checked_under("skip_rows", "a number of lines, 0 to 10000", is_allowed)?;
-        layout.skip_rows = rows.unwrap_or(0.0) as usize;
+        layout.skip_rows = SKIP_ROWS.number(section)?.unwrap_or(0.0) as usize;
         // A comma between the digits of a quoted cell separates no cells.
         if layout.delimiter == layout.decimal && layout.decimal != b',' {
             let allowed = "another mark than the delimiter";
-            return Err(section.key_out_of_range("decimal", "\".\"", allowed));
+            return Err(section.key_out_of_range(DECIMAL.name, "\".\"", allowed));
         }
         Ok(layout)
     }
@@ -121,5 +101,47 @@ impl TextLayout {
     /// Lines above the first row of values.
     pub fn lines_above(&self) -> usize {
         self.skip_rows + 1 + usize::from(self.units_row)
+    }
+}
+
+/// Its value where all rows are of one train, whatever a column says.
+const ALL: &str = "all";
+
+/// The rows of the runs' files that are the train's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum TrainRows {
+    /// All, unless a column says that they are of several trains.
+    #[default]
+    Unsaid,
+    /// All.
+    All,
+    /// Those with a value in a column.
+    Of {
+        /// The column's name.
+        column: String,
+        /// The cell of this train.
+        value: String,
+    },
+}
+
+impl TrainRows {
+    /// Reads the key of `[train]`.
+    pub(super) fn of(train: &Item) -> Result<Self, DatasetError> {
+        let (key, expected) = (ROWS.name, ROWS.rule.allowed);
+        if !train.has(key) {
+            return Ok(TrainRows::Unsaid);
+        }
+        if !train.need(key, expected)?.is_map() {
+            return match ROWS.need_quoted(train)? {
+                ALL => Ok(TrainRows::All),
+                other => Err(ROWS.refused(train, format_args!("{other:?}"))),
+            };
+        }
+        let section = train.need_table(key)?;
+        allow(&section, KEYS)?;
+        Ok(TrainRows::Of {
+            column: COLUMN.need_quoted(&section)?.trim().into(),
+            value: VALUE.need_quoted(&section)?.trim().into(),
+        })
     }
 }

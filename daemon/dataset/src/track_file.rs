@@ -1,19 +1,25 @@
 //! `track.toml`.
 
-use std::ops::Bound;
-
-use dynocar_model::terms::{gradient, masses, place};
 use dynocar_model::track::{
-    Curve, GradientError, LinearProfile, MassSection, ProfileError, StepProfile, Track, TrackError,
-    TrackSurvey, Tunnel,
+    GradientError, IntervalValue, LinearProfile, MassSection, ProfileError, StepProfile, Track,
+    TrackCurve, TrackError, TrackSurvey, Tunnel,
 };
+use dynocar_model::train::NumberRule;
 
-use super::document::{Entries, Item, above_zero};
+use super::document::{Entries, Item};
 use super::error::{DatasetError, SourcePosition};
+use super::keys::track::{
+    ALIGNMENT, ALIGNMENT_FALLING, CURVES, GRADIENT, GRADIENT_ERROR, GRADIENT_ERROR_FALLING,
+    GRADIENT_FALLING, GRADIENT_SHIFT, GRADIENT_STD, KEYS, LENGTH, MASSES, NAME, PERMITTED_SPEED,
+    RESISTANCE, STOPS, TABLE, TUNNELS,
+};
+use super::keys::{FileKey, allow};
 use super::node::Node;
 
-/// A steeper gradient in ‰ than any adhesion railway has is a mistake of unit.
-const GRADIENT_MAX_PERMILLE: f64 = 150.0;
+/// A steeper gradient than any adhesion railway has is a mistake of unit.
+const GRADIENTS: NumberRule = NumberRule::within(-150.0, 150.0, "from -150 to 150 permille");
+const GRADIENT_STDS: NumberRule = NumberRule::within(0.0, 150.0, "from 0 to 150 permille");
+const SPEEDS: NumberRule = NumberRule::above(0.0, 200.0, "a speed in m/s above 0, at most 200");
 /// How a line is called that nobody named.
 const UNNAMED: &str = "unnamed line";
 
@@ -25,44 +31,30 @@ const UNNAMED: &str = "unnamed line";
 pub fn parse_track(label: &str, text: &str) -> Result<Track, DatasetError> {
     let document = Node::of_toml(label, text)?;
     let root = Item::root(label, &document);
-    root.allow(&["track"])?;
-    let Some(section) = root.table("track")? else {
+    root.allow(&[TABLE])?;
+    let Some(section) = root.table(TABLE)? else {
         let unknown = Track::new(UNNAMED.into(), None, None, None, None);
         return unknown.map_err(|error| root.wrong(error));
     };
-    section.allow(&[
-        "name",
-        "length_m",
-        "gradient",
-        gradient::SHIFT,
-        gradient::ERROR,
-        gradient::ERROR_FALLING,
-        "curves",
-        "tunnels",
-        place::LIST,
-        masses::LIST,
-        "gradient_falling",
-        "gradient_std",
-        "stops",
-        "permitted_speed",
-        "alignment",
-        "alignment_falling",
-    ])?;
-    let length_m = section.checked_under("length_m", "a length in m above 0", |it| it > 0.0)?;
-    let gradient = pairs(&section, "gradient", PERMILLE, &gradients(-GRADIENT_MAX_PERMILLE))?;
-    let curves = section.entries::<3>("curves", "[start_m, end_m, radius_m]")?;
-    let tunnels = section.entries::<2>("tunnels", "[start_m, end_m]")?;
-    let name = section.quoted("name")?.unwrap_or(UNNAMED).into();
+    allow(&section, KEYS)?;
+    let length_m = LENGTH.number(&section)?;
+    let gradient = pairs(&section, &GRADIENT, &GRADIENTS)?;
+    let curves = CURVES.entries::<3>(&section)?;
+    let tunnels = TUNNELS.entries::<2>(&section)?;
+    let name = NAME.quoted(&section)?.unwrap_or(UNNAMED).into();
     let profile = gradient.as_ref().map(|(list, _)| &list[..]);
     let to_curve =
-        |&([start_m, end_m, radius_m], _): &([f64; 3], _)| Curve { start_m, end_m, radius_m };
+        |&([start_m, end_m, radius_m], _): &([f64; 3], _)| TrackCurve { start_m, end_m, radius_m };
     let to_tunnel = |&([start_m, end_m], _): &([f64; 2], _)| Tunnel { start_m, end_m };
     let of_curves = curves.as_ref().map(|list| list.iter().map(to_curve).collect());
     let of_tunnels = tunnels.as_ref().map(|list| list.iter().map(to_tunnel).collect());
     let track = Track::new(name, length_m, profile, of_curves, of_tunnels).map_err(|error| {
         let gradient = gradient.map_or_else(Vec::new, |(_, entries)| entries);
-        let starts =
-            [("gradient", gradient), ("curves", placed(curves)), ("tunnels", placed(tunnels))];
+        let starts = [
+            (GRADIENT.name, gradient),
+            (CURVES.name, placed(curves)),
+            (TUNNELS.name, placed(tunnels)),
+        ];
         place_of(&error, &starts, &section).problem(error)
     })?;
     with_survey(with_corrections(track, &section)?, &section)
@@ -79,9 +71,9 @@ fn placed<const N: usize>(entries: Option<Entries<N>>) -> Placed {
 fn place_of(error: &TrackError, lists: &[(&str, Placed); 3], section: &Item) -> SourcePosition {
     let entries = |name: &str| lists.iter().find(|(list, _)| *list == name).map(|(_, it)| &it[..]);
     let (name, index) = match error {
-        TrackError::Gradient(error) => ("gradient", index_of(error)),
-        TrackError::PermittedSpeed(error) => ("permitted_speed", index_of(error)),
-        TrackError::BadRadius { index, .. } => ("curves", Some(*index)),
+        TrackError::Gradient(error) => (GRADIENT.name, index_of(error)),
+        TrackError::PermittedSpeed(error) => (PERMITTED_SPEED.name, index_of(error)),
+        TrackError::BadRadius { index, .. } => (CURVES.name, Some(*index)),
         TrackError::BadInterval { list, index, .. } => (*list, Some(*index)),
         TrackError::Overlap { list, index, .. } => {
             // The error counts by chainage; the file may be in another order.
@@ -105,94 +97,75 @@ fn index_of(error: &ProfileError) -> Option<usize> {
     }
 }
 
-const PERMILLE: &str = "[chainage_m, permille]";
-
-/// Which values a list may hold, and in words.
-type Allowed = (String, (Bound<f64>, Bound<f64>));
-
-fn gradients(low: f64) -> Allowed {
-    let allowed = format!("from {low} to {GRADIENT_MAX_PERMILLE} permille");
-    (allowed, (Bound::Included(low), Bound::Included(GRADIENT_MAX_PERMILLE)))
-}
-
 /// A list of pairs of chainage in m and an allowed value, with the place of each.
 #[expect(clippy::type_complexity, reason = "a list and its places, taken apart at once")]
 fn pairs<'t>(
     section: &Item<'t>,
-    key: &str,
-    form: &str,
-    (words, range): &Allowed,
+    key: &FileKey,
+    rule: &NumberRule,
 ) -> Result<Option<(Vec<(f64, f64)>, Placed<'t>)>, DatasetError> {
-    let Some(entries) = section.entries::<2>(key, form)? else { return Ok(None) };
-    let entries = entries.into_iter().map(|([at_m, value], entry)| {
-        Ok(((at_m, entry.within(value, words, *range)?), (at_m, entry)))
-    });
+    let Some(entries) = key.entries::<2>(section)? else { return Ok(None) };
+    let entries = entries
+        .into_iter()
+        .map(|([at_m, value], entry)| Ok(((at_m, entry.within(value, rule)?), (at_m, entry))));
     entries.collect::<Result<_, DatasetError>>().map(Some)
 }
 
 /// Adds what a survey knows besides the profile.
 fn with_survey(mut track: Track, section: &Item) -> Result<Track, DatasetError> {
     type Wrap = fn(ProfileError) -> TrackError;
-    let profile = |key: &str, form, allowed: Allowed, wrap: Wrap| {
-        let Some((list, entries)) = pairs(section, key, form, &allowed)? else { return Ok(None) };
+    let profile = |key: &FileKey, rule: &NumberRule, wrap: Wrap| {
+        let Some((list, entries)) = pairs(section, key, rule)? else { return Ok(None) };
         StepProfile::new(&list).map(Some).map_err(|error| {
             let entry = index_of(&error).and_then(|index| entries.get(index - 1));
-            let place = entry.map_or_else(|| section.place_of(key), |(_, entry)| entry.place());
+            let place = entry.map_or_else(|| section.place_of(key.name), |(_, it)| it.place());
             place.problem(wrap(error))
         })
     };
-    let gradient =
-        |key: &str, low: f64| profile(key, PERMILLE, gradients(low), TrackError::Gradient);
-    let speeds = ("a speed in m/s above 0, at most 200".into(), above_zero(200.0));
     let stop = |items: &[Item]| {
         let [at, name] = items else { return None };
         Some((at.number("", ..).ok()?, name.as_quoted()?.to_owned()))
     };
-    let stops = section.entries_as("stops", "[chainage_m, \"name\"]", stop)?;
-    let permitted = "permitted_speed";
+    let stops = section.entries_as(STOPS.name, STOPS.rule.allowed, stop)?;
     track.survey = TrackSurvey {
-        gradient_falling: gradient("gradient_falling", -GRADIENT_MAX_PERMILLE)?,
-        gradient_std_permille: gradient("gradient_std", 0.0)?,
+        gradient_falling: profile(&GRADIENT_FALLING, &GRADIENTS, TrackError::Gradient)?,
+        gradient_std_permille: profile(&GRADIENT_STD, &GRADIENT_STDS, TrackError::Gradient)?,
         stops: stops.into_iter().flatten().map(|(stop, _)| stop).collect(),
-        permitted_speed_mps: profile(
-            permitted,
-            "[chainage_m, speed_mps]",
-            speeds,
-            TrackError::PermittedSpeed,
-        )?,
-        alignment: section.quoted("alignment")?.map(Into::into),
-        alignment_falling: section.quoted("alignment_falling")?.map(Into::into),
+        permitted_speed_mps: profile(&PERMITTED_SPEED, &SPEEDS, TrackError::PermittedSpeed)?,
+        alignment: ALIGNMENT.quoted(section)?.map(Into::into),
+        alignment_falling: ALIGNMENT_FALLING.quoted(section)?.map(Into::into),
     };
     Ok(track)
 }
 
 /// Adds what measured runs have shown of the line: resistance at places, other masses in sections.
 fn with_corrections(mut track: Track, section: &Item) -> Result<Track, DatasetError> {
-    let shift = "a shift in m from -10000 to 10000";
-    if let Some(shift_m) = section.optional(gradient::SHIFT, shift, -1e4..=1e4)? {
+    if let Some(shift_m) = GRADIENT_SHIFT.number(section)? {
         track.gradient_shift_m = shift_m;
     }
-    let falling = gradient_error(section, gradient::ERROR_FALLING)?;
-    match (gradient_error(section, gradient::ERROR)?, falling) {
+    let falling = gradient_error(section, &GRADIENT_ERROR_FALLING)?;
+    match (gradient_error(section, &GRADIENT_ERROR)?, falling) {
         (Some(profile), falling) => {
             track.gradient_error = Some(GradientError { profile, falling });
         }
         (None, Some(_)) => {
-            let allowed = "the list gradient_error with it, for growing chainage";
-            let found = "without gradient_error";
-            return Err(section.key_out_of_range(gradient::ERROR_FALLING, found, allowed));
+            let of = GRADIENT_ERROR.name;
+            let allowed = format!("the list {of} with it, for growing chainage");
+            let found = format!("without {of}");
+            return Err(section.key_out_of_range(GRADIENT_ERROR_FALLING.name, &found, &allowed));
         }
         (None, None) => {}
     }
-    if let Some(entries) = section.entries::<3>(place::LIST, "[start_m, end_m, extra N/kN]")? {
-        let places: Vec<_> =
-            entries.iter().map(|([from, to, extra], _)| (*from, *to, *extra)).collect();
+    if let Some(entries) = RESISTANCE.entries::<3>(section)? {
+        let places: Vec<IntervalValue> = entries
+            .iter()
+            .map(|&([start_m, end_m, value], _)| IntervalValue { start_m, end_m, value })
+            .collect();
         track = track
             .with_resistance(&places)
-            .map_err(|error| section.place_of(place::LIST).problem(error))?;
+            .map_err(|error| section.place_of(RESISTANCE.name).problem(error))?;
     }
-    const MASSES: &str = "[from_m, to_m, direction (1 or -1), mass factor]";
-    for (numbers, entry) in section.entries::<4>(masses::LIST, MASSES)?.into_iter().flatten() {
+    for (numbers, entry) in MASSES.entries::<4>(section)?.into_iter().flatten() {
         let [from_m, to_m, direction, mass_factor] = numbers;
         let is_sound =
             from_m < to_m && direction.abs() == 1.0 && (0.1..=10.0).contains(&mass_factor);
@@ -207,10 +180,10 @@ fn with_corrections(mut track: Track, section: &Item) -> Result<Track, DatasetEr
 }
 
 /// Reads the error of the declared gradient, in one of its lists.
-fn gradient_error(section: &Item, name: &str) -> Result<Option<LinearProfile>, DatasetError> {
-    let Some(entries) = section.entries::<2>(name, PERMILLE)? else { return Ok(None) };
+fn gradient_error(section: &Item, key: &FileKey) -> Result<Option<LinearProfile>, DatasetError> {
+    let Some(entries) = key.entries::<2>(section)? else { return Ok(None) };
     let entries = entries.into_iter().map(|([at_m, permille], _)| (at_m, permille)).collect();
-    let refused = |error| section.place_of(name).problem(TrackError::Gradient(error));
+    let refused = |error| section.place_of(key.name).problem(TrackError::Gradient(error));
     LinearProfile::new(entries).map(Some).map_err(refused)
 }
 

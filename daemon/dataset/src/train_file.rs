@@ -1,28 +1,16 @@
 //! `train.toml`.
 
-use std::ops::RangeInclusive;
+use dynocar_model::train::numbers::{BRAKE_UNITS, FORCE_PER_PRESSURE, FULL_MASS};
+use dynocar_model::train::{EffortCurve, NumberRule, TrainModel};
 
-use dynocar_model::terms::{Key, curve, extra, rotating, tunnel};
-use dynocar_model::train::{BrakeGear, Corrections, Davis, Drive, EffortCurve, TrainModel};
-
-use super::corrections::{read_corrections, read_extra};
-use super::document::{Item, above_zero};
+use super::corrections::read_extra;
+use super::document::Item;
 use super::error::DatasetError;
-use super::friction_brake::{UNIT_STDS, components, friction_brake};
+use super::keys::{self, FileKey, TRAIN_TABLES};
 use super::node::Node;
 
-/// k in the declared curve resistance k/R in N/kN, R in m, unless a train says otherwise.
-pub const CURVE_CONSTANT_DEFAULT_N_PER_KN_M: f64 = 600.0;
-/// Mass of a passenger in kg unless a train says otherwise.
-pub const PASSENGER_MASS_DEFAULT_KG: f64 = 70.0;
-#[rustfmt::skip]
-const BRAKE_KEYS: [&str; 18] = [
-    "max_force_kn", "effort", "cylinder_diameter_mm", "disc_radius_mm", "wheel_radius_mm", "efficiency",
-    "ratio", "friction", "pads", "force_per_pressure_n_per_pa", "release_pressure_pa", "units",
-    "failure_probability", UNIT_STDS[0], UNIT_STDS[1], UNIT_STDS[2], UNIT_STDS[3], UNIT_STDS[4],
-];
-/// Which masses a train and a run of it may have.
-pub(super) const MASS: &str = "a mass in t above 0, at most 100000";
+/// How a train is called that nobody named.
+const UNNAMED: &str = "unnamed train";
 
 /// Reads the text of a `train.toml`; `label` names the file in messages.
 ///
@@ -46,159 +34,116 @@ pub(super) const MASS: &str = "a mass in t above 0, at most 100000";
 pub fn parse_train(label: &str, text: &str) -> Result<TrainModel, DatasetError> {
     let document = Node::of_toml(label, text)?;
     let root = Item::root(label, &document);
-    root.allow(&["train", "resistance", "traction", "brake", "corrections", extra::TABLES])?;
-    let train = root.need_table("train")?;
-    let gamma = &rotating::FACTOR;
-    let keys = ["name", "mass_t", "mass_full_t", "length_m", "cars", gamma.name];
-    train.allow(&[&keys[..], &["passenger_mass_kg"]].concat())?;
-    let resistance = root.need_table("resistance")?;
-    let (traction, drive) = match root.table("traction")? {
-        Some(section) => {
-            section.allow(&[
-                "effort",
-                "efficiency",
-                "auxiliary_power_kw",
-                "power_speed_min_mps",
-            ])?;
-            (effort(&section)?, drive(&section)?)
-        }
-        None => (None, None),
-    };
-    let (brake, brake_gear) = match root.table("brake")? {
-        Some(section) => brake(&section)?,
-        None => (None, BrakeGear::default()),
-    };
-    let mass_t = train.required("mass_t", MASS, above_zero(1e5))?;
-    let full = format!("a mass in t above mass_t, {mass_t}, at most 100000");
-    let mass_full_t = train.optional("mass_full_t", &full, mass_t.next_up()..=1e5)?;
-    let length_m =
-        train.required("length_m", "a length in m above 0, at most 10000", above_zero(1e4))?;
-    let is_count = |cars: f64| (1.0..=1000.0).contains(&cars) && cars.fract() == 0.0;
-    let cars = train.checked_under("cars", "a whole number from 1 to 1000", is_count)?;
-    let passenger = "a mass in kg from 0 to 200";
-    let passenger_kg = train.optional("passenger_mass_kg", passenger, 0.0..=200.0)?;
-    let rotating_mass_factor = train.need(gamma.name, gamma.allowed)?;
-    let rotating_mass_factor =
-        rotating_mass_factor.checked(gamma.allowed, |value| gamma.allows(value))?;
-    let (davis, curve_constant_n_per_kn_m, tunnel_constant_n_per_kn_m) = declared(&resistance)?;
-    let mut model = TrainModel {
-        name: train.quoted("name")?.unwrap_or("unnamed train").into(),
-        mass_kg: mass_t * 1000.0,
-        full_mass_kg: mass_full_t.map(|mass_t| 1000.0 * mass_t),
-        passenger_mass_kg: passenger_kg.unwrap_or(PASSENGER_MASS_DEFAULT_KG),
-        length_m,
-        cars: cars.unwrap_or(1.0) as u32,
-        rotating_mass_factor,
-        resistance: davis,
-        curve_constant_n_per_kn_m,
-        tunnel_constant_n_per_kn_m,
-        traction,
-        brake,
-        drive,
-        brake_gear,
-        corrections: Corrections::NONE,
-        extra: read_extra(&root)?,
-    };
-    if let Some(section) = root.table("corrections")? {
-        read_corrections(&section, &mut model)?;
+    root.allow(&TRAIN_TABLES)?;
+    let mut model = TrainModel { name: UNNAMED.into(), ..TrainModel::UNDECLARED };
+    let train = root.need_table(keys::train::TABLE)?;
+    read_numbers(&train, keys::train::TABLE, keys::train::KEYS, &mut model)?;
+    if let Some(name) = keys::train::NAME.quoted(&train)? {
+        model.name = name.into();
     }
+    if let Some(full_kg) = model.full_mass_kg
+        && full_kg <= model.mass_kg
+    {
+        let key = FileKey::from(&FULL_MASS);
+        return Err(key.refused(&train, full_kg / key.rule.factor));
+    }
+    let resistance = root.need_table(keys::resistance::TABLE)?;
+    read_numbers(&resistance, keys::resistance::TABLE, keys::resistance::KEYS, &mut model)?;
+    if let Some(section) = root.table(keys::traction::TABLE)? {
+        read_numbers(&section, keys::traction::TABLE, keys::traction::KEYS, &mut model)?;
+        model.traction = effort(&section, &keys::traction::EFFORT)?;
+    }
+    if let Some(section) = root.table(keys::brake::TABLE)? {
+        read_numbers(&section, keys::brake::TABLE, keys::brake::KEYS, &mut model)?;
+        read_brake(&section, &mut model)?;
+    }
+    if let Some(section) = root.table(keys::corrections::TABLE)? {
+        read_numbers(&section, keys::corrections::TABLE, keys::corrections::KEYS, &mut model)?;
+    }
+    model.extra = read_extra(&root)?;
     Ok(model)
 }
 
-/// Davis coefficients, curve constant and tunnel constant.
-fn declared(section: &Item) -> Result<(Davis, f64, f64), DatasetError> {
-    section.allow(&["a", "b", "c", curve::CONSTANT.name, tunnel::CONSTANT.name])?;
-    // Fitted coefficients may be negative one by one; forces in N instead of N/kN are far out.
-    let davis = Davis {
-        a: section.required("a", "N/kN, from -100 to 100", -100.0..=100.0)?,
-        b: section.required("b", "N/kN per m/s, from -10 to 10", -10.0..=10.0)?,
-        c: section.required("c", "N/kN per (m/s)², from -1 to 1", -1.0..=1.0)?,
-    };
-    let number =
-        |key: &Key| section.checked_under(key.name, key.allowed, |value| key.allows(value));
-    let (curve, tunnel) = (number(&curve::CONSTANT)?, number(&tunnel::CONSTANT)?);
-    Ok((davis, curve.unwrap_or(CURVE_CONSTANT_DEFAULT_N_PER_KN_M), tunnel.unwrap_or(0.0)))
-}
-
-/// The drive that is known by its electric power; `None` where nothing is declared of it.
-fn drive(section: &Item) -> Result<Option<Drive>, DatasetError> {
-    let share = "a share from 0.3 to 1";
-    let efficiency = section.optional("efficiency", share, Drive::EFFICIENCIES)?;
-    let power = "a power in kW from 0 to 2000";
-    let auxiliary_kw = section.optional("auxiliary_power_kw", power, Drive::AUXILIARIES_KW)?;
-    let speed = "a speed in m/s from 0.5 to 20";
-    let speed_min = section.optional("power_speed_min_mps", speed, 0.5..=20.0)?;
-    if efficiency.or(auxiliary_kw).or(speed_min).is_none() {
-        return Ok(None);
+/// Reads the numbers of a table into a train; beside them it holds the other keys.
+fn read_numbers(
+    section: &Item,
+    table: &str,
+    others: &[FileKey],
+    train: &mut TrainModel,
+) -> Result<(), DatasetError> {
+    let numbers = || keys::numbers_of(table);
+    let all: Vec<FileKey> = others.iter().copied().chain(numbers().map(FileKey::from)).collect();
+    keys::allow(section, &all)?;
+    for key in numbers() {
+        if let Some(value) = FileKey::from(key).number(section)? {
+            key.set(train, value);
+        }
     }
-    let usual = Drive::USUAL;
-    Ok(Some(Drive {
-        efficiency: efficiency.unwrap_or(usual.efficiency),
-        auxiliary_power_w: auxiliary_kw.map_or(usual.auxiliary_power_w, |kw| 1e3 * kw),
-        speed_min_mps: speed_min.unwrap_or(usual.speed_min_mps),
-    }))
+    Ok(())
 }
 
-fn brake(section: &Item) -> Result<(Option<EffortCurve>, BrakeGear), DatasetError> {
-    section.allow(&BRAKE_KEYS)?;
-    let max_force_kn = section.optional("max_force_kn", FORCE, FORCES_KN)?;
-    let curve = effort(section)?;
-    if max_force_kn.is_some() && curve.is_some() {
-        return Err(section.exclusive("max_force_kn", "effort"));
+/// Reads what is no single number of a brake, and requires what numbers need beside them.
+fn read_brake(section: &Item, train: &mut TrainModel) -> Result<(), DatasetError> {
+    let (most, curve) = (keys::brake::MAX_FORCE, keys::brake::EFFORT);
+    let most_kn = most.number(section)?;
+    train.brake = effort(section, &curve)?;
+    if most_kn.is_some() && train.brake.is_some() {
+        return Err(section.exclusive(most.name, curve.name));
     }
-    let constant = max_force_kn.and_then(|force| EffortCurve::new(vec![(0.0, force * 1000.0)]));
-    let size =
-        |key| section.optional(key, "a size in mm above 0, at most 2000", above_zero(2000.0));
-    let share = |key| section.optional(key, "above 0, at most 1", above_zero(1.0));
-    let gear = BrakeGear {
-        cylinder_diameter_mm: size("cylinder_diameter_mm")?,
-        disc_radius_mm: size("disc_radius_mm")?,
-        wheel_radius_mm: size("wheel_radius_mm")?,
-        efficiency: share("efficiency")?,
-        ratio: section.optional("ratio", "above 0, at most 100", above_zero(100.0))?,
-        friction: share("friction")?,
-        pads: section.optional("pads", "from 1 to 100000", 1.0..=1e5)?,
-        friction_brake: friction_brake(section)?,
-        components: components(section)?,
-    };
-    Ok((curve.or(constant), gear))
+    if let Some(force_kn) = most_kn {
+        train.brake = EffortCurve::new(vec![(0.0, 1000.0 * force_kn)]);
+    }
+    let gear = &mut train.brake_gear;
+    // A release pressure alone says no force.
+    gear.friction_brake = gear.friction_brake.filter(|_| section.has(FORCE_PER_PRESSURE.name));
+    if gear.components.is_some() {
+        section.need(BRAKE_UNITS.name, BRAKE_UNITS.rule.allowed)?;
+    }
+    Ok(())
 }
-
-const FORCE: &str = "a force in kN from 0 to 10000";
-const FORCES_KN: RangeInclusive<f64> = 0.0..=1e4;
 
 /// The curve under `effort`, from [speed_mps, force kN].
-fn effort<'t>(section: &Item<'t>) -> Result<Option<EffortCurve>, DatasetError> {
-    const KEY: &str = "effort";
-    let Some(entries) = section.entries::<2>(KEY, "[speed_mps, force kN]")? else {
-        return Ok(None);
-    };
+fn effort<'t>(section: &Item<'t>, key: &FileKey) -> Result<Option<EffortCurve>, DatasetError> {
+    let Some(entries) = key.entries::<2>(section)? else { return Ok(None) };
     let point = |([speed_mps, force_kn], entry): ([f64; 2], Item<'t>)| {
-        let speed_mps = entry.within(speed_mps, "a speed in m/s from 0 to 200", 0.0..=200.0)?;
-        let force_kn = entry.within(force_kn, FORCE, FORCES_KN)?;
-        Ok((entry, speed_mps, 1000.0 * force_kn))
+        let speed_mps = entry.within(speed_mps, &SPEED_MPS)?;
+        let force_kn = entry.within(force_kn, &keys::FORCE_KN)?;
+        Ok(EffortEntry { entry, speed_mps, force_n: 1000.0 * force_kn })
     };
-    let points = growing(&section.full(KEY), entries.into_iter().map(point))?;
-    let none = || section.key_out_of_range(KEY, "[]", "at least one [speed_mps, force kN]");
+    let points = growing(&section.full(key.name), entries.into_iter().map(point))?;
+    let none =
+        || section.key_out_of_range(key.name, "[]", &format!("at least one {}", key.rule.allowed));
     EffortCurve::new(points).map(Some).ok_or_else(none)
 }
 
-/// Points of an effort curve, (m/s, N), whose speeds grow, each from where it stands; `key` names the curve.
+const SPEED_MPS: NumberRule = NumberRule::within(0.0, 200.0, "a speed in m/s from 0 to 200");
+
+/// A point of an effort curve, and the entry that it stands in.
+pub struct EffortEntry<'t> {
+    /// The entry.
+    pub entry: Item<'t>,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Force in N.
+    pub force_n: f64,
+}
+
+/// Returns the points of an effort curve, (m/s, N), whose speeds must grow; `key` names the curve.
 ///
 /// # Errors
 ///
 /// At the first that does not follow the one before it.
 pub fn growing<'t>(
     key: &str,
-    points: impl Iterator<Item = Result<(Item<'t>, f64, f64), DatasetError>>,
+    points: impl Iterator<Item = Result<EffortEntry<'t>, DatasetError>>,
 ) -> Result<Vec<(f64, f64)>, DatasetError> {
     let mut grown: Vec<(f64, f64)> = Vec::new();
     for (index, point) in points.enumerate() {
-        let (place, speed_mps, force_n) = point?;
+        let EffortEntry { entry, speed_mps, force_n } = point?;
         if let Some(&(before, _)) = grown.last()
             && speed_mps <= before
         {
-            return Err(place.wrong(format!(
+            return Err(entry.wrong(format!(
                 "{key} entry {}: expected a speed above the one before ({before} m/s), got \
                  {speed_mps} m/s",
                 index + 1
@@ -211,7 +156,7 @@ pub fn growing<'t>(
 
 #[cfg(test)]
 mod tests {
-    use dynocar_model::train::{BrakeComponents, FrictionBrake};
+    use dynocar_model::train::{BrakeComponents, BrakeGear, Davis, FrictionBrake};
 
     use super::*;
 

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::cell::truth;
 use super::error::{DatasetError, SourcePosition};
-use super::lines::{Row, RowReader, below};
+use super::lines::{CellRow, RowReader, below};
 use super::quantity::Quantity;
 use super::run_content::TrainColumn;
 use super::table::Table;
@@ -212,7 +212,7 @@ fn column(
     passes: impl Fn(&str) -> bool,
 ) -> Option<(String, usize)> {
     let text = below("", text, layout.skip_rows).ok()?;
-    let mut names = Row::default();
+    let mut names = CellRow::default();
     RowReader::new(text, layout.delimiter, layout.decimal).read(&mut names);
     let mut names = names.cells.iter().map(|cell| String::from_utf8_lossy(&cell.text));
     let (index, name) = names.by_ref().enumerate().find(|(_, name)| passes(name.trim()))?;
@@ -220,10 +220,10 @@ fn column(
 }
 
 /// Gives every row of values with its line, from 1.
-fn rows(text: &str, layout: &TextLayout, mut take: impl FnMut(&Row, usize)) {
+fn rows(text: &str, layout: &TextLayout, mut take: impl FnMut(&CellRow, usize)) {
     let Ok(text) = below("", text, layout.skip_rows) else { return };
     let mut reader = RowReader::new(text, layout.delimiter, layout.decimal);
-    let mut row = Row::default();
+    let mut row = CellRow::default();
     let mut above = 1 + usize::from(layout.units_row);
     while reader.read(&mut row) {
         if above > 0 {

@@ -8,7 +8,7 @@ use dynocar_shared::{Reason, Status};
 use super::estimators::{self, ESTIMATORS};
 use super::plant::{self, PLANT};
 use super::units;
-use super::variables::{Begins, Interface, Kind, MISSING, Meaning, Variable, Vocabulary};
+use super::variables::{Begins, FmiEnumeration, Interface, Kind, MISSING, Meaning, Variable};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -83,13 +83,16 @@ fn push_types(xml: &mut String) {
 }
 
 /// A vocabulary with the names and numbers of its members.
-type Members = (Vocabulary, Vec<(&'static str, u32)>);
+type Members = (FmiEnumeration, Vec<(&'static str, u32)>);
 
 fn vocabularies() -> [Members; 3] {
     [
-        (Vocabulary::Status, Status::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
-        (Vocabulary::Reason, Reason::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
-        (Vocabulary::Effect, EffectKind::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
+        (FmiEnumeration::Status, Status::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
+        (FmiEnumeration::Reason, Reason::ALL.iter().map(|it| (it.name(), *it as u32)).collect()),
+        (
+            FmiEnumeration::Effect,
+            EffectKind::ALL.iter().map(|it| (it.name(), *it as u32)).collect(),
+        ),
     ]
 }
 

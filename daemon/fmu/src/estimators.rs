@@ -6,7 +6,7 @@ use dynocar_shared::{
     Parameter, ParameterSnapshot, PipelineKind, Quantity, SampleField, TrainSample,
 };
 
-use crate::units::{self, Unit};
+use crate::units::{self, FmiUnit};
 use crate::variables::{
     Interface, Meaning, ModelFile, SnapshotField, Variable, digits, guid, measured, row,
 };
@@ -41,7 +41,7 @@ const fn reported(
     name: &'static str,
     of: PipelineKind,
     reported: SnapshotField,
-    unit: Unit,
+    unit: FmiUnit,
     description: &'static str,
 ) -> Variable {
     row(name, Meaning::Estimate(of, reported), unit, description)

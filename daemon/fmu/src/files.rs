@@ -33,17 +33,17 @@ impl ModelFile {
 
 /// Which files describe train and line.
 #[derive(Clone, Debug)]
-pub struct Files {
+pub struct DescriptionFiles {
     resources: String,
     /// As they were set; empty for the FMU's own.
     train: CString,
     track: CString,
 }
 
-impl Files {
+impl DescriptionFiles {
     /// The FMU's own files at a location, as the simulator names it.
     pub fn of(resources: String) -> Self {
-        Files { resources, train: CString::default(), track: CString::default() }
+        DescriptionFiles { resources, train: CString::default(), track: CString::default() }
     }
 
     /// Where the FMU's own files are.

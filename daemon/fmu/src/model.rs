@@ -8,7 +8,7 @@ use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 
 use crate::error::ModelError;
 use crate::estimators::{ESTIMATORS, Estimators};
-use crate::files::Files;
+use crate::files::DescriptionFiles;
 use crate::inputs::{Inputs, nanoseconds};
 use crate::plant::{
     BEGINNING, STEP_MAX_S, least_step_s, reported, require_drivable, with_beginning,
@@ -54,7 +54,7 @@ enum Behind {
 pub struct Model {
     interface: &'static Interface,
     phase: Phase,
-    files: Files,
+    files: DescriptionFiles,
     inputs: Inputs,
     /// How the driven train begins, and when in s.
     beginning: Beginning,
@@ -72,7 +72,7 @@ impl Model {
         Model {
             interface,
             phase: Phase::Instantiated,
-            files: Files::of(resources),
+            files: DescriptionFiles::of(resources),
             inputs: Inputs::default(),
             beginning: BEGINNING,
             start_s: 0.0,

@@ -8,7 +8,7 @@ use crate::error::ModelError;
 use crate::inputs::Inputs;
 use crate::units;
 use crate::variables::{
-    Begins, Driven, Interface, Meaning, ModelFile, Variable, digits, guid, measured, row,
+    Begins, DrivenValue, Interface, Meaning, ModelFile, Variable, digits, guid, measured, row,
 };
 
 /// The train itself.
@@ -27,7 +27,7 @@ pub(crate) const GUID_DIGITS: [u8; 16] =
     guid::<{ VARIABLES.len() }>(concat!("dynocar_train ", env!("CARGO_PKG_VERSION")), VARIABLES);
 
 const fn force(name: &'static str, part: ForcePart, description: &'static str) -> Variable {
-    row(name, Meaning::Driven(Driven::Force(part)), units::NEWTON, description)
+    row(name, Meaning::Driven(DrivenValue::Force(part)), units::NEWTON, description)
 }
 
 #[rustfmt::skip]
@@ -47,16 +47,16 @@ const VARIABLES: &[Variable] = &[
     measured("curve_radius_m", SampleField::CurveRadius, units::METRE, "Curve radius, 0 on straight track; for lines without a file"),
     row("direction", Meaning::Direction, units::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
 
-    row("motion.speed_mps", Meaning::Driven(Driven::Speed), units::METRE_PER_SECOND, "True speed, never negative"),
-    row("motion.measured_speed_mps", Meaning::Driven(Driven::MeasuredSpeed), units::METRE_PER_SECOND, "Speed as the train's own sensor shows it, by the scale of the speed that was found"),
-    row("motion.position_m", Meaning::Driven(Driven::Position), units::METRE, "Chainage of the train's centre by its own motion"),
-    row("motion.acceleration_mps2", Meaning::Driven(Driven::Acceleration), units::METRE_PER_SECOND_2, "dv/dt, 0 at rest"),
-    row("motion.mass_kg", Meaning::Driven(Driven::Mass), units::KILOGRAM, "Gross mass, with what was found of it"),
+    row("motion.speed_mps", Meaning::Driven(DrivenValue::Speed), units::METRE_PER_SECOND, "True speed, never negative"),
+    row("motion.measured_speed_mps", Meaning::Driven(DrivenValue::MeasuredSpeed), units::METRE_PER_SECOND, "Speed as the train's own sensor shows it, by the scale of the speed that was found"),
+    row("motion.position_m", Meaning::Driven(DrivenValue::Position), units::METRE, "Chainage of the train's centre by its own motion"),
+    row("motion.acceleration_mps2", Meaning::Driven(DrivenValue::Acceleration), units::METRE_PER_SECOND_2, "dv/dt, 0 at rest"),
+    row("motion.mass_kg", Meaning::Driven(DrivenValue::Mass), units::KILOGRAM, "Gross mass, with what was found of it"),
 
     force("force.traction_n", ForcePart::Traction, "Traction force that acts, after the gain and the delay that were found"),
     force("force.brake_n", ForcePart::Brake, "Brake force that acts, after the delay that was found, retarding"),
     force("force.gradient_n", ForcePart::Gradient, "Weight along the gradient, retarding"),
-    row("force.resistance_n", Meaning::Driven(Driven::Resistance), units::NEWTON, "Sum of all that follow, retarding"),
+    row("force.resistance_n", Meaning::Driven(DrivenValue::Resistance), units::NEWTON, "Sum of all that follow, retarding"),
     force("force.basic_n", ForcePart::Basic, "Basic resistance by a, b and c"),
     force("force.curve_n", ForcePart::Curve, "Resistance of curves"),
     force("force.tunnel_n", ForcePart::Tunnel, "Resistance of tunnels"),
@@ -111,16 +111,16 @@ pub(crate) fn least_step_s(train: &DrivenTrain) -> f64 {
 }
 
 /// Returns a value of the train's motion; NaN where nothing has been balanced yet.
-pub(crate) fn reported(train: &DrivenTrain, what: Driven) -> f64 {
+pub(crate) fn reported(train: &DrivenTrain, what: DrivenValue) -> f64 {
     let balance = train.balance();
     match what {
-        Driven::Speed => train.speed_mps(),
-        Driven::MeasuredSpeed => train.measured_speed_mps(),
-        Driven::Position => train.position_m(),
-        Driven::Acceleration => balance.map_or(f64::NAN, |it| it.acceleration_mps2()),
-        Driven::Mass => balance.map_or(f64::NAN, |it| it.mass_kg()),
-        Driven::Force(part) => balance.map_or(f64::NAN, |it| it.force_n(part)),
-        Driven::Resistance => balance.map_or(f64::NAN, |it| it.resistance_n()),
+        DrivenValue::Speed => train.speed_mps(),
+        DrivenValue::MeasuredSpeed => train.measured_speed_mps(),
+        DrivenValue::Position => train.position_m(),
+        DrivenValue::Acceleration => balance.map_or(f64::NAN, |it| it.acceleration_mps2()),
+        DrivenValue::Mass => balance.map_or(f64::NAN, |it| it.mass_kg()),
+        DrivenValue::Force(part) => balance.map_or(f64::NAN, |it| it.force_n(part)),
+        DrivenValue::Resistance => balance.map_or(f64::NAN, |it| it.resistance_n()),
     }
 }
 
@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn every_force_is_reported_under_one_name() {
         for part in ForcePart::ALL {
-            let is_it = |it: &&Variable| it.meaning == Meaning::Driven(Driven::Force(part));
+            let is_it = |it: &&Variable| it.meaning == Meaning::Driven(DrivenValue::Force(part));
             assert_eq!(VARIABLES.iter().filter(is_it).count(), 1, "{part:?}");
         }
     }

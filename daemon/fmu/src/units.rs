@@ -2,48 +2,48 @@
 
 /// A unit and what it is in base units, as the attributes of `BaseUnit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unit {
+pub struct FmiUnit {
     /// Its name; empty for a number without a unit.
     pub name: &'static str,
     /// Exponents of the base units, factor and offset.
     pub base: &'static str,
 }
 
-impl Unit {
+impl FmiUnit {
     const fn new(name: &'static str, base: &'static str) -> Self {
-        Unit { name, base }
+        FmiUnit { name, base }
     }
 }
 
 /// A number without a unit.
-pub const NONE: Unit = Unit::new("", "");
+pub const NONE: FmiUnit = FmiUnit::new("", "");
 /// Length.
-pub const METRE: Unit = Unit::new("m", r#"m="1""#);
+pub const METRE: FmiUnit = FmiUnit::new("m", r#"m="1""#);
 /// Speed.
-pub const METRE_PER_SECOND: Unit = Unit::new("m/s", r#"m="1" s="-1""#);
+pub const METRE_PER_SECOND: FmiUnit = FmiUnit::new("m/s", r#"m="1" s="-1""#);
 /// Acceleration.
-pub const METRE_PER_SECOND_2: Unit = Unit::new("m/s2", r#"m="1" s="-2""#);
+pub const METRE_PER_SECOND_2: FmiUnit = FmiUnit::new("m/s2", r#"m="1" s="-2""#);
 /// Force.
-pub const NEWTON: Unit = Unit::new("N", r#"kg="1" m="1" s="-2""#);
+pub const NEWTON: FmiUnit = FmiUnit::new("N", r#"kg="1" m="1" s="-2""#);
 /// Pressure.
-pub const PASCAL: Unit = Unit::new("Pa", r#"kg="1" m="-1" s="-2""#);
+pub const PASCAL: FmiUnit = FmiUnit::new("Pa", r#"kg="1" m="-1" s="-2""#);
 /// Mass.
-pub const KILOGRAM: Unit = Unit::new("kg", r#"kg="1""#);
+pub const KILOGRAM: FmiUnit = FmiUnit::new("kg", r#"kg="1""#);
 /// Mass, 1000 kg.
-pub const TONNE: Unit = Unit::new("t", r#"kg="1" factor="1000""#);
+pub const TONNE: FmiUnit = FmiUnit::new("t", r#"kg="1" factor="1000""#);
 /// Temperature.
-pub const CELSIUS: Unit = Unit::new("degC", r#"K="1" offset="273.15""#);
+pub const CELSIUS: FmiUnit = FmiUnit::new("degC", r#"K="1" offset="273.15""#);
 /// Gradient, m of height per km.
-pub const PERMILLE: Unit = Unit::new("permille", r#"factor="0.001""#);
+pub const PERMILLE: FmiUnit = FmiUnit::new("permille", r#"factor="0.001""#);
 /// Davis a, and resistance per weight.
-pub const NEWTON_PER_KILONEWTON: Unit = Unit::new("N/kN", r#"factor="0.001""#);
+pub const NEWTON_PER_KILONEWTON: FmiUnit = FmiUnit::new("N/kN", r#"factor="0.001""#);
 /// Davis b.
-pub const DAVIS_B: Unit = Unit::new("N.s/(kN.m)", r#"m="-1" s="1" factor="0.001""#);
+pub const DAVIS_B: FmiUnit = FmiUnit::new("N.s/(kN.m)", r#"m="-1" s="1" factor="0.001""#);
 /// Davis c.
-pub const DAVIS_C: Unit = Unit::new("N.s2/(kN.m2)", r#"m="-2" s="2" factor="0.001""#);
+pub const DAVIS_C: FmiUnit = FmiUnit::new("N.s2/(kN.m2)", r#"m="-2" s="2" factor="0.001""#);
 
 /// Every unit that has a name.
-pub const ALL: [Unit; 12] = [
+pub const ALL: [FmiUnit; 12] = [
     METRE,
     METRE_PER_SECOND,
     METRE_PER_SECOND_2,

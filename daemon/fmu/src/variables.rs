@@ -6,7 +6,7 @@ use dynocar_shared::layout::{FieldLayout, hex_digits, layout_hash};
 use dynocar_shared::{Parameter, PipelineKind, Quantity, SampleField};
 
 use crate::error::ModelError;
-use crate::units::Unit;
+use crate::units::FmiUnit;
 
 /// One of the models in the library, as a simulator sees it.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +111,7 @@ pub enum Begins {
 
 /// Values of the driven train's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Driven {
+pub enum DrivenValue {
     /// True speed.
     Speed,
     /// Speed as the train's own sensor shows it.
@@ -146,7 +146,7 @@ pub enum Meaning {
     /// Parameter: how the driven train begins.
     Begins(Begins),
     /// Output: what the driven train does.
-    Driven(Driven),
+    Driven(DrivenValue),
 }
 
 /// The type of a variable in the standard's sense.
@@ -161,12 +161,12 @@ pub enum Kind {
     /// A text.
     String,
     /// A member of a vocabulary, by its number.
-    Enumeration(Vocabulary),
+    Enumeration(FmiEnumeration),
 }
 
 /// A vocabulary of the project that is an enumeration of the FMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Vocabulary {
+pub enum FmiEnumeration {
     /// Status of the estimate.
     Status,
     /// Why.
@@ -175,13 +175,13 @@ pub enum Vocabulary {
     Effect,
 }
 
-impl Vocabulary {
+impl FmiEnumeration {
     /// The type's name.
     pub const fn name(self) -> &'static str {
         match self {
-            Vocabulary::Status => "Status",
-            Vocabulary::Reason => "Reason",
-            Vocabulary::Effect => "Effect",
+            FmiEnumeration::Status => "Status",
+            FmiEnumeration::Reason => "Reason",
+            FmiEnumeration::Effect => "Effect",
         }
     }
 }
@@ -209,9 +209,9 @@ impl Meaning {
             Meaning::WheelSlide | Meaning::Begins(Begins::HeldAtRest) => Kind::Boolean,
             Meaning::Begins(_) | Meaning::Driven(_) => Kind::Real,
             Meaning::Estimate(_, reported) => match reported {
-                SnapshotField::Status => Kind::Enumeration(Vocabulary::Status),
-                SnapshotField::Reason => Kind::Enumeration(Vocabulary::Reason),
-                SnapshotField::SuspectedEffect => Kind::Enumeration(Vocabulary::Effect),
+                SnapshotField::Status => Kind::Enumeration(FmiEnumeration::Status),
+                SnapshotField::Reason => Kind::Enumeration(FmiEnumeration::Reason),
+                SnapshotField::SuspectedEffect => Kind::Enumeration(FmiEnumeration::Effect),
                 SnapshotField::Usable(_) => Kind::Boolean,
                 SnapshotField::Rejected
                 | SnapshotField::SuspectedEffectNumber
@@ -240,7 +240,7 @@ pub struct Variable {
     /// Meaning of the variable.
     pub meaning: Meaning,
     /// Its unit.
-    pub unit: Unit,
+    pub unit: FmiUnit,
     /// Description in words.
     pub description: &'static str,
 }
@@ -249,7 +249,7 @@ pub struct Variable {
 pub(crate) const fn row(
     name: &'static str,
     meaning: Meaning,
-    unit: Unit,
+    unit: FmiUnit,
     description: &'static str,
 ) -> Variable {
     Variable { name, meaning, unit, description }
@@ -259,7 +259,7 @@ pub(crate) const fn row(
 pub(crate) const fn measured(
     name: &'static str,
     field: SampleField,
-    unit: Unit,
+    unit: FmiUnit,
     description: &'static str,
 ) -> Variable {
     row(name, Meaning::Measured(field), unit, description)

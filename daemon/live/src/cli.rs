@@ -8,7 +8,7 @@ use dynocar::cli::{Failure, carry_out};
 use dynocar::ending;
 use dynocar_recording::cli::WantedArguments;
 
-use crate::live::{Settings, live};
+use crate::live::{LiveSettings, live};
 
 /// Serve samples, snapshots and events live to Foxglove or Lichtblick.
 ///
@@ -43,7 +43,7 @@ pub fn main() -> ExitCode {
 }
 
 fn execute(arguments: &Arguments) -> Result<(), Failure> {
-    let settings = Settings {
+    let settings = LiveSettings {
         wanted: arguments.wanted.wanted()?,
         samples_hz: arguments.samples_hz,
         address: SocketAddr::new(arguments.host, arguments.port),

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use dynocar::output::report_line;
-use dynocar_recording::train_channels::{PAUSE, TrainChannels, Wanted};
+use dynocar_recording::train_channels::{ChannelSelection, PAUSE, TrainChannels};
 use foxglove::{FoxgloveError, WebSocketServerHandle};
 use tokio::runtime::Builder;
 use tokio::time::{sleep, timeout};
@@ -22,9 +22,9 @@ const LEAVE: Duration = Duration::from_secs(1);
 
 /// Settings of the server: contents and address.
 #[derive(Clone, Debug)]
-pub struct Settings {
+pub struct LiveSettings {
     /// Trains and pipelines to read.
-    pub wanted: Wanted,
+    pub wanted: ChannelSelection,
     /// Samples a second that viewers get of each train; every one, when it is 0.
     pub samples_hz: u32,
     /// Where viewers connect to.
@@ -36,7 +36,7 @@ pub struct Settings {
 /// # Errors
 ///
 /// When the address cannot be served or a channel cannot be opened.
-pub fn live(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> {
+pub fn live(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), LiveError> {
     report_viewers();
     // One thread reads and serves by turns: the protocol's library refuses a viewer that subscribes to
     // a channel while it is still being advertised on another thread.
@@ -47,7 +47,7 @@ pub fn live(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> {
     served
 }
 
-async fn serve(settings: &Settings, stop: &AtomicBool) -> Result<(), LiveError> {
+async fn serve(settings: &LiveSettings, stop: &AtomicBool) -> Result<(), LiveError> {
     let mut viewers = Viewers::new(settings.samples_hz)?;
     let mut channels = TrainChannels::open(settings.wanted.clone(), "dynocar-live", &mut viewers)?;
     let server = start(settings.address, &viewers).await?;

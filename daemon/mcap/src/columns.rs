@@ -18,7 +18,7 @@ use crate::topic::Message;
 
 /// Where a column's values come from.
 #[derive(Clone, Copy, Debug)]
-pub enum Source {
+pub enum ColumnSource {
     /// The message's number in the recording.
     Number,
     /// Its `log_time`.
@@ -37,7 +37,7 @@ pub enum Source {
 
 /// A column.
 #[derive(Clone, Debug)]
-pub struct Column {
+pub struct RecordingColumn {
     /// Its name, with the unit.
     pub name: String,
     /// The Rust type of an entry; `string` for a text, `bytes`, `time` for ns since 1970.
@@ -53,12 +53,12 @@ pub struct Column {
     /// Numbers and names, where it holds numbers of a vocabulary.
     pub vocabulary: Option<&'static str>,
     /// Where its values come from.
-    pub source: Source,
+    pub source: ColumnSource,
 }
 
 /// A message of a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Row {
+pub enum RecordingRow {
     /// A sample.
     Sample(TrainSample),
     /// A snapshot.
@@ -68,36 +68,36 @@ pub enum Row {
 }
 
 /// The columns of samples.
-pub static SAMPLES: LazyLock<Vec<Column>> =
+pub static SAMPLES: LazyLock<Vec<RecordingColumn>> =
     LazyLock::new(|| stamps().chain(SAMPLE_FIELDS.iter().filter_map(of_field)).collect());
 
 /// The columns of a pipeline's snapshots.
-pub static SNAPSHOTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
+pub static SNAPSHOTS: LazyLock<Vec<RecordingColumn>> = LazyLock::new(|| {
     let fields = SNAPSHOT_FIELDS.iter().filter_map(of_field);
     let parameters = Parameter::ALL.iter().flat_map(|&it| {
         let name = format!("estimate_{}", it.full_name());
-        let value = plain(name, "f64", it.meaning(), Source::Value(it));
+        let value = plain(name, "f64", it.meaning(), ColumnSource::Value(it));
         let suffixed =
             SUFFIXES.into_iter().enumerate().map(move |(index, (_, word, meaning, _))| {
                 let name = format!("estimate_{}", suffixed_name(it, word));
-                plain(name, "f64", meaning, Source::OfEstimate(it, index))
+                plain(name, "f64", meaning, ColumnSource::OfEstimate(it, index))
             });
         std::iter::once(value).chain(suffixed).map(nullable)
     });
     let rejected = RejectionReason::ALL.iter().map(|&it| {
-        plain(format!("rejected_{}", it.name()), "u32", it.meaning(), Source::Rejected(it))
+        plain(format!("rejected_{}", it.name()), "u32", it.meaning(), ColumnSource::Rejected(it))
     });
     stamps().chain(fields).chain(parameters).chain(rejected).collect()
 });
 
 /// The columns of events.
-pub static EVENTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
+pub static EVENTS: LazyLock<Vec<RecordingColumn>> = LazyLock::new(|| {
     let fields = Event::FIELDS.iter().enumerate().map(|(index, it)| {
         let vocabulary = vocabulary_of_type(it.type_name);
         let type_name = if vocabulary.is_some() { "i32" } else { it.type_name };
         let MessageField { name, meaning, is_optional, .. } = it;
-        let column = plain((*name).to_owned(), type_name, meaning, Source::Event(index));
-        Column { is_nullable: *is_optional, vocabulary, ..column }
+        let column = plain((*name).to_owned(), type_name, meaning, ColumnSource::Event(index));
+        RecordingColumn { is_nullable: *is_optional, vocabulary, ..column }
     });
     stamps().chain(fields).collect()
 });
@@ -105,18 +105,23 @@ pub static EVENTS: LazyLock<Vec<Column>> = LazyLock::new(|| {
 /// Columns before those of a message's fields.
 pub const STAMPS: usize = 2;
 
-fn stamps() -> impl Iterator<Item = Column> {
+fn stamps() -> impl Iterator<Item = RecordingColumn> {
     let number = "The message's place among the recording's, counted from 1.";
     let logged = "When the message was recorded: wall time.";
     [
-        plain("message_number".into(), "u64", number, Source::Number),
-        plain("log_time".into(), "time", logged, Source::LogTime),
+        plain("message_number".into(), "u64", number, ColumnSource::Number),
+        plain("log_time".into(), "time", logged, ColumnSource::LogTime),
     ]
     .into_iter()
 }
 
-fn plain(name: String, type_name: &'static str, meaning: &str, source: Source) -> Column {
-    Column {
+fn plain(
+    name: String,
+    type_name: &'static str,
+    meaning: &str,
+    source: ColumnSource,
+) -> RecordingColumn {
+    RecordingColumn {
         unit: unit_of(&name),
         name,
         type_name,
@@ -128,15 +133,15 @@ fn plain(name: String, type_name: &'static str, meaning: &str, source: Source) -
     }
 }
 
-fn nullable(column: Column) -> Column {
-    Column { is_nullable: true, ..column }
+fn nullable(column: RecordingColumn) -> RecordingColumn {
+    RecordingColumn { is_nullable: true, ..column }
 }
 
 /// The column of a layout's field; `None` for one that is said by others.
-fn of_field(field: &'static Field) -> Option<Column> {
+fn of_field(field: &'static Field) -> Option<RecordingColumn> {
     let name = field.layout.name;
-    let column = plain(name.into(), field.entry_type(), field.meaning, Source::Field(field));
-    let column = Column {
+    let column = plain(name.into(), field.entry_type(), field.meaning, ColumnSource::Field(field));
+    let column = RecordingColumn {
         list: field.is_array().then(|| field.entries()),
         vocabulary: vocabulary_of(name),
         ..column
@@ -148,10 +153,10 @@ fn of_field(field: &'static Field) -> Option<Column> {
     }
 }
 
-impl Column {
+impl RecordingColumn {
     /// A column that stands beside those of messages.
     pub fn beside(name: &str, type_name: &'static str, is_nullable: bool) -> Self {
-        Column { is_nullable, ..plain(name.into(), type_name, "", Source::Number) }
+        RecordingColumn { is_nullable, ..plain(name.into(), type_name, "", ColumnSource::Number) }
     }
 
     /// The type of an entry in Arrow's words.
@@ -189,67 +194,74 @@ impl Column {
 
     /// True for a column that only repeats what others hold.
     pub fn is_repetition(&self) -> bool {
-        matches!(self.source, Source::Value(_) | Source::OfEstimate(..) | Source::Rejected(_))
+        matches!(
+            self.source,
+            ColumnSource::Value(_) | ColumnSource::OfEstimate(..) | ColumnSource::Rejected(_)
+        )
     }
 }
 
-impl Row {
+impl RecordingRow {
     /// The same for whoever writes messages.
     pub fn message(&self) -> Message<'_> {
         match self {
-            Row::Sample(it) => Message::Sample(it),
-            Row::Snapshot(it) => Message::Snapshot(it),
-            Row::Event(it) => Message::Event(it),
+            RecordingRow::Sample(it) => Message::Sample(it),
+            RecordingRow::Snapshot(it) => Message::Snapshot(it),
+            RecordingRow::Event(it) => Message::Event(it),
         }
     }
 
     /// Appends the words of a column that is neither text nor a stamp; gives false where the value is
     /// missing, and then appends as many zeros.
-    pub fn put_words(&self, column: &Column, words: &mut Vec<u64>) -> bool {
+    pub fn put_words(&self, column: &RecordingColumn, words: &mut Vec<u64>) -> bool {
         let one = |words: &mut Vec<u64>, word: Option<u64>| {
             words.push(word.unwrap_or(0));
             word.is_some()
         };
         match (self, column.source) {
-            (Row::Sample(it), Source::Field(field)) => {
+            (RecordingRow::Sample(it), ColumnSource::Field(field)) => {
                 let is_there = match field.missing {
                     Missing::Unless(quantity) => it.valid & quantity.bit() != 0,
                     _ => true,
                 };
                 one(words, is_there.then(|| it.fields()[field.index].word(0)))
             }
-            (Row::Snapshot(it), Source::Field(field)) => {
+            (RecordingRow::Snapshot(it), ColumnSource::Field(field)) => {
                 let entries = it.fields()[field.index];
                 words.extend((0..entries.count()).map(|index| entries.word(index)));
                 true
             }
-            (Row::Snapshot(it), Source::Value(of)) => one(words, it.value(of).map(f64::to_bits)),
-            (Row::Snapshot(it), Source::OfEstimate(of, index)) => {
+            (RecordingRow::Snapshot(it), ColumnSource::Value(of)) => {
+                one(words, it.value(of).map(f64::to_bits))
+            }
+            (RecordingRow::Snapshot(it), ColumnSource::OfEstimate(of, index)) => {
                 let estimate = it.value(of).zip(it.std(of));
                 one(words, estimate.map(|(value, std)| SUFFIXES[index].3(value, std).to_bits()))
             }
-            (Row::Snapshot(it), Source::Rejected(of)) => one(words, Some(it.rejected(of).into())),
-            (Row::Event(it), Source::Event(index)) => one(words, it.word(index)),
+            (RecordingRow::Snapshot(it), ColumnSource::Rejected(of)) => {
+                one(words, Some(it.rejected(of).into()))
+            }
+            (RecordingRow::Event(it), ColumnSource::Event(index)) => one(words, it.word(index)),
             _ => one(words, None),
         }
     }
 
     /// Sets what a column holds; `words` is `None` where the value is missing.
-    pub fn set_words(&mut self, column: &Column, words: Option<&[u64]>) {
+    pub fn set_words(&mut self, column: &RecordingColumn, words: Option<&[u64]>) {
         match (self, column.source, words) {
-            (Row::Sample(it), Source::Field(field), Some(words)) => {
+            (RecordingRow::Sample(it), ColumnSource::Field(field), Some(words)) => {
                 it.fields_mut()[field.index].set_word(0, words[0]);
                 if let Missing::Unless(quantity) = field.missing {
                     it.valid |= quantity.bit();
                 }
             }
-            (Row::Snapshot(it), Source::Field(field), Some(words)) => {
+            (RecordingRow::Snapshot(it), ColumnSource::Field(field), Some(words)) => {
                 let mut fields = it.fields_mut();
                 words.iter().enumerate().for_each(|(index, &word)| {
                     fields[field.index].set_word(index, word);
                 });
             }
-            (Row::Event(it), Source::Event(index), words) => {
+            (RecordingRow::Event(it), ColumnSource::Event(index), words) => {
                 it.set_word(index, words.map(|it| it[0]));
             }
             _ => {}

@@ -1,6 +1,6 @@
 //! Events around samples and snapshots, as messages of a recording.
 
-use dynocar::observing::Change;
+use dynocar::observing::TrainChange;
 use dynocar_shared::TrainId;
 use dynocar_transport::monotonic_now_ns;
 
@@ -33,11 +33,11 @@ message! {
 impl Event {
     /// Of a train, seen now.
     pub fn now(train: TrainId, kind: EventKind, text: String) -> Self {
-        Event::of(train, &Change::new(kind, text))
+        Event::of(train, &TrainChange::new(kind, text))
     }
 
     /// Returns the event of a change of a train, seen now.
-    pub fn of(train: TrainId, change: &Change) -> Self {
+    pub fn of(train: TrainId, change: &TrainChange) -> Self {
         Event {
             monotonic_ns: monotonic_now_ns(),
             train_id: train.0,

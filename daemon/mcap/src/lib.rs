@@ -25,7 +25,6 @@ pub mod columns;
 pub mod copying;
 pub mod error;
 pub mod event;
-pub mod joining;
 pub mod message;
 pub mod reading;
 pub mod recording;

@@ -18,7 +18,7 @@ use crate::schema::{EVENT, SAMPLE, SNAPSHOT, is_described_alike};
 
 /// How a file ends.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ending {
+pub enum FileEnding {
     /// With its index and its last bytes.
     Whole,
     /// Before its end, or damaged.
@@ -32,10 +32,10 @@ pub enum Ending {
     },
 }
 
-impl Ending {
+impl FileEnding {
     /// Where a file breaks off, in words; `None` for a whole one.
     pub fn words(&self, path: &Path) -> Option<String> {
-        let Ending::Broken { read_bytes, file_bytes, reason } = self else { return None };
+        let FileEnding::Broken { read_bytes, file_bytes, reason } = self else { return None };
         let shown = path.display();
         Some(format!(
             "{shown}: breaks off: {read_bytes} of {file_bytes} bytes can be read ({reason})"
@@ -45,7 +45,7 @@ impl Ending {
 
 /// An item of a recording, in the order of writing.
 #[derive(Clone, Debug)]
-pub enum Item<'a> {
+pub enum RecordingItem<'a> {
     /// Names and values.
     Metadata(&'a mcap::records::Metadata),
     /// A file.
@@ -101,7 +101,7 @@ pub trait Visitor {
     /// # Errors
     ///
     /// When nothing more is taken.
-    fn item(&mut self, item: Item<'_>) -> Result<(), Self::Error>;
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), Self::Error>;
 
     /// Takes every message, ours or not, before it is read.
     ///
@@ -117,7 +117,7 @@ pub trait Visitor {
 impl Visitor for () {
     type Error = CopyError;
 
-    fn item(&mut self, _: Item<'_>) -> Result<(), CopyError> {
+    fn item(&mut self, _: RecordingItem<'_>) -> Result<(), CopyError> {
         Ok(())
     }
 }
@@ -132,7 +132,7 @@ const EXPANDED_BYTES: u64 = 256 << 20;
 /// # Errors
 ///
 /// When it is no recording that can be read, or nothing more is taken; a file that breaks off is one.
-pub fn read<V: Visitor>(path: &Path, visitor: &mut V) -> Result<Ending, V::Error> {
+pub fn read<V: Visitor>(path: &Path, visitor: &mut V) -> Result<FileEnding, V::Error> {
     let unreadable = ReadError::of::<std::io::Error>(path);
     let not_mcap = || ReadError::of(path)(ReadProblem::NotMcap).into();
     let mut file = File::open(path).map_err(&unreadable)?;
@@ -150,7 +150,7 @@ pub fn read<V: Visitor>(path: &Path, visitor: &mut V) -> Result<Ending, V::Error
     let mut good = 0;
     let reason = loop {
         match reader.next_event() {
-            None => return Ok(Ending::Whole),
+            None => return Ok(FileEnding::Whole),
             Some(Ok(LinearReadEvent::ReadRequest(need))) => {
                 let read = file.read(reader.insert(need)).map_err(&unreadable)?;
                 reader.notify_read(read);
@@ -169,7 +169,7 @@ pub fn read<V: Visitor>(path: &Path, visitor: &mut V) -> Result<Ending, V::Error
         }
     };
     let reason = reason.to_string();
-    Ok(Ending::Broken { read_bytes: good, file_bytes, reason })
+    Ok(FileEnding::Broken { read_bytes: good, file_bytes, reason })
 }
 
 /// Why reading stops.
@@ -220,11 +220,16 @@ impl Records<'_> {
                 self.messages += 1;
                 return self.message(header, &data, visitor);
             }
-            Record::Metadata(metadata) => visitor.item(Item::Metadata(&metadata)),
+            Record::Metadata(metadata) => visitor.item(RecordingItem::Metadata(&metadata)),
             Record::Attachment { header, data, .. } => {
                 let (name, log_time) = (header.name, header.log_time);
                 let media_type = header.media_type;
-                visitor.item(Item::Attachment { name, log_time, media_type, content: &data })
+                visitor.item(RecordingItem::Attachment {
+                    name,
+                    log_time,
+                    media_type,
+                    content: &data,
+                })
             }
             _ => Ok(()),
         };
@@ -249,14 +254,13 @@ impl Records<'_> {
             };
             match channel.schema.as_ref().map(|it| it.0.as_str()) {
                 Some(SAMPLE) => {
-                    visitor.item(Item::Sample(&decode_sample(data).map_err(malformed)?))
+                    visitor.item(RecordingItem::Sample(&decode_sample(data).map_err(malformed)?))
                 }
-                Some(SNAPSHOT) => {
-                    visitor.item(Item::Snapshot(&decode_snapshot(data).map_err(malformed)?))
-                }
+                Some(SNAPSHOT) => visitor
+                    .item(RecordingItem::Snapshot(&decode_snapshot(data).map_err(malformed)?)),
                 Some(EVENT) => {
                     let event = Event::decode(data).map_err(|error| malformed(error.into()))?;
-                    visitor.item(Item::Event(&event))
+                    visitor.item(RecordingItem::Event(&event))
                 }
                 _ => Ok(()),
             }

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use dynocar_shared::{ParameterSnapshot, TrainSample};
 pub use mcap::records::Metadata;
 
+use crate::copying::read_all;
 use crate::error::{ReadError, ReadProblem};
 use crate::event::Event;
-use crate::joining::read_all;
-use crate::reading::{Item, Raw, Visitor};
+use crate::reading::{Raw, RecordingItem, Visitor};
 
 /// Contents of a recording, each kind in its order.
 #[derive(Debug, Default)]
@@ -36,15 +36,15 @@ pub struct Recording {
 impl Visitor for Recording {
     type Error = ReadError;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), ReadError> {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), ReadError> {
         match item {
-            Item::Metadata(it) => self.metadata.push(it.clone()),
-            Item::Attachment { name, content, .. } => {
+            RecordingItem::Metadata(it) => self.metadata.push(it.clone()),
+            RecordingItem::Attachment { name, content, .. } => {
                 self.attachments.push((name, content.into()));
             }
-            Item::Sample(it) => self.samples.push(*it),
-            Item::Snapshot(it) => self.snapshots.push(*it),
-            Item::Event(it) => self.events.push(it.clone()),
+            RecordingItem::Sample(it) => self.samples.push(*it),
+            RecordingItem::Snapshot(it) => self.snapshots.push(*it),
+            RecordingItem::Event(it) => self.events.push(it.clone()),
         }
         Ok(())
     }
@@ -123,14 +123,14 @@ struct Logged {
 impl Visitor for Logged {
     type Error = ReadError;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), ReadError> {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), ReadError> {
         match item {
-            Item::Sample(_) => self.samples.push(self.log_time),
-            Item::Snapshot(_) | Item::Event(_) if self.keeps_samples_only => {
+            RecordingItem::Sample(_) => self.samples.push(self.log_time),
+            RecordingItem::Snapshot(_) | RecordingItem::Event(_) if self.keeps_samples_only => {
                 self.recording.left_out += 1;
                 return Ok(());
             }
-            Item::Snapshot(_) => self.snapshots.push(self.log_time),
+            RecordingItem::Snapshot(_) => self.snapshots.push(self.log_time),
             _ => {}
         }
         self.recording.item(item)

@@ -3,7 +3,7 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use dynocar_mcap::columns::Column;
+use dynocar_mcap::columns::RecordingColumn;
 use flatbuffers::{FlatBufferBuilder, ForwardsUOffset, UnionWIPOffset, Vector, WIPOffset};
 use parquet::file::metadata::KeyValue;
 
@@ -125,7 +125,7 @@ type Table = WIPOffset<UnionWIPOffset>;
 type Tables = WIPOffset<Vector<'static, ForwardsUOffset<UnionWIPOffset>>>;
 
 /// The schema of a table of ours, each column with its unit, its meaning and the names of its numbers.
-pub fn encoded(columns: &[Column]) -> KeyValue {
+pub fn encoded(columns: &[RecordingColumn]) -> KeyValue {
     let mut bytes = FlatBufferBuilder::new();
     let fields: Vec<Table> = columns.iter().map(|it| field(&mut bytes, it)).collect();
     let fields: Tables = bytes.create_vector(&fields);
@@ -154,7 +154,7 @@ fn table(bytes: &mut Bytes, parts: impl FnOnce(&mut Bytes)) -> Table {
     WIPOffset::new(bytes.end_table(start).value())
 }
 
-fn field(bytes: &mut Bytes, column: &Column) -> Table {
+fn field(bytes: &mut Bytes, column: &RecordingColumn) -> Table {
     let said = [("unit", column.unit), ("meaning", &column.meaning), ("names", &column.names())];
     let said: Vec<Table> = said
         .into_iter()
@@ -201,7 +201,7 @@ fn named(
     })
 }
 
-fn entry_type(bytes: &mut Bytes, column: &Column) -> (u8, Table) {
+fn entry_type(bytes: &mut Bytes, column: &RecordingColumn) -> (u8, Table) {
     match column.type_name {
         "f64" => (types::FLOATING_POINT, table(bytes, |it| it.push_slot_always(slot(0), 2i16))),
         "time" => {

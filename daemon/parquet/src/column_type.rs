@@ -8,7 +8,7 @@ use crate::arrow_schema::Hint;
 
 /// Kind of a column's cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum CellKind {
     /// True or false.
     Truth,
     /// Whole numbers.
@@ -40,13 +40,13 @@ pub enum Kind {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnType {
     /// Its kind.
-    pub kind: Kind,
+    pub kind: CellKind,
     /// Its name, as Arrow has it.
     pub words: String,
 }
 
 impl ColumnType {
-    fn new(kind: Kind, words: impl Into<String>) -> Self {
+    fn new(kind: CellKind, words: impl Into<String>) -> Self {
         ColumnType { kind, words: words.into() }
     }
 
@@ -57,7 +57,7 @@ impl ColumnType {
             1_000_000 => "µs",
             _ => "ns",
         };
-        ColumnType::new(Kind::Time { per_second }, format!("{name}({unit}{zone})"))
+        ColumnType::new(CellKind::Time { per_second }, format!("{name}({unit}{zone})"))
     }
 
     /// The type of a field of a file's schema; `hint` is that of Arrow's schema.
@@ -66,10 +66,11 @@ impl ColumnType {
         let is_repeated =
             info.has_repetition() && info.repetition() == parquet::basic::Repetition::REPEATED;
         match field {
-            Type::GroupType { .. } => ColumnType::new(Kind::Other, nested(field)),
-            Type::PrimitiveType { .. } if is_repeated => {
-                ColumnType::new(Kind::Other, format!("List(non-null {})", plain(field, None).words))
-            }
+            Type::GroupType { .. } => ColumnType::new(CellKind::Other, nested(field)),
+            Type::PrimitiveType { .. } if is_repeated => ColumnType::new(
+                CellKind::Other,
+                format!("List(non-null {})", plain(field, None).words),
+            ),
             Type::PrimitiveType { .. } => plain(field, hint),
         }
     }
@@ -107,22 +108,22 @@ fn plain(field: &Type, hint: Option<Hint>) -> ColumnType {
     let physical = field.get_physical_type();
     let bits = if physical == INT32 { 32 } else { 64 };
     match (physical, said) {
-        (_, Some(LogicalType::Unknown)) => ColumnType::new(Kind::Nothing, "Null"),
-        (BOOLEAN, _) => ColumnType::new(Kind::Truth, "Boolean"),
-        (FLOAT, _) => ColumnType::new(Kind::Float, "Float32"),
-        (DOUBLE, _) => ColumnType::new(Kind::Float, "Float64"),
+        (_, Some(LogicalType::Unknown)) => ColumnType::new(CellKind::Nothing, "Null"),
+        (BOOLEAN, _) => ColumnType::new(CellKind::Truth, "Boolean"),
+        (FLOAT, _) => ColumnType::new(CellKind::Float, "Float32"),
+        (DOUBLE, _) => ColumnType::new(CellKind::Float, "Float64"),
         (INT96, _) => ColumnType::time("Timestamp", 1_000_000_000, ""),
         (INT32 | INT64, Some(LogicalType::Integer(it))) => {
             let sign = if it.is_signed { "" } else { "U" };
             ColumnType::new(
-                Kind::Integer { is_signed: it.is_signed },
+                CellKind::Integer { is_signed: it.is_signed },
                 format!("{sign}Int{}", it.bit_width),
             )
         }
         (_, Some(LogicalType::Decimal(it))) => {
             let bits = if it.precision > 38 { 256 } else { 128 };
             let words = format!("Decimal{bits}({}, {})", it.precision, it.scale);
-            ColumnType::new(Kind::Decimal { scale: it.scale }, words)
+            ColumnType::new(CellKind::Decimal { scale: it.scale }, words)
         }
         (INT32 | INT64, Some(LogicalType::Time(it))) => {
             ColumnType::time(&format!("Time{bits}"), per_second(it.unit), "")
@@ -131,27 +132,27 @@ fn plain(field: &Type, hint: Option<Hint>) -> ColumnType {
             let zone = if it.is_adjusted_to_u_t_c { ", \"UTC\"" } else { "" };
             ColumnType::time("Timestamp", per_second(it.unit), zone)
         }
-        (INT32, Some(LogicalType::Date)) => ColumnType::new(Kind::Other, "Date32"),
+        (INT32, Some(LogicalType::Date)) => ColumnType::new(CellKind::Other, "Date32"),
         (INT32 | INT64, None) => match hint {
             Some(Hint::Time { name: "Time", per_second }) => {
                 ColumnType::time(&format!("Time{bits}"), per_second, "")
             }
             Some(Hint::Time { name, per_second }) => ColumnType::time(name, per_second, ""),
-            Some(Hint::Date) => ColumnType::new(Kind::Other, "Date64"),
-            _ => ColumnType::new(Kind::Integer { is_signed: true }, format!("Int{bits}")),
+            Some(Hint::Date) => ColumnType::new(CellKind::Other, "Date64"),
+            _ => ColumnType::new(CellKind::Integer { is_signed: true }, format!("Int{bits}")),
         },
         (BYTE_ARRAY, Some(LogicalType::String | LogicalType::Json)) => {
-            ColumnType::new(Kind::Text, "Utf8")
+            ColumnType::new(CellKind::Text, "Utf8")
         }
-        (BYTE_ARRAY, _) if hint == Some(Hint::Text) => ColumnType::new(Kind::Text, "Utf8"),
+        (BYTE_ARRAY, _) if hint == Some(Hint::Text) => ColumnType::new(CellKind::Text, "Utf8"),
         (FIXED_LEN_BYTE_ARRAY, Some(LogicalType::Float16)) => {
-            ColumnType::new(Kind::Float, "Float16")
+            ColumnType::new(CellKind::Float, "Float16")
         }
         (FIXED_LEN_BYTE_ARRAY, _) if info.converted_type() == ConvertedType::INTERVAL => {
-            ColumnType::new(Kind::Other, "Interval(DayTime)")
+            ColumnType::new(CellKind::Other, "Interval(DayTime)")
         }
-        (FIXED_LEN_BYTE_ARRAY, _) => ColumnType::new(Kind::Other, "FixedSizeBinary"),
-        _ => ColumnType::new(Kind::Other, "Binary"),
+        (FIXED_LEN_BYTE_ARRAY, _) => ColumnType::new(CellKind::Other, "FixedSizeBinary"),
+        _ => ColumnType::new(CellKind::Other, "Binary"),
     }
 }
 

@@ -7,13 +7,13 @@ use std::fs::File;
 use std::path::Path;
 
 use bytes::Bytes;
-use dynocar_dataset::train_rows::TrainRows;
+use dynocar_dataset::text_layout::TrainRows;
 use dynocar_dataset::trains::names_trains;
 use dynocar_dataset::{ColumnMapping, RunColumn, RunColumns, TrainColumn};
 use dynocar_model::units::{Dimension, Unit};
 use parquet::data_type::FixedLenByteArray;
 
-use crate::column_type::Kind;
+use crate::column_type::CellKind;
 use crate::error::{TableProblem, guarded};
 use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
 
@@ -78,8 +78,10 @@ fn read(
 /// Refuses a column that holds no numbers in a unit.
 fn require_numbers(column: &FileColumn, unit: &Unit) -> Result<(), TableProblem> {
     match column.column_type.kind {
-        Kind::Text | Kind::Other => Err(column.refused("numbers, true and false, or times")),
-        Kind::Time { .. } if unit.dimension() != Dimension::Time => {
+        CellKind::Text | CellKind::Other => {
+            Err(column.refused("numbers, true and false, or times"))
+        }
+        CellKind::Time { .. } if unit.dimension() != Dimension::Time => {
             Err(column.refused(format!("numbers in {}", unit.name())))
         }
         _ => Ok(()),
@@ -92,18 +94,18 @@ fn numbers(file: &ParquetFile, column: &FileColumn, unit: &Unit) -> Result<Vec<f
     // Bytes that do not fit now are asked for again as they come.
     let _ = values.try_reserve_exact(file.rows_reserved());
     let kind = column.column_type.kind;
-    let is_signed = kind != Kind::Integer { is_signed: false };
+    let is_signed = kind != CellKind::Integer { is_signed: false };
     let seconds = Unit::base_of(Dimension::Time);
     let of_count = |count: i64| match kind {
-        Kind::Decimal { scale } => decimal(count, scale),
-        Kind::Time { per_second } => seconds.convert(time_s(count, per_second), unit),
+        CellKind::Decimal { scale } => decimal(count, scale),
+        CellKind::Time { per_second } => seconds.convert(time_s(count, per_second), unit),
         _ if is_signed => count as f64,
         _ => count.cast_unsigned() as f64,
     };
     let of_short =
         |count: i32| of_count(if is_signed { count.into() } else { count.cast_unsigned().into() });
     let of_bytes = |bytes: &[u8]| match (kind, bytes) {
-        (Kind::Decimal { scale }, _) => decimal(digits(bytes), scale),
+        (CellKind::Decimal { scale }, _) => decimal(digits(bytes), scale),
         (_, &[low, high]) => as_written(half(u16::from_le_bytes([low, high]))),
         _ => f64::NAN,
     };
@@ -198,11 +200,11 @@ fn trains(file: &ParquetFile, column: &FileColumn) -> Result<Option<TrainColumn>
         place as f64
     };
     let mut is_text = true;
-    let is_signed = column.is(Kind::Integer { is_signed: true });
+    let is_signed = column.is(CellKind::Integer { is_signed: true });
     match column.column_type.kind {
-        Kind::Text | Kind::Integer { .. } => {}
+        CellKind::Text | CellKind::Integer { .. } => {}
         // Whole numbers of which some are missing are such numbers to pandas.
-        Kind::Float if column.column_type.words == "Float64" => {}
+        CellKind::Float if column.column_type.words == "Float64" => {}
         _ => return Ok(None),
     }
     file.read(column, |part| {

@@ -11,7 +11,7 @@ use std::sync::Once;
 use dynocar_mcap::error::{AtPath, ReadProblem};
 
 /// Why a Parquet file, or a folder of them, cannot be read.
-pub type TableError = AtPath<TableProblem>;
+pub type ParquetFileError = AtPath<TableProblem>;
 
 /// Errors of a Parquet file.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::schema::types::Type;
 
 use crate::arrow_schema::{Hint, hints};
-use crate::column_type::{ColumnType, Kind, is_list};
+use crate::column_type::{CellKind, ColumnType, is_list};
 use crate::error::TableProblem;
 
 pub use parquet::column::reader::ColumnReader;
@@ -40,7 +40,7 @@ pub struct FileColumn {
 }
 
 /// A column in a part of a file's rows.
-pub struct Part {
+pub struct ColumnPart {
     /// Reads its values.
     pub reader: ColumnReader,
     /// The layout of its cells.
@@ -102,14 +102,14 @@ impl ParquetFile {
     pub fn read(
         &self,
         column: &FileColumn,
-        mut take: impl FnMut(Part) -> Result<(), TableProblem>,
+        mut take: impl FnMut(ColumnPart) -> Result<(), TableProblem>,
     ) -> Result<(), TableProblem> {
         for index in 0..self.reader.num_row_groups() {
             let group = self.reader.get_row_group(index).map_err(TableProblem::not_parquet)?;
             let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
             let level = group.metadata().column(column.leaf).column_descr().max_def_level();
             let reader = group.get_column_reader(column.leaf).map_err(TableProblem::not_parquet)?;
-            take(Part { reader, cells: CellLayout { rows, level } })?;
+            take(ColumnPart { reader, cells: CellLayout { rows, level } })?;
         }
         Ok(())
     }
@@ -220,7 +220,7 @@ impl FileColumn {
     }
 
     /// True where its values are of a kind.
-    pub fn is(&self, kind: Kind) -> bool {
+    pub fn is(&self, kind: CellKind) -> bool {
         self.column_type.kind == kind
     }
 }

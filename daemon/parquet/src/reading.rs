@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 
 use dynocar::dataset::is_parquet_path;
 use dynocar::storage::{Disk, settle};
-use dynocar_mcap::columns::{Column, Row, Source};
+use dynocar_mcap::columns::{ColumnSource, RecordingColumn, RecordingRow};
 use dynocar_mcap::error::{ReadProblem, WriteError};
 use dynocar_mcap::recording::{Metadata, Recording};
 use dynocar_mcap::writing::{McapError, RecordingWriter};
 use parquet::data_type::ByteArray;
 
-use crate::error::{TableError, TableProblem, guarded};
+use crate::error::{ParquetFileError, TableProblem, guarded};
 use crate::file::{ColumnReader, FileColumn, ParquetFile, damaged};
 use crate::table::{
     ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachment_columns, metadata_columns,
@@ -27,7 +27,7 @@ pub struct Logged {
     /// When it was recorded, in ns since 1970.
     pub log_time: u64,
     /// The message.
-    pub row: Row,
+    pub row: RecordingRow,
 }
 
 /// An attached file: its name, when it was attached, its content.
@@ -35,7 +35,7 @@ pub type Attached = (String, u64, Vec<u8>);
 
 /// Contents of a recording.
 #[derive(Debug, Default)]
-pub struct Content {
+pub struct ParquetContent {
     /// Its messages, in order.
     pub messages: Vec<Logged>,
     /// Attached files.
@@ -49,25 +49,25 @@ pub struct Content {
 /// # Errors
 ///
 /// Names file and column, and what was expected there.
-pub fn read(path: &Path) -> Result<Content, TableError> {
-    let mut content = Content::default();
+pub fn read(path: &Path) -> Result<ParquetContent, ParquetFileError> {
+    let mut content = ParquetContent::default();
     let mut metadata = BTreeMap::new();
     for file in files(path)? {
         guarded(|| read_file(&file, path.is_dir(), &mut content, &mut metadata))
-            .map_err(TableError::of(&file))?;
+            .map_err(ParquetFileError::of(&file))?;
     }
     content.metadata.extend(metadata.into_values());
     content.messages.sort_by_key(|it| it.number);
-    if !content.messages.iter().any(|it| matches!(it.row, Row::Sample(_))) {
+    if !content.messages.iter().any(|it| matches!(it.row, RecordingRow::Sample(_))) {
         let found = if content.messages.is_empty() { "no message" } else { "snapshots and events" };
         let problem = ReadProblem::NoSamples { found: found.into() };
-        return Err(TableError::of(path)(problem));
+        return Err(ParquetFileError::of(path)(problem));
     }
     Ok(content)
 }
 
 /// The Parquet files of a recording.
-fn files(path: &Path) -> Result<Vec<PathBuf>, TableError> {
+fn files(path: &Path) -> Result<Vec<PathBuf>, ParquetFileError> {
     let listed = || {
         if !std::fs::metadata(path)?.is_dir() {
             return Ok(vec![path.into()]);
@@ -78,13 +78,13 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, TableError> {
         files.sort();
         if files.is_empty() { Err(TableProblem::NotOurs) } else { Ok(files) }
     };
-    listed().map_err(TableError::of(path))
+    listed().map_err(ParquetFileError::of(path))
 }
 
 fn read_file(
     path: &Path,
     is_of_folder: bool,
-    content: &mut Content,
+    content: &mut ParquetContent,
     metadata: &mut BTreeMap<u64, Metadata>,
 ) -> Result<(), TableProblem> {
     let file = ParquetFile::open(File::open(path)?)?;
@@ -146,7 +146,8 @@ fn read_messages(
     table: &TableKind,
     messages: &mut Vec<Logged>,
 ) -> Result<(), TableProblem> {
-    let own: Vec<&Column> = table.columns.iter().filter(|it| !it.is_repetition()).collect();
+    let own: Vec<&RecordingColumn> =
+        table.columns.iter().filter(|it| !it.is_repetition()).collect();
     // Each is there before the first is read.
     let found = own.iter().map(|it| of_file(file, it)).collect::<Result<Vec<_>, _>>()?;
     let first = messages.len();
@@ -159,9 +160,9 @@ fn read_messages(
             let it = &mut messages[row];
             row += 1;
             match (column.source, cell, &mut it.row) {
-                (Source::Number, Cell::Words(words), _) => it.number = words[0],
-                (Source::LogTime, Cell::Words(words), _) => it.log_time = words[0],
-                (_, Cell::Bytes(bytes), Row::Event(event)) => event.text = text(bytes),
+                (ColumnSource::Number, Cell::Words(words), _) => it.number = words[0],
+                (ColumnSource::LogTime, Cell::Words(words), _) => it.log_time = words[0],
+                (_, Cell::Bytes(bytes), RecordingRow::Event(event)) => event.text = text(bytes),
                 (_, Cell::Words(words), row) => row.set_words(column, Some(words)),
                 (_, _, row) => row.set_words(column, None),
             }
@@ -175,7 +176,10 @@ fn text(bytes: &ByteArray) -> String {
 }
 
 /// A file's column, which is refused where it is not there or of another type.
-fn of_file<'f>(file: &'f ParquetFile, expected: &Column) -> Result<&'f FileColumn, TableProblem> {
+fn of_file<'f>(
+    file: &'f ParquetFile,
+    expected: &RecordingColumn,
+) -> Result<&'f FileColumn, TableProblem> {
     let Some(found) = file.columns.iter().find(|it| it.name == expected.name) else {
         let (column, expected) = (expected.name.clone(), expected.arrow_type());
         return Err(TableProblem::NoColumn { column, expected });
@@ -201,7 +205,7 @@ enum Cell<'c> {
 /// Takes the cells of a column, row after row.
 fn each_cell(
     file: &ParquetFile,
-    (expected, found): (&Column, &FileColumn),
+    (expected, found): (&RecordingColumn, &FileColumn),
     mut take: impl FnMut(Cell<'_>),
 ) -> Result<(), TableProblem> {
     let is_signed = expected.type_name.starts_with('i');
@@ -258,7 +262,7 @@ fn each_cell(
 /// The cells of a column, made something else.
 fn cells_of<T>(
     file: &ParquetFile,
-    column: &Column,
+    column: &RecordingColumn,
     mut make: impl FnMut(Cell<'_>) -> T,
 ) -> Result<Vec<T>, TableProblem> {
     let mut cells = Vec::new();
@@ -266,11 +270,14 @@ fn cells_of<T>(
     Ok(cells)
 }
 
-fn numbers_of(file: &ParquetFile, column: &Column) -> Result<Vec<u64>, TableProblem> {
+fn numbers_of(file: &ParquetFile, column: &RecordingColumn) -> Result<Vec<u64>, TableProblem> {
     cells_of(file, column, |it| if let Cell::Words(words) = it { words[0] } else { 0 })
 }
 
-fn bytes_of(file: &ParquetFile, column: &Column) -> Result<Vec<Option<ByteArray>>, TableProblem> {
+fn bytes_of(
+    file: &ParquetFile,
+    column: &RecordingColumn,
+) -> Result<Vec<Option<ByteArray>>, TableProblem> {
     cells_of(
         file,
         column,
@@ -278,16 +285,16 @@ fn bytes_of(file: &ParquetFile, column: &Column) -> Result<Vec<Option<ByteArray>
     )
 }
 
-impl Content {
+impl ParquetContent {
     /// The same as a recording in memory.
     pub fn into_recording(self) -> Recording {
         let mut recording = Recording { metadata: self.metadata, ..Recording::default() };
         recording.attachments = self.attached.into_iter().map(|it| (it.0, it.2)).collect();
         for message in self.messages {
             match message.row {
-                Row::Sample(it) => recording.samples.push(it),
-                Row::Snapshot(it) => recording.snapshots.push(*it),
-                Row::Event(it) => recording.events.push(it),
+                RecordingRow::Sample(it) => recording.samples.push(it),
+                RecordingRow::Snapshot(it) => recording.snapshots.push(*it),
+                RecordingRow::Event(it) => recording.events.push(it),
             }
         }
         recording
@@ -299,7 +306,7 @@ impl Content {
 /// # Errors
 ///
 /// When it cannot be written; then there is no file.
-pub fn write_mcap(content: &Content, path: &Path) -> Result<(), WriteError> {
+pub fn write_mcap(content: &ParquetContent, path: &Path) -> Result<(), WriteError> {
     let file = File::create_new(path).map_err(WriteError::of(path))?;
     let done = write(content, file).and_then(|()| Ok(settle(&Disk, path)?));
     if done.is_err() {
@@ -308,7 +315,7 @@ pub fn write_mcap(content: &Content, path: &Path) -> Result<(), WriteError> {
     done.map_err(WriteError::of(path))
 }
 
-fn write(content: &Content, file: File) -> Result<(), McapError> {
+fn write(content: &ParquetContent, file: File) -> Result<(), McapError> {
     let mut writer = RecordingWriter::copy(BufWriter::new(file))?;
     for it in &content.metadata {
         let pairs = it.metadata.iter().map(|(key, value)| (key.as_str(), value.clone()));

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use dynocar_mcap::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS};
+use dynocar_mcap::columns::{EVENTS, RecordingColumn, RecordingRow, SAMPLES, SNAPSHOTS};
 use dynocar_mcap::event::Event;
 use dynocar_mcap::schema::EVENT;
 use dynocar_shared::{ParameterSnapshot, TrainId, TrainSample};
@@ -27,11 +27,11 @@ pub struct TableKind {
     /// Name under [`KIND`].
     pub name: &'static str,
     /// Its columns.
-    pub columns: &'static LazyLock<Vec<Column>>,
+    pub columns: &'static LazyLock<Vec<RecordingColumn>>,
     /// The layout of its messages.
     pub layout: &'static str,
     /// A message of it without content.
-    pub empty: fn() -> Row,
+    pub empty: fn() -> RecordingRow,
 }
 
 /// The tables of messages.
@@ -40,24 +40,24 @@ pub static TABLES: [TableKind; 3] = [
         name: "samples",
         columns: &SAMPLES,
         layout: TrainSample::WIRE_NAME,
-        empty: || Row::Sample(TrainSample::empty(TrainId(0))),
+        empty: || RecordingRow::Sample(TrainSample::empty(TrainId(0))),
     },
     TableKind {
         name: "snapshots",
         columns: &SNAPSHOTS,
         layout: ParameterSnapshot::WIRE_NAME,
-        empty: || Row::Snapshot(ParameterSnapshot::empty().into()),
+        empty: || RecordingRow::Snapshot(ParameterSnapshot::empty().into()),
     },
     TableKind {
         name: "events",
         columns: &EVENTS,
         layout: EVENT,
-        empty: || Row::Event(Event::default()),
+        empty: || RecordingRow::Event(Event::default()),
     },
 ];
 
 /// A column's type in its file.
-fn parquet_type(column: &Column) -> Result<Type, ParquetError> {
+fn parquet_type(column: &RecordingColumn) -> Result<Type, ParquetError> {
     let repetition = if column.is_nullable { Repetition::OPTIONAL } else { Repetition::REQUIRED };
     let name = if column.list.is_some() { ENTRY } else { &column.name };
     let (physical, logical) = match column.type_name {
@@ -88,27 +88,27 @@ fn parquet_type(column: &Column) -> Result<Type, ParquetError> {
 }
 
 /// The bits of a column's whole numbers, and whether they have a sign.
-pub fn integer(column: &Column) -> (i8, bool) {
+pub fn integer(column: &RecordingColumn) -> (i8, bool) {
     let (sign, bits) = column.type_name.split_at(1);
     (bits.parse().unwrap_or(64), sign == "i")
 }
 
 /// The columns of attached files.
-pub fn attachment_columns() -> [Column; 3] {
+pub fn attachment_columns() -> [RecordingColumn; 3] {
     [
-        Column::beside("name", "string", false),
-        Column::beside("log_time", "time", false),
-        Column::beside("content", "bytes", false),
+        RecordingColumn::beside("name", "string", false),
+        RecordingColumn::beside("log_time", "time", false),
+        RecordingColumn::beside("content", "bytes", false),
     ]
 }
 
 /// The columns of metadata: a row for each pair, and one without a key for a record that has none.
-pub fn metadata_columns() -> [Column; 4] {
+pub fn metadata_columns() -> [RecordingColumn; 4] {
     [
-        Column::beside("record", "u64", false),
-        Column::beside("name", "string", false),
-        Column::beside("key", "string", true),
-        Column::beside("value", "string", true),
+        RecordingColumn::beside("record", "u64", false),
+        RecordingColumn::beside("name", "string", false),
+        RecordingColumn::beside("key", "string", true),
+        RecordingColumn::beside("value", "string", true),
     ]
 }
 
@@ -117,7 +117,7 @@ pub fn metadata_columns() -> [Column; 4] {
 /// # Errors
 ///
 /// None that a caller could cause.
-pub fn file_schema(columns: &[Column]) -> Result<TypePtr, ParquetError> {
+pub fn file_schema(columns: &[RecordingColumn]) -> Result<TypePtr, ParquetError> {
     let fields = columns.iter().map(|it| parquet_type(it).map(Arc::new));
     let fields = fields.collect::<Result<Vec<_>, _>>()?;
     Ok(Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?))

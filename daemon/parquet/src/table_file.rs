@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use dynocar_mcap::columns::Column;
+use dynocar_mcap::columns::RecordingColumn;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
@@ -42,7 +42,7 @@ impl Cells {
 
 /// A file of a table.
 pub struct TableFile {
-    columns: Vec<Column>,
+    columns: Vec<RecordingColumn>,
     writer: SerializedFileWriter<File>,
 }
 
@@ -54,7 +54,7 @@ impl TableFile {
     /// When it cannot be written, or is there already.
     pub fn create(
         path: &Path,
-        columns: Vec<Column>,
+        columns: Vec<RecordingColumn>,
         mut said: Vec<KeyValue>,
     ) -> Result<Self, ParquetError> {
         said.push(encoded(&columns));
@@ -98,7 +98,7 @@ impl TableFile {
 }
 
 fn write_column(
-    column: &Column,
+    column: &RecordingColumn,
     cells: &Cells,
     writer: SerializedColumnWriter,
 ) -> Result<(), ParquetError> {
@@ -112,7 +112,7 @@ fn write_column(
 
 /// Writes the words that are there as numbers.
 fn put_words<T: DataType>(
-    column: &Column,
+    column: &RecordingColumn,
     cells: &Cells,
     number: impl Fn(u64) -> T::T,
     writer: SerializedColumnWriter,
@@ -124,7 +124,7 @@ fn put_words<T: DataType>(
 }
 
 fn put<T: DataType>(
-    column: &Column,
+    column: &RecordingColumn,
     is_there: &[bool],
     values: &[T::T],
     mut writer: SerializedColumnWriter,
@@ -146,7 +146,7 @@ fn put<T: DataType>(
 
 /// Numbers by their differences or by their bytes: dictionaries take numbers for the same that are equal but
 /// not the same to the bit.
-fn properties(columns: &[Column], said: Vec<KeyValue>) -> WriterProperties {
+fn properties(columns: &[RecordingColumn], said: Vec<KeyValue>) -> WriterProperties {
     let mut builder = WriterProperties::builder()
         .set_key_value_metadata(Some(said))
         .set_dictionary_enabled(false)

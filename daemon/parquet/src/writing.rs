@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use dynocar::operator::pipeline_name;
 use dynocar::storage::{Disk, Storage, folder_of, settle};
-use dynocar_mcap::columns::{Column, Row, Source};
+use dynocar_mcap::columns::{ColumnSource, RecordingColumn, RecordingRow};
+use dynocar_mcap::copying::read_all;
 use dynocar_mcap::error::ReadProblem;
 use dynocar_mcap::error::{CopyError, ReadError, WriteError};
-use dynocar_mcap::joining::read_all;
-use dynocar_mcap::reading::{Ending, Item, Raw, Visitor};
+use dynocar_mcap::reading::{FileEnding, Raw, RecordingItem, Visitor};
 use dynocar_mcap::recording::Metadata;
 use dynocar_mcap::schema::{EVENT, SAMPLE, SNAPSHOT};
 use parquet::errors::ParquetError;
@@ -69,7 +69,7 @@ fn written(paths: &[PathBuf], folder: &Path) -> Result<Written, CopyError> {
         written: Written::default(),
     };
     let endings = read_all(paths, &mut tables)?;
-    let is_broken = |it: (&Ending, &PathBuf)| it.0.words(it.1);
+    let is_broken = |it: (&FileEnding, &PathBuf)| it.0.words(it.1);
     tables.written.broken = endings.iter().zip(paths).filter_map(is_broken).collect();
     if tables.written.samples == 0 {
         let found = tables.tables.into_keys().collect::<Vec<_>>().join(", ");
@@ -94,28 +94,28 @@ struct Tables<'p> {
 impl Visitor for Tables<'_> {
     type Error = CopyError;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), CopyError> {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), CopyError> {
         let written = &mut self.written;
         let (count, name, row, kind) = match item {
-            Item::Metadata(it) => {
+            RecordingItem::Metadata(it) => {
                 self.metadata.push(it.clone());
                 return Ok(());
             }
-            Item::Attachment { name, log_time, content, .. } => {
+            RecordingItem::Attachment { name, log_time, content, .. } => {
                 self.attached.push((name, log_time, content.into()));
                 return Ok(());
             }
-            Item::Sample(it) => {
+            RecordingItem::Sample(it) => {
                 let name = format!("samples-{}", it.train_id);
-                (&mut written.samples, name, Row::Sample(*it), &TABLES[0])
+                (&mut written.samples, name, RecordingRow::Sample(*it), &TABLES[0])
             }
-            Item::Snapshot(it) => {
+            RecordingItem::Snapshot(it) => {
                 let pipeline = pipeline_name(it.pipeline_index, it.pipeline_kind());
                 let name = format!("snapshots-{}-{pipeline}", it.train_id);
-                (&mut written.snapshots, name, Row::Snapshot((*it).into()), &TABLES[1])
+                (&mut written.snapshots, name, RecordingRow::Snapshot((*it).into()), &TABLES[1])
             }
-            Item::Event(it) => {
-                (&mut written.events, "events".into(), Row::Event(it.clone()), &TABLES[2])
+            RecordingItem::Event(it) => {
+                (&mut written.events, "events".into(), RecordingRow::Event(it.clone()), &TABLES[2])
             }
         };
         *count += 1;
@@ -198,7 +198,7 @@ fn cells_of_metadata(metadata: &[Metadata]) -> Vec<Cells> {
 
 /// A table that is written.
 struct Table {
-    columns: &'static [Column],
+    columns: &'static [RecordingColumn],
     cells: Vec<Cells>,
     rows: usize,
     file: TableFile,
@@ -206,19 +206,19 @@ struct Table {
 
 impl Table {
     fn new(path: &Path, kind: &TableKind) -> Result<Self, ParquetError> {
-        let columns: &[Column] = kind.columns;
+        let columns: &[RecordingColumn] = kind.columns;
         let said = [(KIND, kind.name), (LAYOUT, kind.layout)];
         let said = said.map(|(key, value)| KeyValue::new(key.to_owned(), value.to_owned()));
         let file = TableFile::create(path, columns.to_vec(), said.into())?;
         Ok(Table { columns, cells: vec![Cells::default(); columns.len()], rows: 0, file })
     }
 
-    fn put(&mut self, number: u64, log_time: u64, row: &Row) -> Result<(), ParquetError> {
+    fn put(&mut self, number: u64, log_time: u64, row: &RecordingRow) -> Result<(), ParquetError> {
         for (column, cells) in self.columns.iter().zip(&mut self.cells) {
             match (column.source, row) {
-                (Source::Number, _) => cells.put_word(number),
-                (Source::LogTime, _) => cells.put_word(log_time),
-                (_, Row::Event(event)) if column.type_name == "string" => {
+                (ColumnSource::Number, _) => cells.put_word(number),
+                (ColumnSource::LogTime, _) => cells.put_word(log_time),
+                (_, RecordingRow::Event(event)) if column.type_name == "string" => {
                     cells.put_bytes(Some(event.text.as_bytes()));
                 }
                 _ => {

@@ -14,9 +14,9 @@ use dynocar::programs::{RECORDING, called_as};
 
 use super::page::page;
 use super::record::{KeepError, RecordError};
+use dynocar_mcap::copying::read_all;
 use dynocar_mcap::copying::recover;
-use dynocar_mcap::joining::read_all;
-use dynocar_mcap::reading::Ending;
+use dynocar_mcap::reading::FileEnding;
 
 pub use record::WantedArguments;
 
@@ -89,8 +89,8 @@ fn execute_recover(arguments: &RecoverArguments) -> Result<(), Failure> {
 }
 
 /// Returns the description of a file's losses, unless the file is whole.
-fn lost((path, ending): (&PathBuf, &Ending)) -> Option<String> {
-    let Ending::Broken { read_bytes, file_bytes, reason } = ending else { return None };
+fn lost((path, ending): (&PathBuf, &FileEnding)) -> Option<String> {
+    let FileEnding::Broken { read_bytes, file_bytes, reason } = ending else { return None };
     let rest = file_bytes.saturating_sub(*read_bytes);
     let path = path.display();
     Some(format!(

@@ -6,8 +6,8 @@ use dynocar_shared::schema::Field;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, Reason, Status};
 
-use dynocar_mcap::annotate::messages::MESSAGES;
-use dynocar_mcap::columns::{Column, EVENTS, SAMPLES, SNAPSHOTS, STAMPS, Source};
+use dynocar_mcap::annotate::MESSAGES;
+use dynocar_mcap::columns::{ColumnSource, EVENTS, RecordingColumn, SAMPLES, SNAPSHOTS, STAMPS};
 use dynocar_mcap::event::{Event, EventKind};
 use dynocar_mcap::message::MessageField;
 use dynocar_mcap::schema::{SAMPLE_FIELDS, SNAPSHOT_FIELDS, SUFFIXES, scalar, vocabulary_of_type};
@@ -54,11 +54,11 @@ pub fn page() -> String {
         PARQUET,
     );
     for column in SNAPSHOTS.iter() {
-        let Source::Value(it) = column.source else { continue };
+        let ColumnSource::Value(it) = column.source else { continue };
         Row { name: it.full_name(), ..Row::of(column) }.put(&mut page, PARQUET, &column.meaning);
     }
     page.push_str(REJECTED);
-    let columns: Vec<&Column> = EVENTS.iter().collect();
+    let columns: Vec<&RecordingColumn> = EVENTS.iter().collect();
     listed(&mut page, Event::NAME, Event::MEANING, Event::FIELDS, &columns[STAMPS..]);
     page.push_str(EXPLANATION);
     for (name, what, fields) in MESSAGES {
@@ -84,7 +84,13 @@ fn table(page: &mut String, name: &str, what: &str, shown: Shown) {
 }
 
 /// A message by the table of its fields, and the columns that they are where they are any.
-fn listed(page: &mut String, name: &str, what: &str, fields: &[MessageField], columns: &[&Column]) {
+fn listed(
+    page: &mut String,
+    name: &str,
+    what: &str,
+    fields: &[MessageField],
+    columns: &[&RecordingColumn],
+) {
     let shown = if columns.is_empty() { MESSAGE } else { PARQUET };
     table(page, &format!("dynocar.{name}"), &plain(what), shown);
     for (index, it) in fields.iter().enumerate() {
@@ -106,7 +112,7 @@ struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    fn of(column: &'a Column) -> Self {
+    fn of(column: &'a RecordingColumn) -> Self {
         let null = if column.is_nullable { ", null" } else { "" };
         let of_type = format!("{}{null}", column.arrow_type());
         Row { name: &column.name, column: of_type, ..Row::default() }
@@ -135,7 +141,12 @@ fn type_of(vocabulary: Option<&str>, type_name: &str) -> String {
     vocabulary.map_or_else(scalar, str::to_owned)
 }
 
-fn layout(page: &mut String, name: &str, what: &str, (fields, columns): (&[Field], &[Column])) {
+fn layout(
+    page: &mut String,
+    name: &str,
+    what: &str,
+    (fields, columns): (&[Field], &[RecordingColumn]),
+) {
     table(page, name, what, ALL);
     for field in fields {
         let shape = if field.is_array() { format!("({},)", field.entries()) } else { "".into() };

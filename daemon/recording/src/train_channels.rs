@@ -9,7 +9,7 @@
 
 use std::time::{Duration, Instant};
 
-use dynocar::observing::{self, Change, ObservedTrain};
+use dynocar::observing::{self, ObservedTrain, TrainChange};
 use dynocar::output::report_line;
 use dynocar_shared::services::{PIPELINES_MAX, SAMPLE_BUFFER};
 use dynocar_shared::{TrainId, TrainSample};
@@ -27,16 +27,16 @@ const LOOK: Duration = Duration::from_millis(200);
 
 /// Selection of trains and pipelines to read.
 #[derive(Clone, Debug)]
-pub struct Wanted {
+pub struct ChannelSelection {
     /// The trains.
-    pub trains: observing::Wanted,
+    pub trains: observing::ObservedSelection,
     /// A pipeline's snapshot is taken when the last is so old, or its status is another.
     pub snapshot_interval: Duration,
 }
 
 /// The trains that are read.
 pub struct TrainChannels {
-    wanted: Wanted,
+    wanted: ChannelSelection,
     name: &'static str,
     channels: Vec<TrainChannel>,
     looked: Option<Instant>,
@@ -49,7 +49,7 @@ impl TrainChannels {
     ///
     /// When a channel cannot be opened or all its places are taken.
     pub fn open<S: Sink>(
-        wanted: Wanted,
+        wanted: ChannelSelection,
         name: &'static str,
         sink: &mut S,
     ) -> Result<Self, S::Error> {
@@ -86,7 +86,7 @@ impl TrainChannels {
     }
 
     fn add<S: Sink>(&mut self, train: TrainId, sink: &mut S) -> Result<(), S::Error> {
-        let Wanted { trains, snapshot_interval } = &self.wanted;
+        let ChannelSelection { trains, snapshot_interval } = &self.wanted;
         let channel = TrainChannel::open(&trains.host, train, *snapshot_interval, self.name)?;
         self.channels.push(channel);
         sink.opened(train)
@@ -256,7 +256,7 @@ impl TrainChannel {
         let is_absent = self.observed.controller().is_none();
         // One that came and went between two looks is gone too.
         if was_driven && was_absent && is_absent {
-            changes.push(Change::new(EventKind::ControllerGone, "no controller".into()));
+            changes.push(TrainChange::new(EventKind::ControllerGone, "no controller".into()));
         }
         for change in changes {
             match change.kind {

@@ -11,14 +11,15 @@ use dynocar_shared::TrainId;
 use super::Failure;
 use super::text::short;
 use crate::config::DaemonConfig;
-use crate::models::decision::Choice;
+use crate::models::decision::ModelChoice;
 use crate::models::difference::differences;
-use crate::models::history::{History, State};
+use crate::models::history::{ModelHistory, State};
 use crate::models::{
-    Figure, ModelHash, ModelText, ModelsError, Moment, NewDecision, Store, Stored, TrainModels,
+    ModelFigure, ModelHash, ModelText, ModelsError, NewDecision, Store, Stored, TrainModels,
+    UtcSecond,
 };
 use crate::output::{print, report_line};
-use crate::shadow::record::{Trials, Tried, ratio_in_words};
+use crate::shadow::record::{TrialRecord, TriedModel, ratio_in_words};
 
 /// The store where none is named.
 const DEFAULT_STORE: &str = "models";
@@ -92,7 +93,7 @@ struct Signed {
 /// A model or train that is not there is an input failure.
 pub fn execute(arguments: &ModelsArguments) -> Result<(), Failure> {
     let models = chosen(arguments)?;
-    let history = History::of(&models).map_err(failure)?;
+    let history = ModelHistory::of(&models).map_err(failure)?;
     let find = |name: &str| found(&history, name);
     let text = match &arguments.command {
         ModelsCommand::List => {
@@ -111,11 +112,11 @@ pub fn execute(arguments: &ModelsArguments) -> Result<(), Failure> {
             diff((one, &text(one)?), (other, &text(other)?))
         }
         ModelsCommand::Adopt { model, signed } => {
-            decide(&models, Choice::Adopt(find(model)?.0.hash), signed)?
+            decide(&models, ModelChoice::Adopt(find(model)?.0.hash), signed)?
         }
-        ModelsCommand::Rollback(signed) => decide(&models, Choice::RollBack, signed)?,
+        ModelsCommand::Rollback(signed) => decide(&models, ModelChoice::RollBack, signed)?,
         ModelsCommand::Reject { model, signed } => {
-            decide(&models, Choice::Reject(find(model)?.0.hash), signed)?
+            decide(&models, ModelChoice::Reject(find(model)?.0.hash), signed)?
         }
     };
     Ok(print(&text)?)
@@ -165,7 +166,7 @@ fn chosen(arguments: &ModelsArguments) -> Result<TrainModels, Failure> {
 }
 
 /// The model that a name means.
-fn found<'h>(history: &'h History, name: &str) -> Result<&'h (Stored, State), Failure> {
+fn found<'h>(history: &'h ModelHistory, name: &str) -> Result<&'h (Stored, State), Failure> {
     let is_meant = |(stored, _): &&(Stored, State)| match name {
         "in-force" => history.in_force == Some(stored.hash),
         "declared" => stored.origin.parent.is_none(),
@@ -184,7 +185,7 @@ fn found<'h>(history: &'h History, name: &str) -> Result<&'h (Stored, State), Fa
     }
 }
 
-fn list(models: &TrainModels, history: &History) -> String {
+fn list(models: &TrainModels, history: &ModelHistory) -> String {
     let mut text = format!(
         "train {}\n{:16}  {:20}  {:9}  {:17}  adds\n",
         models.train(),
@@ -193,7 +194,7 @@ fn list(models: &TrainModels, history: &History) -> String {
         "state",
         "error held out"
     );
-    let trials = Trials::read(models.folder());
+    let trials = TrialRecord::read(models.folder());
     for (stored, state) in &history.models {
         let origin = &stored.origin;
         let on_trial = trials.of(stored.hash).filter(|tried| tried.against.is_some());
@@ -251,11 +252,11 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
     for file in files {
         row("file", &file.display().to_string());
     }
-    text + &trial(&Trials::read(models.folder()), stored.hash)
+    text + &trial(&TrialRecord::read(models.folder()), stored.hash)
 }
 
 /// Describes the daemon's measurements of a model in its trial; empty without a trial.
-fn trial(trials: &Trials, hash: ModelHash) -> String {
+fn trial(trials: &TrialRecord, hash: ModelHash) -> String {
     let Some(tried) = trials.of(hash) else { return String::new() };
     let mut text = String::new();
     let mut row = |name: &str, value: String| {
@@ -270,7 +271,7 @@ fn trial(trials: &Trials, hash: ModelHash) -> String {
         let values = estimate
             .values
             .iter()
-            .map(|(name, value, std)| Figure { value: *value, std: *std }.shown(name));
+            .map(|(name, value, std)| ModelFigure { value: *value, std: *std }.shown(name));
         let values = values.collect::<Vec<_>>().join(", ");
         let suspects = match estimate.suspects.as_str() {
             "" => String::new(),
@@ -282,7 +283,7 @@ fn trial(trials: &Trials, hash: ModelHash) -> String {
 }
 
 /// A model's error over that of the one in force, with what speaks for it.
-fn compared(tried: &Tried) -> String {
+fn compared(tried: &TriedModel) -> String {
     let (trips, e_value) = (tried.evidence.trips(), tried.evidence.e_value());
     let evidence = if e_value < 1e4 { short(e_value, 1) } else { format!("{e_value:.0e}") };
     match tried.error_ratio {
@@ -305,12 +306,12 @@ fn diff(one: (ModelHash, &ModelText), other: (ModelHash, &ModelText)) -> String 
     rows.iter().map(|row| format!("{:key$}  {:before$}  {}\n", row[0], row[1], row[2])).collect()
 }
 
-fn decide(models: &TrainModels, what: Choice, signed: &Signed) -> Result<String, Failure> {
+fn decide(models: &TrainModels, what: ModelChoice, signed: &Signed) -> Result<String, Failure> {
     let new = NewDecision {
         what,
         by: signed.by.clone(),
         reason: signed.reason.clone(),
-        at: Moment::of(SystemTime::now()),
+        at: UtcSecond::of(SystemTime::now()),
     };
     let number = models.decide(&new).map_err(failure)?;
     let in_force = models.in_force().map_err(failure)?;

@@ -12,7 +12,7 @@ use dynocar_transport::Host;
 
 use super::Failure;
 use super::companion::{Passed, become_it, words_of_command};
-use crate::dataset::{self, LoadError, Source, is_parquet_path};
+use crate::dataset::{self, DatasetSource, LoadError, is_parquet_path};
 use crate::output::report_line;
 use crate::programs::WORKSHOP;
 use crate::redrawn::{Redrawn, bar, can_draw};
@@ -82,7 +82,7 @@ fn needs_workshop(path: &Path) -> bool {
 /// that nobody used, are a failure of the work.
 pub fn execute(
     arguments: &ReplayArguments,
-    read: impl Fn(Source) -> Result<Dataset, LoadError>,
+    read: impl Fn(DatasetSource) -> Result<Dataset, LoadError>,
 ) -> Result<(), Failure> {
     let [dataset] = &arguments.dataset[..] else {
         let words = "expected one dataset or recording: several files are for --verify";
@@ -136,11 +136,11 @@ pub fn execute(
 fn of_train(
     path: &Path,
     train: Option<TrainId>,
-    read: impl Fn(Source) -> Result<Dataset, LoadError>,
+    read: impl Fn(DatasetSource) -> Result<Dataset, LoadError>,
 ) -> Result<Dataset, LoadError> {
-    match read(Source { path, train }) {
+    match read(DatasetSource { path, train }) {
         Err(LoadError::NoRecording { .. } | LoadError::Recording { .. }) => {
-            read(Source { path, train: None })
+            read(DatasetSource { path, train: None })
         }
         read => read,
     }

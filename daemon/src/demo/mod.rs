@@ -22,7 +22,7 @@ use crate::dataset::{self, LoadError};
 use crate::ending::{self, EndingError};
 use stage::{Stage, StageError};
 use summary::Latencies;
-use view::View;
+use view::DemoView;
 
 /// Number of the demo's train on the channels.
 const TRAIN: TrainId = TrainId(1);
@@ -68,7 +68,7 @@ pub fn play(rate: f64) -> Result<Summary, DemoError> {
 
     let cycle = control_cycle(&dataset, rate);
     let total = dataset.runs.iter().map(|run| run.samples.len() as u64).sum();
-    let mut view = View::new(&dataset, total, rate);
+    let mut view = DemoView::new(&dataset, total, rate);
     let mut latency = Latencies::default();
     let mut last_draw = Instant::now();
     let mut ended: Option<Instant> = None;

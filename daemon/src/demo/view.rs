@@ -18,14 +18,14 @@ const PLAIN_EVERY: Duration = Duration::from_secs(3);
 const BAR_LETTERS: usize = 40;
 
 /// Shows the estimates as they come.
-pub struct View {
+pub struct DemoView {
     total: u64,
     /// On a terminal.
     redrawn: Option<Redrawn>,
     last_plain: Option<Instant>,
 }
 
-impl View {
+impl DemoView {
     /// Returns a view of the replay of a dataset with `total` samples.
     pub fn new(dataset: &Dataset, total: u64, rate: f64) -> Self {
         report_line(&format!(
@@ -35,7 +35,7 @@ impl View {
         ));
         report_line("controller, daemon and client are three processes; ± is a 95 % interval");
         let redrawn = (std::io::stderr().is_terminal() && can_draw()).then(Redrawn::default);
-        View { total, redrawn, last_plain: None }
+        DemoView { total, redrawn, last_plain: None }
     }
 
     /// Shows what the reader knows.

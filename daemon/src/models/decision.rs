@@ -3,7 +3,7 @@
 use dynocar_model::named;
 use serde::{Deserialize, Serialize};
 
-use super::moment::Moment;
+use super::moment::UtcSecond;
 use super::text::ModelHash;
 
 named! {
@@ -37,25 +37,25 @@ pub struct Decision {
     /// Why; may be empty.
     pub reason: String,
     /// When.
-    pub at: Moment,
+    pub at: UtcSecond,
 }
 
 /// A decision that is to be taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NewDecision {
     /// Chosen decision.
-    pub what: Choice,
+    pub what: ModelChoice,
     /// Who decides: a person's name, or `rule`.
     pub by: String,
     /// Why; may be empty.
     pub reason: String,
     /// When.
-    pub at: Moment,
+    pub at: UtcSecond,
 }
 
 /// Choice between decisions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Choice {
+pub enum ModelChoice {
     /// Put a model of the store in force.
     Adopt(ModelHash),
     /// Put in force again what was so before the model that is.
@@ -99,7 +99,7 @@ mod tests {
             from: None,
             by: "rule".into(),
             reason: String::new(),
-            at: Moment { unix_s: 0 },
+            at: UtcSecond { unix_s: 0 },
         };
         let (adopt, back) = (Action::Adopted, Action::RolledBack);
         let steps = [

@@ -27,7 +27,7 @@ const UNITS: [(&str, &str); 13] = [
 
 /// A key whose values differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Difference {
+pub struct KeyDifference {
     /// The file.
     pub file: &'static str,
     /// The key with its tables.
@@ -37,13 +37,13 @@ pub struct Difference {
 }
 
 /// The keys in which two models differ, by file and key.
-pub fn differences(one: &ModelText, other: &ModelText) -> Vec<Difference> {
+pub fn differences(one: &ModelText, other: &ModelText) -> Vec<KeyDifference> {
     let mut all = of_file(TRAIN_FILE, [Some(&one.train), Some(&other.train)]);
     all.extend(of_file(TRACK_FILE, [one.track.as_ref(), other.track.as_ref()]));
     all
 }
 
-fn of_file(file: &'static str, texts: [Option<&String>; 2]) -> Vec<Difference> {
+fn of_file(file: &'static str, texts: [Option<&String>; 2]) -> Vec<KeyDifference> {
     let [one, other] = texts.map(|text| {
         let mut flat = BTreeMap::new();
         // Text that is not TOML has no keys; the store holds none such.
@@ -55,7 +55,7 @@ fn of_file(file: &'static str, texts: [Option<&String>; 2]) -> Vec<Difference> {
     let differing = keys.into_iter().filter(|key| one.get(*key) != other.get(*key));
     let shown = |value: Option<&Value>, key: &str| value.map_or("–".into(), |it| shown(key, it));
     differing
-        .map(|key| Difference {
+        .map(|key| KeyDifference {
             file,
             key: key.clone(),
             values: [shown(one.get(key), key), shown(other.get(key), key)],

@@ -28,7 +28,7 @@ named! {
 
 /// All that the store holds of a train.
 #[derive(Clone, Debug)]
-pub struct History {
+pub struct ModelHistory {
     /// The models, the oldest first, each with what it is.
     pub models: Vec<(Stored, State)>,
     /// Entries among them that are not decisions.
@@ -39,7 +39,7 @@ pub struct History {
     pub in_force: Option<ModelHash>,
 }
 
-impl History {
+impl ModelHistory {
     /// Of a train.
     ///
     /// # Errors
@@ -62,6 +62,6 @@ impl History {
             }
         };
         let models = models.iter().map(|stored| (stored.clone(), state(stored))).collect();
-        Ok(History { models, left_out, decisions, in_force })
+        Ok(ModelHistory { models, left_out, decisions, in_force })
     }
 }

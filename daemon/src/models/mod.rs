@@ -34,9 +34,9 @@ pub mod text;
 
 pub use decision::{Action, Decision, NewDecision};
 pub use error::ModelsError;
-pub use history::{History, State};
-pub use moment::Moment;
+pub use history::{ModelHistory, State};
+pub use moment::UtcSecond;
 pub use origin::MaintenanceEvent;
-pub use origin::{Figure, FoundEffect, Origin};
+pub use origin::{FoundEffect, ModelFigure, Origin};
 pub use store::{Listing, NewModel, Store, Stored, TrainModels};
 pub use text::{ModelHash, ModelText};

@@ -11,7 +11,7 @@ use time::{OffsetDateTime, PrimitiveDateTime};
 /// A second of UTC, written as RFC 3339 has it: `2026-11-23T05:20:00Z`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
-pub struct Moment {
+pub struct UtcSecond {
     /// Seconds since 1970.
     pub unix_s: u64,
 }
@@ -21,10 +21,10 @@ pub struct Moment {
 #[error("{0:?}: expected a time in UTC, as 2026-11-23T05:20:00Z")]
 pub struct NoMoment(String);
 
-impl Moment {
+impl UtcSecond {
     /// The second in which an instant lies; the first of 1970 for one before.
     pub fn of(instant: SystemTime) -> Self {
-        Moment { unix_s: instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()) }
+        UtcSecond { unix_s: instant.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()) }
     }
 
     /// Its beginning.
@@ -45,7 +45,7 @@ impl Moment {
     }
 }
 
-impl fmt::Display for Moment {
+impl fmt::Display for UtcSecond {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let at = self.in_calendar();
         let (day, hour, minute, second) = (at.date(), at.hour(), at.minute(), at.second());
@@ -53,19 +53,19 @@ impl fmt::Display for Moment {
     }
 }
 
-impl FromStr for Moment {
+impl FromStr for UtcSecond {
     type Err = NoMoment;
 
     fn from_str(text: &str) -> Result<Self, NoMoment> {
         let none = || NoMoment(text.into());
         let at = OffsetDateTime::parse(text, &Rfc3339).map_err(|_| none())?;
-        let moment = Moment { unix_s: at.unix_timestamp().try_into().map_err(|_| none())? };
+        let moment = UtcSecond { unix_s: at.unix_timestamp().try_into().map_err(|_| none())? };
         // Another offset, or a part of a second, would read back as another text.
         if moment.to_string() == text { Ok(moment) } else { Err(none()) }
     }
 }
 
-impl TryFrom<String> for Moment {
+impl TryFrom<String> for UtcSecond {
     type Error = NoMoment;
 
     fn try_from(text: String) -> Result<Self, NoMoment> {
@@ -73,8 +73,8 @@ impl TryFrom<String> for Moment {
     }
 }
 
-impl From<Moment> for String {
-    fn from(moment: Moment) -> String {
+impl From<UtcSecond> for String {
+    fn from(moment: UtcSecond) -> String {
         moment.to_string()
     }
 }
@@ -86,19 +86,19 @@ mod tests {
     #[test]
     fn a_time_reads_back_as_it_is_shown() {
         for unix_s in (0..4_102_444_800).step_by(39_999_983) {
-            let moment = Moment { unix_s };
+            let moment = UtcSecond { unix_s };
             assert_eq!(moment.to_string().parse(), Ok(moment));
         }
-        let moment = Moment::of(UNIX_EPOCH + Duration::from_millis(1_772_323_199_999));
+        let moment = UtcSecond::of(UNIX_EPOCH + Duration::from_millis(1_772_323_199_999));
         assert_eq!(moment.to_string(), "2026-02-28T23:59:59Z");
         assert_eq!(moment.day(), "2026-02-28");
-        let days = [0, 11_016, 11_017, 20_453].map(|day| Moment { unix_s: 86_400 * day }.day());
+        let days = [0, 11_016, 11_017, 20_453].map(|day| UtcSecond { unix_s: 86_400 * day }.day());
         assert_eq!(days, ["1970-01-01", "2000-02-29", "2000-03-01", "2025-12-31"]);
-        assert_eq!(Moment { unix_s: u64::MAX }.to_string(), "9999-12-31T23:59:59Z");
+        assert_eq!(UtcSecond { unix_s: u64::MAX }.to_string(), "9999-12-31T23:59:59Z");
         for wrong in
             ["", "2026-02-30T00:00:00Z", "2026-02-28T00:00:00+01:00", "0000-01-01T00:00:00Z"]
         {
-            assert!(wrong.parse::<Moment>().is_err(), "{wrong}");
+            assert!(wrong.parse::<UtcSecond>().is_err(), "{wrong}");
         }
     }
 }

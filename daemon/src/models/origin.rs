@@ -6,26 +6,26 @@ use dynocar_model::terms::place::in_words;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
-use super::moment::Moment;
+use super::moment::UtcSecond;
 use super::text::ModelHash;
 
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Figure {
+pub struct ModelFigure {
     /// The number, in the unit of its name.
     pub value: f64,
     /// Its standard deviation.
     pub std: f64,
 }
 
-impl Figure {
+impl ModelFigure {
     /// Half the width of the 95 % interval.
     pub fn half_width(self) -> f64 {
         HALF_95 * self.std
     }
 
     /// True where the 95 % intervals of both overlap.
-    pub fn agrees_with(self, other: Figure) -> bool {
+    pub fn agrees_with(self, other: ModelFigure) -> bool {
         (self.value - other.value).abs() <= self.half_width() + other.half_width()
     }
 
@@ -47,7 +47,7 @@ pub struct FoundEffect {
     pub intervals_m: Vec<[f64; 2]>,
     /// Its numbers by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub parameters: BTreeMap<String, Figure>,
+    pub parameters: BTreeMap<String, ModelFigure>,
 }
 
 impl FoundEffect {
@@ -59,7 +59,7 @@ impl FoundEffect {
         let within = |some: &[[f64; 2]], others: &[[f64; 2]]| {
             some.is_empty() == others.is_empty() && some.iter().all(|it| meets(*it, others))
         };
-        let agree = |(name, figure): (&String, &Figure)| {
+        let agree = |(name, figure): (&String, &ModelFigure)| {
             other.parameters.get(name).is_none_or(|other| figure.agrees_with(*other))
         };
         self.kind == other.kind
@@ -91,7 +91,7 @@ pub struct HeldOutError {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
     /// When it was made.
-    pub made: Moment,
+    pub made: UtcSecond,
     /// Version of the program that made it.
     pub version: String,
     /// The command that made it; empty for one that somebody wrote.
@@ -120,7 +120,7 @@ pub struct Origin {
 
 impl Origin {
     /// Of a model that somebody wrote, perhaps from another: nothing was learned.
-    pub fn written(statement: &str, parent: Option<ModelHash>, made: Moment) -> Self {
+    pub fn written(statement: &str, parent: Option<ModelHash>, made: UtcSecond) -> Self {
         Origin {
             made,
             version: env!("CARGO_PKG_VERSION").into(),
@@ -175,10 +175,10 @@ pub struct MaintenanceEvent {
     /// Its kind.
     pub kind: String,
     /// When it was found.
-    pub found: Moment,
+    pub found: UtcSecond,
     /// When it first and last acted, where the runs' dates are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub acted: Option<[Moment; 2]>,
+    pub acted: Option<[UtcSecond; 2]>,
     /// The model in force, against which it was seen.
     pub model: ModelHash,
     /// Where on the line, in m; empty where it is tied to no place.
@@ -188,7 +188,7 @@ pub struct MaintenanceEvent {
     pub sentence: String,
     /// Its numbers by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub size: BTreeMap<String, Figure>,
+    pub size: BTreeMap<String, ModelFigure>,
     /// Probability that as much is found where nothing acts.
     pub p_value: f64,
     /// The runs in which it acted, and when.
@@ -200,7 +200,7 @@ mod tests {
     use super::*;
 
     fn effect(kind: &str, intervals_m: &[[f64; 2]], value: f64) -> FoundEffect {
-        let parameters = [("c_factor".to_owned(), Figure { value, std: 0.1 })].into();
+        let parameters = [("c_factor".to_owned(), ModelFigure { value, std: 0.1 })].into();
         FoundEffect { kind: kind.into(), intervals_m: intervals_m.to_vec(), parameters }
     }
 

@@ -8,9 +8,9 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainId;
 
-use super::decision::{Action, Choice, Decision, NewDecision, in_force_after};
+use super::decision::{Action, Decision, ModelChoice, NewDecision, in_force_after};
 use super::error::ModelsError;
-use super::moment::Moment;
+use super::moment::UtcSecond;
 use super::numbered::{self, Numbered, names_in, read_record, text_of};
 use super::origin::{MaintenanceEvent, Origin};
 use super::text::{ModelHash, ModelText, TRACK_FILE, TRAIN_FILE};
@@ -142,7 +142,11 @@ impl TrainModels {
     /// # Errors
     ///
     /// When it cannot be written.
-    pub fn put_declared(&self, text: &ModelText, made: Moment) -> Result<ModelHash, ModelsError> {
+    pub fn put_declared(
+        &self,
+        text: &ModelText,
+        made: UtcSecond,
+    ) -> Result<ModelHash, ModelsError> {
         let origin = Origin::written("What the configuration declares.", None, made);
         self.put(&NewModel { text: text.clone(), origin, answer_json: None, report_html: None })
     }
@@ -257,12 +261,12 @@ impl TrainModels {
         let mut stack = in_force_after(before.iter().map(|(_, decision)| decision));
         let from = stack.last().copied();
         let (action, model) = match new.what {
-            Choice::Adopt(hash) | Choice::Reject(hash) if from == Some(hash) => {
+            ModelChoice::Adopt(hash) | ModelChoice::Reject(hash) if from == Some(hash) => {
                 return Err(ModelsError::InForce { hash });
             }
-            Choice::Adopt(hash) => (Action::Adopted, Some(hash)),
-            Choice::Reject(hash) => (Action::Rejected, Some(hash)),
-            Choice::RollBack => {
+            ModelChoice::Adopt(hash) => (Action::Adopted, Some(hash)),
+            ModelChoice::Reject(hash) => (Action::Rejected, Some(hash)),
+            ModelChoice::RollBack => {
                 stack.pop().ok_or(ModelsError::NothingAdopted { train: self.train })?;
                 (Action::RolledBack, stack.pop())
             }

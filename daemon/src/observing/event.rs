@@ -41,7 +41,7 @@ vocabulary! {
 
 /// Change of a train.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Change {
+pub struct TrainChange {
     /// Kind of the event.
     pub kind: EventKind,
     /// The pipeline's number in the daemon's configuration, where it concerns one.
@@ -54,9 +54,9 @@ pub struct Change {
     pub text: String,
 }
 
-impl Change {
+impl TrainChange {
     /// A change without numbers.
     pub fn new(kind: EventKind, text: String) -> Self {
-        Change { kind, pipeline: None, status: None, effect: None, text }
+        TrainChange { kind, pipeline: None, status: None, effect: None, text }
     }
 }

@@ -10,19 +10,19 @@ mod train;
 use dynocar_shared::TrainId;
 use dynocar_transport::{ChannelError, Host, Peer, Role};
 
-pub use event::{Change, EventKind};
+pub use event::{EventKind, TrainChange};
 pub use train::ObservedTrain;
 
 /// Selection of trains and pipelines to observe.
 #[derive(Clone, Debug)]
-pub struct Wanted {
+pub struct ObservedSelection {
     /// The run-time directory.
     pub host: Host,
     /// The trains; every train that is there or comes, when empty.
     pub trains: Vec<TrainId>,
 }
 
-impl Wanted {
+impl ObservedSelection {
     /// The trains beside those that are known for which somebody holds one of these roles by now; none where
     /// trains were named.
     ///

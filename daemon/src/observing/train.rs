@@ -6,7 +6,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, TrainId};
 use dynocar_transport::{Announcement, ChannelError, Host, Peer, Role, monotonic_now_ns};
 
-use super::event::{Change, EventKind};
+use super::event::{EventKind, TrainChange};
 use crate::operator::pipeline_name;
 use crate::operator::suspicion::Suspicion;
 
@@ -67,7 +67,11 @@ impl ObservedTrain {
     ///
     /// When an announcement cannot be read, the daemon is incompatible or its channel cannot be opened; the
     /// changes seen before are noted all the same.
-    pub fn look(&mut self, host: &Host, changes: &mut Vec<Change>) -> Result<(), ChannelError> {
+    pub fn look(
+        &mut self,
+        host: &Host,
+        changes: &mut Vec<TrainChange>,
+    ) -> Result<(), ChannelError> {
         let daemon = Peer::look_up(host, self.id, Role::Daemon)?;
         note_peer(&daemon, &mut self.daemon, Role::Daemon, changes);
         // A fault of one of the two keeps nobody from seeing the other.
@@ -99,7 +103,7 @@ impl ObservedTrain {
     }
 
     /// Takes what has come; gives what has changed about the pipelines.
-    pub fn poll(&mut self) -> Vec<Change> {
+    pub fn poll(&mut self) -> Vec<TrainChange> {
         let mut changes = Vec::new();
         let Some(reader) = &mut self.reader else { return changes };
         reader.poll();
@@ -111,7 +115,12 @@ impl ObservedTrain {
     }
 }
 
-fn note_peer(peer: &Peer, known: &mut Option<Announcement>, role: Role, changes: &mut Vec<Change>) {
+fn note_peer(
+    peer: &Peer,
+    known: &mut Option<Announcement>,
+    role: Role,
+    changes: &mut Vec<TrainChange>,
+) {
     let (now, text) = match peer {
         Peer::Absent => (None, format!("no {role}")),
         Peer::Compatible(it) => (Some(it.clone()), it.to_string()),
@@ -125,7 +134,7 @@ fn note_peer(peer: &Peer, known: &mut Option<Announcement>, role: Role, changes:
             (Role::Controller, Some(_)) => EventKind::ControllerCame,
             (Role::Controller, None) => EventKind::ControllerGone,
         };
-        changes.push(Change::new(kind, text));
+        changes.push(TrainChange::new(kind, text));
         *known = now;
     }
 }
@@ -133,12 +142,14 @@ fn note_peer(peer: &Peer, known: &mut Option<Announcement>, role: Role, changes:
 fn note_pipeline(
     reading: &Reading<'_>,
     seen: &mut Option<SeenPipeline>,
-    changes: &mut Vec<Change>,
+    changes: &mut Vec<TrainChange>,
 ) {
     let it = reading.snapshot;
     let name = || pipeline_name(it.pipeline_index, it.pipeline_kind());
-    let of_pipeline =
-        |kind, text| Change { pipeline: Some(it.pipeline_index), ..Change::new(kind, text) };
+    let of_pipeline = |kind, text| TrainChange {
+        pipeline: Some(it.pipeline_index),
+        ..TrainChange::new(kind, text)
+    };
     let now = SeenPipeline {
         epoch: it.epoch,
         status: (it.status, it.reason),
@@ -151,7 +162,7 @@ fn note_pipeline(
         let (status, reason) = (it.status(), it.reason().map_or("unknown", Reason::name));
         let text = format!("{}: {status} ({reason}) at sample {}", name(), it.sample_sequence);
         let change = of_pipeline(EventKind::StatusChanged, text);
-        changes.push(Change { status: Some(now.status), ..change });
+        changes.push(TrainChange { status: Some(now.status), ..change });
     }
     if known.unwrap_or_default().suspect != now.suspect {
         let (kind, text) = match Suspicion::of(it) {
@@ -159,7 +170,7 @@ fn note_pipeline(
             Some(suspicion) => (EventKind::SuspicionRaised, suspicion.to_string()),
         };
         let effect = EffectKind::from_number(now.suspect);
-        changes.push(Change { effect, ..of_pipeline(kind, text) });
+        changes.push(TrainChange { effect, ..of_pipeline(kind, text) });
     }
     if known.is_some_and(|known| known.model != now.model) {
         let text = format!("{}: model {:016x} is in force", name(), now.model);

@@ -10,8 +10,8 @@
 
 pub mod exchange;
 pub mod idle;
+pub mod main_thread;
 pub mod status_log;
 pub mod system;
 pub mod tally;
-pub mod watch;
 pub mod worker;

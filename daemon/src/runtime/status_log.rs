@@ -18,7 +18,7 @@ use dynocar_shared::snapshot::REJECTION_REASONS;
 use crate::operator::refusals;
 
 /// Status and reason by number.
-pub type State = (u32, u32);
+pub type StatusAndReason = (u32, u32);
 
 /// How long a status that comes back has to stay until it is reported, at first.
 const STAY_MIN: Duration = Duration::from_secs(2);
@@ -31,12 +31,12 @@ const REMEMBERED: usize = 8;
 #[derive(Clone, Debug)]
 pub struct StatusLog {
     /// Reported states, with the time at which each last held; the newest last.
-    reported: Vec<(State, Instant)>,
-    seen: State,
+    reported: Vec<(StatusAndReason, Instant)>,
+    seen: StatusAndReason,
     since: Instant,
     stay: Duration,
     /// Statuses that came since the last one that was reported, with how often each did.
-    untold: Vec<(State, u64)>,
+    untold: Vec<(StatusAndReason, u64)>,
     changes: u64,
 }
 
@@ -55,7 +55,11 @@ impl StatusLog {
 
     /// Looks at the status; when it is to be reported, the statuses that came since the last that was
     /// and were not, with how often each did.
-    pub fn look(&mut self, state: State, now: Instant) -> Option<Vec<(State, u64)>> {
+    pub fn look(
+        &mut self,
+        state: StatusAndReason,
+        now: Instant,
+    ) -> Option<Vec<(StatusAndReason, u64)>> {
         if state != self.seen {
             (self.seen, self.since) = (state, now);
             match self.untold.iter_mut().find(|it| it.0 == state) {
@@ -83,7 +87,7 @@ impl StatusLog {
         self.changes
     }
 
-    fn report(&mut self, now: Instant) -> Option<Vec<(State, u64)>> {
+    fn report(&mut self, now: Instant) -> Option<Vec<(StatusAndReason, u64)>> {
         if self.reported.len() == REMEMBERED {
             self.reported.remove(0);
         }
@@ -131,12 +135,15 @@ impl RefusalLog {
 mod tests {
     use super::*;
 
-    const GOOD: State = (2, 0);
-    const AT_BOUND: State = (2, 7);
-    const INVALID: State = (4, 3);
+    const GOOD: StatusAndReason = (2, 0);
+    const AT_BOUND: StatusAndReason = (2, 7);
+    const INVALID: StatusAndReason = (4, 3);
 
     /// Returns the reports of a status given by tenth of a second: (time in s, status, unreported changes).
-    fn reported(state_at: impl Fn(u64) -> State, seconds: u64) -> Vec<(f64, State, u64)> {
+    fn reported(
+        state_at: impl Fn(u64) -> StatusAndReason,
+        seconds: u64,
+    ) -> Vec<(f64, StatusAndReason, u64)> {
         let start = Instant::now();
         let mut log = StatusLog::new(start);
         (0..10 * seconds)

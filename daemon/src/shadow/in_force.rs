@@ -7,7 +7,7 @@ use tracing::{info, warn};
 
 use super::rule::Rule;
 use crate::config::{DaemonConfig, TrainConfig};
-use crate::models::{ModelHash, ModelsError, Moment, Store, TrainModels};
+use crate::models::{ModelHash, ModelsError, Store, TrainModels, UtcSecond};
 
 /// How far back it is looked what a model grew from.
 const ANCESTORS_MAX: usize = 10_000;
@@ -30,7 +30,7 @@ fn settle_train(
     train: &mut TrainConfig,
     rule: &Rule,
 ) -> Result<(), NotInForce> {
-    let declared = models.put_declared(&train.text, Moment::of(SystemTime::now()))?;
+    let declared = models.put_declared(&train.text, UtcSecond::of(SystemTime::now()))?;
     let Some(hash) = models.in_force()? else { return Ok(()) };
     permitted(models, rule, hash)?;
     let (id, added) = (train.id.0, models.stored(hash)?.origin.adds());

@@ -5,14 +5,14 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_core::trial::evidence::{Evidence, RATIO_MAX};
+use dynocar_core::trial::evidence::{RATIO_MAX, RivalEvidence};
 use dynocar_core::trial::ledger::Ledger;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot};
 use serde::{Deserialize, Serialize};
 use tracing::warn;
 
-use crate::models::{ModelHash, Moment};
+use crate::models::{ModelHash, UtcSecond};
 use crate::storage::{Disk, Rights, StorageError, replace};
 
 /// The file, in a train's folder of the store.
@@ -22,7 +22,7 @@ const MODELS_MAX: usize = 32;
 
 /// Estimate of a rival's pipeline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
+pub struct RivalEstimate {
     /// The pipeline's name.
     pub pipeline: String,
     /// Its status.
@@ -34,7 +34,7 @@ pub struct Estimate {
     pub suspects: String,
 }
 
-impl Estimate {
+impl RivalEstimate {
     /// Returns the estimate of a snapshot of a pipeline.
     pub fn of(pipeline: &str, snapshot: &ParameterSnapshot) -> Self {
         let count = snapshot.parameter_count as usize;
@@ -45,7 +45,7 @@ impl Estimate {
         });
         let suspect = EffectKind::from_number(snapshot.suspected_effect);
         let suspect = suspect.filter(|&kind| kind != EffectKind::None);
-        Estimate {
+        RivalEstimate {
             pipeline: pipeline.into(),
             status: snapshot.status().to_string(),
             values: values.collect(),
@@ -56,11 +56,11 @@ impl Estimate {
 
 /// A model that is or was on trial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Tried {
+pub struct TriedModel {
     /// The model.
     pub model: ModelHash,
     /// When a sample was last predicted by it.
-    pub last: Moment,
+    pub last: UtcSecond,
     /// The model in force that it is compared with, while it is on trial.
     pub against: Option<ModelHash>,
     /// Its open-loop error over 60 s, in m/s, in all.
@@ -69,12 +69,12 @@ pub struct Tried {
     /// at once with 95 %.
     pub error_ratio: Option<[f64; 2]>,
     /// Evidence of the trips for it against the model in force.
-    pub evidence: Evidence,
+    pub evidence: RivalEvidence,
     /// Its errors by day and place.
     pub ledger: Ledger,
     /// Estimates of its pipelines.
     #[serde(default)]
-    pub estimates: Vec<Estimate>,
+    pub estimates: Vec<RivalEstimate>,
 }
 
 /// An interval of [`Evidence::error_ratio`] in words that go before "the error of …".
@@ -89,29 +89,31 @@ pub fn ratio_in_words([low, high]: [f64; 2]) -> String {
 
 /// The trials of a train.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Trials {
+pub struct TrialRecord {
     /// The model in force.
     pub in_force: Option<ModelHash>,
     /// The models that are on trial, and those that were.
-    pub models: Vec<Tried>,
+    pub models: Vec<TriedModel>,
 }
 
-impl Trials {
+impl TrialRecord {
     /// Reads the file of an earlier daemon in a train's folder; empty where there is none, or where it cannot be
     /// read, which is logged.
     pub fn read(folder: &Path) -> Self {
         let path = folder.join(TRIALS_FILE);
         let text = match std::fs::read_to_string(&path) {
             Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Trials::default(),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return TrialRecord::default();
+            }
             Err(error) => {
                 warn!("{}: {error}; the trials begin anew", path.display());
-                return Trials::default();
+                return TrialRecord::default();
             }
         };
         serde_json::from_str(&text).unwrap_or_else(|error| {
             warn!("{}: no record of trials: {error}; the trials begin anew", path.display());
-            Trials::default()
+            TrialRecord::default()
         })
     }
 
@@ -128,12 +130,12 @@ impl Trials {
     }
 
     /// Returns the trial of a model.
-    pub fn of(&self, model: ModelHash) -> Option<&Tried> {
+    pub fn of(&self, model: ModelHash) -> Option<&TriedModel> {
         self.models.iter().find(|it| it.model == model)
     }
 
     /// Takes over what models on trial show now; others stay as they were.
-    pub fn update(&mut self, in_force: ModelHash, now: Vec<Tried>) {
+    pub fn update(&mut self, in_force: ModelHash, now: Vec<TriedModel>) {
         self.in_force = Some(in_force);
         for tried in now {
             match self.models.iter_mut().find(|it| it.model == tried.model) {

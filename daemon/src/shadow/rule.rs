@@ -6,7 +6,7 @@ use dynocar_core::trial::Rival;
 use serde::Deserialize;
 use toml::Table;
 
-use crate::models::decision::Choice;
+use crate::models::decision::ModelChoice;
 use crate::models::{Action, ModelHash, ModelText, ModelsError, TrainModels};
 
 /// Who adopts.
@@ -41,10 +41,10 @@ impl Rule {
 
     /// Returns the choice when a rival is better: to take back the model in force, if the rival was in force before
     /// it, else to adopt the rival.
-    pub fn choice(standing: &Standing, rival: ModelHash) -> Choice {
+    pub fn choice(standing: &ModelStanding, rival: ModelHash) -> ModelChoice {
         match standing.before {
-            Some(before) if before == rival => Choice::RollBack,
-            _ => Choice::Adopt(rival),
+            Some(before) if before == rival => ModelChoice::RollBack,
+            _ => ModelChoice::Adopt(rival),
         }
     }
 
@@ -69,7 +69,7 @@ fn number(table: &Table, key: &str) -> Option<f64> {
 
 /// A train's model in force and its rivals, by the store's decisions.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Standing {
+pub struct ModelStanding {
     /// The model in force.
     pub in_force: ModelHash,
     /// Model in force before, to which a rollback leads; `None` for a model without a predecessor.
@@ -88,7 +88,7 @@ pub fn standing(
     models: &TrainModels,
     declared: ModelHash,
     (named, candidates_max): (Option<&[ModelHash]>, usize),
-) -> Result<Standing, ModelsError> {
+) -> Result<ModelStanding, ModelsError> {
     let decisions = models.decisions()?;
     let mut stack = vec![declared];
     stack.extend(crate::models::decision::in_force_after(decisions.iter().map(|(_, it)| it)));
@@ -111,7 +111,7 @@ pub fn standing(
             rivals.push(rival);
         }
     }
-    Ok(Standing { in_force, before, rivals })
+    Ok(ModelStanding { in_force, before, rivals })
 }
 
 #[cfg(test)]

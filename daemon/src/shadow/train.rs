@@ -6,24 +6,24 @@ use std::time::{Instant, SystemTime};
 
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::motion::STANDING_MPS;
-use dynocar_core::trial::evidence::Evidence;
+use dynocar_core::trial::evidence::RivalEvidence;
 use dynocar_core::trial::open_loop::OpenLoop;
-use dynocar_core::trial::{Rival, Trials};
+use dynocar_core::trial::{ModelTrials, Rival};
 use dynocar_shared::TrainSample;
 use tracing::{info, warn};
 
 use super::figures::TrialFigures;
 use super::in_force::{self, with_model};
-use super::record::{self, Estimate, Tried, ratio_in_words};
-use super::rule::{Adopt, Rule, Standing, standing};
+use super::record::{self, RivalEstimate, TriedModel, ratio_in_words};
+use super::rule::{Adopt, ModelStanding, Rule, standing};
 use crate::config::{ModelsConfig, PipelineConfig, TrainConfig};
-use crate::models::{ModelHash, ModelsError, Moment, NewDecision, TrainModels};
+use crate::models::{ModelHash, ModelsError, NewDecision, TrainModels, UtcSecond};
 use crate::pipelines::{SettingRefused, build_pipeline};
 use crate::runtime::exchange::{Exchange, Set};
 
 /// A pipeline of the configuration, and which of the threads that serve the train runs it.
 #[derive(Clone, Debug)]
-pub struct Placed {
+pub struct PlacedPipeline {
     /// Kind, settings and name.
     pub settings: PipelineConfig,
     /// Its number in the configuration.
@@ -46,13 +46,13 @@ pub struct ShadowTrain {
     /// The train with the model that was in force at the start.
     train: TrainConfig,
     /// By seat, then in the order in which the thread runs them.
-    placed: Vec<Placed>,
+    placed: Vec<PlacedPipeline>,
     models: TrainModels,
     settings: ModelsConfig,
     exchange: Arc<Exchange>,
-    trials: Trials,
-    record: record::Trials,
-    standing: Standing,
+    trials: ModelTrials,
+    record: record::TrialRecord,
+    standing: ModelStanding,
     changing: Option<Changing>,
     /// Messages already logged, so that each is logged once.
     reported: HashSet<String>,
@@ -67,18 +67,19 @@ impl ShadowTrain {
     /// Of a train with the model in force, by a store's decisions.
     pub fn new(
         train: TrainConfig,
-        placed: Vec<Placed>,
+        placed: Vec<PlacedPipeline>,
         models: TrainModels,
         settings: ModelsConfig,
         exchange: Arc<Exchange>,
     ) -> Self {
-        let record = record::Trials::read(models.folder());
+        let record = record::TrialRecord::read(models.folder());
         let open_loop = OpenLoop::new(Arc::clone(&train.model), train.track.clone());
         let ledger = record.of(train.model_hash).map(|it| it.ledger.clone()).unwrap_or_default();
-        let evidence = Evidence::new(settings.rule.least_gain);
+        let evidence = RivalEvidence::new(settings.rule.least_gain);
         let in_force = Rival::new(train.model_hash.0, open_loop, Vec::new(), (evidence, ledger));
-        let trials = Trials::new(train.id, in_force, Vec::new());
-        let standing = Standing { in_force: train.model_hash, before: None, rivals: Vec::new() };
+        let trials = ModelTrials::new(train.id, in_force, Vec::new());
+        let standing =
+            ModelStanding { in_force: train.model_hash, before: None, rivals: Vec::new() };
         ShadowTrain {
             train,
             placed,
@@ -185,9 +186,9 @@ impl ShadowTrain {
         let in_force = self.in_force();
         let against = |rival: &Rival| (rival.model != in_force.0).then_some(in_force);
         let all = std::iter::once(&self.trials.in_force).chain(&self.trials.rivals);
-        let tried = all.map(|rival| Tried {
+        let tried = all.map(|rival| TriedModel {
             model: ModelHash(rival.model),
-            last: Moment::of(now),
+            last: UtcSecond::of(now),
             against: against(rival),
             error_mps: rival.ledger.all.rmse_mps(),
             error_ratio: rival.evidence.error_ratio(),
@@ -241,7 +242,7 @@ impl ShadowTrain {
             .filter(|it| it.against == Some(self.in_force()))
             .map(|it| it.evidence.clone())
             .filter(|it| it.least_gain() == least_gain)
-            .unwrap_or_else(|| Evidence::new(least_gain));
+            .unwrap_or_else(|| RivalEvidence::new(least_gain));
         let ledger = known.map(|it| it.ledger.clone()).unwrap_or_default();
         Ok(Rival::new(hash.0, open_loop, pipelines, (evidence, ledger)))
     }
@@ -277,7 +278,7 @@ impl ShadowTrain {
 
     fn decide(&mut self, hash: ModelHash, reason: String, now: SystemTime) {
         let what = Rule::choice(&self.standing, hash);
-        let at = Moment::of(now);
+        let at = UtcSecond::of(now);
         info!(train = self.id(), model = %hash, "decided by rule: {reason}");
         let decision = NewDecision { what, by: RULE.into(), reason, at };
         match self.models.decide(&decision) {
@@ -332,9 +333,9 @@ impl ShadowTrain {
         self.seen = None;
     }
 
-    fn estimates(&self, pipelines: &[Pipeline]) -> Vec<Estimate> {
-        let estimate = |(placed, pipeline): (&Placed, &Pipeline)| {
-            Estimate::of(&placed.settings.name, pipeline.snapshot())
+    fn estimates(&self, pipelines: &[Pipeline]) -> Vec<RivalEstimate> {
+        let estimate = |(placed, pipeline): (&PlacedPipeline, &Pipeline)| {
+            RivalEstimate::of(&placed.settings.name, pipeline.snapshot())
         };
         self.placed.iter().zip(pipelines).map(estimate).collect()
     }

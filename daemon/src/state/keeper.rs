@@ -30,7 +30,7 @@ struct KeptTrain {
 }
 
 /// Keeps the states of all trains.
-pub struct Keeper {
+pub struct StateKeeper {
     /// On the disk, and in the run-time directory.
     directories: [PathBuf; 2],
     interval: Duration,
@@ -40,7 +40,7 @@ pub struct Keeper {
     stop: Arc<AtomicBool>,
 }
 
-impl Keeper {
+impl StateKeeper {
     /// A keeper that writes into the directory so often; `stored` is what the trains' states held at the start, by index of the train.
     ///
     /// # Errors
@@ -69,7 +69,7 @@ impl Keeper {
             |it: &crate::config::PipelineConfig| (it.name.clone(), settings_hash(&it.estimator));
         let pipelines = config.pipelines.iter().map(name).collect();
         let directories = [directory, host.root().to_owned()];
-        Ok(Keeper { directories, interval, pipelines, trains, stop })
+        Ok(StateKeeper { directories, interval, pipelines, trains, stop })
     }
 
     /// Writes what is validated, every so often and at the end, when nothing is left in the run-time directory.

@@ -15,11 +15,11 @@
 //!
 //! [`KeptEstimate`]: dynocar_core::pipeline::KeptEstimate
 
+pub mod directories;
 pub mod entry;
 mod error;
 pub mod file;
 pub mod keeper;
-pub mod place;
 
 use std::path::{Path, PathBuf};
 
@@ -117,7 +117,7 @@ impl<'a> Taken<'a> {
     /// Takes the states up; `None` when the daemon is to keep none, or cannot, which the log says.
     pub fn up(config: &'a DaemonConfig, host: &Host) -> Option<Self> {
         let state = config.state.as_ref()?;
-        match place::prepare(state.directory.as_deref()) {
+        match directories::prepare(state.directory.as_deref()) {
             Ok(directory) => {
                 info!(directory = %directory.display(), "state");
                 let stored = load_all([&directory, host.root()], &config.trains);

@@ -100,14 +100,14 @@ impl PipelineHealth {
             Some(Reason::None) => String::new(),
             reason => format!(" ({})", reason.map_or("unknown", Reason::name)),
         };
-        let of_quantity = |&(quantity, state, why): &(Quantity, UseState, &'static str)| match state
-        {
+        let of_quantity = |quantity: Quantity, state: UseState, why: &str| match state {
             UseState::Usable => format!("; {quantity} usable"),
             _ if why == state.name() => format!("; {quantity} {state}: {}", state.ends()),
             _ => format!("; {quantity} {state} ({why}): {}", state.ends()),
         };
-        let uses: String = self.uses.iter().map(of_quantity).collect();
-        format!("{}{reason}{uses}", self.status)
+        let uses =
+            self.uses.iter().map(|&(quantity, state, why)| of_quantity(quantity, state, why));
+        format!("{}{reason}{}", self.status, uses.collect::<String>())
     }
 
     fn verdict(&self) -> Verdict {

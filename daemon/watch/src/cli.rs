@@ -8,8 +8,8 @@ use std::sync::Arc;
 use clap::{CommandFactory, Parser};
 use dynocar::cli::{Failure, carry_out};
 use dynocar::config::DaemonConfig;
-use dynocar::ending::Ending;
-use dynocar::observing::Wanted;
+use dynocar::ending::ProgramEnding;
+use dynocar::observing::ObservedSelection;
 use dynocar::redrawn::can_draw;
 use dynocar_shared::TrainId;
 use dynocar_transport::Host;
@@ -52,10 +52,10 @@ fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let trains = wanted(arguments, config.as_ref())?;
     let root = config.as_ref().and_then(|config| config.process.root.as_deref());
     let host = Host::of(root).map_err(Failure::work)?;
-    let ending = Ending::begin().map_err(Failure::work)?;
+    let ending = ProgramEnding::begin().map_err(Failure::work)?;
     terminal::end_though_stuck(Arc::clone(&ending.flag))
         .map_err(|error| Failure::Work(format!("watching for the end: {error}")))?;
-    let mut watcher = Watcher::new(Wanted { host, trains }, config);
+    let mut watcher = Watcher::new(ObservedSelection { host, trains }, config);
     if arguments.plain || !std::io::stdout().is_terminal() || !can_draw() {
         return plain::run(&mut watcher, &ending);
     }

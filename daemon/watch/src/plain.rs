@@ -4,7 +4,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 use dynocar::cli::Failure;
-use dynocar::ending::Ending;
+use dynocar::ending::ProgramEnding;
 use dynocar::output::OutputError;
 use dynocar::redrawn::is_utf8;
 
@@ -22,7 +22,7 @@ const WRITE_EVERY: Duration = Duration::from_secs(1);
 /// # Errors
 ///
 /// When standard output cannot be written.
-pub fn run(watcher: &mut Watcher, ending: &Ending) -> Result<(), Failure> {
+pub fn run(watcher: &mut Watcher, ending: &ProgramEnding) -> Result<(), Failure> {
     // The first look takes what is there; a heartbeat brings it.
     let mut next = Instant::now() + WRITE_EVERY / 2;
     while !ending.is_due() {

@@ -39,12 +39,17 @@ pub struct PipelineState {
     /// Age in s of the newest sample behind it; `None` before the first.
     pub sample_age_s: Option<f64>,
     /// The last minutes.
-    pub history: History,
+    pub history: PlotHistory,
 }
 
 impl PipelineState {
     /// Returns the latest snapshot and history of a pipeline; falls back to the name of its kind if it is unnamed.
-    pub fn new(name: Option<String>, history: History, reading: &Reading<'_>, now_ns: i64) -> Self {
+    pub fn new(
+        name: Option<String>,
+        history: PlotHistory,
+        reading: &Reading<'_>,
+        now_ns: i64,
+    ) -> Self {
         let snapshot = *reading.snapshot;
         let age_ns = now_ns.saturating_sub(snapshot.sample_published_ns);
         PipelineState {
@@ -136,7 +141,7 @@ const POINTS: usize = 600;
 
 /// Plotted values of one second.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct PlotPoint {
     /// Unexplained force in kN, retarding positive.
     pub unexplained_kn: f64,
     /// Evidence for the suspected effect.
@@ -145,20 +150,20 @@ pub struct Point {
 
 /// Points, the newest last, and the rate of samples.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct History {
-    points: VecDeque<Point>,
+pub struct PlotHistory {
+    points: VecDeque<PlotPoint>,
     /// Host's time in ns and sequence number of the newest sample, a second ago.
     last: Option<(i64, u64)>,
     rate_hz: Option<f64>,
 }
 
-impl History {
+impl PlotHistory {
     /// Takes a point; call it once a second, with the host's time in ns.
     pub fn push(&mut self, snapshot: &ParameterSnapshot, now_ns: i64) {
         if self.points.len() == POINTS {
             self.points.pop_front();
         }
-        self.points.push_back(Point {
+        self.points.push_back(PlotPoint {
             unexplained_kn: 1e-3 * snapshot.unexplained_force_n,
             evidence: snapshot.suspicion_evidence,
         });
@@ -176,7 +181,7 @@ impl History {
     }
 
     /// Returns the newest points, at most `count`, the oldest first.
-    pub fn newest(&self, count: usize) -> impl Iterator<Item = &Point> + Clone {
+    pub fn newest(&self, count: usize) -> impl Iterator<Item = &PlotPoint> + Clone {
         self.points.iter().skip(self.points.len().saturating_sub(count))
     }
 }

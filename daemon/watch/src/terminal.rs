@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use crossterm::terminal::disable_raw_mode;
 use dynocar::cli::Failure;
-use dynocar::ending::Ending;
+use dynocar::ending::ProgramEnding;
 use ratatui::DefaultTerminal;
 
-use crate::screen::{Choice, Palette, View, draw};
+use crate::screen::{Palette, ScreenChoice, ScreenView, draw};
 use crate::watcher::Watcher;
 
 /// How often snapshots are taken and keys waited for.
@@ -27,7 +27,7 @@ const END_WITHIN: Duration = Duration::from_secs(2);
 /// # Errors
 ///
 /// When the terminal cannot be used.
-pub fn run(watcher: &mut Watcher, ending: &Ending, has_colour: bool) -> Result<(), Failure> {
+pub fn run(watcher: &mut Watcher, ending: &ProgramEnding, has_colour: bool) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::Work(format!("the terminal cannot be used: {error}"));
     let mut terminal = ratatui::try_init().map_err(failed)?;
     let result = show(&mut terminal, watcher, ending, Palette::new(has_colour));
@@ -63,10 +63,10 @@ pub fn end_though_stuck(must_end: Arc<AtomicBool>) -> io::Result<()> {
 fn show(
     terminal: &mut DefaultTerminal,
     watcher: &mut Watcher,
-    ending: &Ending,
+    ending: &ProgramEnding,
     palette: Palette,
 ) -> io::Result<()> {
-    let mut choice = Choice::default();
+    let mut choice = ScreenChoice::default();
     let mut drawn: Option<Instant> = None;
     while !ending.is_due() {
         watcher.look();
@@ -104,19 +104,23 @@ fn is_quit(key: KeyEvent) -> bool {
 }
 
 /// Returns the choice after a key.
-fn pressed(choice: Choice, key: KeyCode, trains: usize) -> Choice {
+fn pressed(choice: ScreenChoice, key: KeyCode, trains: usize) -> ScreenChoice {
     let trains = trains.max(1);
     let other = match choice.view {
-        View::Overview => View::Pipelines,
-        View::Pipelines => View::Overview,
+        ScreenView::Overview => ScreenView::Pipelines,
+        ScreenView::Pipelines => ScreenView::Overview,
     };
     match key {
-        KeyCode::Char('?' | 'h') => Choice { has_help: !choice.has_help, ..choice },
-        KeyCode::Tab => Choice { train: (choice.train + 1) % trains, ..choice },
-        KeyCode::BackTab => Choice { train: (choice.train + trains - 1) % trains, ..choice },
-        KeyCode::Left | KeyCode::Right => Choice { view: other, has_help: false, ..choice },
-        KeyCode::Char('1') => Choice { view: View::Overview, has_help: false, ..choice },
-        KeyCode::Char('2') => Choice { view: View::Pipelines, has_help: false, ..choice },
+        KeyCode::Char('?' | 'h') => ScreenChoice { has_help: !choice.has_help, ..choice },
+        KeyCode::Tab => ScreenChoice { train: (choice.train + 1) % trains, ..choice },
+        KeyCode::BackTab => ScreenChoice { train: (choice.train + trains - 1) % trains, ..choice },
+        KeyCode::Left | KeyCode::Right => ScreenChoice { view: other, has_help: false, ..choice },
+        KeyCode::Char('1') => {
+            ScreenChoice { view: ScreenView::Overview, has_help: false, ..choice }
+        }
+        KeyCode::Char('2') => {
+            ScreenChoice { view: ScreenView::Pipelines, has_help: false, ..choice }
+        }
         _ => choice,
     }
 }
@@ -127,11 +131,11 @@ mod tests {
 
     #[test]
     fn keys_change_train_and_view_and_go_round() {
-        let start = Choice::default();
+        let start = ScreenChoice::default();
         assert_eq!(pressed(start, KeyCode::BackTab, 3).train, 2);
-        assert_eq!(pressed(Choice { train: 2, ..start }, KeyCode::Tab, 3).train, 0);
+        assert_eq!(pressed(ScreenChoice { train: 2, ..start }, KeyCode::Tab, 3).train, 0);
         assert_eq!(pressed(start, KeyCode::Tab, 0).train, 0);
-        assert_eq!(pressed(start, KeyCode::Right, 1).view, View::Pipelines);
+        assert_eq!(pressed(start, KeyCode::Right, 1).view, ScreenView::Pipelines);
         let helped = pressed(start, KeyCode::Char('?'), 1);
         assert!(helped.has_help && !pressed(helped, KeyCode::Char('?'), 1).has_help);
         assert!(!pressed(helped, KeyCode::Char('2'), 1).has_help);

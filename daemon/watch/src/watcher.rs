@@ -4,11 +4,11 @@ use std::mem::take;
 use std::time::{Duration, Instant};
 
 use dynocar::config::{DaemonConfig, PipelineConfig};
-use dynocar::observing::{ObservedTrain, Wanted};
+use dynocar::observing::{ObservedSelection, ObservedTrain};
 use dynocar_shared::TrainId;
 use dynocar_transport::{Host, Role, monotonic_now_ns};
 
-use super::state::History;
+use super::state::PlotHistory;
 use crate::advisor::Advisor;
 use crate::state::{Daemon, PipelineState, TrainState};
 
@@ -19,7 +19,7 @@ const ADVISE_EVERY: Duration = Duration::from_secs(5);
 
 /// Watches trains.
 pub struct Watcher {
-    wanted: Wanted,
+    wanted: ObservedSelection,
     config: Option<DaemonConfig>,
     watched: Vec<Watched>,
     last_look: Option<Instant>,
@@ -35,7 +35,7 @@ struct Watched {
 
 impl Watcher {
     /// A watcher of these trains.
-    pub fn new(wanted: Wanted, config: Option<DaemonConfig>) -> Self {
+    pub fn new(wanted: ObservedSelection, config: Option<DaemonConfig>) -> Self {
         let named = wanted.trains.clone();
         let watched = Vec::new();
         let mut watcher = Watcher { wanted, config, watched, last_look: None, last_advice: None };
@@ -131,7 +131,7 @@ impl Watched {
                 }
                 None => {
                     let name = names.get(index as usize).map(|it| it.name.clone());
-                    let new = PipelineState::new(name, History::default(), &reading, now_ns);
+                    let new = PipelineState::new(name, PlotHistory::default(), &reading, now_ns);
                     pipelines.insert(place, new);
                 }
             }

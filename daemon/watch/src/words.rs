@@ -8,7 +8,7 @@ use crate::state::{Daemon, PipelineState, TrainState};
 
 /// A quantity or one of its parameters in a table.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct TableRow {
+pub struct QuantityRow {
     /// Label; parameters of a quantity are indented.
     pub label: String,
     /// The value; a bound has a sign before it.
@@ -26,23 +26,23 @@ pub struct TableRow {
 }
 
 /// The table of a train's quantities; the resistance at these shares of the speeds driven.
-pub fn rows(train: &TrainState, shares: &[f64]) -> Vec<TableRow> {
+pub fn rows(train: &TrainState, shares: &[f64]) -> Vec<QuantityRow> {
     let mut all = Vec::new();
     for &quantity in Quantity::ALL {
         let Some(pipeline) = train.answering(quantity) else { continue };
-        let head = TableRow {
+        let head = QuantityRow {
             label: quantity.name().replace('_', " "),
             use_state: Some(pipeline.use_of(quantity)),
             why: pipeline.why(quantity),
             age_s: pipeline.sample_age_s,
-            ..TableRow::default()
+            ..QuantityRow::default()
         };
         if quantity == Quantity::Resistance {
             all.push(head);
             all.extend(resistance_rows(pipeline, shares));
         } else {
             let value = main_value(quantity, pipeline);
-            all.push(TableRow {
+            all.push(QuantityRow {
                 number: value.number,
                 interval: value.interval,
                 unit: value.unit,
@@ -53,12 +53,12 @@ pub fn rows(train: &TrainState, shares: &[f64]) -> Vec<TableRow> {
     all
 }
 
-fn resistance_rows(pipeline: &PipelineState, shares: &[f64]) -> Vec<TableRow> {
+fn resistance_rows(pipeline: &PipelineState, shares: &[f64]) -> Vec<QuantityRow> {
     let snapshot = &pipeline.snapshot;
     let of_parameter = |parameter: Parameter| {
         let (value, std) = (snapshot.value(parameter)?, snapshot.std(parameter)?);
         let label = format!("  {}", parameter.name());
-        Some(TableRow { label, ..with_interval(value, std, unit(parameter)) })
+        Some(QuantityRow { label, ..with_interval(value, std, unit(parameter)) })
     };
     let davis = [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC];
     let (low, high) = (snapshot.speed_min_mps, snapshot.speed_max_mps);
@@ -66,13 +66,13 @@ fn resistance_rows(pipeline: &PipelineState, shares: &[f64]) -> Vec<TableRow> {
         let speed_mps = (low + share * (high - low)).round();
         let w0 = snapshot.resistance_at(speed_mps).filter(|_| high > low)?;
         let label = format!("  at {:.0} km/h", 3.6 * speed_mps);
-        Some(TableRow { label, ..with_interval(w0.w0_n_per_kn, w0.w0_std_n_per_kn, "N/kN") })
+        Some(QuantityRow { label, ..with_interval(w0.w0_n_per_kn, w0.w0_std_n_per_kn, "N/kN") })
     };
     davis.into_iter().filter_map(of_parameter).chain(shares.iter().filter_map(at_speed)).collect()
 }
 
 /// The value of a quantity other than the resistance.
-fn main_value(quantity: Quantity, pipeline: &PipelineState) -> TableRow {
+fn main_value(quantity: Quantity, pipeline: &PipelineState) -> QuantityRow {
     let candidates: &[Parameter] = match quantity {
         Quantity::Resistance => &[],
         Quantity::Mass => &[Parameter::Mass],
@@ -84,10 +84,12 @@ fn main_value(quantity: Quantity, pipeline: &PipelineState) -> TableRow {
     let found = candidates.iter().find_map(|&parameter| {
         Some((parameter, snapshot.value(parameter)?, snapshot.std(parameter)?))
     });
-    let Some((parameter, value, std)) = found else { return TableRow::default() };
+    let Some((parameter, value, std)) = found else { return QuantityRow::default() };
     let row = with_interval(value, std, unit(parameter));
     match parameter {
-        Parameter::AdhesionLowerBound => TableRow { number: format!("≥ {}", row.number), ..row },
+        Parameter::AdhesionLowerBound => {
+            QuantityRow { number: format!("≥ {}", row.number), ..row }
+        }
         _ => row,
     }
 }
@@ -104,11 +106,11 @@ fn unit(parameter: Parameter) -> &'static str {
 }
 
 /// A value with its interval, to two digits of the interval.
-fn with_interval(value: f64, std: f64, unit: &'static str) -> TableRow {
+fn with_interval(value: f64, std: f64, unit: &'static str) -> QuantityRow {
     let half = HALF_95 * std;
     let digits = digits(half);
     let interval = if half > 0.0 { format!("± {half:.digits$}") } else { String::new() };
-    TableRow { number: format!("{value:.digits$}"), interval, unit, ..TableRow::default() }
+    QuantityRow { number: format!("{value:.digits$}"), interval, unit, ..QuantityRow::default() }
 }
 
 /// Decimals that show two digits of an interval.

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
-use dynocar_analysis::brakes::{Basis, Correction, EtcsBrake, Parameters};
-use dynocar_analysis::stops::Law;
+use dynocar_analysis::brakes::{Basis, BrakeParameters, Correction, EtcsBrake};
+use dynocar_analysis::stops::DecelerationLaw;
 use serde::Serialize;
 
-use crate::report::html::Column::{Numbers, Words};
-use crate::report::html::{self, Columns, escape, table};
+use crate::report::html::ColumnAlignment::{Numbers, Words};
+use crate::report::html::{self, TableColumns, escape, table};
 use crate::report::page::document;
 use crate::report::provenance::Provenance;
 
@@ -24,9 +24,9 @@ pub struct BrakesAnswer {
     /// How many stops the parameters are from, of how many.
     pub stops: [usize; 2],
     /// The law of the stops by all of the brake.
-    pub law: Law,
+    pub law: DecelerationLaw,
     /// The parameters.
-    pub parameters: Parameters,
+    pub parameters: BrakeParameters,
     /// The same as OSRD's `etcs_brake_params`.
     pub etcs: EtcsBrake,
     /// Source of each of its values.
@@ -38,7 +38,7 @@ pub struct BrakesAnswer {
 }
 
 /// Columns of Kdry_rst.
-pub const K_DRY: Columns<Correction> = &[
+pub const K_DRY: TableColumns<Correction> = &[
     ("EBCL", |it| it.ebcl.to_string()),
     ("one stop in", |it| format!("{:.0e}", 1.0 / it.probability)),
     ("measured", |it| share(it.measured)),
@@ -49,7 +49,7 @@ pub const K_DRY: Columns<Correction> = &[
 ];
 
 /// Columns of what values rest on.
-const RESTS_ON: Columns<Basis> = &[
+const RESTS_ON: TableColumns<Basis> = &[
     ("value", |it| it.key.into()),
     ("", |it| if it.is_guess { "a guess" } else { "" }.into()),
     ("rests on", |it| it.rests_on.clone()),
@@ -59,7 +59,12 @@ fn share(share: Option<f64>) -> String {
     share.map_or("-".into(), |it| format!("{it:.3}"))
 }
 
-fn as_html<T>(caption: &str, columns: Columns<T>, column: html::Column, rows: &[T]) -> String {
+fn as_html<T>(
+    caption: &str,
+    columns: TableColumns<T>,
+    column: html::ColumnAlignment,
+    rows: &[T],
+) -> String {
     let cells: Vec<_> = columns.iter().map(|it| move |row: &T| escape(&it.1(row))).collect();
     let columns: Vec<html::TableColumn<'_, T>> = columns
         .iter()

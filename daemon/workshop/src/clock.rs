@@ -1,13 +1,13 @@
 //! Times of recordings that count from 1970, as dates.
 
-use dynocar::models::Moment;
+use dynocar::models::UtcSecond;
 
 /// Times in s from 2000 to 2100 count from 1970; recordings with another origin are shorter.
 const OF_EPOCH_S: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
 
 /// Returns the second in UTC of a time in s that counts from 1970; `None` for one that counts from elsewhere.
-pub fn moment(time_s: f64) -> Option<Moment> {
-    OF_EPOCH_S.contains(&time_s).then_some(Moment { unix_s: time_s as u64 })
+pub fn moment(time_s: f64) -> Option<UtcSecond> {
+    OF_EPOCH_S.contains(&time_s).then_some(UtcSecond { unix_s: time_s as u64 })
 }
 
 #[cfg(test)]

@@ -1,20 +1,20 @@
 //! The dataset at a path, be it a folder or a recording, which is one in memory.
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
-use dynocar::dataset::{DatasetFolder, LoadError, Source, is_parquet_path};
+use dynocar::dataset::{DatasetFolder, DatasetSource, LoadError, is_parquet_path};
 use dynocar::output::report_line;
 use dynocar::text_file::require_regular;
 use dynocar_analysis::dataset::{
     Dataset, DatasetFiles, DatasetHead, FileProblem, Manifest, RunContent, is_parquet,
 };
-use dynocar_model::units::Unit;
-
-use crate::convert::{ModelFiles, RecordedDataset, dataset_of};
 use dynocar_mcap::recording::Recording;
+use dynocar_model::units::Unit;
 use dynocar_parquet::columns::columns_of;
 use dynocar_parquet::reading;
+
+use super::convert::{ModelFiles, RecordedDataset, dataset_of};
 
 /// True for the name of a recording.
 pub fn is_recording(path: &Path) -> bool {
@@ -46,7 +46,7 @@ impl FilesOfDataset {
     /// # Errors
     ///
     /// When there is nothing, or what is no dataset.
-    pub fn at<'p>(source: impl Into<Source<'p>>) -> Result<Self, LoadError> {
+    pub fn at<'p>(source: impl Into<DatasetSource<'p>>) -> Result<Self, LoadError> {
         let source = source.into();
         if !is_recording(source.path) {
             return DatasetFolder::at(source).map(FilesOfDataset::Folder);
@@ -124,7 +124,9 @@ impl DatasetFiles for FilesOfDataset {
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(FilesOfDataset, DatasetHead), LoadError> {
+pub fn open<'p>(
+    source: impl Into<DatasetSource<'p>>,
+) -> Result<(FilesOfDataset, DatasetHead), LoadError> {
     let source = source.into();
     if !is_recording(source.path) {
         let (folder, head) = dynocar::dataset::open(source)?;
@@ -140,7 +142,7 @@ pub fn open<'p>(source: impl Into<Source<'p>>) -> Result<(FilesOfDataset, Datase
 /// # Errors
 ///
 /// The first mistake, with file, line and choices.
-pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
+pub fn load<'p>(source: impl Into<DatasetSource<'p>>) -> Result<Dataset, LoadError> {
     load_with_speed_unit(source).map(|(dataset, _)| dataset)
 }
 
@@ -150,9 +152,35 @@ pub fn load<'p>(source: impl Into<Source<'p>>) -> Result<Dataset, LoadError> {
 ///
 /// The first mistake, with file, line and choices.
 pub fn load_with_speed_unit<'p>(
-    source: impl Into<Source<'p>>,
+    source: impl Into<DatasetSource<'p>>,
 ) -> Result<(Dataset, Unit), LoadError> {
     let (files, head) = open(source)?;
     let unit = head.manifest.speed_unit();
     Ok((head.read(&files)?, unit))
+}
+
+/// The way from a folder, which need not be there yet, to a file.
+pub fn from_folder(folder: &Path, file: &Path) -> PathBuf {
+    relative(&real(file), &real(folder))
+}
+
+/// A path without links, as far as it is there.
+pub fn real(path: &Path) -> PathBuf {
+    let full = std::path::absolute(path).unwrap_or_else(|_| path.into());
+    for known in full.ancestors() {
+        if let Ok(start) = known.canonicalize() {
+            let rest = full.strip_prefix(known).unwrap_or(Path::new(""));
+            return start.join(rest).components().collect();
+        }
+    }
+    full
+}
+
+/// The way from a folder to a file, both in full.
+fn relative(file: &Path, folder: &Path) -> PathBuf {
+    let (file, folder): (Vec<Component>, Vec<Component>) =
+        (file.components().collect(), folder.components().collect());
+    let shared = file.iter().zip(&folder).take_while(|(one, other)| one == other).count();
+    let up = folder[shared..].iter().map(|_| Component::ParentDir);
+    up.chain(file[shared..].iter().copied()).collect()
 }

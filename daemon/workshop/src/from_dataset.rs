@@ -5,18 +5,22 @@ use std::io::BufWriter;
 use std::path::{Component, Path};
 
 use dynocar::cli::Failure;
-use dynocar::dataset::LoadError;
+use dynocar::dataset::{DatasetSource, LoadError};
+use dynocar::output::report_line;
 use dynocar::storage::{Disk, settle};
 use dynocar_analysis::dataset::{Dataset, DatasetFiles, MANIFEST_FILE};
+use dynocar_analysis::explain::report::timeline::Timeline;
 use dynocar_analysis::identify::published_samples;
-use dynocar_shared::{TrainId, TrainSample};
-
-use crate::convert::{RowError, from_rows, is_rows};
-use crate::dataset::open;
+use dynocar_mcap::annotate;
 use dynocar_mcap::error::WriteError;
 use dynocar_mcap::recording::DATASET_FOLDER;
 use dynocar_mcap::topic::Message;
 use dynocar_mcap::writing::{McapError, RecordingWriter, WallClock};
+use dynocar_shared::{TrainId, TrainSample};
+use tempfile::TempDir;
+
+use super::convert::{RowError, from_rows, is_rows};
+use super::dataset::open;
 
 /// Between two runs of a dataset, for nobody knows the time that passed, in ns.
 const BETWEEN_RUNS_NS: i64 = 1_000_000_000;
@@ -122,4 +126,29 @@ fn write(
     }
     writer.finish()?.into_inner().map_err(|error| error.into_error())?;
     Ok(settle(&Disk, path)?)
+}
+
+/// Copies a recording, or the dataset at a path as one, into a new file with an explanation of it.
+///
+/// # Errors
+///
+/// A recording that cannot be read is an input failure.
+pub fn annotate(from: DatasetSource, timeline: &Timeline, to: &Path) -> Result<(), Failure> {
+    let DatasetSource { path, train } = from;
+    let train = train.map(|it| it.0);
+    let added = if path.is_dir() || path.extension().is_some_and(|it| it == "toml") {
+        let folder = TempDir::with_prefix("dynocar-").map_err(Failure::work)?;
+        let recording = folder.path().join("dataset.mcap");
+        from_dataset(path, &recording)?;
+        annotate::annotate(&recording, train, timeline, to)?
+    } else {
+        annotate::annotate(path, train, timeline, to)?
+    };
+    report_line(&format!(
+        "annotated recording: {}: {} intervals in which an effect acts, {} messages in all",
+        to.display(),
+        added.effects,
+        added.messages
+    ));
+    Ok(())
 }

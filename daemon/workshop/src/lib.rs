@@ -17,10 +17,8 @@
 //! - [`report`]: an explanation as a page of HTML
 //! - [`run_facts`]: what is shown of a recorded run
 //! - [`survey`]: raw recordings to a dataset on a surveyed line
-//! - [`track_text`]: the text of a line's file
 //! - [`verify`]: every recorded snapshot computed again
 
-pub mod annotation;
 pub mod brakes_page;
 pub mod cli;
 pub mod clock;
@@ -29,10 +27,8 @@ pub mod dataset;
 pub mod fmu;
 pub mod from_dataset;
 pub mod learn;
-pub mod paths;
 pub mod report;
 pub mod run_facts;
 pub mod survey;
-pub mod track_text;
 pub mod updated;
 pub mod verify;

@@ -2,7 +2,7 @@
 
 use dynocar_analysis::dataset::{ForceSource, GradientSource, PositionSource, Run};
 
-use dynocar::models::Moment;
+use dynocar::models::UtcSecond;
 
 /// A run's mass in t: the declared one, or the mean of what its samples carry, with the range where they
 /// carry several.
@@ -19,9 +19,9 @@ pub fn tonnes(mass_kg: f64) -> String {
 }
 
 /// When a run was recorded, where that is known.
-pub fn recorded(run: &Run) -> Option<Moment> {
+pub fn recorded(run: &Run) -> Option<UtcSecond> {
     let unix_s = run.recorded_unix_s?.try_into().ok()?;
-    Some(Moment { unix_s })
+    Some(UtcSecond { unix_s })
 }
 
 /// The same in words, as people write it.

@@ -7,23 +7,22 @@
 //! needs one. What belongs to certain runs is an event and no property of a train or a line: it is
 //! listed, so that nobody takes the files for more than they are.
 
-mod runs;
-
 use std::path::{Path, PathBuf};
 
-use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
-use dynocar_analysis::explain::{Explanation, evidence::Fit};
-use dynocar_model::terms::extra::{self, Extra, Factor};
-use dynocar_model::terms::{Entry, Key};
-use toml::{Table, Value};
-
-use crate::dataset::open;
-use dynocar::dataset::Source;
+use dynocar::dataset::{DatasetSource, LoadError, read_text};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
-use dynocar::output::write_in_folder;
+use dynocar::output::{OutputError, require_new, write_in_folder};
+use dynocar_analysis::dataset::written::{
+    alignment_files, can_hold, name_model, run_files, set, write_entry,
+};
+use dynocar_analysis::dataset::{DatasetFiles, FileProblem, MANIFEST_FILE};
+use dynocar_analysis::explain::Explanation;
+use dynocar_analysis::explain::evidence::Fit;
+use dynocar_model::train::numbers::{AUXILIARY_POWER, DAVIS_A, DAVIS_B, DAVIS_C, DRIVE_EFFICIENCY};
+use toml::Table;
 
-pub use runs::name_model;
-pub use runs::{UPDATED_MARK, UpdatedModelError};
+use super::dataset::from_folder;
+use super::dataset::{FilesOfDataset, open};
 
 /// The files of an updated model: the train, the line where something is known of it, and the dataset.
 pub const UPDATED_FILES: [&str; 3] = [TRAIN_FILE, TRACK_FILE, MANIFEST_FILE];
@@ -45,7 +44,7 @@ pub struct UpdatedFiles {
 ///
 /// When the declared files cannot be read or the grown ones not written.
 pub fn write_updated<'s>(
-    dataset: impl Into<Source<'s>>,
+    dataset: impl Into<DatasetSource<'s>>,
     explanation: &Explanation,
     folder: &Path,
 ) -> Result<UpdatedFiles, UpdatedModelError> {
@@ -63,16 +62,16 @@ pub fn write_updated<'s>(
     let declared = (&texts.0[..], texts.1.as_deref());
     let mut grown = UpdatedTables::of(explanation, declared, labels)?;
     if let (Some(declared), Some(track)) = (track, &mut grown.track) {
-        runs::keep_alignments(track, &source.path_of(&declared.path), folder);
+        keep_alignments(track, &source.path_of(&declared.path), folder);
     }
     let mut manifest = table(&read(MANIFEST_FILE)?, &source.label(MANIFEST_FILE))?;
-    runs::keep_runs(&mut manifest, &source, folder)?;
-    runs::name_model(&mut manifest, grown.track.is_some());
+    keep_runs(&mut manifest, &source, folder)?;
+    name_model(&mut manifest, TRAIN_FILE, grown.track.as_ref().map(|_| TRACK_FILE));
     let texts = grown.texts(explanation, labels, MANIFEST_FILE);
     let dataset =
         updated_text(explanation, MANIFEST_FILE, &dataset.path.display().to_string(), &manifest);
     if texts.track.is_none() {
-        runs::forget(&folder.join(TRACK_FILE))?;
+        forget(&folder.join(TRACK_FILE))?;
     }
     let all = [Some(texts.train), texts.track, Some(dataset)];
     let named = UPDATED_FILES.into_iter().zip(all).filter_map(|(name, text)| Some((name, text?)));
@@ -125,9 +124,9 @@ impl UpdatedTables {
         let mut track = declared.unwrap_or_default();
         let not_expressed = grow(&explanation.outcome.fit, &mut train, &mut track);
         if let Some(drive) = explanation.answer.drive.as_ref().filter(|it| it.at_bound.is_none()) {
-            set(&mut train, "traction", "efficiency", drive.efficiency.value);
+            set(&mut train, &DRIVE_EFFICIENCY, drive.efficiency.value);
             if let Some(known) = drive.auxiliary_power_kw {
-                set(&mut train, "traction", "auxiliary_power_kw", known.value);
+                set(&mut train, &AUXILIARY_POWER, known.value);
             }
         }
         let track = (is_declared || !track.is_empty()).then_some(track);
@@ -160,8 +159,8 @@ fn table(text: &str, label: &str) -> Result<Table, UpdatedModelError> {
 /// that they cannot express.
 pub fn grow(fit: &Fit, train: &mut Table, track: &mut Table) -> Vec<String> {
     let mut not_expressed = Vec::new();
-    for (key, value) in ["a", "b", "c"].into_iter().zip(&fit.theta) {
-        set(train, "resistance", key, *value);
+    for (key, value) in [DAVIS_A, DAVIS_B, DAVIS_C].iter().zip(&fit.theta) {
+        set(train, key, *value);
     }
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
         let entries = effect.entries(&fit.theta[range]);
@@ -179,117 +178,83 @@ pub fn grow(fit: &Fit, train: &mut Table, track: &mut Table) -> Vec<String> {
     not_expressed
 }
 
-/// True for an entry that the files may hold in addition to what they hold already.
-fn can_hold(entry: &Entry, train: &Table, track: &Table) -> bool {
-    match entry {
-        Entry::Number(key, found) => key.allows(joined(key, train, *found)),
-        Entry::Extra(_) | Entry::TrackNumber(..) | Entry::Rows(..) => true,
-        // Such a list stands alone.
-        Entry::List(name, _) => track.get("track").and_then(|own| own.get(name)).is_none(),
-    }
-}
-
-fn write_entry(entry: Entry, train: &mut Table, track: &mut Table) {
-    match entry {
-        Entry::Number(key, found) => {
-            let value = joined(key, train, found);
-            set(train, key.table, key.name, value);
+/// Names the runs where they lie; those of a recording are written into the folder.
+///
+/// # Errors
+///
+/// When a run cannot be written, or would take the place of another file.
+pub fn keep_runs(
+    manifest: &mut Table,
+    source: &FilesOfDataset,
+    folder: &Path,
+) -> Result<(), UpdatedModelError> {
+    for file in run_files(manifest) {
+        if !source.is_recording() {
+            *file = seen_from(folder, &source.path_of(file));
+            continue;
         }
-        Entry::Extra(found) => {
-            let tables = train.entry(extra::TABLES).or_insert_with(|| Value::Array(Vec::new()));
-            if let Some(tables) = tables.as_array_mut() {
-                tables.push(Value::Table(extra_table(&found)));
-            }
+        let target = folder.join(&*file);
+        // Runs have no mark of their own.
+        if !is_updated(&folder.join(TRAIN_FILE)) {
+            require_new(&target)?;
         }
-        Entry::TrackNumber(name, found) => {
-            let declared = number(track, "track", name).unwrap_or(0.0);
-            set(track, "track", name, declared + found);
-        }
-        Entry::Rows(name, rows) | Entry::List(name, rows) => {
-            if let Some(list) = track_list(track, name) {
-                list.extend(rows.into_iter().map(Value::from));
-            }
-        }
+        let text = source.read(file).map_err(|problem| UpdatedModelError::Declared {
+            label: source.label(file),
+            problem: problem.to_string(),
+        })?;
+        let (parent, name) = (target.parent().unwrap_or(folder), target.file_name());
+        let name = name.unwrap_or_default().to_string_lossy();
+        write_in_folder(parent, &name, &text)?;
+    }
+    Ok(())
+}
+
+/// Names the ways on the map, which lie beside the declared line's file.
+pub fn keep_alignments(track: &mut Table, declared: &Path, folder: &Path) {
+    let beside = declared.parent().unwrap_or(Path::new(""));
+    for file in alignment_files(track) {
+        *file = seen_from(folder, &beside.join(&*file));
     }
 }
 
-/// A table of `[[extra]]`.
-fn extra_table(found: &Extra) -> Table {
-    let factor = |factor: &Factor| {
-        let mut table = Table::new();
-        table.insert("of".into(), factor.of.name().into());
-        table.insert("form".into(), factor.form.name().into());
-        for (name, number) in factor.form.numbers().iter().zip(factor.numbers) {
-            table.insert((*name).into(), Value::Float(number));
-        }
-        Value::Table(table)
-    };
-    let mut table = Table::new();
-    table.insert(extra::FORCE.into(), Value::Float(found.n_per_kn));
-    let factors: Vec<Value> = found.factors.iter().map(factor).collect();
-    table.insert(extra::FACTORS.into(), Value::Array(factors));
-    table
-}
-
-/// A number that was found with the one that stands in the file.
-fn joined(key: &Key, train: &Table, found: f64) -> f64 {
-    number(train, key.table, key.name).map_or(found, |declared| key.join(declared, found))
-}
-
-/// A list of `[track]`, made when absent.
-fn track_list<'t>(track: &'t mut Table, key: &str) -> Option<&'t mut Vec<Value>> {
-    let section = track.entry("track").or_insert_with(|| Value::Table(Table::new()));
-    section.as_table_mut()?.entry(key).or_insert_with(|| Value::Array(Vec::new())).as_array_mut()
-}
-
-fn number(table: &Table, section: &str, key: &str) -> Option<f64> {
-    let value = table.get(section)?.get(key)?;
-    value.as_float().or_else(|| value.as_integer().map(|it| it as f64))
-}
-
-/// Sets a number in a section, which is made when absent.
-pub fn set(table: &mut Table, section: &str, key: &str, value: f64) {
-    let entry = table.entry(section).or_insert_with(|| Value::Table(Table::new()));
-    if let Value::Table(section) = entry {
-        section.insert(key.into(), Value::Float(value));
+/// Removes a file that an earlier explanation wrote and this one does not: the model lacks it.
+///
+/// # Errors
+///
+/// When it is there and cannot be removed.
+pub fn forget(file: &Path) -> Result<(), OutputError> {
+    if !is_updated(file) {
+        return Ok(());
     }
+    std::fs::remove_file(file).map_err(|source| OutputError::File { path: file.into(), source })
 }
 
-#[cfg(test)]
-mod tests {
-    use dynocar_model::terms::{gradient, place, traction, wind};
-
-    use super::*;
-
-    #[test]
-    fn a_finding_joins_what_is_declared_by_the_rule_of_its_key() {
-        let declared = "[corrections]\ntraction_gain = 1.1\nwind_plus_mps = 2";
-        let (mut train, mut track): (Table, Table) = (declared.parse().unwrap(), Table::new());
-        write_entry(Entry::Number(&traction::GAIN, 0.9), &mut train, &mut track);
-        write_entry(Entry::Number(&wind::WIND_PLUS, 3.0), &mut train, &mut track);
-        assert_eq!(train["corrections"]["traction_gain"], Value::Float(1.1 * 0.9));
-        assert_eq!(train["corrections"]["wind_plus_mps"], Value::Float(5.0));
-        assert!(track.is_empty());
-    }
-
-    #[test]
-    fn what_belongs_to_the_line_makes_its_file_where_there_is_none() {
-        let (mut train, mut track) = (Table::new(), Table::new());
-        let entry = Entry::Rows(place::LIST, vec![vec![1000.0, 2000.0, 1.5]]);
-        assert!(can_hold(&entry, &train, &track));
-        write_entry(entry, &mut train, &mut track);
-        let expected: Table = "[track]\nresistance = [[1000.0, 2000.0, 1.5]]".parse().unwrap();
-        assert_eq!(track, expected);
-    }
-
-    #[test]
-    fn what_no_file_may_hold_is_not_written() {
-        let (train, track) = (Table::new(), Table::new());
-        assert!(can_hold(&Entry::Number(&traction::GAIN, 1.4), &train, &track));
-        assert!(!can_hold(&Entry::Number(&traction::GAIN, 2.4), &train, &track));
-        let list = Entry::List(gradient::ERROR, Vec::new());
-        assert!(can_hold(&list, &train, &track));
-        let track = "[track]\ngradient_error = [[0.0, 1.0]]".parse().unwrap();
-        assert!(!can_hold(&list, &train, &track));
-    }
+fn is_updated(file: &Path) -> bool {
+    read_text(file).is_ok_and(|text| text.starts_with(UPDATED_MARK))
 }
+
+fn seen_from(folder: &Path, file: &Path) -> String {
+    from_folder(folder, file).display().to_string()
+}
+
+/// Why the grown files cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum UpdatedModelError {
+    /// The dataset cannot be read.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// A declared file is not there any more or is no TOML.
+    #[error("{label}: expected a TOML file, got {problem}")]
+    Declared {
+        /// The file.
+        label: String,
+        /// Problem of the run.
+        problem: String,
+    },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// How a grown file begins.
+pub const UPDATED_MARK: &str = "# Grown from ";

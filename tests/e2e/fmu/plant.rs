@@ -8,7 +8,7 @@ use dynocar_fmu::ffi::Status;
 use dynocar_fmu::{MISSING, PLANT};
 use dynocar_model::simulate::{Prediction, Restart};
 use dynocar_shared::{SampleField, TrainSample};
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 use super::simulator::{Fmu, reference, reference_in};
 use super::{demo, unpacked};
@@ -36,7 +36,7 @@ fn set(fmu: &Fmu, name: &str, value: f64) {
 }
 
 /// The FMU of an updated model, unpacked; `grown` holds its files.
-fn of_updated(site: &Site, grown: &str) -> Fmu {
+fn of_updated(site: &DaemonSite, grown: &str) -> Fmu {
     done(site, &["fmu", "--plant", "-o", "train.fmu", "--grown", grown]);
     let resources = unpacked(site, "train.fmu").join("resources");
     Fmu::of(&PLANT, resources.to_str().unwrap())
@@ -44,7 +44,7 @@ fn of_updated(site: &Site, grown: &str) -> Fmu {
 
 /// The demo with a train that has been corrected, in a wind in m/s against growing chainage, as a
 /// dataset whose folder holds an updated model too.
-fn corrected_demo(site: &Site, wind_plus_mps: f64) {
+fn corrected_demo(site: &DaemonSite, wind_plus_mps: f64) {
     std::fs::create_dir_all(site.path().join("grown/runs")).unwrap();
     for file in ["dataset.toml", "track.toml", "runs/01.csv", "runs/02.csv", "runs/03.csv"] {
         std::fs::copy(demo().join(file), site.path().join("grown").join(file)).unwrap();
@@ -81,7 +81,7 @@ fn the_train_drives_recorded_runs_as_explain_predicts_them() {
     // A tail wind that is faster than the train turns the sign of its air resistance, at the
     // measured speed there and at the simulated one here: each direction has its head wind.
     for (index, wind_plus_mps) in [(0, 2.5), (1, -2.5)] {
-        let site = Site::new();
+        let site = DaemonSite::new();
         corrected_demo(&site, wind_plus_mps);
         let dataset = dataset::load(&site.path().join("grown")).unwrap();
         let davis = dataset.train.resistance;
@@ -108,7 +108,7 @@ fn the_train_drives_recorded_runs_as_explain_predicts_them() {
 
 #[test]
 fn what_was_found_is_seen_in_the_forces_and_they_are_the_whole() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     corrected_demo(&site, 2.5);
     let fmu = of_updated(&site, "grown");
     set(&fmu, "initial_speed_mps", 12.0);
@@ -166,7 +166,7 @@ fn a_standing_train_starts_by_traction_and_what_is_not_connected_is_none() {
 
 #[test]
 fn what_no_train_does_is_refused_in_words() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     corrected_demo(&site, 2.5);
     let fmu = of_updated(&site, "grown");
     let named = |name: &str| reference_in(&PLANT, name);

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_int, c_void};
 
 use dynocar_fmu::ffi::Status;
-use dynocar_fmu::ffi::instance::{CO_SIMULATION, CallbackFunctions, Component, Logger, Text};
+use dynocar_fmu::ffi::instance::{CO_SIMULATION, CallbackFunctions, Component, FmiString, Logger};
 use dynocar_fmu::ffi::life::{
     fmi2DoStep, fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2FreeInstance,
     fmi2Instantiate, fmi2SetupExperiment,
@@ -19,15 +19,15 @@ use dynocar_fmu::{ESTIMATORS, Interface};
 type Said = RefCell<Vec<String>>;
 
 /// A logger for formats that ask for no argument.
-type PlainLogger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text);
+type PlainLogger = unsafe extern "C" fn(*mut c_void, FmiString, c_int, FmiString, FmiString);
 
 /// Takes a message down; the FMU's formats ask for no argument.
 unsafe extern "C" fn take_down(
     said: *mut c_void,
-    _name: Text,
+    _name: FmiString,
     _status: c_int,
-    _category: Text,
-    words: Text,
+    _category: FmiString,
+    words: FmiString,
 ) {
     // SAFETY: the environment is the list of the instance that speaks, and words end with NUL.
     let (said, words) = unsafe { (&*said.cast::<Said>(), CStr::from_ptr(words)) };

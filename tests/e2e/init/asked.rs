@@ -3,7 +3,7 @@
 use std::fs::read_to_string;
 use std::process::ExitStatus;
 
-use dynocar_tests::process::{Process, Site, Terminal, Tie};
+use dynocar_tests::process::{DaemonSite, Process, Terminal, Tie};
 
 use crate::commands::{DYNOCAR, dynocar, run, said};
 
@@ -14,7 +14,7 @@ struct Asked {
 }
 
 impl Asked {
-    fn start(site: &Site, arguments: &[&str]) -> Self {
+    fn start(site: &DaemonSite, arguments: &[&str]) -> Self {
         let mut command = site.command(DYNOCAR, arguments);
         command.current_dir(site.path());
         let terminal = Terminal::open();
@@ -34,7 +34,7 @@ impl Asked {
 
 #[test]
 fn at_a_terminal_every_question_has_its_default_and_a_wrong_answer_is_asked_again() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     site.write("a.csv", &run("t,v [km/h],F [kN],x"));
     let mut asked = Asked::start(&site, &["init", "--b", "0.02"]);
     asked.answer("Folder for the files [my_train]: ", "");
@@ -80,7 +80,7 @@ fn at_a_terminal_every_question_has_its_default_and_a_wrong_answer_is_asked_agai
 
 #[test]
 fn questions_that_are_broken_off_leave_nothing_behind() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let mut asked = Asked::start(&site, &["init"]);
     asked.answer("Folder for the files [my_train]: ", "made");
     asked.terminal.see("[none]: ");
@@ -92,7 +92,7 @@ fn questions_that_are_broken_off_leave_nothing_behind() {
 
 #[test]
 fn nobody_is_asked_where_a_folder_is_given_or_nobody_is_there() {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let (status, shown) = Asked::start(&site, &["init", "made"]).end();
     assert!(status.success(), "{shown}");
     assert!(!shown.contains("]: "), "{shown}");

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::{Command, Output, Stdio};
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 pub const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");
 
@@ -13,14 +13,14 @@ pub fn said(output: &Output) -> String {
 }
 
 /// A command in the site's folder, with nobody at the keyboard.
-pub fn dynocar(site: &Site, arguments: &[&str]) -> Output {
+pub fn dynocar(site: &DaemonSite, arguments: &[&str]) -> Output {
     let mut command = Command::new(DYNOCAR);
     command.args(arguments).current_dir(site.path()).stdin(Stdio::null());
     command.output().unwrap()
 }
 
 /// Standard output of a command that must succeed.
-pub fn done(site: &Site, arguments: &[&str]) -> String {
+pub fn done(site: &DaemonSite, arguments: &[&str]) -> String {
     let output = dynocar(site, arguments);
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", said(&output));
     String::from_utf8(output.stdout).unwrap()

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use dynocar_tests::process::Site;
+use dynocar_tests::process::DaemonSite;
 
 use crate::commands::DYNOCAR;
 
@@ -22,13 +22,13 @@ pub fn blocks<'g>(guide: &'g str, language: &str) -> Vec<&'g str> {
 }
 
 /// Puts `dynocar` on the path of a site's commands.
-pub fn install(site: &Site) {
+pub fn install(site: &DaemonSite) {
     std::fs::create_dir(site.path().join("bin")).unwrap();
     std::os::unix::fs::symlink(DYNOCAR, site.path().join("bin/dynocar")).unwrap();
 }
 
 /// Runs a line that must succeed in the site's folder; gives what it printed for people.
-pub fn run(site: &Site, line: &str) -> String {
+pub fn run(site: &DaemonSite, line: &str) -> String {
     let path = std::env::var("PATH").unwrap_or_default();
     let output = Command::new("sh")
         .args(["-c", line])

@@ -9,14 +9,14 @@ use dynocar_tests::fuzz::{self, Target};
 use dynocar_tests::golden;
 use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
-use dynocar_tests::soak::arguments::{Arguments, Command, Months, Rounds};
-use dynocar_tests::soak::bad_samples::{Scene, Tally};
-use dynocar_tests::soak::months::story::Span;
+use dynocar_tests::soak::arguments::{Arguments, Command, Months, SoakRounds};
+use dynocar_tests::soak::bad_samples::{SoakScene, SoakTally};
+use dynocar_tests::soak::months::story::StorySpan;
 use dynocar_tests::soak::months::{self, Life, LifeSettings, Story, mistakes};
 use dynocar_tests::soak::{Programs, day, faults, hostile, load, starts, state_kills};
 
 /// Tallies by the kind of estimator and whether sensors failed.
-type Tallies = BTreeMap<(String, bool), Tally>;
+type Tallies = BTreeMap<(String, bool), SoakTally>;
 
 fn main() -> ExitCode {
     let programs = Programs::beside(&std::env::current_exe().expect("the program's path"));
@@ -25,7 +25,7 @@ fn main() -> ExitCode {
         Err(status) => return status,
     };
     match arguments.command {
-        Command::Faults(Rounds { rounds, seed }) => {
+        Command::Faults(SoakRounds { rounds, seed }) => {
             let summary = faults::run(&programs, rounds, seed);
             say(format!("{rounds} rounds: {summary:?}"));
         }
@@ -42,24 +42,24 @@ fn main() -> ExitCode {
         Command::Mistakes { trains, years, seed, trips_between_mistakes } => {
             say(format!("{:?}", mistakes::measure(trains, years, seed, trips_between_mistakes)));
         }
-        Command::Hostile(Rounds { rounds, seed }) => {
+        Command::Hostile(SoakRounds { rounds, seed }) => {
             hostile::measure(&programs, rounds, seed).iter().for_each(|it| say(format!("{it:?}")));
         }
-        Command::Starts(Rounds { rounds, seed }) => {
+        Command::Starts(SoakRounds { rounds, seed }) => {
             let summary = starts::run(&programs, rounds, seed);
             say(format!("{rounds} roots: {summary:?}"));
         }
-        Command::State(Rounds { rounds, seed }) => {
+        Command::State(SoakRounds { rounds, seed }) => {
             let states = state_kills::kill_writers(&programs.peer, rounds, seed);
             say(format!("{rounds} kills among {states} writes, every state readable"));
         }
-        Command::Samples { rounds: Rounds { rounds, seed }, kinds } => {
+        Command::Samples { rounds: SoakRounds { rounds, seed }, kinds } => {
             let mut tallies = Tallies::new();
             (0..rounds).for_each(|round| samples(round, seed + round, &kinds, &mut tallies));
             print_tallies(&tallies);
             say(format!("{rounds} scenes, every sample accounted for, every snapshot finite"));
         }
-        Command::Fuzz(Rounds { rounds, seed }) => {
+        Command::Fuzz(SoakRounds { rounds, seed }) => {
             for target in Target::ALL {
                 let accepted = fuzz::run(target, rounds, seed);
                 say(format!("{target:?}: {rounds} inputs, {accepted} accepted, none misbehaved"));
@@ -92,7 +92,7 @@ fn live(months: &Months) -> Result<(), String> {
         for seed in months.seed..months.seed + months.lives {
             let settings = LifeSettings {
                 story,
-                span: Span { onset: months.onset, end: months.end },
+                span: StorySpan { onset: months.onset, end: months.end },
                 seed,
                 days: months.days,
                 trips: months.trips,
@@ -124,7 +124,7 @@ fn give_up(error: &OutputError) {
 /// One scene without and with every failure at six rates; adds to the tallies of the kinds.
 fn samples(round: u64, seed: u64, kinds: &[String], tallies: &mut Tallies) {
     let train_type = TrainType::ALL[(round % 4) as usize];
-    let scene = Scene::new(seed, train_type);
+    let scene = SoakScene::new(seed, train_type);
     let is_wanted = |kind: &str| kinds.is_empty() || kinds.iter().any(|wanted| wanted == kind);
     let mut watch = |failure, rate| {
         for watched in scene.watch(failure, rate, seed, is_wanted) {
@@ -143,7 +143,7 @@ fn samples(round: u64, seed: u64, kinds: &[String], tallies: &mut Tallies) {
 fn print_tallies(tallies: &Tallies) {
     for ((kind, is_failing), tally) in tallies {
         let samples = if *is_failing { "failing" } else { "good" };
-        let Tally { looks, trusted, wrong, wrong_at_end } = tally;
+        let SoakTally { looks, trusted, wrong, wrong_at_end } = tally;
         say(format!(
             "{kind}, {samples} samples: {looks} looks, {trusted} trusted, {wrong} of them wrong; \
              {wrong_at_end} wrong at the end of a scene"

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use dynocar::runtime::system::ends_with_this;
 use rustix::process::{Pid, Signal, kill_process};
 
-pub use site::Site;
+pub use site::DaemonSite;
 pub use terminal::{Terminal, Tie};
 
 /// How long a test waits for what must happen before it calls it a hang.

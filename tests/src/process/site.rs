@@ -11,24 +11,24 @@ use tempfile::TempDir;
 use super::Process;
 
 /// A run-time directory with a configuration of its own; processes of different sites never meet.
-pub struct Site {
+pub struct DaemonSite {
     directory: TempDir,
 }
 
-impl Default for Site {
+impl Default for DaemonSite {
     fn default() -> Self {
-        Site::new()
+        DaemonSite::new()
     }
 }
 
-impl Site {
+impl DaemonSite {
     /// A new, empty site.
     ///
     /// # Panics
     ///
     /// When no temporary directory can be made.
     pub fn new() -> Self {
-        Site { directory: TempDir::new().expect("a temporary directory") }
+        DaemonSite { directory: TempDir::new().expect("a temporary directory") }
     }
 
     /// The site's folder for files.
@@ -166,7 +166,7 @@ impl Site {
     }
 }
 
-impl Drop for Site {
+impl Drop for DaemonSite {
     fn drop(&mut self) {
         for name in self.segments() {
             // A file that another process removes first is gone as well.

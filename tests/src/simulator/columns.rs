@@ -2,7 +2,7 @@
 
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::random::Random;
+use super::random::SimulatorRandom;
 use super::run_maker::RunPlan;
 
 /// Contents of a column.
@@ -134,7 +134,7 @@ pub struct FileStyle {
 }
 
 /// Draws a style; ideal recordings are written with `extra_decimals` more.
-pub fn make_style(extra_decimals: usize, random: &mut Random) -> FileStyle {
+pub fn make_style(extra_decimals: usize, random: &mut SimulatorRandom) -> FileStyle {
     let house = random.integer(0, 4);
     let has_control_force = random.chance(0.2);
     let mut quantities = vec![ColumnKind::Time, ColumnKind::Position, ColumnKind::Speed];

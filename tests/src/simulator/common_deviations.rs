@@ -1,7 +1,7 @@
 //! Deviations that are the same in all runs of a dataset.
 
-use super::deviations::Deviations;
-use super::random::{Random, Stream};
+use super::deviations::TrueDeviations;
+use super::random::{SimulatorRandom, Stream};
 use super::train_maker::rounded;
 
 /// A draw of what is off in all runs of a dataset alike.
@@ -34,8 +34,8 @@ const WARMING_S: (f64, f64) = (150.0, 400.0);
 
 impl CommonDeviations {
     /// The draw of a seed.
-    pub fn draw(deviations: &Deviations, seed: u64) -> Self {
-        let mut random = Random::new(seed, Stream::Deviations);
+    pub fn draw(deviations: &TrueDeviations, seed: u64) -> Self {
+        let mut random = SimulatorRandom::new(seed, Stream::Deviations);
         let mut near_one = |share: f64| 1.0 + share * random.gaussian();
         let curve_constant = near_one(deviations.curve_constant_share);
         let force_gains = [near_one(deviations.force_share), near_one(deviations.force_share)];

@@ -8,7 +8,7 @@ use dynocar_analysis::dataset::Dataset;
 use dynocar_model::train::TrainModel;
 
 use super::columns::{FileStyle, make_style, row_text};
-use super::random::{Random, Stream};
+use super::random::{SimulatorRandom, Stream};
 use super::{SimulatedDataset, SimulatedRun, gnss};
 
 /// A file of a dataset: its path within the folder, and its text.
@@ -23,7 +23,7 @@ const GNSS_COLUMNS: &str = "latitude = { column = \"lat\", unit = \"deg\" }\n\
 pub fn dataset_files(dataset: &SimulatedDataset) -> Vec<FileText> {
     let settings = &dataset.settings;
     let extra_decimals = if settings.sensor_noise == 0.0 { 4 } else { 0 };
-    let style = make_style(extra_decimals, &mut Random::new(settings.seed, Stream::Files));
+    let style = make_style(extra_decimals, &mut SimulatorRandom::new(settings.seed, Stream::Files));
     let mut files = vec![
         ("dataset.toml".to_string(), dataset_toml(dataset, &style)),
         ("train.toml".to_string(), train_toml(dataset.declared_train())),

@@ -2,14 +2,14 @@
 
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::random::Random;
+use super::random::SimulatorRandom;
 use super::settings::Defects;
 
 /// Spoils the samples of one run.
 pub fn spoil(
     samples: Vec<TrainSample>,
     defects: &Defects,
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<TrainSample> {
     let mut samples = remove_rows(samples, defects, random);
     for sample in samples.iter_mut().skip(1) {
@@ -26,7 +26,7 @@ pub fn spoil(
 fn remove_rows(
     samples: Vec<TrainSample>,
     defects: &Defects,
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<TrainSample> {
     let mut gap_end_ns = i64::MIN;
     let mut last_ns = samples.first().map_or(0, |sample| sample.time_ns);
@@ -46,7 +46,7 @@ fn remove_rows(
         .collect()
 }
 
-fn empty_cells(sample: &mut TrainSample, share: f64, random: &mut Random) {
+fn empty_cells(sample: &mut TrainSample, share: f64, random: &mut SimulatorRandom) {
     for field in [
         SampleField::Position,
         SampleField::TractionForce,
@@ -61,7 +61,7 @@ fn empty_cells(sample: &mut TrainSample, share: f64, random: &mut Random) {
 }
 
 /// One quantity far off.
-fn spike(sample: &mut TrainSample, random: &mut Random) {
+fn spike(sample: &mut TrainSample, random: &mut SimulatorRandom) {
     match random.integer(0, 3) {
         0 => {
             let off_mps = random.sign() * random.uniform(3.0, 30.0);
@@ -82,7 +82,11 @@ fn spike(sample: &mut TrainSample, random: &mut Random) {
     }
 }
 
-fn repeat_rows(samples: Vec<TrainSample>, share: f64, random: &mut Random) -> Vec<TrainSample> {
+fn repeat_rows(
+    samples: Vec<TrainSample>,
+    share: f64,
+    random: &mut SimulatorRandom,
+) -> Vec<TrainSample> {
     let mut rows = Vec::with_capacity(samples.len());
     for sample in samples {
         rows.push(sample);
@@ -93,7 +97,11 @@ fn repeat_rows(samples: Vec<TrainSample>, share: f64, random: &mut Random) -> Ve
     rows
 }
 
-fn swap_rows(samples: Vec<TrainSample>, share: f64, random: &mut Random) -> Vec<TrainSample> {
+fn swap_rows(
+    samples: Vec<TrainSample>,
+    share: f64,
+    random: &mut SimulatorRandom,
+) -> Vec<TrainSample> {
     let mut rows = samples;
     for k in 2..rows.len() {
         if random.chance(share) {

@@ -4,7 +4,7 @@
 ///
 /// An undeclared effect of a kind takes the place of the deviation of the same kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Deviations {
+pub struct TrueDeviations {
     /// Of the true from the declared mass, from run to run.
     pub mass_share: f64,
     /// Of the load, anew at each stop of each run.
@@ -41,9 +41,9 @@ pub struct Deviations {
     pub has_couplings: bool,
 }
 
-impl Deviations {
+impl TrueDeviations {
     /// Everything is as declared.
-    pub const NONE: Deviations = Deviations {
+    pub const NONE: TrueDeviations = TrueDeviations {
         mass_share: 0.0,
         load_share: 0.0,
         map_permille: 0.0,
@@ -63,19 +63,23 @@ impl Deviations {
     };
 
     /// A good survey, calibrated forces, and the little that differs from run to run.
-    pub const PLAIN: Deviations = Deviations {
+    pub const PLAIN: TrueDeviations = TrueDeviations {
         survey_permille: 0.05,
         run_force_share: 0.002,
         run_resistance_share: 0.01,
-        ..Deviations::NONE
+        ..TrueDeviations::NONE
     };
 
     /// Cars on couplings, and winds: 0.4 m/s, seldom above the least that is an effect.
-    pub const COUPLED: Deviations =
-        Deviations { has_couplings: true, day_wind_mps: 0.4, gust_mps: 0.4, ..Deviations::PLAIN };
+    pub const COUPLED: TrueDeviations = TrueDeviations {
+        has_couplings: true,
+        day_wind_mps: 0.4,
+        gust_mps: 0.4,
+        ..TrueDeviations::PLAIN
+    };
 
     /// Everything a little wrong at once, as on a railway.
-    pub const ROUGH: Deviations = Deviations {
+    pub const ROUGH: TrueDeviations = TrueDeviations {
         mass_share: 0.02,
         map_permille: 0.12,
         curve_constant_share: 0.15,
@@ -85,10 +89,10 @@ impl Deviations {
         force_share: 0.006,
         wheel_share: 0.0015,
         warming_share: 0.05,
-        ..Deviations::PLAIN
+        ..TrueDeviations::PLAIN
     };
 
     /// The same, and what hides in many runs as it is in all of them: another rotating mass and rounded gradients.
-    pub const ROUGHER: Deviations =
-        Deviations { rotating_mass: 0.004, vertical_curve_m: 80.0, ..Deviations::ROUGH };
+    pub const ROUGHER: TrueDeviations =
+        TrueDeviations { rotating_mass: 0.004, vertical_curve_m: 80.0, ..TrueDeviations::ROUGH };
 }

@@ -6,9 +6,9 @@ use dynocar_model::terms::{
 use dynocar_model::track::{GradientError, LinearProfile, StepProfile};
 
 use super::common_deviations::CommonDeviations;
-use super::effects::{Effect, MassSection, RunWindow};
+use super::effects::{TrueEffect, TrueMassSection, TrueRunWindow};
 use super::line_maker::SimulatedLine;
-use super::random::{Random, Stream};
+use super::random::{SimulatorRandom, Stream};
 use super::run_maker::RunPlan;
 use super::settings::SimulatorSettings;
 use super::train_maker::TrueTrain;
@@ -51,15 +51,15 @@ pub struct Disturbances {
     /// Dragging brake in N.
     pub drag_force_n: f64,
     /// When it drags.
-    pub drag_windows: Vec<RunWindow>,
+    pub drag_windows: Vec<TrueRunWindow>,
     /// Cylinder pressure in Pa that remains while it drags.
     pub residual_pressure_pa: f64,
     /// Measured over true speed.
     pub speed_scale: f64,
     /// Other masses by place.
-    pub mass_sections: Vec<MassSection>,
+    pub mass_sections: Vec<TrueMassSection>,
     /// Other masses by time.
-    pub mass_windows: Vec<(RunWindow, f64)>,
+    pub mass_windows: Vec<(TrueRunWindow, f64)>,
     /// Reported over true traction force.
     pub traction_gain: f64,
     /// Reported over true brake force.
@@ -148,7 +148,7 @@ impl Disturbances {
 
     /// Returns a dataset's effects in one run of it.
     pub fn of(
-        effects: &[Effect],
+        effects: &[TrueEffect],
         train: &TrueTrain,
         line: &SimulatedLine,
         plan: &RunPlan,
@@ -166,7 +166,7 @@ impl Disturbances {
     /// Small differences that no effect describes.
     fn vary(&mut self, plan: &RunPlan, settings: &SimulatorSettings) {
         let deviations = &settings.deviations;
-        let mut of_run = Random::new(settings.seed, Stream::Variation(plan.number));
+        let mut of_run = SimulatorRandom::new(settings.seed, Stream::Variation(plan.number));
         self.resistance_factor = 1.0 + deviations.run_resistance_share * of_run.gaussian();
         self.force_reading_factor = 1.0 + deviations.run_force_share * of_run.gaussian();
         let mass = 1.0 + deviations.mass_share * of_run.gaussian();
@@ -175,9 +175,9 @@ impl Disturbances {
             .map(|stop_m| (stop_m, mass * (1.0 + deviations.load_share * of_run.gaussian())))
             .collect();
         self.headwind_mps = deviations.day_wind_mps
-            * Random::new(settings.seed, Stream::Day(plan.number)).gaussian();
+            * SimulatorRandom::new(settings.seed, Stream::Day(plan.number)).gaussian();
         self.gust_sd_mps = deviations.gust_mps;
-        let mut survey = Random::new(settings.seed, Stream::Survey);
+        let mut survey = SimulatorRandom::new(settings.seed, Stream::Survey);
         let surveyed: Vec<(f64, f64)> = self
             .gradient
             .entries()
@@ -215,71 +215,71 @@ impl Disturbances {
         }
     }
 
-    fn apply(&mut self, effect: &Effect, plan: &RunPlan, seed: u64) {
-        let of_run = |window: &&RunWindow| window.run == plan.number;
+    fn apply(&mut self, effect: &TrueEffect, plan: &RunPlan, seed: u64) {
+        let of_run = |window: &&TrueRunWindow| window.run == plan.number;
         let in_runs = |runs: &[usize]| runs.is_empty() || runs.contains(&plan.number);
         match effect {
-            Effect::TunnelDrag { c_factor } => self.tunnel_c_factor = *c_factor,
-            Effect::CurveResistance { k_n_per_kn_m } => {
+            TrueEffect::TunnelDrag { c_factor } => self.tunnel_c_factor = *c_factor,
+            TrueEffect::CurveResistance { k_n_per_kn_m } => {
                 self.curve_constant_n_per_kn_m = *k_n_per_kn_m;
             }
-            Effect::Wind { wind_plus_mps, run_sd_mps, gust_sd_mps } => {
-                let of_the_day = Random::new(seed, Stream::Gusts(plan.number)).gaussian();
+            TrueEffect::Wind { wind_plus_mps, run_sd_mps, gust_sd_mps } => {
+                let of_the_day = SimulatorRandom::new(seed, Stream::Gusts(plan.number)).gaussian();
                 self.headwind_mps += plan.direction * wind_plus_mps + run_sd_mps * of_the_day;
                 self.gust_sd_mps = self.gust_sd_mps.max(*gust_sd_mps);
             }
-            Effect::DraggingBrake { force_n, windows, residual_pressure_pa } => {
+            TrueEffect::DraggingBrake { force_n, windows, residual_pressure_pa } => {
                 self.drag_force_n = *force_n;
                 self.drag_windows = windows.iter().filter(of_run).copied().collect();
                 self.residual_pressure_pa = *residual_pressure_pa;
             }
-            Effect::WheelDiameter { speed_scale } => self.speed_scale = *speed_scale,
-            Effect::GradientShift { shift_m } => {
+            TrueEffect::WheelDiameter { speed_scale } => self.speed_scale = *speed_scale,
+            TrueEffect::GradientShift { shift_m } => {
                 let moved: Vec<(f64, f64)> =
                     self.gradient.entries().map(|(m, permille)| (m + shift_m, permille)).collect();
                 self.gradient = StepProfile::new(&moved).expect("a moved profile keeps its order");
                 self.gradient_shift_m = *shift_m;
             }
-            Effect::GradientError { profile } => {
+            TrueEffect::GradientError { profile } => {
                 let error = LinearProfile::new(profile.clone()).expect("ascending chainages");
                 self.gradient = with_error(&self.gradient, profile, &error);
                 self.gradient_error = Some(GradientError { profile: error, falling: None });
             }
-            Effect::MassChangeSections(sections) => {
+            TrueEffect::MassChangeSections(sections) => {
                 let of_direction =
                     sections.iter().filter(|section| section.direction == plan.direction);
                 self.mass_sections = of_direction.copied().collect();
             }
-            Effect::MassChangeWindows(windows) => {
+            TrueEffect::MassChangeWindows(windows) => {
                 let of_run = windows.iter().filter(|(window, _)| window.run == plan.number);
                 self.mass_windows = of_run.copied().collect();
             }
-            Effect::TractionGain { gain } => self.traction_gain = *gain,
-            Effect::BrakeGain { gain } => self.brake_gain = *gain,
-            Effect::BrakeDelay { delay_s, lag_s } => self.brake_late_s = [*delay_s, *lag_s],
-            Effect::ActuatorDelay { delay_s, lag_s } => {
+            TrueEffect::TractionGain { gain } => self.traction_gain = *gain,
+            TrueEffect::BrakeGain { gain } => self.brake_gain = *gain,
+            TrueEffect::BrakeDelay { delay_s, lag_s } => self.brake_late_s = [*delay_s, *lag_s],
+            TrueEffect::ActuatorDelay { delay_s, lag_s } => {
                 (self.delay_s, self.lag_s) = (*delay_s, *lag_s);
             }
-            Effect::SpeedDelay { delay_s, lag_s } => {
+            TrueEffect::SpeedDelay { delay_s, lag_s } => {
                 (self.speed_delay_s, self.speed_lag_s) = (*delay_s, *lag_s);
             }
-            Effect::RotatingMass { rotating_mass_factor } => {
+            TrueEffect::RotatingMass { rotating_mass_factor } => {
                 self.rotating_mass_factor = *rotating_mass_factor;
             }
-            Effect::BearingTemperature { delta_a_n_per_kn, tau_s } => {
+            TrueEffect::BearingTemperature { delta_a_n_per_kn, tau_s } => {
                 self.cold_bearings = Some((*delta_a_n_per_kn, *tau_s));
             }
-            Effect::AmbientTemperature { w0_per_k, reference_k } => {
+            TrueEffect::AmbientTemperature { w0_per_k, reference_k } => {
                 self.ambient = Some((*w0_per_k, *reference_k));
             }
-            Effect::LocalResistance { extra_n_per_kn, intervals_m, runs } => {
+            TrueEffect::LocalResistance { extra_n_per_kn, intervals_m, runs } => {
                 self.local = in_runs(runs).then(|| interval_profile(intervals_m, *extra_n_per_kn));
             }
-            Effect::LowAdhesion { adhesion, intervals_m, runs } => {
+            TrueEffect::LowAdhesion { adhesion, intervals_m, runs } => {
                 let cap = AdhesionCap { adhesion: *adhesion, intervals_m: intervals_m.clone() };
                 self.adhesion = in_runs(runs).then_some(cap);
             }
-            Effect::Unlisted(unlisted) => self.unlisted = Some(*unlisted),
+            TrueEffect::Unlisted(unlisted) => self.unlisted = Some(*unlisted),
         }
     }
 
@@ -324,7 +324,7 @@ impl Disturbances {
         let by_place = || {
             let sections = self.mass_sections.iter();
             let around =
-                |section: &&MassSection| (section.from_m..section.to_m).contains(&centre_m);
+                |section: &&TrueMassSection| (section.from_m..section.to_m).contains(&centre_m);
             sections.clone().find(around).map(|section| section.mass_factor)
         };
         by_time.or_else(by_place).unwrap_or(1.0)

@@ -1,11 +1,11 @@
 //! A driver who keeps to the limits, coasts and stops at the stations.
 
-use dynocar_model::simulate::motion::Motion;
+use dynocar_model::simulate::motion::SimulatedMotion;
 
 use super::driving::{Controls, Driver, TrainOnLine};
 use super::line_maker::SimulatedLine;
-use super::permitted_speed::{Leg, PermittedSpeed};
-use super::random::Random;
+use super::permitted_speed::{PermittedLeg, PermittedSpeed};
+use super::random::SimulatorRandom;
 use super::run_maker::RunPlan;
 use super::train_maker::TrueTrain;
 
@@ -36,7 +36,7 @@ pub struct TrainDriver<'a> {
     line: &'a SimulatedLine,
     plan: &'a RunPlan,
     declared: TrainOnLine<'a>,
-    random: Random,
+    random: SimulatorRandom,
     /// Distances travelled in m at the stops.
     stops_m: Vec<f64>,
     next_stop: usize,
@@ -50,7 +50,7 @@ impl<'a> TrainDriver<'a> {
         train: &'a TrueTrain,
         line: &'a SimulatedLine,
         plan: &'a RunPlan,
-        random: Random,
+        random: SimulatorRandom,
     ) -> Self {
         let mut random = random;
         let stops_m: Vec<f64> =
@@ -73,12 +73,12 @@ impl<'a> TrainDriver<'a> {
         train.handling.holding_share * train.brake_max_n(0.0)
     }
 
-    fn stop_distance_m(&self, motion: Motion) -> f64 {
+    fn stop_distance_m(&self, motion: SimulatedMotion) -> f64 {
         self.stops_m[self.next_stop] - motion.distance_m
     }
 
     /// Permitted speed in m/s when the brakes will have come on.
-    fn permitted_ahead_mps(&self, motion: Motion) -> f64 {
+    fn permitted_ahead_mps(&self, motion: SimulatedMotion) -> f64 {
         let handling = &self.train.handling;
         let ahead_s = 0.5 + handling.brake_lag_s + 0.5 * self.braking_mps2() / handling.jerk_mps3;
         self.permitted.at(motion.distance_m + ahead_s * motion.speed_mps)
@@ -88,7 +88,7 @@ impl<'a> TrainDriver<'a> {
         self.plan.style.braking_share * self.train.handling.braking_mps2
     }
 
-    fn update_mode(&mut self, time_s: f64, motion: Motion) -> bool {
+    fn update_mode(&mut self, time_s: f64, motion: SimulatedMotion) -> bool {
         let (speed_mps, stop_m) = (motion.speed_mps, self.stop_distance_m(motion));
         if let Mode::Standing { until_s } = self.mode {
             if time_s < until_s {
@@ -132,7 +132,7 @@ impl<'a> TrainDriver<'a> {
         true
     }
 
-    fn depart(&mut self, motion: Motion) {
+    fn depart(&mut self, motion: SimulatedMotion) {
         if self.stop_distance_m(motion) < ARRIVED_M {
             self.next_stop += 1;
         }
@@ -150,14 +150,14 @@ impl<'a> TrainDriver<'a> {
     }
 
     /// The force in N along the travel that gives an acceleration in m/s², by the declared model.
-    fn force_for_n(&self, motion: Motion, acceleration_mps2: f64) -> f64 {
+    fn force_for_n(&self, motion: SimulatedMotion, acceleration_mps2: f64) -> f64 {
         let inertia_kg = self.declared.mass_kg * (1.0 + self.declared.train.rotating_mass_factor);
         let coasting_mps2 = self.declared.acceleration_mps2(motion, Controls::default());
         inertia_kg * (acceleration_mps2 - coasting_mps2)
     }
 
     /// Deceleration wanted while braking, as an acceleration in m/s².
-    fn braking_acceleration_mps2(&self, motion: Motion) -> f64 {
+    fn braking_acceleration_mps2(&self, motion: SimulatedMotion) -> f64 {
         let (speed_mps, stop_m) = (motion.speed_mps, self.stop_distance_m(motion));
         let ordinary_mps2 = self.braking_mps2();
         let for_stop_mps2 = speed_mps * speed_mps / (2.0 * (stop_m - 0.3).max(0.4));
@@ -175,7 +175,7 @@ impl<'a> TrainDriver<'a> {
 }
 
 impl Driver for TrainDriver<'_> {
-    fn controls(&mut self, time_s: f64, motion: Motion) -> Option<Controls> {
+    fn controls(&mut self, time_s: f64, motion: SimulatedMotion) -> Option<Controls> {
         if !self.update_mode(time_s, motion) {
             return None;
         }
@@ -219,7 +219,7 @@ fn permitted_to(
     from_m: f64,
     to_m: f64,
 ) -> PermittedSpeed {
-    let leg = Leg {
+    let leg = PermittedLeg {
         from_m,
         to_m,
         origin_m: plan.start_m,

@@ -1,6 +1,6 @@
 //! The declared train under a driver: the track is looked up at the simulated position.
 
-use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 
@@ -16,12 +16,12 @@ pub struct Controls {
 /// Decides on the forces.
 pub trait Driver {
     /// The forces from `time_s` on, given where the train is; `None` ends the run.
-    fn controls(&mut self, time_s: f64, motion: Motion) -> Option<Controls>;
+    fn controls(&mut self, time_s: f64, motion: SimulatedMotion) -> Option<Controls>;
 }
 
 /// A closure (time in s, motion) to the forces.
-impl<F: FnMut(f64, Motion) -> Option<Controls>> Driver for F {
-    fn controls(&mut self, time_s: f64, motion: Motion) -> Option<Controls> {
+impl<F: FnMut(f64, SimulatedMotion) -> Option<Controls>> Driver for F {
+    fn controls(&mut self, time_s: f64, motion: SimulatedMotion) -> Option<Controls> {
         self(time_s, motion)
     }
 }
@@ -43,14 +43,14 @@ pub struct TrainOnLine<'a> {
 
 impl TrainOnLine<'_> {
     /// Chainage in m of the train's centre.
-    pub fn position_m(&self, motion: Motion) -> f64 {
+    pub fn position_m(&self, motion: SimulatedMotion) -> f64 {
         self.start_m + self.direction * motion.distance_m
     }
 
     /// dv/dt in m/s² by the declared model; what is not known of the line counts as none there.
     ///
     /// At rest a negative value means that the train stays where it is.
-    pub fn acceleration_mps2(&self, motion: Motion, controls: Controls) -> f64 {
+    pub fn acceleration_mps2(&self, motion: SimulatedMotion, controls: Controls) -> f64 {
         let train = self.train;
         let centre_m = self.position_m(motion);
         let on_track = |look_up: fn(&Track, f64, f64) -> Option<f64>| {
@@ -77,7 +77,7 @@ pub struct DrivenPoint {
     /// Time in s from the start.
     pub time_s: f64,
     /// Distance and speed.
-    pub motion: Motion,
+    pub motion: SimulatedMotion,
     /// Forces from here to the next point.
     pub controls: Controls,
 }
@@ -92,7 +92,7 @@ pub fn drive(
     time_max_s: f64,
 ) -> Vec<DrivenPoint> {
     let mut points = Vec::new();
-    let mut motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
+    let mut motion = SimulatedMotion { distance_m: 0.0, speed_mps: 0.0 };
     for k in 0.. {
         let time_s = k as f64 * step_s;
         let Some(controls) = driver.controls(time_s, motion) else { break };

@@ -22,7 +22,7 @@ pub struct LineUnderTrain {
 
 /// Values that change from instant to instant besides place and speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Instant {
+pub struct SimulatedMoment {
     /// Time in s from the run's first sample.
     pub time_s: f64,
     /// Headwind in m/s along the travel, gusts included.
@@ -35,7 +35,7 @@ pub struct Instant {
 
 /// Resisting forces in N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Resistance {
+pub struct SimulatedResistance {
     /// Basic and curve resistance by the true Davis coefficients and the declared curve constant.
     pub ordinary_n: f64,
     /// Force of the undeclared effects.
@@ -44,7 +44,7 @@ pub struct Resistance {
     pub gradient_n: f64,
 }
 
-impl Resistance {
+impl SimulatedResistance {
     /// All together.
     pub fn total_n(&self) -> f64 {
         self.ordinary_n + self.extra_n + self.gradient_n
@@ -86,7 +86,12 @@ impl TruePhysics<'_> {
     }
 
     /// Everything that holds the train back at a speed in m/s.
-    pub fn resistance(&self, speed_mps: f64, under: &LineUnderTrain, now: &Instant) -> Resistance {
+    pub fn resistance(
+        &self,
+        speed_mps: f64,
+        under: &LineUnderTrain,
+        now: &SimulatedMoment,
+    ) -> SimulatedResistance {
         let disturbances = self.disturbances;
         let davis = self.train.resistance;
         let w0_n_per_kn = disturbances.resistance_factor * davis.w0_n_per_kn(speed_mps);
@@ -106,7 +111,7 @@ impl TruePhysics<'_> {
         let all_n_per_kn = davis.w0_n_per_kn(speed_mps) + all.extra_n_per_kn(davis, speed_mps);
         let drag_n = disturbances.drag_n(now.time_s);
         let weight_kn = TrainModel::weight_kn(now.mass_kg);
-        Resistance {
+        SimulatedResistance {
             ordinary_n: weight_kn * ordinary_n_per_kn,
             extra_n: weight_kn * (all_n_per_kn - ordinary_n_per_kn) + drag_n,
             gradient_n: weight_kn * under.gradient_permille,

@@ -8,7 +8,7 @@ use super::unlisted::Unlisted;
 
 /// An interval of time in one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunWindow {
+pub struct TrueRunWindow {
     /// Number of the run, from 0.
     pub run: usize,
     /// Start in s from the run's first sample.
@@ -19,7 +19,7 @@ pub struct RunWindow {
 
 /// Another mass between two places.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MassSection {
+pub struct TrueMassSection {
     /// Lower chainage in m.
     pub from_m: f64,
     /// Upper chainage in m.
@@ -32,7 +32,7 @@ pub struct MassSection {
 
 /// Something true of the train, the line or the sensors that nobody declares; SI units.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Effect {
+pub enum TrueEffect {
     /// The aerodynamic term of the part of the train in a tunnel is `c_factor` times as large.
     TunnelDrag {
         /// Factor on c v².
@@ -57,7 +57,7 @@ pub enum Effect {
         /// Force in N.
         force_n: f64,
         /// When; the force builds up over 10 s.
-        windows: Vec<RunWindow>,
+        windows: Vec<TrueRunWindow>,
         /// Cylinder pressure in Pa that remains, where it shows.
         residual_pressure_pa: f64,
     },
@@ -77,9 +77,9 @@ pub enum Effect {
         profile: Vec<(f64, f64)>,
     },
     /// Another mass between certain places.
-    MassChangeSections(Vec<MassSection>),
+    MassChangeSections(Vec<TrueMassSection>),
     /// Another mass in certain intervals of time, with true over declared mass.
-    MassChangeWindows(Vec<(RunWindow, f64)>),
+    MassChangeWindows(Vec<(TrueRunWindow, f64)>),
     /// The reported traction force is not the true one.
     TractionGain {
         /// Reported over true force.
@@ -152,39 +152,42 @@ pub enum Effect {
     Unlisted(Unlisted),
 }
 
-impl Effect {
+impl TrueEffect {
     /// The kind by which `dynocar explain` should name it.
     pub fn kind(&self) -> EffectKind {
         match self {
-            Effect::TunnelDrag { .. } => EffectKind::TunnelDrag,
-            Effect::CurveResistance { .. } => EffectKind::CurveResistance,
-            Effect::Wind { .. } => EffectKind::Wind,
-            Effect::DraggingBrake { .. } => EffectKind::DraggingBrake,
-            Effect::WheelDiameter { .. } => EffectKind::WheelDiameter,
-            Effect::GradientShift { .. } => EffectKind::GradientShift,
-            Effect::GradientError { .. } => EffectKind::GradientError,
-            Effect::MassChangeSections(_) | Effect::MassChangeWindows(_) => EffectKind::MassChange,
-            Effect::TractionGain { .. } => EffectKind::TractionGain,
-            Effect::BrakeGain { .. } => EffectKind::BrakeGain,
-            Effect::BrakeDelay { .. } => EffectKind::BrakeDelay,
-            Effect::ActuatorDelay { .. } => EffectKind::ActuatorDelay,
-            Effect::SpeedDelay { .. } => EffectKind::SpeedDelay,
-            Effect::RotatingMass { .. } => EffectKind::RotatingMass,
-            Effect::BearingTemperature { .. } => EffectKind::BearingTemperature,
-            Effect::AmbientTemperature { .. } => EffectKind::AmbientTemperature,
-            Effect::LocalResistance { .. } => EffectKind::LocalResistance,
-            Effect::LowAdhesion { .. } => EffectKind::LowAdhesion,
-            Effect::Unlisted(_) => EffectKind::Unknown,
+            TrueEffect::TunnelDrag { .. } => EffectKind::TunnelDrag,
+            TrueEffect::CurveResistance { .. } => EffectKind::CurveResistance,
+            TrueEffect::Wind { .. } => EffectKind::Wind,
+            TrueEffect::DraggingBrake { .. } => EffectKind::DraggingBrake,
+            TrueEffect::WheelDiameter { .. } => EffectKind::WheelDiameter,
+            TrueEffect::GradientShift { .. } => EffectKind::GradientShift,
+            TrueEffect::GradientError { .. } => EffectKind::GradientError,
+            TrueEffect::MassChangeSections(_) | TrueEffect::MassChangeWindows(_) => {
+                EffectKind::MassChange
+            }
+            TrueEffect::TractionGain { .. } => EffectKind::TractionGain,
+            TrueEffect::BrakeGain { .. } => EffectKind::BrakeGain,
+            TrueEffect::BrakeDelay { .. } => EffectKind::BrakeDelay,
+            TrueEffect::ActuatorDelay { .. } => EffectKind::ActuatorDelay,
+            TrueEffect::SpeedDelay { .. } => EffectKind::SpeedDelay,
+            TrueEffect::RotatingMass { .. } => EffectKind::RotatingMass,
+            TrueEffect::BearingTemperature { .. } => EffectKind::BearingTemperature,
+            TrueEffect::AmbientTemperature { .. } => EffectKind::AmbientTemperature,
+            TrueEffect::LocalResistance { .. } => EffectKind::LocalResistance,
+            TrueEffect::LowAdhesion { .. } => EffectKind::LowAdhesion,
+            TrueEffect::Unlisted(_) => EffectKind::Unknown,
         }
     }
 
     /// The same with windows that end with their runs, given each run's length in s.
     #[must_use]
     pub fn ended_with_runs(mut self, lengths_s: &[f64]) -> Self {
-        let end = |window: &mut RunWindow| window.end_s = window.end_s.min(lengths_s[window.run]);
+        let end =
+            |window: &mut TrueRunWindow| window.end_s = window.end_s.min(lengths_s[window.run]);
         match &mut self {
-            Effect::DraggingBrake { windows, .. } => windows.iter_mut().for_each(end),
-            Effect::MassChangeWindows(windows) => {
+            TrueEffect::DraggingBrake { windows, .. } => windows.iter_mut().for_each(end),
+            TrueEffect::MassChangeWindows(windows) => {
                 windows.iter_mut().for_each(|(window, _)| end(window));
             }
             _ => {}
@@ -196,14 +199,14 @@ impl Effect {
     /// `time_offset_s`, the time of a run's first sample.
     pub fn parameters(&self, time_offset_s: f64) -> Value {
         match self {
-            Effect::TunnelDrag { c_factor } => json!({ "c_factor": c_factor }),
-            Effect::CurveResistance { k_n_per_kn_m } => json!({ "k_n_per_kn_m": k_n_per_kn_m }),
-            Effect::Wind { wind_plus_mps, .. } => json!({ "wind_plus_mps": wind_plus_mps }),
-            Effect::DraggingBrake { force_n, .. } => json!({ "force_n": force_n }),
-            Effect::WheelDiameter { speed_scale } => json!({ "speed_scale": speed_scale }),
-            Effect::GradientShift { shift_m } => json!({ "shift_m": shift_m }),
-            Effect::GradientError { profile } => json!({ "profile": profile }),
-            Effect::MassChangeSections(sections) => json!({
+            TrueEffect::TunnelDrag { c_factor } => json!({ "c_factor": c_factor }),
+            TrueEffect::CurveResistance { k_n_per_kn_m } => json!({ "k_n_per_kn_m": k_n_per_kn_m }),
+            TrueEffect::Wind { wind_plus_mps, .. } => json!({ "wind_plus_mps": wind_plus_mps }),
+            TrueEffect::DraggingBrake { force_n, .. } => json!({ "force_n": force_n }),
+            TrueEffect::WheelDiameter { speed_scale } => json!({ "speed_scale": speed_scale }),
+            TrueEffect::GradientShift { shift_m } => json!({ "shift_m": shift_m }),
+            TrueEffect::GradientError { profile } => json!({ "profile": profile }),
+            TrueEffect::MassChangeSections(sections) => json!({
                 "sections": sections.iter().map(|section| json!({
                     "from_m": section.from_m,
                     "to_m": section.to_m,
@@ -211,47 +214,49 @@ impl Effect {
                     "mass_factor": section.mass_factor,
                 })).collect::<Vec<_>>()
             }),
-            Effect::MassChangeWindows(windows) => json!({
+            TrueEffect::MassChangeWindows(windows) => json!({
                 "windows": windows.iter().map(|(window, mass_factor)| {
                     let mut entry = window_json(window, time_offset_s);
                     entry.insert("mass_factor".into(), json!(mass_factor));
                     Value::Object(entry)
                 }).collect::<Vec<_>>()
             }),
-            Effect::TractionGain { gain } | Effect::BrakeGain { gain } => json!({ "gain": gain }),
-            Effect::ActuatorDelay { delay_s, lag_s }
-            | Effect::BrakeDelay { delay_s, lag_s }
-            | Effect::SpeedDelay { delay_s, lag_s } => {
+            TrueEffect::TractionGain { gain } | TrueEffect::BrakeGain { gain } => {
+                json!({ "gain": gain })
+            }
+            TrueEffect::ActuatorDelay { delay_s, lag_s }
+            | TrueEffect::BrakeDelay { delay_s, lag_s }
+            | TrueEffect::SpeedDelay { delay_s, lag_s } => {
                 json!({ "delay_s": delay_s, "lag_s": lag_s })
             }
-            Effect::RotatingMass { rotating_mass_factor } => {
+            TrueEffect::RotatingMass { rotating_mass_factor } => {
                 json!({ "rotating_mass_factor": rotating_mass_factor })
             }
-            Effect::BearingTemperature { delta_a_n_per_kn, tau_s } => {
+            TrueEffect::BearingTemperature { delta_a_n_per_kn, tau_s } => {
                 json!({ "delta_a_n_per_kn": delta_a_n_per_kn, "tau_s": tau_s })
             }
-            Effect::AmbientTemperature { w0_per_k, reference_k } => {
+            TrueEffect::AmbientTemperature { w0_per_k, reference_k } => {
                 json!({ "w0_per_k": w0_per_k, "reference_k": reference_k })
             }
-            Effect::LocalResistance { extra_n_per_kn, .. } => {
+            TrueEffect::LocalResistance { extra_n_per_kn, .. } => {
                 json!({ "extra_n_per_kn": extra_n_per_kn })
             }
-            Effect::LowAdhesion { adhesion, .. } => json!({ "adhesion": adhesion }),
-            Effect::Unlisted(unlisted) => json!({ "extra_n_per_kn": unlisted.n_per_kn }),
+            TrueEffect::LowAdhesion { adhesion, .. } => json!({ "adhesion": adhesion }),
+            TrueEffect::Unlisted(unlisted) => json!({ "extra_n_per_kn": unlisted.n_per_kn }),
         }
     }
 
     /// Where it acts, by the names that `dynocar explain --json` uses.
     pub fn place(&self, time_offset_s: f64) -> Value {
         match self {
-            Effect::DraggingBrake { windows, .. } => json!({
+            TrueEffect::DraggingBrake { windows, .. } => json!({
                 "windows": windows
                     .iter()
                     .map(|window| window_json(window, time_offset_s))
                     .collect::<Vec<_>>()
             }),
-            Effect::LocalResistance { intervals_m, runs, .. }
-            | Effect::LowAdhesion { intervals_m, runs, .. } => {
+            TrueEffect::LocalResistance { intervals_m, runs, .. }
+            | TrueEffect::LowAdhesion { intervals_m, runs, .. } => {
                 let mut place = Map::new();
                 if !intervals_m.is_empty() {
                     place.insert("intervals_m".into(), json!(intervals_m));
@@ -262,7 +267,7 @@ impl Effect {
                 }
                 Value::Object(place)
             }
-            Effect::Unlisted(unlisted) => match unlisted.speed_range_mps() {
+            TrueEffect::Unlisted(unlisted) => match unlisted.speed_range_mps() {
                 Some(range) => json!({ "speed_range_mps": range }),
                 None => json!({}),
             },
@@ -271,7 +276,7 @@ impl Effect {
     }
 }
 
-fn window_json(window: &RunWindow, time_offset_s: f64) -> Map<String, Value> {
+fn window_json(window: &TrueRunWindow, time_offset_s: f64) -> Map<String, Value> {
     let mut entry = Map::new();
     entry.insert("run".into(), json!(run_file(window.run)));
     entry.insert("t_start_s".into(), json!(time_offset_s + window.start_s));

@@ -4,7 +4,7 @@ use dynocar_analysis::survey::geodesy::LocalPlane;
 use dynocar_shared::TrainSample;
 
 use super::line_maker::SimulatedLine;
-use super::random::Random;
+use super::random::SimulatorRandom;
 use super::settings::{GnssReceiver, SimulatorSettings};
 use super::true_run::{TRUE_STEP_S, TrueState};
 
@@ -60,7 +60,7 @@ pub fn positions(
     states: &[TrueState],
     line: &SimulatedLine,
     (receiver, settings): (GnssReceiver, &SimulatorSettings),
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<Option<Position>> {
     let alignment = alignment_m(line);
     let plane = LocalPlane::around(ORIGIN_DEG.0, ORIGIN_DEG.1, ORIGIN_M);

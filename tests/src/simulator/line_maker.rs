@@ -1,8 +1,8 @@
 //! Random lines: gradients, curves, tunnels, stations, speed limits, balises.
 
-use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::track::{Track, TrackCurve, Tunnel};
 
-use super::random::Random;
+use super::random::SimulatorRandom;
 use super::settings::{SimulatorSettings, TrainType};
 use super::train_maker::rounded;
 
@@ -143,7 +143,7 @@ pub fn make_line(
     train_type: TrainType,
     train: (f64, f64),
     has_tunnels: bool,
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> SimulatedLine {
     let ranges = match train_type {
         TrainType::Freight => FREIGHT,
@@ -176,7 +176,7 @@ pub fn make_line(
     SimulatedLine { track, length_m, stations_m, limits, balises_m }
 }
 
-fn make_gradient(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<(f64, f64)> {
+fn make_gradient(ranges: &Ranges, length_m: f64, random: &mut SimulatorRandom) -> Vec<(f64, f64)> {
     let mut gradient = Vec::new();
     let mut chainage_m = 0.0;
     let mut height_m = 0.0;
@@ -194,7 +194,7 @@ fn make_gradient(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<(f6
     gradient
 }
 
-fn make_curves(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<Curve> {
+fn make_curves(ranges: &Ranges, length_m: f64, random: &mut SimulatorRandom) -> Vec<TrackCurve> {
     let mut curves = Vec::new();
     let mut free_m = 0.0;
     loop {
@@ -204,13 +204,13 @@ fn make_curves(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<Curve
         if end_m >= length_m {
             return curves;
         }
-        curves.push(Curve { start_m, end_m, radius_m: random.pick(ranges.radii_m) });
+        curves.push(TrackCurve { start_m, end_m, radius_m: random.pick(ranges.radii_m) });
         free_m = end_m;
     }
 }
 
 /// One tunnel in each of as many equal parts of the line's middle.
-fn make_tunnels(ranges: &Ranges, length_m: f64, random: &mut Random) -> Vec<Tunnel> {
+fn make_tunnels(ranges: &Ranges, length_m: f64, random: &mut SimulatorRandom) -> Vec<Tunnel> {
     let count = random.integer(ranges.tunnels.0, ranges.tunnels.1);
     let part_m = 0.8 * length_m / count as f64;
     (0..count)
@@ -228,7 +228,7 @@ fn make_stations(
     ranges: &Ranges,
     length_m: f64,
     train_length_m: f64,
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<f64> {
     let margin_m = 0.5 * train_length_m + ranges.end_margin_m;
     let end_m = length_m - margin_m;
@@ -249,8 +249,8 @@ fn make_limits(
     ranges: &Ranges,
     length_m: f64,
     speed_max_mps: f64,
-    curves: &[Curve],
-    random: &mut Random,
+    curves: &[TrackCurve],
+    random: &mut SimulatorRandom,
 ) -> Vec<SpeedLimit> {
     let mut limits = Vec::new();
     let mut chainage_m = 0.0;
@@ -277,7 +277,7 @@ fn make_balises(
     ranges: &Ranges,
     length_m: f64,
     stations_m: &[f64],
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<f64> {
     let mut balises_m = stations_m.to_vec();
     let mut chainage_m = 0.0;

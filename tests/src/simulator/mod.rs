@@ -51,8 +51,8 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::TrainSample;
 
-pub use deviations::Deviations;
-pub use effects::Effect;
+pub use deviations::TrueDeviations;
+pub use effects::TrueEffect;
 pub use settings::{
     Defects, EffectRequest, ForceSampling, GnssReceiver, SimulatorSettings, TrainType,
 };
@@ -64,7 +64,7 @@ use disturbances::Disturbances;
 use dynamics::TruePhysics;
 use effect_maker::{EffectScene, make_effect, suitable_types};
 use line_maker::{SimulatedLine, make_line};
-use random::{Random, Stream};
+use random::{SimulatorRandom, Stream};
 use run_maker::{RunPlan, make_plans};
 use sensors::{Sensors, make_sensors, measure_run};
 use train_maker::{TrueTrain, make_train};
@@ -95,7 +95,7 @@ pub struct SimulatedDataset {
     /// The line, declared and true.
     pub line: SimulatedLine,
     /// The undeclared effects.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<TrueEffect>,
     /// The sensors.
     pub sensors: Sensors,
     /// The runs.
@@ -121,20 +121,20 @@ impl SimulatedDataset {
 /// When fewer than two runs, a period of sampling outside 0.1 to 1 s, or a duration below 60 s is
 /// asked for.
 pub fn simulate(settings: &SimulatorSettings) -> SimulatedDataset {
-    let world = World::of(settings);
+    let world = SimulatedWorld::of(settings);
     let effects = draw_effects(settings, &world.scene());
     let runs: Vec<SimulatedRun> =
         world.plans.iter().map(|plan| world.run(plan.clone(), &effects)).collect();
     let lengths_s: Vec<f64> =
         runs.iter().map(|run| run.states[run.states.len() - 1].time_s).collect();
     let effects = effects.into_iter().map(|effect| effect.ended_with_runs(&lengths_s)).collect();
-    let World { settings, train, line, sensors, .. } = world;
+    let SimulatedWorld { settings, train, line, sensors, .. } = world;
     SimulatedDataset { settings, train, line, effects, sensors, runs }
 }
 
 /// A train, a line and the runs that are planned, before anything is undeclared.
 #[derive(Clone, Debug, PartialEq)]
-pub struct World {
+pub struct SimulatedWorld {
     /// Settings of the simulator.
     pub settings: SimulatorSettings,
     /// The train, declared and true.
@@ -147,7 +147,7 @@ pub struct World {
     pub plans: Vec<RunPlan>,
 }
 
-impl World {
+impl SimulatedWorld {
     /// Draws a world.
     ///
     /// # Panics
@@ -163,17 +163,17 @@ impl World {
     }
 
     /// Drives and records a run with some effects.
-    pub fn run(&self, plan: RunPlan, effects: &[Effect]) -> SimulatedRun {
+    pub fn run(&self, plan: RunPlan, effects: &[TrueEffect]) -> SimulatedRun {
         simulate_run(&self.settings, &self.train, &self.line, plan, effects, &self.sensors)
     }
 }
 
-fn draw_world(settings: &SimulatorSettings) -> World {
+fn draw_world(settings: &SimulatorSettings) -> SimulatedWorld {
     assert!(settings.runs >= 2, "expected at least 2 runs, got {}", settings.runs);
     let period_s = settings.sample_period_s;
     assert!((0.1..=1.0).contains(&period_s), "expected a period of 0.1 to 1 s, got {period_s} s");
     assert!(settings.duration_s >= 60.0, "expected 60 s or more, got {} s", settings.duration_s);
-    let stream = |stream: Stream| Random::new(settings.seed, stream);
+    let stream = |stream: Stream| SimulatorRandom::new(settings.seed, stream);
     let mut of_train = stream(Stream::Train);
     let drawn_type = of_train.pick(&fitting_types(&settings.effects));
     let train_type = settings.train_type.unwrap_or(drawn_type);
@@ -185,7 +185,7 @@ fn draw_world(settings: &SimulatorSettings) -> World {
     let line = make_line(settings, train_type, size, has_tunnels, &mut of_line);
     let plans = make_plans(settings, &train, &line, &mut stream(Stream::Plans));
     let sensors = make_sensors(&train, settings.sensor_noise, &mut stream(Stream::SensorTypes));
-    World { settings: settings.clone(), train, line, sensors, plans }
+    SimulatedWorld { settings: settings.clone(), train, line, sensors, plans }
 }
 
 /// Types of train on which all the effects show; all types when there is no such.
@@ -198,19 +198,19 @@ fn fitting_types(request: &EffectRequest) -> Vec<TrainType> {
     if fitting.is_empty() { TrainType::ALL.to_vec() } else { fitting }
 }
 
-fn draw_effects(settings: &SimulatorSettings, scene: &EffectScene<'_>) -> Vec<Effect> {
+fn draw_effects(settings: &SimulatorSettings, scene: &EffectScene<'_>) -> Vec<TrueEffect> {
     match &settings.effects {
         EffectRequest::Exactly(effects) => effects.clone(),
         EffectRequest::LoadsByStop => {
-            let mut random = Random::new(settings.seed, Stream::Effects);
+            let mut random = SimulatorRandom::new(settings.seed, Stream::Effects);
             vec![scene.loads_by_stop(&mut random)]
         }
         EffectRequest::AnyLaw => {
-            let mut random = Random::new(settings.seed, Stream::Effects);
+            let mut random = SimulatorRandom::new(settings.seed, Stream::Effects);
             vec![scene.any_law(settings.duration_s, &mut random)]
         }
         EffectRequest::Kinds(kinds) => {
-            let mut random = Random::new(settings.seed, Stream::Effects);
+            let mut random = SimulatorRandom::new(settings.seed, Stream::Effects);
             kinds
                 .iter()
                 .filter_map(|&kind| make_effect(kind, scene, settings.duration_s, &mut random))
@@ -224,10 +224,10 @@ fn simulate_run(
     train: &TrueTrain,
     line: &SimulatedLine,
     plan: RunPlan,
-    effects: &[Effect],
+    effects: &[TrueEffect],
     sensors: &Sensors,
 ) -> SimulatedRun {
-    let stream = |stream: Stream| Random::new(settings.seed, stream);
+    let stream = |stream: Stream| SimulatorRandom::new(settings.seed, stream);
     let disturbances = Disturbances::of(effects, train, line, &plan, settings);
     let physics = TruePhysics { train, line, plan: &plan, disturbances: &disturbances };
     let mut states = drive_run(&physics, settings);

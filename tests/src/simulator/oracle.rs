@@ -8,7 +8,7 @@ use std::sync::Arc;
 use dynocar_core::pipeline::admission::Admission;
 use dynocar_model::force::{ForceResolver, ResolvedSample};
 use dynocar_model::simulate::{
-    ForceModel, Prediction, QuadraticForces, Recording, Restart, STANDING_MPS, SpeedError,
+    ForceModel, OpenLoopRecording, Prediction, QuadraticForces, Restart, STANDING_MPS, SpeedError,
     declared_polynomial,
 };
 use dynocar_model::terms::delay::DelayLine;
@@ -20,7 +20,7 @@ use super::{SimulatedDataset, SimulatedRun};
 
 /// RMSE in m/s over the pooled holdout runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Errors {
+pub struct OracleErrors {
     /// Of the declared model.
     pub declared_mps: f64,
     /// Of the true Davis coefficients with the true effects.
@@ -31,9 +31,9 @@ pub struct Errors {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleScore {
     /// From start to end.
-    pub full_run: Errors,
+    pub full_run: OracleErrors,
     /// Restarted every 60 s.
-    pub window60: Errors,
+    pub window60: OracleErrors,
 }
 
 /// Scores the declared and the true model on the holdout runs.
@@ -42,7 +42,7 @@ pub struct OracleScore {
 ///
 /// When a holdout run has no usable samples, which the simulator does not make.
 pub fn score(dataset: &SimulatedDataset) -> OracleScore {
-    let runs: Vec<(Recording, QuadraticForces, OracleForces)> = dataset
+    let runs: Vec<(OpenLoopRecording, QuadraticForces, OracleForces)> = dataset
         .runs
         .iter()
         .filter(|run| run.plan.is_holdout)
@@ -53,7 +53,7 @@ pub fn score(dataset: &SimulatedDataset) -> OracleScore {
             (recording, declared, truth)
         })
         .collect();
-    let errors = |restart: Restart| Errors {
+    let errors = |restart: Restart| OracleErrors {
         declared_mps: pooled_mps(runs.iter().map(|run| error(&run.0, &run.1, restart))),
         true_mps: pooled_mps(runs.iter().map(|run| error(&run.0, &run.2, restart))),
     };
@@ -64,7 +64,7 @@ fn pooled_mps(errors: impl Iterator<Item = SpeedError>) -> f64 {
     errors.sum::<SpeedError>().rmse_mps().expect("a simulated run moves")
 }
 
-fn error(recording: &Recording, model: &impl ForceModel, restart: Restart) -> SpeedError {
+fn error(recording: &OpenLoopRecording, model: &impl ForceModel, restart: Restart) -> SpeedError {
     let mut prediction = Prediction::new();
     prediction.simulate(recording, model, restart);
     SpeedError::of(recording, &prediction)
@@ -75,13 +75,13 @@ fn error(recording: &Recording, model: &impl ForceModel, restart: Restart) -> Sp
 /// # Panics
 ///
 /// When no sample is usable.
-pub fn record(dataset: &SimulatedDataset, run: &SimulatedRun) -> Recording {
+pub fn record(dataset: &SimulatedDataset, run: &SimulatedRun) -> OpenLoopRecording {
     let train = Arc::new(dataset.train.declared.clone());
     let mut admission = Admission::new(SIMULATED_TRAIN, Arc::clone(&train));
     let mut resolver = ForceResolver::new(train, Some(Arc::new(dataset.line.track.clone())));
     let resolve = |sample| Some(resolver.resolve(&admission.validate(sample).ok()?));
     let resolved: Vec<ResolvedSample> = run.samples.iter().filter_map(resolve).collect();
-    Recording::new(resolved).expect("a simulated run has forces")
+    OpenLoopRecording::new(resolved).expect("a simulated run has forces")
 }
 
 /// The true model of one run.
@@ -111,7 +111,7 @@ impl ForceModel for OracleForces {
 pub fn oracle_forces(
     dataset: &SimulatedDataset,
     run: &SimulatedRun,
-    recording: &Recording,
+    recording: &OpenLoopRecording,
 ) -> OracleForces {
     let disturbances = &run.disturbances;
     let davis = dataset.train.resistance;
@@ -197,7 +197,7 @@ fn extra_n_per_kn(
 }
 
 /// Traction minus brake in N that acts behind the reported forces, at each sample.
-fn acting_forces_n(recording: &Recording, disturbances: &Disturbances) -> Vec<f64> {
+fn acting_forces_n(recording: &OpenLoopRecording, disturbances: &Disturbances) -> Vec<f64> {
     let mut late = DelayLine::new(disturbances.delay_s, disturbances.lag_s);
     let [brake_delay_s, brake_lag_s] = disturbances.brake_late_s;
     let mut late_brake = DelayLine::new(brake_delay_s, brake_lag_s);

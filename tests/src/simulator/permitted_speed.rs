@@ -12,7 +12,7 @@ pub struct PermittedSpeed {
 
 /// A way from one stop to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leg {
+pub struct PermittedLeg {
     /// Distance travelled in m at its start.
     pub from_m: f64,
     /// Distance travelled in m at the stop.
@@ -33,7 +33,7 @@ pub struct Leg {
 
 impl PermittedSpeed {
     /// The profile of a leg.
-    pub fn new(line: &SimulatedLine, leg: &Leg) -> Self {
+    pub fn new(line: &SimulatedLine, leg: &PermittedLeg) -> Self {
         let spacing_m = 4.0;
         let count = ((leg.to_m - leg.from_m) / spacing_m).ceil().max(1.0) as usize;
         let mut squares: Vec<f64> = (0..count)

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use dynocar_shared::SampleField;
 
 use super::dataset_writer::{FileText, dataset_files};
-use super::random::{Random, Stream};
+use super::random::{SimulatorRandom, Stream};
 use super::true_run::TRUE_STEP_S;
 use super::{SimulatedDataset, SimulatedRun};
 
@@ -39,7 +39,7 @@ impl TrueDrive {
 
 /// The files of a dataset of which power is recorded in place of forces: every brake feeds back.
 pub fn power_files(dataset: &SimulatedDataset, drive: &TrueDrive) -> Vec<FileText> {
-    let mut random = Random::new(dataset.settings.seed, Stream::Files);
+    let mut random = SimulatorRandom::new(dataset.settings.seed, Stream::Files);
     let mut manifest = format!(
         "[dataset]\nname = \"power-{}\"\n[train]\nfile = \"train.toml\"\n[track]\nfile = \
          \"track.toml\"\n[columns]\ntime = {{ column = \"t\", unit = \"s\" }}\nposition = {{ column = \
@@ -69,7 +69,7 @@ pub fn power_files(dataset: &SimulatedDataset, drive: &TrueDrive) -> Vec<FileTex
     files
 }
 
-fn run_csv(run: &SimulatedRun, drive: &TrueDrive, random: &mut Random) -> String {
+fn run_csv(run: &SimulatedRun, drive: &TrueDrive, random: &mut SimulatorRandom) -> String {
     let mut text = String::from("t,s,v,P\n");
     let first_ns = run.samples.first().map_or(0, |sample| sample.time_ns);
     for sample in &run.samples {

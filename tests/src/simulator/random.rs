@@ -71,17 +71,17 @@ impl Stream {
 
 /// A seeded source of random numbers.
 #[derive(Clone, Debug)]
-pub struct Random {
+pub struct SimulatorRandom {
     generator: ChaCha8Rng,
     spare_gaussian: Option<f64>,
 }
 
-impl Random {
+impl SimulatorRandom {
     /// The stream of a subject under a seed.
     pub fn new(seed: u64, stream: Stream) -> Self {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(stream.number());
-        Random { generator, spare_gaussian: None }
+        SimulatorRandom { generator, spare_gaussian: None }
     }
 
     /// Uniform from `low` to `high`.

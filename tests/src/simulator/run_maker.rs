@@ -1,7 +1,7 @@
 //! Which runs are made: direction, load, stops, weather and manner of driving.
 
 use super::line_maker::SimulatedLine;
-use super::random::Random;
+use super::random::SimulatorRandom;
 use super::run_file::run_file;
 use super::settings::{SimulatorSettings, TrainType};
 use super::train_maker::{TrueTrain, rounded};
@@ -67,7 +67,7 @@ pub fn make_plans(
     settings: &SimulatorSettings,
     train: &TrueTrain,
     line: &SimulatedLine,
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<RunPlan> {
     let first_sign = random.sign();
     let holdouts = choose_holdouts(settings, random);
@@ -94,7 +94,7 @@ pub fn make_plans(
 }
 
 /// Runs of both directions in turn, never the first two.
-fn choose_holdouts(settings: &SimulatorSettings, random: &mut Random) -> Vec<usize> {
+fn choose_holdouts(settings: &SimulatorSettings, random: &mut SimulatorRandom) -> Vec<usize> {
     let mut holdouts: Vec<usize> = Vec::new();
     let count = settings.holdout_runs.min(settings.runs.saturating_sub(1));
     while holdouts.len() < count {
@@ -108,7 +108,7 @@ fn choose_holdouts(settings: &SimulatorSettings, random: &mut Random) -> Vec<usi
     holdouts
 }
 
-fn make_style(train_type: TrainType, random: &mut Random) -> DrivingStyle {
+fn make_style(train_type: TrainType, random: &mut SimulatorRandom) -> DrivingStyle {
     let (dwell_low_s, dwell_high_s) = match train_type {
         TrainType::Metro => (18.0, 30.0),
         _ => (20.0, 45.0),
@@ -130,7 +130,7 @@ fn make_route(
     line: &SimulatedLine,
     direction: f64,
     style: &DrivingStyle,
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> (f64, Vec<f64>) {
     let places_m = match train.train_type {
         TrainType::Freight => signals_m(train, line, random),
@@ -171,7 +171,7 @@ fn make_route(
 }
 
 /// Places where a freight train may have to stop: every kilometre or two.
-fn signals_m(train: &TrueTrain, line: &SimulatedLine, random: &mut Random) -> Vec<f64> {
+fn signals_m(train: &TrueTrain, line: &SimulatedLine, random: &mut SimulatorRandom) -> Vec<f64> {
     let margin_m = 0.5 * train.declared.length_m + 80.0;
     let mut places_m = vec![margin_m + random.uniform(0.0, 1500.0)];
     loop {

@@ -6,7 +6,7 @@ use dynocar_shared::{SampleField, TrainId, TrainSample};
 use super::actuators::lagged;
 use super::disturbances::Disturbances;
 use super::line_maker::SimulatedLine;
-use super::random::Random;
+use super::random::SimulatorRandom;
 use super::run_maker::RunPlan;
 use super::settings::{ForceSampling, SimulatorSettings};
 use super::train_maker::TrueTrain;
@@ -36,13 +36,13 @@ impl Sensor {
     }
 
     /// A reading of a true value.
-    pub fn read(&self, truth: f64, random: &mut Random) -> f64 {
+    pub fn read(&self, truth: f64, random: &mut SimulatorRandom) -> f64 {
         let noise = (self.noise + self.relative_noise * truth.abs()) * random.gaussian();
         self.to_quantum(truth + noise)
     }
 
     /// A reading of something that is never negative and exactly zero when it is off.
-    fn read_positive(&self, truth: f64, random: &mut Random) -> f64 {
+    fn read_positive(&self, truth: f64, random: &mut SimulatorRandom) -> f64 {
         let reading = self.read(truth, random).max(0.0);
         if truth == 0.0 { 0.0 } else { reading }
     }
@@ -74,7 +74,7 @@ pub struct Sensors {
 }
 
 /// Draws the sensors of a train; `factor` scales their noise and quanta.
-pub fn make_sensors(train: &TrueTrain, factor: f64, random: &mut Random) -> Sensors {
+pub fn make_sensors(train: &TrueTrain, factor: f64, random: &mut SimulatorRandom) -> Sensors {
     let force_max_n = train.traction_max_n(0.0).max(train.brake_max_n(0.0));
     let force_quantum_n = if force_max_n > 400e3 { 200.0 } else { 50.0 };
     let sensor = |noise: f64, relative_noise: f64, quantum: f64| {
@@ -123,7 +123,7 @@ pub fn measure_run(
     line: &SimulatedLine,
     (sensors, disturbances): (&Sensors, &Disturbances),
     settings: &SimulatorSettings,
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<TrainSample> {
     let odometer = read_odometer(states, plan, line, (sensors, disturbances), random);
     let shown_mps = shown_speeds_mps(states, disturbances);
@@ -216,7 +216,7 @@ fn read_odometer(
     plan: &RunPlan,
     line: &SimulatedLine,
     (sensors, disturbances): (&Sensors, &Disturbances),
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<f64> {
     let scale = disturbances.speed_scale * (1.0 + sensors.odometer_scale_sd * random.gaussian());
     let mut shown_m = states[0].position_m + sensors.balise_sd_m * random.gaussian();

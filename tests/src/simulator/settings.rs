@@ -2,8 +2,8 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::deviations::Deviations;
-use super::effects::Effect;
+use super::deviations::TrueDeviations;
+use super::effects::TrueEffect;
 
 /// A kind of train.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub enum EffectRequest {
     /// gives a null, [`EffectKind::Unknown`] one that no library declares.
     Kinds(Vec<EffectKind>),
     /// Exactly these.
-    Exactly(Vec<Effect>),
+    Exactly(Vec<TrueEffect>),
     /// Another load between every two stations, in each direction.
     LoadsByStop,
     /// One resistance by a law outside the library, drawn from the seed.
@@ -60,7 +60,7 @@ impl EffectRequest {
             EffectRequest::Kinds(kinds) => kinds.clone(),
             EffectRequest::LoadsByStop => vec![EffectKind::MassChange],
             EffectRequest::AnyLaw => vec![EffectKind::Unknown],
-            EffectRequest::Exactly(effects) => effects.iter().map(Effect::kind).collect(),
+            EffectRequest::Exactly(effects) => effects.iter().map(TrueEffect::kind).collect(),
         }
     }
 }
@@ -136,7 +136,7 @@ pub struct SimulatorSettings {
     /// Whether the map holds the line's tunnels; else its list of them is empty.
     pub maps_tunnels: bool,
     /// Deviations of everything that is declared.
-    pub deviations: Deviations,
+    pub deviations: TrueDeviations,
     /// Wheel-slip events that a run has on average, where traction allows.
     pub wheel_slips_per_run: f64,
     /// Defects between sensors and file.
@@ -196,7 +196,7 @@ impl SimulatorSettings {
             resistance_spread: 1.0,
             is_level_and_straight: false,
             maps_tunnels: true,
-            deviations: Deviations::PLAIN,
+            deviations: TrueDeviations::PLAIN,
             wheel_slips_per_run: 0.25,
             defects: Defects::NONE,
             gnss: None,
@@ -211,7 +211,7 @@ impl SimulatorSettings {
         SimulatorSettings {
             sensor_noise: 0.0,
             resistance_spread: 0.0,
-            deviations: Deviations::NONE,
+            deviations: TrueDeviations::NONE,
             wheel_slips_per_run: 0.0,
             ..SimulatorSettings::new(seed, effects)
         }

@@ -2,7 +2,7 @@
 
 use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 
-use super::random::Random;
+use super::random::SimulatorRandom;
 use super::settings::TrainType;
 
 /// A car as the simulator sees it.
@@ -20,7 +20,7 @@ pub struct Car {
 
 /// How a train's drives and brakes answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Handling {
+pub struct TrainHandling {
     /// Highest speed in m/s.
     pub speed_max_mps: f64,
     /// Ordinary deceleration in m/s² for stops.
@@ -53,7 +53,7 @@ pub struct TrueTrain {
     /// The cars, first one ahead.
     pub cars: Vec<Car>,
     /// Drives and brakes.
-    pub handling: Handling,
+    pub handling: TrainHandling,
 }
 
 impl TrueTrain {
@@ -170,7 +170,11 @@ const HIGH_SPEED: Ranges = Ranges {
 
 /// Draws a train; `resistance_spread` scales the distance of its true Davis coefficients from the
 /// declared ones.
-pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Random) -> TrueTrain {
+pub fn make_train(
+    train_type: TrainType,
+    resistance_spread: f64,
+    random: &mut SimulatorRandom,
+) -> TrueTrain {
     let ranges = match train_type {
         TrainType::Freight => FREIGHT,
         TrainType::Regional => REGIONAL,
@@ -179,7 +183,7 @@ pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Ra
     };
     let cars = make_cars(train_type, &ranges, random);
     let (mass_kg, length_m) = (cars.0, cars.1);
-    let draw = |range: (f64, f64), random: &mut Random| random.uniform(range.0, range.1);
+    let draw = |range: (f64, f64), random: &mut SimulatorRandom| random.uniform(range.0, range.1);
     let declared_resistance = Davis {
         a: rounded(draw(ranges.a, random), 1e-3),
         b: rounded(draw(ranges.b, random), 1e-4),
@@ -212,7 +216,7 @@ pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Ra
         corrections: Default::default(),
         extra: Vec::new(),
     };
-    let handling = Handling {
+    let handling = TrainHandling {
         speed_max_mps,
         braking_mps2: ranges.braking_mps2,
         jerk_mps3: ranges.jerk_mps3,
@@ -227,7 +231,11 @@ pub fn make_train(train_type: TrainType, resistance_spread: f64, random: &mut Ra
 }
 
 /// Mass in kg, length in m and cars; a freight train has its locomotive ahead.
-fn make_cars(train_type: TrainType, ranges: &Ranges, random: &mut Random) -> (f64, f64, Vec<Car>) {
+fn make_cars(
+    train_type: TrainType,
+    ranges: &Ranges,
+    random: &mut SimulatorRandom,
+) -> (f64, f64, Vec<Car>) {
     let count = random.integer(ranges.cars.0, ranges.cars.1);
     let uniform_length_m = random.uniform(ranges.car_length_m.0, ranges.car_length_m.1);
     let uniform_mass_kg = random.uniform(ranges.car_mass_kg.0, ranges.car_mass_kg.1);
@@ -269,7 +277,7 @@ fn traction_effort(
     ranges: &Ranges,
     mass_kg: f64,
     speed_max_mps: f64,
-    random: &mut Random,
+    random: &mut SimulatorRandom,
 ) -> Vec<(f64, f64)> {
     let pull_n = mass_kg * random.uniform(ranges.pull_mps2.0, ranges.pull_mps2.1);
     let power_w = mass_kg * random.uniform(ranges.power_w_per_kg.0, ranges.power_w_per_kg.1);

@@ -1,13 +1,13 @@
 //! One run as it truly happened.
 
-use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::TrainModel;
 
 use super::actuators::{Actuators, LateForces};
 use super::driver::TrainDriver;
 use super::driving::{Controls, Driver};
-use super::dynamics::{Instant, Resistance, TruePhysics};
-use super::random::{Random, Stream};
+use super::dynamics::{SimulatedMoment, SimulatedResistance, TruePhysics};
+use super::random::{SimulatorRandom, Stream};
 use super::settings::{ForceSampling, SimulatorSettings};
 
 /// Step in s of the true motion.
@@ -34,7 +34,7 @@ pub struct TrueState {
     /// Forces that act on the train.
     pub acting: Controls,
     /// Resisting forces.
-    pub resistance: Resistance,
+    pub resistance: SimulatedResistance,
     /// Brake-cylinder pressure in Pa.
     pub cylinder_pressure_pa: f64,
     /// Outside temperature in °C.
@@ -50,7 +50,7 @@ pub struct TrueState {
 /// Drives a run to its last stop.
 pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec<TrueState> {
     let (train, plan, disturbances) = (physics.train, physics.plan, physics.disturbances);
-    let stream = |stream: Stream| Random::new(settings.seed, stream);
+    let stream = |stream: Stream| SimulatorRandom::new(settings.seed, stream);
     let mut driver =
         TrainDriver::new(train, physics.line, plan, stream(Stream::Driver(plan.number)));
     let held_n = TrainDriver::holding_force_n(train);
@@ -61,7 +61,7 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
     let mut late_brake = LateForces::new(brake_delay_s, brake_lag_s, TRUE_STEP_S, held);
     let mut slip = WheelSlip::new(settings, stream(Stream::Slip(plan.number)));
     let mut weather = Weather::new(physics, stream(Stream::Gusts(plan.number)));
-    let mut motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
+    let mut motion = SimulatedMotion { distance_m: 0.0, speed_mps: 0.0 };
     let held_steps = (settings.sample_period_s / TRUE_STEP_S).round().max(1.0) as usize;
     let mut held_on = held;
     let steps_max = (DURATION_FACTOR_MAX * settings.duration_s / TRUE_STEP_S) as usize;
@@ -80,7 +80,7 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
         let position_m = plan.start_m + plan.direction * motion.distance_m;
         let (headwind_mps, temperature_degc) = weather.advance();
         let mass_kg = plan.mass_kg * disturbances.mass_factor(time_s, position_m);
-        let now = Instant { time_s, headwind_mps, temperature_degc, mass_kg };
+        let now = SimulatedMoment { time_s, headwind_mps, temperature_degc, mass_kg };
         let brake_force_n = late_brake.advance(forces).brake_force_n;
         let mut acting = late.advance(Controls { brake_force_n, ..forces });
         if let Some(cap) = &disturbances.adhesion {
@@ -121,7 +121,7 @@ pub fn drive_run(physics: &TruePhysics<'_>, settings: &SimulatorSettings) -> Vec
 
 /// Gusts and the slow change of temperature.
 struct Weather {
-    random: Random,
+    random: SimulatorRandom,
     mean_headwind_mps: f64,
     gust_sd_mps: f64,
     gust_mps: f64,
@@ -133,7 +133,7 @@ struct Weather {
 const GUST_TIME_S: f64 = 20.0;
 
 impl Weather {
-    fn new(physics: &TruePhysics<'_>, random: Random) -> Self {
+    fn new(physics: &TruePhysics<'_>, random: SimulatorRandom) -> Self {
         let mut random = random;
         // The first number of this stream is the wind of the day.
         random.gaussian();
@@ -161,7 +161,7 @@ impl Weather {
 
 /// Short slips of the driven wheels under strong traction at low speed.
 struct WheelSlip {
-    random: Random,
+    random: SimulatorRandom,
     probability_per_step: f64,
     /// Steps done, steps in all, greatest slip in m/s.
     active: Option<(u32, u32, f64)>,
@@ -171,7 +171,7 @@ struct WheelSlip {
 const SLIPPERY_S_PER_RUN: f64 = 60.0;
 
 impl WheelSlip {
-    fn new(settings: &SimulatorSettings, random: Random) -> Self {
+    fn new(settings: &SimulatorSettings, random: SimulatorRandom) -> Self {
         let probability_per_step = settings.wheel_slips_per_run * TRUE_STEP_S / SLIPPERY_S_PER_RUN;
         WheelSlip { random, probability_per_step, active: None }
     }

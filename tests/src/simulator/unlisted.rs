@@ -1,6 +1,6 @@
 //! Resistances that no library holds, by laws of the simulator's own.
 
-use super::random::Random;
+use super::random::SimulatorRandom;
 
 /// Inputs of a law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,7 +120,7 @@ impl Unlisted {
         (speed_max_mps, w0_n_per_kn): (f64, f64),
         warmest_degc: f64,
         duration_s: f64,
-        random: &mut Random,
+        random: &mut SimulatorRandom,
     ) -> Self {
         let mut of = |low: f64, high: f64| random.uniform(low, high);
         let speed = |share: f64| share * speed_max_mps;

@@ -19,7 +19,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Kills, stops and restarts of all processes
-    Faults(Rounds),
+    Faults(SoakRounds),
     /// Eight trains at 200 Hz, with faults
     Load {
         /// How long, in s
@@ -57,23 +57,23 @@ pub enum Command {
         trips_between_mistakes: f64,
     },
     /// Garbage into each kind of segment; prints who survives
-    Hostile(Rounds),
+    Hostile(SoakRounds),
     /// `kill -9` of daemon, controller and client while they start, ten starts a round
-    Starts(Rounds),
+    Starts(SoakRounds),
     /// `kill -9` while a state file is written
-    State(Rounds),
+    State(SoakRounds),
     /// Every pipeline under every failure of its sensors, a simulated scene each round; prints the
     /// estimates that are trusted and wrong at the end, and how many were at a look every 40 s
     Samples {
         /// Scenes and seed
         #[command(flatten)]
-        rounds: Rounds,
+        rounds: SoakRounds,
         /// Kinds of estimator, all when absent
         #[arg(long, value_delimiter = ',', value_parser = known_kinds())]
         kinds: Vec<String>,
     },
     /// Mutations of `tests/corpus` into every reader
-    Fuzz(Rounds),
+    Fuzz(SoakRounds),
     /// Makes `tests/golden/demo.txt` anew, after a change that is meant
     Golden,
 }
@@ -109,7 +109,7 @@ pub struct Months {
 
 /// How often, and by chance of which seed.
 #[derive(Debug, Args)]
-pub struct Rounds {
+pub struct SoakRounds {
     /// How many
     #[arg(long, default_value_t = 1000)]
     pub rounds: u64,

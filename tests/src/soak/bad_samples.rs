@@ -11,7 +11,7 @@ use dynocar_shared::{Parameter, ParameterSnapshot, Status, TrainSample};
 use crate::sensor_failures::{SensorFailure, Spoiled};
 use crate::simulator::sensors::SIMULATED_TRAIN;
 use crate::simulator::{
-    Deviations, EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, simulate,
+    EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, TrueDeviations, simulate,
 };
 
 /// Standard deviations within which a trusted value must lie.
@@ -37,7 +37,7 @@ pub const LOOK_SAMPLES: u64 = 200;
 
 /// How often estimates were looked at, trusted, and wrong nevertheless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct SoakTally {
     /// Looks.
     pub looks: u64,
     /// Looks at an estimate called `estimated`.
@@ -48,7 +48,7 @@ pub struct Tally {
     pub wrong_at_end: u64,
 }
 
-impl Tally {
+impl SoakTally {
     fn add(&mut self, snapshot: &ParameterSnapshot, is_wrong: bool) {
         self.looks += 1;
         self.trusted += u64::from(snapshot.status() == Status::Estimated);
@@ -56,8 +56,8 @@ impl Tally {
     }
 }
 
-impl std::ops::AddAssign for Tally {
-    fn add_assign(&mut self, other: Tally) {
+impl std::ops::AddAssign for SoakTally {
+    fn add_assign(&mut self, other: SoakTally) {
         self.looks += other.looks;
         self.trusted += other.trusted;
         self.wrong += other.wrong;
@@ -67,24 +67,24 @@ impl std::ops::AddAssign for Tally {
 
 /// One kind of estimator over a scene.
 #[derive(Clone, Debug)]
-pub struct Watched {
+pub struct WatchedSnapshots {
     /// The kind of estimator.
     pub kind: String,
     /// Counts over all looks.
-    pub tally: Tally,
+    pub tally: SoakTally,
     /// Whether it was misled at the end.
     pub misled_at_end: Option<Misled>,
 }
 
 /// Simulated driving without anything undeclared.
 #[derive(Debug)]
-pub struct Scene {
+pub struct SoakScene {
     data: SimulatedDataset,
     samples: Vec<TrainSample>,
     estimators: Vec<EstimatorSettings>,
 }
 
-impl Scene {
+impl SoakScene {
     /// The scene of a seed and a type of train.
     pub fn new(seed: u64, train_type: TrainType) -> Self {
         let mut settings = SimulatorSettings::new(seed, EffectRequest::none());
@@ -92,7 +92,7 @@ impl Scene {
         settings.runs = 2;
         settings.holdout_runs = 0;
         settings.duration_s = 400.0;
-        settings.deviations = Deviations::NONE;
+        settings.deviations = TrueDeviations::NONE;
         settings.resistance_spread = 0.5;
         let data = simulate(&settings);
         let mut samples: Vec<TrainSample> = Vec::new();
@@ -102,12 +102,12 @@ impl Scene {
                 samples.push(TrainSample { sequence, run, ..*sample });
             }
         }
-        Scene { data, samples, estimators: default_estimators() }
+        SoakScene { data, samples, estimators: default_estimators() }
     }
 
     /// The same before other estimators than those by default.
     pub fn before(self, estimators: Vec<EstimatorSettings>) -> Self {
-        Scene { estimators, ..self }
+        SoakScene { estimators, ..self }
     }
 
     /// Runs every estimator over the samples under a failure; gives those that were misled at the
@@ -133,7 +133,7 @@ impl Scene {
         rate: f64,
         seed: u64,
         is_wanted: impl Fn(&str) -> bool,
-    ) -> Vec<Watched> {
+    ) -> Vec<WatchedSnapshots> {
         let spoiled = match failure {
             Some(failure) => failure.apply(&self.samples, rate, seed),
             None => Spoiled { samples: self.samples.clone(), dropped: 0 },
@@ -145,7 +145,8 @@ impl Scene {
                 continue;
             }
             let case = format!("{failure:?} at {rate}, seed {seed}, {kind}");
-            let mut watched = Watched { kind, tally: Tally::default(), misled_at_end: None };
+            let mut watched =
+                WatchedSnapshots { kind, tally: SoakTally::default(), misled_at_end: None };
             let misled = |what| Misled { failure, rate, kind: watched.kind.clone(), what };
             let last = self.feed(settings, &spoiled, failure, &case, |run, it| {
                 // Before a train departs, the mass of the run before may stand.

@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use rustix::process::Signal;
 
 use super::Programs;
-use crate::process::{Process, Site, await_true};
+use crate::process::{DaemonSite, Process, await_true};
 
 /// Faults of the processes in one round.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +69,7 @@ fn parse(line: &str) -> Option<ClientPoll> {
 
 /// The processes with what is known of them.
 struct Cast<'a> {
-    site: Site,
+    site: DaemonSite,
     programs: &'a Programs,
     config: String,
     daemon: Process,
@@ -92,11 +92,11 @@ pub struct FaultsSummary {
     pub daemons: u64,
 }
 
-fn start(site: &Site, program: &std::path::Path, arguments: &[&str]) -> Process {
+fn start(site: &DaemonSite, program: &std::path::Path, arguments: &[&str]) -> Process {
     site.start(program.to_str().expect("a UTF-8 path"), arguments)
 }
 
-fn start_daemon(site: &Site, programs: &Programs, config: &str) -> (Process, u64) {
+fn start_daemon(site: &DaemonSite, programs: &Programs, config: &str) -> (Process, u64) {
     let daemon = start(site, &programs.dynocar, &["run", "--config", config]);
     daemon.await_error("serving");
     let log = daemon.errors();
@@ -107,7 +107,7 @@ fn start_daemon(site: &Site, programs: &Programs, config: &str) -> (Process, u64
 
 impl<'a> Cast<'a> {
     fn new(programs: &'a Programs) -> Self {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let pipelines = "[[pipelines]]\nkind = \"echo\"\n";
         let config = site.write_config(1, "idle = \"adaptive\"", pipelines);
         let config = config.to_str().expect("a UTF-8 path").to_owned();

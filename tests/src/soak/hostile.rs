@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::Programs;
-use crate::process::{Site, await_true};
+use crate::process::{DaemonSite, await_true};
 
 /// A part of the transport's shared memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,7 +74,7 @@ pub struct Vandalism {
 /// # Panics
 ///
 /// When `/dev/shm` cannot be read.
-pub fn vandalise(site: &Site, kind: SegmentKind, duration: Duration, seed: u64) -> Vandalism {
+pub fn vandalise(site: &DaemonSite, kind: SegmentKind, duration: Duration, seed: u64) -> Vandalism {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let paths: Vec<PathBuf> = site
         .segments()
@@ -126,7 +126,7 @@ pub fn measure(programs: &Programs, rounds: u64, seed: u64) -> Vec<Survivors> {
     for (kind, round) in
         SegmentKind::ALL.into_iter().flat_map(|kind| (0..rounds).map(move |it| (kind, it)))
     {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let config = site.write_config(1, "", "[[pipelines]]\nkind = \"echo\"\n");
         let daemon = site.start(&dynocar, &["run", "--config", &text(&config)]);
         daemon.await_error("serving");

@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use rustix::process::Signal;
 
 use super::Programs;
-use crate::process::{Process, Site, await_true};
+use crate::process::{DaemonSite, Process, await_true};
 
 /// Trains served.
 pub const TRAINS: u64 = 8;
@@ -115,7 +115,7 @@ pub(super) fn resident_kib(process: &Process) -> u64 {
     line.split_whitespace().nth(1).and_then(|word| word.parse().ok()).expect("KiB")
 }
 
-fn start_daemon(site: &Site, programs: &Programs) -> Process {
+fn start_daemon(site: &DaemonSite, programs: &Programs) -> Process {
     let pipelines: String = KINDS
         .iter()
         .map(|kind| format!("[[pipelines]]\nkind = \"{kind}\"\nthread = \"all\"\n"))
@@ -133,7 +133,7 @@ fn start_daemon(site: &Site, programs: &Programs) -> Process {
 /// When memory grows or a sample is not accounted for.
 pub fn run(programs: &Programs, seconds: u64, seed: u64) -> LoadReport {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let site = Site::new();
+    let site = DaemonSite::new();
     let daemon = start_daemon(&site, programs);
     let host = site.host();
     let mut controllers: Vec<_> =

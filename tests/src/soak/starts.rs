@@ -9,7 +9,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::Programs;
-use crate::process::{Process, Site};
+use crate::process::{DaemonSite, Process};
 
 /// A process is killed within this many ms of its start.
 const START_MS: u64 = 60;
@@ -50,7 +50,7 @@ enum Part {
 }
 
 fn round(programs: &Programs, random: &mut impl Rng, summary: &mut StartsSummary) {
-    let site = Site::new();
+    let site = DaemonSite::new();
     let config = site.write_config(1, "", "[[pipelines]]\nkind = \"echo\"\n");
     let config = config.to_str().expect("a UTF-8 path");
     let dynocar = programs.dynocar.to_str().expect("a UTF-8 path");

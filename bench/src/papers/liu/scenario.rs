@@ -4,7 +4,7 @@
 //! falls on. Its Fisher information about the true speed is the sum over steps of
 //! (dp/dspeed)² / p, averaged over where in a step the true speed lies.
 
-use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, SMatrix, SVector};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
@@ -75,7 +75,7 @@ pub fn inertia() -> f64 {
 
 /// True speeds in km/h of a run, every [`STEP_S`], until it reaches its last speed.
 pub fn true_speeds_kmh((from_kmh, to_kmh): (f64, f64), davis: &Davis) -> Vec<f64> {
-    let mut motion = Motion { distance_m: 0.0, speed_mps: from_kmh / 3.6 };
+    let mut motion = SimulatedMotion { distance_m: 0.0, speed_mps: from_kmh / 3.6 };
     let mut speeds = Vec::new();
     while motion.speed_mps * 3.6 >= to_kmh {
         speeds.push(motion.speed_mps * 3.6);

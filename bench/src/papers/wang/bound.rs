@@ -7,7 +7,7 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector4};
 
 use super::ride::{GUST_STD_MPS, GUST_TIME_S, MEAN_WIND_STD_MPS, speed_variance};
-use super::shuttle::{Instant, PERIOD_S, Shuttle};
+use super::shuttle::{PERIOD_S, Shuttle, ShuttleMoment};
 
 /// Unknowns: inverse mass relative to the true one, then z1, z2, z3 in a basis.
 const UNKNOWNS: usize = 10;
@@ -16,23 +16,23 @@ const WITH_START: usize = UNKNOWNS + 1;
 
 /// Information of a drive on mass and resistance.
 #[derive(Clone, Debug)]
-pub struct Information {
+pub struct FisherInformation {
     matrix: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     basis: SpeedBasis,
 }
 
-impl Information {
+impl FisherInformation {
     /// The Fisher information of a drive, every sample of which has white Gaussian noise of the
     /// sensor's variance; the speed at the start of each leg is unknown.
     ///
     /// The sensitivities S of the speed obey S' = ∂a/∂v S + ∂a/∂theta along the true motion.
-    pub fn of(shuttle: &Shuttle, ride: &[Instant]) -> Self {
+    pub fn of(shuttle: &Shuttle, ride: &[ShuttleMoment]) -> Self {
         let basis = SpeedBasis::new(30.0);
         let mut total = SMatrix::zeros();
         for leg in ride.split(|instant| instant.speed_mps <= 0.0).filter(|leg| leg.len() > 1) {
             total += leg_information(shuttle, leg, &basis);
         }
-        Information { matrix: total, basis }
+        FisherInformation { matrix: total, basis }
     }
 
     /// Least standard deviation of the mass, relative, when all resistances are known.
@@ -64,7 +64,7 @@ impl Information {
 
 fn leg_information(
     shuttle: &Shuttle,
-    leg: &[Instant],
+    leg: &[ShuttleMoment],
     basis: &SpeedBasis,
 ) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
     let per_n_per_kn = 1e-3 * STANDARD_GRAVITY_MPS2;
@@ -100,7 +100,7 @@ fn leg_information(
 /// of a Kalman filter that knows the law of the wind and linearises at the true motion.
 ///
 /// State: speed, inverse mass, mean wind, gust.
-pub fn mass_std_in_wind(shuttle: &Shuttle, leg: &[Instant]) -> f64 {
+pub fn mass_std_in_wind(shuttle: &Shuttle, leg: &[ShuttleMoment]) -> f64 {
     let per_n_per_kn = 1e-3 * STANDARD_GRAVITY_MPS2;
     let std = Vector4::new(10.0, 1.0, MEAN_WIND_STD_MPS, GUST_STD_MPS);
     let mut filter = Gaussian::independent(Vector4::zeros(), std);

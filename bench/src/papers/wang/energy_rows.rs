@@ -6,9 +6,11 @@
 //! before.
 
 use super::ride::{kalman, known_resistance, leg, measure};
-use super::shuttle::{BRAKE_MAX_N, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle, calm};
+use super::shuttle::{
+    BRAKE_MAX_N, EMPTY_MASS_KG, PERIOD_S, STATIONS_M, Shuttle, ShuttleMoment, calm,
+};
 use crate::chance::Chance;
-use crate::papers::row::{Row, Seeds, WANG};
+use crate::papers::row::{PaperRow, Seeds, WANG};
 use crate::statistics::{mean, straight_line};
 
 /// The fixed mass in kg that the controller assumes without learning.
@@ -40,7 +42,7 @@ struct Driven {
 }
 
 /// The rows for energy.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let shuttle = Shuttle::new(false);
     let seeds = seeds.at_most(20);
     let learned_kg: Vec<f64> =
@@ -66,7 +68,7 @@ fn comparison(
     text: &str,
     fixed: &Case,
     others: impl Iterator<Item = Case>,
-) -> [Row; 2] {
+) -> [PaperRow; 2] {
     let (mut as_it_comes, mut at_equal_time, mut later_s) = (Vec::new(), Vec::new(), Vec::new());
     let before = drive(shuttle, fixed, CRUISE_MPS);
     let equal_before = energy_at_time(shuttle, fixed, before.time_s);
@@ -77,14 +79,14 @@ fn comparison(
         at_equal_time.push(100.0 * (1.0 - equal_after / equal_before));
         later_s.push(after.time_s - before.time_s);
     }
-    let row = |quantity: String, unit, paper_method: &[f64]| Row {
+    let row = |quantity: String, unit, paper_method: &[f64]| PaperRow {
         paper_method: Some(mean(paper_method)),
-        ..Row::new(WANG, "Figure 10", quantity, unit, Seeds::from_zero(at_equal_time.len()))
+        ..PaperRow::new(WANG, "Figure 10", quantity, unit, Seeds::from_zero(at_equal_time.len()))
     };
     let saving = format!("traction energy saved, {text}");
     let later = format!("later arrival, {text}, whatever the running times");
     [
-        Row {
+        PaperRow {
             published: Some(PUBLISHED_SAVING),
             ours: Some(mean(&at_equal_time)),
             ..row(saving, "%", &as_it_comes)
@@ -129,8 +131,8 @@ fn drive(shuttle: &Shuttle, case: &Case, cruise_mps: f64) -> Driven {
 
 /// E = ∫ F_t v dt of Wang 2022, eq. (28)-(29), where the paper calls the force F_t a power; force
 /// and speed are linear between two instants, and braking gives nothing back.
-fn traction_energy_j(ride: &[Instant]) -> f64 {
-    let work_j = |pair: &[Instant]| {
+fn traction_energy_j(ride: &[ShuttleMoment]) -> f64 {
+    let work_j = |pair: &[ShuttleMoment]| {
         let [from_n, to_n] = [pair[0].force_n.max(0.0), pair[1].force_n.max(0.0)];
         let [from_mps, to_mps] = [pair[0].speed_mps, pair[1].speed_mps];
         let product = 2.0 * (from_n * from_mps + to_n * to_mps) + from_n * to_mps + to_n * from_mps;
@@ -140,7 +142,7 @@ fn traction_energy_j(ride: &[Instant]) -> f64 {
 }
 
 /// A controller that follows the plan from station to station.
-fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &Instant, f64) -> f64 {
+fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &ShuttleMoment, f64) -> f64 {
     let mut is_stopping = false;
     move |shuttle, now, to_m| {
         let left_m = (to_m - now.position_m).abs();
@@ -157,7 +159,7 @@ fn plan_follower(case: Case, cruise_mps: f64) -> impl FnMut(&Shuttle, &Instant, 
         } else {
             (cruise_mps, 0.0)
         };
-        let planned = Instant { speed_mps, mass_kg: case.assumed_kg, force_n: 0.0, ..*now };
+        let planned = ShuttleMoment { speed_mps, mass_kg: case.assumed_kg, force_n: 0.0, ..*now };
         // The force at which the assumed train would just move as planned.
         let drag_mps2 = -shuttle.acceleration_mps2(&planned, 0.0);
         let correction_mps2 = case.gain_per_s * (speed_mps - now.speed_mps);
@@ -174,7 +176,7 @@ mod tests {
 
     #[test]
     fn a_force_and_a_speed_that_both_change_are_integrated_exactly_and_brakes_give_nothing_back() {
-        let at = |time_s: f64, speed_mps: f64, force_n: f64| Instant {
+        let at = |time_s: f64, speed_mps: f64, force_n: f64| ShuttleMoment {
             time_s,
             position_m: 0.0,
             speed_mps,
@@ -183,7 +185,7 @@ mod tests {
             mass_kg: 1e5,
         };
         // F = 1000 t, v = t over 2 s: ∫ 1000 t² dt = 8000/3.
-        let mut ride: Vec<Instant> =
+        let mut ride: Vec<ShuttleMoment> =
             (0..=10).map(|k| 0.2 * f64::from(k)).map(|t| at(t, t, 1000.0 * t)).collect();
         assert!((traction_energy_j(&ride) - 8000.0 / 3.0).abs() < 1e-6);
         ride.extend([at(2.0, 2.0, -5000.0), at(3.0, 1.0, -5000.0)]);

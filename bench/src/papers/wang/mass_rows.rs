@@ -5,12 +5,12 @@ use dynocar_estimators::wang::MassRegression;
 use dynocar_estimators::wang::line_resistance::LineResistance;
 use dynocar_model::force::ResolvedSample;
 
-use super::bound::{Information, mass_std_in_wind};
+use super::bound::{FisherInformation, mass_std_in_wind};
 use super::resistance_rows::{CROSSING, joint_least_squares};
 use super::ride::{kalman, known_resistance, leg, measure, presumed, staged, there_and_back, wind};
-use super::shuttle::{Disturbance, EMPTY_MASS_KG, Shuttle, calm};
+use super::shuttle::{DisturbanceLaw, EMPTY_MASS_KG, Shuttle, calm};
 use crate::chance::Chance;
-use crate::papers::row::{Row, Seeds, WANG};
+use crate::papers::row::{PaperRow, Seeds, WANG};
 use crate::papers::score::PaperScore;
 use crate::statistics::mean;
 
@@ -27,7 +27,7 @@ enum Condition {
 }
 
 impl Condition {
-    fn disturbance(self, shuttle: &Shuttle, seed: u64) -> Box<Disturbance<'_>> {
+    fn disturbance(self, shuttle: &Shuttle, seed: u64) -> Box<DisturbanceLaw<'_>> {
         let permille = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
         match self {
             Condition::Calm => Box::new(calm),
@@ -43,23 +43,23 @@ impl Condition {
 const LEGS_PER_SEED: usize = 5;
 
 /// The rows for mass.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let (shuttle, legs) = (Shuttle::new(false), seeds.each(LEGS_PER_SEED));
     let calm_leg = |mass_kg| leg(&shuttle, mass_kg, &mut calm);
     let mut rows = Vec::new();
     for (mass_kg, published) in TABLE_3 {
         let score = run(&shuttle, mass_kg, Condition::Calm, 1.0, legs);
         let what = format!("mass of {:.1} t after one leg of 3 km, newly loaded", 1e-3 * mass_kg);
-        let bound = 100.0 * Information::of(&shuttle, &calm_leg(mass_kg)).mass_std();
+        let bound = 100.0 * FisherInformation::of(&shuttle, &calm_leg(mass_kg)).mass_std();
         let (published, bound) = (Some(published), Some(bound));
-        rows.push(Row { published, bound, ..score.row(row(&what, legs)) });
+        rows.push(PaperRow { published, bound, ..score.row(row(&what, legs)) });
     }
     let (mass_kg, published) = TABLE_3[1];
     let score = run(&shuttle, mass_kg, Condition::Calm, 1.0, legs);
     let bias = score.bias(row("bias of the mass of 117.1 t: mean error with its sign", legs));
-    rows.push(Row { published: Some(-published), ..bias });
+    rows.push(PaperRow { published: Some(-published), ..bias });
     let leg = calm_leg(mass_kg);
-    let biased = Information::of(&shuttle, &leg).mass_std_with_bias();
+    let biased = FisherInformation::of(&shuttle, &leg).mass_std_with_bias();
     for (condition, what, bound) in [
         (
             Condition::Wind,
@@ -76,7 +76,7 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
         let score = run(&shuttle, mass_kg, condition, 1.0, legs);
         let what = format!("mass of 117.1 t after one leg, {what}");
         let bound = bound.map(|std| 100.0 * std);
-        rows.push(Row { bound, ..score.row(row(&what, legs)) });
+        rows.push(PaperRow { bound, ..score.row(row(&what, legs)) });
     }
     // No estimator can distinguish this from mass: the rows show the shift.
     let rotating = Shuttle { inertia_factor: 1.08, ..shuttle.clone() };
@@ -92,15 +92,15 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
     let crossings = seeds.at_most(20);
     let what = "mass of 117.1 t after one leg of 3 km, resistances learned from one crossing";
     let score = after_crossing(&shuttle, mass_kg, crossings).row(row(what, crossings));
-    rows.push(Row { published: Some(published), ..score });
+    rows.push(PaperRow { published: Some(published), ..score });
     rows.push(step_row(&shuttle, seeds));
     rows
 }
 
 /// A row without figures.
-fn row(quantity: &str, seeds: Seeds) -> Row {
+fn row(quantity: &str, seeds: Seeds) -> PaperRow {
     let note = "paper's method: force on differentiated speed; baseline: the reverse";
-    Row::new(WANG, "Table 3", quantity, "%", seeds).noted(note)
+    PaperRow::new(WANG, "Table 3", quantity, "%", seeds).noted(note)
 }
 
 /// The whole chain: resistances from one crossing, then the mass with them.
@@ -167,7 +167,7 @@ fn take(
 }
 
 /// A change of mass at a stop: seconds under force until the error stays below 1 %.
-fn step_row(shuttle: &Shuttle, seeds: Seeds) -> Row {
+fn step_row(shuttle: &Shuttle, seeds: Seeds) -> PaperRow {
     let loaded_kg = 1.12 * EMPTY_MASS_KG;
     let ride = there_and_back(shuttle, loaded_kg, &mut calm);
     let stop = ride.iter().position(|instant| instant.mass_kg == loaded_kg).expect("a second leg");
@@ -197,11 +197,11 @@ fn step_row(shuttle: &Shuttle, seeds: Seeds) -> Row {
     let quantity = "12 % more mass after a stop: time under force until the error stays below 1 %";
     let note = "paper's method: force on differentiated speed, nothing where it never does; \
                 baseline: the reverse";
-    Row {
+    PaperRow {
         paper_method: time_s(&paper),
         baseline: time_s(&reverse),
         ours: time_s(&ours),
-        ..Row::new(WANG, "Figure 9", quantity, "s", seeds).noted(note)
+        ..PaperRow::new(WANG, "Figure 9", quantity, "s", seeds).noted(note)
     }
 }
 

@@ -2,9 +2,9 @@
 //! features, one step a sample, learning rate 1e-7).
 
 use dynocar_core::pipeline::Estimator;
+use dynocar_estimators::wang::known_motion::KnownMotion;
+use dynocar_estimators::wang::known_motion::LearningSet;
 use dynocar_estimators::wang::line_resistance::LineResistance;
-use dynocar_estimators::wang::motion::Motion;
-use dynocar_estimators::wang::motion::Section;
 use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_estimators::wang::{StagedDescent, StagedDescentSettings};
 use dynocar_model::force::ResolvedSample;
@@ -12,11 +12,11 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use nalgebra::Vector3;
 
-use super::bound::Information;
+use super::bound::FisherInformation;
 use super::ride::measure;
-use super::shuttle::{Instant, Shuttle, calm};
+use super::shuttle::{Shuttle, ShuttleMoment, calm};
 use crate::chance::Chance;
-use crate::papers::row::{Row, Seeds, WANG};
+use crate::papers::row::{PaperRow, Seeds, WANG};
 use crate::papers::score::{PaperScore, w0_errors};
 use crate::statistics::{mean, root_mean_square};
 
@@ -26,17 +26,17 @@ pub const CROSSING: usize = 28_000;
 const NAMES: [&str; 3] = ["basic resistance z1", "curve resistance z2", "tunnel resistance z3"];
 
 /// The rows for resistance.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let shuttle = Shuttle::new(false);
     let ride = shuttle.crossing(CROSSING, &mut calm);
-    let speeds = Section::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
-    let information = Information::of(&shuttle, &ride);
+    let speeds = LearningSet::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
+    let information = FisherInformation::of(&shuttle, &ride);
     let scores = run(&shuttle, &ride, &speeds, seeds);
-    let mut rows: Vec<Row> = (0..3)
+    let mut rows: Vec<PaperRow> = (0..3)
         .map(|i| {
             let bound = Some(information.resistance_std(i, &speeds[i]));
             let what = format!("{}: one crossing of 28,000 samples", NAMES[i]);
-            Row { bound, ..scores[i].row(row(&what, seeds)) }
+            PaperRow { bound, ..scores[i].row(row(&what, seeds)) }
         })
         .collect();
     let empirical = Davis { a: 2.7551, b: 0.014 * 3.6, c: 0.00075 * 12.96 };
@@ -48,28 +48,28 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
 }
 
 /// With curves inside tunnels, which Algorithm 1 puts into the curve set.
-fn curve_in_tunnel_row(seeds: Seeds) -> Row {
+fn curve_in_tunnel_row(seeds: Seeds) -> PaperRow {
     let shuttle = Shuttle::new(true);
     let ride = shuttle.crossing(CROSSING, &mut calm);
-    let speeds = Section::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
-    let curve = Section::Curve as usize;
-    let bound = Information::of(&shuttle, &ride).resistance_std(curve, &speeds[curve]);
+    let speeds = LearningSet::ALL.map(|section| driven_speeds(&shuttle, &ride, section));
+    let curve = LearningSet::Curve as usize;
+    let bound = FisherInformation::of(&shuttle, &ride).resistance_std(curve, &speeds[curve]);
     let score = &run(&shuttle, &ride, &speeds, seeds)[curve];
     let what = format!("{}: with two curves inside tunnels", NAMES[curve]);
-    Row { bound: Some(bound), ..score.row(row(&what, seeds)) }
+    PaperRow { bound: Some(bound), ..score.row(row(&what, seeds)) }
 }
 
 /// A row without figures.
-fn row(what: &str, seeds: Seeds) -> Row {
+fn row(what: &str, seeds: Seeds) -> PaperRow {
     let quantity = format!("{what}, error over the speeds driven there");
-    Row::new(WANG, "Table 2", quantity, "N/kN", seeds).noted(
+    PaperRow::new(WANG, "Table 2", quantity, "N/kN", seeds).noted(
         "paper's method: staged descent, features normalised; baseline: Table 1's empirical values",
     )
 }
 
 fn run(
     shuttle: &Shuttle,
-    ride: &[Instant],
+    ride: &[ShuttleMoment],
     speeds: &[Vec<f64>; 3],
     seeds: Seeds,
 ) -> [PaperScore; 3] {
@@ -86,7 +86,7 @@ fn run(
         }
         let ours = polynomials(&joint.resistance().expect("a sound regression"));
         let theirs = polynomials(&staged.resistance());
-        for section in Section::ALL {
+        for section in LearningSet::ALL {
             let i = section as usize;
             let covariance = joint.resistance_covariance(section).expect("a sound regression");
             scores[i].paper.extend(w0_errors(&theirs[i], &truths[i], &speeds[i]));
@@ -103,7 +103,7 @@ pub fn joint_least_squares(shuttle: &Shuttle) -> JointLeastSquares {
 }
 
 /// The rows that show the printed learning rate to fail.
-fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [Row; 2] {
+fn printed_rows(shuttle: &Shuttle, ride: &[ShuttleMoment], seeds: Seeds) -> [PaperRow; 2] {
     let (mut until, mut moved) = (Vec::new(), Vec::new());
     for seed in seeds.range() {
         let samples = measure(shuttle, ride, &mut Chance::new(seed));
@@ -117,9 +117,9 @@ fn printed_rows(shuttle: &Shuttle, ride: &[Instant], seeds: Seeds) -> [Row; 2] {
         until.extend(in_kmh.diverged_after.map(|count| count as f64));
         moved.push((in_mps.weights[0][0] - start).abs());
     }
-    let row = |quantity: &str, unit, value| Row {
+    let row = |quantity: &str, unit, value| PaperRow {
         paper_method: Some(value),
-        ..Row::new(WANG, "section 3.1", quantity, unit, seeds)
+        ..PaperRow::new(WANG, "section 3.1", quantity, unit, seeds)
     };
     [
         row("learning rate 1e-7, speed in km/h: samples until it has diverged", "1", mean(&until)),
@@ -137,16 +137,16 @@ fn polynomials(resistance: &LineResistance) -> [Davis; 3] {
 }
 
 /// Twenty speeds in m/s over the middle 90 % of those driven in a section.
-fn driven_speeds(shuttle: &Shuttle, ride: &[Instant], section: Section) -> Vec<f64> {
+fn driven_speeds(shuttle: &Shuttle, ride: &[ShuttleMoment], section: LearningSet) -> Vec<f64> {
     let mut speeds: Vec<f64> = ride
         .iter()
         .filter(|instant| instant.speed_mps > 1.0)
         .filter(|instant| {
             let [_, curve, tunnel] = shuttle.shares(instant.position_m);
             match section {
-                Section::Basic => curve == 0.0 && tunnel == 0.0,
-                Section::Curve => curve > 0.999,
-                Section::Tunnel => tunnel > 0.999,
+                LearningSet::Basic => curve == 0.0 && tunnel == 0.0,
+                LearningSet::Curve => curve > 0.999,
+                LearningSet::Tunnel => tunnel > 0.999,
             }
         })
         .map(|instant| instant.speed_mps)
@@ -173,7 +173,7 @@ struct PrintedDescent {
     steps: u64,
     /// The number of steps after which a coefficient had diverged; the last ones before that stay.
     diverged_after: Option<u64>,
-    last: Option<Motion>,
+    last: Option<KnownMotion>,
 }
 
 impl PrintedDescent {
@@ -192,14 +192,15 @@ impl PrintedDescent {
 
     /// Learns from the step to a sample, the acceleration being the differentiated speed.
     fn update(&mut self, sample: &ResolvedSample) {
-        let motion = Motion::of(sample).ok().filter(|now| now.speed_mps >= SPEED_MIN_MPS);
+        let motion = KnownMotion::of(sample).ok().filter(|now| now.speed_mps >= SPEED_MIN_MPS);
         let Some((from, to)) = std::mem::replace(&mut self.last, motion).zip(motion) else {
             return;
         };
-        let (Some(step_s), Some(section)) = (to.step_from(&from), Section::of(&from, &to)) else {
+        let (Some(step_s), Some(section)) = (to.step_from(&from), LearningSet::of(&from, &to))
+        else {
             return;
         };
-        let mean = |value: fn(&Motion) -> f64| 0.5 * (value(&from) + value(&to));
+        let mean = |value: fn(&KnownMotion) -> f64| 0.5 * (value(&from) + value(&to));
         let acceleration_mps2 = (to.speed_mps - from.speed_mps) / step_s;
         let specific_mps2 = mean(|at| at.force_n) / to.declared_kg - acceleration_mps2;
         let target = 1e3 * specific_mps2 / STANDARD_GRAVITY_MPS2 - mean(|at| at.known_n_per_kn);
@@ -211,7 +212,7 @@ impl PrintedDescent {
     /// The network of eq. (19)-(25) computes z · (1, v, v²); with b_j subtracted in (19), the
     /// threshold is -alpha_j, where (22) prints alpha_j. Force and gradient are not among its
     /// inputs: the target is the resistance in N/kN that they leave.
-    fn learn(&mut self, section: Section, speed_mps: f64, target_n_per_kn: f64) {
+    fn learn(&mut self, section: LearningSet, speed_mps: f64, target_n_per_kn: f64) {
         if self.diverged_after.is_some() {
             return;
         }
@@ -219,8 +220,8 @@ impl PrintedDescent {
         let features = Vector3::new(1.0, speed, speed * speed);
         let mut weights = self.weights[section as usize];
         let known = match section {
-            Section::Basic => 0.0,
-            Section::Curve | Section::Tunnel => self.weights[0].dot(&features),
+            LearningSet::Basic => 0.0,
+            LearningSet::Curve | LearningSet::Tunnel => self.weights[0].dot(&features),
         };
         let error = known + weights.dot(&features) - target_n_per_kn;
         weights -= features * (2.0 * error * RATE);
@@ -246,7 +247,7 @@ mod tests {
             let speed_mps = (0.2 * f64::from(k)).min(27.0);
             let scatter = if k.is_multiple_of(2) { 10.0 } else { -10.0 };
             let target = table_1.w0_n_per_kn(speed_mps) + 0.5 + scatter;
-            descent.learn(Section::Basic, speed_mps, target);
+            descent.learn(LearningSet::Basic, speed_mps, target);
         }
         descent
     }

@@ -11,7 +11,8 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::shuttle::{
-    BRAKE_MAX_N, CURVE_RADIUS_M, Disturbance, EMPTY_MASS_KG, Instant, PERIOD_S, STATIONS_M, Shuttle,
+    BRAKE_MAX_N, CURVE_RADIUS_M, DisturbanceLaw, EMPTY_MASS_KG, PERIOD_S, STATIONS_M, Shuttle,
+    ShuttleMoment,
 };
 use crate::chance::Chance;
 use crate::rig::pipelines::resolving;
@@ -20,11 +21,11 @@ use crate::statistics::KMH;
 const SERVICE_BRAKE_MPS2: f64 = 0.7;
 
 /// Decides on traction minus brake in N that is wanted now on the way to a stop at a chainage in m.
-pub type RideDriver<'a> = dyn FnMut(&Shuttle, &Instant, f64) -> f64 + 'a;
+pub type RideDriver<'a> = dyn FnMut(&Shuttle, &ShuttleMoment, f64) -> f64 + 'a;
 
 /// Powers to the limit, lets the speed fall by 6 km/h while coasting, brakes for lower limits
 /// and for the stop.
-fn limit_driver() -> impl FnMut(&Shuttle, &Instant, f64) -> f64 {
+fn limit_driver() -> impl FnMut(&Shuttle, &ShuttleMoment, f64) -> f64 {
     let (mut is_powering, mut is_stopping) = (true, false);
     move |shuttle, now, to_m| {
         let brake_n = |deceleration: f64| (-now.mass_kg * deceleration).max(-BRAKE_MAX_N);
@@ -53,7 +54,7 @@ fn limit_driver() -> impl FnMut(&Shuttle, &Instant, f64) -> f64 {
 }
 
 /// Greatest deceleration in m/s² that a lower limit ahead asks for, and the limit here in m/s.
-fn limit_need(now: &Instant) -> (f64, f64) {
+fn limit_need(now: &ShuttleMoment) -> (f64, f64) {
     let mut needed = 0.0_f64;
     let mut here_mps = f64::INFINITY;
     for (start_m, end_m, limit_kmh) in limits() {
@@ -91,11 +92,11 @@ impl Shuttle {
     /// Drives like [`limit_driver`].
     pub fn drive(
         &self,
-        start: &Instant,
+        start: &ShuttleMoment,
         to_m: f64,
         dwell_s: f64,
-        disturbance: &mut Disturbance<'_>,
-    ) -> Vec<Instant> {
+        disturbance: &mut DisturbanceLaw<'_>,
+    ) -> Vec<ShuttleMoment> {
         self.drive_with(&mut limit_driver(), start, to_m, dwell_s, disturbance)
     }
 
@@ -103,12 +104,12 @@ impl Shuttle {
     pub fn drive_with(
         &self,
         driver: &mut RideDriver<'_>,
-        start: &Instant,
+        start: &ShuttleMoment,
         to_m: f64,
         dwell_s: f64,
-        disturbance: &mut Disturbance<'_>,
-    ) -> Vec<Instant> {
-        let mut now = Instant { speed_mps: 0.0, force_n: 0.0, ..*start };
+        disturbance: &mut DisturbanceLaw<'_>,
+    ) -> Vec<ShuttleMoment> {
+        let mut now = ShuttleMoment { speed_mps: 0.0, force_n: 0.0, ..*start };
         now.direction = (to_m - now.position_m).signum();
         let mut ride = vec![now];
         loop {
@@ -132,8 +133,12 @@ impl Shuttle {
     }
 
     /// Drives to and fro until there are `count` samples, the empty train throughout.
-    pub fn crossing(&self, count: usize, disturbance: &mut Disturbance<'_>) -> Vec<Instant> {
-        let mut ride: Vec<Instant> = Vec::with_capacity(count + 8_000);
+    pub fn crossing(
+        &self,
+        count: usize,
+        disturbance: &mut DisturbanceLaw<'_>,
+    ) -> Vec<ShuttleMoment> {
+        let mut ride: Vec<ShuttleMoment> = Vec::with_capacity(count + 8_000);
         let mut now = self.standing_at(STATIONS_M[0], EMPTY_MASS_KG);
         let mut station = 0_usize;
         let mut is_outbound = true;
@@ -155,7 +160,11 @@ impl Shuttle {
 }
 
 /// The leg of 3 km from the first station: power, coasting around 80 km/h, braking.
-pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut Disturbance<'_>) -> Vec<Instant> {
+pub fn leg(
+    shuttle: &Shuttle,
+    mass_kg: f64,
+    disturbance: &mut DisturbanceLaw<'_>,
+) -> Vec<ShuttleMoment> {
     shuttle.drive(&shuttle.standing_at(STATIONS_M[0], mass_kg), STATIONS_M[1], 10.0, disturbance)
 }
 
@@ -166,12 +175,12 @@ pub fn leg(shuttle: &Shuttle, mass_kg: f64, disturbance: &mut Disturbance<'_>) -
 pub fn there_and_back(
     shuttle: &Shuttle,
     mass_kg: f64,
-    disturbance: &mut Disturbance<'_>,
-) -> Vec<Instant> {
+    disturbance: &mut DisturbanceLaw<'_>,
+) -> Vec<ShuttleMoment> {
     let empty = shuttle.standing_at(STATIONS_M[1], EMPTY_MASS_KG);
     let mut ride = shuttle.drive(&empty, STATIONS_M[0], 20.0, disturbance);
     let last = ride[ride.len() - 1];
-    let loaded = Instant { time_s: last.time_s + PERIOD_S, mass_kg, ..last };
+    let loaded = ShuttleMoment { time_s: last.time_s + PERIOD_S, mass_kg, ..last };
     ride.extend(shuttle.drive(&loaded, STATIONS_M[1], 10.0, disturbance));
     ride
 }
@@ -262,7 +271,11 @@ pub fn speed_variance() -> f64 {
 }
 
 /// The samples of a drive with noise and rounding, through validation and force resolution.
-pub fn measure(shuttle: &Shuttle, ride: &[Instant], random: &mut Chance) -> Vec<ResolvedSample> {
+pub fn measure(
+    shuttle: &Shuttle,
+    ride: &[ShuttleMoment],
+    random: &mut Chance,
+) -> Vec<ResolvedSample> {
     let mut resolve = resolving(TrainId(1), &shuttle.train, Some(shuttle.track.clone()));
     let mut resolved = Vec::with_capacity(ride.len());
     for (index, instant) in ride.iter().enumerate() {

@@ -6,8 +6,8 @@
 
 use std::sync::Arc;
 
-use dynocar_model::simulate::motion::{Motion, advance};
-use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
+use dynocar_model::track::{Track, TrackCurve, Tunnel};
 use dynocar_model::train::{Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
@@ -49,7 +49,7 @@ pub struct Shuttle {
 
 /// A state of the train.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Instant {
+pub struct ShuttleMoment {
     /// Time in s.
     pub time_s: f64,
     /// Chainage of the centre in m.
@@ -66,7 +66,7 @@ pub struct Instant {
 
 /// Disturbance of the train that neither map nor model knows: resistance in N/kN beyond the model's at a speed in
 /// m/s, asked for once a period.
-pub type Disturbance<'a> = dyn FnMut(f64) -> f64 + 'a;
+pub type DisturbanceLaw<'a> = dyn FnMut(f64) -> f64 + 'a;
 
 /// Nothing beyond the model.
 pub fn calm(_speed_mps: f64) -> f64 {
@@ -116,7 +116,7 @@ impl Shuttle {
     }
 
     /// Acceleration in m/s² with `extra` N/kN of resistance.
-    pub fn acceleration_mps2(&self, at: &Instant, extra_n_per_kn: f64) -> f64 {
+    pub fn acceleration_mps2(&self, at: &ShuttleMoment, extra_n_per_kn: f64) -> f64 {
         let gradient = self.track.gradient_permille(at.position_m, self.train.length_m);
         let w = self.sum(at.position_m, |davis| davis.w0_n_per_kn(at.speed_mps))
             + at.direction * gradient.unwrap_or(0.0)
@@ -125,17 +125,22 @@ impl Shuttle {
     }
 
     /// One sampling period further, the force linear between `from.force_n` and `to_n`.
-    pub fn advance(&self, from: &Instant, to_n: f64, disturbance: &mut Disturbance<'_>) -> Instant {
+    pub fn advance(
+        &self,
+        from: &ShuttleMoment,
+        to_n: f64,
+        disturbance: &mut DisturbanceLaw<'_>,
+    ) -> ShuttleMoment {
         let extra = disturbance(from.speed_mps);
         let slew_n_per_s = (to_n - from.force_n) / PERIOD_S;
-        let at = |ahead_s: f64, motion: Motion| Instant {
+        let at = |ahead_s: f64, motion: SimulatedMotion| ShuttleMoment {
             time_s: from.time_s + ahead_s,
             position_m: from.position_m + from.direction * motion.distance_m,
             speed_mps: motion.speed_mps,
             force_n: from.force_n + slew_n_per_s * ahead_s,
             ..*from
         };
-        let start = Motion { distance_m: 0.0, speed_mps: from.speed_mps };
+        let start = SimulatedMotion { distance_m: 0.0, speed_mps: from.speed_mps };
         let end = advance(start, PERIOD_S, |ahead_s, motion| {
             self.acceleration_mps2(&at(ahead_s, motion), extra)
         });
@@ -143,8 +148,15 @@ impl Shuttle {
     }
 
     /// The train at rest.
-    pub fn standing_at(&self, position_m: f64, mass_kg: f64) -> Instant {
-        Instant { time_s: 0.0, position_m, speed_mps: 0.0, force_n: 0.0, direction: 1.0, mass_kg }
+    pub fn standing_at(&self, position_m: f64, mass_kg: f64) -> ShuttleMoment {
+        ShuttleMoment {
+            time_s: 0.0,
+            position_m,
+            speed_mps: 0.0,
+            force_n: 0.0,
+            direction: 1.0,
+            mass_kg,
+        }
     }
 }
 
@@ -167,7 +179,7 @@ fn gradients() -> Vec<(f64, f64)> {
 }
 
 /// Curves of 250 to 600 m outside the tunnels; if wanted, two more inside.
-fn curves(curve_in_tunnel: bool) -> Vec<Curve> {
+fn curves(curve_in_tunnel: bool) -> Vec<TrackCurve> {
     let mut random = Chance::new(28_001);
     let mut list = Vec::new();
     let mut start_m = 400.0;
@@ -176,13 +188,13 @@ fn curves(curve_in_tunnel: bool) -> Vec<Curve> {
         let is_near =
             |tunnel: &Tunnel| start_m < tunnel.end_m + 80.0 && end_m > tunnel.start_m - 80.0;
         if !tunnels().iter().any(is_near) {
-            list.push(Curve { start_m, end_m, radius_m: CURVE_RADIUS_M });
+            list.push(TrackCurve { start_m, end_m, radius_m: CURVE_RADIUS_M });
         }
         start_m = end_m + (400.0 + 700.0 * random.uniform()).round();
     }
     if curve_in_tunnel {
-        list.push(Curve { start_m: 11_700.0, end_m: 12_300.0, radius_m: CURVE_RADIUS_M });
-        list.push(Curve { start_m: 23_000.0, end_m: 23_400.0, radius_m: CURVE_RADIUS_M });
+        list.push(TrackCurve { start_m: 11_700.0, end_m: 12_300.0, radius_m: CURVE_RADIUS_M });
+        list.push(TrackCurve { start_m: 23_000.0, end_m: 23_400.0, radius_m: CURVE_RADIUS_M });
     }
     list
 }

@@ -15,10 +15,10 @@ use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::scenario::{
-    CASES, Profile, Run, all_speeds_mps, davis_covariance, drive, fast_speeds_mps,
+    CASES, DrivingProfile, NoiseFreeRun, all_speeds_mps, davis_covariance, drive, fast_speeds_mps,
 };
 use crate::chance::Chance;
-use crate::papers::row::{Row, Seeds, XIA};
+use crate::papers::row::{PaperRow, Seeds, XIA};
 use crate::papers::score::{PaperScore, w0_errors};
 use crate::statistics::root_mean_square;
 
@@ -44,7 +44,7 @@ fn random_start(random: &mut Chance) -> Davis {
 }
 
 fn newton(
-    run: &Run,
+    run: &NoiseFreeRun,
     speeds_mps: &[f64],
     start: &Davis,
     restarts: Restarts,
@@ -60,7 +60,7 @@ fn newton(
 }
 
 fn fit(
-    run: &Run,
+    run: &NoiseFreeRun,
     speeds_mps: &[f64],
     start: Option<&Davis>,
     bounds: ParameterBox<3>,
@@ -75,11 +75,13 @@ fn anywhere() -> ParameterBox<3> {
 }
 
 /// The two runs of Table 3: name, driving, length in m.
-const RUNS: [(&str, Profile, f64); 2] =
-    [("full speed profile, 25 km", Profile::Full, 25e3), ("cruise, 20 km", Profile::Cruise, 20e3)];
+const RUNS: [(&str, DrivingProfile, f64); 2] = [
+    ("full speed profile, 25 km", DrivingProfile::Full, 25e3),
+    ("cruise, 20 km", DrivingProfile::Cruise, 20e3),
+];
 
 /// Shares of random starts from which each method finds the truth.
-pub fn convergence_rows(seeds: Seeds) -> Vec<Row> {
+pub fn convergence_rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = Vec::new();
     for (name, profile, length_m) in RUNS {
         for (case, truth) in CASES.iter().enumerate() {
@@ -100,12 +102,13 @@ pub fn convergence_rows(seeds: Seeds) -> Vec<Row> {
             }
             let share = |count: usize| Some(100.0 * count as f64 / seeds.count as f64);
             let quantity = format!("random starts that converge, case {}, {name}", case + 1);
-            rows.push(Row {
+            rows.push(PaperRow {
                 published: Some(100.0),
                 paper_method: share(converged[1]),
                 baseline: share(converged[0]),
                 ours: share(converged[2]),
-                ..Row::new(XIA, "Table 3", quantity, "%", seeds).noted("baseline: without restarts")
+                ..PaperRow::new(XIA, "Table 3", quantity, "%", seeds)
+                    .noted("baseline: without restarts")
             });
         }
     }
@@ -114,18 +117,18 @@ pub fn convergence_rows(seeds: Seeds) -> Vec<Row> {
 
 /// Error in a without noise: the paper's method where it converges, ours from integral least
 /// squares; the runs differ in line and driver.
-pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
+pub fn noise_free_rows(seeds: Seeds) -> Vec<PaperRow> {
     let mut rows = Vec::new();
     for (name, profile, length_m) in [
-        ("full speed profile, 25 km", Profile::Full, 25e3),
-        ("cruise, 120 km", Profile::Cruise, 120e3),
+        ("full speed profile, 25 km", DrivingProfile::Full, 25e3),
+        ("cruise, 120 km", DrivingProfile::Cruise, 120e3),
     ] {
         for (case, truth) in CASES.iter().enumerate() {
             let mut score = PaperScore::default();
             for seed in seeds.range() {
                 let run = drive(profile, length_m, seed, |_| *truth);
                 let speeds = &run.speeds_mps;
-                if profile == Profile::Full {
+                if profile == DrivingProfile::Full {
                     let start = random_start(&mut Chance::new(1000 + seed));
                     let found = newton(&run, speeds, &start, Restarts::WhenStalled, seed);
                     if found.has_converged {
@@ -141,9 +144,9 @@ pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
             }
             let quantity =
                 format!("error in a without noise, case {}, {name}, where converged", case + 1);
-            rows.push(Row {
+            rows.push(PaperRow {
                 published: Some((PUBLISHED_A[case] - truth.a).abs()),
-                ..score.row(Row::new(XIA, "Table 3", quantity, "N/kN", seeds))
+                ..score.row(PaperRow::new(XIA, "Table 3", quantity, "N/kN", seeds))
             });
         }
     }
@@ -151,11 +154,11 @@ pub fn noise_free_rows(seeds: Seeds) -> Vec<Row> {
 }
 
 /// Figure 4: w0 from noisy runs compared with the bound.
-pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
+pub fn noise_rows(seeds: Seeds) -> Vec<PaperRow> {
     let truth = CASES[0];
     let (fast, all) = (fast_speeds_mps(), all_speeds_mps());
-    let cruise = drive(Profile::Cruise, 120e3, 1, |_| truth);
-    let full = drive(Profile::Full, 40e3, 1, |_| truth);
+    let cruise = drive(DrivingProfile::Cruise, 120e3, 1, |_| truth);
+    let full = drive(DrivingProfile::Full, 40e3, 1, |_| truth);
     let [mut free, mut boxed, mut profile] = <[PaperScore; 3]>::default();
     let (cruise_bound, full_bound) =
         (davis_covariance(&cruise, &truth), davis_covariance(&full, &truth));
@@ -182,11 +185,11 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
     }
     let published = w0_errors(&PUBLISHED_NOISY, &truth, &fast);
     let line = |quantity: &str, score: &PaperScore| {
-        score.row(Row::new(XIA, "Figure 4", quantity, "N/kN", seeds))
+        score.row(PaperRow::new(XIA, "Figure 4", quantity, "N/kN", seeds))
     };
     vec![
         line("w0 over 270-305 km/h, cruise of 120 km, coefficients free", &free),
-        Row {
+        PaperRow {
             published: Some(root_mean_square(&published)),
             ..line("w0 over 270-305 km/h, cruise of 120 km, within Table 2's bounds", &boxed)
         },
@@ -197,7 +200,7 @@ pub fn noise_rows(seeds: Seeds) -> Vec<Row> {
 /// The minimum of the paper's deviation within bounds, with the first measured speed for
 /// v_0: what Algorithm 1 finds at best.
 struct PaperDeviation<'a> {
-    run: &'a Run,
+    run: &'a NoiseFreeRun,
     speeds_mps: &'a [f64],
 }
 
@@ -222,7 +225,7 @@ impl LeastSquares<3> for PaperDeviation<'_> {
 }
 
 fn paper_minimum(
-    run: &Run,
+    run: &NoiseFreeRun,
     speeds_mps: &[f64],
     start: &Davis,
     bounds: &ParameterBox<3>,

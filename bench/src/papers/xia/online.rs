@@ -5,7 +5,7 @@
 //! most. The error with noise is taken from km 64 on, but for the 8 km after the switch at km 82.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-use dynocar_estimators::xia::trajectory::hypothesis::{Hypothesis, OutlierModel};
+use dynocar_estimators::xia::trajectory::hypothesis::{JumpHypothesis, OutlierModel};
 use dynocar_estimators::xia::trajectory::noise::{LearnedNoise, NoiseModel};
 use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings, StepDoubt};
 use dynocar_estimators::xia::trajectory::step::StepRule;
@@ -16,11 +16,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::offline;
 use super::scenario::{
-    CASES, Profile, ROTATING_MASS_FACTOR, Run, SAMPLING_M, SPEED_NOISE_MPS, all_speeds_mps,
-    disturbed_davis_covariance, drive, fast_speeds_mps,
+    CASES, DrivingProfile, NoiseFreeRun, ROTATING_MASS_FACTOR, SAMPLING_M, SPEED_NOISE_MPS,
+    all_speeds_mps, disturbed_davis_covariance, drive, fast_speeds_mps,
 };
 use crate::chance::Chance;
-use crate::papers::row::{Row, Seeds, XIA};
+use crate::papers::row::{PaperRow, Seeds, XIA};
 use crate::papers::score::{PaperScore, w0_std};
 use crate::statistics::{mean, root_mean_square};
 
@@ -72,7 +72,7 @@ fn settings(davis: Davis, std: Vector3<f64>) -> OnlineSettings {
 type Estimates = Vec<(Davis, Matrix3<f64>)>;
 
 /// Ours: the filter of `trajectory_kalman` with its default settings.
-fn ours(run: &Run, speeds_mps: &[f64], settings: OnlineSettings) -> Estimates {
+fn ours(run: &NoiseFreeRun, speeds_mps: &[f64], settings: OnlineSettings) -> Estimates {
     let mut filter = OnlineFilter::new(settings);
     filter.begin(speeds_mps[0]);
     let steps = run.steps.iter().zip(speeds_mps).zip(&speeds_mps[1..]);
@@ -89,7 +89,7 @@ fn ours(run: &Run, speeds_mps: &[f64], settings: OnlineSettings) -> Estimates {
 /// The bound: a single filter that is given the noise by step, that the forces are exact, and
 /// where the coefficients switch.
 fn informed(
-    run: &Run,
+    run: &NoiseFreeRun,
     speeds_mps: &[f64],
     (davis, std): (Davis, Vector3<f64>),
     noise_mps: impl Fn(usize) -> f64,
@@ -102,7 +102,7 @@ fn informed(
         ..settings(davis, std).noise
     };
     let no_outliers = OutlierModel { share: 1e-12, density: 0.5 };
-    let mut filter = Hypothesis::new(&davis, &std, LearnedNoise::new(&model));
+    let mut filter = JumpHypothesis::new(&davis, &std, LearnedNoise::new(&model));
     filter.noise.speed_variance = noise_mps(0).powi(2);
     filter.anchor(speeds_mps[0]);
     (0..run.steps.len())
@@ -121,7 +121,7 @@ fn informed(
 
 /// The paper: Algorithm 1 over the newest 20 steps, each window from the answer of the one
 /// before.
-fn paper(run: &Run, speeds_mps: &[f64], seed: u64) -> Estimates {
+fn paper(run: &NoiseFreeRun, speeds_mps: &[f64], seed: u64) -> Estimates {
     let mut source = RestartSource::new(seed);
     let mut davis = declared().0;
     let bounds = ParameterBox { ..offline::bounds() };
@@ -155,7 +155,7 @@ struct Following {
 }
 
 impl Following {
-    fn push(&mut self, run: &Run, estimates: &Estimates) {
+    fn push(&mut self, run: &NoiseFreeRun, estimates: &Estimates) {
         let errors: Vec<f64> = estimates
             .iter()
             .enumerate()
@@ -184,13 +184,13 @@ impl Following {
 }
 
 /// Table 4, and the consistency of the online filter where the coefficients stay.
-pub fn rows(seeds: Seeds) -> Vec<Row> {
+pub fn rows(seeds: Seeds) -> Vec<PaperRow> {
     let (davis, std) = declared();
     let (mut filter, mut bound, mut windows) =
         (Following::default(), Following::default(), Following::default());
     let paper_lines = seeds.count.div_ceil(10);
     for seed in seeds.range() {
-        let run = drive(Profile::Cruise, 120e3, seed, table_4);
+        let run = drive(DrivingProfile::Cruise, 120e3, seed, table_4);
         let mut random = Chance::new(5000 + seed);
         let speeds = run.measured_mps(NOISY_FROM, &mut random);
         filter.push(&run, &ours(&run, &speeds, settings(davis, std)));
@@ -202,11 +202,11 @@ pub fn rows(seeds: Seeds) -> Vec<Row> {
             windows.push(&run, &paper(&run, &speeds, seed));
         }
     }
-    let row = |quantity: &str, unit, of: &dyn Fn(&Following) -> f64, least: f64| Row {
+    let row = |quantity: &str, unit, of: &dyn Fn(&Following) -> f64, least: f64| PaperRow {
         paper_method: Some(of(&windows)),
         ours: Some(of(&filter)),
         bound: Some(least),
-        ..Row::new(XIA, "Table 4", quantity, unit, seeds)
+        ..PaperRow::new(XIA, "Table 4", quantity, unit, seeds)
             .noted(format!("paper's method: {paper_lines} lines"))
     };
     let settled = "w0 at the driven speed, noisy sections, settled";
@@ -245,7 +245,7 @@ fn drawn_row(
     speeds_mps: &[f64],
     seeds: Seeds,
     of_seed: impl Fn(u64, &mut Chance) -> Drawn,
-) -> Row {
+) -> PaperRow {
     let mut score = PaperScore::default();
     for seed in seeds.range() {
         let mut random = Chance::new(9000 + seed);
@@ -254,16 +254,16 @@ fn drawn_row(
             score.take_bound(&bound, speeds_mps);
         }
     }
-    score.row(Row::new(XIA, "Table 4", quantity, "N/kN", seeds))
+    score.row(PaperRow::new(XIA, "Table 4", quantity, "N/kN", seeds))
 }
 
 /// A full speed profile; the forces are exact, as the filter is set to assume.
-fn exact_forces_row(seeds: Seeds) -> Row {
+fn exact_forces_row(seeds: Seeds) -> PaperRow {
     let (mean_davis, std) = constant_prior();
     let quantity = "online, no switch: w0 over 30-300 km/h after a full profile of 40 km";
     drawn_row(quantity, &all_speeds_mps(), seeds, |seed, random| {
         let truth = drawn(constant_prior(), random);
-        let run = drive(Profile::Full, 40e3, seed, |_| truth);
+        let run = drive(DrivingProfile::Full, 40e3, seed, |_| truth);
         let measured = run.measured_mps(0, random);
         let mut settings = settings(mean_davis, std);
         settings.noise.disturbance = 0.0;
@@ -276,9 +276,9 @@ fn exact_forces_row(seeds: Seeds) -> Row {
 
 /// Cruise under a disturbance that lasts for seconds, of which the filter knows nothing; the
 /// bound knows its strength and correlation.
-fn disturbed_row(seeds: Seeds) -> Row {
+fn disturbed_row(seeds: Seeds) -> PaperRow {
     let (mean_davis, std) = constant_prior();
-    let nominal = drive(Profile::Cruise, 120e3, 1, |_| mean_davis);
+    let nominal = drive(DrivingProfile::Cruise, 120e3, 1, |_| mean_davis);
     let prior = Matrix3::from_diagonal(&std.map(|std| 1.0 / (std * std)));
     let bound = disturbed_davis_covariance(&nominal, &mean_davis)
         .try_inverse()
@@ -288,7 +288,7 @@ fn disturbed_row(seeds: Seeds) -> Row {
                     w0 over 270-305 km/h after 120 km";
     drawn_row(quantity, &fast_speeds_mps(), seeds, |_, random| {
         let truth = drawn(constant_prior(), random);
-        let run = drive(Profile::Cruise, 120e3, 1, |_| truth).disturbed(&truth, random);
+        let run = drive(DrivingProfile::Cruise, 120e3, 1, |_| truth).disturbed(&truth, random);
         let measured = run.measured_mps(0, random);
         Some((truth, ours(&run, &measured, settings(mean_davis, std)).pop()?, bound))
     })

@@ -6,9 +6,9 @@
 //! just that). The truth moves by eq. 7, as the paper's own data do (mean squares of 1e-9).
 
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
-use dynocar_estimators::xia::trajectory::step::Step;
+use dynocar_estimators::xia::trajectory::step::TrajectoryStep;
 use dynocar_model::force::balance::mps2_per_n_per_kn;
-use dynocar_model::track::{Curve, Track};
+use dynocar_model::track::{Track, TrackCurve};
 use dynocar_model::train::Davis;
 use nalgebra::{DMatrix, Matrix3};
 
@@ -55,7 +55,7 @@ pub fn all_speeds_mps() -> Vec<f64> {
 
 /// How the train is driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Profile {
+pub enum DrivingProfile {
     /// 273 to 303 km/h.
     Cruise,
     /// From 7 km/h to as much as 300 km/h and back, with traction, coasting and braking.
@@ -64,14 +64,14 @@ pub enum Profile {
 
 /// A run without noise: one speed more than steps.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct NoiseFreeRun {
     /// Steps of 100 m.
-    pub steps: Vec<Step>,
+    pub steps: Vec<TrajectoryStep>,
     /// True speeds in m/s.
     pub speeds_mps: Vec<f64>,
 }
 
-impl Run {
+impl NoiseFreeRun {
     /// The speeds with white noise from a step on.
     pub fn measured_mps(&self, noisy_from: usize, random: &mut Chance) -> Vec<f64> {
         let noise = |i: usize, random: &mut Chance| {
@@ -82,7 +82,7 @@ impl Run {
 
     /// The same reported forces, with a disturbance of the resistance that nobody reports: a
     /// first-order autoregression of [`DISTURBANCE_N_PER_KN`] and [`DISTURBANCE_S`].
-    pub fn disturbed(&self, davis: &Davis, random: &mut Chance) -> Run {
+    pub fn disturbed(&self, davis: &Davis, random: &mut Chance) -> NoiseFreeRun {
         let mut speeds_mps = vec![self.speeds_mps[0]];
         let mut disturbance = DISTURBANCE_N_PER_KN * random.normal();
         for (i, step) in self.steps.iter().enumerate() {
@@ -92,18 +92,18 @@ impl Run {
             disturbance = kept * disturbance
                 + (1.0 - kept * kept).sqrt() * DISTURBANCE_N_PER_KN * random.normal();
         }
-        Run { steps: self.steps.clone(), speeds_mps }
+        NoiseFreeRun { steps: self.steps.clone(), speeds_mps }
     }
 }
 
 /// The speed after a step by eq. 7; the truth's own formula, apart from the estimators'.
-fn next_speed_mps(step: &Step, davis: &Davis, speed_mps: f64) -> f64 {
+fn next_speed_mps(step: &TrajectoryStep, davis: &Davis, speed_mps: f64) -> f64 {
     let resistance = step.resistance_gain * davis.w0_n_per_kn(speed_mps);
     (speed_mps * speed_mps + 2.0 * step.size * (step.drive_mps2 - resistance)).sqrt()
 }
 
 /// Speeds in m/s along steps from an initial speed.
-pub fn speeds_mps(steps: &[Step], initial_mps: f64, davis: &Davis) -> Vec<f64> {
+pub fn speeds_mps(steps: &[TrajectoryStep], initial_mps: f64, davis: &Davis) -> Vec<f64> {
     let mut speeds = Vec::with_capacity(steps.len() + 1);
     speeds.push(initial_mps);
     for (i, step) in steps.iter().enumerate() {
@@ -115,16 +115,21 @@ pub fn speeds_mps(steps: &[Step], initial_mps: f64, davis: &Davis) -> Vec<f64> {
 /// Drives a run from chainage 0; the same seed gives the same line and driver.
 ///
 /// `davis_at` gives the coefficients by chainage in m.
-pub fn drive(profile: Profile, length_m: f64, seed: u64, davis_at: impl Fn(f64) -> Davis) -> Run {
+pub fn drive(
+    profile: DrivingProfile,
+    length_m: f64,
+    seed: u64,
+    davis_at: impl Fn(f64) -> Davis,
+) -> NoiseFreeRun {
     let mut random = Chance::new(seed);
     let track = line(&mut random);
     let (mut speed_mps, phases) = match profile {
-        Profile::Cruise => (288.0 * KMH, vec![]),
-        Profile::Full => (7.0 * KMH, full_profile(length_m)),
+        DrivingProfile::Cruise => (288.0 * KMH, vec![]),
+        DrivingProfile::Full => (7.0 * KMH, full_profile(length_m)),
     };
     let mut driver = Driver { phases, cruise_mps: speed_mps, next_change_m: 0.0 };
     let count = (length_m / SAMPLING_M) as usize;
-    let mut run = Run { steps: Vec::with_capacity(count), speeds_mps: vec![speed_mps] };
+    let mut run = NoiseFreeRun { steps: Vec::with_capacity(count), speeds_mps: vec![speed_mps] };
     for i in 0..count {
         let centre_m = SAMPLING_M * i as f64;
         let davis = davis_at(centre_m);
@@ -134,7 +139,7 @@ pub fn drive(profile: Profile, length_m: f64, seed: u64, davis_at: impl Fn(f64) 
         let resisting_kn = weight_kn * (davis.w0_n_per_kn(speed_mps) + uphill + curve) / 1000.0;
         let force_kn = driver.force_kn(centre_m, speed_mps, resisting_kn, &mut random);
         let inertia_t = MASS_T * (1.0 + ROTATING_MASS_FACTOR);
-        let step = Step {
+        let step = TrajectoryStep {
             size: SAMPLING_M,
             drive_mps2: (force_kn - weight_kn * (uphill + curve) / 1000.0) / inertia_t,
             resistance_gain: mps2_per_n_per_kn(ROTATING_MASS_FACTOR),
@@ -159,7 +164,7 @@ fn line(random: &mut Chance) -> Track {
     while at_m < 118_000.0 {
         let end_m = at_m + 800.0 + 1500.0 * random.uniform();
         let radius_m = 7000.0 + 5000.0 * random.uniform();
-        curves.push(Curve { start_m: at_m, end_m, radius_m });
+        curves.push(TrackCurve { start_m: at_m, end_m, radius_m });
         at_m = end_m + 1000.0 + 5000.0 * random.uniform();
     }
     Track::new("seeded".into(), None, Some(&gradient), Some(curves), None)
@@ -224,13 +229,13 @@ impl Driver {
 
 /// Least covariance of (a, b, c) that an unbiased estimator can have from a run's speeds with
 /// white noise, when the initial speed is not known either.
-pub fn davis_covariance(run: &Run, davis: &Davis) -> Matrix3<f64> {
+pub fn davis_covariance(run: &NoiseFreeRun, davis: &Davis) -> Matrix3<f64> {
     covariance(jacobian(run, davis)) * SPEED_NOISE_MPS.powi(2)
 }
 
-/// The same where the resistance is disturbed as in [`Run::disturbed`] and the disturbance's
+/// The same where the resistance is disturbed as in [`NoiseFreeRun::disturbed`] and the disturbance's
 /// strength and correlation are known: generalised least squares.
-pub fn disturbed_davis_covariance(run: &Run, davis: &Davis) -> Matrix3<f64> {
+pub fn disturbed_davis_covariance(run: &NoiseFreeRun, davis: &Davis) -> Matrix3<f64> {
     let rows = jacobian(run, davis);
     let rows = DMatrix::from_fn(rows.len(), 4, |i, j| rows[i][j]);
     let count = run.speeds_mps.len();
@@ -254,7 +259,7 @@ pub fn disturbed_davis_covariance(run: &Run, davis: &Davis) -> Matrix3<f64> {
 
 /// Derivatives of every speed with respect to v_0, a, b and c, by central differences of the
 /// truth's own recursion rather than by the derivatives that the estimators use.
-fn jacobian(run: &Run, davis: &Davis) -> Vec<[f64; 4]> {
+fn jacobian(run: &NoiseFreeRun, davis: &Davis) -> Vec<[f64; 4]> {
     statistics::jacobian([1e-4, 1e-4, 1e-6, 1e-8], |[dv, da, db, dc]| {
         let moved = Davis { a: davis.a + da, b: davis.b + db, c: davis.c + dc };
         speeds_mps(&run.steps, run.speeds_mps[0] + dv, &moved)
@@ -262,7 +267,7 @@ fn jacobian(run: &Run, davis: &Davis) -> Vec<[f64; 4]> {
 }
 
 /// Derivatives of every speed with respect to 1 N/kN of resistance during each step.
-fn effects(run: &Run, davis: &Davis) -> DMatrix<f64> {
+fn effects(run: &NoiseFreeRun, davis: &Davis) -> DMatrix<f64> {
     let width = 1e-4;
     let count = run.speeds_mps.len();
     let mut effect = DMatrix::zeros(count, count - 1);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use dynocar_client::ffi::{EffortPlace, ReadingCopy, Resistance, StopRequest, Stopping};
+use dynocar_client::ffi::{EffortPlace, ReadingCopy, ResistanceAtSpeed, StopRequest, Stopping};
 use dynocar_shared::layout::FieldLayout;
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::services::PIPELINES_MAX;
@@ -74,7 +74,7 @@ const ANSWERS: [Struct; 3] = [
         "A snapshot copied out, with its age. is_usable is for what was asked, by usable_quantities."
     ),
     of!(
-        Resistance,
+        ResistanceAtSpeed,
         "dynocar_resistance",
         "Basic resistance (no gradient, no curve) at a speed: w0(v) = a + b v + c v^2."
     ),

@@ -5,8 +5,8 @@
 //! `train_kalman` would know after each ([`rehearsal`]). What driving does not help has its
 //! remedy in words ([`remedy`]). The line is taken as level: a snapshot does not say where the train is.
 
-pub mod drive;
 pub mod known;
+pub mod manoeuvre;
 pub mod noise;
 pub mod rehearsal;
 pub mod remedy;
@@ -15,8 +15,8 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Parameter, ParameterSnapshot};
 use nalgebra::{Matrix3, Vector3};
 
-use drive::{DriveKind, Scene};
 use known::{ANSWERED, davis_of};
+use manoeuvre::{DriveKind, Scene};
 use noise::RunNoise;
 use rehearsal::{Forecast, KnownBefore, MASS, forecast};
 

@@ -14,8 +14,8 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use nalgebra::{Matrix3, SVector};
 
-use super::drive::{Drive, DriveKind, Scene};
 use super::known::ANSWERED;
+use super::manoeuvre::{DriveKind, PlannedManoeuvre, Scene};
 use super::noise::RunNoise;
 
 /// Shortest step in s; samples that come faster are taken together.
@@ -42,7 +42,7 @@ pub struct KnownBefore {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
     /// The manoeuvre.
-    pub drive: Drive,
+    pub drive: PlannedManoeuvre,
     /// Time in s that it takes.
     pub lasts_s: f64,
     /// Speed in m/s at its end.
@@ -57,12 +57,16 @@ pub fn forecast(
     scene: &Scene<'_>,
     known: &KnownBefore,
     noise: &RunNoise,
-    drive: Drive,
+    drive: PlannedManoeuvre,
 ) -> Option<Forecast> {
     let mut rehearsal = Rehearsal::new(scene, known, noise)?;
     rehearsal.speed_mps = drive.from_mps;
-    let hold =
-        Drive { kind: DriveKind::Hold, to_mps: drive.from_mps, within_s: LEAD_IN_S, ..drive };
+    let hold = PlannedManoeuvre {
+        kind: DriveKind::Hold,
+        to_mps: drive.from_mps,
+        within_s: LEAD_IN_S,
+        ..drive
+    };
     rehearsal.drive(hold, true);
     let before = rehearsal.std()?;
     let lasts_s = rehearsal.drive(drive, false);
@@ -131,7 +135,7 @@ impl<'a> Rehearsal<'a> {
     }
 
     /// Drives a manoeuvre to its end; `is_free` holds a speed whatever the traction. Gives the time in s.
-    fn drive(&mut self, drive: Drive, is_free: bool) -> f64 {
+    fn drive(&mut self, drive: PlannedManoeuvre, is_free: bool) -> f64 {
         let gain = mps2_per_n_per_kn(self.scene.train.rotating_mass_factor);
         let weight_kn = TrainModel::weight_kn(self.scene.mass_kg);
         let mut driver = drive.begin();

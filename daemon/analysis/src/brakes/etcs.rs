@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use super::parameters::{Correction, Parameters};
-use super::steps::Steps;
+use super::parameters::{BrakeParameters, Correction};
+use super::speed_steps::SpeedSteps;
 use crate::dataset::DatasetError;
 use crate::dataset::document::Item;
 
@@ -13,19 +13,19 @@ use crate::dataset::document::Item;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EtcsBrake {
     /// A_brake_emergency in m/s².
-    pub gamma_emergency: Steps,
+    pub gamma_emergency: SpeedSteps,
     /// A_brake_service in m/s².
-    pub gamma_service: Steps,
+    pub gamma_service: SpeedSteps,
     /// A_brake_normal_service in m/s².
-    pub gamma_normal_service: Steps,
+    pub gamma_normal_service: SpeedSteps,
     /// Kdry_rst.
-    pub k_dry: Steps,
+    pub k_dry: SpeedSteps,
     /// Kwet_rst.
-    pub k_wet: Steps,
+    pub k_wet: SpeedSteps,
     /// Kn+ in m/s².
-    pub k_n_pos: Steps,
+    pub k_n_pos: SpeedSteps,
     /// Kn- in m/s².
-    pub k_n_neg: Steps,
+    pub k_n_neg: SpeedSteps,
     /// T_traction_cut_off in s.
     pub t_traction_cut_off: f64,
     /// Build-up in s of the service brake, for the first service brake intervention.
@@ -49,7 +49,7 @@ pub struct Basis {
 
 /// Declared figures beside the stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Choice {
+pub struct DeclaredBrakeFigures {
     /// Level of confidence of Kdry_rst; `None` where none is supported.
     pub ebcl: Option<u32>,
     /// Kwet_rst where no wet stops are recorded.
@@ -59,9 +59,9 @@ pub struct Choice {
 impl EtcsBrake {
     /// The parameters, and what each rests on. The form asks for all of them, and for factors at the boundaries of the
     /// emergency steps: what is not known is replaced, and marked as a guess.
-    pub fn of(found: &Parameters, choice: &Choice) -> (Self, Vec<Basis>) {
+    pub fn of(found: &BrakeParameters, choice: &DeclaredBrakeFigures) -> (Self, Vec<Basis>) {
         let emergency = &found.emergency;
-        let over = |value: f64| Steps::constant(value).between(&emergency.boundaries);
+        let over = |value: f64| SpeedSteps::constant(value).between(&emergency.boundaries);
         let normal = found.normal_service.as_ref();
         let service = found.service.as_ref().or(normal).unwrap_or(emergency);
         let k_dry = reached(found, choice).and_then(Correction::k_dry);
@@ -75,8 +75,8 @@ impl EtcsBrake {
                 Some(wet) => wet.between(&emergency.boundaries),
                 None => over(choice.k_wet.unwrap_or(1.0)),
             },
-            k_n_pos: Steps::constant(0.0),
-            k_n_neg: Steps::constant(0.0),
+            k_n_pos: SpeedSteps::constant(0.0),
+            k_n_neg: SpeedSteps::constant(0.0),
             t_traction_cut_off: found.cut_off.map_or(0.0, |it| it.greatest_s),
             t_bs1: t_bs,
             t_bs2: t_bs,
@@ -88,7 +88,10 @@ impl EtcsBrake {
 }
 
 /// The level that is chosen.
-fn reached<'f>(found: &'f Parameters, choice: &Choice) -> Option<&'f Correction> {
+fn reached<'f>(
+    found: &'f BrakeParameters,
+    choice: &DeclaredBrakeFigures,
+) -> Option<&'f Correction> {
     found.k_dry.iter().find(|it| Some(it.ebcl) == choice.ebcl)
 }
 
@@ -100,7 +103,7 @@ fn guess(key: &'static str, rests_on: impl Into<String>) -> Basis {
     Basis { key, rests_on: rests_on.into(), is_guess: true }
 }
 
-fn decelerations(found: &Parameters) -> Vec<Basis> {
+fn decelerations(found: &BrakeParameters) -> Vec<Basis> {
     let stops = found.stops;
     let usual = format!("the median of {} stops by less than all of the brake", found.usual_stops);
     let (normal, instead) = match &found.normal_service {
@@ -134,7 +137,7 @@ fn decelerations(found: &Parameters) -> Vec<Basis> {
     vec![emergency, service, normal]
 }
 
-fn factors(found: &Parameters, choice: &Choice) -> Vec<Basis> {
+fn factors(found: &BrakeParameters, choice: &DeclaredBrakeFigures) -> Vec<Basis> {
     let stops = found.stops;
     let k_dry = match reached(found, choice).filter(|it| it.k_dry().is_some()) {
         Some(it) if it.measured.is_some() => {
@@ -157,7 +160,7 @@ fn factors(found: &Parameters, choice: &Choice) -> Vec<Basis> {
     vec![k_dry, k_wet, pos, neg]
 }
 
-fn times(found: &Parameters) -> Vec<Basis> {
+fn times(found: &BrakeParameters) -> Vec<Basis> {
     let key = "t_traction_cut_off";
     let cut_off = match &found.cut_off {
         Some(it) => known(
@@ -213,11 +216,11 @@ fn steps(
     key: &'static str,
     allowed: &'static str,
     range: RangeInclusive<f64>,
-) -> Result<Steps, DatasetError> {
+) -> Result<SpeedSteps, DatasetError> {
     let item = root.need(key, "boundaries and values")?;
     let list = |name: &'static str| item.need(name, "a list of numbers");
     let boundaries = list("boundaries")?;
-    let mut read = Steps::default();
+    let mut read = SpeedSteps::default();
     for entry in boundaries.list("boundaries", 0)? {
         let speed_mps = entry.number("a speed in m/s above 0, at most 200", 1e-9..=200.0)?;
         if read.boundaries.last().is_some_and(|last| speed_mps <= *last) {

@@ -4,11 +4,13 @@
 mod components;
 mod etcs;
 mod parameters;
-mod steps;
-mod table;
+mod speed_steps;
+mod stopping_table;
 
 pub use components::{Weakest, weakest, weakest_plain};
-pub use etcs::{Basis, Choice, EtcsBrake, read};
-pub use parameters::{Correction, LEVELS, Parameters, corrections, lower_bound, usual, wet_share};
-pub use steps::{STEPS_MAX, Steps};
-pub use table::{HEAD, TableLaw, TableRow, parse, write};
+pub use etcs::{Basis, DeclaredBrakeFigures, EtcsBrake, read};
+pub use parameters::{
+    BrakeParameters, Correction, LEVELS, corrections, lower_bound, usual, wet_share,
+};
+pub use speed_steps::{STEPS_MAX, SpeedSteps};
+pub use stopping_table::{HEAD, StoppingTableRow, TableLaw, parse, write};

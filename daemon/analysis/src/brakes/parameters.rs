@@ -5,8 +5,8 @@ use serde::Serialize;
 use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, StudentsT};
 
 use super::components::weakest;
-use super::steps::Steps;
-use crate::stops::{CutOff, Day, Law, Manner, RecordedStop};
+use super::speed_steps::SpeedSteps;
+use crate::stops::{CutOff, DecelerationLaw, Manner, RecordedStop, StopStatistics};
 
 /// Levels of confidence that a balise may ask for (EBCL): all stops but one in 10 to the level reach it.
 pub const LEVELS: u32 = 10;
@@ -40,17 +40,17 @@ impl Correction {
 
 /// The parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Parameters {
+pub struct BrakeParameters {
     /// How many stops the emergency steps are of.
     pub stops: usize,
     /// Whether a record of the brake shows that it was applied in full in them.
     pub is_commanded: bool,
     /// A_brake_emergency in m/s²: by all of the brake.
-    pub emergency: Steps,
+    pub emergency: SpeedSteps,
     /// A_brake_service in m/s²; `None` without full service stops.
-    pub service: Option<Steps>,
+    pub service: Option<SpeedSteps>,
     /// A_brake_normal_service in m/s²: what drivers use; `None` without their stops.
-    pub normal_service: Option<Steps>,
+    pub normal_service: Option<SpeedSteps>,
     /// How many stops that is of.
     pub usual_stops: usize,
     /// The lower bound of the mean deceleration, that the emergency steps lie below: speed in m/s and m/s².
@@ -64,11 +64,11 @@ pub struct Parameters {
     /// Kdry_rst by level.
     pub k_dry: Vec<Correction>,
     /// Kwet_rst over speed; `None` without wet stops.
-    pub k_wet: Option<Steps>,
+    pub k_wet: Option<SpeedSteps>,
 }
 
 /// The curve that the mean deceleration of a law lies above with a confidence.
-pub fn lower_bound(law: &Law, confidence: f64) -> Vec<[f64; 2]> {
+pub fn lower_bound(law: &DecelerationLaw, confidence: f64) -> Vec<[f64; 2]> {
     let quantile =
         StudentsT::new(0.0, 1.0, law.freedom).map_or(2.0, |it| it.inverse_cdf(confidence));
     let common = law.repeatability / (law.stops as f64).sqrt();
@@ -80,27 +80,27 @@ pub fn lower_bound(law: &Law, confidence: f64) -> Vec<[f64; 2]> {
 }
 
 /// The decelerations that half of the stops by less than all of the brake exceed, and how many these are.
-pub fn usual(stops: &[RecordedStop]) -> (Option<Steps>, usize) {
+pub fn usual(stops: &[RecordedStop]) -> (Option<SpeedSteps>, usize) {
     let is_usual = |it: &&RecordedStop| it.manner == Manner::Modulated && !it.has_slid;
     let usual: Vec<RecordedStop> = stops.iter().filter(is_usual).cloned().collect();
-    let day = Day::of(&usual);
+    let day = StopStatistics::of(&usual);
     let enough = day.decelerations.iter().filter(|it| it.stops >= 3);
     let curve: Vec<[f64; 2]> =
         enough.map(|it| [it.speed_mps, it.deceleration_mps2.median]).collect();
-    (Steps::below(&curve), usual.len())
+    (SpeedSteps::below(&curve), usual.len())
 }
 
 /// Deceleration on a wet rail over that on a dry one.
-pub fn wet_share(dry: &Law, wet: &Law) -> Option<Steps> {
+pub fn wet_share(dry: &DecelerationLaw, wet: &DecelerationLaw) -> Option<SpeedSteps> {
     let pairs = dry.points.iter().zip(&wet.points);
     let curve: Vec<[f64; 2]> = pairs
         .map(|(dry, wet)| [dry.speed_mps, (wet.deceleration_mps2 / dry.deceleration_mps2).min(1.0)])
         .collect();
-    Steps::below(&curve)
+    SpeedSteps::below(&curve)
 }
 
 /// The corrections of all levels.
-pub fn corrections(law: &Law, declared: Option<&BrakeComponents>) -> Vec<Correction> {
+pub fn corrections(law: &DecelerationLaw, declared: Option<&BrakeComponents>) -> Vec<Correction> {
     let brake = declared.map(|it| conditioned(it, law));
     let level = |ebcl: u32| {
         let probability =
@@ -114,7 +114,7 @@ pub fn corrections(law: &Law, declared: Option<&BrakeComponents>) -> Vec<Correct
 
 /// The components given the stops: what all units have in common is known as well as the stops show it, and what
 /// stops differ by beyond what the units explain is common to them.
-fn conditioned(declared: &BrakeComponents, law: &Law) -> BrakeComponents {
+fn conditioned(declared: &BrakeComponents, law: &DecelerationLaw) -> BrakeComponents {
     let units = f64::from(declared.units);
     let alive = 1.0 - declared.failure_probability;
     let each = declared.friction_std.powi(2)

@@ -50,26 +50,26 @@ impl ForcePart {
 
 /// Balance of the accelerations of a train at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Balance {
+pub struct AccelerationBalance {
     forces: SampleForces,
     davis: Davis,
     speed_mps: f64,
     is_held: bool,
 }
 
-impl Balance {
+impl AccelerationBalance {
     pub(super) fn new(forces: SampleForces, davis: Davis, speed_mps: f64) -> Self {
-        Balance { forces, davis, speed_mps, is_held: false }
+        AccelerationBalance { forces, davis, speed_mps, is_held: false }
     }
 
     /// The same at another speed in m/s nearby.
     pub(super) fn at(self, speed_mps: f64) -> Self {
-        Balance { speed_mps, ..self }
+        AccelerationBalance { speed_mps, ..self }
     }
 
     /// The same while a brake that nobody reports holds the train.
     pub(super) fn held(self) -> Self {
-        Balance { is_held: true, ..self }
+        AccelerationBalance { is_held: true, ..self }
     }
 
     /// Returns the acceleration by the forces in m/s²: negative even where they hold the train at rest.

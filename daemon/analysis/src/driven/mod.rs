@@ -10,12 +10,12 @@ use std::sync::Arc;
 
 use dynocar_model::force::{ForceResolver, ValidSample};
 use dynocar_model::simulate::is_pulled;
-use dynocar_model::simulate::motion::{Motion, STEP_MAX_S, advance};
+use dynocar_model::simulate::motion::{STEP_MAX_S, SimulatedMotion, advance};
 use dynocar_model::terms::delay::DelayLine;
 use dynocar_model::track::Track;
 use dynocar_model::train::{Corrections, TrainModel};
 use dynocar_shared::{SampleField, TrainSample};
-pub use force_parts::{Balance, ForcePart};
+pub use force_parts::{AccelerationBalance, ForcePart};
 
 use crate::explain::evidence::SampleForces;
 
@@ -40,7 +40,7 @@ pub struct DrivenTrain {
     speed_mps: f64,
     /// Response of a late sensor to the true speed in m/s.
     sensor: Option<LateSensor>,
-    balance: Option<Balance>,
+    balance: Option<AccelerationBalance>,
 }
 
 /// A speed sensor that is late.
@@ -108,7 +108,7 @@ impl DrivenTrain {
     }
 
     /// Returns the balance of accelerations at the end of the newest step.
-    pub fn balance(&self) -> Option<&Balance> {
+    pub fn balance(&self) -> Option<&AccelerationBalance> {
         self.balance.as_ref()
     }
 
@@ -118,7 +118,7 @@ impl DrivenTrain {
     ///
     /// Bounded work, no allocation.
     pub fn look(&mut self, acting: &TrainSample) {
-        let here = Motion { distance_m: 0.0, speed_mps: self.speed_mps };
+        let here = SimulatedMotion { distance_m: 0.0, speed_mps: self.speed_mps };
         let (balance, pulled) = self.balanced(acting, here);
         let is_held = self.is_held_at_rest && self.speed_mps == 0.0 && !pulled;
         self.balance = Some(if is_held { balance.held() } else { balance });
@@ -145,7 +145,7 @@ impl DrivenTrain {
     }
 
     fn drive_part(&mut self, step_s: f64, acting: impl Fn(f64) -> TrainSample) {
-        let begin = Motion { distance_m: 0.0, speed_mps: self.speed_mps };
+        let begin = SimulatedMotion { distance_m: 0.0, speed_mps: self.speed_mps };
         let mut is_held = self.is_held_at_rest && self.speed_mps == 0.0;
         let mut direction = 1.0;
         let after = advance(begin, step_s, |at_s, motion| {
@@ -157,7 +157,7 @@ impl DrivenTrain {
             balance.unheld_mps2()
         });
         if is_held {
-            self.balance = self.balance.map(Balance::held);
+            self.balance = self.balance.map(AccelerationBalance::held);
             return;
         }
         self.speed_mps = after.speed_mps;
@@ -167,7 +167,11 @@ impl DrivenTrain {
     }
 
     /// The forces at a motion within a step, and whether the train is pulled.
-    fn balanced(&mut self, acting: &TrainSample, motion: Motion) -> (Balance, bool) {
+    fn balanced(
+        &mut self,
+        acting: &TrainSample,
+        motion: SimulatedMotion,
+    ) -> (AccelerationBalance, bool) {
         let mut sample = *acting;
         if sample.get(SampleField::Position).is_none() {
             let travelled_m = f64::from(sample.direction) * motion.distance_m;
@@ -181,7 +185,10 @@ impl DrivenTrain {
         let resolved =
             self.forces.resolve(&ValidSample { sample: &sample, step_s: 0.0, segment: 1 });
         let forces = SampleForces::declared(&resolved, self.train.rotating_mass_factor);
-        (Balance::new(forces, self.train.resistance, motion.speed_mps), is_pulled(&resolved))
+        (
+            AccelerationBalance::new(forces, self.train.resistance, motion.speed_mps),
+            is_pulled(&resolved),
+        )
     }
 }
 

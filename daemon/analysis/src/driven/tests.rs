@@ -1,7 +1,7 @@
 //! The driven train compared with the open-loop prediction, and where no recording goes.
 
-use dynocar_model::simulate::{Prediction, Recording, Restart};
-use dynocar_model::track::{Curve, Track};
+use dynocar_model::simulate::{OpenLoopRecording, Prediction, Restart};
+use dynocar_model::track::{Track, TrackCurve};
 use dynocar_model::train::Davis;
 
 use super::*;
@@ -42,7 +42,7 @@ fn train_at(train: TrainModel, track: Option<Track>, speed_mps: f64) -> DrivenTr
 }
 
 fn track() -> Track {
-    let curves = vec![Curve { start_m: 700.0, end_m: 1100.0, radius_m: 400.0 }];
+    let curves = vec![TrackCurve { start_m: 700.0, end_m: 1100.0, radius_m: 400.0 }];
     let gradient = [(0.0, 4.0), (900.0, -6.0)];
     Track::new("hill".into(), Some(9000.0), Some(&gradient), Some(curves), None).unwrap()
 }
@@ -61,7 +61,7 @@ fn a_train_driven_along_a_recording_goes_to_the_bit_as_is_predicted() {
     let resolved: Vec<_> = (0..700)
         .map(|k| forces.resolve(&ValidSample { sample: &at(k), step_s: 0.2, segment: 1 }))
         .collect();
-    let recording = Recording::new(resolved).unwrap();
+    let recording = OpenLoopRecording::new(resolved).unwrap();
     let law = |k: usize, speed_mps: f64| {
         let forces = SampleForces::declared(&recording.samples()[k], train.rotating_mass_factor);
         let [p0, p1, p2] = forces.polynomial(train.resistance, speed_mps);

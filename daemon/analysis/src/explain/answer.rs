@@ -8,6 +8,9 @@ use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
 use super::course::Course;
+pub use super::location::{
+    CovariateRange, Location, PlaceUncertainty, RunWindow, WindowUncertainty,
+};
 use super::stop_to_stop::{Judged, StopToStop};
 use crate::dataset::DatasetDiagnostic;
 
@@ -29,78 +32,6 @@ named! {
     }
 }
 
-/// An interval of time in a run, in the recording's own time.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RunWindow {
-    /// The run's file.
-    pub run: String,
-    /// Start in s.
-    pub t_start_s: f64,
-    /// End in s.
-    pub t_end_s: f64,
-}
-
-/// A range of a covariate.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CovariateRange {
-    /// Its name with the unit.
-    pub name: String,
-    /// Lowest and highest value.
-    pub range: [f64; 2],
-}
-
-/// How surely a window's ends are known.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct WindowUncertainty {
-    /// The run's file.
-    pub run: String,
-    /// 95 % interval of the start in s.
-    pub t_start_s: [f64; 2],
-    /// 95 % interval of the end in s; absent for an end that was not estimated.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub t_end_s: Option<[f64; 2]>,
-}
-
-/// How surely a place is known: 95 % intervals of the ends that were estimated.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct PlaceUncertainty {
-    /// Of both ends of every interval, in m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub intervals_m: Option<Vec<[[f64; 2]; 2]>>,
-    /// Of the windows that were estimated from the speeds.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub windows: Option<Vec<WindowUncertainty>>,
-    /// Of the least and the greatest value of the covariate; `null` where the data end.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub range: Option<[Option<[f64; 2]>; 2]>,
-    /// Probability that the effect acts in a run, for all fit runs where the runs were chosen.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub run_probability: Option<BTreeMap<String, f64>>,
-}
-
-/// Where an effect acts; all that is given holds together.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Location {
-    /// Chainages in m of the train's centre.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub intervals_m: Option<Vec<[f64; 2]>>,
-    /// Stretches of time.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub windows: Option<Vec<RunWindow>>,
-    /// Files of the runs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub runs: Option<Vec<String>>,
-    /// Lowest and highest speed in m/s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub speed_range_mps: Option<[f64; 2]>,
-    /// A covariate and its range.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub covariate: Option<CovariateRange>,
-    /// How surely that is known, where it was estimated.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub uncertainty_95: Option<PlaceUncertainty>,
-}
-
 impl ExplainAnswer {
     /// Adds what limits the verdict.
     pub fn add_caveat(&mut self, sentence: &str) {
@@ -114,25 +45,9 @@ impl ExplainAnswer {
     }
 }
 
-impl Location {
-    /// A place that is a set of intervals; nothing given for an empty set.
-    pub fn of_intervals(intervals_m: Vec<[f64; 2]>) -> Self {
-        Location {
-            intervals_m: (!intervals_m.is_empty()).then_some(intervals_m),
-            ..Location::default()
-        }
-    }
-
-    /// Whether the place may be in a run, by its file.
-    pub fn may_be_in(&self, file: &str) -> bool {
-        self.runs.as_ref().is_none_or(|runs| runs.iter().any(|run| run == file))
-            && self.windows.as_ref().is_none_or(|all| all.iter().any(|own| own.run == file))
-    }
-}
-
 /// A mass that holds between two places.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MassSection {
+pub struct FoundMassSection {
     /// Lower chainage in m.
     pub from_m: f64,
     /// Upper chainage in m.
@@ -166,7 +81,7 @@ pub enum ParameterValue {
     /// [chainage in m, value] along the line.
     Profile(Vec<[f64; 2]>),
     /// Masses by place.
-    Sections(Vec<MassSection>),
+    Sections(Vec<FoundMassSection>),
     /// Masses by time.
     Windows(Vec<MassWindow>),
     /// A formula.
@@ -175,7 +90,7 @@ pub enum ParameterValue {
 
 /// The work of an effect, and how far off a prediction ends without and with it, both on the fit runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Meaning {
+pub struct EffectMeaning {
     /// Work in kWh that it takes from the train on 100 km; negative where it gives.
     pub energy_kwh_per_100_km: f64,
     /// The same over the work of the traction; absent where nothing pulls.
@@ -205,16 +120,32 @@ pub struct EffectAnswer {
     /// Share of the open-loop error on the fit runs that goes when the effect is added last.
     pub error_reduction: f64,
     /// Meaning in kWh and metres.
-    pub meaning: Meaning,
+    pub meaning: EffectMeaning,
     /// Contradiction between the sources of evidence about it; absent where they agree.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contradiction: Option<String>,
     /// Its numbers that are not the same in all runs; empty where all are.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub over_time: Vec<Course>,
+    /// Its numbers by the runs held out alone; absent where these hardly show it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutAnswer>,
     /// For an effect outside the library, forms that explain less of the data, the best first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub runners_up: Vec<RunnerUp>,
+}
+
+/// The numbers of an effect by the runs held out alone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOutAnswer {
+    /// Number of these runs.
+    pub runs: usize,
+    /// Parameters in SI units.
+    pub parameters: BTreeMap<String, ParameterValue>,
+    /// Their standard deviations.
+    pub std: BTreeMap<String, ParameterValue>,
+    /// Probability that they differ as much from the stated ones where the effect is the same in all runs.
+    pub p_value: f64,
 }
 
 /// Another form of an effect outside the library.

@@ -4,11 +4,12 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{DavisDeviations, EffectAnswer, Identifiability, PlaceUncertainty};
 use super::course::Course;
-use super::described::small;
+use super::described::{by_held_out_runs, small};
 use super::evidence::{Fit, FitProblem};
+use super::held_out::HeldOutEffect;
 use super::identifiability::not_held;
-use super::score::Score;
-use super::selection::{Deviations, Outcome, Search};
+use super::score::PredictionScore;
+use super::selection::{Deviations, Search, SearchOutcome};
 
 use crate::statistics::share_of;
 
@@ -20,6 +21,8 @@ pub struct FinishedFit<'a> {
     pub places: &'a [Option<PlaceUncertainty>],
     /// The numbers that change over the runs.
     pub courses: &'a [(EffectKind, Vec<Course>)],
+    /// Numbers of each effect by the runs held out alone.
+    pub held_out: &'a [Option<HeldOutEffect>],
 }
 
 impl FinishedFit<'_> {
@@ -33,10 +36,10 @@ impl FinishedFit<'_> {
 /// Returns the limits of a verdict.
 pub fn caveats(
     search: &Search,
-    outcome: &Outcome,
+    outcome: &SearchOutcome,
     effects: &[EffectAnswer],
     known: &FinishedFit,
-    score: &Score,
+    score: &PredictionScore,
     identifiability: &[Identifiability],
 ) -> Vec<String> {
     let contradictions = effects.iter().filter_map(|effect| effect.contradiction.clone());
@@ -45,6 +48,7 @@ pub fn caveats(
         all.iter().map(|course| format!(" {}", course.sentence(kind.name())))
     });
     caveats.extend(courses);
+    caveats.extend(effects.iter().filter_map(by_held_out_runs));
     caveats.extend([worse_held_out(effects, score), small_beside(outcome, effects)]);
     caveats.push(undetermined(search.problem, &outcome.fit, &known.deviations.std));
     caveats.extend(not_held(identifiability));
@@ -58,7 +62,7 @@ pub fn trimmed(sentences: &[String]) -> Vec<String> {
 }
 
 /// Describes the certain and small effects beside those that are named; empty without either.
-fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
+fn small_beside(outcome: &SearchOutcome, effects: &[EffectAnswer]) -> String {
     let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();
     if small.is_empty() || effects.is_empty() {
         return String::new();
@@ -67,7 +71,7 @@ fn small_beside(outcome: &Outcome, effects: &[EffectAnswer]) -> String {
 }
 
 /// Returns that the runs held out are predicted worse with what was found; empty when they are not.
-fn worse_held_out(effects: &[EffectAnswer], score: &Score) -> String {
+fn worse_held_out(effects: &[EffectAnswer], score: &PredictionScore) -> String {
     let Some(judged) = score.judged() else { return String::new() };
     let [before, after] = judged.error_mps;
     let [shown_before, shown_after] = [before, after].map(|error| format!("{error:.3}"));

@@ -5,7 +5,7 @@ use dynocar_shared::vocabulary::{self, EffectKind};
 use super::answer::RunnerUp;
 use super::effects::UNKNOWN;
 use super::evidence::{EQUAL, SCORE_MIN};
-use super::selection::{Outcome, Refusal, Search, Trial, is_certain_beside, penalty};
+use super::selection::{EffectTrial, Refusal, Search, SearchOutcome, is_certain_beside, penalty};
 use crate::statistics::least_first;
 
 /// A competing hypothesis takes away this share of what the accepted effect does of the open-loop error, and has this
@@ -26,9 +26,9 @@ pub struct CompetingHypotheses {
 /// Beside those that the runs could not distinguish from it whatever they showed, a competing hypothesis explains the data as
 /// well, would be accepted as the accepted one was, takes away about as much of the open-loop error, and has nothing left to explain once the effect
 /// is in: what keeps its evidence acts beside the effect and not in its place.
-pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
+pub fn competing_hypotheses(outcome: &SearchOutcome) -> Vec<CompetingHypotheses> {
     let effects = &outcome.fit.model.effects;
-    let of = |accepted: EffectKind, tried: &[Trial], twins: &[EffectKind]| {
+    let of = |accepted: EffectKind, tried: &[EffectTrial], twins: &[EffectKind]| {
         let own = tried.iter().find(|trial| trial.kind == accepted);
         let close =
             tried.iter().filter(|trial| own.is_some_and(|own| comes_close(trial, own, outcome)));
@@ -56,7 +56,7 @@ pub fn competing_hypotheses(outcome: &Outcome) -> Vec<CompetingHypotheses> {
 }
 
 /// Whether a trial could stand in the place of the accepted one.
-fn comes_close(trial: &Trial, accepted: &Trial, outcome: &Outcome) -> bool {
+fn comes_close(trial: &EffectTrial, accepted: &EffectTrial, outcome: &SearchOutcome) -> bool {
     let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
     let left = last.clone().find(|left| left.kind == trial.kind).map_or(0.0, |left| left.evidence);
     let may_be = match Search::refusal(trial) {
@@ -107,7 +107,7 @@ fn form(formula: String) -> String {
 
 /// The forms next best to the one that was found, each fitted with everything else; empty where
 /// nothing outside the library was found.
-pub fn runners_up(search: &Search, outcome: &Outcome) -> Vec<RunnerUp> {
+pub fn runners_up(search: &Search, outcome: &SearchOutcome) -> Vec<RunnerUp> {
     let fit = &outcome.fit;
     let Some(index) = fit.model.position(EffectKind::Unknown) else { return Vec::new() };
     let found = fit.model.effects[index].formula(fit.effect_parameters(index)).map(form);

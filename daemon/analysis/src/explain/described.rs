@@ -1,35 +1,63 @@
 //! Effects in words, for the statement.
 
+use std::collections::BTreeMap;
+
 use dynocar_model::terms::place::in_words;
 use dynocar_shared::HALF_95;
 
-use super::answer::{EffectAnswer, Location, ParameterValue, PlaceUncertainty};
-use super::selection::{Outcome, Trial};
+use super::answer::{EffectAnswer, HeldOutAnswer, Location, ParameterValue, PlaceUncertainty};
+use super::over_time::CHANCE_MAX;
+use super::selection::{EffectTrial, SearchOutcome};
 
 /// Intervals of a place at most in a sentence.
 const PLACES_SHOWN: usize = 4;
 
 /// An effect with its numbers, where it acts, and how surely that is known.
 pub(super) fn describe(effect: &EffectAnswer) -> String {
-    let mut parts = Vec::new();
-    for (name, value) in &effect.parameters {
-        if let ParameterValue::Formula(formula) = value {
-            parts.insert(0, formula.clone());
-        }
-        if let (ParameterValue::Number(value), Some(ParameterValue::Number(deviation))) =
-            (value, effect.std.get(name))
-        {
-            parts.push(match HALF_95 * deviation {
-                // A reference that was chosen and not estimated.
-                0.0 => format!("{name} = {value}"),
-                half_width => format!("{name} = {value:.4} ± {half_width:.4}"),
-            });
-        }
-    }
+    let formula = effect.parameters.values().find_map(|value| match value {
+        ParameterValue::Formula(formula) => Some(formula.clone()),
+        _ => None,
+    });
+    let mut parts: Vec<String> = formula.into_iter().collect();
+    parts.extend(numbers(&effect.parameters, &effect.std));
     parts.extend(effect.parameters.values().find_map(mass_factors));
     parts.extend(describe_place(&effect.place));
     parts.extend(effect.place.uncertainty_95.as_ref().and_then(precision));
     format!("{} ({})", effect.kind, parts.join(", "))
+}
+
+/// The numbers among values, each with its 95 % interval.
+fn numbers<'a>(
+    values: &'a BTreeMap<String, ParameterValue>,
+    std: &'a BTreeMap<String, ParameterValue>,
+) -> impl Iterator<Item = String> + 'a {
+    values.iter().filter_map(|(name, value)| {
+        let ParameterValue::Number(value) = value else { return None };
+        let Some(ParameterValue::Number(deviation)) = std.get(name) else { return None };
+        Some(match HALF_95 * deviation {
+            // A reference that was chosen and not estimated.
+            0.0 => format!("{name} = {value}"),
+            half_width => format!("{name} = {value:.4} ± {half_width:.4}"),
+        })
+    })
+}
+
+/// States what the runs held out say of an effect by themselves; `None` where they hardly show it.
+pub(super) fn by_held_out_runs(effect: &EffectAnswer) -> Option<String> {
+    let HeldOutAnswer { runs, parameters, std, p_value } = effect.held_out.as_ref()?;
+    let numbers: Vec<String> = numbers(parameters, std).collect();
+    let judged = match *p_value < CHANCE_MAX {
+        true => format!(
+            "which is not what the fit runs say (chance of as much: {p_value:.0e}): it is not the same in all runs, \
+             or not what acts"
+        ),
+        false => "which agrees with the fit runs".into(),
+    };
+    Some(format!(
+        " The {runs} runs held out by themselves give {} {}, {judged}.",
+        effect.kind,
+        numbers.join(", ")
+    ))
 }
 
 /// Where something acts.
@@ -89,7 +117,7 @@ fn mass_factors(value: &ParameterValue) -> Option<String> {
 
 /// Describes a certain and small effect: its kind with its numbers in the model, or in the trial that took it in
 /// where nothing is named.
-pub(super) fn small(outcome: &Outcome, trial: &Trial) -> String {
+pub(super) fn small(outcome: &SearchOutcome, trial: &EffectTrial) -> String {
     let effect = &trial.fit.model.effects[trial.last()];
     let tried = trial.fit.effect_parameters(trial.last());
     let values = outcome.values(trial.kind).unwrap_or(tried);

@@ -5,27 +5,27 @@ use std::sync::Arc;
 
 use dynocar_model::terms::delay::DelayLine;
 use dynocar_model::terms::speed_delay::LateSpeed;
-use dynocar_model::terms::{Entry, Key, Parameter};
+use dynocar_model::terms::{Key, ModelEntry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::answer::{Location, ParameterValue};
 use super::evidence::{RunData, SampleForces};
-use super::places::{End, Site};
+use super::places::{IntervalEnd, Site};
 
 /// An effect with its structure (places, windows, runs) fixed, shared by models.
 pub type SharedHypothesis = Arc<dyn Hypothesis>;
 
 /// Published form of an estimate: values and standard deviations by the names of the answer.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Reported {
+pub struct ReportedValues {
     /// Values.
     pub values: BTreeMap<String, ParameterValue>,
     /// Standard deviations.
     pub deviations: BTreeMap<String, ParameterValue>,
 }
 
-impl Reported {
+impl ReportedValues {
     /// Adds a number with its standard deviation.
     pub fn push(&mut self, name: &str, value: f64, deviation: f64) {
         self.values.insert(name.into(), ParameterValue::Number(value));
@@ -69,8 +69,8 @@ impl ReportContext<'_> {
     }
 
     /// Each of the effect's parameters.
-    pub fn each_of(&self, parameters: &[Parameter]) -> Reported {
-        let mut reported = Reported::default();
+    pub fn each_of(&self, parameters: &[Parameter]) -> ReportedValues {
+        let mut reported = ReportedValues::default();
         for (i, parameter) in parameters.iter().enumerate() {
             reported.push(parameter.name, self.parameters[i], self.deviations[i]);
         }
@@ -316,12 +316,12 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     }
 
     /// The ends of its places that were estimated from the speeds.
-    fn ends(&self) -> Vec<End> {
+    fn ends(&self) -> Vec<IntervalEnd> {
         self.site().map_or_else(Vec::new, Site::ends)
     }
 
     /// The same structure with one of its ends elsewhere; `None` where that makes no place.
-    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+    fn with_end(&self, end: &IntervalEnd, at: f64) -> Option<SharedHypothesis> {
         self.at_site(self.site()?.moved(end, at)?)
     }
 
@@ -369,9 +369,10 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     }
 
     /// Returns the entries of the effect in the files of a train and a line; `None` where these cannot hold it.
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<ModelEntry>> {
         let each = self.nature().keys.iter().zip(parameters);
-        let numbers: Vec<Entry> = each.map(|(key, value)| Entry::Number(key, *value)).collect();
+        let numbers: Vec<ModelEntry> =
+            each.map(|(key, value)| ModelEntry::Number(key, *value)).collect();
         (!numbers.is_empty()).then_some(numbers)
     }
 
@@ -381,7 +382,7 @@ pub trait Hypothesis: Send + Sync + std::fmt::Debug {
     }
 
     /// Parameters by the names of the answer.
-    fn report(&self, context: &ReportContext) -> Reported {
+    fn report(&self, context: &ReportContext) -> ReportedValues {
         context.each_of(self.parameters())
     }
 }

@@ -12,17 +12,17 @@ use super::answer::Identifiability;
 use super::competing::separating_run;
 use super::effects::{Candidate, LIBRARY};
 use super::report::words::number;
-use super::selection::{Outcome, Search};
+use super::selection::{Search, SearchOutcome};
 
 /// The kinds that are one number of the whole train or line, and not found.
-fn whole_kinds(search: &Search, outcome: &Outcome) -> Vec<Candidate> {
+fn whole_kinds(search: &Search, outcome: &SearchOutcome) -> Vec<Candidate> {
     let Some(scan) = search.scan(&outcome.fit) else { return Vec::new() };
     let others = LIBRARY.iter().filter(|effect| !outcome.fit.model.has(effect.kind));
     others.filter_map(|effect| effect.whole(&scan)).collect()
 }
 
 /// Returns the information of the data on each number that was not found.
-pub fn identifiability(search: &Search, outcome: &Outcome) -> Vec<Identifiability> {
+pub fn identifiability(search: &Search, outcome: &SearchOutcome) -> Vec<Identifiability> {
     let kinds = whole_kinds(search, outcome);
     let fitted = outcome.fit.theta.len();
     let mut model = outcome.fit.model.clone();

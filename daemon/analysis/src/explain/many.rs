@@ -9,12 +9,12 @@
 use std::sync::Arc;
 
 use dynocar_model::track::Track;
-use dynocar_model::train::{Drive, TrainModel};
+use dynocar_model::train::{PowerTrain, TrainModel};
 
 use super::evidence::{Density, Fit, FitProblem, RunData, RunDataError, RunNormal, prepare_at};
+use super::held_out::HeldOutRun;
 use super::over_time::Span;
-use super::score::RunScore;
-use super::selection::{Beside, Outcome, Search};
+use super::selection::{Beside, Search, SearchOutcome};
 use crate::dataset::{Dataset, Role, Run};
 use crate::parallel;
 
@@ -114,14 +114,14 @@ impl Held {
 pub struct Preparation {
     /// Train and line, without runs.
     declared: Dataset,
-    drive: Option<Drive>,
+    drive: Option<PowerTrain>,
     late_s: Option<f64>,
     train: Arc<TrainModel>,
 }
 
 impl Preparation {
     /// With forces from the power of another drive, and moved in time, where that was found.
-    pub fn new(declared: &Dataset, drive: Option<Drive>, late_s: Option<f64>) -> Self {
+    pub fn new(declared: &Dataset, drive: Option<PowerTrain>, late_s: Option<f64>) -> Self {
         let declared = declared.without_runs();
         let train = drive.map_or(declared.train.clone(), |it| declared.with_drive(it).train);
         Preparation { declared, drive, late_s, train }
@@ -175,27 +175,31 @@ fn is_common(fit: &Fit) -> bool {
 
 impl<E: From<RunDataError> + Send> Many<'_, E> {
     /// Moves a model that was found in the held runs, thinned, to where all fit it best as they were recorded: beside
-    /// the usual errors, and the one that predicts. It stays where only some runs show its effects.
+    /// the usual errors, and the one that predicts. False where it stays, since only some runs show its effects.
     pub(super) fn join(
         &self,
         search: &Search,
         preparation: &Preparation,
-        outcome: &mut Outcome,
-    ) -> Result<(), E> {
+        outcome: &mut SearchOutcome,
+    ) -> Result<bool, E> {
         let problem = search.problem;
         let Some(joint) = outcome.beside().filter(|_| is_common(&outcome.fit)) else {
-            return Ok(());
+            return Ok(false);
         };
         (search.progress)(0.95, "reading all runs");
         let fits = [&joint.fit, &outcome.fit, &outcome.base];
         let [beside, own, base] = self.normals(problem, preparation, fits)?;
-        let fit = problem.joined_by(&joint.fit, &beside);
+        let count = outcome.fit.model.effects.len();
+        let fit = problem.joined(&joint.fit, beside, count, |fit| {
+            let [again] = self.normals(problem, preparation, [fit])?;
+            Ok::<_, E>(again)
+        })?;
         let effects = 3..outcome.fit.theta.len();
         let moved: Vec<f64> = effects.map(|i| fit.theta[i] - joint.fit.theta[i]).collect();
         outcome.set_beside(Beside { fit, shared: joint.shared });
         outcome.fit = problem.with_davis_joined(&outcome.fit, &own, &moved);
         outcome.base = problem.with_davis_joined(&outcome.base, &base, &[]);
-        Ok(())
+        Ok(true)
     }
 
     /// Returns the normal equations of the fit runs, by group, as far along the line as the searched runs go.
@@ -208,40 +212,56 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         let mut sums = fits.map(|_| Vec::new());
         for group in self.held.members(Role::Fit) {
             let each = parallel::of_each(&group, |index| -> Result<_, E> {
-                let mut run = (self.read)(*index)?;
-                if let Some(reach_m) = problem.reach_m(f64::from(run.direction)) {
-                    run.forget_forces_beyond(reach_m);
-                }
-                let run = preparation.run(run, Density::Recorded)?;
-                Ok(fits.map(|fit| problem.normal_of(&run, fit)))
+                let run = self.within(problem, (self.read)(*index)?, preparation)?;
+                Ok(run.map(|run| fits.map(|fit| problem.normal_of(&run, fit))))
             });
             let mut sum = fits.map(|fit| RunNormal::none(fit.theta.len()));
             for own in each {
-                sum.iter_mut().zip(&own?).for_each(|(sum, own)| sum.add(own));
+                let own = own?.into_iter().flatten();
+                sum.iter_mut().zip(own).for_each(|(sum, own)| sum.add(&own));
             }
             sums.iter_mut().zip(sum).for_each(|(sums, sum)| sums.push(sum));
         }
         Ok(sums)
     }
 
-    /// The errors of the holdout runs; of the held ones alone where something acts in some runs only.
-    pub(super) fn scores(
+    /// Reduces the holdout runs to their errors and their evidence; the held ones alone where something acts in some runs only.
+    pub(super) fn judged(
         &self,
-        holdout: &[RunData],
+        search: &Search,
         preparation: &Preparation,
-        outcome: &Outcome,
-    ) -> Result<Vec<RunScore>, E> {
-        let score = |run: &RunData| RunScore::of(run, &outcome.base, &outcome.fit);
+        outcome: &SearchOutcome,
+    ) -> Result<Vec<HeldOutRun>, E> {
+        let problem = search.problem;
         if !is_common(&outcome.fit) {
-            return Ok(parallel::of_each(holdout, score));
+            let judged = |run: &RunData| HeldOutRun::of((problem, outcome), run, Some(run));
+            return Ok(parallel::of_each(search.holdout, judged));
         }
         let roles = self.dataset.runs.iter().map(|run| run.role).enumerate();
         let own: Vec<usize> = roles.filter(|it| it.1 == Role::Holdout).map(|it| it.0).collect();
-        let scores = parallel::of_each(&own, |index| -> Result<_, E> {
-            let run = preparation.run((self.read)(*index)?, Density::Recorded)?;
-            Ok(score(&run))
+        let judged = parallel::of_each(&own, |index| -> Result<_, E> {
+            let read = (self.read)(*index)?;
+            let within = self.within(problem, read.clone(), preparation)?;
+            let run = preparation.run(read, Density::Recorded)?;
+            Ok(HeldOutRun::of((problem, outcome), &run, within.as_ref()))
         });
-        scores.into_iter().collect()
+        judged.into_iter().collect()
+    }
+
+    /// Makes a run ready as far along the line as the searched runs go; `None` for one that goes elsewhere.
+    fn within(
+        &self,
+        problem: &FitProblem,
+        mut run: Run,
+        preparation: &Preparation,
+    ) -> Result<Option<RunData>, RunDataError> {
+        if let Some(reach_m) = problem.reach_m(f64::from(run.direction)) {
+            run.forget_forces_beyond(reach_m);
+            if !run.has_forces() {
+                return Ok(None);
+            }
+        }
+        preparation.run(run, Density::Recorded).map(Some)
     }
 
     /// First and last file of the runs in each row of normal equations.
@@ -250,7 +270,7 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
     }
 
     /// How many runs say what, as a sentence to follow another.
-    pub(super) fn sentence(&self, outcome: &Outcome) -> String {
+    pub(super) fn sentence(&self, outcome: &SearchOutcome) -> String {
         let fit = self.dataset.with_role(Role::Fit).count();
         let sizes = match is_common(&outcome.fit) {
             true => "all of them say how large it is",

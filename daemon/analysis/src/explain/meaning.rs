@@ -3,12 +3,12 @@
 use dynocar_model::simulate::{ForceModel, MOVING_SPEED_MPS, Prediction, Restart};
 use dynocar_model::units::J_PER_KWH;
 
-use super::answer::Meaning;
+use super::answer::EffectMeaning;
 use super::evidence::{Fit, FitProblem, RunData, UpdatedForces};
 use super::score::predicted;
 use crate::statistics::rms;
 
-impl Meaning {
+impl EffectMeaning {
     /// That of one effect of a fitted model; `rest` is the model refitted without it.
     pub fn of(problem: &FitProblem, fit: &Fit, index: usize, rest: &Fit) -> Self {
         let (mut effect_j, mut traction_j, mut distance_m) = (0.0, 0.0, 0.0);
@@ -20,7 +20,7 @@ impl Meaning {
         }
         let kwh_per_100_km = effect_j / J_PER_KWH / (distance_m / 100e3);
         let errors = distance_error_m(problem, rest).zip(distance_error_m(problem, fit));
-        Meaning {
+        EffectMeaning {
             energy_kwh_per_100_km: if distance_m > 0.0 { kwh_per_100_km } else { 0.0 },
             share_of_traction_energy: (traction_j > 0.0).then(|| effect_j / traction_j),
             distance_error_60_s_m: errors.map(|(without, with)| [without, with]),

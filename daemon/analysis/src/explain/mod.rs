@@ -14,7 +14,7 @@
 //! - [`gradient_prior`]: how maps err
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`many`]: some of many runs, and what all of them say
-//! - [`course`], [`over_time`]: what is not the same in all runs
+//! - [`course`], [`over_time`], [`held_out`]: what is not the same in all runs, and what those held out say
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
 //!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
@@ -27,13 +27,15 @@ mod caveats;
 pub mod competing;
 pub mod course;
 pub mod described;
-pub mod drive;
+pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
 pub mod gradient_prior;
+pub mod held_out;
 pub mod hypothesis;
 pub mod identifiability;
+mod location;
 pub mod many;
 pub mod meaning;
 pub mod over_time;
@@ -53,13 +55,15 @@ use dynocar_core::plausibility::Severity;
 
 use crate::dataset::dataset_diagnostic::diagnostics;
 use crate::dataset::{Dataset, Role};
+use crate::parallel;
 use answer::ExplainAnswer;
 use answer::WithStd;
-use drive::EstimatedDrive;
+use drive_efficiency::EstimatedDrive;
 use evidence::{Density, FitProblem, RunData, RunDataError};
+use held_out::HeldOutRun;
 use many::{Held, Many, Preparation};
-use score::{RunScore, Score};
-use selection::{Deviations, Outcome, Progress, Search};
+use score::PredictionScore;
+use selection::{Deviations, Progress, Search, SearchOutcome};
 use unexplained::Unexplained;
 
 /// Fit and holdout runs with the models that were fitted.
@@ -73,9 +77,9 @@ pub struct Explanation {
     /// How surely its parameters are known.
     pub deviations: Deviations,
     /// Open-loop errors.
-    pub score: Score,
+    pub score: PredictionScore,
     /// Result of the search.
-    pub outcome: Outcome,
+    pub outcome: SearchOutcome,
     /// How runs are made ready for its models.
     pub preparation: Preparation,
 }
@@ -118,12 +122,11 @@ fn explained<E: From<RunDataError> + Send>(
 ) -> Result<Explanation, E> {
     progress(0.0, "reading the runs");
     let density = if many.is_some() { Density::Thinned } else { Density::Recorded };
-    let Prepared { estimated_drive, late, preparation, runs } = Prepared::of(&dataset, density)?;
+    let Prepared { forces, preparation, runs } = Prepared::of(&dataset, density)?;
     let track = preparation.track().map(|track| &**track);
     let all = many.as_ref().map_or(&dataset.runs, |many| &many.dataset.runs);
     let diagnostics = diagnostics(preparation.train(), track, all);
-    // A dead time and a lag are separated by the shape of the force, which the search saw thinned.
-    let step_s = density.step_s(dataset.step_s());
+    let recorded_step_s = dataset.step_s();
     drop(dataset);
     let (fit_runs, holdout): (Vec<RunData>, Vec<RunData>) =
         runs.into_iter().partition(|run| run.role == Role::Fit);
@@ -143,17 +146,18 @@ fn explained<E: From<RunDataError> + Send>(
         search.look_under_noise(&mut outcome);
     }
     let known = places::settle(&problem, &mut outcome.fit);
-    let mut deviations = selection::given_usual_errors(&search, &mut outcome, step_s);
-    progress(0.95, "scoring the holdout runs");
-    let scores = match &many {
-        Some(many) => {
-            many.join(&search, &preparation, &mut outcome)?;
-            deviations = selection::deviations_given(&outcome, step_s);
-            many.scores(&holdout, &preparation, &outcome)?
-        }
-        None => holdout.iter().map(|run| RunScore::of(run, &outcome.base, &outcome.fit)).collect(),
+    selection::move_beside_usual_errors(&search, &mut outcome);
+    // A dead time and a lag are separated by the shape of the force, which the search of many runs saw thinned.
+    let is_joined = match &many {
+        Some(many) => many.join(&search, &preparation, &mut outcome)?,
+        None => false,
     };
-    let score = Score::of(&problem, scores, &outcome.base, &outcome.fit);
+    let seen = if is_joined { Density::Recorded } else { density };
+    let deviations = selection::deviations_given(&outcome, seen.step_s(recorded_step_s));
+    progress(0.95, "scoring the holdout runs");
+    let judged = judged(many.as_ref(), &search, &preparation, &outcome)?;
+    let scores = judged.iter().map(|run| run.score.clone()).collect();
+    let score = PredictionScore::of(&problem, scores, &outcome.base, &outcome.fit);
     let spans = match &many {
         Some(many) => many.spans(),
         None => problem.runs.iter().map(|run| [run.file.clone(), run.file.clone()]).collect(),
@@ -161,16 +165,20 @@ fn explained<E: From<RunDataError> + Send>(
     let beside = outcome.beside();
     let finished = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
     let courses = over_time::courses(&problem, finished, &spans, &deviations.std);
-    let known = caveats::FinishedFit { deviations: &deviations, places: &known, courses: &courses };
+    let held_out = held_out::by_held_out_runs(
+        (&problem, finished),
+        &judged,
+        &deviations.covariance,
+        known.len(),
+    );
+    let known = caveats::FinishedFit {
+        deviations: &deviations,
+        places: &known,
+        courses: &courses,
+        held_out: &held_out,
+    };
     let mut answer = verdict::answer(&search, &outcome, &known, &score, diagnostics);
-    if let Some(estimated) = estimated_drive {
-        answer.add_caveat(&estimated.answer.sentence());
-        answer.drive = Some(estimated.answer);
-    }
-    if let Some(late) = late {
-        answer.add_caveat(&force_time::sentence(late));
-        answer.force_late_s = Some(late);
-    }
+    forces.add_to(&mut answer);
     if let Some(many) = &many {
         answer.add_caveat(&many.sentence(&outcome));
     }
@@ -178,17 +186,50 @@ fn explained<E: From<RunDataError> + Send>(
     Ok(Explanation { answer, problem, holdout, deviations, score, outcome, preparation })
 }
 
-/// Runs made ready, with what was found of their forces.
-struct Prepared {
+/// Reduces the runs held out to their errors and their evidence on a finished model.
+fn judged<E: From<RunDataError> + Send>(
+    many: Option<&Many<E>>,
+    search: &Search,
+    preparation: &Preparation,
+    outcome: &SearchOutcome,
+) -> Result<Vec<HeldOutRun>, E> {
+    let of = |run: &RunData| HeldOutRun::of((search.problem, outcome), run, Some(run));
+    match many {
+        Some(many) => many.judged(search, preparation, outcome),
+        None => Ok(parallel::of_each(search.holdout, of)),
+    }
+}
+
+/// Corrections of the forces that were found before the search.
+struct FoundForces {
     estimated_drive: Option<EstimatedDrive>,
     late: Option<WithStd>,
+}
+
+impl FoundForces {
+    /// States them in an answer.
+    fn add_to(self, answer: &mut ExplainAnswer) {
+        if let Some(estimated) = self.estimated_drive {
+            answer.add_caveat(&estimated.answer.sentence());
+            answer.drive = Some(estimated.answer);
+        }
+        if let Some(late) = self.late {
+            answer.add_caveat(&force_time::sentence(late));
+            answer.force_late_s = Some(late);
+        }
+    }
+}
+
+/// Runs made ready, with what was found of their forces.
+struct Prepared {
+    forces: FoundForces,
     preparation: Preparation,
     runs: Vec<RunData>,
 }
 
 impl Prepared {
     fn of(dataset: &Dataset, density: Density) -> Result<Self, RunDataError> {
-        let estimated_drive = drive::estimated(dataset)?;
+        let estimated_drive = drive_efficiency::estimated(dataset)?;
         let (declared, drive) = (dataset, estimated_drive.as_ref().map(|it| it.drive));
         let retaken = drive.map(|drive| dataset.with_drive(drive));
         let dataset = retaken.as_ref().unwrap_or(dataset);
@@ -197,6 +238,6 @@ impl Prepared {
         let dataset = moved.as_ref().unwrap_or(dataset);
         let runs = evidence::prepare_at(dataset, density)?;
         let preparation = Preparation::new(declared, drive, late.map(|late| late.value));
-        Ok(Prepared { estimated_drive, late, preparation, runs })
+        Ok(Prepared { forces: FoundForces { estimated_drive, late }, preparation, runs })
     }
 }

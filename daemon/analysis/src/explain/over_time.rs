@@ -13,6 +13,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::course::{Course, CoursePart};
 use super::evidence::{Fit, FitProblem, RunNormal};
+use super::hypothesis::Hypothesis;
 
 /// Fewer runs show no course.
 const RUNS_MIN: usize = 8;
@@ -21,8 +22,8 @@ const STEP_RUNS_MIN: usize = 3;
 /// Number of runs of a shown part, at least, and the greatest number of parts.
 const PART_RUNS_MIN: usize = 2;
 const PARTS_MAX: usize = 6;
-/// A course is stated where chance makes as much less often than this, all that were looked for together.
-const CHANCE_MAX: f64 = 1e-3;
+/// A change is stated where chance makes as much less often than this: of a course, all that were looked for together.
+pub const CHANCE_MAX: f64 = 1e-3;
 /// A number of an effect with more is one value of a profile.
 const NUMBERS_MAX: usize = 2;
 
@@ -42,10 +43,9 @@ pub fn courses(
     let mut all = Vec::new();
     let mut knows_scale = false;
     for (effect, range) in fit.model.effects.iter().zip(fit.model.ranges()) {
-        let (nature, place) = (effect.nature(), effect.place());
+        let nature = effect.nature();
         knows_scale |= nature.changes_speed_scale;
-        let is_common = place.runs.is_none() && place.windows.is_none();
-        if !is_common || range.len() > NUMBERS_MAX || range.end > stds.len() {
+        if !is_one_in_all_runs(&**effect) || range.end > stds.len() {
             continue;
         }
         let mut runs = fit.runs.clone();
@@ -69,9 +69,16 @@ pub fn courses(
     all
 }
 
+/// Whether an effect has the same one or two numbers in each run.
+pub fn is_one_in_all_runs(effect: &dyn Hypothesis) -> bool {
+    let place = effect.place();
+    let is_common = place.runs.is_none() && place.windows.is_none();
+    is_common && effect.parameters().len() <= NUMBERS_MAX && !effect.nature().is_one_number_a_run
+}
+
 /// The course of the scale of the speeds by positions alone, where no effect of the model is about it.
 fn by_positions(problem: &FitProblem, fit: &Fit, spans: &[Span]) -> Option<Course> {
-    let (ratio, std) = problem.distance_ratio?;
+    let (ratio, std) = problem.positions.distance_ratio?;
     let mut runs = vec![RunNormal::none(1); fit.runs.len()];
     add_positions(problem, ratio.recip(), 0, &mut runs);
     let prior = (&DMatrix::zeros(1, 1), &DVector::zeros(1));

@@ -12,7 +12,7 @@ use crate::parallel;
 
 /// Errors of the model without and with the effects.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Score {
+pub struct PredictionScore {
     /// Whole holdout runs, by run: before and after.
     pub holdout_runs: Vec<[SpeedError; 2]>,
     /// Holdout runs restarted every 60 s: before and after.
@@ -114,7 +114,7 @@ impl FitErrors {
         let has_speed_scale = fit.model.effects.iter().any(|it| it.nature().changes_speed_scale);
         FitErrors {
             speed_mps,
-            distance: problem.distance_ratio.map_or(0.0, missed),
+            distance: problem.positions.distance_ratio.map_or(0.0, missed),
             has_speed_scale,
         }
     }
@@ -175,7 +175,7 @@ pub fn pooled(parts: impl Iterator<Item = [SpeedError; 2]>) -> Option<[f64; 3]> 
     Some([before, after, stop_to_stop::reduction([before, after])])
 }
 
-impl Score {
+impl PredictionScore {
     /// The scores of the holdout runs with the errors of the models without and with the effects on the fit runs.
     pub fn of(problem: &FitProblem, holdout: Vec<RunScore>, before: &Fit, after: &Fit) -> Self {
         let summed = |parts: &mut dyn Iterator<Item = [SpeedError; 2]>| {
@@ -186,7 +186,7 @@ impl Score {
         let fitted = problem.runs.iter();
         let of_fitted =
             |run: &RunData| [before, after].map(|fit| run_error(fit, run, Restart::FullRun));
-        Score {
+        PredictionScore {
             holdout_runs: holdout.iter().map(|run| run.full).collect(),
             holdout_window60: summed(&mut holdout.iter().map(|run| run.window60)),
             fit_runs: summed(&mut fitted.map(of_fitted)),

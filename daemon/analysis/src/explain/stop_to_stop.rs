@@ -8,7 +8,7 @@
 
 use std::ops::Range;
 
-use dynocar_model::simulate::{Recording, STANDING_MPS, departs};
+use dynocar_model::simulate::{OpenLoopRecording, STANDING_MPS, departs};
 use serde::Serialize;
 
 use super::bootstrap::intervals_95;
@@ -19,7 +19,7 @@ const STOP_RUN_MOVING_MIN_S: f64 = 10.0;
 
 /// The runs from stop to stop that can be simulated from departure to standstill: first sample,
 /// at rest, and one past the last, at rest again.
-pub fn stop_runs(recording: &Recording) -> Vec<Range<usize>> {
+pub fn stop_runs(recording: &OpenLoopRecording) -> Vec<Range<usize>> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let mut runs = Vec::new();
     let mut from = None;
@@ -187,11 +187,11 @@ mod tests {
     use super::*;
     use crate::explain::evidence::coasting;
 
-    fn recorded(samples: Vec<ResolvedSample>) -> Recording {
-        Recording::new(samples).unwrap()
+    fn recorded(samples: Vec<ResolvedSample>) -> OpenLoopRecording {
+        OpenLoopRecording::new(samples).unwrap()
     }
 
-    fn predict(recording: &Recording, restart: Restart) -> Prediction {
+    fn predict(recording: &OpenLoopRecording, restart: Restart) -> Prediction {
         let mut prediction = Prediction::new();
         let davis = Davis { a: 1.5, b: 0.02, c: 0.004 };
         prediction.simulate(recording, &QuadraticForces::declared(recording, davis), restart);

@@ -1,7 +1,7 @@
 //! Remainder when the search is done: whether noise explains it, and where it lives.
 
 use super::answer::Location;
-use super::selection::{Outcome, Refusal, Search};
+use super::selection::{Refusal, Search, SearchOutcome};
 use dynocar_shared::vocabulary::EffectKind;
 
 /// Time in s over which the force that is left is averaged: gusts and joints of rails are gone.
@@ -26,7 +26,7 @@ pub struct Unexplained {
 
 impl Unexplained {
     /// Returns the residual of a finished search; `None` without motion.
-    pub fn of(search: &Search, outcome: &Outcome) -> Option<Self> {
+    pub fn of(search: &Search, outcome: &SearchOutcome) -> Option<Self> {
         let (n_per_kn, share) = search.problem.noise_n_per_kn(outcome.fit.noise, OVER_S)?;
         let last = outcome.rounds.last().into_iter().flat_map(|round| round.iter());
         let tried = last.clone().filter_map(|trial| Some((trial.kind, Search::refusal(trial)?)));

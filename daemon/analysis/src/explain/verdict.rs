@@ -1,14 +1,15 @@
 //! From the search to the answer.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use dynocar_core::plausibility::Severity;
 use dynocar_model::simulate::SpeedError;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
-    BaseAnswer, Considered, DavisDeviations, EffectAnswer, ExplainAnswer, Location, Meaning,
-    Verdict,
+    BaseAnswer, Considered, DavisDeviations, EffectAnswer, EffectMeaning, ExplainAnswer,
+    HeldOutAnswer, Location, Verdict,
 };
 use super::caveats::{FinishedFit, caveats, told_by_data, trimmed};
 use super::competing::runners_up;
@@ -16,10 +17,13 @@ use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, sepa
 use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
+use super::held_out::HeldOutEffect;
+use super::hypothesis::{Hypothesis, ReportedValues};
 use super::identifiability::identifiability;
-use super::score::{self, Score};
+use super::score::{self, PredictionScore};
 use super::selection::{
-    Deviations, Outcome, ScaleSources, Search, deciding_score, discounted, few_runs_factor, penalty,
+    Deviations, ScaleSources, Search, SearchOutcome, deciding_score, discounted, few_runs_factor,
+    penalty,
 };
 use super::unexplained::Unexplained;
 use crate::dataset::DatasetDiagnostic;
@@ -33,9 +37,9 @@ const LIBRARY_SHARE_MIN: f64 = 0.5;
 /// The answer to a finished search.
 pub fn answer(
     search: &Search,
-    outcome: &Outcome,
+    outcome: &SearchOutcome,
     known: &FinishedFit,
-    score: &Score,
+    score: &PredictionScore,
     diagnostics: Vec<DatasetDiagnostic>,
 ) -> ExplainAnswer {
     let (fit, std) = (&outcome.fit, &known.deviations.std);
@@ -106,7 +110,7 @@ fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
 }
 
 /// Why nothing was scored, and what is known instead; `None` when something was.
-fn unscored(search: &Search, score: &Score) -> Option<String> {
+fn unscored(search: &Search, score: &PredictionScore) -> Option<String> {
     if score.holdout_rmse_mps()[0].is_some() {
         return None;
     }
@@ -131,7 +135,11 @@ fn moving_s(search: &Search) -> f64 {
     search.problem.runs.iter().fold(0.0, |sum, run| sum + run.moving_s())
 }
 
-fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Vec<EffectAnswer> {
+fn effect_answers(
+    search: &Search,
+    outcome: &SearchOutcome,
+    known: &FinishedFit,
+) -> Vec<EffectAnswer> {
     let Deviations { std, covariance, c } = known.deviations;
     let fit = &outcome.fit;
     let apart = ScaleSources::of(search.problem, outcome).filter(ScaleSources::are_apart);
@@ -153,7 +161,7 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
             let weights = search.problem.runs.iter().filter_map(|run| run.samples().first());
             let weight_kn = weights.map(|sample| sample.weight_kn).sum::<f64>()
                 / search.problem.runs.len().max(1) as f64;
-            let reported = effect.report(&ReportContext {
+            let stated = ReportContext {
                 parameters: &fit.theta[range.clone()],
                 deviations: &std[range.clone()],
                 c: *c,
@@ -162,7 +170,10 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
                 first: range.start,
                 weight_kn,
                 few_runs_factor: few_runs_factor(search.problem.runs.len()),
-            });
+            };
+            let reported = effect.report(&stated);
+            let held_out = known.held_out[index].as_ref();
+            let held_out = held_out.map(|it| held_out_answer(&**effect, it, range.clone(), stated));
             let answer = EffectAnswer {
                 kind: effect.kind().name(),
                 place: Location { uncertainty_95: known.places[index].clone(), ..effect.place() },
@@ -170,11 +181,12 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
                 std: reported.deviations,
                 p_value: p_value(score),
                 error_reduction: reduction,
-                meaning: Meaning::of(search.problem, fit, index, &rest),
+                meaning: EffectMeaning::of(search.problem, fit, index, &rest),
                 contradiction: apart
                     .filter(|_| effect.nature().changes_speed_scale)
                     .map(|sources| sources.sentence()),
                 over_time: known.courses(effect.kind()),
+                held_out,
                 runners_up: if effect.kind() == EffectKind::Unknown {
                     runners_up(search, outcome)
                 } else {
@@ -188,9 +200,28 @@ fn effect_answers(search: &Search, outcome: &Outcome, known: &FinishedFit) -> Ve
     answers.into_iter().map(|(_, answer)| answer).collect()
 }
 
+/// The numbers of an effect by the runs held out, in the form of those of the fit runs, which are stated in a context.
+fn held_out_answer(
+    effect: &dyn Hypothesis,
+    held_out: &HeldOutEffect,
+    range: Range<usize>,
+    stated: ReportContext,
+) -> HeldOutAnswer {
+    let ReportedValues { values, deviations } = effect.report(&ReportContext {
+        parameters: &held_out.theta[range.clone()],
+        deviations: &held_out.std[range],
+        c: held_out.theta[2],
+        c_deviation: held_out.std[2],
+        covariance: &held_out.covariance,
+        ..stated
+    });
+    let (runs, p_value) = (held_out.runs, held_out.p_value);
+    HeldOutAnswer { runs, parameters: values, std: deviations, p_value }
+}
+
 fn verdict(
     search: &Search,
-    outcome: &Outcome,
+    outcome: &SearchOutcome,
     competing: &[CompetingHypotheses],
     left: Option<&Unexplained>,
 ) -> Verdict {
@@ -218,7 +249,7 @@ fn verdict(
     if competing.is_empty() { Verdict::Effect } else { Verdict::Ambiguous }
 }
 
-fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Considered> {
+fn considered(outcome: &SearchOutcome, competing: &[CompetingHypotheses]) -> Vec<Considered> {
     let mut list: Vec<Considered> = Vec::new();
     if let Some(last) = outcome.rounds.last() {
         for trial in last.iter() {
@@ -254,7 +285,7 @@ fn considered(outcome: &Outcome, competing: &[CompetingHypotheses]) -> Vec<Consi
 
 fn statement(
     search: &Search,
-    outcome: &Outcome,
+    outcome: &SearchOutcome,
     verdict: Verdict,
     effects: &[EffectAnswer],
     competing: &[CompetingHypotheses],

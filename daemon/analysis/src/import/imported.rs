@@ -1,6 +1,6 @@
 //! Result of an import: a train or a line as far as the file describes it, and an account of every field.
 
-use dynocar_model::track::Curve;
+use dynocar_model::track::TrackCurve;
 use dynocar_model::train::Davis;
 
 use crate::dataset::document::Item;
@@ -149,7 +149,7 @@ pub struct ImportedLine {
     /// (chainage in m, ‰ climbing positive as the chainage grows).
     pub gradient: Option<Vec<(f64, f64)>>,
     /// Curves.
-    pub curves: Option<Vec<Curve>>,
+    pub curves: Option<Vec<TrackCurve>>,
     /// Stops: chainage in m and name.
     pub stops: Vec<(f64, String)>,
     /// (chainage in m, permitted speed in m/s).

@@ -35,7 +35,7 @@ use format::Kind;
 
 /// A file.
 #[derive(Clone, Copy, Debug)]
-pub struct Source<'t> {
+pub struct ImportSource<'t> {
     /// Its name in messages.
     pub label: &'t str,
     /// Its text.
@@ -59,7 +59,7 @@ pub struct Imported {
 /// Where a file is of no known format or breaks the rules of its own; with file, line, the path to the
 /// value and what was expected.
 pub fn import(
-    sources: &[Source],
+    sources: &[ImportSource],
     forced: Option<Format>,
     reading: &ImportReading,
 ) -> Result<Imported, DatasetError> {

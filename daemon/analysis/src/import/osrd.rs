@@ -3,12 +3,13 @@
 //! Some files state A, B and C in N, N/(m/s) and N/(m/s)² for the whole train, others the same for each
 //! kg, and none says which. The two differ by the mass in kg, so that the size distinguishes them.
 
+use dynocar_model::train::numbers::{LENGTH, MASS, ROTATING_MASS_FACTOR};
 use dynocar_model::train::{Davis, TrainModel};
 
 use super::imported::{Account, ImportReading, ImportedTrain, force_n};
-use crate::brakes::{Steps, read};
+use crate::brakes::{SpeedSteps, read};
 use crate::dataset::document::{Item, above_zero};
-use crate::dataset::train_file::growing;
+use crate::dataset::train_file::{EffortEntry, growing};
 use crate::dataset::{DatasetError, unusual_resistance};
 
 /// Why fields have no place, and which.
@@ -38,10 +39,10 @@ const SPEED_MPS: f64 = 20.0;
 pub(super) fn train(root: &Item, reading: &ImportReading) -> Result<ImportedTrain, DatasetError> {
     let mut account = Account::default();
     let mass_kg = root.required("mass", "a mass in kg from 1000 to 1e8", 1e3..=1e8)?;
-    account.taken("mass", "mass_t", "kg / 1000");
+    account.taken("mass", MASS.name, "kg / 1000");
     let length = root.optional("length", "a length in m from 1 to 10000", 1.0..=1e4)?;
-    let length_m = account.given(length, "length", ("length_m", "m"), "no length");
-    let (field, key) = ("inertia_coefficient", "rotating_mass_factor");
+    let length_m = account.given(length, "length", (LENGTH.name, "m"), "no length");
+    let (field, key) = ("inertia_coefficient", ROTATING_MASS_FACTOR.name);
     let inertia = root.optional(field, "a coefficient from 1 to 2", 1.0..=2.0)?;
     let inertia = account.given(inertia, field, (key, "less 1"), "no inertia_coefficient");
     account.unknown("cars", "the format has none");
@@ -81,7 +82,7 @@ pub(super) fn train(root: &Item, reading: &ImportReading) -> Result<ImportedTrai
 pub(super) fn brake_alone(root: &Item) -> Result<ImportedTrain, DatasetError> {
     let mut account = Account::default();
     let brake_mps2 = Some(brake(root, "", &mut account)?);
-    for key in ["mass_t", "length_m", "rotating_mass_factor", "a, b, c"] {
+    for key in [MASS.name, LENGTH.name, ROTATING_MASS_FACTOR.name, "a, b, c"] {
         account.unknown(key, "the file holds a brake alone");
     }
     account.rest("", root, &[]);
@@ -106,7 +107,7 @@ fn brake(
     prefix: &str,
     account: &mut Account,
 ) -> Result<Vec<(f64, f64)>, DatasetError> {
-    let Steps { boundaries, values } = read(item)?.gamma_emergency;
+    let SpeedSteps { boundaries, values } = read(item)?.gamma_emergency;
     let how = "m/s² times the inertial mass, under [brake]";
     account.taken(&format!("{prefix}gamma_emergency"), "effort", how);
     let others = "gamma_service, gamma_normal_service, k_dry, k_wet, k_n_pos, k_n_neg, \
@@ -189,7 +190,7 @@ fn effort(
     }
     let points = speeds.into_iter().zip(forces).map(|(speed, force)| {
         let speed_mps = speed.number("a speed in m/s from 0 to 200", 0.0..=200.0)?;
-        Ok((speed, speed_mps, force_n(&force)?))
+        Ok(EffortEntry { entry: speed, speed_mps, force_n: force_n(&force)? })
     });
     let points = growing(&curve.full("speeds"), points)?;
     let field = format!("effort_curves.modes.{stated}.default_curve");

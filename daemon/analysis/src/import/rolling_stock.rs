@@ -1,6 +1,7 @@
 //! railtoolkit's rolling stock: vehicles, and trains as formations of them (schema 2022.05; the later
 //! main has the same).
 
+use dynocar_model::train::numbers::{LENGTH, MASS, ROTATING_MASS_FACTOR};
 use dynocar_model::train::{Davis, EffortCurve};
 
 use super::imported::{Account, ImportReading, ImportedTrain};
@@ -105,12 +106,12 @@ fn train(
     let empty_kg = sum(&|it| it.empty_kg);
     let permitted_kg = sum(&|it| it.load_kg.unwrap_or(0.0));
     let count = formation.len();
-    account.taken("vehicles.mass", "mass_t", format!("t, the sum over {count}"));
+    account.taken("vehicles.mass", MASS.name, format!("t, the sum over {count}"));
     let load_t = permitted_kg / 1000.0;
     match (permitted_kg > 0.0, share > 0.0) {
         (true, true) => {
             let how = format!("{:.4} t, {share} of what is permitted, added", share * load_t);
-            account.taken("vehicles.load_limit", "mass_t", how);
+            account.taken("vehicles.load_limit", MASS.name, how);
         }
         (true, false) => {
             let why = format!("mass_t is the empty train's; --load 1 adds all of {load_t:.4} t");
@@ -119,7 +120,7 @@ fn train(
         (false, true) => account.left("vehicles.load_limit", "no vehicle has one: none is added"),
         (false, false) => {}
     }
-    account.taken("vehicles.length", "length_m", format!("m, the sum over {count}"));
+    account.taken("vehicles.length", LENGTH.name, format!("m, the sum over {count}"));
     let rotating_mass_factor = rotating(formation, empty_kg, &mut account);
     let mass_kg = empty_kg + share * permitted_kg;
     let resistance = resistance(formation, share, mass_kg, &mut account);
@@ -148,13 +149,13 @@ fn rotating(formation: &[&Vehicle], empty_kg: f64, account: &mut Account) -> Opt
     for vehicle in formation {
         let Some(factor) = vehicle.rotation else {
             let why = format!("'{}' has no rotation_mass", vehicle.id);
-            account.unknown("rotating_mass_factor", why);
+            account.unknown(ROTATING_MASS_FACTOR.name, why);
             return None;
         };
         inertia_kg += factor * vehicle.empty_kg;
     }
     let how = "factor less 1, the mean by mass";
-    account.taken("vehicles.rotation_mass", "rotating_mass_factor", how);
+    account.taken("vehicles.rotation_mass", ROTATING_MASS_FACTOR.name, how);
     Some(inertia_kg / empty_kg - 1.0)
 }
 

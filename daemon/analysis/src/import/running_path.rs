@@ -5,6 +5,7 @@ use super::imported::{Account, ImportedLine};
 use super::rolling_stock::unique;
 use crate::dataset::DatasetError;
 use crate::dataset::document::{Item, above_zero};
+use crate::dataset::keys::track::{LENGTH, PERMITTED_SPEED};
 
 const SECTIONS: &str = "characteristic_sections";
 /// Why fields have no place, and which.
@@ -55,7 +56,7 @@ fn line(item: &Item, id: &str) -> Result<ImportedLine, DatasetError> {
     }
     let (first_m, last_m) = (sections[0].position_m, sections[sections.len() - 1].position_m);
     let positions = "paths.characteristic_sections.position";
-    account.taken(positions, "length_m", "m, the last less the first");
+    account.taken(positions, LENGTH.name, "m, the last less the first");
     let mut given = |list: Vec<(f64, f64)>, field: &str, key: &'static str, how: &str| {
         let how = format!("{how}{}", list.first().map_or("".into(), |it| since(it.0, first_m)));
         let list = Some(list).filter(|list| !list.is_empty());
@@ -65,7 +66,7 @@ fn line(item: &Item, id: &str) -> Result<ImportedLine, DatasetError> {
     let gradient = steps(&sections, |it| it.resistance_permille);
     let gradient = given(gradient, "resistance", "gradient", "‰, whatever resists");
     let permitted = steps(&sections, |it| it.speed_mps);
-    let permitted_speed = given(permitted, "speed", "permitted_speed", "km/h / 3.6");
+    let permitted_speed = given(permitted, "speed", PERMITTED_SPEED.name, "km/h / 3.6");
     account.unknown("curves", "the format has none: its resistance holds theirs with the gradient");
     account.unknown("tunnels", "the format has none");
     account.unknown("stops", "the format has none");

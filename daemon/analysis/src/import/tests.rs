@@ -17,12 +17,12 @@ fn read(text: &str) -> Imported {
 }
 
 fn read_as(text: &str, reading: &ImportReading) -> Imported {
-    let source = Source { label: "file", text };
+    let source = ImportSource { label: "file", text };
     import(&[source], None, reading).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn refusal(text: &str) -> String {
-    let source = Source { label: "file", text };
+    let source = ImportSource { label: "file", text };
     import(&[source], None, &ImportReading::default()).unwrap_err().to_string()
 }
 
@@ -116,7 +116,8 @@ fn vehicles_may_stand_in_another_file_than_their_train() {
     let (head, vehicles) = STOCK.split_once("vehicles:").unwrap();
     let schema = head.split_once("trains:").unwrap().0;
     let stock = format!("{schema}vehicles:{vehicles}");
-    let sources = [Source { label: "a", text: head }, Source { label: "b", text: &stock }];
+    let sources =
+        [ImportSource { label: "a", text: head }, ImportSource { label: "b", text: &stock }];
     let both = import(&sources, None, &ImportReading::default()).unwrap();
     assert_eq!(davis(&both.trains[0]), davis(&read(STOCK).trains[0]));
     let words =
@@ -160,7 +161,7 @@ fn a_ttobench_track_keeps_its_lists_and_the_mean_curvature_of_transitions() {
     let tenths = [1.0, 3.0, 5.0, 7.0, 9.0].map(|tenth| 5000.0 / tenth);
     assert_close(&radii, &[&tenths[..], &[500.0]].concat());
     assert_eq!((curves[0].start_m, curves[5].start_m, curves[5].end_m), (400.0, 500.0, 800.0));
-    let turned = |it: &dynocar_model::track::Curve| (it.end_m - it.start_m) / it.radius_m;
+    let turned = |it: &dynocar_model::track::TrackCurve| (it.end_m - it.start_m) / it.radius_m;
     assert_close(&[curves.iter().map(turned).sum()], &[100.0 / 1000.0 + 300.0 / 500.0]);
     let bare = TRACK.replace("curvatures", "curviness");
     let account = &read(&bare).lines[0].account;
@@ -218,7 +219,7 @@ fn davis_coefficients_are_reported_by_their_size() {
 fn another_mode_of_traction_is_taken_when_it_is_wanted() {
     let effort = |mode: Option<&str>| {
         let reading = ImportReading { mode: mode.map(Into::into), ..ImportReading::default() };
-        let source = [Source { label: "file", text: TRAM }];
+        let source = [ImportSource { label: "file", text: TRAM }];
         import(&source, None, &reading).map(|it| flat(it.trains[0].traction.as_ref().unwrap()))
     };
     assert_eq!(effort(None).unwrap(), [0.0, 90e3, 10.0, 60e3, 25.0, 24e3]);
@@ -313,7 +314,7 @@ fn railml_is_refused_with_the_reason_and_other_xml_with_its_root() {
 #[test]
 fn a_format_may_be_forced_and_then_says_what_is_missing() {
     let forced = |text, format| {
-        let source = [Source { label: "file", text }];
+        let source = [ImportSource { label: "file", text }];
         import(&source, Some(format), &ImportReading::default()).unwrap_err().to_string()
     };
     assert_eq!(

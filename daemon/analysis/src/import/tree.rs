@@ -4,7 +4,7 @@ use granit_parser::{Event, Parser, ScalarStyle};
 
 use crate::dataset::DatasetError;
 use crate::dataset::SourcePosition;
-use crate::dataset::node::{Content, Node};
+use crate::dataset::node::{Node, NodeContent};
 
 /// No format nests deeper; a file that does would cost stack.
 const DEPTH_MAX: usize = 64;
@@ -61,16 +61,16 @@ impl<'e, I: Iterator<Item = Result<(Event<'e>, usize), DatasetError>>> Reader<'_
             return Err((self.wrong)(line, format!("expected at most {DEPTH_MAX} levels")));
         }
         let content = match event {
-            Event::Scalar(text, ScalarStyle::Plain, ..) => Content::Plain(text.into_owned()),
-            Event::Scalar(text, ..) => Content::Text(text.into_owned()),
+            Event::Scalar(text, ScalarStyle::Plain, ..) => NodeContent::Plain(text.into_owned()),
+            Event::Scalar(text, ..) => NodeContent::Text(text.into_owned()),
             Event::SequenceStart(..) => {
                 let mut items = Vec::new();
                 while let Some(item) = self.next(depth + 1)? {
                     items.push(item);
                 }
-                Content::List(items)
+                NodeContent::List(items)
             }
-            Event::MappingStart(..) => Content::Map(self.entries(depth + 1)?),
+            Event::MappingStart(..) => NodeContent::Map(self.entries(depth + 1)?),
             Event::Alias(_) => {
                 return Err((self.wrong)(line, "aliases (*name) are not taken".into()));
             }
@@ -82,7 +82,7 @@ impl<'e, I: Iterator<Item = Result<(Event<'e>, usize), DatasetError>>> Reader<'_
     fn entries(&mut self, depth: usize) -> Result<Vec<(String, Node)>, DatasetError> {
         let mut entries = Vec::new();
         while let Some(key) = self.next(depth)? {
-            let (Content::Text(text) | Content::Plain(text)) = key.content else {
+            let (NodeContent::Text(text) | NodeContent::Plain(text)) = key.content else {
                 return Err((self.wrong)(key.line.unwrap_or(1), "expected a name as key".into()));
             };
             entries.extend(self.next(depth)?.map(|value| (text, value)));
@@ -112,12 +112,12 @@ mod tests {
             "\u{feff}{\n\t\"a\": [\"x\",\n\n\t1.5],\n\t\"b\": {\"c\": \"d\"}}",
         ] {
             let root = parse("a", text).unwrap_or_else(|error| panic!("{error}"));
-            let Content::Map(entries) = &root.content else { panic!("{root:?}") };
+            let NodeContent::Map(entries) = &root.content else { panic!("{root:?}") };
             let names: Vec<&str> = entries.iter().map(|(name, _)| name.as_str()).collect();
             assert_eq!(names, ["a", "b"]);
-            let Content::List(items) = &entries[0].1.content else { panic!("{root:?}") };
+            let NodeContent::List(items) = &entries[0].1.content else { panic!("{root:?}") };
             assert_eq!(items[1].line, Some(4));
-            assert!(matches!(&items[1].content, Content::Plain(text) if text == "1.5"));
+            assert!(matches!(&items[1].content, NodeContent::Plain(text) if text == "1.5"));
         }
     }
 
@@ -127,8 +127,8 @@ mod tests {
         let pairs = pairs.join(",");
         let text = format!("{{\"a\":{{\"values\":[{pairs}]}},\"b\":\"\\u00e9\\ud83d\\ude83\"}}");
         let root = parse("a", &text).unwrap_or_else(|error| panic!("{error}"));
-        let Content::Map(entries) = &root.content else { panic!("{root:?}") };
-        assert!(matches!(&entries[1].1.content, Content::Text(text) if text == "é🚃"));
+        let NodeContent::Map(entries) = &root.content else { panic!("{root:?}") };
+        assert!(matches!(&entries[1].1.content, NodeContent::Text(text) if text == "é🚃"));
     }
 
     #[test]

@@ -2,13 +2,14 @@
 
 use std::ops::{Bound, RangeBounds};
 
-use dynocar_model::track::Curve;
+use dynocar_model::track::TrackCurve;
 use dynocar_model::units::{Dimension, Unit};
 
 use super::imported::{Account, ImportedLine};
 use super::ttobench::{id, rest, unit};
 use crate::dataset::DatasetError;
 use crate::dataset::document::{Item, above_zero};
+use crate::dataset::keys::track::{GRADIENT, LENGTH, PERMITTED_SPEED};
 
 const WITHOUT_PLACE: [(&str, &str); 1] =
     [("track.toml holds gradients, no height above the sea", "altitude")];
@@ -27,18 +28,19 @@ pub(super) fn line(root: &Item) -> Result<ImportedLine, DatasetError> {
     let mut account = Account::default();
     let stops = stops(root)?;
     let length_m = stops[stops.len() - 1];
-    account.taken("stops", "length_m", "m, the last stop");
+    account.taken("stops", LENGTH.name, "m, the last stop");
     account.taken("stops", "stops", "m; the format has no names");
     let speeds = root.get("speed limits").map(|item| {
         pairs(&item, ("velocity", Dimension::Speed), "up to 200 m/s", above_zero(200.0))
     });
-    let (field, key) = ("speed limits", ("permitted_speed", "to m/s"));
+    let (field, key) = ("speed limits", (PERMITTED_SPEED.name, "to m/s"));
     let permitted_speed = account.given(speeds.transpose()?, field, key, "no speed limits");
     let slopes = root.get("gradients").map(|item| {
         let list = pairs(&item, ("slope", Dimension::Ratio), "within 0.15", -0.15..=0.15)?;
         Ok(list.into_iter().map(|(at_m, slope)| (at_m, 1000.0 * slope)).collect())
     });
-    let why = "no gradients; the format means a level line: gradient = [[0.0, 0.0]] says so";
+    let level = GRADIENT.assign("[[0.0, 0.0]]");
+    let why = &format!("no gradients; the format means a level line: {level} says so");
     let key = ("gradient", "to ‰, climbing positive");
     let gradient = account.given(slopes.transpose()?, "gradients", key, why);
     let curves = root.get("curvatures").map(|item| curves(&item, length_m)).transpose()?;
@@ -102,7 +104,7 @@ fn pairs(
 }
 
 /// Curves from triples of position and the radius there and before the next.
-fn curves(item: &Item, length_m: f64) -> Result<Vec<Curve>, DatasetError> {
+fn curves(item: &Item, length_m: f64) -> Result<Vec<TrackCurve>, DatasetError> {
     let units = item.need("units", "the units of the values")?;
     let along = unit(&units, "position", Dimension::Length)?;
     let from = unit(&units, "radius at start", Dimension::Length)?;
@@ -129,7 +131,7 @@ fn curves(item: &Item, length_m: f64) -> Result<Vec<Curve>, DatasetError> {
             let piece_start_m = start_m + piece * step_m;
             if curvature.abs() * RADIUS_MAX_M >= 1.0 && piece_end_m > piece_start_m {
                 let radius_m = 1.0 / curvature.abs();
-                curves.push(Curve { start_m: piece_start_m, end_m: piece_end_m, radius_m });
+                curves.push(TrackCurve { start_m: piece_start_m, end_m: piece_end_m, radius_m });
             }
         }
     }

@@ -1,5 +1,6 @@
 //! A train of TTOBench: resistance in kN over km/h, and greatest force and power of its drive.
 
+use dynocar_model::train::numbers::{LENGTH, MASS, ROTATING_MASS_FACTOR};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_model::units::Dimension;
 
@@ -31,10 +32,10 @@ pub(super) fn train(root: &Item) -> Result<ImportedTrain, DatasetError> {
     root.need("mass", "a mass with its unit")?;
     let mass_kg = value(root, "mass", Dimension::Mass, "a mass from 1000 to 1e8 kg", 1e3..=1e8)?
         .unwrap_or_default();
-    account.taken("mass", "mass_t", "t");
-    account.unknown("length_m", "the format has none");
+    account.taken("mass", MASS.name, "t");
+    account.unknown(LENGTH.name, "the format has none");
     let rho = value(root, "rho", Dimension::Ratio, "a share from 0 to 1 of the mass", 0.0..=1.0)?;
-    let key = ("rotating_mass_factor", "as a share of the mass");
+    let key = (ROTATING_MASS_FACTOR.name, "as a share of the mass");
     let rotating_mass_factor = account.given(rho, "rho", key, "no rho");
     let coaches = root.get("num coaches").map(|item| {
         let is_count = |it: f64| (1.0..=1000.0).contains(&it) && it.fract() == 0.0;

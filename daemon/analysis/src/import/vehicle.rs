@@ -13,7 +13,7 @@ use dynocar_model::train::{Davis, EffortCurve};
 use super::imported::force_n;
 use crate::dataset::DatasetError;
 use crate::dataset::document::{Item, above_zero};
-use crate::dataset::train_file::growing;
+use crate::dataset::train_file::{EffortEntry, growing};
 
 /// Speed in m/s at which the coefficients of speed hold.
 const REFERENCE_MPS: f64 = 100.0 / 3.6;
@@ -112,7 +112,7 @@ fn effort(list: &Item) -> Result<EffortCurve, DatasetError> {
     let points = list.list(FORM, 3)?.into_iter().map(|pair| {
         let [speed, force] = pair.tuple(FORM)?;
         let speed_mps = speed.number("a speed in km/h from 0 to 720", 0.0..=720.0)? / 3.6;
-        Ok((pair, speed_mps, force_n(&force)?))
+        Ok(EffortEntry { entry: pair, speed_mps, force_n: force_n(&force)? })
     });
     let points = growing(&list.path, points)?;
     Ok(EffortCurve::new(points).expect("three or more finite points of growing speed"))

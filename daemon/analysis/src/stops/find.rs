@@ -59,7 +59,7 @@ pub enum FoundBy {
 
 /// A stop: from the first sample under the brake to the first that stands.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stop {
+pub struct StopSpan {
     /// Its samples in the run, from the last application of the brake on.
     pub samples: RangeInclusive<usize>,
     /// The sample from which on the brake was applied in full; `None` where it never was.
@@ -95,7 +95,7 @@ pub fn find(
     samples: &[TrainSample],
     brake: Option<&EffortCurve>,
     settings: &FindSettings,
-) -> Vec<Stop> {
+) -> Vec<StopSpan> {
     let full = applied(samples, brake, settings.share_min);
     let at_all = applied(samples, brake, APPLIED_AT_ALL.min(settings.share_min));
     let found_by = if full.is_some() { FoundBy::Brake } else { FoundBy::Speed };
@@ -128,7 +128,7 @@ pub fn find(
             }
         };
         let from = full_from.map_or(from, |full| full.min(from));
-        Stop { samples: from..=end, full_from, found_by }
+        StopSpan { samples: from..=end, full_from, found_by }
     };
     // A train that only moved up has not stopped again.
     let runs = ends.filter(|&end| {
@@ -264,7 +264,7 @@ mod tests {
         (0..450).map(sample).collect()
     }
 
-    fn found(samples: &[TrainSample]) -> Vec<Stop> {
+    fn found(samples: &[TrainSample]) -> Vec<StopSpan> {
         let brake = EffortCurve::new(vec![(0.0, 100e3)]);
         find(samples, brake.as_ref(), &FindSettings::default())
     }
@@ -290,11 +290,13 @@ mod tests {
     fn half_a_brake_is_no_full_stop_and_a_soft_end_is_one() {
         let half = run(|time_s| Some(if time_s > 59.9 { 50e3 } else { 0.0 }));
         assert!(starts_s(&half).is_empty());
-        let [Stop { samples, full_from: None, .. }] = &found(&half)[..] else { panic!("one stop") };
+        let [StopSpan { samples, full_from: None, .. }] = &found(&half)[..] else {
+            panic!("one stop")
+        };
         assert!((time_s(&half, *samples.start()) - 60.0).abs() < 0.3);
         let soft = run(|time_s| Some(if (59.9..78.5).contains(&time_s) { 100e3 } else { 0.0 }));
         assert_eq!(starts_s(&soft).len(), 1);
         let released = run(|time_s| Some(if (59.9..70.0).contains(&time_s) { 100e3 } else { 0.0 }));
-        let [Stop { full_from: None, .. }] = found(&released)[..] else { panic!("one stop") };
+        let [StopSpan { full_from: None, .. }] = found(&released)[..] else { panic!("one stop") };
     }
 }

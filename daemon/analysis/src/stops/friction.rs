@@ -14,7 +14,7 @@ use dynocar_model::train::{BrakeGear, TrainModel};
 use dynocar_shared::{Parameter, PipelineKind, SampleField, Status, TrainId, TrainSample};
 use serde::Serialize;
 
-use super::curve::Curve;
+use super::deceleration_curve::DecelerationCurve;
 
 /// Friction coefficient that the mean deceleration of the stop is declared to need.
 const DECLARED_FRICTION: f64 = 0.3;
@@ -37,7 +37,7 @@ pub struct FrictionPoint {
 /// Runs `brake_smoother` and `adhesion_smoother` over a stop of a run; one point for each m/s.
 pub fn friction(
     samples: &[TrainSample],
-    curve: &Curve,
+    curve: &DecelerationCurve,
     train: &TrainModel,
     track: Option<&Arc<Track>>,
 ) -> Vec<FrictionPoint> {
@@ -82,7 +82,7 @@ pub fn friction(
 }
 
 /// The train with a gear that gives a stop's mean deceleration at the declared friction.
-fn with_brake(train: &TrainModel, curve: &Curve) -> Option<TrainModel> {
+fn with_brake(train: &TrainModel, curve: &DecelerationCurve) -> Option<TrainModel> {
     let from = &curve.points[curve.built_up?];
     let last = curve.points.last()?;
     let mean_mps2 = (from.speed_mps - last.speed_mps) / (last.time_s - from.time_s);

@@ -2,28 +2,30 @@
 //! behind it, and the length of the next stop.
 //!
 //! - [`find`]: where in a run the brake was applied until the train stood
-//! - [`Curve`]: speed and deceleration along one stop, from its speeds alone
-//! - [`Law`]: deceleration over speed of all stops, and how much stops differ
+//! - [`DecelerationCurve`]: speed and deceleration along one stop, from its speeds alone
+//! - [`DecelerationLaw`]: deceleration over speed of all stops, and how much stops differ
 //! - [`StoppingDistance`]: how long the next stop is, with a bound
 //! - [`friction`]: the pipelines of Jin 2020 and Xie 2019 over a stop, fed with a brake of unknown force
 //! - [`CutOff`]: when the traction of a braked train was gone
-//! - [`Day`]: all stops together, whatever the driver wanted
+//! - [`StopStatistics`]: all stops together, whatever the driver wanted
 //! - [`Study`]: all of it over a dataset
 
-mod curve;
 mod cut_off;
-mod day;
+mod deceleration_curve;
+mod deceleration_law;
 mod find;
 mod friction;
-mod law;
 mod recorded;
+mod stop_statistics;
 mod study;
 
-pub use curve::{Curve, Point};
 pub use cut_off::CutOff;
-pub use day::{Day, DecelerationSpread, FromSpeed, Spread};
-pub use find::{FindSettings, FoundBy, Stop, find};
+pub use deceleration_curve::{DecelerationCurve, DecelerationPoint};
+pub use deceleration_law::{
+    DecelerationLaw, Gradient, LawPoint, MeasuredResponse, StoppingDistance,
+};
+pub use find::{FindSettings, FoundBy, StopSpan, find};
 pub use friction::{FrictionPoint, friction};
-pub use law::{Gradient, Law, LawPoint, MeasuredResponse, StoppingDistance};
 pub use recorded::{Manner, RecordedStop};
+pub use stop_statistics::{DecelerationSpread, FromSpeed, QuantileRange, StopStatistics};
 pub use study::{Study, StudySettings};

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::curve::Point;
+use super::deceleration_curve::DecelerationPoint;
+use super::deceleration_law::StoppingDistance;
 use super::find::FoundBy;
 use super::friction::FrictionPoint;
-use super::law::StoppingDistance;
 use crate::dataset::Role;
 
 /// How a train was brought to a stand.
@@ -50,7 +50,7 @@ pub struct RecordedStop {
     /// Why it shows no law of the brake; `None` for a stop that does.
     pub no_law: Option<String>,
     /// Deceleration at whole m/s, from fast to slow.
-    pub decelerations: Vec<Point>,
+    pub decelerations: Vec<DecelerationPoint>,
     /// For a stop held out: what the law said of it.
     pub predicted: Option<StoppingDistance>,
     /// The friction behind it.

@@ -7,13 +7,13 @@ use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
 
-use super::curve::{Curve, Point};
 use super::cut_off::cut_off_s;
-use super::day::Day;
+use super::deceleration_curve::{DecelerationCurve, DecelerationPoint};
+use super::deceleration_law::{DecelerationLaw, Gradient, StoppingDistance};
 use super::find::{FindSettings, FoundBy, began_ns, find, usable};
 use super::friction::friction;
-use super::law::{Gradient, Law, StoppingDistance};
 use super::recorded::{Manner, RecordedStop};
+use super::stop_statistics::StopStatistics;
 use crate::dataset::{Dataset, Role, Run};
 
 /// How stops are found, and what is assumed of them.
@@ -31,11 +31,11 @@ pub struct Study {
     /// The stops, in the order of the runs.
     pub stops: Vec<RecordedStop>,
     /// Deceleration over speed of the fit runs' stops; `None` without a stop whose brake built up.
-    pub law: Option<Law>,
+    pub law: Option<DecelerationLaw>,
     /// How long the next stop is, from slow to fast.
     pub distances: Vec<StoppingDistance>,
     /// All stops together: from which speeds how long, how hard, and how long the train stood.
-    pub day: Day,
+    pub day: StopStatistics,
     /// Quantities that these stops do not determine.
     pub cannot_tell: Vec<String>,
 }
@@ -53,11 +53,11 @@ impl Study {
             .iter()
             .flat_map(|dataset| dataset.runs.iter().map(move |run| (dataset, run)))
             .flat_map(|(dataset, run)| found_in(dataset, run, settings));
-        let (mut stops, curves): (Vec<RecordedStop>, Vec<Curve>) = found.unzip();
+        let (mut stops, curves): (Vec<RecordedStop>, Vec<DecelerationCurve>) = found.unzip();
         let is = |stop: &RecordedStop, role| stop.role == role && stop.manner == Manner::Full;
         let of_law = stops.iter().zip(curves).filter(|(stop, _)| is(stop, Role::Fit));
-        let of_law: Vec<Curve> = of_law.map(|(_, curve)| curve).collect();
-        let law = Law::of(&of_law, settings.repeatability);
+        let of_law: Vec<DecelerationCurve> = of_law.map(|(_, curve)| curve).collect();
+        let law = DecelerationLaw::of(&of_law, settings.repeatability);
         let speeds = match (&law, from_mps) {
             (Some(law), []) => {
                 let fastest = law.fastest_mps();
@@ -77,13 +77,17 @@ impl Study {
             stop.predicted = predict(stop.from_mps, stop.gradient_permille.unwrap_or(0.0));
         }
         let cannot_tell = cannot_tell(datasets, &stops, law.as_ref());
-        let day = Day::of(&stops);
+        let day = StopStatistics::of(&stops);
         Study { stops, distances, day, cannot_tell, law }
     }
 }
 
 /// The stops of a run, each with its curve.
-fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(RecordedStop, Curve)> {
+fn found_in(
+    dataset: &Dataset,
+    run: &Run,
+    settings: &StudySettings,
+) -> Vec<(RecordedStop, DecelerationCurve)> {
     let mut all = usable(&run.samples);
     let stops = find(&all, dataset.train.brake.as_ref(), &settings.find);
     for stop in stops.iter().filter(|it| it.found_by == FoundBy::Speed) {
@@ -91,7 +95,7 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
     }
     let studied = stops.into_iter().filter_map(|stop| {
         let end = *stop.samples.end();
-        let full = stop.full_from.and_then(|from| Curve::of(&all[from..=end]));
+        let full = stop.full_from.and_then(|from| DecelerationCurve::of(&all[from..=end]));
         let has_slid = all[stop.samples.clone()].iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0);
         let no_law = match has_slid {
             true => Some("the wheels slid: their speed is not the train's".into()),
@@ -102,7 +106,7 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
             .flatten();
         let (from, mut curve) = match (full, stop.full_from, &no_law) {
             (Some(curve), Some(from), None) => (from, curve),
-            _ => (*stop.samples.start(), Curve::of(&all[stop.samples])?),
+            _ => (*stop.samples.start(), DecelerationCurve::of(&all[stop.samples])?),
         };
         let samples = &all[from..=end];
         let is_full = no_law.is_none();
@@ -139,7 +143,7 @@ fn found_in(dataset: &Dataset, run: &Run, settings: &StudySettings) -> Vec<(Reco
 }
 
 /// Takes the gradient, where every sample knows it, out of a stop's decelerations; its mean in ‰ along the travel.
-fn level(curve: &mut Curve, samples: &[TrainSample], dataset: &Dataset) -> Option<f64> {
+fn level(curve: &mut DecelerationCurve, samples: &[TrainSample], dataset: &Dataset) -> Option<f64> {
     let train = &dataset.train;
     let at = |sample: &TrainSample| {
         let direction = f64::from(sample.direction);
@@ -158,7 +162,11 @@ fn level(curve: &mut Curve, samples: &[TrainSample], dataset: &Dataset) -> Optio
 }
 
 /// Why a stop shows no law of the brake; `full` is its part under all of the brake.
-fn why_no_law(full: Option<&Curve>, found_by: FoundBy, share_min: f64) -> Option<String> {
+fn why_no_law(
+    full: Option<&DecelerationCurve>,
+    found_by: FoundBy,
+    share_min: f64,
+) -> Option<String> {
     let Some(curve) = full else {
         return Some(match found_by {
             FoundBy::Brake => {
@@ -179,16 +187,20 @@ fn why_no_law(full: Option<&Curve>, found_by: FoundBy, share_min: f64) -> Option
 }
 
 /// Deceleration at whole m/s that the train passed.
-fn decelerations(curve: &Curve) -> Vec<Point> {
+fn decelerations(curve: &DecelerationCurve) -> Vec<DecelerationPoint> {
     let fastest = curve.from_mps().floor() as u32;
     let at = |k: u32| {
         let speed_mps = f64::from(k);
-        Some(Point { speed_mps, ..*curve.at_speed(speed_mps)? })
+        Some(DecelerationPoint { speed_mps, ..*curve.at_speed(speed_mps)? })
     };
     (1..=fastest).rev().filter_map(at).collect()
 }
 
-fn cannot_tell(datasets: &[Dataset], found: &[RecordedStop], law: Option<&Law>) -> Vec<String> {
+fn cannot_tell(
+    datasets: &[Dataset],
+    found: &[RecordedStop],
+    law: Option<&DecelerationLaw>,
+) -> Vec<String> {
     let mut said = Vec::new();
     let blind = found.iter().filter(|it| it.gradient_permille.is_none()).count();
     if blind > 0 {
@@ -212,7 +224,7 @@ fn cannot_tell(datasets: &[Dataset], found: &[RecordedStop], law: Option<&Law>) 
         ));
     }
     said.push("how friction divides into coefficient, pressure and ratio: only its course over speed is determined".into());
-    if let Some(Law { stops: 1, .. }) = law {
+    if let Some(DecelerationLaw { stops: 1, .. }) = law {
         said.push(
             "how stops differ: one stop was recorded, and the repeatability is assumed".into(),
         );

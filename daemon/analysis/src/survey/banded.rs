@@ -12,7 +12,7 @@ pub struct Banded {
 
 /// The Cholesky factor of a [`Banded`] matrix.
 #[derive(Clone, Debug)]
-pub struct Factor {
+pub struct BandedCholesky {
     lower: Banded,
 }
 
@@ -54,7 +54,7 @@ impl Banded {
     /// # Errors
     ///
     /// When the matrix is not positive definite.
-    pub fn factor(mut self) -> Result<Factor, NotPositive> {
+    pub fn factor(mut self) -> Result<BandedCholesky, NotPositive> {
         let (width, stride) = (self.width, self.width + 1);
         // Of a column what lies below the diagonal, the lowest first: as rows lie in memory.
         let mut column = vec![0.0; width];
@@ -80,11 +80,11 @@ impl Banded {
                 }
             }
         }
-        Ok(Factor { lower: self })
+        Ok(BandedCholesky { lower: self })
     }
 }
 
-impl Factor {
+impl BandedCholesky {
     /// Solves for one right-hand side in place.
     pub fn solve(&self, right: &mut [f64]) {
         let Banded { size, width, below } = &self.lower;

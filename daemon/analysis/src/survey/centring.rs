@@ -2,9 +2,9 @@
 
 use super::alignment::Alignment;
 use super::banded::Banded;
-use super::recording::Recording;
+use super::recording::SurveyRecording;
 use super::silence::GAP_MAX_M;
-use super::tracking::{Placed, follow};
+use super::tracking::{PlacedFix, follow};
 use crate::statistics::median;
 
 /// Standard deviation in m of a fix, which fades slowly.
@@ -21,7 +21,7 @@ const ROUNDS: usize = 4;
 
 /// Rows of a recording that run along an alignment.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pass {
+pub struct SurveyPass {
     /// Number of the recording.
     pub recording: usize,
     /// The rows.
@@ -31,11 +31,11 @@ pub struct Pass {
 }
 
 /// Moves a first alignment into the middle of the passes.
-pub fn align(first: Alignment, passes: &[Pass], recordings: &[Recording]) -> Alignment {
+pub fn align(first: Alignment, passes: &[SurveyPass], recordings: &[SurveyRecording]) -> Alignment {
     let mut alignment = first;
     for _ in 0..ROUNDS {
         let Some(back) = alignment.reversed() else { return alignment };
-        let place = |pass: &Pass| {
+        let place = |pass: &SurveyPass| {
             let recording = &recordings[pass.recording];
             if pass.direction > 0 {
                 return follow(recording, pass.rows.clone(), &alignment);
@@ -48,7 +48,7 @@ pub fn align(first: Alignment, passes: &[Pass], recordings: &[Recording]) -> Ali
             }
             placed
         };
-        let placed: Vec<Vec<Placed>> = passes.iter().map(place).collect();
+        let placed: Vec<Vec<PlacedFix>> = passes.iter().map(place).collect();
         let speed_mps = mean_speed(passes, recordings);
         let Some(moved) = moved(&alignment, &placed, speed_mps) else { return alignment };
         alignment = moved;
@@ -57,7 +57,7 @@ pub fn align(first: Alignment, passes: &[Pass], recordings: &[Recording]) -> Ali
 }
 
 /// Mean speed in m/s while moving.
-fn mean_speed(passes: &[Pass], recordings: &[Recording]) -> f64 {
+fn mean_speed(passes: &[SurveyPass], recordings: &[SurveyRecording]) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for pass in passes {
         let speeds = &recordings[pass.recording].raw.speed_mps[pass.rows.clone()];
@@ -70,7 +70,7 @@ fn mean_speed(passes: &[Pass], recordings: &[Recording]) -> f64 {
 }
 
 /// The alignment moved sideways to the middle of the passes, and smoothed.
-fn moved(alignment: &Alignment, placed: &[Vec<Placed>], speed_mps: f64) -> Option<Alignment> {
+fn moved(alignment: &Alignment, placed: &[Vec<PlacedFix>], speed_mps: f64) -> Option<Alignment> {
     let count = alignment.nodes_m().len();
     let mut left_m: Vec<Vec<f64>> = vec![Vec::new(); count];
     for pass in placed {

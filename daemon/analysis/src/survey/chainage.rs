@@ -8,8 +8,8 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::centring::{FIX_FADING_S, FIX_STD_M};
-use super::recording::Recording;
-use super::tracking::Placed;
+use super::recording::SurveyRecording;
+use super::tracking::PlacedFix;
 use crate::explain::answer::WithStd;
 
 /// Standard deviation in m of the wheels' slip over 1 m; it grows with the root of the distance.
@@ -70,9 +70,9 @@ pub struct Chained {
 /// Smooths the chainage of the rows from the first to the last placed fix; `None` with too few
 /// fixes.
 pub fn chain(
-    recording: &Recording,
+    recording: &SurveyRecording,
     rows: std::ops::Range<usize>,
-    placed: &[Placed],
+    placed: &[PlacedFix],
     known: WheelsAndLag,
 ) -> Option<Chained> {
     if placed.len() < 20 {
@@ -121,15 +121,15 @@ pub fn chain(
     Some(Chained { first_row: rows.start, chainage_m, learned })
 }
 
-fn speed(recording: &Recording, row: usize) -> f64 {
+fn speed(recording: &SurveyRecording, row: usize) -> f64 {
     let speed_mps = recording.raw.speed_mps[row];
     if speed_mps.is_nan() { 0.0 } else { speed_mps }
 }
 
 /// State and covariance at each placed fix.
 fn smooth(
-    recording: &Recording,
-    placed: &[Placed],
+    recording: &SurveyRecording,
+    placed: &[PlacedFix],
     start_m: f64,
     known: WheelsAndLag,
     weights: &[f64],

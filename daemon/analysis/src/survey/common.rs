@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::observation::Observation;
+use super::observation::BlockDifference;
 
 /// Acceleration of gravity in m/s².
 pub const GRAVITY_MPS2: f64 = 9.81;
@@ -89,7 +89,7 @@ impl Prior {
     }
 
     /// Force in N for each kg, without the gradient.
-    pub fn unit_force(&self, observation: &Observation, common: &Common) -> f64 {
+    pub fn unit_force(&self, observation: &BlockDifference, common: &Common) -> f64 {
         let [a, b, c] = common.davis();
         let speed = observation.speed_mps;
         (1.0 + self.rotating_mass_factor) * observation.acceleration_mps2
@@ -97,7 +97,7 @@ impl Prior {
     }
 
     /// Mass in kg at an observation.
-    pub fn mass_kg(&self, observation: &Observation, common: &Common) -> f64 {
+    pub fn mass_kg(&self, observation: &BlockDifference, common: &Common) -> f64 {
         let counted = observation.passengers * (common.passenger_kg() - self.passenger_kg);
         observation.mass_kg + self.mass_kg * common.mass_share() + counted
     }
@@ -105,7 +105,7 @@ impl Prior {
     /// Returns the change of the modelled force by each unit of the unknowns, in N.
     pub fn slopes(
         &self,
-        observation: &Observation,
+        observation: &BlockDifference,
         mass_kg: f64,
         unit: f64,
     ) -> [f64; Common::COUNT] {

@@ -1,7 +1,7 @@
 //! Where the unknown heights of a line's alignments lie, and what a gradient under a vehicle is of them.
 
 use super::common::Common;
-use super::normal::Solution;
+use super::normal::HeightSolution;
 
 /// Distance in m between heights.
 pub const HEIGHT_STEP_M: f64 = 10.0;
@@ -13,7 +13,7 @@ const STATED_STEPS: usize = 10;
 
 /// Where heights lie in the system.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Layout {
+pub struct HeightLayout {
     /// For the two alignments: number of the first height, and number of heights.
     pub blocks: Vec<(usize, usize)>,
     /// Chainage in m of a block's first height along its alignment.
@@ -38,7 +38,7 @@ impl LineCourse {
     }
 }
 
-impl Layout {
+impl HeightLayout {
     /// Heights for alignments of some lengths in m.
     pub fn new(lengths_m: &[f64], vehicle_m: f64) -> Self {
         let start_m = -(MARGIN_M + 0.5 * vehicle_m);
@@ -49,7 +49,7 @@ impl Layout {
             (next - count, count)
         };
         let blocks = lengths_m.iter().map(block).collect();
-        Layout { blocks, start_m, vehicle_m }
+        HeightLayout { blocks, start_m, vehicle_m }
     }
 
     /// Number of heights.
@@ -103,8 +103,8 @@ impl Layout {
 
     /// Variance of the mean gradient over 100 m around each piece between neighbouring
     /// heights: between two heights alone the forces show little, and nobody feels it.
-    pub fn gradient_variances(&self, solution: &Solution) -> Vec<Vec<f64>> {
-        let Solution { columns, covariance, .. } = solution;
+    pub fn gradient_variances(&self, solution: &HeightSolution) -> Vec<Vec<f64>> {
+        let HeightSolution { columns, covariance, .. } = solution;
         let inverse = solution.factor.inverse_band();
         let of_steps = |from: usize, to: usize| {
             let per_m = 1.0 / ((to - from) as f64 * HEIGHT_STEP_M);

@@ -2,8 +2,8 @@
 //! under its pressure.
 
 use super::banded::NotPositive;
-use super::observation::Observation;
-use super::profile::{Profile, ProfileEvidence};
+use super::observation::BlockDifference;
+use super::profile::{HeightProfile, ProfileEvidence};
 use super::recording::RawRecording;
 use crate::explain::answer::WithStd;
 use crate::parallel;
@@ -21,9 +21,9 @@ const BLOCK_M: f64 = 100.0;
 
 /// A profile and what it was learned with.
 #[derive(Clone, Debug)]
-pub struct Learned {
+pub struct LearnedProfile {
     /// The profile.
-    pub profile: Profile,
+    pub profile: HeightProfile,
     /// Variance per m of the gradient's random walk, chosen by leaving passes out.
     pub walk_per_m: f64,
     /// Root mean square in N of the residuals of passes left out, by pass; `NaN` for a pass of
@@ -39,9 +39,12 @@ pub struct Learned {
 /// # Errors
 ///
 /// When there is nothing to learn from.
-pub fn learn(evidence: &mut ProfileEvidence, acting_from_pa: f64) -> Result<Learned, NotPositive> {
+pub fn learn(
+    evidence: &mut ProfileEvidence,
+    acting_from_pa: f64,
+) -> Result<LearnedProfile, NotPositive> {
     let all = std::mem::take(&mut evidence.observations);
-    let (braked, free): (Vec<Observation>, Vec<Observation>) =
+    let (braked, free): (Vec<BlockDifference>, Vec<BlockDifference>) =
         all.into_iter().partition(|it| it.friction_pa[2] > acting_from_pa);
     evidence.observations = free;
     let mut walk_per_m = smoothest(evidence)?;
@@ -65,7 +68,7 @@ pub fn learn(evidence: &mut ProfileEvidence, acting_from_pa: f64) -> Result<Lear
         }
     }
     let left_out_n = left_out(evidence, walk_per_m)?;
-    Ok(Learned { profile, walk_per_m, left_out_n, brake })
+    Ok(LearnedProfile { profile, walk_per_m, left_out_n, brake })
 }
 
 /// True when every alignment has two passes, so that one can be left out.
@@ -78,7 +81,7 @@ fn can_leave_out(evidence: &ProfileEvidence) -> bool {
 }
 
 /// Number of the group in which an observation is left out.
-fn group(evidence: &ProfileEvidence, observation: &Observation, by_pass: bool) -> u32 {
+fn group(evidence: &ProfileEvidence, observation: &BlockDifference, by_pass: bool) -> u32 {
     if !by_pass {
         return (observation.along_m / BLOCK_M).max(0.0) as u32 % FOLDS;
     }
@@ -94,7 +97,7 @@ fn smoothest(evidence: &ProfileEvidence) -> Result<f64, NotPositive> {
     let by_pass = can_leave_out(evidence);
     let scale_n = evidence.fit(1e-6, &|_| true, false)?.residual_n;
     let cost = |walk_per_m: f64, fold: u32| {
-        let is_out = |it: &Observation| group(evidence, it, by_pass) == fold;
+        let is_out = |it: &BlockDifference| group(evidence, it, by_pass) == fold;
         if !evidence.observations.iter().any(is_out) {
             return Ok(0.0);
         }
@@ -119,15 +122,15 @@ fn left_out(evidence: &ProfileEvidence, walk_per_m: f64) -> Result<Vec<f64>, Not
     let mut sums = vec![(0.0, 0usize); passes];
     if can_leave_out(evidence) {
         let profiles = parallel::of_each_number(FOLDS as usize, |fold| {
-            let is_out = |it: &Observation| group(evidence, it, true) == fold as u32;
+            let is_out = |it: &BlockDifference| group(evidence, it, true) == fold as u32;
             let has_some = evidence.observations.iter().any(is_out);
             has_some.then(|| evidence.fit(walk_per_m, &|it| !is_out(it), false)).transpose()
         });
         let profiles =
-            profiles.into_iter().collect::<Result<Vec<Option<Profile>>, NotPositive>>()?;
+            profiles.into_iter().collect::<Result<Vec<Option<HeightProfile>>, NotPositive>>()?;
         for (fold, profile) in profiles.iter().enumerate() {
             let Some(profile) = profile else { continue };
-            let is_out = |it: &Observation| group(evidence, it, true) == fold as u32;
+            let is_out = |it: &BlockDifference| group(evidence, it, true) == fold as u32;
             for (observation, residual_n) in evidence.residuals(profile).filter(|it| is_out(it.0)) {
                 let sum = &mut sums[observation.pass as usize];
                 *sum = (sum.0 + residual_n * residual_n, sum.1 + 1);

@@ -3,7 +3,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::banded::{Banded, Factor, NotPositive};
+use super::banded::{Banded, BandedCholesky, NotPositive};
 use super::common::Common;
 
 const COUNT: usize = Common::COUNT;
@@ -85,7 +85,7 @@ impl Normal {
     /// # Errors
     ///
     /// When they have no solution.
-    pub fn solve(self) -> Result<Solution, NotPositive> {
+    pub fn solve(self) -> Result<HeightSolution, NotPositive> {
         let Normal { matrix, right: mut heights_m, border, mut corner, mut corner_right, .. } =
             self;
         corner.fill_upper_triangle_with_lower_triangle();
@@ -116,12 +116,12 @@ impl Normal {
                 *height -= column[index] * common[index];
             }
         }
-        Ok(Solution { heights_m, common: Common(common), covariance, columns, factor })
+        Ok(HeightSolution { heights_m, common: Common(common), covariance, columns, factor })
     }
 }
 
 /// Solution of the normal equations.
-pub struct Solution {
+pub struct HeightSolution {
     /// Change of each height in m.
     pub heights_m: Vec<f64>,
     /// Change of the common unknowns.
@@ -131,10 +131,10 @@ pub struct Solution {
     /// Inverse of the heights' matrix times what they share with the common unknowns.
     pub columns: BorderColumns,
     /// Factor of the heights' matrix.
-    pub factor: Factor,
+    pub factor: BandedCholesky,
 }
 
-impl Solution {
+impl HeightSolution {
     /// Standard deviations of the common unknowns.
     pub fn common_std(&self) -> Common {
         Common(self.covariance.diagonal().map(|variance| variance.max(0.0).sqrt()))

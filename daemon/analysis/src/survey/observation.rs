@@ -18,7 +18,7 @@ const STEP_MAX_S: f64 = 2.5;
 
 /// One difference of two blocks.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observation {
+pub struct BlockDifference {
     /// Number of the pass.
     pub pass: u32,
     /// Place in m along the alignment, and how far the window reaches to either side.
@@ -50,7 +50,7 @@ pub fn observations(
     pass: u32,
     block_s: f64,
     speed_factor: f64,
-) -> Vec<Observation> {
+) -> Vec<BlockDifference> {
     let rows = chained.first_row..chained.first_row + chained.chainage_m.len();
     let period_s = period(&raw.time_s[rows.clone()]);
     let block = ((block_s / period_s).round() as usize).max(1);
@@ -83,7 +83,7 @@ fn observe(
     window: std::ops::Range<usize>,
     block: usize,
     speed_factor: f64,
-) -> Option<Observation> {
+) -> Option<BlockDifference> {
     let friction = |row: usize| raw.friction_pa.get(row).copied().unwrap_or(0.0);
     let mut friction_pa = [f64::INFINITY, 0.0, 0.0];
     for row in window.clone() {
@@ -118,7 +118,7 @@ fn observe(
     if !raw.mass_kg[row].is_finite() {
         return None;
     }
-    Some(Observation {
+    Some(BlockDifference {
         pass: 0,
         along_m: 0.0,
         reach_m: 0.0,

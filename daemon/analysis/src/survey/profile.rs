@@ -7,9 +7,9 @@
 
 use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
-use super::layout::{HEIGHT_STEP_M, Layout, LineCourse};
+use super::layout::{HEIGHT_STEP_M, HeightLayout, LineCourse};
 use super::normal::Normal;
-use super::observation::Observation;
+use super::observation::BlockDifference;
 use crate::parallel;
 use crate::statistics::middle;
 
@@ -44,21 +44,32 @@ pub struct Altitude {
 #[derive(Clone, Debug)]
 pub struct ProfileEvidence {
     /// Where heights lie.
-    pub layout: Layout,
+    pub layout: HeightLayout,
     /// The alignment of each pass.
     pub courses: Vec<LineCourse>,
     /// Observations of the forces, in the order of the passes.
-    pub observations: Vec<Observation>,
+    pub observations: Vec<BlockDifference>,
     /// Altitudes of the GNSS.
     pub altitudes: Vec<Altitude>,
     /// Declared values of the vehicle.
     pub prior: Prior,
 }
 
+/// Gradient from a chainage on, up to the next entry.
+#[derive(Clone, Copy, Debug)]
+pub struct GradientEntry {
+    /// Chainage in m.
+    pub from_m: f64,
+    /// Gradient in ‰, climbing positive.
+    pub gradient_permille: f64,
+    /// Its standard deviation in ‰.
+    pub std_permille: f64,
+}
+
 /// A fitted profile.
 #[derive(Clone, Debug)]
-pub struct Profile {
-    layout: Layout,
+pub struct HeightProfile {
+    layout: HeightLayout,
     /// Heights in m, all blocks.
     heights_m: Vec<f64>,
     /// Values common to all passes.
@@ -76,7 +87,7 @@ pub struct Profile {
 }
 
 /// Which observations count.
-pub type Fold<'f> = &'f (dyn Fn(&Observation) -> bool + Sync);
+pub type Fold<'f> = &'f (dyn Fn(&BlockDifference) -> bool + Sync);
 
 /// Whether a pass is one of the few, evenly chosen and of both directions alike, that show what is a property
 /// of the line or of the recording, and no number to be averaged.
@@ -98,8 +109,9 @@ impl ProfileEvidence {
         let mut numbers = vec![None; self.courses.len()];
         let chosen = (0..self.courses.len()).filter(|&pass| is_chosen(pass));
         chosen.enumerate().for_each(|(number, pass)| numbers[pass] = Some(number as u32));
-        let renumbered =
-            |it: &Observation| Some(Observation { pass: numbers[it.pass as usize]?, ..*it });
+        let renumbered = |it: &BlockDifference| {
+            Some(BlockDifference { pass: numbers[it.pass as usize]?, ..*it })
+        };
         let courses = self.courses.iter().enumerate().filter(|(pass, _)| is_chosen(*pass));
         ProfileEvidence {
             layout: self.layout.clone(),
@@ -120,9 +132,9 @@ impl ProfileEvidence {
         walk_per_m: f64,
         counts: Fold,
         wants_std: bool,
-    ) -> Result<Profile, NotPositive> {
+    ) -> Result<HeightProfile, NotPositive> {
         let size = self.layout.size();
-        let mut state = Profile {
+        let mut state = HeightProfile {
             layout: self.layout.clone(),
             heights_m: vec![0.0; size],
             common: self.prior.start(),
@@ -145,7 +157,7 @@ impl ProfileEvidence {
     /// One step of Gauss and Newton over heights and common unknowns.
     fn improve(
         &self,
-        state: &mut Profile,
+        state: &mut HeightProfile,
         walk_per_m: f64,
         counts: Fold,
         wants_std: bool,
@@ -155,7 +167,7 @@ impl ProfileEvidence {
         let mut normal = none();
         self.add_priors(state, walk_per_m, &mut normal);
         normal.add_common(self.prior.rows(&state.common));
-        let of_chunk = |observations: &[Observation]| {
+        let of_chunk = |observations: &[BlockDifference]| {
             let (mut normal, mut row) = (none(), Vec::with_capacity(16));
             for observation in observations.iter().filter(|it| counts(it)) {
                 let course = self.courses[observation.pass as usize];
@@ -171,7 +183,7 @@ impl ProfileEvidence {
             normal
         };
         // Added up in order: the same on any number of threads.
-        let chunks: Vec<&[Observation]> = self.observations.chunks(CHUNK).collect();
+        let chunks: Vec<&[BlockDifference]> = self.observations.chunks(CHUNK).collect();
         let chunks = parallel::of_each(&chunks, |observations| of_chunk(observations));
         chunks.into_iter().for_each(|chunk| normal.add(chunk));
         let mut sizes_n = std::mem::take(&mut normal.sizes_n);
@@ -192,7 +204,7 @@ impl ProfileEvidence {
     }
 
     /// Smoothness of the gradient, a gradient of nothing, and GNSS altitudes.
-    fn add_priors(&self, state: &Profile, walk_per_m: f64, normal: &mut Normal) {
+    fn add_priors(&self, state: &HeightProfile, walk_per_m: f64, normal: &mut Normal) {
         let (heights, Normal { matrix, right, .. }) = (&state.heights_m, normal);
         let mut add = |row: &[(usize, f64)], target: f64, weight: f64| {
             let now: f64 = row.iter().map(|&(node, value)| value * heights[node]).sum();
@@ -227,15 +239,15 @@ impl ProfileEvidence {
     }
 
     /// The mass of each pass, given all else.
-    fn fit_masses(&self, state: &mut Profile, counts: Fold) {
-        let of_pass = |observations: &[Observation]| {
+    fn fit_masses(&self, state: &mut HeightProfile, counts: Fold) {
+        let of_pass = |observations: &[BlockDifference]| {
             let pass = observations[0].pass as usize;
             let mut row = Vec::with_capacity(16);
             let (mut top, mut bottom) = (0.0, 1.0 / (PASS_MASS_STD * PASS_MASS_STD));
             let mut counted = observations.iter().filter(|it| counts(it)).peekable();
             counted.peek()?;
             for observation in counted {
-                let Observation { along_m, reach_m, .. } = *observation;
+                let BlockDifference { along_m, reach_m, .. } = *observation;
                 self.layout.gradient(self.courses[pass], along_m, reach_m, &mut row);
                 let (residual_n, _, unit) = state.residual(observation, &row, &self.prior);
                 let slope = observation.mass_kg * unit;
@@ -246,7 +258,7 @@ impl ProfileEvidence {
             Some((pass, top / bottom))
         };
         let by_pass = self.observations.chunk_by(|one, next| one.pass == next.pass);
-        let by_pass: Vec<&[Observation]> = by_pass.collect();
+        let by_pass: Vec<&[BlockDifference]> = by_pass.collect();
         let masses = parallel::of_each(&by_pass, |observations| of_pass(observations));
         let masses: Vec<(usize, f64)> = masses.into_iter().flatten().collect();
         // The part that all passes share is the vehicle's, and moves there at once.
@@ -259,8 +271,8 @@ impl ProfileEvidence {
     /// Residuals in N with their observations.
     pub fn residuals<'e>(
         &'e self,
-        profile: &'e Profile,
-    ) -> impl Iterator<Item = (&'e Observation, f64)> + 'e {
+        profile: &'e HeightProfile,
+    ) -> impl Iterator<Item = (&'e BlockDifference, f64)> + 'e {
         let mut row = Vec::with_capacity(16);
         self.observations.iter().map(move |observation| {
             let course = self.courses[observation.pass as usize];
@@ -269,7 +281,7 @@ impl ProfileEvidence {
         })
     }
 
-    fn autocorrelation(&self, profile: &Profile, counts: Fold) -> f64 {
+    fn autocorrelation(&self, profile: &HeightProfile, counts: Fold) -> f64 {
         let (mut product, mut square, mut last) = (0.0, 0.0, None);
         let bound = 4.0 * profile.residual_n;
         for (observation, residual_n) in self.residuals(profile).filter(|it| counts(it.0)) {
@@ -286,7 +298,7 @@ impl ProfileEvidence {
     }
 }
 
-impl Profile {
+impl HeightProfile {
     /// Weight of a residual in N: Student's distribution.
     fn weight(&self, residual_n: f64) -> f64 {
         let ratio = residual_n / self.residual_n;
@@ -296,7 +308,7 @@ impl Profile {
     /// Recorded less modelled force in N, the mass in kg, and the force in N for each kg.
     fn residual(
         &self,
-        observation: &Observation,
+        observation: &BlockDifference,
         gradient: &[(usize, f64)],
         prior: &Prior,
     ) -> (f64, f64, f64) {
@@ -308,15 +320,18 @@ impl Profile {
         (force_n - mass_kg * unit, mass_kg, unit)
     }
 
-    /// Gradient in ‰ along a block with its standard deviation: (from in m, gradient, std).
-    pub fn gradient_permille(&self, block: usize) -> Vec<(f64, f64, f64)> {
+    /// Returns the gradient along a block.
+    pub fn gradient_permille(&self, block: usize) -> Vec<GradientEntry> {
         let (first, count) = self.layout.blocks[block];
         (0..count - 1)
             .map(|node| {
                 let rise = self.heights_m[first + node + 1] - self.heights_m[first + node];
                 let variance = self.gradient_var.get(block).map_or(f64::NAN, |list| list[node]);
-                let at_m = self.layout.start_m + node as f64 * HEIGHT_STEP_M;
-                (at_m, 1000.0 * rise / HEIGHT_STEP_M, 1000.0 * variance.sqrt())
+                GradientEntry {
+                    from_m: self.layout.start_m + node as f64 * HEIGHT_STEP_M,
+                    gradient_permille: 1000.0 * rise / HEIGHT_STEP_M,
+                    std_permille: 1000.0 * variance.sqrt(),
+                }
             })
             .collect()
     }

@@ -47,7 +47,7 @@ pub struct Fix {
 
 /// A recording with its distance by the wheels and its fixes on the plane.
 #[derive(Clone, Debug)]
-pub struct Recording<'r> {
+pub struct SurveyRecording<'r> {
     /// Recorded rows.
     pub raw: &'r RawRecording,
     /// Distance in m by integrating the speed, from 0 at the first row.
@@ -56,7 +56,7 @@ pub struct Recording<'r> {
     pub fixes: Vec<Fix>,
 }
 
-impl<'r> Recording<'r> {
+impl<'r> SurveyRecording<'r> {
     /// Integrates the speed and projects the fixes.
     pub fn of(raw: &'r RawRecording, plane: &LocalPlane) -> Self {
         let mut travelled_m = Vec::with_capacity(raw.time_s.len());
@@ -83,7 +83,7 @@ impl<'r> Recording<'r> {
                 fixes.push(Fix { row, at_m: plane.project(latitude, longitude) });
             }
         }
-        Recording { raw, travelled_m, fixes }
+        SurveyRecording { raw, travelled_m, fixes }
     }
 
     /// The first row at or past a distance in m.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use dynocar_model::terms::wheel::STILL_MPS;
 
 use super::geodesy::distance_squared;
-use super::recording::Recording;
+use super::recording::SurveyRecording;
 
 /// Distance in m between the points that are looked at.
 pub const POINT_STEP_M: f64 = 20.0;
@@ -31,7 +31,7 @@ pub struct RecordingPart {
 
 /// Cuts a recording into parts: where its path follows, for 300 m, a path that it took before
 /// in the same part, it has turned. The cut is where it stood longest in between.
-pub fn recording_parts(number: usize, recording: &Recording) -> Vec<RecordingPart> {
+pub fn recording_parts(number: usize, recording: &SurveyRecording) -> Vec<RecordingPart> {
     let points = recording.points(POINT_STEP_M);
     let mut found = Vec::new();
     let mut from = 0;
@@ -106,7 +106,7 @@ fn confirmed(twins: &[Option<usize>], from: usize) -> Option<Return> {
 }
 
 /// Distance in m where a recording stood longest between two paths; `None` when it did not stand.
-fn longest_stand(recording: &Recording, from_m: f64, to_m: f64) -> Option<f64> {
+fn longest_stand(recording: &SurveyRecording, from_m: f64, to_m: f64) -> Option<f64> {
     let raw = recording.raw;
     let rows = recording.row_at(from_m)..recording.row_at(to_m);
     let (mut longest, mut stand): ((f64, f64), Option<(f64, f64)>) = ((0.0, 0.0), None);

@@ -1,7 +1,7 @@
 //! Where a receiver was silent, the path of one pass is that of another.
 
 use super::geodesy::distance_squared;
-use super::recording::Recording;
+use super::recording::SurveyRecording;
 use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M};
 
 /// Fixes further apart along the path than this many m leave it open in between.
@@ -19,7 +19,7 @@ pub struct TracePoint {
 }
 
 /// Points every `step_m` along a part.
-pub fn trace(part: &RecordingPart, recordings: &[Recording], step_m: f64) -> Vec<TracePoint> {
+pub fn trace(part: &RecordingPart, recordings: &[SurveyRecording], step_m: f64) -> Vec<TracePoint> {
     let recording = &recordings[part.recording];
     let silences: Vec<(f64, f64)> = recording
         .fixes

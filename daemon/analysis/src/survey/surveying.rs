@@ -4,14 +4,14 @@ use super::alignment::{FoundCurve, curves, turning_rad};
 use super::banded::NotPositive;
 use super::chainage::WheelsAndLag;
 use super::common::Prior;
+use super::driven_line::{Alignments, find, pass_of};
 use super::geodesy::LocalPlane;
-use super::layout::{Layout, LineCourse};
+use super::layout::{HeightLayout, LineCourse};
 use super::learn::acting_from_pa;
-use super::learn::{Learned, learn};
-use super::line::{Alignments, find, pass_of};
-use super::observation::{Observation, observations};
+use super::learn::{LearnedProfile, learn};
+use super::observation::{BlockDifference, observations};
 use super::profile::{Altitude, ProfileEvidence, is_one_of_few};
-use super::recording::{RawRecording, Recording, plane_of};
+use super::recording::{RawRecording, SurveyRecording, plane_of};
 use super::recording_parts::{RecordingPart, recording_parts};
 use super::stops::{SurveyedStop, stands, stops};
 use super::trips::{NotUsed, Trip, not_used, trips};
@@ -74,7 +74,7 @@ pub enum SurveyError {
 #[derive(Clone, Debug)]
 pub struct SurveyedProfile {
     /// The profile and what belongs to it.
-    pub learned: Learned,
+    pub learned: LearnedProfile,
     /// Curves of the growing alignment.
     pub curves: Vec<FoundCurve>,
     /// Numbers of the trips that took part, in the order of the passes.
@@ -117,7 +117,7 @@ pub fn survey(
         None => plane_of(raws).ok_or(SurveyError::NoPositions)?,
     };
     let recordings =
-        parallel::of_each_number(raws.len(), |number| Recording::of(&raws[number], &plane));
+        parallel::of_each_number(raws.len(), |number| SurveyRecording::of(&raws[number], &plane));
     let cut = parallel::of_each_number(recordings.len(), |number| {
         recording_parts(number, &recordings[number])
     });
@@ -153,7 +153,7 @@ fn length_std(alignments: &Alignments) -> f64 {
 }
 
 fn found_stops(
-    recordings: &[Recording],
+    recordings: &[SurveyRecording],
     alignments: &Alignments,
     trips: &[Trip],
     of_all: bool,
@@ -179,7 +179,7 @@ fn found_stops(
 
 /// The profile from the fit trips.
 fn profile(
-    recordings: &[Recording],
+    recordings: &[SurveyRecording],
     vehicle: &Vehicle,
     alignments: &Alignments,
     trips: &[Trip],
@@ -193,7 +193,7 @@ fn profile(
     if let Some(falling) = alignments.falling.as_ref().filter(|it| !it.is_same) {
         lengths_m.push(falling.alignment.length_m());
     }
-    let layout = Layout::new(&lengths_m, vehicle.length_m);
+    let layout = HeightLayout::new(&lengths_m, vehicle.length_m);
     let course = |&number: &usize| course(trips[number].direction, alignments);
     let courses: Vec<LineCourse> = fit.iter().map(course).collect();
     // Where each direction has an alignment of its own, its profile holds the curves' resistance too.
@@ -219,17 +219,17 @@ fn profile(
             let seen = observations(raw, &trip.along, pass as u32, block_s, speed_factor);
             let limit_m =
                 alignments.of(trip.direction).map_or(0.0, |alignment| alignment.length_m());
-            let on_line = |mut it: Observation| {
+            let on_line = |mut it: BlockDifference| {
                 let at_m = courses[pass].in_block(it.along_m);
                 let k = vehicle.curve_constant_n_per_kn_m;
                 it.curve_n_per_kn = k * curvature(curves.iter(), at_m, vehicle.length_m);
                 (-ENDS_M..=limit_m + ENDS_M).contains(&it.along_m).then_some(it)
             };
-            seen.into_iter().filter_map(on_line).collect::<Vec<Observation>>()
+            seen.into_iter().filter_map(on_line).collect::<Vec<BlockDifference>>()
         };
         let passes: Vec<_> = fit.iter().enumerate().filter(|(pass, _)| of(*pass)).collect();
         let observations = parallel::of_each(&passes, |pass| of_pass(*pass));
-        observations.into_iter().flatten().collect::<Vec<Observation>>()
+        observations.into_iter().flatten().collect::<Vec<BlockDifference>>()
     };
     let of_few = |block_s: f64| observe(block_s, &|pass| is_one_of_few(pass, fit.len()));
     let block_s = shortest_block_s(&mut evidence, of_few)?;
@@ -246,7 +246,7 @@ fn profile(
 /// Length in s of the shortest blocks of which residuals do not alternate.
 fn shortest_block_s(
     evidence: &mut ProfileEvidence,
-    observed: impl Fn(f64) -> Vec<Observation>,
+    observed: impl Fn(f64) -> Vec<BlockDifference>,
 ) -> Result<f64, NotPositive> {
     let [shorter @ .., longest_s] = BLOCKS_S;
     for block_s in shorter {
@@ -280,7 +280,7 @@ fn curvature<'c>(curves: impl Iterator<Item = &'c FoundCurve>, at_m: f64, vehicl
     curves.map(inside).sum()
 }
 
-fn altitudes(trip: &Trip, recording: &Recording, course: LineCourse) -> Vec<Altitude> {
+fn altitudes(trip: &Trip, recording: &SurveyRecording, course: LineCourse) -> Vec<Altitude> {
     let raw = recording.raw;
     let mut found: Vec<Altitude> = Vec::new();
     let rows = trip.rows();

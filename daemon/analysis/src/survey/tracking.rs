@@ -2,7 +2,7 @@
 
 use super::alignment::{Alignment, Foot};
 use super::geodesy::distance_squared;
-use super::recording::{Fix, Recording};
+use super::recording::{Fix, SurveyRecording};
 use super::recording_parts::SAME_ALIGNMENT_M;
 use crate::statistics::least_first;
 
@@ -21,7 +21,7 @@ const BEYOND_M: f64 = 30.0;
 
 /// A fix placed on an alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub struct PlacedFix {
     /// Row of the recording.
     pub row: usize,
     /// Chainage in m.
@@ -33,10 +33,10 @@ pub struct Placed {
 /// Places the fixes of some rows on an alignment that is driven in its own direction: the longest part
 /// without leaving it.
 pub fn follow(
-    recording: &Recording,
+    recording: &SurveyRecording,
     rows: std::ops::Range<usize>,
     alignment: &Alignment,
-) -> Vec<Placed> {
+) -> Vec<PlacedFix> {
     let fixes = &recording.fixes;
     let first = fixes.partition_point(|fix| fix.row < rows.start);
     let end = fixes.partition_point(|fix| fix.row < rows.end);
@@ -57,13 +57,13 @@ pub fn follow(
 }
 
 fn follow_from(
-    recording: &Recording,
+    recording: &SurveyRecording,
     fixes: &[Fix],
     start: usize,
     offset_m: f64,
     alignment: &Alignment,
-) -> (Vec<Placed>, usize) {
-    let mut placed: Vec<Placed> = Vec::new();
+) -> (Vec<PlacedFix>, usize) {
+    let mut placed: Vec<PlacedFix> = Vec::new();
     let mut offset_m = offset_m;
     let mut seen_at_m = recording.travelled_m[fixes[start].row];
     for (index, fix) in fixes.iter().enumerate().skip(start) {
@@ -81,7 +81,7 @@ fn follow_from(
             offset_m += FOLLOWING * difference_m;
             seen_at_m = travelled_m;
             let Foot { chainage_m, left_m } = beside;
-            placed.push(Placed { row: fix.row, chainage_m, left_m });
+            placed.push(PlacedFix { row: fix.row, chainage_m, left_m });
         } else if travelled_m - seen_at_m > LEFT_AFTER_M {
             return (placed, index);
         }
@@ -92,7 +92,7 @@ fn follow_from(
 /// The first fix from which on a recording follows an alignment for a while, and what its alignment lacks of
 /// the chainage in m.
 fn found(
-    recording: &Recording,
+    recording: &SurveyRecording,
     fixes: &[Fix],
     from: usize,
     alignment: &Alignment,
@@ -136,7 +136,7 @@ fn found(
 /// Returns the possible error of a fix's alignment in the chainage in m: for each place of the alignment beside
 /// which it is and in whose direction it moves; `None` while it stands.
 fn offsets(
-    recording: &Recording,
+    recording: &SurveyRecording,
     fixes: &[Fix],
     index: usize,
     alignment: &Alignment,

@@ -1,12 +1,14 @@
 //! One-way trips along the line, and the parts of the recordings that are not trips.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
-use super::centring::Pass;
+use super::centring::SurveyPass;
 use super::chainage::{Chained, WheelsAndLag, chain};
-use super::line::Alignments;
-use super::recording::Recording;
-use super::tracking::follow;
+use super::driven_line::Alignments;
+use super::recording::SurveyRecording;
+use super::tracking::{PlacedFix, follow};
 use crate::explain::answer::WithStd;
 use crate::parallel;
 
@@ -56,31 +58,38 @@ pub struct NotUsed {
     pub reason: &'static str,
 }
 
+/// A pass on its alignment, with what it shows by itself.
+struct PlacedPass {
+    rows: Range<usize>,
+    fixes: Vec<PlacedFix>,
+    learned: WheelsAndLag,
+}
+
 /// Gives every pass its chainage; what the fit runs show of wheels and lag comes with it.
 pub fn trips(
-    passes: &[Pass],
+    passes: &[SurveyPass],
     alignments: &Alignments,
-    recordings: &[Recording],
+    recordings: &[SurveyRecording],
 ) -> (Vec<Trip>, WheelsAndLag) {
     let placed = parallel::of_each(passes, |pass| {
         let recording = &recordings[pass.recording];
         let alignment = alignments.of(pass.direction)?;
-        let placed = follow(recording, pass.rows.clone(), alignment);
+        let fixes = follow(recording, pass.rows.clone(), alignment);
         let rows = with_stands(recording, pass.rows.clone());
-        let alone = chain(recording, rows.clone(), &placed, WheelsAndLag::UNKNOWN)?;
-        Some((rows, placed, alone.learned))
+        let alone = chain(recording, rows.clone(), &fixes, WheelsAndLag::UNKNOWN)?;
+        Some(PlacedPass { rows, fixes, learned: alone.learned })
     });
-    let is_fit = |pass: &Pass| recordings[pass.recording].raw.is_fit;
+    let is_fit = |pass: &SurveyPass| recordings[pass.recording].raw.is_fit;
     let has_fit = passes.iter().any(is_fit);
     let learned: Vec<WheelsAndLag> = passes
         .iter()
         .zip(&placed)
         .filter(|(pass, _)| is_fit(pass) || !has_fit)
-        .filter_map(|(_, placed)| placed.as_ref().map(|it| it.2))
+        .filter_map(|(_, placed)| placed.as_ref().map(|it| it.learned))
         .collect();
     let together = WheelsAndLag::together(&learned, SCALE_SPREAD).unwrap_or(WheelsAndLag::UNKNOWN);
-    let of_pass = |index: usize, placed: Option<(_, Vec<_>, _)>| {
-        let (pass, (rows, placed, _)) = (&passes[index], placed?);
+    let of_pass = |index: usize, placed: Option<PlacedPass>| {
+        let (pass, PlacedPass { rows, fixes, .. }) = (&passes[index], placed?);
         let recording = &recordings[pass.recording];
         let is_fit = recording.raw.is_fit;
         // Another day's wheels may be worn or new.
@@ -89,7 +98,7 @@ pub fn trips(
             false => WheelsAndLag::UNKNOWN.scale,
         };
         let lag_s = WithStd { std: together.lag_s.std.max(0.05), ..together.lag_s };
-        let along = chain(recording, rows, &placed, WheelsAndLag { scale, lag_s })?;
+        let along = chain(recording, rows, &fixes, WheelsAndLag { scale, lag_s })?;
         Some(Trip { recording: pass.recording, is_fit, direction: pass.direction, along })
     };
     let trips = parallel::of_each_owned(placed, of_pass);
@@ -109,7 +118,10 @@ pub fn trips(
 }
 
 /// The rows with the stands before and after them.
-fn with_stands(recording: &Recording, rows: std::ops::Range<usize>) -> std::ops::Range<usize> {
+fn with_stands(
+    recording: &SurveyRecording,
+    rows: std::ops::Range<usize>,
+) -> std::ops::Range<usize> {
     let near = |row: usize, from: usize| {
         let (travelled_m, time_s) = (&recording.travelled_m, &recording.raw.time_s);
         (travelled_m[row] - travelled_m[from]).abs() < REACH.0
@@ -126,7 +138,7 @@ fn with_stands(recording: &Recording, rows: std::ops::Range<usize>) -> std::ops:
 }
 
 /// Returns the parts of the recordings outside the trips, and the reasons.
-pub fn not_used(trips: &[Trip], recordings: &[Recording]) -> Vec<NotUsed> {
+pub fn not_used(trips: &[Trip], recordings: &[SurveyRecording]) -> Vec<NotUsed> {
     let mut found = Vec::new();
     for (number, recording) in recordings.iter().enumerate() {
         let rows = recording.raw.time_s.len();
@@ -148,7 +160,7 @@ pub fn not_used(trips: &[Trip], recordings: &[Recording]) -> Vec<NotUsed> {
     found
 }
 
-fn reason(recording: &Recording, rows: std::ops::Range<usize>) -> &'static str {
+fn reason(recording: &SurveyRecording, rows: std::ops::Range<usize>) -> &'static str {
     let moved_m = recording.travelled_m[rows.end - 1] - recording.travelled_m[rows.start];
     let fixes = recording.fixes.iter().filter(|fix| rows.contains(&fix.row)).count();
     match (moved_m < 50.0, fixes < 10) {

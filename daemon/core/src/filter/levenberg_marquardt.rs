@@ -68,7 +68,7 @@ pub struct SolverSettings<const N: usize> {
 
 /// How the solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
+pub enum Termination {
     /// No step promises a decrease worth taking.
     Converged,
     /// No step decreases the cost although the model promises one; at the limit of round-off.
@@ -79,7 +79,7 @@ pub enum Stop {
 
 /// Where the solver ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solution<const N: usize> {
+pub struct LeastSquaresSolution<const N: usize> {
     /// The parameters.
     pub point: SVector<f64, N>,
     /// Cost and linear model there.
@@ -87,7 +87,7 @@ pub struct Solution<const N: usize> {
     /// Linearisations after the first.
     pub iterations: u32,
     /// Why it ended.
-    pub stop: Stop,
+    pub stop: Termination,
 }
 
 /// Damping below which a step is Gauss-Newton's; keeps unexcited directions where they are.
@@ -107,7 +107,7 @@ pub fn minimise<const N: usize>(
     start: &SVector<f64, N>,
     bounds: &ParameterBox<N>,
     settings: &SolverSettings<N>,
-) -> Option<Solution<N>> {
+) -> Option<LeastSquaresSolution<N>> {
     let mut point = bounds.clamp(start);
     let mut current = problem.linearise(&point)?;
     problem.accept();
@@ -119,10 +119,14 @@ pub fn minimise<const N: usize>(
         let enough = settings.decrease_tolerance.max(settings.relative_tolerance * current.cost);
         // Also ends on a step that is not finite.
         if !(decrease > enough) {
-            break if damping > DAMPING_FIRST_FAILURE { Stop::Stalled } else { Stop::Converged };
+            break if damping > DAMPING_FIRST_FAILURE {
+                Termination::Stalled
+            } else {
+                Termination::Converged
+            };
         }
         if iterations == settings.iterations_max {
-            break Stop::IterationsExhausted;
+            break Termination::IterationsExhausted;
         }
         iterations += 1;
         let trial_point = bounds.clamp(&(point + step));
@@ -135,11 +139,11 @@ pub fn minimise<const N: usize>(
                 (point, current) = (trial_point, trial);
                 problem.accept();
             }
-            None if damping >= DAMPING_MAX => break Stop::Stalled,
+            None if damping >= DAMPING_MAX => break Termination::Stalled,
             None => damping = (damping * 4.0).max(DAMPING_FIRST_FAILURE),
         }
     };
-    Some(Solution { point, linearisation: current, iterations, stop })
+    Some(LeastSquaresSolution { point, linearisation: current, iterations, stop })
 }
 
 /// The minimiser of the damped model within the box, and the decrease of the undamped model.
@@ -331,7 +335,7 @@ mod tests {
         // With x = 0.5 held: y minimises (0.5 + y - 2)² + 0.0001 (y - 1)².
         let y = (1.5 + 0.0001) / 1.0001;
         assert!((solution.point - SVector::<f64, 2>::new(0.5, y)).norm() < 1e-9);
-        assert_eq!(solution.stop, Stop::Converged);
+        assert_eq!(solution.stop, Termination::Converged);
     }
 
     #[test]

@@ -25,7 +25,6 @@ pub mod gaussian;
 mod information;
 pub mod lanes;
 pub mod levenberg_marquardt;
-mod line;
 mod median;
 mod mils;
 pub mod particle;
@@ -33,6 +32,7 @@ pub mod random;
 mod rank_one;
 mod rls;
 pub mod square_root;
+mod straight_line;
 #[cfg(test)]
 mod test_runs;
 pub mod triangular;
@@ -43,10 +43,10 @@ pub use bounded::{Bounded, bounded_minimum};
 pub use drifting_level::DriftingLevel;
 pub use gaussian::{Gaussian, Innovation};
 pub use information::SquareRootInformation;
-pub use line::FittedLine;
 pub use median::RunningMedian;
 pub use mils::{Mils, Penalty};
 pub use rls::Rls;
+pub use straight_line::FittedLine;
 pub use whitening::{Propagation, Sighting, UnitRow, Whitener};
 
 /// A belief or a measurement is not sound: a matrix that should be positive definite is not.

@@ -14,7 +14,7 @@ use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use super::input_fault::{DetectedFault, InputFault};
 use super::watch::Figures;
-use super::window_balance::{Balance, Fitted};
+use super::window_balance::{FittedFactor, WindowBalance};
 use crate::pipeline::admission::limits::MASS;
 
 /// Factors of forces within these bounds are effects that a train can have.
@@ -114,17 +114,18 @@ fn kinematic(figures: &Figures) -> Option<DetectedFault> {
         InputFault::PositionScale => !has_usual_step,
         _ => false,
     };
-    let misfit = |(fault, factor, expected): &(InputFault, f64, f64)| {
-        let of_unit = fault.misfit(*factor)?;
+    let misfit = |fault: InputFault, factor: f64, expected: f64| {
+        let of_unit = fault.misfit(factor)?;
         Some(match of_forces {
             Some(of_forces) if of_forces > 0.0 => of_unit + (of_forces / expected).ln().abs(),
             // The forces do not show it: a time in another unit shows in the steps.
-            _ => of_unit + if is_unlikely(*fault) { 1.0 } else { 0.0 },
+            _ => of_unit + if is_unlikely(fault) { 1.0 } else { 0.0 },
         })
     };
-    let known = candidates.iter().filter_map(|candidate| Some((misfit(candidate)?, candidate)));
-    let (_, (fault, factor, _)) = known.min_by(|one, other| one.0.total_cmp(&other.0))?;
-    Some(DetectedFault { fault: *fault, factor: *factor })
+    let known = candidates.into_iter().filter_map(|(fault, factor, expected)| {
+        Some((misfit(fault, factor, expected)?, DetectedFault { fault, factor }))
+    });
+    known.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, fault)| fault)
 }
 
 /// The factor of both forces, when they have one.
@@ -200,9 +201,9 @@ fn of_gradient(figures: &Figures, by: f64, found: &mut DetectedFaults) {
 
 /// Judges the gradients of a recorded run by all of it, which shows smaller factors than a few windows do: degrees
 /// that were read as per cent.
-pub fn gradient_fault(all: &Balance) -> Option<DetectedFault> {
+pub fn gradient_fault(all: &WindowBalance) -> Option<DetectedFault> {
     let [.., gradient] = all.fit()?;
-    let Fitted { factor, scatter_mps2, .. } = gradient;
+    let FittedFactor { factor, scatter_mps2, .. } = gradient;
     let is_known = all.windows() >= ALL_WINDOWS_MIN && gradient.is_known(ALL_DEVIATIONS_MIN);
     if !is_known || factor < 0.0 || !is_outside(factor, GRADIENT_FACTORS) {
         return None;

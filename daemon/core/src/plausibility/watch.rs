@@ -6,7 +6,7 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::window_balance::{Balance, Slopes, WindowMean};
+use super::window_balance::{Slopes, WindowBalance, WindowMean};
 use crate::filter::RunningMedian;
 
 /// Time in s over which accelerations are averaged; one step where the steps are longer.
@@ -69,7 +69,7 @@ struct Distances {
 
 /// Follows the samples of one train; of fixed size.
 #[derive(Clone, Debug)]
-pub struct Watch {
+pub struct PlausibilityWatch {
     train: Arc<TrainModel>,
     last: Option<TrainSample>,
     usual_step_s: f64,
@@ -80,7 +80,7 @@ pub struct Watch {
     /// Means of the window that the last sample ended.
     pub ended: Option<WindowMean>,
     distances: Distances,
-    balance: Balance,
+    balance: WindowBalance,
     distance_ratios: RunningMedian<RATIOS>,
     masses: f64,
     mass_ratio: f64,
@@ -88,10 +88,10 @@ pub struct Watch {
     pressure: PressureContrast,
 }
 
-impl Watch {
+impl PlausibilityWatch {
     /// A watch over the samples of a train as it is declared.
     pub fn new(train: Arc<TrainModel>) -> Self {
-        Watch {
+        PlausibilityWatch {
             train,
             last: None,
             usual_step_s: 0.0,
@@ -100,7 +100,7 @@ impl Watch {
             is_position_measured: true,
             ended: None,
             distances: Distances::default(),
-            balance: Balance::default(),
+            balance: WindowBalance::default(),
             distance_ratios: RunningMedian::default(),
             masses: 0.0,
             mass_ratio: 1.0,

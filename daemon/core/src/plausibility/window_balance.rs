@@ -50,7 +50,7 @@ pub struct Slopes {
 
 /// The factor of one quantity as least squares give it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Fitted {
+pub struct FittedFactor {
     /// Acceleration over what the reported quantity would give.
     pub factor: f64,
     /// Its standard deviation, were the windows' errors independent.
@@ -61,7 +61,7 @@ pub struct Fitted {
     pub scatter_mps2: f64,
 }
 
-impl Fitted {
+impl FittedFactor {
     /// True when the motion determines the factor, at least this number of standard deviations away from 0.
     pub fn is_known(&self, deviations: f64) -> bool {
         self.own_share > OWN_SHARE_MIN && self.factor.abs() > deviations * self.std
@@ -70,7 +70,7 @@ impl Fitted {
 
 /// Sums over the windows lately, or over all of a recorded run.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Balance {
+pub struct WindowBalance {
     /// Share of what stands in the sums that is kept when a window comes in.
     keep: f64,
     gram: SMatrix<f64, COLUMNS, COLUMNS>,
@@ -79,9 +79,9 @@ pub struct Balance {
     windows: f64,
 }
 
-impl Default for Balance {
+impl Default for WindowBalance {
     fn default() -> Self {
-        Balance {
+        WindowBalance {
             keep: 1.0 - 1.0 / MEMORY,
             gram: SMatrix::zeros(),
             with_inertia: SVector::zeros(),
@@ -91,10 +91,10 @@ impl Default for Balance {
     }
 }
 
-impl Balance {
+impl WindowBalance {
     /// Sums over all windows, for recorded data.
     pub fn of_all() -> Self {
-        Balance { keep: 1.0, ..Balance::default() }
+        WindowBalance { keep: 1.0, ..WindowBalance::default() }
     }
 
     /// Takes in a window.
@@ -128,13 +128,14 @@ impl Balance {
 
     /// The factors by least squares, as far as the motion determines them.
     pub fn slopes(&self) -> Slopes {
-        let slope = |fitted: Fitted| fitted.is_known(KNOWN_DEVIATIONS).then_some(fitted.factor);
+        let slope =
+            |fitted: FittedFactor| fitted.is_known(KNOWN_DEVIATIONS).then_some(fitted.factor);
         let [traction, brake, gradient] = self.fit().unwrap_or_default();
         Slopes { traction: slope(traction), brake: slope(brake), gradient: slope(gradient) }
     }
 
     /// The factors of traction, brake and gradient by least squares; `None` for too few windows.
-    pub fn fit(&self) -> Option<[Fitted; 3]> {
+    pub fn fit(&self) -> Option<[FittedFactor; 3]> {
         if self.windows < WINDOWS_MIN {
             return None;
         }
@@ -151,7 +152,7 @@ impl Balance {
         let solution = inverse * right;
         let left = (self.inertia_square - solution.dot(&right)).max(0.0);
         let variance = left / (self.windows - COLUMNS as f64).max(1.0);
-        Some(std::array::from_fn(|column| Fitted {
+        Some(std::array::from_fn(|column| FittedFactor {
             factor: solution[column] / scale[column],
             std: (variance * inverse[(column, column)]).sqrt() / scale[column],
             own_share: if self.gram[(column, column)] > 0.0 {
@@ -164,7 +165,7 @@ impl Balance {
     }
 
     /// Adds the windows of another run.
-    pub fn add(&mut self, other: &Balance) {
+    pub fn add(&mut self, other: &WindowBalance) {
         self.gram += other.gram;
         self.with_inertia += other.with_inertia;
         self.inertia_square += other.inertia_square;

@@ -45,7 +45,7 @@ fn ratio_of_score(score: f64) -> f64 {
 
 /// Evidence of the trips so far for a rival.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Evidence {
+pub struct RivalEvidence {
     /// Share of the error that the rival must take away to count as better.
     least_gain: f64,
     /// E-process value by bet.
@@ -62,10 +62,10 @@ pub struct Evidence {
     squares: f64,
 }
 
-impl Evidence {
+impl RivalEvidence {
     /// Before the first trip; the rival must take away a share `least_gain` of the error, 0 to 1.
     pub fn new(least_gain: f64) -> Self {
-        Evidence {
+        RivalEvidence {
             least_gain,
             e_value: [0.0; BETS.len()],
             trips: 0,
@@ -151,7 +151,7 @@ mod tests {
         seed: u64,
     ) -> Option<usize> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut evidence = Evidence::new(0.1);
+        let mut evidence = RivalEvidence::new(0.1);
         (1..=trips).find(|_| {
             evidence.take((mean + spread * random.random_range(-1.0..1.0)).clamp(-1.0, 1.0));
             evidence.e_value() >= level
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_rival_that_becomes_better_later_is_found_later_all_the_same() {
-        let mut evidence = Evidence::new(0.1);
+        let mut evidence = RivalEvidence::new(0.1);
         for _ in 0..2000 {
             evidence.take(score_of_ratio(2.0));
         }
@@ -196,7 +196,7 @@ mod tests {
         let missed = (0..300)
             .filter(|&seed| {
                 let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
-                let mut evidence = Evidence::new(0.1);
+                let mut evidence = RivalEvidence::new(0.1);
                 (0..500).any(|_| {
                     evidence.take(mean + 0.3 * random.random_range(-1.0..1.0));
                     evidence.error_ratio().is_some_and(|[low, high]| !(low..=high).contains(&0.7))
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn the_interval_narrows() {
-        let mut evidence = Evidence::new(0.1);
+        let mut evidence = RivalEvidence::new(0.1);
         assert_eq!(evidence.error_ratio(), None);
         evidence.take(score_of_ratio(0.6));
         assert_eq!(evidence.error_ratio(), Some([0.0, RATIO_MAX]), "one trip shows nothing");

@@ -15,4 +15,4 @@ pub mod open_loop;
 mod tests;
 mod trials;
 
-pub use trials::{Rival, Trials};
+pub use trials::{ModelTrials, Rival};

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use dynocar_model::force::{ForceResolver, ResolvedSample, ValidSample};
-use dynocar_model::simulate::{Prediction, QuadraticForces, Recording, Restart, SpeedError};
+use dynocar_model::simulate::{
+    OpenLoopRecording, Prediction, QuadraticForces, Restart, SpeedError,
+};
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 
@@ -56,7 +58,7 @@ impl OpenLoop {
     /// Ends the window: what the model leaves of it, nothing where nothing can be simulated.
     pub fn close(&mut self) -> WindowError {
         let samples = std::mem::replace(&mut self.samples, Vec::with_capacity(SAMPLES_MAX));
-        let Ok(recording) = Recording::new(samples) else {
+        let Ok(recording) = OpenLoopRecording::new(samples) else {
             return WindowError::default();
         };
         let forces = QuadraticForces::declared(&recording, self.train.resistance);
@@ -70,7 +72,7 @@ impl OpenLoop {
 }
 
 /// The difference of the distances over the time that they took; `None` where they cannot be compared.
-fn distance_error_mps(recording: &Recording, predicted_mps: &[f64]) -> Option<f64> {
+fn distance_error_mps(recording: &OpenLoopRecording, predicted_mps: &[f64]) -> Option<f64> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let (first, last) = (samples.first()?, samples.last()?);
     let driven_s = time_s.last().copied().filter(|&driven_s| driven_s > 0.0)?;

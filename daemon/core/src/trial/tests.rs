@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use dynocar_model::simulate::motion::{Motion, advance};
+use dynocar_model::simulate::motion::{SimulatedMotion, advance};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::evidence::Evidence;
+use super::evidence::RivalEvidence;
 use super::ledger::Ledger;
 use super::open_loop::OpenLoop;
-use super::{Rival, Trials};
+use super::{ModelTrials, Rival};
 
 const TRAIN: TrainId = TrainId(1);
 const MASS_KG: f64 = 100e3;
@@ -20,14 +20,14 @@ fn train(a: f64) -> TrainModel {
 
 fn rival(model: u64, a: f64) -> Rival {
     let open_loop = OpenLoop::new(Arc::new(train(a)), None);
-    Rival::new(model, open_loop, Vec::new(), (Evidence::new(0.1), Ledger::default()))
+    Rival::new(model, open_loop, Vec::new(), (RivalEvidence::new(0.1), Ledger::default()))
 }
 
 /// Five minutes of accelerating, coasting and braking on level track, every 0.2 s.
 fn trip(run: u32, a: f64, sequence: &mut u64) -> Vec<TrainSample> {
     let step_s = 0.2;
     let w0_n = TrainModel::weight_kn(MASS_KG) * a;
-    let mut motion = Motion { distance_m: 0.0, speed_mps: 0.0 };
+    let mut motion = SimulatedMotion { distance_m: 0.0, speed_mps: 0.0 };
     let mut samples = Vec::new();
     for k in 0..1500_u32 {
         let (traction_n, brake_n) = match k {
@@ -61,7 +61,7 @@ fn trip(run: u32, a: f64, sequence: &mut u64) -> Vec<TrainSample> {
 
 #[test]
 fn a_rival_that_is_right_wins_and_the_day_and_the_place_of_the_errors_are_known() {
-    let mut trials = Trials::new(TRAIN, rival(1, 2.0), vec![rival(2, 3.0)]);
+    let mut trials = ModelTrials::new(TRAIN, rival(1, 2.0), vec![rival(2, 3.0)]);
     let (mut sequence, mut compared) = (0, 0);
     for run in 0..40 {
         for sample in trip(run, 3.0, &mut sequence) {
@@ -88,10 +88,10 @@ fn a_rival_with_the_right_wheels_wins_by_the_way() {
     };
     let rival = |model: u64, train: TrainModel| {
         let open_loop = OpenLoop::new(Arc::new(train), None);
-        Rival::new(model, open_loop, Vec::new(), (Evidence::new(0.1), Ledger::default()))
+        Rival::new(model, open_loop, Vec::new(), (RivalEvidence::new(0.1), Ledger::default()))
     };
     let rivals = vec![rival(2, worn(1.02, 3.0))];
-    let mut trials = Trials::new(TRAIN, rival(1, train(3.0)), rivals);
+    let mut trials = ModelTrials::new(TRAIN, rival(1, train(3.0)), rivals);
     let mut sequence = 0;
     for run in 0..30 {
         for mut sample in trip(run, 3.0, &mut sequence) {
@@ -106,7 +106,7 @@ fn a_rival_with_the_right_wheels_wins_by_the_way() {
 
 #[test]
 fn a_rival_that_comes_in_mid_trip_is_compared_from_the_next_one_on() {
-    let mut trials = Trials::new(TRAIN, rival(1, 2.0), Vec::new());
+    let mut trials = ModelTrials::new(TRAIN, rival(1, 2.0), Vec::new());
     let mut sequence = 0;
     let first = trip(1, 3.0, &mut sequence);
     for (k, sample) in first.iter().enumerate() {
@@ -125,7 +125,7 @@ fn a_rival_that_comes_in_mid_trip_is_compared_from_the_next_one_on() {
 
 #[test]
 fn after_a_change_the_comparison_begins_anew_with_the_roles_exchanged() {
-    let mut trials = Trials::new(TRAIN, rival(1, 2.0), vec![rival(2, 3.0)]);
+    let mut trials = ModelTrials::new(TRAIN, rival(1, 2.0), vec![rival(2, 3.0)]);
     let mut sequence = 0;
     for run in 0..4 {
         for sample in trip(run, 3.0, &mut sequence) {
@@ -146,7 +146,7 @@ fn after_a_change_the_comparison_begins_anew_with_the_roles_exchanged() {
 
 #[test]
 fn a_controller_that_counts_no_trips_is_compared_all_the_same() {
-    let mut trials = Trials::new(TRAIN, rival(1, 2.0), vec![rival(2, 3.0)]);
+    let mut trials = ModelTrials::new(TRAIN, rival(1, 2.0), vec![rival(2, 3.0)]);
     let (mut sequence, mut start_ns) = (0, 0);
     for _ in 0..20 {
         for sample in trip(0, 3.0, &mut sequence) {

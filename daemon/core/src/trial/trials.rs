@@ -4,7 +4,7 @@ use dynocar_model::force::ValidSample;
 use dynocar_model::simulate::{Restart, SpeedError};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
-use super::evidence::{Evidence, score};
+use super::evidence::{RivalEvidence, score};
 use super::ledger::Ledger;
 use super::open_loop::{OpenLoop, WindowError};
 use crate::pipeline::Pipeline;
@@ -23,7 +23,7 @@ pub struct Rival {
     /// The configured pipelines, with this model.
     pub pipelines: Vec<Pipeline>,
     /// Evidence of the trips for it, against the model in force.
-    pub evidence: Evidence,
+    pub evidence: RivalEvidence,
     /// Its errors.
     pub ledger: Ledger,
     /// The score of the newest trip that was compared.
@@ -41,7 +41,7 @@ impl Rival {
         model: u64,
         open_loop: OpenLoop,
         pipelines: Vec<Pipeline>,
-        (evidence, ledger): (Evidence, Ledger),
+        (evidence, ledger): (RivalEvidence, Ledger),
     ) -> Self {
         let trip = TripError::default();
         Rival {
@@ -98,7 +98,7 @@ struct Window {
 }
 
 /// One train's models on trial, by the samples of its controller.
-pub struct Trials {
+pub struct ModelTrials {
     admission: Admission,
     /// The model in force. Its evidence is against itself and stays empty; its pipelines run
     /// elsewhere.
@@ -110,12 +110,12 @@ pub struct Trials {
     moved_s: f64,
 }
 
-impl Trials {
+impl ModelTrials {
     /// Of a train.
     pub fn new(train: TrainId, in_force: Rival, rivals: Vec<Rival>) -> Self {
         let admission = Admission::new(train, in_force.open_loop.train.clone());
         let mut trials =
-            Trials { admission, in_force, rivals, window: None, run: None, moved_s: 0.0 };
+            ModelTrials { admission, in_force, rivals, window: None, run: None, moved_s: 0.0 };
         trials.begin_trip();
         trials
     }
@@ -160,7 +160,7 @@ impl Trials {
     pub fn change(&mut self, index: usize) {
         std::mem::swap(&mut self.in_force, &mut self.rivals[index]);
         for model in self.models() {
-            model.evidence = Evidence::new(model.evidence.least_gain());
+            model.evidence = RivalEvidence::new(model.evidence.least_gain());
         }
         self.begin_trip();
     }

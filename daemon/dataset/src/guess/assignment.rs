@@ -2,10 +2,10 @@
 
 use std::cmp::Reverse;
 
-use super::columns::{Column, Columns};
+use super::columns::{InspectedColumn, InspectedColumns};
 use super::facts::Facts;
 use super::guessed::{GivenColumn, GuessedColumn, Unmapped};
-use super::matching::{UNKNOWN_UNIT, can_hold, consider};
+use super::matching::{UNKNOWN_UNIT, are_alike, can_hold, consider, figures};
 use super::name::named_unit;
 use crate::{DatasetError, Quantity, SourcePosition};
 
@@ -27,7 +27,7 @@ struct Candidate {
 
 /// Assignment of columns to quantities.
 pub struct Assignment<'c> {
-    columns: &'c [Column],
+    columns: &'c [InspectedColumn],
     /// Column and what it is taken for, or rather not: with the reason.
     taken: Vec<(usize, GuessedColumn, bool)>,
     dropped: Vec<(usize, String)>,
@@ -42,7 +42,7 @@ impl<'c> Assignment<'c> {
     ///
     /// Where what is declared cannot be.
     pub fn new(
-        columns: &'c Columns,
+        columns: &'c InspectedColumns,
         given: &[GivenColumn],
         label: &str,
     ) -> Result<Self, DatasetError> {
@@ -82,7 +82,11 @@ impl<'c> Assignment<'c> {
         Ok(assignment)
     }
 
-    fn take_given(&mut self, given: &GivenColumn, columns: &Columns) -> Result<(), String> {
+    fn take_given(
+        &mut self,
+        given: &GivenColumn,
+        columns: &InspectedColumns,
+    ) -> Result<(), String> {
         let (name, quantity) = (&given.column, given.quantity);
         let index = self.columns.iter().position(|column| column.name.text == given.column.trim());
         let Some(index) = index else {
@@ -172,7 +176,7 @@ impl<'c> Assignment<'c> {
     }
 
     /// The first column that would be a quantity that nothing is taken for, were its unit known.
-    pub fn unknown_unit(&self) -> Option<(&'c Column, Quantity, &str)> {
+    pub fn unknown_unit(&self) -> Option<(&'c InspectedColumn, Quantity, &str)> {
         self.refused.iter().find_map(|(index, quantity, reason)| {
             let is_it = reason.starts_with(UNKNOWN_UNIT)
                 && !self.has(*quantity)
@@ -341,17 +345,6 @@ impl<'c> Assignment<'c> {
     }
 }
 
-/// Greatest magnitude and mean of a column's values in the base unit, as it is taken.
-fn figures(facts: &Facts, guessed: &GuessedColumn) -> [f64; 2] {
-    let figures = [facts.top(), facts.mean()];
-    figures.map(|it| guessed.unit.to_base(it.unwrap_or(f64::NAN) * guessed.scale))
-}
-
-/// True for the figures of columns that say the same, but for noise.
-fn are_alike(one: [f64; 2], other: [f64; 2]) -> bool {
-    one.iter().zip(other).all(|(one, other)| (one - other).abs() <= 0.02 * one.abs().max(1e-9))
-}
-
 /// A force with more than this share of values below zero is signed.
 const SIGNED_SHARE: f64 = 0.02;
 
@@ -384,7 +377,8 @@ pub fn settle(assignment: &mut Assignment) {
     }
     let turned = assignment.facts(BrakeForce).map(|facts| facts.signs());
     if turned.is_some_and(|(up, down)| down > up) {
-        assignment.turn(BrakeForce, "its values are negative while it brakes: scale = -1");
+        let scale = crate::keys::column::SCALE.assign(-1);
+        assignment.turn(BrakeForce, &format!("its values are negative while it brakes: {scale}"));
     }
     let has_control = assignment.has(ControlForce);
     for (handle, force) in [(TractionHandle, TractionForce), (BrakeHandle, BrakeForce)] {

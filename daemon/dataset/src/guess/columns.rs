@@ -1,18 +1,18 @@
 //! The columns of all files together, with what their values are like.
 use super::facts::Facts;
-use super::guessed::Recording;
-use super::layout::{Layout, layout};
-use super::marks::Evidence;
+use super::guessed::RecordingText;
+use super::layout::{GuessedLayout, layout};
+use super::marks::MarkEvidence;
 use super::name::Name;
 use crate::TextLayout;
 use crate::cell::{is_word, parse_cell, truth};
 use crate::error::{DatasetError, NO_HEADER, SourcePosition};
-use crate::lines::{Row, RowReader, below};
+use crate::lines::{CellRow, RowReader, below};
 use crate::text_layout::Marks;
 
 /// A column of the first file's header.
 #[derive(Clone, Debug)]
-pub struct Column {
+pub struct InspectedColumn {
     /// Its name.
     pub name: Name,
     /// Facts on its values in each file.
@@ -25,29 +25,29 @@ pub struct Column {
 
 /// All files, read through.
 #[derive(Clone, Debug)]
-pub struct Columns {
+pub struct InspectedColumns {
     /// How the first file's text falls into cells, as that of all.
-    pub layout: Layout,
+    pub layout: GuessedLayout,
     /// The columns, in the order of the first file's header.
-    pub columns: Vec<Column>,
+    pub columns: Vec<InspectedColumn>,
     /// Rows of values in each file.
     pub rows: Vec<usize>,
 }
 
-impl Columns {
+impl InspectedColumns {
     /// Reads files that are laid out alike.
     ///
     /// # Errors
     ///
     /// Where one of them has no header or no rows, or another layout than the first.
-    pub fn read(files: &[Recording]) -> Result<Self, DatasetError> {
-        let layouts: Vec<Layout> =
+    pub fn read(files: &[RecordingText]) -> Result<Self, DatasetError> {
+        let layouts: Vec<GuessedLayout> =
             files.iter().map(|file| layout(file.label, file.text)).collect::<Result<_, _>>()?;
         let Some(first) = layouts.first() else {
             return Err(SourcePosition::whole("no file").problem(NO_HEADER));
         };
         let mut first = first.clone();
-        let mut evidence = Evidence::default();
+        let mut evidence = MarkEvidence::default();
         for (file, it) in files.iter().zip(&layouts) {
             let text = below(file.label, file.text, it.text.skip_rows)?;
             evidence.push_text(text, it.text.delimiter, it.text.lines_above() - it.text.skip_rows);
@@ -57,10 +57,10 @@ impl Columns {
         for (file, other) in files.iter().zip(&layouts) {
             require_alike(file, other, (files[0].label, &first.text))?;
         }
-        let mut columns: Vec<Column> = first
+        let mut columns: Vec<InspectedColumn> = first
             .header
             .iter()
-            .map(|name| Column {
+            .map(|name| InspectedColumn {
                 name: name.clone(),
                 facts: Vec::new(),
                 all: Facts::new(),
@@ -80,7 +80,7 @@ impl Columns {
             }
             rows.push(count);
         }
-        Ok(Columns { layout: first, columns, rows })
+        Ok(InspectedColumns { layout: first, columns, rows })
     }
 
     /// Every column's name, for messages.
@@ -92,7 +92,7 @@ impl Columns {
 }
 
 /// Why no dataset can map a column of this name.
-fn unusable(name: &Name, files: &[Recording], layouts: &[Layout]) -> Option<String> {
+fn unusable(name: &Name, files: &[RecordingText], layouts: &[GuessedLayout]) -> Option<String> {
     files.iter().zip(layouts).find_map(|(file, layout)| {
         match layout.header.iter().filter(|other| *other == name).count() {
             0 => Some(format!("{} has no such column", file.label)),
@@ -103,8 +103,8 @@ fn unusable(name: &Name, files: &[Recording], layouts: &[Layout]) -> Option<Stri
 }
 
 fn require_alike(
-    file: &Recording,
-    layout: &Layout,
+    file: &RecordingText,
+    layout: &GuessedLayout,
     (label, first): (&str, &TextLayout),
 ) -> Result<(), DatasetError> {
     let mark = |mark: u8| format!("{:?}", char::from(mark).to_string());
@@ -126,8 +126,8 @@ fn require_alike(
 
 /// Reads the facts on the values of every column, and the number of rows.
 fn read_file(
-    file: &Recording,
-    layout: &Layout,
+    file: &RecordingText,
+    layout: &GuessedLayout,
     marks: Marks,
 ) -> Result<(Vec<Facts>, usize), DatasetError> {
     let TextLayout { skip_rows, delimiter, units_row, .. } = layout.text;
@@ -135,7 +135,7 @@ fn read_file(
     let mut reader = RowReader::new(text, delimiter, marks.decimal);
     let mut facts = vec![Facts::new(); layout.header.len()];
     let above = 1 + usize::from(units_row);
-    let (mut row, mut rows) = (Row::default(), 0);
+    let (mut row, mut rows) = (CellRow::default(), 0);
     while reader.read(&mut row) {
         rows += 1;
         if rows <= above {

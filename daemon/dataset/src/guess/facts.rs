@@ -45,7 +45,7 @@ impl Spread {
 
 /// A cell that holds text where numbers were expected.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Text {
+pub struct TextCell {
     /// The file and a comma, where there are several.
     pub file: String,
     /// Line in the file, from 1.
@@ -54,11 +54,11 @@ pub struct Text {
     pub cell: String,
 }
 
-impl Text {
+impl TextCell {
     /// The same, with its file where there are several.
     pub fn of_file(self, label: &str, files: usize) -> Self {
         let file = if files > 1 { format!("{label}, ") } else { String::new() };
-        Text { file, ..self }
+        TextCell { file, ..self }
     }
 }
 
@@ -68,7 +68,7 @@ pub struct Facts {
     /// Cells with a finite number.
     pub numbers: usize,
     /// The first cell that is neither empty nor a number.
-    pub text: Option<Text>,
+    pub text: Option<TextCell>,
     /// Cells that are neither.
     pub texts: usize,
     /// Cells that say yes or no.
@@ -170,7 +170,7 @@ impl Facts {
         let printable = |letter: char| if letter.is_control() { ' ' } else { letter };
         let cell = || cell.chars().take(40).map(printable).collect();
         self.texts += 1;
-        self.text.get_or_insert_with(|| Text { file: String::new(), line, cell: cell() });
+        self.text.get_or_insert_with(|| TextCell { file: String::new(), line, cell: cell() });
     }
 
     /// Takes in what was seen of the same column in another file.
@@ -299,6 +299,6 @@ mod tests {
         seen.push_text(3, "a\tb");
         seen.push_text(4, "c");
         assert_eq!((seen.top(), seen.middle(), seen.step(), seen.span()), (None, None, None, None));
-        assert_eq!(seen.text, Some(Text { file: String::new(), line: 3, cell: "a b".into() }));
+        assert_eq!(seen.text, Some(TextCell { file: String::new(), line: 3, cell: "a b".into() }));
     }
 }

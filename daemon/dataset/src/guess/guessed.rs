@@ -12,7 +12,7 @@ use crate::{GradientSource, PositionSource, Quantity, Run, TextLayout, TimeForma
 
 /// A recording's file.
 #[derive(Clone, Copy, Debug)]
-pub struct Recording<'t> {
+pub struct RecordingText<'t> {
     /// The file, as the user would find it.
     pub label: &'t str,
     /// Its text.

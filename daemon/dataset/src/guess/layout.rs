@@ -19,7 +19,7 @@ const ROWS_MAX: usize = 200;
 
 /// How a file's text falls into cells.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Layout {
+pub struct GuessedLayout {
     /// As a dataset says it.
     pub text: TextLayout,
     /// The columns' names, with the units that stand below them.
@@ -44,7 +44,7 @@ struct Block {
 /// # Errors
 ///
 /// Where no line above the values holds names of columns, or no values follow.
-pub fn layout(label: &str, text: &str) -> Result<Layout, DatasetError> {
+pub fn layout(label: &str, text: &str) -> Result<GuessedLayout, DatasetError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let readings = DELIMITERS.map(|delimiter| {
         let rows = first_rows(text, delimiter);
@@ -99,7 +99,7 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, DatasetError> {
     };
     let (delimiter, skip_rows) = (*delimiter, names.line - 1);
     let units_row = units.is_some();
-    Ok(Layout {
+    Ok(GuessedLayout {
         text: TextLayout { delimiter, skip_rows, units_row, ..TextLayout::PLAIN },
         header: names.cells.iter().enumerate().map(name).collect(),
     })
@@ -107,7 +107,7 @@ pub fn layout(label: &str, text: &str) -> Result<Layout, DatasetError> {
 
 fn first_rows(text: &str, delimiter: u8) -> Vec<Row> {
     let mut reader = RowReader::new(text, delimiter, b'.');
-    let (mut rows, mut row) = (Vec::new(), lines::Row::default());
+    let (mut rows, mut row) = (Vec::new(), lines::CellRow::default());
     while rows.len() <= ROWS_MAX && reader.read(&mut row) {
         let cells = row.cells.iter().map(|cell| String::from_utf8_lossy(&cell.text).into());
         rows.push(Row { line: row.line, cells: cells.collect() });
@@ -228,8 +228,8 @@ mod tests {
     use super::*;
 
     fn recognised(text: &str) -> (char, char, usize) {
-        let file = crate::guess::Recording { label: "a.csv", text };
-        let read = crate::guess::columns::Columns::read(&[file]).unwrap().layout;
+        let file = crate::guess::RecordingText { label: "a.csv", text };
+        let read = crate::guess::columns::InspectedColumns::read(&[file]).unwrap().layout;
         let TextLayout { delimiter, decimal, .. } = read.text;
         (char::from(delimiter), char::from(decimal), read.header.len())
     }

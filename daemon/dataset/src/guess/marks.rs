@@ -1,13 +1,13 @@
 //! Which marks stand in numbers: before their fraction, and between groups of three digits.
 
 use crate::cell::{is_word, ungrouped};
-use crate::lines::{Row, RowReader};
+use crate::lines::{CellRow, RowReader};
 use crate::text_layout::Marks;
 use crate::text_layout::THOUSANDS;
 
 /// Evidence of the cells of files on their marks.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Evidence {
+pub struct MarkEvidence {
     /// Cells in which a comma, and a point, can be nothing but a decimal mark.
     commas: usize,
     points: usize,
@@ -18,11 +18,11 @@ pub struct Evidence {
     either_point: usize,
 }
 
-impl Evidence {
+impl MarkEvidence {
     /// Takes in the rows of a text below the lines above them.
     pub fn push_text(&mut self, text: &str, delimiter: u8, lines_above: usize) {
         let mut reader = RowReader::new(text, delimiter, b'.');
-        let (mut row, mut rows) = (Row::default(), 0);
+        let (mut row, mut rows) = (CellRow::default(), 0);
         while reader.read(&mut row) {
             rows += 1;
             for cell in row.cells.iter().filter(|_| rows > lines_above) {
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     fn marks(cells: &[&str]) -> (char, Option<char>) {
-        let mut evidence = Evidence::default();
+        let mut evidence = MarkEvidence::default();
         cells.iter().for_each(|cell| evidence.push(cell.as_bytes()));
         let Marks { decimal, thousands } = evidence.marks();
         (decimal.into(), thousands)

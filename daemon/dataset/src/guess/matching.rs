@@ -2,12 +2,12 @@
 
 use dynocar_model::units::{Dimension, Unit, is_unit};
 
-use super::facts::{Facts, Text};
+use super::facts::{Facts, TextCell};
 use super::guessed::GuessedColumn;
 use super::name::{Name, readings, scaled_unit};
 use super::vocabulary::{TermWeight, VOCABULARY, listed, terms};
 use crate::Quantity;
-use crate::names::nearest;
+use crate::error::nearest;
 
 /// Weight of a name that says the quantity and nothing else.
 const SAID: i32 = 100;
@@ -82,7 +82,7 @@ pub fn can_hold(facts: &Facts, quantity: Quantity) -> Result<(), String> {
     );
     let is_rare = facts.texts * TEXTS_RARE < facts.numbers;
     if let Some(text) = facts.text.as_ref().filter(|_| !(is_needed && is_rare)) {
-        let Text { file, line, cell } = text;
+        let TextCell { file, line, cell } = text;
         return Err(format!("it holds text in {file}line {line}: '{cell}'"));
     }
     let (Some(top), min, max) = (facts.top(), facts.min, facts.max) else {
@@ -209,12 +209,14 @@ fn by_likeness(words: &[String], quantity: Quantity) -> Option<(i32, String)> {
     if joined.chars().count() < WITHIN_MIN || is_known() {
         return None;
     }
-    let is_named = |(it, weight, term): &(Quantity, TermWeight, &str)| {
-        let is_own = *term == it.name().replace('_', " ");
-        (*weight == TermWeight::Named || is_own) && term.len() >= WITHIN_MIN - 1
+    let is_named = |it: Quantity, weight: TermWeight, term: &str| {
+        let is_own = term == it.name().replace('_', " ");
+        (weight == TermWeight::Named || is_own) && term.len() >= WITHIN_MIN - 1
     };
-    let (of, names): (Vec<Quantity>, Vec<String>) =
-        all().filter(is_named).map(|(it, _, term)| (it, term.replace(' ', ""))).unzip();
+    let (of, names): (Vec<Quantity>, Vec<String>) = all()
+        .filter(|&(it, weight, term)| is_named(it, weight, term))
+        .map(|(it, _, term)| (it, term.replace(' ', "")))
+        .unzip();
     let nearest = nearest(&joined, &names)?;
     let is_meant = of.iter().zip(&names).any(|(of, term)| *of == quantity && term == nearest);
     // Likeness of single letters only: a name's beginning says too little here.
@@ -256,4 +258,15 @@ fn contradiction(words: &[String], quantity: Quantity) -> Option<String> {
         }
     }
     None
+}
+
+/// Greatest magnitude and mean of a column's values in the base unit, as it is taken.
+pub fn figures(facts: &Facts, guessed: &GuessedColumn) -> [f64; 2] {
+    let figures = [facts.top(), facts.mean()];
+    figures.map(|it| guessed.unit.to_base(it.unwrap_or(f64::NAN) * guessed.scale))
+}
+
+/// True for the figures of columns that say the same, but for noise.
+pub fn are_alike(one: [f64; 2], other: [f64; 2]) -> bool {
+    one.iter().zip(other).all(|(one, other)| (one - other).abs() <= 0.02 * one.abs().max(1e-9))
 }

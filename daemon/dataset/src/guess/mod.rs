@@ -29,8 +29,8 @@ mod vocabulary;
 #[cfg(test)]
 mod tests;
 
-pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, Recording, Unmapped};
-pub use layout::{Layout, layout};
+pub use guessed::{GivenColumn, Guess, GuessedColumn, GuessedRun, RecordingText, Unmapped};
+pub use layout::{GuessedLayout, layout};
 pub use name::Name;
 
 use dynocar_model::units::Unit;
@@ -44,8 +44,8 @@ use super::{DatasetError, Quantity, SourcePosition};
 ///
 /// If a file cannot be part of a dataset, or holds no time or no speed that can be recognised; with file, line and
 /// the expected contents.
-pub fn guess(files: &[Recording], given: &[GivenColumn]) -> Result<Guess, DatasetError> {
-    let read = columns::Columns::read(files)?;
+pub fn guess(files: &[RecordingText], given: &[GivenColumn]) -> Result<Guess, DatasetError> {
+    let read = columns::InspectedColumns::read(files)?;
     let label = files.first().map_or("", |file| file.label);
     let mut assignment = assignment::Assignment::new(&read, given, label)?;
     assignment::settle(&mut assignment);

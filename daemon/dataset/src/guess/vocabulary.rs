@@ -26,14 +26,14 @@ pub enum TermWeight {
 #[serde(deny_unknown_fields)]
 pub struct Vocabulary {
     /// Words that no quantity is called by.
-    pub words: Words,
+    pub words: NonQuantityWords,
     quantities: BTreeMap<String, Entry>,
 }
 
 /// Words that no quantity is called by, separated by commas.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Words {
+pub struct NonQuantityWords {
     /// They change nothing of what a column is.
     pub neutral: String,
     /// They number the parts of a whole.

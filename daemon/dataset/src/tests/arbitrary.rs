@@ -64,7 +64,7 @@ proptest! {
         let _ = Manifest::parse("d", &text);
         let _ = parse_train("t", &text);
         let _ = parse_track("l", &text);
-        let mut example = Example::new(&[("position", "s", "m")], &text);
+        let mut example = Example::new(&[["position", "s", "m"]], &text);
         let _ = example.load();
         example.csv = format!("t,v,s\n{text}");
         let _ = example.load();
@@ -76,8 +76,8 @@ proptest! {
         direction in prop::bool::ANY,
     ) {
         let columns = [
-            ("position", "s", "km"), ("control_force", "F", "MN"), ("altitude", "h", "m"),
-            ("curve_radius", "R", "m"),
+            ["position", "s", "km"], ["control_force", "F", "MN"], ["altitude", "h", "m"],
+            ["curve_radius", "R", "m"],
         ];
         let rows: Vec<String> = rows.iter().map(|cells| cells.join(",")).collect();
         let csv = format!("t,v,s,F,h,R\n0,{}", &rows.join("\n").split_once(',').unwrap().1);
@@ -95,7 +95,7 @@ proptest! {
                 return Ok(());
             }
         };
-        prop_assert!(run.samples.len() + run.quality.rows_without_time == run.quality.lines.rows);
+        prop_assert!(run.samples.len() == run.quality.samples());
         for sample in &run.samples {
             for field in SampleField::ALL {
                 prop_assert!(sample.get(field).is_none_or(f64::is_finite), "{field:?}");

@@ -17,7 +17,7 @@ fn a_run_without_any_speed_or_with_one_time_only_is_refused() {
 #[test]
 fn what_a_run_lacks_altogether_is_diagnosed() {
     let diagnostics = |csv: &str| {
-        let mapped = [("control_force", "F", "kN")];
+        let mapped = [["control_force", "F", "kN"]];
         let run = Example::new(&mapped, csv).run();
         run.diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
     };
@@ -33,9 +33,9 @@ fn what_a_run_lacks_altogether_is_diagnosed() {
 
 #[test]
 fn under_traction_only_a_brake_that_is_not_recorded_or_wrong_spoils_nothing() {
-    let traction = ("traction_force", "F", "kN");
-    let brake = ("brake_force", "B", "kN");
-    let forces = |mapped: &[(&str, &str, &str)], csv: &str| {
+    let traction = ["traction_force", "F", "kN"];
+    let brake = ["brake_force", "B", "kN"];
+    let forces = |mapped: &[[&str; 3]], csv: &str| {
         let mut dataset = Example::new(mapped, csv).load().unwrap();
         dataset.keep_traction_only();
         let of = |field| dataset.runs[0].samples.iter().map(|it| it.get(field)).collect::<Vec<_>>();

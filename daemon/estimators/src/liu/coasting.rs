@@ -9,7 +9,7 @@
 
 use dynocar_core::filter::FittedLine;
 use dynocar_core::pipeline::momentum::{
-    Columns, DataSettings, PARAMETERS, SPEED_SCALE_MPS, SpeedWatch, UnitSample,
+    DataSettings, MomentumColumns, PARAMETERS, SPEED_SCALE_MPS, SpeedWatch, UnitSample,
     resistance_integral, trapezoids,
 };
 use dynocar_core::pipeline::motion::SpeedNoise;
@@ -46,7 +46,7 @@ struct Chain {
     integral: [f64; 1 + PARAMETERS],
     half_before: Option<Half>,
     half: Option<Half>,
-    row_before: Option<Columns>,
+    row_before: Option<MomentumColumns>,
 }
 
 /// Builds [`CoastingSegment`]s from samples.
@@ -184,8 +184,8 @@ impl Half {
     }
 
     /// The slopes over this half and the next.
-    fn slopes(&self, next: &Half) -> Option<Columns> {
-        let mut row = Columns::zeros();
+    fn slopes(&self, next: &Half) -> Option<MomentumColumns> {
+        let mut row = MomentumColumns::zeros();
         for column in 0..1 + PARAMETERS {
             row[column] = self.columns[column].joined(&next.columns[column]).slope()?;
         }

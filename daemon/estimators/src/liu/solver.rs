@@ -4,7 +4,7 @@ use dynocar_core::filter::{Gaussian, Mils, NotPositiveDefinite, Penalty, Rls};
 use dynocar_core::pipeline::momentum::{DataSettings, PARAMETERS, UNKNOWNS};
 
 use crate::resistance::noise_bank::NoiseBank;
-use crate::resistance::regression::{Solution, Unknowns, WhiteRow};
+use crate::resistance::regression::{RegressionSolution, Unknowns, WhiteRow};
 use crate::resistance::settings::{INNOVATION_LENGTH_MAX, MilsSettings, RlsSettings};
 
 /// One of the paper's algorithms.
@@ -93,7 +93,9 @@ impl Solver {
     /// Goes on from the bank's likeliest member, whose rows were whitened otherwise than the
     /// ones taken in so far.
     pub fn restart(&mut self, bank: &NoiseBank) {
-        let Some(Solution { estimate, covariance }) = bank.likeliest_solution() else { return };
+        let Some(RegressionSolution { estimate, covariance }) = bank.likeliest_solution() else {
+            return;
+        };
         match self {
             Solver::Batch => {}
             Solver::Rls(rls) => rls.belief = Gaussian { mean: estimate, covariance },
@@ -109,12 +111,12 @@ impl Solver {
     }
 
     /// The solution so far; `None` while there is none.
-    pub fn solution(&self, bank: &NoiseBank) -> Option<Solution> {
+    pub fn solution(&self, bank: &NoiseBank) -> Option<RegressionSolution> {
         let (estimate, covariance) = match self {
             Solver::Batch => return bank.mixture,
             Solver::Rls(rls) => (rls.belief.mean, rls.belief.covariance),
             Solver::Mils { recursion, .. } => (*recursion.estimate(), recursion.covariance()),
         };
-        bank.widened(&Solution { estimate, covariance })
+        bank.widened(&RegressionSolution { estimate, covariance })
     }
 }

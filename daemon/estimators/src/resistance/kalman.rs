@@ -20,8 +20,8 @@ use nalgebra::{SMatrix, SVector};
 
 use super::least_squares::ResistanceLeastSquares;
 use super::noise_bank::LikeliestNoise;
-use super::regression::{AffineMotion, Solution};
-use super::report::Report;
+use super::regression::{AffineMotion, RegressionSolution};
+use super::report::ResistanceReport;
 use super::settings::KalmanSettings;
 
 const SPEED: usize = 0;
@@ -60,7 +60,7 @@ pub struct ResistanceKalman {
     /// Speeds in a row that speak against the filter, with the sign of their side.
     consecutive_outliers: i32,
     monitor: InnovationMonitor,
-    report: Report,
+    report: ResistanceReport,
     resets: u64,
 }
 
@@ -244,7 +244,7 @@ impl ResistanceKalman {
 
     /// Goes on with another solution, and with the speed and the disturbance that belong to it;
     /// where the least squares do not know them, they stay what they are for given unknowns.
-    fn take_over(&mut self, solution: &Solution) {
+    fn take_over(&mut self, solution: &RegressionSolution) {
         let Some(motion) = self.least_squares.motion().or_else(|| self.own_motion()) else {
             self.reset();
             return;
@@ -289,8 +289,8 @@ impl ResistanceKalman {
         (self.filter.mean[DISTURBANCE], variance.max(0.0).sqrt())
     }
 
-    fn solution(&self) -> Solution {
-        Solution {
+    fn solution(&self) -> RegressionSolution {
+        RegressionSolution {
             estimate: self.filter.mean.fixed_rows::<UNKNOWNS>(FIRST_UNKNOWN).into_owned(),
             covariance: self
                 .filter
@@ -308,7 +308,7 @@ impl ResistanceKalman {
     }
 }
 
-fn filter_at(solution: &Solution) -> Gaussian<STATES> {
+fn filter_at(solution: &RegressionSolution) -> Gaussian<STATES> {
     let mut mean = State::zeros();
     let mut covariance = SMatrix::<f64, STATES, STATES>::identity();
     mean.fixed_rows_mut::<UNKNOWNS>(FIRST_UNKNOWN).copy_from(&solution.estimate);

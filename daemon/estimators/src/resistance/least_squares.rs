@@ -11,9 +11,11 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason};
 use nalgebra::{Matrix3, SMatrix};
 
 use super::noise_bank::NoiseBank;
-use super::regression::{AffineMotion, Observation, Solution, Unknowns, WhiteRow};
-use super::report::{DrivenSpeeds, Evidence, Report};
-use super::source::RowSource;
+use super::observation_source::RowSource;
+use super::regression::{
+    AffineMotion, RegressionObservation, RegressionSolution, Unknowns, WhiteRow,
+};
+use super::report::{DrivenSpeeds, ResistanceReport, SolutionEvidence};
 use crate::liu::solver::{Solver, bank_penalty};
 
 /// Rows that the innovation statistics look back over.
@@ -43,15 +45,15 @@ pub struct ResistanceLeastSquares {
     fresh: Solver,
     solver: Solver,
     /// The declared resistance as a start.
-    pub(super) declared: Solution,
-    solution: Option<Solution>,
+    pub(super) declared: RegressionSolution,
+    solution: Option<RegressionSolution>,
     known: Davis,
     monitor: InnovationMonitor,
     deviations: RunningMedian<SCALE_ROWS>,
     refused_share: f64,
     speeds: DrivenSpeeds,
     /// The report on its own solution.
-    pub(super) report: Report,
+    pub(super) report: ResistanceReport,
     obstacle: Option<Reason>,
     refused_in_a_row: u32,
     /// How far the disturbance has been let go by the newest sample.
@@ -88,7 +90,7 @@ impl ResistanceLeastSquares {
             deviations: RunningMedian::default(),
             refused_share: 0.0,
             speeds: DrivenSpeeds::default(),
-            report: Report::unestimated(&declared, Reason::TooFewSamples),
+            report: ResistanceReport::unestimated(&declared, Reason::TooFewSamples),
             obstacle: None,
             refused_in_a_row: 0,
             jump_n_per_kn: None,
@@ -101,12 +103,12 @@ impl ResistanceLeastSquares {
     /// The innovation of a row over its standard deviation.
     fn normalised(&self, row: &WhiteRow) -> f64 {
         let own = self.solution.filter(|_| self.is_warm());
-        let Solution { estimate, covariance } = own.unwrap_or(self.declared);
+        let RegressionSolution { estimate, covariance } = own.unwrap_or(self.declared);
         let variance = 1.0 + row.features.dot(&(covariance * row.features));
         (row.observed - row.features.dot(&estimate)) / variance.sqrt()
     }
 
-    fn take(&mut self, observation: &Observation, speed_mps: f64) -> Outcome {
+    fn take(&mut self, observation: &RegressionObservation, speed_mps: f64) -> Outcome {
         if observation.is_first() {
             self.monitor.break_here();
             self.solver.skip();
@@ -143,7 +145,7 @@ impl ResistanceLeastSquares {
 
     /// Leaves a row out. After a few in a row it is a force that has come to stay: the
     /// disturbance is let go, and the next rows show how large it is.
-    fn refuse(&mut self, observation: &Observation, row: &WhiteRow) {
+    fn refuse(&mut self, observation: &RegressionObservation, row: &WhiteRow) {
         self.bank.refuse(observation);
         self.solver.skip();
         self.monitor.break_here();
@@ -192,11 +194,11 @@ impl ResistanceLeastSquares {
     /// deviation in N/kN.
     pub(super) fn judged(
         &self,
-        solution: &Solution,
+        solution: &RegressionSolution,
         monitor: &InnovationMonitor,
         disturbance: (f64, f64),
-    ) -> Option<Report> {
-        let evidence = Evidence {
+    ) -> Option<ResistanceReport> {
+        let evidence = SolutionEvidence {
             disturbed: self.bank.disturbed(),
             disturbance_n_per_kn: disturbance.0,
             disturbance_std_n_per_kn: disturbance.1,
@@ -205,7 +207,7 @@ impl ResistanceLeastSquares {
             rows: self.bank.count(),
             refused_share: self.refused_share,
         };
-        Report::judge(solution, &evidence)
+        ResistanceReport::judge(solution, &evidence)
     }
 
     fn judge(&mut self) {
@@ -232,7 +234,7 @@ impl ResistanceLeastSquares {
         self.solution = None;
         self.source.break_chain();
         self.resets += 1;
-        self.report = Report::unestimated(&self.declared, Reason::NumericalFailure);
+        self.report = ResistanceReport::unestimated(&self.declared, Reason::NumericalFailure);
     }
 }
 
@@ -240,7 +242,7 @@ impl ResistanceLeastSquares {
     /// Writes a report on these samples; returns the judgement.
     pub(super) fn write_with(
         &self,
-        report: &Report,
+        report: &ResistanceReport,
         monitor: &InnovationMonitor,
         snapshot: &mut ParameterSnapshot,
     ) -> Judgement {
@@ -319,14 +321,14 @@ impl Estimator for ResistanceLeastSquares {
         let mut block = self.declared.covariance.fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0);
         block.copy_from(&covariance);
         self.known = Davis { a: davis[0], b: davis[1], c: davis[2] };
-        self.report = Report::unestimated(&self.declared, Reason::TooFewSamples);
+        self.report = ResistanceReport::unestimated(&self.declared, Reason::TooFewSamples);
         true
     }
 }
 
 /// The declared resistance as a start, trusted to half its value and 1 N/kN; the forces as the
 /// settings trust them.
-fn declared_solution(train: &TrainModel, settings: &DataSettings) -> Solution {
+fn declared_solution(train: &TrainModel, settings: &DataSettings) -> RegressionSolution {
     let declared = scaled(&train.resistance);
     let forces = bank_penalty(settings, 0.0);
     let estimate = Unknowns::from_fn(|i, _| if i < PARAMETERS { declared[i] } else { 0.0 });
@@ -334,5 +336,5 @@ fn declared_solution(train: &TrainModel, settings: &DataSettings) -> Solution {
         true => (1.0 + 0.5 * declared[i].abs()).powi(2),
         false => 1.0 / forces[i],
     });
-    Solution { estimate, covariance: SMatrix::from_diagonal(&variances) }
+    RegressionSolution { estimate, covariance: SMatrix::from_diagonal(&variances) }
 }

@@ -13,10 +13,10 @@
 mod kalman;
 mod least_squares;
 pub(crate) mod noise_bank;
+mod observation_source;
 pub(crate) mod regression;
 mod report;
 pub mod settings;
-mod source;
 #[cfg(test)]
 pub(crate) mod test_runs;
 #[cfg(test)]

@@ -10,7 +10,8 @@ use dynocar_core::filter::bank::{Bank, Mixture};
 use dynocar_core::pipeline::momentum::{Disturbance, PARAMETERS, SinceBlock, gap_s};
 
 use super::regression::{
-    AffineMotion, Observation, PRIOR_ROWS, RegressionNoise, Solution, Unknowns, WhiteRow,
+    AffineMotion, PRIOR_ROWS, RegressionNoise, RegressionObservation, RegressionSolution, Unknowns,
+    WhiteRow,
 };
 
 /// Standard deviations of the disturbance in N/kN: from nothing to as large as resistance itself.
@@ -56,13 +57,13 @@ pub struct NoiseBank {
     /// Their probabilities.
     shares: [f64; MODELS],
     /// Solutions of those that matter, after the newest row.
-    solutions: [Option<Solution>; MODELS],
+    solutions: [Option<RegressionSolution>; MODELS],
     penalty: Unknowns,
     forgetting: f64,
     rows_since_renewal: u32,
     last_time_ns: Option<i64>,
     /// The mixture of all models; `None` while the rows do not determine the parameters.
-    pub mixture: Option<Solution>,
+    pub mixture: Option<RegressionSolution>,
 }
 
 impl NoiseBank {
@@ -109,7 +110,7 @@ impl NoiseBank {
     /// # Real-time
     ///
     /// Bounded work, no allocation.
-    pub fn predict(&mut self, observation: &Observation) -> Option<WhiteRow> {
+    pub fn predict(&mut self, observation: &RegressionObservation) -> Option<WhiteRow> {
         let gap_s = gap_s(&mut self.last_time_ns, observation.time_ns());
         for model in self.models.hypotheses_mut() {
             match observation.is_first() {
@@ -118,7 +119,7 @@ impl NoiseBank {
             }
         }
         match observation {
-            Observation::Block(block) if block.is_first => None,
+            RegressionObservation::Block(block) if block.is_first => None,
             _ => self.models.likeliest().row(observation),
         }
     }
@@ -129,7 +130,7 @@ impl NoiseBank {
     /// # Real-time
     ///
     /// One small factorisation for each model of weight, no allocation.
-    pub fn accept(&mut self, observation: &Observation) -> bool {
+    pub fn accept(&mut self, observation: &RegressionObservation) -> bool {
         let seen = observation.sighting();
         for model in self.models.hypotheses_mut() {
             model.accept(&seen, self.forgetting);
@@ -148,8 +149,8 @@ impl NoiseBank {
 
     /// Goes on without the predicted observation: as the start of a new chain for a block,
     /// whose momentum may have truly changed.
-    pub fn refuse(&mut self, observation: &Observation) {
-        if matches!(observation, Observation::Block(_)) {
+    pub fn refuse(&mut self, observation: &RegressionObservation) {
+        if matches!(observation, RegressionObservation::Block(_)) {
             for model in self.models.hypotheses_mut() {
                 model.restart(observation, Some(0.0));
             }
@@ -169,7 +170,7 @@ impl NoiseBank {
     }
 
     /// The likeliest model's own solution; `None` while the rows do not determine it.
-    pub fn likeliest_solution(&self) -> Option<Solution> {
+    pub fn likeliest_solution(&self) -> Option<RegressionSolution> {
         let cached = self.solutions[self.models.likeliest_index()];
         cached.or_else(|| self.models.likeliest().solution())
     }
@@ -201,8 +202,8 @@ impl NoiseBank {
     /// reached for them too would be too wide in the other 99 cases of 100. Nor is it widened
     /// for the rows' scale, since the filter takes the noise of its speeds from the scatter of
     /// all samples, which are many times as many as the rows.
-    pub fn widened(&self, solution: &Solution) -> Option<Solution> {
-        let davis = |solution: &Solution| {
+    pub fn widened(&self, solution: &RegressionSolution) -> Option<RegressionSolution> {
+        let davis = |solution: &RegressionSolution| {
             solution.covariance.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into_owned()
         };
         let mixed = davis(&self.mix(CREDIBLE, 1.0)?).cholesky()?.unpack();
@@ -214,7 +215,7 @@ impl NoiseBank {
         covariance
             .fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0)
             .copy_from(&(wide * wide.transpose()));
-        Some(Solution { estimate: solution.estimate, covariance })
+        Some(RegressionSolution { estimate: solution.estimate, covariance })
     }
 
     /// The slow force that the model does not know, over all models.
@@ -233,7 +234,7 @@ impl NoiseBank {
 
     /// The mixture of the likeliest models that together have so much of the probability, each
     /// covariance times a factor.
-    fn mix(&self, probability: f64, factor: f64) -> Option<Solution> {
+    fn mix(&self, probability: f64, factor: f64) -> Option<RegressionSolution> {
         let mut order: [usize; MODELS] = std::array::from_fn(|index| index);
         order.sort_unstable_by(|&i, &j| self.shares[j].total_cmp(&self.shares[i]));
         let mut mixture = Mixture::default();
@@ -246,7 +247,7 @@ impl NoiseBank {
             mixture.add(weight, &own.estimate, &(own.covariance * factor));
         }
         let Gaussian { mean: estimate, covariance } = mixture.belief;
-        (mixture.weight > 0.0).then_some(Solution { estimate, covariance })
+        (mixture.weight > 0.0).then_some(RegressionSolution { estimate, covariance })
     }
 
     fn weigh(&mut self) {
@@ -296,23 +297,23 @@ fn log_prior(index: usize) -> f64 {
 mod tests {
     use super::super::test_runs::normal;
     use super::*;
-    use dynocar_core::pipeline::momentum::{Columns, MomentumBlock};
+    use dynocar_core::pipeline::momentum::{MomentumBlock, MomentumColumns};
     use rand::{RngExt, SeedableRng};
 
     /// Blocks of 5 s with a disturbance and white noise; w0 = 2 + 0.5 (v/20) + 1 (v/20)².
-    fn blocks(count: usize, disturbance: Disturbance, noise: f64) -> Vec<Observation> {
+    fn blocks(count: usize, disturbance: Disturbance, noise: f64) -> Vec<RegressionObservation> {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(6);
         let kept = (-5.0 / disturbance.time_s).exp();
         let (mut momentum, mut force) = (500.0, disturbance.std_n_per_kn * normal(&mut random));
         (0..count)
             .map(|index| {
                 let v = 0.2 + random.random::<f64>();
-                let mut impulse = Columns::zeros();
+                let mut impulse = MomentumColumns::zeros();
                 (impulse[1], impulse[2], impulse[3]) = (5.0, 5.0 * v, 5.0 * v * v);
                 momentum -= impulse[1] * (2.0 + force) + 0.5 * impulse[2] + impulse[3];
                 force = kept * force
                     + disturbance.std_n_per_kn * (1.0 - kept * kept).sqrt() * normal(&mut random);
-                Observation::Block(MomentumBlock {
+                RegressionObservation::Block(MomentumBlock {
                     is_first: index == 0,
                     momentum: momentum + noise * normal(&mut random),
                     momentum_variance: noise * noise,
@@ -325,7 +326,7 @@ mod tests {
             .collect()
     }
 
-    fn after(blocks: &[Observation]) -> NoiseBank {
+    fn after(blocks: &[RegressionObservation]) -> NoiseBank {
         let mut bank = NoiseBank::new(&Unknowns::repeat(1e-3), 1.0);
         for block in blocks {
             if bank.predict(block).is_some() {
@@ -364,7 +365,7 @@ mod tests {
     fn a_refused_block_leaves_no_trace_in_the_rows() {
         let none = Disturbance { std_n_per_kn: 0.0, time_s: 10.0 };
         let mut blocks = blocks(300, none, 0.4);
-        let Observation::Block(bad) = &mut blocks[150] else { panic!("blocks only") };
+        let RegressionObservation::Block(bad) = &mut blocks[150] else { panic!("blocks only") };
         bad.momentum += 1000.0;
         let mut bank = NoiseBank::new(&Unknowns::repeat(1e-3), 1.0);
         for (index, block) in blocks.iter().enumerate() {

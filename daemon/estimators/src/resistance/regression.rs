@@ -3,8 +3,8 @@
 
 use dynocar_core::filter::{Propagation, Sighting, SquareRootInformation, Whitener};
 use dynocar_core::pipeline::momentum::{
-    COLUMNS, Columns, DISTURBANCE, Disturbance, MOMENTUM, MomentumBlock, STATES, SinceBlock,
-    UNKNOWNS, momentum_seen,
+    COLUMNS, DISTURBANCE, Disturbance, MOMENTUM, MomentumBlock, MomentumColumns, STATES,
+    SinceBlock, UNKNOWNS, momentum_seen,
 };
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
@@ -15,7 +15,7 @@ pub type RowWhitener = Whitener<STATES, COLUMNS>;
 
 /// Estimate of the unknowns with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solution {
+pub struct RegressionSolution {
     /// The unknowns.
     pub estimate: Unknowns,
     /// Covariance for intervals by the normal distribution.
@@ -39,9 +39,9 @@ pub struct CoastingSegment {
     /// True when it shares its first half with no segment before it.
     pub is_first: bool,
     /// Resistance after known forces in N/kN, then the mean regressors with the slope's weights.
-    pub row: Columns,
+    pub row: MomentumColumns,
     /// The row of the segment before, which shares half of the samples; unused in the first.
-    pub row_before: Columns,
+    pub row_before: MomentumColumns,
     /// Variance of the resistance by the noise of the speed.
     pub variance: f64,
     /// Time in s from the segment before.
@@ -54,7 +54,7 @@ pub struct CoastingSegment {
 
 /// One observation of the regression, of either source.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Observation {
+pub enum RegressionObservation {
     /// From measured forces.
     Block(MomentumBlock),
     /// From coasting.
@@ -65,20 +65,20 @@ pub enum Observation {
 /// average of new errors, `e_k + OVERLAP e_{k-1}`: OVERLAP / (1 + OVERLAP²) = -1/4.
 const OVERLAP: f64 = -0.267_949_192_431_122_7;
 
-impl Observation {
+impl RegressionObservation {
     /// True when nothing before it is connected with it.
     pub fn is_first(&self) -> bool {
         match self {
-            Observation::Block(block) => block.is_first,
-            Observation::Segment(segment) => segment.is_first,
+            RegressionObservation::Block(block) => block.is_first,
+            RegressionObservation::Segment(segment) => segment.is_first,
         }
     }
 
     /// Time of the newest sample in ns.
     pub fn time_ns(&self) -> i64 {
         match self {
-            Observation::Block(block) => block.time_ns,
-            Observation::Segment(segment) => segment.time_ns,
+            RegressionObservation::Block(block) => block.time_ns,
+            RegressionObservation::Segment(segment) => segment.time_ns,
         }
     }
 
@@ -91,20 +91,20 @@ impl Observation {
         gap_s: Option<f64>,
     ) -> Propagation<STATES, COLUMNS> {
         match self {
-            Observation::Block(block) => {
+            RegressionObservation::Block(block) => {
                 disturbance.across_gap(gap_s, block.momentum, block.momentum_variance)
             }
-            Observation::Segment(_) => disturbance.decay(gap_s.unwrap_or(f64::INFINITY)),
+            RegressionObservation::Segment(_) => disturbance.decay(gap_s.unwrap_or(f64::INFINITY)),
         }
     }
 
     /// How the error moves from the observation before to this one.
     pub fn propagation(&self, disturbance: &Disturbance) -> Propagation<STATES, COLUMNS> {
         match self {
-            Observation::Block(block) => {
+            RegressionObservation::Block(block) => {
                 disturbance.over_impulse(block.impulse[1], &block.impulse, block.impulse_variance)
             }
-            Observation::Segment(segment) => {
+            RegressionObservation::Segment(segment) => {
                 // The new error of the row before is that row less its other parts.
                 let mut step: Propagation<STATES, COLUMNS> = disturbance.decay(segment.step_s);
                 step.transition[(MOMENTUM, MOMENTUM)] = -OVERLAP;
@@ -118,8 +118,10 @@ impl Observation {
     /// Returns the observation of the error.
     pub fn sighting(&self) -> Sighting<STATES, COLUMNS> {
         match self {
-            Observation::Block(block) => momentum_seen(block.momentum, block.momentum_variance),
-            Observation::Segment(segment) => Sighting {
+            RegressionObservation::Block(block) => {
+                momentum_seen(block.momentum, block.momentum_variance)
+            }
+            RegressionObservation::Segment(segment) => Sighting {
                 direction: Vector2::new(1.0, 1.0),
                 observed: segment.row,
                 variance: segment.variance / (1.0 + OVERLAP * OVERLAP),
@@ -172,12 +174,12 @@ impl RegressionNoise {
     }
 
     /// Moves to the next observation of a chain.
-    pub fn propagate(&mut self, observation: &Observation) {
+    pub fn propagate(&mut self, observation: &RegressionObservation) {
         self.whitener.propagate(&observation.propagation(&self.disturbance));
     }
 
     /// Moves to the first observation of a chain, so long after the last; unknown when `None`.
-    pub fn restart(&mut self, observation: &Observation, gap_s: Option<f64>) {
+    pub fn restart(&mut self, observation: &RegressionObservation, gap_s: Option<f64>) {
         self.whitener.propagate(&observation.restart(&self.disturbance, gap_s));
     }
 
@@ -189,7 +191,7 @@ impl RegressionNoise {
 
     /// The row of an observation that the model has moved to; `None` when its variance is not
     /// sound.
-    pub fn row(&self, observation: &Observation) -> Option<WhiteRow> {
+    pub fn row(&self, observation: &RegressionObservation) -> Option<WhiteRow> {
         let row = self.whitener.row(&observation.sighting())?;
         let columns = row.columns / self.scale().sqrt();
         let features = columns.fixed_rows::<UNKNOWNS>(1).into_owned();
@@ -225,10 +227,10 @@ impl RegressionNoise {
     }
 
     /// Generalised least squares with its covariance; `None` while undetermined.
-    pub fn solution(&self) -> Option<Solution> {
+    pub fn solution(&self) -> Option<RegressionSolution> {
         let estimate = self.information.solve().ok()?;
         let covariance = self.information.covariance().ok()? * self.scale();
-        Some(Solution { estimate, covariance })
+        Some(RegressionSolution { estimate, covariance })
     }
 
     /// Speed and disturbance now, so long after the newest block.

@@ -3,7 +3,7 @@
 use dynocar_core::filter::bounded_minimum;
 use dynocar_core::pipeline::InnovationMonitor;
 use dynocar_core::pipeline::admission::limits::UNFIT_SHARE;
-use dynocar_core::pipeline::judge::Case;
+use dynocar_core::pipeline::judge::StatusInputs;
 use dynocar_core::pipeline::momentum::{PARAMETERS, SPEED_SCALE_MPS, regressors, unscaling};
 use dynocar_core::pipeline::motion::SpeedRange;
 use dynocar_core::pipeline::output::excitation;
@@ -12,7 +12,7 @@ use dynocar_shared::{Manoeuvre, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 
 use super::noise_bank::Disturbed;
-use super::regression::Solution;
+use super::regression::RegressionSolution;
 
 /// Rows before anything is called estimated.
 const ROWS_MIN: f64 = 12.0;
@@ -61,7 +61,7 @@ const INTEGRATION_SHARE_STD: f64 = 1e-4;
 
 /// Evidence for and against a solution.
 #[derive(Clone, Copy, Debug)]
-pub struct Evidence<'a> {
+pub struct SolutionEvidence<'a> {
     /// The slow force that the model does not know, over all rows.
     pub disturbed: Disturbed,
     /// That force now, retarding, in N/kN.
@@ -80,7 +80,7 @@ pub struct Evidence<'a> {
 
 /// Resistance as a snapshot reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report {
+pub struct ResistanceReport {
     /// Status of the estimate for a controller.
     pub status: Status,
     /// Why.
@@ -95,10 +95,10 @@ pub struct Report {
     pub missing_manoeuvres: u32,
 }
 
-impl Report {
+impl ResistanceReport {
     /// Before any estimate: the declared resistance, hardly trusted.
-    pub fn unestimated(declared: &Solution, reason: Reason) -> Self {
-        Report {
+    pub fn unestimated(declared: &RegressionSolution, reason: Reason) -> Self {
+        ResistanceReport {
             status: Status::Unestimated,
             reason,
             estimate: declared.estimate.fixed_rows::<PARAMETERS>(0).into_owned(),
@@ -113,7 +113,7 @@ impl Report {
     /// # Real-time
     ///
     /// A few factorisations of order 3, no allocation.
-    pub fn judge(solution: &Solution, evidence: &Evidence) -> Option<Self> {
+    pub fn judge(solution: &RegressionSolution, evidence: &SolutionEvidence) -> Option<Self> {
         let free = solution.estimate.fixed_rows::<PARAMETERS>(0).into_owned();
         let covariance =
             solution.covariance.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into_owned();
@@ -132,7 +132,7 @@ impl Report {
         let case = case(evidence, at(speeds.mean_mps()), excited, bounded.at_bound != 0);
         let (status, reason) = case.verdict();
         let (excited, missing_manoeuvres) = excitation(excited);
-        Some(Report { status, reason, estimate, covariance, excited, missing_manoeuvres })
+        Some(ResistanceReport { status, reason, estimate, covariance, excited, missing_manoeuvres })
     }
 
     /// Davis coefficients.
@@ -144,19 +144,19 @@ impl Report {
 
 /// All that the judge asks for, by w0 at the mean speed with its standard deviation.
 fn case(
-    evidence: &Evidence,
+    evidence: &SolutionEvidence,
     (w0, w0_std): (f64, f64),
     excited: [bool; PARAMETERS],
     is_at_bound: bool,
-) -> Case {
-    let Evidence { disturbed, innovations, .. } = evidence;
+) -> StatusInputs {
+    let SolutionEvidence { disturbed, innovations, .. } = evidence;
     let now = evidence.disturbance_n_per_kn.abs();
     let has_structure = disturbed.std_n_per_kn > DISTURBANCE_SHARE_MAX * w0
         && disturbed.evidence > DISTURBANCE_EVIDENCE_MIN;
     let is_disturbed = now > DISTURBANCE_SHARE_MAX * w0
         && now > DISTURBANCE_STDS_MAX * evidence.disturbance_std_n_per_kn;
     let is_too_large = innovations.are_too_large() || is_disturbed;
-    Case {
+    StatusInputs {
         fault: None,
         input: (evidence.refused_share > UNFIT_SHARE.high).then_some(Reason::BadInput),
         is_ready: evidence.rows >= ROWS_MIN,
@@ -190,10 +190,12 @@ mod tests {
     fn judged(
         estimate: [f64; 3],
         stds: [f64; 3],
-        change: impl FnOnce(&mut Evidence<'_>),
-    ) -> Report {
-        let mut solution =
-            Solution { estimate: nalgebra::zero(), covariance: SMatrix::identity() * 1e-4 };
+        change: impl FnOnce(&mut SolutionEvidence<'_>),
+    ) -> ResistanceReport {
+        let mut solution = RegressionSolution {
+            estimate: nalgebra::zero(),
+            covariance: SMatrix::identity() * 1e-4,
+        };
         for i in 0..PARAMETERS {
             solution.estimate[i] = estimate[i];
             solution.covariance[(i, i)] = stds[i] * stds[i];
@@ -202,7 +204,7 @@ mod tests {
         let mut speeds = DrivenSpeeds::default();
         speeds.push(5.0);
         speeds.push(30.0);
-        let mut evidence = Evidence {
+        let mut evidence = SolutionEvidence {
             disturbed: Disturbed { std_n_per_kn: 0.02, evidence: 50.0 },
             disturbance_n_per_kn: 0.0,
             disturbance_std_n_per_kn: 0.1,
@@ -212,7 +214,7 @@ mod tests {
             refused_share: 0.0,
         };
         change(&mut evidence);
-        Report::judge(&solution, &evidence).unwrap()
+        ResistanceReport::judge(&solution, &evidence).unwrap()
     }
 
     const GOOD: [f64; 3] = [1.5, 0.4, 1.2];
@@ -220,7 +222,7 @@ mod tests {
 
     #[test]
     fn every_reservation_has_its_reason() {
-        let reason = |report: Report| (report.status, report.reason);
+        let reason = |report: ResistanceReport| (report.status, report.reason);
         assert_eq!(reason(judged(GOOD, SMALL, |_| {})), (Status::Estimated, Reason::None));
         let few = judged(GOOD, SMALL, |evidence| evidence.rows = 5.0);
         assert_eq!(reason(few), (Status::Unestimated, Reason::TooFewSamples));

@@ -17,7 +17,7 @@ const TICK_S: f64 = 0.05;
 
 /// Simulated scenario; forces in N/kN.
 #[derive(Clone, Copy, Debug)]
-pub struct Scenario {
+pub struct RunScenario {
     pub davis: Davis,
     pub rotating_mass_factor: f64,
     pub speed_max_mps: f64,
@@ -33,9 +33,9 @@ pub struct Scenario {
     pub seed: u64,
 }
 
-impl Default for Scenario {
+impl Default for RunScenario {
     fn default() -> Self {
-        Scenario {
+        RunScenario {
             davis: Davis { a: 1.8, b: 0.03, c: 0.0035 },
             rotating_mass_factor: 0.06,
             speed_max_mps: 28.0,
@@ -84,7 +84,7 @@ pub fn driven(davis: &Davis, speed_mps: f64, driving: f64, step_s: f64) -> Vec<U
         .collect()
 }
 
-impl Scenario {
+impl RunScenario {
     /// The train as declared: with another resistance than the true one.
     pub fn train(&self) -> Arc<TrainModel> {
         let Davis { a, b, c } = self.davis;

@@ -5,7 +5,7 @@ use dynocar_shared::{
     Manoeuvre, ParameterSnapshot, Reason, RejectionReason, SampleField, Status, TrainSample,
 };
 
-use super::test_runs::Scenario;
+use super::test_runs::RunScenario;
 use crate::EstimatorSettings;
 
 const KINDS: [&str; 6] = ["ls", "rls", "regularised_rls", "mils", "v_mils", "resistance_kalman"];
@@ -14,7 +14,7 @@ fn kind(name: &str) -> String {
     format!("kind = \"{name}\"")
 }
 
-fn assert_close(scenario: &Scenario, snapshot: &ParameterSnapshot, tolerance: f64, what: &str) {
+fn assert_close(scenario: &RunScenario, snapshot: &ParameterSnapshot, tolerance: f64, what: &str) {
     for speed_mps in [10.0, 15.0, 20.0, 25.0] {
         let error = scenario.relative_error(snapshot, speed_mps);
         let normalised = scenario.normalised_error(snapshot, speed_mps);
@@ -28,7 +28,7 @@ fn assert_close(scenario: &Scenario, snapshot: &ParameterSnapshot, tolerance: f6
 
 #[test]
 fn every_kind_finds_the_resistance_of_a_driven_train() {
-    let scenario = Scenario::default();
+    let scenario = RunScenario::default();
     for name in KINDS {
         let snapshot = scenario.identify(&kind(name));
         assert_eq!(snapshot.status(), Status::Estimated, "{name}");
@@ -39,7 +39,7 @@ fn every_kind_finds_the_resistance_of_a_driven_train() {
 
 #[test]
 fn every_kind_finds_it_from_one_sample_a_second() {
-    let scenario = Scenario { step_s: 1.0, quantum_mps: 0.1 / 3.6, ..Scenario::default() };
+    let scenario = RunScenario { step_s: 1.0, quantum_mps: 0.1 / 3.6, ..RunScenario::default() };
     for name in KINDS {
         assert_close(&scenario, &scenario.identify(&kind(name)), 0.04, name);
     }
@@ -47,7 +47,7 @@ fn every_kind_finds_it_from_one_sample_a_second() {
 
 #[test]
 fn coasting_segments_find_it_too() {
-    let scenario = Scenario { duration_s: 3600.0, ..Scenario::default() };
+    let scenario = RunScenario { duration_s: 3600.0, ..RunScenario::default() };
     for name in KINDS {
         let settings = format!("{}\ndata.source = \"coasting\"", kind(name));
         assert_close(&scenario, &scenario.identify(&settings), 0.06, name);
@@ -60,7 +60,8 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
     let mut total = 0;
     for seed in 0..40 {
         let disturbance_std = if seed % 2 == 0 { 0.0 } else { 0.08 };
-        let scenario = Scenario { seed, disturbance_std, duration_s: 900.0, ..Scenario::default() };
+        let scenario =
+            RunScenario { seed, disturbance_std, duration_s: 900.0, ..RunScenario::default() };
         let samples = scenario.samples();
         for (index, name) in KINDS.iter().enumerate() {
             let snapshot = scenario.identify_samples(&kind(name), &samples);
@@ -79,7 +80,7 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
 
 #[test]
 fn a_shift_of_the_forces_by_half_a_step_is_found_and_taken_off() {
-    let scenario = Scenario { step_s: 1.0, duration_s: 3600.0, ..Scenario::default() };
+    let scenario = RunScenario { step_s: 1.0, duration_s: 3600.0, ..RunScenario::default() };
     let mut samples = scenario.samples();
     // A logger that writes each force one sample late.
     for i in (1..samples.len()).rev() {
@@ -93,7 +94,7 @@ fn a_shift_of_the_forces_by_half_a_step_is_found_and_taken_off() {
 
 #[test]
 fn a_wrong_scale_of_the_forces_is_found_and_taken_off() {
-    let scenario = Scenario { force_scale: 1.03, duration_s: 3600.0, ..Scenario::default() };
+    let scenario = RunScenario { force_scale: 1.03, duration_s: 3600.0, ..RunScenario::default() };
     for name in ["ls", "resistance_kalman"] {
         assert_close(&scenario, &scenario.identify(&kind(name)), 0.03, name);
     }
@@ -101,7 +102,7 @@ fn a_wrong_scale_of_the_forces_is_found_and_taken_off() {
 
 #[test]
 fn spikes_of_the_speed_are_refused_and_do_no_harm() {
-    let scenario = Scenario { spike_share: 0.03, ..Scenario::default() };
+    let scenario = RunScenario { spike_share: 0.03, ..RunScenario::default() };
     for name in KINDS {
         let snapshot = scenario.identify(&kind(name));
         assert!(snapshot.rejected(RejectionReason::Outlier) > 100, "{name}");
@@ -112,7 +113,7 @@ fn spikes_of_the_speed_are_refused_and_do_no_harm() {
 #[test]
 fn a_slow_force_that_the_model_does_not_know_is_flagged() {
     let scenario =
-        Scenario { disturbance_std: 1.5, disturbance_time_s: 30.0, ..Scenario::default() };
+        RunScenario { disturbance_std: 1.5, disturbance_time_s: 30.0, ..RunScenario::default() };
     for name in KINDS {
         let snapshot = scenario.identify(&kind(name));
         assert_eq!(snapshot.status(), Status::Degraded, "{name}");
@@ -123,7 +124,7 @@ fn a_slow_force_that_the_model_does_not_know_is_flagged() {
 
 #[test]
 fn the_unexplained_force_follows_a_dragging_brake() {
-    let scenario = Scenario { duration_s: 1500.0, ..Scenario::default() };
+    let scenario = RunScenario { duration_s: 1500.0, ..RunScenario::default() };
     let mut samples = scenario.samples();
     let free = scenario.identify_samples(&kind("resistance_kalman"), &samples);
     let weight_kn = 200.0 * 9.81;
@@ -140,7 +141,7 @@ fn the_unexplained_force_follows_a_dragging_brake() {
 
 #[test]
 fn cruising_shows_the_resistance_there_and_says_what_is_missing() {
-    let scenario = Scenario { is_coasting_only: true, ..Scenario::default() };
+    let scenario = RunScenario { is_coasting_only: true, ..RunScenario::default() };
     let davis = scenario.davis;
     let mut samples = scenario.samples();
     // Level line, steady speed: traction equals the resistance.
@@ -170,9 +171,13 @@ fn cruising_shows_the_resistance_there_and_says_what_is_missing() {
 
 #[test]
 fn a_train_that_has_changed_is_believed_by_the_forgetting_recursion() {
-    let before = Scenario { duration_s: 3000.0, ..Scenario::default() };
-    let after =
-        Scenario { davis: Davis { a: 2.6, ..before.davis }, duration_s: 3000.0, seed: 2, ..before };
+    let before = RunScenario { duration_s: 3000.0, ..RunScenario::default() };
+    let after = RunScenario {
+        davis: Davis { a: 2.6, ..before.davis },
+        duration_s: 3000.0,
+        seed: 2,
+        ..before
+    };
     let mut samples = before.samples();
     let last = *samples.last().unwrap();
     samples.extend(after.samples().into_iter().map(|mut sample| {
@@ -182,7 +187,7 @@ fn a_train_that_has_changed_is_believed_by_the_forgetting_recursion() {
     }));
     // Two lines, one track file: the gradient travels with the samples instead.
     let fast = "kind = \"rls\"\nforgetting = 0.99";
-    let with_gradient = |scenario: &Scenario, samples: &mut [TrainSample]| {
+    let with_gradient = |scenario: &RunScenario, samples: &mut [TrainSample]| {
         let track = scenario.track();
         for sample in samples {
             let gradient = track.gradient_permille(sample.position_m, 100.0).unwrap();
@@ -201,7 +206,7 @@ fn a_train_that_has_changed_is_believed_by_the_forgetting_recursion() {
 
 #[test]
 fn without_forces_or_gradient_it_says_what_is_missing() {
-    let scenario = Scenario { duration_s: 60.0, ..Scenario::default() };
+    let scenario = RunScenario { duration_s: 60.0, ..RunScenario::default() };
     let mut samples = scenario.samples();
     for sample in &mut samples {
         sample.valid &= !SampleField::TractionForce.bit();
@@ -222,7 +227,7 @@ fn without_forces_or_gradient_it_says_what_is_missing() {
 
 #[test]
 fn a_train_that_stands_teaches_nothing() {
-    let scenario = Scenario { duration_s: 300.0, ..Scenario::default() };
+    let scenario = RunScenario { duration_s: 300.0, ..RunScenario::default() };
     let mut samples = scenario.samples();
     for sample in &mut samples {
         sample.speed_mps = 0.0;
@@ -240,7 +245,7 @@ fn a_train_that_stands_teaches_nothing() {
 
 #[test]
 fn hostile_samples_leave_no_number_that_is_not_finite() {
-    let scenario = Scenario { duration_s: 600.0, ..Scenario::default() };
+    let scenario = RunScenario { duration_s: 600.0, ..RunScenario::default() };
     let mut samples = scenario.samples();
     for (i, sample) in samples.iter_mut().enumerate() {
         match i % 97 {
@@ -269,7 +274,7 @@ fn hostile_samples_leave_no_number_that_is_not_finite() {
 
 #[test]
 fn samples_without_any_noise_break_no_factorisation() {
-    let scenario = Scenario { speed_std_mps: 0.0, quantum_mps: 0.0, ..Scenario::default() };
+    let scenario = RunScenario { speed_std_mps: 0.0, quantum_mps: 0.0, ..RunScenario::default() };
     for name in KINDS {
         let snapshot = scenario.identify(&kind(name));
         assert_eq!(snapshot.generation, 0, "{name}");
@@ -282,7 +287,7 @@ fn a_setting_that_is_misspelt_or_out_of_range_is_refused_by_name() {
     let misspelt = "kind = \"rls\"\nforgeting = 0.9";
     let error = toml::from_str::<EstimatorSettings>(misspelt).unwrap_err();
     assert!(error.message().contains("forgeting"), "{error}");
-    let train = Scenario::default().train();
+    let train = RunScenario::default().train();
     for (settings, key) in [
         ("kind = \"rls\"\nforgetting = 1.5", "forgetting"),
         ("kind = \"ls\"\nlambda = -1.0", "lambda"),

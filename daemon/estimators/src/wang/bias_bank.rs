@@ -10,8 +10,8 @@ use dynocar_core::pipeline::motion::{OutlierRow, Trust};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::bias_model::{BiasModel, MapError};
+use super::known_motion::{Inertia, KnownMotion};
 use super::line_resistance::LineResistance;
-use super::motion::{Inertia, Motion};
 
 /// Index of the speed in m/s in a filter's state.
 pub const SPEED: usize = 0;
@@ -37,14 +37,14 @@ pub struct Dynamics {
 impl Dynamics {
     /// Deceleration in m/s² by resistance and gradient, which does not depend on the mass.
     #[inline]
-    pub fn drag_mps2(&self, motion: &Motion, speed_mps: f64) -> f64 {
+    pub fn drag_mps2(&self, motion: &KnownMotion, speed_mps: f64) -> f64 {
         self.inertia.mps2_per_n_per_kn() * self.resistance.w_n_per_kn(motion, speed_mps)
     }
 }
 
 /// Mean and covariance of inverse mass and bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moments {
+pub struct MassBiasMoments {
     /// Reference mass over mass.
     pub inverse_mass: f64,
     /// Its variance.
@@ -117,7 +117,7 @@ impl BiasBank {
     }
 
     /// Lets the error of the map at a place into every bias of which nothing is known yet.
-    pub fn begin_on_map(&mut self, motion: &Motion) {
+    pub fn begin_on_map(&mut self, motion: &KnownMotion) {
         let map = MapError::over(motion, 0.0, self.dynamics.inertia.mps2_per_n_per_kn());
         for Behaviour { filter, model, .. } in self.behaviours.hypotheses_mut() {
             let std_mps2 = model.std_given_others_mps2(map.std_mps2, motion.speed_mps);
@@ -126,7 +126,7 @@ impl BiasBank {
     }
 
     /// Moves on by a step between two samples, with the force linear between them (Heun).
-    pub fn predict(&mut self, from: &Motion, to: &Motion, step_s: f64) {
+    pub fn predict(&mut self, from: &KnownMotion, to: &KnownMotion, step_s: f64) {
         let dynamics = &self.dynamics;
         let (push_from, push_to) =
             (dynamics.inertia.push_mps2(from), dynamics.inertia.push_mps2(to));
@@ -192,16 +192,16 @@ impl BiasBank {
     }
 
     /// Inverse mass and bias, averaged over the behaviours by their evidence.
-    pub fn moments(&self) -> Moments {
+    pub fn moments(&self) -> MassBiasMoments {
         self.averaged(|_| true)
     }
 
     /// The same of those behaviours alone that know of forces which jump between samples.
-    pub fn moments_after_a_jump(&self) -> Moments {
+    pub fn moments_after_a_jump(&self) -> MassBiasMoments {
         self.averaged(BiasModel::knows_of_jumps)
     }
 
-    fn averaged(&self, counts: impl Fn(&BiasModel) -> bool) -> Moments {
+    fn averaged(&self, counts: impl Fn(&BiasModel) -> bool) -> MassBiasMoments {
         let shares = self.behaviours.shares(|behaviour| counts(&behaviour.model));
         let mut mixture = Mixture::<2>::default();
         for (share, Behaviour { model, filter, .. }) in
@@ -222,7 +222,7 @@ impl BiasBank {
         let Gaussian { mean, covariance } = mixture.belief;
         let product = (covariance[(0, 0)] * covariance[(1, 1)]).sqrt();
         let correlation = covariance[(0, 1)] / product;
-        Moments {
+        MassBiasMoments {
             inverse_mass: mean[0],
             inverse_mass_variance: covariance[(0, 0)],
             bias_mps2: mean[1],
@@ -262,8 +262,8 @@ mod tests {
         }
     }
 
-    fn motion(k: i64, force_n: f64) -> Motion {
-        Motion {
+    fn motion(k: i64, force_n: f64) -> KnownMotion {
+        KnownMotion {
             time_ns: k * 200_000_000,
             segment: 1,
             speed_mps: 0.0,

@@ -3,7 +3,7 @@
 use dynocar_core::pipeline::motion::jump_variance;
 use dynocar_model::track::gradient_error_kept;
 
-use super::motion::Motion;
+use super::known_motion::KnownMotion;
 
 /// Speed in m/s at which the bias of a behaviour that grows with speed is stated.
 const GROWTH_REFERENCE_MPS: f64 = 20.0;
@@ -22,7 +22,7 @@ pub struct MapError {
 impl MapError {
     /// Over a step in s that begins with a motion; `mps2_per_permille` turns gradients into
     /// accelerations.
-    pub fn over(motion: &Motion, step_s: f64, mps2_per_permille: f64) -> Self {
+    pub fn over(motion: &KnownMotion, step_s: f64, mps2_per_permille: f64) -> Self {
         if motion.gradient_std_permille <= 0.0 {
             return MapError { std_mps2: 0.0, keep: 1.0 };
         }

@@ -19,8 +19,8 @@ use dynocar_model::train::TrainModel;
 use nalgebra::SVector;
 
 use super::bias_model::{BiasModel, MapError};
+use super::known_motion::{Inertia, KnownMotion};
 use super::line_resistance::SpeedBasis;
-use super::motion::{Inertia, Motion};
 
 /// Resistance in N/kN that a curve or a tunnel typically adds.
 const TYPICAL_N_PER_KN: f64 = 5.0;
@@ -57,7 +57,7 @@ impl Regressors {
     }
 
     /// How fast the integrals grow.
-    pub fn rates(&self, motion: &Motion) -> Integrals {
+    pub fn rates(&self, motion: &KnownMotion) -> Integrals {
         let unit_mps2 = self.inertia.mps2_per_n_per_kn();
         let phi = self.basis.at(motion.speed_mps) * unit_mps2;
         let shares = [1.0, self.reference_radius_m * motion.curvature_per_m, motion.tunnel_share];

@@ -21,8 +21,8 @@ use super::integrals::{
     BiasHypothesis, INVERSE_MASS, IntegralStep, Integrals, POLYNOMIALS, RegressorRow, Regressors,
     UNKNOWNS,
 };
+use super::known_motion::{KnownMotion, LearningSet};
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance};
-use super::motion::{Motion, Section};
 
 /// Updates between two looks at the slope of the resistance.
 const REFRESH_EVERY: u32 = 50;
@@ -39,7 +39,7 @@ pub struct JointLeastSquares {
     initial: Bank<BiasHypothesis, JOINT_MODELS>,
     pub(super) bank: Bank<BiasHypothesis, JOINT_MODELS>,
     stops: StopWatch,
-    last: Option<(Motion, Integrals)>,
+    last: Option<(KnownMotion, Integrals)>,
     integrals: Integrals,
     /// Change of the tied acceleration in the last step, in m/s².
     tied_change: f64,
@@ -103,7 +103,7 @@ impl JointLeastSquares {
     /// z1, z2 and z3, the latter two beyond what is declared; `None` when the regression is not sound.
     pub fn resistance(&self) -> Option<LineResistance> {
         let solution = self.bank.likeliest().regression.solve()?;
-        let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(&solution, section));
+        let [basic, curve, tunnel] = LearningSet::ALL.map(|section| self.davis(&solution, section));
         Some(LineResistance {
             basic,
             curve: Some(curve),
@@ -113,7 +113,7 @@ impl JointLeastSquares {
     }
 
     /// Covariance of [a, b, c] of one polynomial; `None` when the regression is not sound.
-    pub fn resistance_covariance(&self, section: Section) -> Option<Matrix3<f64>> {
+    pub fn resistance_covariance(&self, section: LearningSet) -> Option<Matrix3<f64>> {
         let places = [0, 1, 2].map(|i| POLYNOMIALS[section as usize] + i);
         let own = self.covariance(&self.covariance_root()?, places);
         let to_davis = self.regressors.basis.to_davis_matrix();
@@ -133,7 +133,7 @@ impl JointLeastSquares {
         self.noise.variance().sqrt()
     }
 
-    pub(super) fn davis(&self, solution: &RegressorRow, section: Section) -> Davis {
+    pub(super) fn davis(&self, solution: &RegressorRow, section: LearningSet) -> Davis {
         let at = POLYNOMIALS[section as usize];
         self.regressors.basis.to_davis(&solution.fixed_rows::<3>(at).into_owned())
     }
@@ -151,7 +151,7 @@ impl JointLeastSquares {
         SMatrix::from_fn(|i, j| root.row(places[i]).dot(&root.row(places[j])))
     }
 
-    fn begin(&mut self, motion: Motion) -> Outcome {
+    fn begin(&mut self, motion: KnownMotion) -> Outcome {
         self.integrals = Integrals::zero();
         self.tied_change = 0.0;
         let (row, value) = self.integrals.equation(motion.speed_mps);
@@ -169,7 +169,12 @@ impl JointLeastSquares {
         Outcome::Used
     }
 
-    fn advance(&mut self, last: (Motion, Integrals), motion: Motion, step_s: f64) -> Outcome {
+    fn advance(
+        &mut self,
+        last: (KnownMotion, Integrals),
+        motion: KnownMotion,
+        step_s: f64,
+    ) -> Outcome {
         let rates = self.regressors.rates(&motion);
         self.integrals.add(&last.1, &rates, step_s);
         let (row, value) = self.integrals.equation(motion.speed_mps);
@@ -216,8 +221,8 @@ impl JointLeastSquares {
     }
 
     /// Ends a step at the expected speed in place of one that is not believed.
-    fn bridge(&mut self, motion: Motion, measured: &Integrals, error_mps: f64, step_s: f64) {
-        let expected = Motion { speed_mps: (motion.speed_mps - error_mps).max(0.0), ..motion };
+    fn bridge(&mut self, motion: KnownMotion, measured: &Integrals, error_mps: f64, step_s: f64) {
+        let expected = KnownMotion { speed_mps: (motion.speed_mps - error_mps).max(0.0), ..motion };
         let rates = self.regressors.rates(&expected);
         self.integrals.correct(measured, &rates, step_s);
         self.last = Some((expected, rates));
@@ -226,7 +231,12 @@ impl JointLeastSquares {
     /// A step with what comes to the level in addition to the bias: what the trapezoid misses, and what
     /// the noise of the speed does in the features. There it moves the resistance, and with it
     /// the integral, by a random walk.
-    fn step(&mut self, last: &(Motion, Integrals), rates: &Integrals, step_s: f64) -> IntegralStep {
+    fn step(
+        &mut self,
+        last: &(KnownMotion, Integrals),
+        rates: &Integrals,
+        step_s: f64,
+    ) -> IntegralStep {
         let [tied, push] = Integrals::changes(&last.1, rates);
         let tied_before = std::mem::replace(&mut self.tied_change, tied);
         let slope = self.latest.slope(&last.0, last.0.speed_mps);
@@ -289,7 +299,7 @@ impl Estimator for JointLeastSquares {
             self.is_opened = true;
             self.last = None;
         }
-        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
+        let motion = match KnownMotion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
             Err(outcome) => return outcome,
         };

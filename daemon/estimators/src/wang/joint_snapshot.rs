@@ -1,7 +1,7 @@
 //! Contents of a snapshot by [`JointLeastSquares`].
 
 use dynocar_core::filter::drifting_level::BIAS;
-use dynocar_core::pipeline::judge::{Case, InputState};
+use dynocar_core::pipeline::judge::{InputState, StatusInputs};
 use dynocar_core::pipeline::output::{
     DAVIS_AND_MASS, excitation, write_innovations, write_parameters,
 };
@@ -10,7 +10,7 @@ use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 
 use super::integrals::{INVERSE_MASS, POLYNOMIALS, RegressorRow, UNKNOWNS};
 use super::joint::JointLeastSquares;
-use super::motion::Section;
+use super::known_motion::LearningSet;
 
 /// Used samples below which nothing is said.
 const SAMPLES_MIN: u64 = 50;
@@ -47,11 +47,16 @@ impl JointLeastSquares {
         self.case(input, is_mass_known, known[1]).verdict()
     }
 
-    fn case(&self, input: &InputState, is_mass_known: bool, is_resistance_known: bool) -> Case {
+    fn case(
+        &self,
+        input: &InputState,
+        is_mass_known: bool,
+        is_resistance_known: bool,
+    ) -> StatusInputs {
         let some = is_mass_known || is_resistance_known;
         let failure = (Status::Invalid, Reason::NumericalFailure);
         let lasting = self.fit.is_lasting().then_some(Reason::InnovationsNotWhite);
-        Case {
+        StatusInputs {
             fault: (self.is_fresh_reset && !is_mass_known).then_some(failure),
             input: input.doubt,
             is_ready: input.used >= SAMPLES_MIN,
@@ -70,10 +75,10 @@ impl JointLeastSquares {
         root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
         snapshot: &mut ParameterSnapshot,
     ) -> f64 {
-        let davis = self.davis(solution, Section::Basic);
+        let davis = self.davis(solution, LearningSet::Basic);
         let inverse = solution[INVERSE_MASS];
         let mass_kg = self.regressors.inertia.reference_mass_kg / inverse;
-        let first = POLYNOMIALS[Section::Basic as usize];
+        let first = POLYNOMIALS[LearningSet::Basic as usize];
         let own = self.covariance(root, [first, first + 1, first + 2, INVERSE_MASS]);
         let mut to_units = Matrix4::zeros();
         let to_davis = self.regressors.basis.to_davis_matrix();
@@ -90,7 +95,7 @@ impl JointLeastSquares {
 
     /// Standard deviations of the basic resistance in N/kN at low, middle and high speed.
     fn resistance_stds(&self, root: &SMatrix<f64, UNKNOWNS, UNKNOWNS>) -> [f64; 3] {
-        let first = POLYNOMIALS[Section::Basic as usize];
+        let first = POLYNOMIALS[LearningSet::Basic as usize];
         let own = self.covariance(root, [first, first + 1, first + 2]);
         JUDGED_AT.map(|share| {
             let phi: Vector3<f64> =

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::judge::{Case, InputState, Judgement};
+use dynocar_core::pipeline::judge::{InputState, Judgement, StatusInputs};
 use dynocar_core::pipeline::motion::{SpeedNoise, SpeedRange, StopWatch, jump_variance};
 use dynocar_core::pipeline::output::{write_innovations, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
@@ -14,9 +14,9 @@ use dynocar_shared::{
 };
 use nalgebra::{Matrix2, Vector2};
 
-use super::bias_bank::{BiasBank, Dynamics, Moments, SPEED};
+use super::bias_bank::{BiasBank, Dynamics, MassBiasMoments, SPEED};
 use super::kalman_settings::MassKalmanSettings;
-use super::motion::{Inertia, Motion};
+use super::known_motion::{Inertia, KnownMotion};
 
 /// Samples over which the evidence for a behaviour of the bias is remembered.
 const EVIDENCE_MEMORY: f64 = 3000.0;
@@ -45,9 +45,9 @@ pub struct MassKalman {
     initial_bank: BiasBank,
     bank: BiasBank,
     stops: StopWatch,
-    last: Option<Motion>,
+    last: Option<KnownMotion>,
     /// Inverse mass as known when force last acted, bias as known now.
-    moments: Moments,
+    moments: MassBiasMoments,
     declared_mass_kg: f64,
     is_warm_started: bool,
     /// True until a motion begins after the mass was opened: nothing is known of the bias.
@@ -142,7 +142,7 @@ impl MassKalman {
         self.moments = self.bank.moments();
     }
 
-    fn begin(&mut self, motion: Motion) -> Outcome {
+    fn begin(&mut self, motion: KnownMotion) -> Outcome {
         if std::mem::take(&mut self.is_opened) && motion.gradient_std_permille > 0.0 {
             self.bank.begin_on_map(&motion);
         }
@@ -153,7 +153,7 @@ impl MassKalman {
         Outcome::Used
     }
 
-    fn advance(&mut self, from: Motion, motion: Motion, step_s: f64) -> Outcome {
+    fn advance(&mut self, from: KnownMotion, motion: KnownMotion, step_s: f64) -> Outcome {
         let before_mps = self.bank.best().mean[SPEED];
         self.bank.predict(&from, &motion, step_s);
         let moved_mps = (self.bank.best().mean[SPEED] - before_mps).abs();
@@ -218,9 +218,9 @@ impl MassKalman {
         input.used >= SAMPLES_MIN || self.moved_s >= MOVED_MIN_S
     }
 
-    fn case(&self, input: &InputState) -> Case {
+    fn case(&self, input: &InputState) -> StatusInputs {
         let failure = (Status::Invalid, Reason::NumericalFailure);
-        Case {
+        StatusInputs {
             fault: self.is_fresh_reset.then_some(failure),
             input: input.doubt,
             is_ready: self.is_ready(input),
@@ -255,7 +255,7 @@ impl Estimator for MassKalman {
     }
 
     fn update(&mut self, sample: &ResolvedSample) -> Outcome {
-        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
+        let motion = match KnownMotion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
             Err(outcome) => return outcome,
         };

@@ -3,7 +3,7 @@
 use dynocar_model::train::{Davis, TrainModel};
 use nalgebra::{Matrix3, Vector3};
 
-use super::motion::Motion;
+use super::known_motion::KnownMotion;
 
 /// Resistance of a train on a line, in N/kN: Wang 2022, eq. (5), (9), (10), each polynomial
 /// weighted by how much of it acts.
@@ -11,7 +11,7 @@ use super::motion::Motion;
 /// The paper's curve resistance z2 knows no radius. Here it holds at a reference radius and
 /// goes with 1/R, as all curve formulas do; on a line of equal radii the two are the same.
 /// All of it comes in addition to what is declared of curves, tunnels and the rest
-/// ([`Motion::known_n_per_kn`]), which acts in any case: the paper declares none.
+/// ([`KnownMotion::known_n_per_kn`]), which acts in any case: the paper declares none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineResistance {
     /// z1: basic resistance.
@@ -37,7 +37,7 @@ impl LineResistance {
 
     /// All that retards in N/kN at a speed in m/s: this resistance plus what is known.
     #[inline]
-    pub fn w_n_per_kn(&self, motion: &Motion, speed_mps: f64) -> f64 {
+    pub fn w_n_per_kn(&self, motion: &KnownMotion, speed_mps: f64) -> f64 {
         let curve = self.curve.map_or(0.0, |curve| {
             self.reference_radius_m * motion.curvature_per_m * curve.w0_n_per_kn(speed_mps)
         });
@@ -48,7 +48,7 @@ impl LineResistance {
 
     /// Derivative of the resistance after speed, in N/kN per m/s.
     #[inline]
-    pub fn slope(&self, motion: &Motion, speed_mps: f64) -> f64 {
+    pub fn slope(&self, motion: &KnownMotion, speed_mps: f64) -> f64 {
         let slope = |davis: Davis| davis.b + 2.0 * davis.c * speed_mps;
         let curve = self
             .curve

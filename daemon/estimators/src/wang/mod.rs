@@ -15,8 +15,8 @@ mod joint;
 mod joint_snapshot;
 mod kalman;
 mod kalman_settings;
+pub mod known_motion;
 pub mod line_resistance;
-pub mod motion;
 mod staged;
 
 pub use joint::{JointLeastSquares, JointLeastSquaresSettings};

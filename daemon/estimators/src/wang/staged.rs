@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_core::pipeline::judge::{Case, InputState, Judgement};
+use dynocar_core::pipeline::judge::{InputState, Judgement, StatusInputs};
 use dynocar_core::pipeline::motion::{MOVING_MPS, SpeedRange, StopWatch};
 use dynocar_core::pipeline::output::{DAVIS_AND_MASS, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
@@ -16,8 +16,8 @@ use nalgebra::{Matrix4, SVector, Vector4};
 use serde::Deserialize;
 
 use super::descent::MeanSquare;
+use super::known_motion::{Inertia, KnownMotion, LearningSet};
 use super::line_resistance::{DEFAULT_REFERENCE_RADIUS_M, LineResistance, SpeedBasis};
-use super::motion::{Inertia, Motion, Section};
 
 /// Used samples below which nothing is said.
 const SAMPLES_MIN: f64 = 50.0;
@@ -59,7 +59,7 @@ pub struct StagedDescent {
     mass: Stage<1>,
     learned: u64,
     stops: StopWatch,
-    last: Option<Motion>,
+    last: Option<KnownMotion>,
     speeds: SpeedRange,
 }
 
@@ -92,7 +92,7 @@ impl StagedDescent {
 
     /// z1, z2 and z3 as learned so far, the latter two beyond what is declared.
     pub fn resistance(&self) -> LineResistance {
-        let [basic, curve, tunnel] = Section::ALL.map(|section| self.davis(section));
+        let [basic, curve, tunnel] = LearningSet::ALL.map(|section| self.davis(section));
         LineResistance {
             basic,
             curve: Some(curve),
@@ -126,16 +126,16 @@ impl StagedDescent {
         }
     }
 
-    fn davis(&self, section: Section) -> Davis {
+    fn davis(&self, section: LearningSet) -> Davis {
         let rest = |stage: &Stage<6>| stage.coefficients.fixed_rows::<3>(3).into_owned();
         self.basis.to_davis(&match section {
-            Section::Basic => self.basic.coefficients,
-            Section::Curve => rest(&self.curve),
-            Section::Tunnel => rest(&self.tunnel),
+            LearningSet::Basic => self.basic.coefficients,
+            LearningSet::Curve => rest(&self.curve),
+            LearningSet::Tunnel => rest(&self.tunnel),
         })
     }
 
-    fn learn(&mut self, from: &Motion, to: &Motion, step_s: f64) -> Outcome {
+    fn learn(&mut self, from: &KnownMotion, to: &KnownMotion, step_s: f64) -> Outcome {
         let speed_mps = 0.5 * (from.speed_mps + to.speed_mps);
         let force_n = 0.5 * (from.force_n + to.force_n);
         let known = 0.5 * (from.known_n_per_kn + to.known_n_per_kn);
@@ -143,12 +143,12 @@ impl StagedDescent {
         let inertia_mps2 = self.inertia.inertial_mass_kg(1.0) * acceleration_mps2;
         self.speeds.push(speed_mps);
         if self.learned >= self.settings.resistance_samples {
-            let at = Motion { speed_mps, known_n_per_kn: known, ..*to };
+            let at = KnownMotion { speed_mps, known_n_per_kn: known, ..*to };
             let w = self.resistance().w_n_per_kn(&at, speed_mps);
             return self.learn_mass(force_n, inertia_mps2 + 1e-3 * STANDARD_GRAVITY_MPS2 * w);
         }
         self.learned += 1;
-        let Some(section) = Section::of(from, to) else { return Outcome::Used };
+        let Some(section) = LearningSet::of(from, to) else { return Outcome::Used };
         // Eq. (11), (12) and (18), uphill positive where the text has it negative, G in N and
         // the resistance per kN of it, and the rotating mass that (18) leaves out.
         let specific_mps2 = force_n / to.declared_kg - inertia_mps2;
@@ -157,21 +157,21 @@ impl StagedDescent {
         Outcome::Updated
     }
 
-    fn descend(&mut self, section: Section, speed_mps: f64, target: f64, at: &Motion) {
+    fn descend(&mut self, section: LearningSet, speed_mps: f64, target: f64, at: &KnownMotion) {
         let (steps, rate) = (self.settings.steps_per_sample, self.settings.rate);
         let phi = self.basis.at(speed_mps);
         let (stage, share) = match section {
-            Section::Basic => {
+            LearningSet::Basic => {
                 self.basic.sums.add(&phi, target);
                 for _ in 0..steps {
                     self.basic.sums.step(&mut self.basic.coefficients, 0, rate);
                 }
                 return;
             }
-            Section::Curve => {
+            LearningSet::Curve => {
                 (&mut self.curve, self.settings.reference_radius_m * at.curvature_per_m)
             }
-            Section::Tunnel => (&mut self.tunnel, at.tunnel_share),
+            LearningSet::Tunnel => (&mut self.tunnel, at.tunnel_share),
         };
         let mut features = SVector::<f64, 6>::zeros();
         features.fixed_rows_mut::<3>(0).copy_from(&phi);
@@ -223,10 +223,10 @@ impl StagedDescent {
         1.0 / self.mass.sums.explained_share() - 1.0
     }
 
-    fn case(&self, input: &InputState, is_mass_known: bool) -> Case {
+    fn case(&self, input: &InputState, is_mass_known: bool) -> StatusInputs {
         let is_begun = self.basic.sums.count >= SAMPLES_MIN || is_mass_known;
         let is_bracketed = self.mass_bracket() <= BRACKET_MAX;
-        Case {
+        StatusInputs {
             fault: None,
             input: input.doubt,
             is_ready: self.learned >= self.settings.resistance_samples,
@@ -247,7 +247,7 @@ impl Estimator for StagedDescent {
         if self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps) {
             self.mass.sums = MeanSquare::default();
         }
-        let motion = match Motion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
+        let motion = match KnownMotion::seen(sample, self.settings.speed_min_mps, &mut self.last) {
             Ok(motion) => motion,
             Err(outcome) => return outcome,
         };
@@ -260,7 +260,7 @@ impl Estimator for StagedDescent {
     }
 
     fn write(&self, input: &InputState, snapshot: &mut ParameterSnapshot) -> Judgement {
-        let davis = self.davis(Section::Basic);
+        let davis = self.davis(LearningSet::Basic);
         let mass_std_kg = self.mass_std_kg();
         let mut covariance = Matrix4::zeros();
         let basic = self.basic.sums.covariance(&self.basic.coefficients);

@@ -11,7 +11,7 @@
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::xia::trajectory::step::{Step, StepRule};
+use crate::xia::trajectory::step::{StepRule, TrajectoryStep};
 
 /// f(θ) of eq. 8 with derivatives with respect to (a, b, c).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub struct Deviation {
 /// `speeds_mps` holds one more entry than `steps`; the first is the speed before the first
 /// step, which the paper takes for exact. `None` when the computed train stops (v² < 0), which
 /// happens for up to 95 % of random parameters on long data with braking.
-pub fn deviation(steps: &[Step], speeds_mps: &[f64], davis: &Davis) -> Option<Deviation> {
+pub fn deviation(steps: &[TrajectoryStep], speeds_mps: &[f64], davis: &Davis) -> Option<Deviation> {
     debug_assert_eq!(steps.len() + 1, speeds_mps.len());
     let (&first_mps, measured_mps) = speeds_mps.split_first()?;
     let mut speed_mps = first_mps;
@@ -74,13 +74,13 @@ mod tests {
     const SCALES: [f64; 3] = [1.0, 0.02, 0.001];
 
     /// Traction, coasting and braking over hills; the measured speeds carry a wave as noise.
-    fn example() -> (Vec<Step>, Vec<f64>) {
+    fn example() -> (Vec<TrajectoryStep>, Vec<f64>) {
         let gain = mps2_per_n_per_kn(0.06);
-        let steps: Vec<Step> = (0..60)
+        let steps: Vec<TrajectoryStep> = (0..60)
             .map(|i| {
                 let drive = [0.35, 0.12, 0.0, -0.25][(i / 15) % 4];
                 let drive_mps2 = drive + 0.05 * (f64::from(i as u32) * 0.7).sin();
-                Step { size: 100.0, drive_mps2, resistance_gain: gain }
+                TrajectoryStep { size: 100.0, drive_mps2, resistance_gain: gain }
             })
             .collect();
         let mut speeds = vec![40.0];

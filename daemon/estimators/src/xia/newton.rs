@@ -14,13 +14,13 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
-use super::window::Window;
+use super::window::StepWindow;
 use super::wolfe_newton::{NewtonSettings, RestartSource, Restarts, wolfe_newton};
 use crate::xia::trajectory::fit::{
     DavisPrior, FitError, FitSettings, TrajectoryFit, TrajectoryFitter,
 };
 use crate::xia::trajectory::motion::{MotionTracker, MotionUpdate, UnexplainedForce};
-use crate::xia::trajectory::quality::{Estimate, LongRunVariance, prior_std};
+use crate::xia::trajectory::quality::{DavisEstimate, LongRunVariance, prior_std};
 use crate::xia::trajectory::step::StepRule;
 
 /// Speed noise before the first window, in m/s.
@@ -49,7 +49,7 @@ pub struct TrajectoryNewton {
     speed_noise_mps: f64,
     source: RestartSource,
     tracker: MotionTracker,
-    window: Window,
+    window: StepWindow,
     fitter: TrajectoryFitter,
     davis: Davis,
     covariance: Matrix3<f64>,
@@ -99,7 +99,7 @@ impl TrajectoryNewton {
             speed_noise_mps: settings.speed_noise_mps.unwrap_or(SPEED_NOISE_FIRST_MPS),
             source: RestartSource::new(settings.seed),
             tracker: MotionTracker::default(),
-            window: Window::new(rule, capacity, settings.interval_m),
+            window: StepWindow::new(rule, capacity, settings.interval_m),
             fitter: TrajectoryFitter::with_capacity(1, capacity + 1),
             davis: prior.davis,
             covariance: Matrix3::from_diagonal(&prior.std.component_mul(&prior.std)),
@@ -277,7 +277,7 @@ impl Estimator for TrajectoryNewton {
         let inflation = self.long_run.inflation();
         let covariance = self.covariance * inflation;
         write_parameters(snapshot, DAVIS, &Vector3::new(a, b, c), &covariance);
-        let estimate = Estimate {
+        let estimate = DavisEstimate {
             davis: self.davis,
             covariance,
             prior_std: self.prior_std,

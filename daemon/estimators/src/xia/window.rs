@@ -4,7 +4,7 @@ use dynocar_core::pipeline::motion::jump_variance;
 
 use crate::xia::trajectory::fit::MotionSegment;
 use crate::xia::trajectory::motion::MotionStep;
-use crate::xia::trajectory::step::{Step, StepRule};
+use crate::xia::trajectory::step::{StepRule, TrajectoryStep};
 
 /// The newest steps of unbroken motion, each about as long as the sampling distance.
 ///
@@ -13,10 +13,10 @@ use crate::xia::trajectory::step::{Step, StepRule};
 /// eq. 7 (the same work) and over time for the time rule (the same impulse), and the speed at
 /// its end is the sample's own.
 #[derive(Clone, Debug)]
-pub struct Window {
+pub struct StepWindow {
     rule: StepRule,
     interval_m: f64,
-    steps: Vec<Step>,
+    steps: Vec<TrajectoryStep>,
     speeds_mps: Vec<f64>,
     /// Time in s of each step, and variance in (m/s)² of what it misses as forces jump.
     missed: Vec<(f64, f64)>,
@@ -37,10 +37,10 @@ struct OpenStep {
     gain: f64,
 }
 
-impl Window {
+impl StepWindow {
     /// Returns an empty window of `steps` steps of at least a distance in m each.
     pub fn new(rule: StepRule, steps: usize, interval_m: f64) -> Self {
-        Window {
+        StepWindow {
             rule,
             interval_m,
             steps: Vec::with_capacity(steps),
@@ -91,7 +91,7 @@ impl Window {
             self.speeds_mps.remove(0);
             self.missed.remove(0);
         }
-        self.steps.push(Step {
+        self.steps.push(TrajectoryStep {
             size,
             drive_mps2: self.open.drive / size,
             resistance_gain: self.open.gain / size,
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn samples_are_gathered_until_the_distance_is_reached() {
-        let mut window = Window::new(StepRule::Distance, 3, 100.0);
+        let mut window = StepWindow::new(StepRule::Distance, 3, 100.0);
         window.begin(30.0);
         let closed: Vec<bool> =
             (0..8).map(|i| window.push(&motion(f64::from(i)), 30.0 + f64::from(i))).collect();
@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn a_full_window_drops_its_oldest_step() {
-        let mut window = Window::new(StepRule::Time, 2, 30.0);
+        let mut window = StepWindow::new(StepRule::Time, 2, 30.0);
         window.begin(30.0);
         for i in 0..5 {
             assert!(window.push(&motion(f64::from(i)), f64::from(i)));

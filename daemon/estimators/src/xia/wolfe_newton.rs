@@ -18,7 +18,7 @@ use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::deviation::{Deviation, deviation};
-use crate::xia::trajectory::step::Step;
+use crate::xia::trajectory::step::TrajectoryStep;
 
 /// When Algorithm 1 draws new parameters at random.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,7 +128,7 @@ impl RestartSource {
 ///
 /// At most `iterations_max` iterations of at most 31 trajectories each; no allocation.
 pub fn wolfe_newton(
-    steps: &[Step],
+    steps: &[TrajectoryStep],
     speeds_mps: &[f64],
     start: &Davis,
     settings: &NewtonSettings,
@@ -215,14 +215,14 @@ mod tests {
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 
-    fn example() -> (Vec<Step>, Vec<f64>) {
+    fn example() -> (Vec<TrajectoryStep>, Vec<f64>) {
         let resistance_gain = mps2_per_n_per_kn(0.06);
         let mut speeds = vec![15.0];
         let mut steps = Vec::new();
         for i in 0..200 {
             let speed = *speeds.last().unwrap();
             let drive_mps2 = [0.4, 0.1, 0.0, -0.2][(i / 50) % 4];
-            let step = Step { size: 100.0, drive_mps2, resistance_gain };
+            let step = TrajectoryStep { size: 100.0, drive_mps2, resistance_gain };
             speeds.push(StepRule::Distance.advance(&step, &TRUTH, speed).unwrap().speed_mps);
             steps.push(step);
         }

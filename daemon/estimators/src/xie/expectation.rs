@@ -7,7 +7,7 @@ use dynocar_core::filter::fixed_lag::{ForwardStep, smooth_means};
 use dynocar_core::filter::particle::{ParticleModel, ParticleSmoother};
 use dynocar_core::filter::random::Random;
 use dynocar_core::filter::{Gaussian, lanes};
-use dynocar_core::pipeline::braking::engine::Observation;
+use dynocar_core::pipeline::braking::engine::BrakingObservation;
 use dynocar_core::pipeline::braking::motion::{self, DISTANCE, MotionNoise, StepInputs};
 use nalgebra::{SMatrix, SVector};
 
@@ -214,11 +214,11 @@ impl Statistics {
 
 /// One observation with the step that led to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Entry {
+pub struct ObservedStep {
     /// The known motion since the entry before.
     pub inputs: StepInputs,
     /// Measured values.
-    pub observed: Observation,
+    pub observed: BrakingObservation,
     /// The process noise of that step.
     pub noise: MoveNoise,
 }
@@ -248,7 +248,7 @@ impl MoveNoise {
 #[derive(Clone, Debug)]
 pub struct ObservedWindow {
     /// In order of time; the first entry's inputs lead into the window.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<ObservedStep>,
     /// Distance in m and speed in m/s at the first entry, before its measurement.
     pub first: Gaussian<2>,
 }

@@ -2,9 +2,11 @@
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::pipeline::Estimator;
-use dynocar_core::pipeline::braking::engine::{Engine, EngineStep, Estimate, Observation};
+use dynocar_core::pipeline::braking::engine::{
+    BrakingEstimate, BrakingObservation, Engine, EngineStep,
+};
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
-use dynocar_core::pipeline::braking::law::Law;
+use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{MotionNoise, SCALE, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::{BrakeFactor, BrakingSettings};
 use dynocar_core::pipeline::braking::tracker::{PriorScale, TrackerModel, measure};
@@ -16,7 +18,7 @@ use nalgebra::{SMatrix, SVector};
 use serde::Deserialize;
 
 use super::expectation::{
-    Entry, Expectation, KalmanExpectation, MoveNoise, ObservedWindow, ParticleExpectation,
+    Expectation, KalmanExpectation, MoveNoise, ObservedStep, ObservedWindow, ParticleExpectation,
     WindowModel,
 };
 
@@ -105,7 +107,7 @@ pub struct EmWindow<E> {
     expectation: E,
     window: ObservedWindow,
     share: f64,
-    estimate: Option<Estimate>,
+    estimate: Option<BrakingEstimate>,
 }
 
 impl<E: Expectation> EmWindow<E> {
@@ -155,7 +157,7 @@ impl<E: Expectation> EmWindow<E> {
         let trend = self.share - halfway;
         let std = (self.information_variance()? + scatter_variance + trend * trend).sqrt();
         let demand = self.window.entries[self.window.entries.len() / 2].observed.demand;
-        self.estimate = Some(Estimate {
+        self.estimate = Some(BrakingEstimate {
             coefficient: Uncertain::new(demand * self.share, demand * std),
             scale: Uncertain::new(self.share, std),
             covariance: demand * std * std,
@@ -170,7 +172,7 @@ impl<E: Expectation> EmWindow<E> {
     fn information_variance(&self) -> Option<f64> {
         let scale = Uncertain::new(self.share, 10.0);
         let model = TrackerModel {
-            law: Law::Demand,
+            law: BrakingLaw::Demand,
             noise: MotionNoise { measured_speed_m2_per_s2: None, ..self.noise },
             walk: Walk::Scale(0.0),
             first_speed_std_mps: 1.0,
@@ -207,7 +209,7 @@ impl<E: Expectation> EmWindow<E> {
 }
 
 impl<E: Expectation> Engine for EmWindow<E> {
-    fn start(&mut self, first: &Observation) {
+    fn start(&mut self, first: &BrakingObservation) {
         self.window.entries.clear();
         self.share = self.settings.initial.map_or(1.0, |initial| initial / first.demand);
         self.estimate = None;
@@ -225,16 +227,16 @@ impl<E: Expectation> Engine for EmWindow<E> {
             basic_mps2: [0.0; 3],
         };
         let noise = MoveNoise::over(&self.noise, inputs.step_s);
-        self.window.entries.push(Entry { inputs, observed: *first, noise });
+        self.window.entries.push(ObservedStep { inputs, observed: *first, noise });
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<EngineStep> {
+    fn step(&mut self, inputs: &StepInputs, observed: &BrakingObservation) -> Option<EngineStep> {
         if self.window.entries.is_empty() {
             self.start(observed);
             return Some(EngineStep::Restarted);
         }
         let noise = MoveNoise::over(&self.noise, inputs.step_s);
-        self.window.entries.push(Entry { inputs: *inputs, observed: *observed, noise });
+        self.window.entries.push(ObservedStep { inputs: *inputs, observed: *observed, noise });
         if self.window.entries.len() < self.settings.window {
             return Some(EngineStep::Collected);
         }
@@ -247,7 +249,7 @@ impl<E: Expectation> Engine for EmWindow<E> {
         self.noise.measured_distance_m2 = variance_m2;
     }
 
-    fn estimate(&self) -> Option<Estimate> {
+    fn estimate(&self) -> Option<BrakingEstimate> {
         self.estimate
     }
 }

@@ -2,15 +2,15 @@
 
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
-use dynocar_core::pipeline::braking::engine::{Engine, EngineStep, Observation};
-use dynocar_core::pipeline::braking::law::Law;
+use dynocar_core::pipeline::braking::engine::{BrakingObservation, Engine, EngineStep};
+use dynocar_core::pipeline::braking::law::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::BrakingSettings;
 use dynocar_core::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};
 use dynocar_shared::Uncertain;
 use nalgebra::SVector;
 
-use super::expectation::{Entry, MoveNoise};
+use super::expectation::{MoveNoise, ObservedStep};
 use super::*;
 
 const NOISE: MotionNoise = MotionNoise {
@@ -35,19 +35,19 @@ fn inputs() -> StepInputs {
 }
 
 /// Measured distances of a braking with a constant coefficient.
-fn observed(seed: u64) -> Vec<Observation> {
+fn observed(seed: u64) -> Vec<BrakingObservation> {
     let mut random = Random::new(seed);
     let (mut distance_m, mut speed_mps) = (0.0, FIRST_MPS);
     let noise = MoveNoise::over(&NOISE, 0.2);
     (0..STEPS)
         .map(|_| {
-            let observation = Observation {
+            let observation = BrakingObservation {
                 distance_m: distance_m + 0.1 * random.normal(),
                 speed_mps,
                 is_speed_valid: false,
                 demand: DEMAND,
             };
-            let moved = motion::advance(&inputs(), &Law::Constant, speed_mps, TRUTH);
+            let moved = motion::advance(&inputs(), &BrakingLaw::Constant, speed_mps, TRUTH);
             distance_m += moved.travelled_m + noise.stds[0] * random.normal();
             speed_mps = moved.speed_mps + noise.stds[1] * random.normal();
             observation
@@ -69,7 +69,7 @@ fn window(seed: u64) -> ObservedWindow {
     let noise = MoveNoise::over(&NOISE, 0.2);
     let entries: Vec<_> = observed(seed)
         .into_iter()
-        .map(|observed| Entry { inputs: inputs(), observed, noise })
+        .map(|observed| ObservedStep { inputs: inputs(), observed, noise })
         .collect();
     let first = Gaussian::independent(
         SVector::from([entries[0].observed.distance_m, FIRST_MPS]),
@@ -82,7 +82,7 @@ fn window(seed: u64) -> ObservedWindow {
 fn estimate<E: Expectation>(model: EmSettings, expectation: E, seed: u64) -> Uncertain {
     let mut em = EmWindow::new(model, NOISE, expectation);
     let observed = observed(seed);
-    em.start(&Observation { speed_mps: FIRST_MPS, ..observed[0] });
+    em.start(&BrakingObservation { speed_mps: FIRST_MPS, ..observed[0] });
     let mut last = EngineStep::Collected;
     for observation in &observed[1..] {
         assert_eq!(last, EngineStep::Collected);
@@ -161,7 +161,7 @@ fn the_iterations_converge_to_the_maximum_likelihood_of_the_window() {
     // The same window with the coefficient as a constant state, hardly known beforehand.
     let mut tracker = Tracker::new(
         TrackerModel {
-            law: Law::Constant,
+            law: BrakingLaw::Constant,
             noise: NOISE,
             walk: Walk::Scale(0.0),
             first_speed_std_mps: 0.1,
@@ -172,7 +172,7 @@ fn the_iterations_converge_to_the_maximum_likelihood_of_the_window() {
         false,
     );
     let observed = observed(4);
-    tracker.start(&Observation { speed_mps: FIRST_MPS, ..observed[0] });
+    tracker.start(&BrakingObservation { speed_mps: FIRST_MPS, ..observed[0] });
     for observation in &observed[1..] {
         tracker.step(&inputs(), observation).unwrap();
     }
@@ -229,6 +229,6 @@ fn an_observation_that_no_particle_explains_is_a_failure() {
     for observation in &observed[1..STEPS - 1] {
         em.step(&inputs(), observation).unwrap();
     }
-    let lost = Observation { distance_m: f64::NAN, ..observed[STEPS - 1] };
+    let lost = BrakingObservation { distance_m: f64::NAN, ..observed[STEPS - 1] };
     assert!(em.step(&inputs(), &lost).is_none());
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
-use dynocar_model::track::{Curve, Track, Tunnel};
+use dynocar_model::track::{Track, TrackCurve, Tunnel};
 use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};
 
@@ -65,7 +65,7 @@ fn train() -> Arc<TrainModel> {
 fn track() -> Arc<Track> {
     let gradient: Vec<_> =
         (0..40).map(|i| (500.0 * f64::from(i), 6.0 * f64::from(i).sin())).collect();
-    let curves = vec![Curve { start_m: 900.0, end_m: 1400.0, radius_m: 500.0 }];
+    let curves = vec![TrackCurve { start_m: 900.0, end_m: 1400.0, radius_m: 500.0 }];
     let tunnels = vec![Tunnel { start_m: 2500.0, end_m: 3300.0 }];
     Arc::new(Track::new("t".into(), None, Some(&gradient), Some(curves), Some(tunnels)).unwrap())
 }

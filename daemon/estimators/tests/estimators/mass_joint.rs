@@ -5,7 +5,7 @@ use crate::mass_common::{
 };
 use dynocar_core::pipeline::Outcome;
 use dynocar_estimators::EstimatorSettings;
-use dynocar_estimators::wang::motion::Section;
+use dynocar_estimators::wang::known_motion::LearningSet;
 use dynocar_estimators::wang::{JointLeastSquares, JointLeastSquaresSettings};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};
@@ -80,7 +80,7 @@ fn curve_and_tunnel_resistance_are_functions_of_speed() {
         assert!((curve - 1.2).abs() < 0.12, "{curve} at {speed_mps}");
         assert!((tunnel - 3.0).abs() < 0.12, "{tunnel} at {speed_mps}");
     }
-    let covariance = estimator.resistance_covariance(Section::Tunnel).unwrap();
+    let covariance = estimator.resistance_covariance(LearningSet::Tunnel).unwrap();
     assert!(covariance.cholesky().is_some());
 }
 

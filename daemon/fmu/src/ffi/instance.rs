@@ -108,7 +108,7 @@ pub(super) unsafe fn take_back(component: Component) {
 /// # Safety
 ///
 /// See [the module](super#safety).
-pub(super) unsafe fn text<'a>(place: Text) -> Option<&'a CStr> {
+pub(super) unsafe fn text<'a>(place: FmiString) -> Option<&'a CStr> {
     // SAFETY: a text that is not NULL ends with a NUL byte.
     (!place.is_null()).then(|| unsafe { CStr::from_ptr(place) })
 }
@@ -116,7 +116,7 @@ pub(super) unsafe fn text<'a>(place: Text) -> Option<&'a CStr> {
 /// `fmi2Component`: an instance, see [`Instance`].
 pub type Component = *mut c_void;
 /// `fmi2String`: UTF-8, ends with NUL.
-pub type Text = *const c_char;
+pub type FmiString = *const c_char;
 /// `fmi2Boolean`: 0 is false.
 pub type Boolean = c_int;
 
@@ -135,7 +135,7 @@ pub const CO_SIMULATION: c_int = 1;
 
 /// `fmi2CallbackLogger`: environment, name of the instance, status, category, format and what the
 /// format asks for.
-pub type Logger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text, ...);
+pub type Logger = unsafe extern "C" fn(*mut c_void, FmiString, c_int, FmiString, FmiString, ...);
 
 /// `fmi2CallbackFunctions`: what the simulator lends an instance. Only the logger is used.
 #[derive(Clone, Copy, Debug)]

@@ -9,7 +9,7 @@ use std::ffi::{c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::instance::{
-    Boolean, CO_SIMULATION, CallbackFunctions, Component, Instance, Log, Status, Text, call,
+    Boolean, CO_SIMULATION, CallbackFunctions, Component, FmiString, Instance, Log, Status, call,
     take_back, text,
 };
 use crate::description::INTERFACES;
@@ -35,10 +35,10 @@ pub extern "C" fn fmi2GetVersion() -> *const c_char {
 /// See [the module](super#safety).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2Instantiate(
-    name: Text,
+    name: FmiString,
     kind: c_int,
-    guid: Text,
-    resources: Text,
+    guid: FmiString,
+    resources: FmiString,
     callbacks: *const CallbackFunctions,
     _visible: Boolean,
     _logging_on: Boolean,
@@ -104,7 +104,7 @@ macro_rules! calls {
 
 calls! {
     /// Accepted without effect: errors are always logged, and there is nothing else to log.
-    fmi2SetDebugLogging(_logging_on: Boolean, _count: usize, _categories: *const Text), |_| Ok(());
+    fmi2SetDebugLogging(_logging_on: Boolean, _count: usize, _categories: *const FmiString), |_| Ok(());
     /// Takes note of when an experiment begins; tolerance and stop matter to no model.
     fmi2SetupExperiment(
         _tolerance_defined: Boolean, _tolerance: f64, start_time_s: f64,
@@ -161,5 +161,5 @@ unsupported! {
     fmi2GetRealStatus(_kind: c_int, _value: *mut f64);
     fmi2GetIntegerStatus(_kind: c_int, _value: *mut c_int);
     fmi2GetBooleanStatus(_kind: c_int, _value: *mut c_int);
-    fmi2GetStringStatus(_kind: c_int, _value: *mut Text);
+    fmi2GetStringStatus(_kind: c_int, _value: *mut FmiString);
 }

@@ -4,7 +4,7 @@
 
 use std::ffi::c_int;
 
-use super::instance::{Boolean, Component, Status, Text, call, text};
+use super::instance::{Boolean, Component, FmiString, Status, call, text};
 use crate::error::ModelError;
 use crate::model::Model;
 
@@ -92,7 +92,7 @@ rows! {
     /// Gets truth values.
     fmi2GetBoolean: get *mut Boolean, |model, reference| Ok(model.boolean(reference)?.into());
     /// Gets texts, which are good until they are set, reset or freed.
-    fmi2GetString: get *mut Text, |model, reference| Ok(model.string(reference)?.as_ptr());
+    fmi2GetString: get *mut FmiString, |model, reference| Ok(model.string(reference)?.as_ptr());
     /// Sets measured inputs.
     fmi2SetReal: set *const f64, Model::set_real;
     /// Sets the run and the direction.
@@ -100,10 +100,10 @@ rows! {
     /// Sets truth values.
     fmi2SetBoolean: set *const Boolean, |model, reference, value| model.set_boolean(reference, value != 0);
     /// Sets the paths of files.
-    fmi2SetString: set *const Text, set_text;
+    fmi2SetString: set *const FmiString, set_text;
 }
 
-fn set_text(model: &mut Model, reference: u32, value: Text) -> Result<(), ModelError> {
+fn set_text(model: &mut Model, reference: u32, value: FmiString) -> Result<(), ModelError> {
     // SAFETY: a text of the caller's array, or NULL.
     let value = unsafe { text(value) };
     model.set_string(reference, value.ok_or(ModelError::Null("a text"))?)

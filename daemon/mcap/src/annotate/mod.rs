@@ -3,10 +3,9 @@
 //!
 //! When the moments of a dataset's runs were, as a recording logs them.
 
-pub mod messages;
-
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use dynocar::cli::Failure;
 use dynocar::storage::Disk;
@@ -14,12 +13,14 @@ use dynocar_analysis::explain::report::timeline::{RunTimeline, Timeline};
 use mcap::McapError;
 use mcap::records::MessageHeader;
 use prost::Message;
+use prost_types::{FileDescriptorProto, FileDescriptorSet};
 
 use super::copying::{CopyWriter, copy};
 use super::error::{AtPath, CopyError, WriteError};
-use super::reading::{Item, Raw, Visitor};
+use super::message::{MessageField, message};
+use super::reading::{Raw, RecordingItem, Visitor};
 use super::recording::trains_of;
-use messages::{Effect, PredictedSpeed, Residual, Verdict};
+use super::schema::{fields_of, message};
 
 /// Why a recording is not annotated.
 #[derive(Debug, thiserror::Error)]
@@ -77,7 +78,7 @@ pub fn annotate(
     to: &Path,
 ) -> Result<Annotated, AnnotateError> {
     let mut added = Annotated::default();
-    copy(&Disk, &[from.into()], to, &mut Moments::default(), |writer, moments| {
+    copy(&Disk, &[from.into()], to, &mut SampleMoments::default(), |writer, moments| {
         let (train, runs) = runs_of(moments, train, timeline).map_err(AtPath::of(from))?;
         let annotations = Annotations::new(writer, train);
         let written = annotations.and_then(|it| it.write(timeline, &runs));
@@ -89,7 +90,7 @@ pub fn annotate(
 
 /// The train and its runs.
 fn runs_of(
-    moments: &Moments,
+    moments: &SampleMoments,
     train: Option<u64>,
     timeline: &Timeline,
 ) -> Result<(u64, Vec<RunMoments>), OtherRuns> {
@@ -123,7 +124,7 @@ impl<'w> Annotations<'w> {
     fn new(writer: &'w mut CopyWriter, train: u64) -> Result<Self, McapError> {
         let mut channel = |name: &str, topic: String| {
             let name = format!("dynocar.{name}");
-            let schema = writer.add_schema(&name, "protobuf", &messages::DESCRIPTORS)?;
+            let schema = writer.add_schema(&name, "protobuf", &DESCRIPTORS)?;
             writer.add_channel(schema, &topic, "protobuf", &BTreeMap::new())
         };
         Ok(Annotations {
@@ -208,7 +209,7 @@ impl<'w> Annotations<'w> {
 
 /// The samples of a recording with their moments, run by run as a dataset of it has them.
 #[derive(Debug, Default)]
-pub struct Moments {
+pub struct SampleMoments {
     /// When the newest message was logged, in ns since 1970.
     logged_ns: u64,
     samples: Vec<Moment>,
@@ -222,11 +223,11 @@ struct Moment {
     logged_ns: u64,
 }
 
-impl Visitor for Moments {
+impl Visitor for SampleMoments {
     type Error = CopyError;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), CopyError> {
-        if let Item::Sample(it) = item {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), CopyError> {
+        if let RecordingItem::Sample(it) = item {
             let (run, logged_ns) = ((it.run, it.direction), self.logged_ns);
             let time_ns = it.time_ns;
             self.samples.push(Moment { train: it.train_id, run, time_ns, logged_ns });
@@ -240,7 +241,7 @@ impl Visitor for Moments {
     }
 }
 
-impl Moments {
+impl SampleMoments {
     /// The trains that there are samples of, in order.
     pub fn trains(&self) -> Vec<u64> {
         trains_of(self.samples.iter().map(|it| it.train))
@@ -276,3 +277,93 @@ impl RunMoments {
         logged_ns.saturating_add_signed(time_ns - of_sample_ns)
     }
 }
+
+message! {
+    /// Statement of `explain` about a recording.
+    Verdict {
+        /// none, effect, ambiguous, unknown or insufficient_data.
+        1 verdict: String = string;
+        /// The verdict in a sentence or two.
+        2 text: String = string;
+        /// RMSE of the predicted speed on the runs held out, without the effects.
+        3 rmse_before_mps: Option<f64> = double optional;
+        /// The same with the effects.
+        4 rmse_after_mps: Option<f64> = double optional;
+    }
+}
+
+message! {
+    /// An effect that begins to act here.
+    Effect {
+        /// The train.
+        1 train_id: u64 = uint64;
+        /// The file of the run in the dataset that was explained.
+        2 run_file: String = string;
+        /// The kind's name.
+        3 kind: String = string;
+        /// Its place among the effects found, from 1.
+        4 number: u32 = uint32;
+        /// Kind, size and place in words.
+        5 text: String = string;
+        /// For how long it acts from here on.
+        6 duration_s: f64 = double;
+        /// When it ends to act, in ns since 1970 like the message's log time.
+        7 end_ns: u64 = uint64;
+        /// Chainage of the train's centre where it begins to act.
+        8 begin_position_m: Option<f64> = double optional;
+        /// Chainage of the train's centre where it ends to act.
+        9 end_position_m: Option<f64> = double optional;
+        /// Share of the open-loop error on the fit runs that goes when the effect is added last.
+        10 error_reduction: f64 = double;
+        /// Probability that the search finds as much where nothing acts.
+        11 p_value: f64 = double;
+    }
+}
+
+message! {
+    /// The resistance that the models lack, over about 20 s; positive retards. Logged at the middle.
+    Residual {
+        /// The length of time.
+        1 duration_s: f64 = double;
+        /// Without the effects found.
+        2 residual_before_n_per_kn: f64 = double;
+        /// With the effects found.
+        3 residual_after_n_per_kn: f64 = double;
+    }
+}
+
+message! {
+    /// The speed as measured, and as the models predict it from the run's first sample on.
+    PredictedSpeed {
+        /// Measured.
+        1 measured_speed_mps: f64 = double;
+        /// Predicted without the effects found.
+        2 speed_before_mps: f64 = double;
+        /// Predicted with the effects found.
+        3 speed_after_mps: f64 = double;
+        /// Predicted without the effects less measured.
+        4 error_before_mps: f64 = double;
+        /// Predicted with the effects less measured.
+        5 error_after_mps: f64 = double;
+    }
+}
+
+/// The messages with their names, what they are and their fields.
+pub const MESSAGES: [(&str, &str, &[MessageField]); 4] = [
+    (Verdict::NAME, Verdict::MEANING, Verdict::FIELDS),
+    (Effect::NAME, Effect::MEANING, Effect::FIELDS),
+    (Residual::NAME, Residual::MEANING, Residual::FIELDS),
+    (PredictedSpeed::NAME, PredictedSpeed::MEANING, PredictedSpeed::FIELDS),
+];
+
+/// The messages as the bytes that an MCAP schema holds.
+pub static DESCRIPTORS: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let file = FileDescriptorProto {
+        name: Some("dynocar/explanation.proto".into()),
+        package: Some("dynocar".into()),
+        syntax: Some("proto3".into()),
+        message_type: MESSAGES.iter().map(|it| message(it.0, fields_of(it.2))).collect(),
+        ..Default::default()
+    };
+    FileDescriptorSet { file: vec![file] }.encode_to_vec()
+});

@@ -11,7 +11,7 @@ pub fn mps2_per_n_per_kn(rotating_mass_factor: f64) -> f64 {
 
 /// Forces on a train at a moment, in the direction of travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ActingForces {
+pub struct ForceBalance {
     /// Gross mass in kg.
     pub mass_kg: f64,
     /// gamma.
@@ -24,7 +24,7 @@ pub struct ActingForces {
     pub resistance_n_per_kn: [f64; 3],
 }
 
-impl ActingForces {
+impl ForceBalance {
     /// The acceleration in m/s² as p0 + p1 v + p2 v² of the speed in m/s.
     #[inline]
     pub fn acceleration_mps2(&self) -> [f64; 3] {
@@ -46,7 +46,7 @@ mod tests {
 
     #[test]
     fn forces_balance_inertia() {
-        let acting = ActingForces {
+        let acting = ForceBalance {
             mass_kg: 100e3,
             rotating_mass_factor: 0.06,
             force_n: 80e3,
@@ -59,7 +59,7 @@ mod tests {
         let left_n = 80e3 - weight_kn * (5.0 + 1.5 + 0.03 * 20.0 + 0.001 * 400.0);
         let accelerated_n = 1.06 * 100e3 * (p0 + speed_mps * (p1 + speed_mps * p2));
         assert!((accelerated_n - left_n).abs() < 1e-9 * 80e3);
-        let on_a_unit_more = ActingForces { gradient_permille: 6.0, ..acting };
+        let on_a_unit_more = ForceBalance { gradient_permille: 6.0, ..acting };
         let taken_mps2 = p0 - on_a_unit_more.acceleration_mps2()[0];
         assert!((taken_mps2 - mps2_per_n_per_kn(0.06)).abs() < 1e-12);
     }

@@ -7,7 +7,7 @@ use crate::train::Davis;
 
 const DAVIS: Davis = Davis { a: 1.5, b: 0.02, c: 0.004 };
 
-fn predict(recording: &Recording, restart: Restart) -> Prediction {
+fn predict(recording: &OpenLoopRecording, restart: Restart) -> Prediction {
     let mut prediction = Prediction::new();
     let model = QuadraticForces::declared(recording, DAVIS);
     prediction.simulate(recording, &model, restart);
@@ -26,7 +26,7 @@ fn perfect_run(count: usize) -> Vec<ResolvedSample> {
     speeds.enumerate().map(|(k, &speed_mps)| ResolvedSample { speed_mps, ..pulled(k) }).collect()
 }
 
-fn rmse_mps(recording: &Recording, restart: Restart) -> f64 {
+fn rmse_mps(recording: &OpenLoopRecording, restart: Restart) -> f64 {
     SpeedError::of(recording, &predict(recording, restart)).rmse_mps().unwrap()
 }
 
@@ -133,11 +133,11 @@ fn a_stop_on_a_falling_gradient_is_held_without_a_reported_brake() {
 #[test]
 fn a_run_without_forces_or_order_is_refused() {
     let bare = ResolvedSample { brake_force_n: None, ..coasting_sample(0.0) };
-    let refused = Recording::new(vec![bare]);
+    let refused = OpenLoopRecording::new(vec![bare]);
     assert_eq!(refused, Err(SimulateError::NoForces { samples: 1 }));
     let backwards = vec![coasting_sample(1.0), coasting_sample(0.5)];
     assert!(matches!(
-        Recording::new(backwards),
+        OpenLoopRecording::new(backwards),
         Err(SimulateError::TimeNotIncreasing { index: 1, .. })
     ));
 }

@@ -5,7 +5,7 @@
 //!                          - weight_kN gradient + whatever else the force model says
 //! ```
 //!
-//! Over a recorded run ([`Recording`], [`Prediction`]) it is open loop: the reported forces act, the
+//! Over a recorded run ([`OpenLoopRecording`], [`Prediction`]) it is open loop: the reported forces act, the
 //! track is looked up at the measured position, the predicted speed is compared with the measured
 //! one. It is the judge of every model, and an optimiser calls it thousands of times. Simulators
 //! of driven trains, which look the track up at the simulated position, share its step
@@ -23,7 +23,7 @@
 //!
 //! Resistance and brakes only oppose motion, so a train never rolls backwards: the speed is kept
 //! at or above zero, the instant of stopping and of starting is found within the step, and the
-//! time at rest adds nothing. See [`Recording`] for what else is done about stops and gaps.
+//! time at rest adds nothing. See [`OpenLoopRecording`] for what else is done about stops and gaps.
 
 #[cfg(test)]
 mod analytic_tests;
@@ -35,6 +35,6 @@ mod recording;
 
 pub use prediction::{MOVING_SPEED_MPS, Prediction, Restart, STANDING_MPS, SpeedError, departs};
 pub use recording::{
-    ForceModel, Polynomial, QuadraticForces, Recording, SimulateError, declared_polynomial,
+    ForceModel, OpenLoopRecording, Polynomial, QuadraticForces, SimulateError, declared_polynomial,
     is_pulled,
 };

@@ -2,7 +2,7 @@
 
 /// Where a train is and how fast it goes along its direction of travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct SimulatedMotion {
     /// Distance travelled in m.
     pub distance_m: f64,
     /// Speed in m/s, never negative.
@@ -41,13 +41,13 @@ fn speed_after_dip(speed_mps: f64, start: f64, end: f64, step_s: f64) -> f64 {
 /// A stop within the step ends the way at the stopping point.
 #[inline]
 pub fn advance(
-    motion: Motion,
+    motion: SimulatedMotion,
     step_s: f64,
-    mut acceleration_mps2: impl FnMut(f64, Motion) -> f64,
-) -> Motion {
+    mut acceleration_mps2: impl FnMut(f64, SimulatedMotion) -> f64,
+) -> SimulatedMotion {
     let start = acceleration_mps2(0.0, motion);
     let predicted_mps = (motion.speed_mps + step_s * start).clamp(0.0, SPEED_MAX_MPS);
-    let predicted = Motion {
+    let predicted = SimulatedMotion {
         distance_m: motion.distance_m + 0.5 * step_s * (motion.speed_mps + predicted_mps),
         speed_mps: predicted_mps,
     };
@@ -61,7 +61,7 @@ pub fn advance(
         let braking = -0.5 * (start + end);
         (0.5 * motion.speed_mps * motion.speed_mps / braking).min(motion.speed_mps * step_s)
     };
-    Motion { distance_m: motion.distance_m + travelled_m, speed_mps }
+    SimulatedMotion { distance_m: motion.distance_m + travelled_m, speed_mps }
 }
 
 #[cfg(test)]
@@ -93,13 +93,13 @@ mod tests {
 
     #[test]
     fn a_train_pulled_backwards_stays_where_it_is() {
-        let at_rest = Motion { distance_m: 7.0, speed_mps: 0.0 };
+        let at_rest = SimulatedMotion { distance_m: 7.0, speed_mps: 0.0 };
         assert_eq!(advance(at_rest, 1.0, |_, _| -0.4), at_rest);
     }
 
     #[test]
     fn a_stop_ends_after_the_braking_distance() {
-        let mut motion = Motion { distance_m: 0.0, speed_mps: 10.03 };
+        let mut motion = SimulatedMotion { distance_m: 0.0, speed_mps: 10.03 };
         for _ in 0..100 {
             motion = advance(motion, 0.5, |_, _| -0.8);
         }

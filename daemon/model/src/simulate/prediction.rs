@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::motion::{SPEED_MAX_MPS, STEP_MAX_S, speed_after};
-use super::recording::{ForceModel, Recording, SampleRole};
+use super::recording::{ForceModel, OpenLoopRecording, SampleRole};
 use crate::force::ResolvedSample;
 
 pub use crate::terms::wheel::STANDING_MPS;
@@ -64,7 +64,7 @@ impl Prediction {
     }
 
     /// Predicted measured speed in m/s at each sample; the measured one where the run cannot be
-    /// simulated (see [`Recording::is_simulated`]).
+    /// simulated (see [`OpenLoopRecording::is_simulated`]).
     pub fn speed_mps(&self) -> &[f64] {
         &self.speed_mps
     }
@@ -73,13 +73,18 @@ impl Prediction {
     ///
     /// The start is the measured speed, unless the samples after it show it to be an outlier:
     /// then it is the median of the starts that they would have given.
-    pub fn simulate(&mut self, recording: &Recording, model: &impl ForceModel, restart: Restart) {
+    pub fn simulate(
+        &mut self,
+        recording: &OpenLoopRecording,
+        model: &impl ForceModel,
+        restart: Restart,
+    ) {
         Prediction::simulate_beside(recording, model, [(self, restart)]);
     }
 
     /// Simulates a run in some ways at once: a processor works on one while the other waits for its last speed.
     pub fn simulate_beside<const N: usize>(
-        recording: &Recording,
+        recording: &OpenLoopRecording,
         model: &impl ForceModel,
         mut ways: [(&mut Prediction, Restart); N],
     ) {
@@ -135,7 +140,7 @@ fn step(model: &impl ForceModel, from: usize, speed_mps: f64, step_s: f64) -> f6
 }
 
 /// True speed in m/s to start from at a sample.
-fn start_speed(recording: &Recording, model: &impl ForceModel, index: usize) -> f64 {
+fn start_speed(recording: &OpenLoopRecording, model: &impl ForceModel, index: usize) -> f64 {
     let (samples, time_s, roles) = (recording.samples(), recording.time_s(), recording.roles());
     let scale = model.speed_scale();
     let measured_mps = samples[index].speed_mps / scale;
@@ -190,7 +195,7 @@ impl SpeedError {
     /// # Panics
     ///
     /// When the prediction belongs to another run.
-    pub fn of(recording: &Recording, prediction: &Prediction) -> Self {
+    pub fn of(recording: &OpenLoopRecording, prediction: &Prediction) -> Self {
         SpeedError::within(recording, prediction, 0..recording.samples().len())
     }
 
@@ -199,7 +204,11 @@ impl SpeedError {
     /// # Panics
     ///
     /// When the prediction belongs to another run, or the run has not these samples.
-    pub fn within(recording: &Recording, prediction: &Prediction, samples: Range<usize>) -> Self {
+    pub fn within(
+        recording: &OpenLoopRecording,
+        prediction: &Prediction,
+        samples: Range<usize>,
+    ) -> Self {
         assert_eq!(recording.samples().len(), prediction.speed_mps().len());
         let mut error = SpeedError::default();
         for i in samples {

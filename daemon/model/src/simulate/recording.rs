@@ -3,7 +3,7 @@
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
 use crate::force::ResolvedSample;
-use crate::force::balance::ActingForces;
+use crate::force::balance::ForceBalance;
 use crate::train::Davis;
 
 /// Gaps in s up to which a missing force is bridged by a straight line.
@@ -42,7 +42,7 @@ pub enum SimulateError {
 /// - Samples that validation refused (outliers, repeated rows) are simply not there; the step
 ///   across them is longer.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Recording {
+pub struct OpenLoopRecording {
     samples: Vec<ResolvedSample>,
     /// Time in s from the run's first sample.
     time_s: Vec<f64>,
@@ -71,7 +71,7 @@ const REST_SPEED_MPS: f64 = 0.05;
 /// Below this traction, as acceleration in m/s², a train at rest counts as not pulled.
 const REST_TRACTION_MPS2: f64 = 0.005;
 
-impl Recording {
+impl OpenLoopRecording {
     /// Makes a run ready; `samples` are in order of time.
     ///
     /// # Errors
@@ -103,7 +103,7 @@ impl Recording {
             return Err(SimulateError::NoForces { samples: samples.len() });
         }
         let speed_mps = samples.iter().map(|sample| sample.speed_mps).collect();
-        Ok(Recording { samples, time_s, speed_mps, roles, knows_gradient, bridged })
+        Ok(OpenLoopRecording { samples, time_s, speed_mps, roles, knows_gradient, bridged })
     }
 
     /// The samples, missing forces bridged where they could be.
@@ -261,7 +261,7 @@ pub struct QuadraticForces {
 
 impl QuadraticForces {
     /// The declared model over a run with the given Davis coefficients.
-    pub fn declared(recording: &Recording, resistance: Davis) -> Self {
+    pub fn declared(recording: &OpenLoopRecording, resistance: Davis) -> Self {
         let mut forces = QuadraticForces::default();
         let polynomial = |sample| declared_polynomial(sample, resistance);
         forces.restart(1.0);
@@ -295,10 +295,10 @@ impl ForceModel for QuadraticForces {
 }
 
 /// The declared model at a sample. A gradient that is not known counts as level track;
-/// [`Recording::knows_gradient`] says.
+/// [`OpenLoopRecording::knows_gradient`] says.
 pub fn declared_polynomial(sample: &ResolvedSample, resistance: Davis) -> Polynomial {
     let Davis { a, b, c } = resistance;
-    let acting = ActingForces {
+    let acting = ForceBalance {
         mass_kg: sample.mass_kg,
         rotating_mass_factor: sample.rotating_mass_factor(),
         force_n: sample.control_force_n().unwrap_or(0.0),
@@ -317,7 +317,7 @@ pub(super) mod tests {
         ResolvedSample { time_ns: (time_s * 1e9).round() as i64, ..ResolvedSample::coasting() }
     }
 
-    pub(in crate::simulate) fn recorded(samples: Vec<ResolvedSample>) -> Recording {
-        Recording::new(samples).unwrap()
+    pub(in crate::simulate) fn recorded(samples: Vec<ResolvedSample>) -> OpenLoopRecording {
+        OpenLoopRecording::new(samples).unwrap()
     }
 }

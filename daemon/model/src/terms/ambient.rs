@@ -7,31 +7,14 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use crate::train::Corrections;
 
-use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+use super::{Least, Parameter, Resistance, Suspect};
+pub use crate::train::numbers::{AMBIENT_REFERENCE as REFERENCE, AMBIENT_W0 as W0_PER_K};
 
 /// 0 °C in K.
 const ZERO_DEGC_K: f64 = 273.15;
 /// The standard atmosphere's 15 °C in K, for which coefficients are declared.
 pub const REFERENCE_K: f64 = Corrections::NONE.ambient_reference_k;
 
-/// Relative change of the basic resistance per kelvin.
-pub const W0_PER_K: Key = Key {
-    table: "corrections",
-    name: "ambient_w0_per_k",
-    range: [-0.1, 0.1],
-    allowed: "from -0.1 to 0.1 per kelvin",
-    joined: Joined::Added,
-    of: |train| &mut train.corrections.ambient_w0_per_k,
-};
-/// Temperature in K at which the basic resistance holds.
-pub const REFERENCE: Key = Key {
-    table: "corrections",
-    name: "ambient_reference_k",
-    range: [200.0, 350.0],
-    allowed: "from 200 to 350 K",
-    joined: Joined::Replaced,
-    of: |train| &mut train.corrections.ambient_reference_k,
-};
 /// Air density alone gives -0.0035 per kelvin; grease makes it more.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("w0_per_k", (-0.05, 0.05), 0.0005)];
 /// A smaller change per kelvin does not matter over the temperatures of a year.

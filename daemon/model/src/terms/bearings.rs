@@ -5,26 +5,9 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+use super::{Least, Parameter, Resistance, Suspect};
+pub use crate::train::numbers::{BEARING_DELTA_A as DELTA_A, BEARING_TAU as TAU};
 
-/// Addition to a at a cold start, in N/kN.
-pub const DELTA_A: Key = Key {
-    table: "corrections",
-    name: "bearing_delta_a_n_per_kn",
-    range: [0.0, 50.0],
-    allowed: "from 0 to 50 N/kN",
-    joined: Joined::Added,
-    of: |train| &mut train.corrections.bearing_delta_a_n_per_kn,
-};
-/// Time constant in s with which they warm up.
-pub const TAU: Key = Key {
-    table: "corrections",
-    name: "bearing_tau_s",
-    range: [1.0, 1e5],
-    allowed: "from 1 to 100000 s",
-    joined: Joined::Replaced,
-    of: |train| &mut train.corrections.bearing_tau_s,
-};
 /// Delta and tau.
 pub const PARAMETERS: [Parameter; 2] = [
     Parameter::new("delta_a_n_per_kn", (0.0, 20.0), 0.02),

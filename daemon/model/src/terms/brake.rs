@@ -3,17 +3,9 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Suspect, adhesion};
+use super::{Least, Parameter, Suspect, adhesion};
+pub use crate::train::numbers::BRAKE_GAIN as GAIN;
 
-/// Reported over true brake force.
-pub const GAIN: Key = Key {
-    table: "corrections",
-    name: "brake_gain",
-    range: [0.5, 2.0],
-    allowed: "from 0.5 to 2",
-    joined: Joined::Multiplied,
-    of: |train| &mut train.corrections.brake_gain,
-};
 /// A brake that is nearer to its report is as good as declared.
 pub const GAIN_LEAST: f64 = adhesion::DECLARED_BRAKE_STD;
 

@@ -2,17 +2,9 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+use super::{Least, Parameter, Resistance, Suspect};
+pub use crate::train::numbers::CURVE_CONSTANT as CONSTANT;
 
-/// k in N/kN m; R in m.
-pub const CONSTANT: Key = Key {
-    table: "resistance",
-    name: "curve_constant_n_per_kn_m",
-    range: [0.0, 5000.0],
-    allowed: "from 0 to 5000",
-    joined: Joined::Replaced,
-    of: |train| &mut train.curve_constant_n_per_kn_m,
-};
 /// Total k is between none and about eight times the usual.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("k_n_per_kn_m", (0.0, 5000.0), 20.0)];
 /// A k that differs by less from the declared one is within what formulas differ by.

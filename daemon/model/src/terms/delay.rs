@@ -1,34 +1,13 @@
 //! Forces that act later than they are reported: a dead time, then a first-order lag.
 
-use super::{Joined, Key, Parameter};
+use super::Parameter;
+pub use crate::train::numbers::{
+    ACTUATOR_DELAY as DELAY, ACTUATOR_LAG as LAG, BRAKE_DELAY, BRAKE_LAG,
+};
 
-/// Dead time in s.
-pub const DELAY: Key = Key {
-    table: "corrections",
-    name: "actuator_delay_s",
-    range: [0.0, 6.0],
-    allowed: "from 0 to 6 s",
-    joined: Joined::Added,
-    of: |train| &mut train.corrections.actuator_delay_s,
-};
-/// Time constant in s of the lag.
-pub const LAG: Key = Key {
-    table: "corrections",
-    name: "actuator_lag_s",
-    range: [0.0, 10.0],
-    allowed: "from 0 to 10 s",
-    joined: Joined::Added,
-    of: |train| &mut train.corrections.actuator_lag_s,
-};
-/// Dead time in s of the brake alone, beyond that of both.
-pub const BRAKE_DELAY: Key =
-    Key { name: "brake_delay_s", of: |train| &mut train.corrections.brake_delay_s, ..DELAY };
-/// Time constant in s of the lag of the brake alone.
-pub const BRAKE_LAG: Key =
-    Key { name: "brake_lag_s", of: |train| &mut train.corrections.brake_lag_s, ..LAG };
 /// Delay and lag.
 pub const PARAMETERS: [Parameter; 2] = [
-    Parameter::new("delay_s", (0.0, DELAY.range[1]), 0.05),
+    Parameter::new("delay_s", (0.0, DELAY.rule.range[1]), 0.05),
     Parameter::new("lag_s", (0.0, 8.0), 0.05),
 ];
 /// Name of their sum, which runs show far better than either.

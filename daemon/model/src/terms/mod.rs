@@ -26,28 +26,9 @@ pub mod tunnel;
 pub mod wheel;
 pub mod wind;
 
-pub use key::{Entry, Joined, Key, Least, Parameter, Suspect, SuspectInput};
+pub use crate::train::numbers::Key;
+pub use key::{Least, ModelEntry, Parameter, Suspect, SuspectInput};
 pub use resistance::Resistance;
-
-/// Every number of a term that stands in `[corrections]` of `train.toml`.
-pub const CORRECTIONS: [&Key; 16] = [
-    &wheel::SPEED_SCALE,
-    &speed_delay::DELAY,
-    &speed_delay::LAG,
-    &traction::GAIN,
-    &brake::GAIN,
-    &delay::BRAKE_DELAY,
-    &delay::BRAKE_LAG,
-    &delay::DELAY,
-    &delay::LAG,
-    &tunnel::C_FACTOR,
-    &tunnel::DC,
-    &wind::WIND_PLUS,
-    &bearings::DELTA_A,
-    &bearings::TAU,
-    &ambient::W0_PER_K,
-    &ambient::REFERENCE,
-];
 
 /// Suspects of the monitor, one column of its regression each.
 pub const SUSPECTS: [Suspect; 8] = [
@@ -71,11 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_two_terms_claim_a_key_or_a_suspicion() {
-        for (k, key) in CORRECTIONS.iter().enumerate() {
-            assert!(!CORRECTIONS[..k].contains(key), "{}", key.name);
-            assert_eq!(key.table, "corrections", "{}", key.name);
-        }
+    fn no_two_terms_claim_a_suspicion() {
         for (k, suspect) in SUSPECTS.iter().enumerate() {
             assert!(SUSPECTS[..k].iter().all(|other| other.effect != suspect.effect));
         }

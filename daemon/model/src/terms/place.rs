@@ -3,10 +3,9 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Least, Parameter, Resistance, Suspect};
-use crate::track::{StepProfile, TrackError, interval_profile};
+pub use crate::track::RESISTANCE as LIST;
+use crate::track::{IntervalValue, StepProfile, TrackError, interval_profile};
 
-/// The list of `[track]` that holds [start in m, end in m, extra in N/kN].
-pub const LIST: &str = "resistance";
 /// A snow drift or a tight superelevation; a hundred N/kN is a steep hill.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (0.0, 100.0), 0.02)];
 
@@ -16,9 +15,9 @@ pub const PARAMETERS: [Parameter; 1] = [Parameter::new("extra_n_per_kn", (0.0, 1
 ///
 /// When intervals overlap, are reversed or not finite.
 pub fn profile(intervals_m: &[[f64; 2]], extra_n_per_kn: f64) -> Result<StepProfile, TrackError> {
-    let places: Vec<(f64, f64, f64)> =
-        intervals_m.iter().map(|&[from_m, to_m]| (from_m, to_m, extra_n_per_kn)).collect();
-    interval_profile(LIST, &places)
+    let place =
+        |&[start_m, end_m]: &[f64; 2]| IntervalValue { start_m, end_m, value: extra_n_per_kn };
+    interval_profile(LIST, &intervals_m.iter().map(place).collect::<Vec<_>>())
 }
 
 /// Returns intervals in m along the line in words, as in `1200–1500 m, 2100–2300 m`.

@@ -2,17 +2,9 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Suspect};
+use super::{Least, Parameter, Suspect};
+pub use crate::train::numbers::ROTATING_MASS_FACTOR as FACTOR;
 
-/// Key of the rotating-mass factor gamma.
-pub const FACTOR: Key = Key {
-    table: "train",
-    name: "rotating_mass_factor",
-    range: [0.0, 1.0],
-    allowed: "a rotating-mass factor from 0 to 1",
-    joined: Joined::Replaced,
-    of: |train| &mut train.rotating_mass_factor,
-};
 /// Locomotives with small loads reach 0.25 to 0.3.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("rotating_mass_factor", (0.0, 0.5), 0.005)];
 /// Least difference of the factor that counts as an effect; a load changes it by less.

@@ -6,26 +6,9 @@
 
 use super::delay::{DelayLine, Forces};
 use super::wheel::STANDING_MPS;
-use super::{Joined, Key, Parameter, Resistance};
+use super::{Parameter, Resistance};
+pub use crate::train::numbers::{SPEED_DELAY as DELAY, SPEED_LAG as LAG};
 
-/// Dead time in s.
-pub const DELAY: Key = Key {
-    table: "corrections",
-    name: "speed_delay_s",
-    range: [0.0, 5.0],
-    allowed: "from 0 to 5 s",
-    joined: Joined::Added,
-    of: |train| &mut train.corrections.speed_delay_s,
-};
-/// Time constant in s of the lag.
-pub const LAG: Key = Key {
-    table: "corrections",
-    name: "speed_lag_s",
-    range: [0.0, 5.0],
-    allowed: "from 0 to 5 s",
-    joined: Joined::Added,
-    of: |train| &mut train.corrections.speed_lag_s,
-};
 /// Delay and lag.
 pub const PARAMETERS: [Parameter; 2] =
     [Parameter::new("delay_s", (0.0, 4.0), 0.05), Parameter::new("lag_s", (0.0, 4.0), 0.05)];

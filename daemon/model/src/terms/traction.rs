@@ -2,17 +2,9 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Suspect};
+use super::{Least, Parameter, Suspect};
+pub use crate::train::numbers::TRACTION_GAIN as GAIN;
 
-/// Reported over true traction force.
-pub const GAIN: Key = Key {
-    table: "corrections",
-    name: "traction_gain",
-    range: [0.5, 2.0],
-    allowed: "from 0.5 to 2",
-    joined: Joined::Multiplied,
-    of: |train| &mut train.corrections.traction_gain,
-};
 /// Beyond these a controller reports something else.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("gain", (0.6, 1.6), 0.005)];
 /// Force sensors are good to this.

@@ -3,38 +3,14 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Resistance, Suspect};
+use super::{Least, Parameter, Resistance, Suspect};
+pub use crate::train::numbers::{
+    TUNNEL_C_FACTOR as C_FACTOR, TUNNEL_CONSTANT as CONSTANT, TUNNEL_DC as DC,
+};
 
-/// Resistance in N/kN of each metre of tunnel around the train.
-pub const CONSTANT: Key = Key {
-    table: "resistance",
-    name: "tunnel_constant_n_per_kn_m",
-    range: [0.0, 1.0],
-    allowed: "from 0 to 1",
-    joined: Joined::Added,
-    of: |train| &mut train.tunnel_constant_n_per_kn_m,
-};
-/// Factor on c v² inside.
-pub const C_FACTOR: Key = Key {
-    table: "corrections",
-    name: "tunnel_c_factor",
-    range: [0.0, 100.0],
-    allowed: "from 0 to 100",
-    joined: Joined::Multiplied,
-    of: |train| &mut train.corrections.tunnel_c_factor,
-};
-/// Addition to c inside, whatever c is: it is found in this form, since c itself may hardly be known.
-pub const DC: Key = Key {
-    table: "corrections",
-    name: "tunnel_dc_n_per_kn_per_mps2",
-    range: [-0.2, 0.2],
-    allowed: "from -0.2 to 0.2 N/kN per (m/s)²",
-    joined: Joined::Added,
-    of: |train| &mut train.corrections.tunnel_dc_n_per_kn_per_mps2,
-};
 /// Single-track tunnels reach several times c; the bound is in N/kN per (m/s)².
 pub const PARAMETERS: [Parameter; 1] =
-    [Parameter::new("dc_n_per_kn_per_mps2", (0.0, DC.range[1]), 1e-5)];
+    [Parameter::new("dc_n_per_kn_per_mps2", (0.0, DC.rule.range[1]), 1e-5)];
 /// A smaller share of c is within the accuracy of tunnel factors, which are tabulated to one decimal.
 pub const LEAST_SHARE_OF_C: f64 = 0.1;
 

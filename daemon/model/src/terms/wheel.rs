@@ -1,20 +1,12 @@
 //! Wheels of another diameter than declared: measured speed = scale · true speed.
 
-use super::{Joined, Key, Parameter};
+use super::Parameter;
+pub use crate::train::numbers::SPEED_SCALE;
 
 /// Up to this speed in m/s a train stands; below it a wheel sensor sees nothing.
 pub const STANDING_MPS: f64 = 0.3;
 /// A recorded speed in m/s below which a vehicle surely stands, however it was measured.
 pub const STILL_MPS: f64 = 0.1;
-/// Measured over true speed.
-pub const SPEED_SCALE: Key = Key {
-    table: "corrections",
-    name: "speed_scale",
-    range: [0.8, 1.25],
-    allowed: "from 0.8 to 1.25",
-    joined: Joined::Multiplied,
-    of: |train| &mut train.corrections.speed_scale,
-};
 /// Wheels are turned down by at most about a tenth of their diameter.
 pub const PARAMETERS: [Parameter; 1] = [Parameter::new("speed_scale", (0.88, 1.12), 0.002)];
 /// Least effect; the wear of a wheel between two measurements is less.

@@ -3,17 +3,9 @@
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Joined, Key, Least, Parameter, Resistance, Suspect, SuspectInput};
+use super::{Least, Parameter, Resistance, Suspect, SuspectInput};
+pub use crate::train::numbers::WIND_PLUS;
 
-/// Headwind in m/s for the direction of growing chainage.
-pub const WIND_PLUS: Key = Key {
-    table: "corrections",
-    name: "wind_plus_mps",
-    range: [-50.0, 50.0],
-    allowed: "from -50 to 50 m/s",
-    joined: Joined::Added,
-    of: |train| &mut train.corrections.wind_plus_mps,
-};
 /// Faster wind stops the trains.
 pub const PARAMETER: Parameter = Parameter::new("wind_plus_mps", (-35.0, 35.0), 0.05);
 /// Root mean square in m/s of the winds along a line on ordinary days, at most.

@@ -6,11 +6,25 @@
 
 mod profile;
 
-pub use profile::{GradientError, LinearProfile, ProfileError, StepProfile, along_line};
+pub use profile::{
+    GradientError, IntervalValue, LinearProfile, ProfileError, StepProfile, along_line,
+};
+
+/// The list of `[track]` that holds curves.
+pub const CURVES: &str = "curves";
+/// The list of `[track]` that holds tunnels.
+pub const TUNNELS: &str = "tunnels";
+/// The list of `[track]` that holds [start in m, end in m, extra in N/kN] of places that resist.
+pub const RESISTANCE: &str = "resistance";
 
 /// Errors of a surveyed gradient further apart than this in m are their own: the integral scale of a
 /// process along the chainage.
 pub const GRADIENT_ERROR_FREE_M: f64 = 200.0;
+
+/// Returns the standard deviation of the mean of a gradient's error over a length in m, as a share of that at a place.
+pub fn gradient_error_of_mean(length_m: f64) -> f64 {
+    (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt()
+}
 
 /// Share of a surveyed gradient's error that is still there after a distance in m.
 pub fn gradient_error_kept(distance_m: f64) -> f64 {
@@ -91,7 +105,7 @@ pub struct Track {
     gradient_permille: Option<StepProfile>,
     curvature_per_m: Option<StepProfile>,
     tunnel: Option<TunnelProfiles>,
-    curves: Vec<Curve>,
+    curves: Vec<TrackCurve>,
     tunnels: Vec<Tunnel>,
     resistance_n_per_kn: Option<StepProfile>,
     /// How far in m the true gradient lies from the profile, towards growing chainage.
@@ -126,7 +140,7 @@ impl Track {
         name: String,
         length_m: Option<f64>,
         gradient: Option<&[(f64, f64)]>,
-        curves: Option<Vec<Curve>>,
+        curves: Option<Vec<TrackCurve>>,
         tunnels: Option<Vec<Tunnel>>,
     ) -> Result<Self, TrackError> {
         let gradient_permille =
@@ -149,13 +163,13 @@ impl Track {
         })
     }
 
-    /// The same line with further resistance in N/kN at places: (start, end, extra).
+    /// Returns the line with further resistance in N/kN at places.
     ///
     /// # Errors
     ///
     /// When intervals overlap, are reversed or not finite.
-    pub fn with_resistance(mut self, places: &[(f64, f64, f64)]) -> Result<Self, TrackError> {
-        self.resistance_n_per_kn = Some(interval_profile("resistance", places)?);
+    pub fn with_resistance(mut self, places: &[IntervalValue]) -> Result<Self, TrackError> {
+        self.resistance_n_per_kn = Some(interval_profile(RESISTANCE, places)?);
         Ok(self)
     }
 
@@ -211,7 +225,7 @@ impl Track {
         let length_m = to_m - from_m;
         let profile = self.survey.gradient_std_permille.as_ref()?;
         let std = profile.mean_around(0.5 * (from_m + to_m), length_m);
-        Some(std * (GRADIENT_ERROR_FREE_M / length_m.max(GRADIENT_ERROR_FREE_M)).sqrt())
+        Some(std * gradient_error_of_mean(length_m))
     }
 
     /// True when both directions have one gradient profile.
@@ -247,7 +261,7 @@ impl Track {
     }
 
     /// The known curves, by chainage as declared.
-    pub fn curves(&self) -> &[Curve] {
+    pub fn curves(&self) -> &[TrackCurve] {
         &self.curves
     }
 
@@ -272,7 +286,7 @@ impl Track {
     }
 }
 
-fn curvature_profile(curves: &[Curve]) -> Result<StepProfile, TrackError> {
+fn curvature_profile(curves: &[TrackCurve]) -> Result<StepProfile, TrackError> {
     for (i, curve) in curves.iter().enumerate() {
         // The reciprocal of a subnormal radius is infinite.
         let is_usable = curve.radius_m.is_finite() && (1.0 / curve.radius_m).is_finite();
@@ -280,43 +294,49 @@ fn curvature_profile(curves: &[Curve]) -> Result<StepProfile, TrackError> {
             return Err(TrackError::BadRadius { index: i + 1, radius_m: curve.radius_m });
         }
     }
-    let intervals: Vec<_> =
-        curves.iter().map(|curve| (curve.start_m, curve.end_m, 1.0 / curve.radius_m)).collect();
-    interval_profile("curves", &intervals)
+    let bend = |it: &TrackCurve| IntervalValue {
+        start_m: it.start_m,
+        end_m: it.end_m,
+        value: 1.0 / it.radius_m,
+    };
+    let intervals: Vec<IntervalValue> = curves.iter().map(bend).collect();
+    interval_profile(CURVES, &intervals)
 }
 
 fn tunnel_profiles(tunnels: &[Tunnel]) -> Result<TunnelProfiles, TrackError> {
-    let with = |value: fn(&Tunnel) -> f64| -> Vec<(f64, f64, f64)> {
-        tunnels.iter().map(|tunnel| (tunnel.start_m, tunnel.end_m, value(tunnel))).collect()
+    let with = |value: fn(&Tunnel) -> f64| -> Vec<IntervalValue> {
+        let interval =
+            |it: &Tunnel| IntervalValue { start_m: it.start_m, end_m: it.end_m, value: value(it) };
+        tunnels.iter().map(interval).collect()
     };
     Ok(TunnelProfiles {
-        inside: interval_profile("tunnels", &with(|_| 1.0))?,
-        length_m: interval_profile("tunnels", &with(|tunnel| tunnel.end_m - tunnel.start_m))?,
+        inside: interval_profile(TUNNELS, &with(|_| 1.0))?,
+        length_m: interval_profile(TUNNELS, &with(|tunnel| tunnel.end_m - tunnel.start_m))?,
     })
 }
 
 /// A greater chainage in m cannot be distinguished from its neighbours to the millimetre, nor be meant.
 const CHAINAGE_MAX_M: f64 = 1e9;
 
-/// A profile that is zero outside the given (start, end, value) intervals.
+/// Returns the profile that is zero outside the intervals.
 ///
 /// # Errors
 ///
 /// When intervals overlap, are reversed or not finite; `list` names them.
 pub fn interval_profile(
     list: &'static str,
-    intervals: &[(f64, f64, f64)],
+    intervals: &[IntervalValue],
 ) -> Result<StepProfile, TrackError> {
-    for (i, &(start_m, end_m, _)) in intervals.iter().enumerate() {
+    for (i, &IntervalValue { start_m, end_m, .. }) in intervals.iter().enumerate() {
         let is_on_earth = |at_m: f64| at_m.abs() <= CHAINAGE_MAX_M;
         if !(is_on_earth(start_m) && is_on_earth(end_m) && start_m < end_m) {
             return Err(TrackError::BadInterval { list, index: i + 1, start_m, end_m });
         }
     }
     let mut ordered = intervals.to_vec();
-    ordered.sort_by(|one, other| one.0.total_cmp(&other.0));
+    ordered.sort_by(|one, other| one.start_m.total_cmp(&other.start_m));
     let mut steps: Vec<(f64, f64)> = vec![(f64::MIN, 0.0)];
-    for (i, &(start_m, end_m, value)) in ordered.iter().enumerate() {
+    for (i, &IntervalValue { start_m, end_m, value }) in ordered.iter().enumerate() {
         let last = steps.len() - 1;
         let (free_from, _) = steps[last];
         if start_m < free_from {
@@ -343,7 +363,7 @@ mod tests;
 
 /// A curve of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curve {
+pub struct TrackCurve {
     /// Chainage in m where it starts.
     pub start_m: f64,
     /// Chainage in m where it ends.

@@ -202,6 +202,17 @@ impl GradientError {
     }
 }
 
+/// A value between two chainages in m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IntervalValue {
+    /// Chainage in m where it starts.
+    pub start_m: f64,
+    /// Chainage in m where it ends.
+    pub end_m: f64,
+    /// The value between them.
+    pub value: f64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,7 +7,7 @@ fn line() -> Track {
         "test".into(),
         Some(3000.0),
         Some(&[(0.0, 4.0), (1000.0, -2.0)]),
-        Some(vec![Curve { start_m: 500.0, end_m: 600.0, radius_m: 400.0 }]),
+        Some(vec![TrackCurve { start_m: 500.0, end_m: 600.0, radius_m: 400.0 }]),
         Some(vec![Tunnel { start_m: 2000.0, end_m: 2500.0 }]),
     )
     .unwrap()
@@ -71,7 +71,7 @@ fn an_absent_list_is_unknown_and_an_empty_one_is_none_there() {
 
 #[test]
 fn overlapping_and_reversed_intervals_are_refused_with_their_number() {
-    let curve = |start_m, end_m, radius_m| Curve { start_m, end_m, radius_m };
+    let curve = |start_m, end_m, radius_m| TrackCurve { start_m, end_m, radius_m };
     let with = |curves| Track::new("x".into(), None, None, Some(curves), None).unwrap_err();
     assert!(matches!(
         with(vec![curve(0.0, 100.0, 300.0), curve(50.0, 150.0, 300.0)]),
@@ -89,8 +89,8 @@ fn overlapping_and_reversed_intervals_are_refused_with_their_number() {
 #[test]
 fn touching_curves_are_one_after_the_other() {
     let curves = vec![
-        Curve { start_m: 0.0, end_m: 100.0, radius_m: 200.0 },
-        Curve { start_m: 100.0, end_m: 200.0, radius_m: 400.0 },
+        TrackCurve { start_m: 0.0, end_m: 100.0, radius_m: 200.0 },
+        TrackCurve { start_m: 100.0, end_m: 200.0, radius_m: 400.0 },
     ];
     let track = Track::new("t".into(), None, None, Some(curves), None).unwrap();
     let curvature = track.curvature_per_m(100.0, 100.0).unwrap();

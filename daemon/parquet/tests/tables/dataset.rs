@@ -9,7 +9,7 @@ use arrow_array::{
     Float32Array, Float64Array, Int16Array, Int32Array, RecordBatch, StringArray,
     Time32MillisecondArray, TimestampMicrosecondArray, UInt64Array,
 };
-use dynocar_analysis::dataset::train_rows::TrainRows;
+use dynocar_analysis::dataset::text_layout::TrainRows;
 use dynocar_analysis::dataset::{
     ColumnMapping, Dataset, DatasetFiles, FileProblem, MANIFEST_FILE, Manifest, is_parquet,
 };

@@ -1,7 +1,7 @@
 //! The Arrow schema, the columns and the page of the fields say the same.
 
 use arrow_schema::Schema;
-use dynocar_mcap::columns::{Column, EVENTS, Row, SAMPLES, SNAPSHOTS};
+use dynocar_mcap::columns::{EVENTS, RecordingColumn, RecordingRow, SAMPLES, SNAPSHOTS};
 use dynocar_mcap::event::Event;
 use dynocar_parquet::writing::write_folder;
 use dynocar_shared::schema::{unit_end, unit_of};
@@ -16,7 +16,11 @@ fn schemas() -> [Schema; 3] {
     let at = |name: &str| folder.path().join(name);
     let sample = TrainSample::empty(TrainId(1));
     let snapshot = ParameterSnapshot { train_id: 1, ..ParameterSnapshot::empty() };
-    let rows = [Row::Sample(sample), Row::Snapshot(snapshot.into()), Row::Event(Event::default())];
+    let rows = [
+        RecordingRow::Sample(sample),
+        RecordingRow::Snapshot(snapshot.into()),
+        RecordingRow::Event(Event::default()),
+    ];
     write(&at("run.mcap"), &rows.map(|it| (1, it)));
     write_folder(&[at("run.mcap")], &at("run.parquet")).unwrap();
     ["samples-1", "snapshots-1-", "events"].map(|name| {
@@ -54,7 +58,7 @@ fn of_estimate(name: &str) -> Vec<String> {
     words.iter().map(|word| format!("estimate_{stem}{word}{end}")).collect()
 }
 
-fn in_words(schema: &Schema, columns: &[Column]) -> Vec<[String; 3]> {
+fn in_words(schema: &Schema, columns: &[RecordingColumn]) -> Vec<[String; 3]> {
     let said = |it: &arrow_schema::Field| {
         let null = if it.is_nullable() { ", null" } else { "" };
         let unit = it.metadata().get("unit").cloned().unwrap_or_default();

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, StringArray};
 use arrow_schema::DataType;
-use dynocar_mcap::columns::Row;
+use dynocar_mcap::columns::RecordingRow;
 use dynocar_parquet::reading::read;
 use dynocar_parquet::writing::write_folder;
 use dynocar_shared::{SampleField, TrainId, TrainSample};
@@ -34,7 +34,8 @@ fn refusal(path: &Path) -> String {
 
 fn recording(folder: &Path) -> std::path::PathBuf {
     let sample = TrainSample::empty(TrainId(1)).with(SampleField::Speed, 3.0);
-    let messages: Vec<(u64, Row)> = (0..50).map(|it| (it, Row::Sample(sample))).collect();
+    let messages: Vec<(u64, RecordingRow)> =
+        (0..50).map(|it| (it, RecordingRow::Sample(sample))).collect();
     write(&folder.join("run.mcap"), &messages);
     write_folder(&[folder.join("run.mcap")], &folder.join("run.parquet")).unwrap();
     folder.join("run.parquet/samples-1.parquet")

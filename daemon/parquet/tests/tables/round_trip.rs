@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dynocar_mcap::columns::Row;
+use dynocar_mcap::columns::RecordingRow;
 use dynocar_mcap::event::Event;
 use dynocar_parquet::reading::{read, write_mcap};
 use dynocar_parquet::writing::write_folder;
@@ -25,12 +25,12 @@ fn word() -> impl Strategy<Value = u64> {
 }
 
 /// A message of one of two trains, with any content.
-fn row() -> impl Strategy<Value = Row> {
+fn row() -> impl Strategy<Value = RecordingRow> {
     let sample = prop::collection::vec(word(), 19).prop_map(|words| {
         let mut sample = TrainSample::empty(TrainId(1));
         words.iter().enumerate().for_each(|(index, &it)| sample.set_word(index, it));
         sample.train_id = 1 + words[0] % 2;
-        Row::Sample(sample)
+        RecordingRow::Sample(sample)
     });
     let snapshot = prop::collection::vec(word(), 100).prop_map(|words| {
         let mut snapshot = ParameterSnapshot::empty();
@@ -39,7 +39,7 @@ fn row() -> impl Strategy<Value = Row> {
         }
         (snapshot.train_id, snapshot.pipeline_index) = (1 + words[0] % 2, words[1] as u32 % 3);
         snapshot.pipeline_kind = words[2] as u32 % 30;
-        Row::Snapshot(snapshot.into())
+        RecordingRow::Snapshot(snapshot.into())
     });
     let event = (prop::collection::vec(word(), 7), any::<u8>(), ".{0,20}").prop_map(
         |(words, is_there, text)| {
@@ -47,7 +47,7 @@ fn row() -> impl Strategy<Value = Row> {
             for (index, &word) in words.iter().enumerate() {
                 event.set_word(index, (index < 3 || is_there >> index & 1 == 1).then_some(word));
             }
-            Row::Event(event)
+            RecordingRow::Event(event)
         },
     );
     prop_oneof![4 => sample, 2 => snapshot, 1 => event]
@@ -60,7 +60,7 @@ proptest! {
         mut messages in prop::collection::vec((any::<u64>(), row()), 0..40),
         last in any::<u64>(),
     ) {
-        messages.push((last, Row::Sample(TrainSample::empty(TrainId(1)))));
+        messages.push((last, RecordingRow::Sample(TrainSample::empty(TrainId(1)))));
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         write(&at("run.mcap"), &messages);
@@ -82,8 +82,8 @@ fn long(path: &Path) -> Vec<TrainSample> {
             sample
         })
         .collect();
-    let messages: Vec<(u64, Row)> =
-        samples.iter().map(|it| (it.time_ns as u64, Row::Sample(*it))).collect();
+    let messages: Vec<(u64, RecordingRow)> =
+        samples.iter().map(|it| (it.time_ns as u64, RecordingRow::Sample(*it))).collect();
     write(path, &messages);
     samples
 }

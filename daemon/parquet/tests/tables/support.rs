@@ -5,9 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow_array::{ArrayRef, RecordBatch};
-use dynocar_mcap::columns::Row;
+use dynocar_mcap::columns::RecordingRow;
 use dynocar_mcap::error::ReadError;
-use dynocar_mcap::reading::{Item, Raw, Visitor, read};
+use dynocar_mcap::reading::{Raw, RecordingItem, Visitor, read};
 use dynocar_mcap::recording::Metadata;
 use dynocar_mcap::writing::RecordingWriter;
 use parquet::arrow::ArrowWriter;
@@ -34,10 +34,10 @@ impl Everything {
 impl Visitor for Everything {
     type Error = ReadError;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), ReadError> {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), ReadError> {
         match item {
-            Item::Metadata(it) => self.metadata.push(it.clone()),
-            Item::Attachment { name, log_time, content, .. } => {
+            RecordingItem::Metadata(it) => self.metadata.push(it.clone()),
+            RecordingItem::Attachment { name, log_time, content, .. } => {
                 self.attached.push((name, log_time, content.into()));
             }
             _ => {}
@@ -54,7 +54,7 @@ impl Visitor for Everything {
 }
 
 /// Writes a recording with a configuration attached.
-pub fn write(path: &Path, messages: &[(u64, Row)]) {
+pub fn write(path: &Path, messages: &[(u64, RecordingRow)]) {
     let mut writer = RecordingWriter::copy(File::create_new(path).unwrap()).unwrap();
     writer.metadata("dynocar", &[("version", "of old".to_owned())]).unwrap();
     let files =

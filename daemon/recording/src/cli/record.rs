@@ -10,8 +10,8 @@ use dynocar::{ending, observing};
 use dynocar_shared::TrainId;
 use dynocar_transport::Host;
 
-use crate::record::{Keeping, Rotation, SYNC, Settings, record, request_keeping};
-use crate::train_channels::Wanted;
+use crate::record::{Keeping, RecorderSettings, Rotation, SYNC, record, request_keeping};
+use crate::train_channels::ChannelSelection;
 
 /// Record what a controller and the daemon write, as MCAP.
 #[derive(Debug, Args)]
@@ -59,11 +59,11 @@ impl WantedArguments {
     /// # Errors
     ///
     /// When there is no run-time directory.
-    pub fn wanted(&self) -> Result<Wanted, Failure> {
+    pub fn wanted(&self) -> Result<ChannelSelection, Failure> {
         let host = Host::of(self.root.as_deref()).map_err(Failure::work)?;
         let trains = self.trains.iter().copied().map(TrainId).collect();
-        Ok(Wanted {
-            trains: observing::Wanted { host, trains },
+        Ok(ChannelSelection {
+            trains: observing::ObservedSelection { host, trains },
             snapshot_interval: Duration::from_millis(self.snapshots_ms),
         })
     }
@@ -94,7 +94,7 @@ pub const MIB: u64 = 1 << 20;
 ///
 /// A name that is taken is an input failure.
 pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
-    let settings = Settings {
+    let settings = RecorderSettings {
         wanted: arguments.wanted.wanted()?,
         output: arguments.output.clone(),
         rotation: Rotation {
@@ -115,7 +115,7 @@ pub fn execute(arguments: &RecordArguments) -> Result<(), Failure> {
 /// # Errors
 ///
 /// As above.
-pub fn run(settings: &Settings) -> Result<(), Failure> {
+pub fn run(settings: &RecorderSettings) -> Result<(), Failure> {
     let stop = ending::flag().map_err(Failure::work)?;
     let recorded = record(settings, &stop)?;
     report_line(&format!(
@@ -188,7 +188,7 @@ fn hours(text: &str) -> Result<f64, String> {
 pub fn execute_flight_recorder(arguments: &FlightRecorderArguments) -> Result<(), Failure> {
     let age = Duration::from_secs_f64(3600.0 * arguments.hours);
     let bytes = arguments.ring_mib * MIB;
-    run(&Settings {
+    run(&RecorderSettings {
         wanted: arguments.wanted.wanted()?,
         output: arguments.folder.join(RING),
         rotation: Rotation {

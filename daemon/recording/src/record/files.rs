@@ -14,7 +14,7 @@ use dynocar_transport::monotonic_now_ns;
 
 use super::configuration::Configuration;
 use super::housekeeping::{Housekeeper, Rotation, Task};
-use super::keeping::{self, Keeper};
+use super::keeping::{self, EventKeeper};
 use super::ring::next;
 use super::{RecordError, Recorded};
 use dynocar_mcap::event::{Event, EventKind};
@@ -40,7 +40,7 @@ impl Write for Counted {
 }
 
 /// The file that is written, and what every new one has to begin with.
-pub struct Files {
+pub struct RecordingFiles {
     storage: SharedStorage,
     output: PathBuf,
     rotation: Rotation,
@@ -60,7 +60,7 @@ pub struct Files {
     ring: Option<PathBuf>,
 }
 
-impl Files {
+impl RecordingFiles {
     /// Begins the first file. With rotation its name is the output's with a number that is greater
     /// than all that are there. Files are brought to the disk no more often than every `sync`, and a keeper
     /// keeps for good what lies around the events that are reasons to.
@@ -73,14 +73,14 @@ impl Files {
         output: &Path,
         rotation: Rotation,
         sync: Option<Duration>,
-        keeper: Option<Keeper>,
+        keeper: Option<EventKeeper>,
     ) -> Result<Self, RecordError> {
         let path = if rotation.is_on() { next(output) } else { output.to_path_buf() };
         let (writer, bytes) = open(&storage, &path)?;
         let ring = keeper.is_some().then(|| folder_of(output).into());
         let mut housekeeper = Housekeeper::new(Arc::clone(&storage), output, rotation, keeper);
         housekeeper.ask(Task::Begun { file: path.clone() });
-        Ok(Files {
+        Ok(RecordingFiles {
             housekeeper,
             storage,
             output: output.into(),
@@ -104,7 +104,7 @@ impl Files {
     /// When the system gives no thread.
     pub fn keep_house_in_parallel(self) -> Result<Self, RecordError> {
         let housekeeper = self.housekeeper.in_parallel().map_err(RecordError::Thread)?;
-        Ok(Files { housekeeper, ..self })
+        Ok(RecordingFiles { housekeeper, ..self })
     }
 
     /// Samples, snapshots and events that no power cut takes any more.
@@ -219,7 +219,7 @@ impl Files {
     ///
     /// As above.
     pub fn finish(mut self) -> Result<Recorded, RecordError> {
-        let Files { writer, path, .. } = self;
+        let RecordingFiles { writer, path, .. } = self;
         writer.finish().map_err(|source| RecordError::Write { path: path.clone(), source })?;
         if self.sync.is_some() {
             self.housekeeper.ask(Task::Settle { file: path, items: self.recorded.items() });

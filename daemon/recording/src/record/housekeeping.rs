@@ -15,7 +15,7 @@ use std::time::Duration;
 use dynocar::output::report_line;
 use dynocar::storage::{SharedStorage, Storage, settle};
 
-use super::keeping::{KeepError, Keeper};
+use super::keeping::{EventKeeper, KeepError};
 use super::ring::{Aged, Ages};
 use dynocar_mcap::event::Event;
 
@@ -68,7 +68,7 @@ struct Housekeeping {
     storage: SharedStorage,
     output: PathBuf,
     rotation: Rotation,
-    keeper: Option<Keeper>,
+    keeper: Option<EventKeeper>,
     ages: Ages,
     progress: Arc<Progress>,
     /// The file whose name is on the disk.
@@ -114,7 +114,7 @@ impl Housekeeping {
     }
 
     /// A problem of keeping is reported, and stops nothing.
-    fn keep(&mut self, work: impl FnOnce(&mut Keeper, &[Aged]) -> Result<(), KeepError>) {
+    fn keep(&mut self, work: impl FnOnce(&mut EventKeeper, &[Aged]) -> Result<(), KeepError>) {
         let Some(keeper) = &mut self.keeper else { return };
         let files = self.ages.of_files(&self.output);
         if let Err(problem) = work(keeper, &files) {
@@ -143,7 +143,7 @@ impl Housekeeper {
         storage: SharedStorage,
         output: &Path,
         rotation: Rotation,
-        keeper: Option<Keeper>,
+        keeper: Option<EventKeeper>,
     ) -> Self {
         let progress = Arc::<Progress>::default();
         let housekeeping = Housekeeping {

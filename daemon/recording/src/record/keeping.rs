@@ -71,7 +71,7 @@ impl From<StorageError> for KeepError {
 }
 
 /// Keeps what lies around a moment.
-pub struct Keeper {
+pub struct EventKeeper {
     storage: SharedStorage,
     ring: PathBuf,
     keeping: Keeping,
@@ -84,7 +84,7 @@ pub struct Keeper {
     _lock: File,
 }
 
-impl std::fmt::Debug for Keeper {
+impl std::fmt::Debug for EventKeeper {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Keeper")
             .field("ring", &self.ring)
@@ -134,7 +134,7 @@ pub fn request(ring: &Path, reason: &str) -> io::Result<bool> {
     Ok(true)
 }
 
-impl Keeper {
+impl EventKeeper {
     /// Takes a ring's folder, which is made where it is not there. An event that another recorder has left
     /// open goes on.
     ///
@@ -156,7 +156,7 @@ impl Keeper {
         let left = Duration::try_from_secs_f64(left_s).unwrap_or_default().min(keeping.after);
         let until = Instant::now() + left;
         let open = open.filter(|_| !left.is_zero());
-        Ok(Keeper {
+        Ok(EventKeeper {
             storage,
             ring: ring.into(),
             keeping,

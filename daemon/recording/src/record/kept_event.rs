@@ -6,7 +6,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use dynocar::models::moment::Moment;
+use dynocar::models::moment::UtcSecond;
 use dynocar::stamp::{SinceBoot, Stamp};
 use dynocar::storage::{Rights, SharedStorage, StorageError, replace};
 use serde::{Deserialize, Serialize};
@@ -73,7 +73,7 @@ impl Reason {
     /// The reason that an event is.
     pub fn of(event: &Event, now: SystemTime) -> Self {
         Reason {
-            at: Moment::of(now).to_string(),
+            at: UtcSecond::of(now).to_string(),
             train: event.train_id,
             kind: event.kind().name().to_owned(),
             text: event.text.clone(),

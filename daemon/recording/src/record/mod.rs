@@ -20,13 +20,13 @@ use dynocar_mcap::writing::McapError;
 use dynocar_shared::TrainId;
 use dynocar_transport::ChannelError;
 
-use crate::train_channels::{PAUSE, Sink, TrainChannels, Wanted};
+use crate::train_channels::{ChannelSelection, PAUSE, Sink, TrainChannels};
 use dynocar_mcap::event::{Event, EventKind};
 use dynocar_mcap::topic::Message;
 
-pub use files::Files;
+pub use files::RecordingFiles;
 pub use housekeeping::Rotation;
-pub use keeping::{KeepError, Keeper, Keeping, request as request_keeping};
+pub use keeping::{EventKeeper, KeepError, Keeping, request as request_keeping};
 
 /// How often what was taken is handed to the system: what a kill costs at most.
 const FLUSH: Duration = Duration::from_millis(400);
@@ -36,9 +36,9 @@ pub const SYNC: Duration = Duration::from_secs(1);
 
 /// Contents and destination of a recording.
 #[derive(Clone, Debug)]
-pub struct Settings {
+pub struct RecorderSettings {
     /// Trains and pipelines to read.
-    pub wanted: Wanted,
+    pub wanted: ChannelSelection,
     /// The file; with rotation the beginning of the files' names.
     pub output: PathBuf,
     /// When a file is full.
@@ -112,13 +112,13 @@ impl Recorded {
 /// # Errors
 ///
 /// See [`RecordError`]; what was written by then can be read.
-pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
+pub fn record(settings: &RecorderSettings, stop: &AtomicBool) -> Result<Recorded, RecordError> {
     let folder = folder_of(&settings.output);
     let disk: SharedStorage = Arc::new(Disk);
-    let keeper = |keeping| Keeper::begin(Arc::clone(&disk), folder, keeping);
+    let keeper = |keeping| EventKeeper::begin(Arc::clone(&disk), folder, keeping);
     let keeper = settings.keeping.map(keeper).transpose()?;
-    let Settings { output, rotation, sync, .. } = settings;
-    let files = Files::begin(disk, output, *rotation, *sync, keeper)?;
+    let RecorderSettings { output, rotation, sync, .. } = settings;
+    let files = RecordingFiles::begin(disk, output, *rotation, *sync, keeper)?;
     let mut recorder = Recorder {
         files: files.keep_house_in_parallel()?,
         configuration: settings.configuration.clone(),
@@ -149,7 +149,7 @@ pub fn record(settings: &Settings, stop: &AtomicBool) -> Result<Recorded, Record
 
 /// Writes the received messages into files.
 struct Recorder {
-    files: Files,
+    files: RecordingFiles,
     /// The daemon's configuration, where it was named.
     configuration: Option<PathBuf>,
     maintenance: Maintenance,

@@ -6,10 +6,10 @@ use dynocar_analysis::explain::answer::Verdict;
 use dynocar_analysis::explain::report::timeline::{
     ActingEffect, ResidualWindow, RunTimeline, SpeedPoint, Timeline,
 };
-use dynocar_mcap::annotate::messages::{Effect, PredictedSpeed, Residual};
 use dynocar_mcap::annotate::{AnnotateError, OtherRuns, annotate};
+use dynocar_mcap::annotate::{Effect, PredictedSpeed, Residual};
 use dynocar_mcap::error::ReadError;
-use dynocar_mcap::reading::{Item, Raw, Visitor, read};
+use dynocar_mcap::reading::{Raw, RecordingItem, Visitor, read};
 use dynocar_mcap::recording::Recording;
 use dynocar_shared::TrainSample;
 use prost::Message;
@@ -23,7 +23,7 @@ struct Logged(HashMap<String, Vec<(u64, Vec<u8>)>>);
 impl Visitor for Logged {
     type Error = ReadError;
 
-    fn item(&mut self, _: Item<'_>) -> Result<(), ReadError> {
+    fn item(&mut self, _: RecordingItem<'_>) -> Result<(), ReadError> {
         Ok(())
     }
 

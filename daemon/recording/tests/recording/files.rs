@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use crate::support::{samples, snapshots, write};
 use dynocar_mcap::copying::recover;
-use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::reading::{FileEnding, read};
 use dynocar_mcap::recording::Recording;
 use dynocar_shared::TrainSample;
 use proptest::prelude::*;
@@ -104,13 +104,13 @@ fn a_file_cut_anywhere_is_read_up_to_there_and_made_whole() {
         std::fs::write(&cut, &bytes[..bytes.len() * share / 100]).unwrap();
         let mut left = Recording::default();
         let ending = read(&cut, &mut left).unwrap();
-        assert!(matches!(ending, Ending::Broken { .. }), "{share} %: {ending:?}");
+        assert!(matches!(ending, FileEnding::Broken { .. }), "{share} %: {ending:?}");
         assert_eq!(left.samples, whole.samples[..left.samples.len()]);
         counts.push(left.samples.len());
         let mended = folder.path().join(format!("whole-{share}.mcap"));
         recover(std::slice::from_ref(&cut), &mended).unwrap();
         let mut again = Recording::default();
-        assert_eq!(read(&mended, &mut again).unwrap(), Ending::Whole);
+        assert_eq!(read(&mended, &mut again).unwrap(), FileEnding::Whole);
         assert_eq!(again.samples, left.samples);
         assert_eq!(again.snapshots, left.snapshots);
         assert_eq!(again.attachments, left.attachments);

@@ -10,7 +10,7 @@ use dynocar_mcap::copying::recover;
 use dynocar_mcap::event::{Event, EventKind};
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::topic::Message;
-use dynocar_recording::record::{Files, Keeper, Keeping, Rotation, request_keeping};
+use dynocar_recording::record::{EventKeeper, Keeping, RecordingFiles, Rotation, request_keeping};
 use dynocar_shared::{Status, TrainId, TrainSample};
 
 const HOUR: Duration = Duration::from_secs(3600);
@@ -37,9 +37,9 @@ fn stretches(ring: &Path) -> Vec<PathBuf> {
     folders
 }
 
-fn ring(folder: &Path, keeping: Keeping) -> Files {
+fn ring(folder: &Path, keeping: Keeping) -> RecordingFiles {
     let rotation = Rotation { bytes: Some(8_000), keep_bytes: Some(30_000), ..Rotation::default() };
-    let begin = || Keeper::begin(Arc::new(Disk), folder, keeping);
+    let begin = || EventKeeper::begin(Arc::new(Disk), folder, keeping);
     // A process that another test starts holds the ring's lock, too, until it is a program of its own.
     let keeper = (0..1000).find_map(|_| {
         begin().ok().or_else(|| {
@@ -49,10 +49,11 @@ fn ring(folder: &Path, keeping: Keeping) -> Files {
     });
     let keeper = keeper.expect("nobody else has the ring");
     let sync = Some(Duration::from_secs(1));
-    Files::begin(Arc::new(Disk), &folder.join("ring.mcap"), rotation, sync, Some(keeper)).unwrap()
+    RecordingFiles::begin(Arc::new(Disk), &folder.join("ring.mcap"), rotation, sync, Some(keeper))
+        .unwrap()
 }
 
-fn drive(files: &mut Files, sequences: std::ops::Range<u64>) {
+fn drive(files: &mut RecordingFiles, sequences: std::ops::Range<u64>) {
     for sequence in sequences {
         let sample = TrainSample { sequence, ..TrainSample::empty(TrainId(1)) };
         files.write(Message::Sample(&sample)).unwrap();
@@ -188,7 +189,7 @@ fn a_request_is_kept_and_one_to_nobody_is_refused() {
     assert!(account.contains("the driver felt a jerk"), "{account}");
     files.flush().unwrap();
     assert_eq!(stretches(folder.path()).len(), 1, "asked once");
-    let second = Keeper::begin(Arc::new(Disk), folder.path(), keeping()).unwrap_err();
+    let second = EventKeeper::begin(Arc::new(Disk), folder.path(), keeping()).unwrap_err();
     assert!(second.to_string().contains("another recorder"), "{second}");
     files.finish().unwrap();
     assert!(!request_keeping(folder.path(), "too late").unwrap());

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar::dataset::{self, Source};
+use dynocar::dataset::{self, DatasetSource};
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::topic::Message;
 use dynocar_mcap::writing::{RecordingWriter, WallClock};
@@ -156,7 +156,7 @@ fn of_several_trains_the_chosen_one_is_read() {
         to_dataset(paths, &folder, Some(train), &ModelFiles::default()).unwrap();
         let read = dataset::load(&folder).unwrap();
         assert_eq!(read.train.mass_kg, mass_kg);
-        let source = Source { path: &path, train: Some(TrainId(train)) };
+        let source = DatasetSource { path: &path, train: Some(TrainId(train)) };
         assert_eq!(dynocar_workshop::dataset::load(source).unwrap(), read);
         let speeds = read.runs.iter().flat_map(|run| &run.samples).map(|it| it.speed_mps);
         assert!(speeds.eq(own.iter().map(|it| it.speed_mps + more_mps)), "train {train}");

@@ -9,13 +9,13 @@ use std::time::Duration;
 use crate::support_site::{Controller, TRAIN, TestSite, await_true};
 use dynocar::config::DaemonConfig;
 use dynocar_mcap::event::EventKind;
-use dynocar_mcap::reading::{Ending, read};
+use dynocar_mcap::reading::{FileEnding, read};
 use dynocar_mcap::recording::Recording;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{ParameterSnapshot, PipelineKind};
 use dynocar_transport::channel::Transport;
 use dynocar_transport::monotonic_now_ns;
-use dynocar_workshop::verify::{Configurations, Outcome, overlay, text, verify};
+use dynocar_workshop::verify::{ComparisonOutcome, Configurations, overlay, text, verify};
 use rustix::process::{Pid, Signal, kill_process};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_dynocar-recording");
@@ -109,7 +109,7 @@ fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() 
     assert_eq!(recovered.status.code(), Some(3), "the end is lost");
     assert!(words(&recovered).contains("lost of "));
     let mut again = Recording::default();
-    assert_eq!(read(&whole, &mut again).unwrap(), Ending::Whole);
+    assert_eq!(read(&whole, &mut again).unwrap(), FileEnding::Whole);
     assert_eq!((&again.samples, &again.snapshots), (&left.samples, &left.snapshots));
 
     let configurations = Configurations::of(&again).unwrap();
@@ -122,7 +122,7 @@ fn a_recorder_outlives_daemons_and_controllers_and_what_is_killed_is_verified() 
     // On a machine so busy that samples are lost, daemon and recorder did not take the same.
     let lost = left.snapshots.iter().any(|it| it.samples_lost > 0)
         || count(&site, EventKind::SamplesLost) > 0;
-    assert!(lost || verified.iter().all(|it| it.outcome == Outcome::Same), "{printed}");
+    assert!(lost || verified.iter().all(|it| it.outcome == ComparisonOutcome::Same), "{printed}");
     assert!(lost || !printed.contains("cannot"), "{printed}");
 }
 
@@ -137,7 +137,7 @@ fn a_recorder_that_is_asked_to_ends_whole() {
     signal(recorder.id(), Signal::INT);
     assert!(recorder.wait().unwrap().success());
     let mut recording = Recording::default();
-    assert_eq!(read(&site.at("run.mcap"), &mut recording).unwrap(), Ending::Whole);
+    assert_eq!(read(&site.at("run.mcap"), &mut recording).unwrap(), FileEnding::Whole);
     let kinds: Vec<i32> = recording.events.iter().map(|it| it.kind).collect();
     assert_eq!(kinds.first(), Some(&(EventKind::RecordingBegan as i32)));
     assert_eq!(kinds.last(), Some(&(EventKind::RecordingEnded as i32)));

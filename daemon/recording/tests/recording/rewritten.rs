@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar_mcap::copying::recover;
 use dynocar_mcap::error::CopyError;
-use dynocar_mcap::reading::{ChannelInfo, Item, Raw, Visitor, read};
+use dynocar_mcap::reading::{ChannelInfo, Raw, RecordingItem, Visitor, read};
 use dynocar_mcap::recording::Recording;
 use dynocar_workshop::convert::{ModelFiles, to_dataset};
 use dynocar_workshop::from_dataset::from_dataset;
@@ -27,8 +27,8 @@ struct Tool {
 impl Visitor for Tool {
     type Error = CopyError;
 
-    fn item(&mut self, item: Item<'_>) -> Result<(), CopyError> {
-        if let Item::Attachment { name, log_time, media_type, content } = item {
+    fn item(&mut self, item: RecordingItem<'_>) -> Result<(), CopyError> {
+        if let RecordingItem::Attachment { name, log_time, media_type, content } = item {
             let (create_time, data) = (log_time, content.into());
             let it = Attachment { log_time, create_time, name, media_type, data };
             self.writer.attach(&it).unwrap();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use dynocar::storage::Disk;
 use dynocar_mcap::topic::Message;
-use dynocar_recording::record::{Files, RecordError, Rotation};
+use dynocar_recording::record::{RecordError, RecordingFiles, Rotation};
 use dynocar_shared::{TrainId, TrainSample};
 
 /// The numbered files of a folder, in order, with their lengths.
@@ -27,7 +27,7 @@ fn files_are_numbered_on_and_the_oldest_go_when_they_take_too_much() {
     std::fs::write(folder.path().join("run-mine.mcap"), "stays").unwrap();
     let rotation =
         Rotation { bytes: Some(20_000), keep_bytes: Some(60_000), ..Rotation::default() };
-    let mut files = Files::begin(Arc::new(Disk), &output, rotation, None, None).unwrap();
+    let mut files = RecordingFiles::begin(Arc::new(Disk), &output, rotation, None, None).unwrap();
     assert!(files.path().ends_with("run-000042.mcap"));
     for sequence in 1..=4000 {
         let sample = TrainSample { sequence, ..TrainSample::empty(TrainId(1)) };
@@ -49,8 +49,9 @@ fn a_name_that_is_taken_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("run.mcap");
     std::fs::write(&output, "precious").unwrap();
-    let refused =
-        Files::begin(Arc::new(Disk), &output, Rotation::default(), None, None).err().unwrap();
+    let refused = RecordingFiles::begin(Arc::new(Disk), &output, Rotation::default(), None, None)
+        .err()
+        .unwrap();
     assert!(matches!(refused, RecordError::Taken { .. }), "{refused}");
     assert_eq!(std::fs::read_to_string(&output).unwrap(), "precious");
 }

@@ -6,7 +6,7 @@ use crate::support::{samples, snapshots, write};
 use dynocar_mcap::recording::Recording;
 use dynocar_mcap::writing::{RecordingWriter, WallClock};
 use dynocar_shared::{ParameterSnapshot, TrainSample};
-use dynocar_workshop::verify::{Configurations, Outcome, Verified, verify};
+use dynocar_workshop::verify::{ComparisonOutcome, Configurations, Verified, verify};
 
 fn verified(samples: &[TrainSample], snapshots: &[ParameterSnapshot]) -> Vec<Verified> {
     let folder = tempfile::tempdir().unwrap();
@@ -23,7 +23,7 @@ fn a_recording_from_the_daemons_start_on_is_the_same_to_the_bit() {
     let verified = verified(&samples, &answers);
     assert_eq!(verified.len(), 3, "the shipped pipelines");
     for it in &verified {
-        assert_eq!((it.same, &it.outcome), (it.recorded, &Outcome::Same), "{}", it.name);
+        assert_eq!((it.same, &it.outcome), (it.recorded, &ComparisonOutcome::Same), "{}", it.name);
         assert!(it.recorded > 30, "{}: {} snapshots", it.name, it.recorded);
     }
 }
@@ -47,12 +47,12 @@ fn the_files_of_a_recording_that_rotated_are_verified_as_one_and_only_in_their_o
     let whole = Recording::load_all(&files).unwrap();
     assert_eq!((whole.samples.len(), whole.attachments.len()), (samples.len(), 3));
     for it in verify(&whole, &Configurations::of(&whole).unwrap()) {
-        assert_eq!((it.same, &it.outcome), (it.recorded, &Outcome::Same), "{}", it.name);
+        assert_eq!((it.same, &it.outcome), (it.recorded, &ComparisonOutcome::Same), "{}", it.name);
         assert!(it.recorded > 30, "{}: {} snapshots", it.name, it.recorded);
     }
     let last = Recording::load(&files[2]).unwrap();
     let late = verify(&last, &Configurations::of(&last).unwrap());
-    assert!(late.iter().all(|it| matches!(it.outcome, Outcome::BeginsLate { .. })));
+    assert!(late.iter().all(|it| matches!(it.outcome, ComparisonOutcome::BeginsLate { .. })));
 
     let error = Recording::load_all(&[files[1].clone(), files[0].clone()]).unwrap_err().to_string();
     assert!(
@@ -84,14 +84,14 @@ fn one_bit_that_is_another_is_found_with_field_and_sample() {
     let sample = tampered.sample_sequence;
     let verified = verified(&samples, &answers);
     match &verified[1].outcome {
-        Outcome::Differs(found) => {
+        ComparisonOutcome::Differs(found) => {
             assert_eq!((found.field, found.sample), ("covariance", sample), "{found:?}");
             assert!(verified[1].same < verified[1].recorded);
         }
         other => panic!("expected a difference, found {other:?}"),
     }
     for index in [0, 2] {
-        assert_eq!(verified[index].outcome, Outcome::Same);
+        assert_eq!(verified[index].outcome, ComparisonOutcome::Same);
     }
 }
 
@@ -102,7 +102,7 @@ fn a_sample_that_is_another_is_found() {
     let changed = samples.iter().position(|it| it.speed_mps > 5.0).unwrap();
     samples[changed].speed_mps += 0.01;
     for it in verified(&samples, &answers).iter().filter(|it| it.name == "train_kalman") {
-        let Outcome::Differs(found) = &it.outcome else { panic!("{:?}", it.outcome) };
+        let ComparisonOutcome::Differs(found) = &it.outcome else { panic!("{:?}", it.outcome) };
         assert!(found.sample >= samples[changed].sequence, "{found:?}");
     }
 }
@@ -113,17 +113,17 @@ fn a_recording_that_begins_later_says_so_and_one_that_lacks_samples_says_up_to_w
     let answers = snapshots(&samples, 40);
     let late: Vec<_> = answers.iter().filter(|it| it.sequence > 300).copied().collect();
     for it in verified(&samples[250..], &late) {
-        assert_eq!(it.outcome, Outcome::BeginsLate { before: 250 }, "{}", it.name);
+        assert_eq!(it.outcome, ComparisonOutcome::BeginsLate { before: 250 }, "{}", it.name);
     }
     let gap: Vec<_> =
         samples.iter().enumerate().filter(|it| it.0 < 500 || it.0 > 520).map(|it| *it.1).collect();
     for it in verified(&gap, &answers) {
         let is_reported = matches!(
             it.outcome,
-            Outcome::OtherSamples { agree_up_to, .. } if (480..=620).contains(&agree_up_to)
+            ComparisonOutcome::OtherSamples { agree_up_to, .. } if (480..=620).contains(&agree_up_to)
         );
         assert!(
-            is_reported || matches!(it.outcome, Outcome::Differs(_)),
+            is_reported || matches!(it.outcome, ComparisonOutcome::Differs(_)),
             "{}: {:?}",
             it.name,
             it.outcome
@@ -138,6 +138,6 @@ fn samples_lost_on_the_way_to_the_daemon_alone_are_no_wrong_bits() {
     let samples = samples();
     let answers = snapshots(&samples[100..], 40);
     for it in verified(&samples, &answers) {
-        assert_eq!(it.outcome, Outcome::Same, "{}", it.name);
+        assert_eq!(it.outcome, ComparisonOutcome::Same, "{}", it.name);
     }
 }

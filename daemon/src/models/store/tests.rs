@@ -1,5 +1,5 @@
-use super::super::moment::Moment;
-use super::super::origin::{Figure, FoundEffect};
+use super::super::moment::UtcSecond;
+use super::super::origin::{FoundEffect, ModelFigure};
 use super::*;
 
 const TRAIN: &str = "[train]\nmass_t=100\nlength_m=80\nrotating_mass_factor=0.05\n\
@@ -14,11 +14,11 @@ fn empty() -> (tempfile::TempDir, TrainModels) {
 }
 
 fn model(a: f64, parent: Option<ModelHash>, unix_s: u64) -> NewModel {
-    let parameters = [("c_factor".to_owned(), Figure { value: 2.0, std: 0.1 })].into();
+    let parameters = [("c_factor".to_owned(), ModelFigure { value: 2.0, std: 0.1 })].into();
     let effect =
         FoundEffect { kind: "tunnel_drag".into(), intervals_m: vec![[1e3, 2e3]], parameters };
     let origin = Origin {
-        made: Moment { unix_s },
+        made: UtcSecond { unix_s },
         version: "0.1.0".into(),
         command: "dynocar learn".into(),
         parent,
@@ -38,8 +38,8 @@ fn model(a: f64, parent: Option<ModelHash>, unix_s: u64) -> NewModel {
     }
 }
 
-fn decision(what: Choice) -> NewDecision {
-    NewDecision { what, by: "Anna".into(), reason: "better".into(), at: Moment { unix_s: 7 } }
+fn decision(what: ModelChoice) -> NewDecision {
+    NewDecision { what, by: "Anna".into(), reason: "better".into(), at: UtcSecond { unix_s: 7 } }
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn what_is_changed_half_written_or_foreign_is_named_and_not_used() {
     assert!(matches!(models.put(&model(1.0, None, 1)), Err(ModelsError::Changed { .. })));
     let missing = ModelHash(5);
     assert!(matches!(models.load(missing), Err(ModelsError::NoModel { .. })));
-    let refused = models.decide(&decision(Choice::Adopt(changed))).unwrap_err().to_string();
+    let refused = models.decide(&decision(ModelChoice::Adopt(changed))).unwrap_err().to_string();
     assert!(refused.contains("changed after it was put into the store"), "{refused}");
 }
 
@@ -92,23 +92,23 @@ fn decisions_say_what_is_in_force_and_rollbacks_go_back_one_by_one() {
     let decide = |what| models.decide(&decision(what));
     assert_eq!(models.in_force().unwrap(), None);
     assert_eq!(models.candidates(declared).unwrap(), [b, a], "the newest first");
-    assert!(matches!(decide(Choice::RollBack), Err(ModelsError::NothingAdopted { .. })));
-    assert_eq!(decide(Choice::Adopt(a)).unwrap(), 1);
-    assert!(matches!(decide(Choice::Adopt(a)), Err(ModelsError::InForce { .. })));
-    assert!(matches!(decide(Choice::Adopt(ModelHash(9))), Err(ModelsError::NoModel { .. })));
+    assert!(matches!(decide(ModelChoice::RollBack), Err(ModelsError::NothingAdopted { .. })));
+    assert_eq!(decide(ModelChoice::Adopt(a)).unwrap(), 1);
+    assert!(matches!(decide(ModelChoice::Adopt(a)), Err(ModelsError::InForce { .. })));
+    assert!(matches!(decide(ModelChoice::Adopt(ModelHash(9))), Err(ModelsError::NoModel { .. })));
     assert_eq!(models.candidates(a).unwrap(), [c]);
-    assert_eq!(decide(Choice::Adopt(c)).unwrap(), 2);
-    assert_eq!(decide(Choice::RollBack).unwrap(), 3);
+    assert_eq!(decide(ModelChoice::Adopt(c)).unwrap(), 2);
+    assert_eq!(decide(ModelChoice::RollBack).unwrap(), 3);
     assert_eq!(models.in_force().unwrap(), Some(a));
     assert!(models.candidates(a).unwrap().is_empty(), "what was taken back is none");
-    assert_eq!(decide(Choice::RollBack).unwrap(), 4);
+    assert_eq!(decide(ModelChoice::RollBack).unwrap(), 4);
     assert_eq!(models.in_force().unwrap(), None);
     assert_eq!(models.candidates(declared).unwrap(), [b]);
-    decide(Choice::Reject(b)).unwrap();
+    decide(ModelChoice::Reject(b)).unwrap();
     assert!(models.candidates(declared).unwrap().is_empty());
     let last = models.decisions().unwrap().pop().unwrap();
     assert_eq!((last.0, last.1.action, last.1.by.as_str()), (5, Action::Rejected, "Anna"));
-    let nobody = NewDecision { by: " ".into(), ..decision(Choice::Adopt(b)) };
+    let nobody = NewDecision { by: " ".into(), ..decision(ModelChoice::Adopt(b)) };
     assert!(matches!(models.decide(&nobody), Err(ModelsError::NoName)));
 }
 
@@ -124,8 +124,8 @@ fn writers_at_the_same_time_take_numbers_of_their_own_and_make_a_model_once() {
                 models.put(new).unwrap();
                 for _ in 0..5 {
                     // Half of them find that the other already decided so.
-                    let _ = models.decide(&decision(Choice::Adopt(hashes[thread % 2])));
-                    models.decide(&decision(Choice::Reject(new.text.hash()))).unwrap();
+                    let _ = models.decide(&decision(ModelChoice::Adopt(hashes[thread % 2])));
+                    models.decide(&decision(ModelChoice::Reject(new.text.hash()))).unwrap();
                 }
             });
         }
@@ -145,7 +145,7 @@ fn writers_at_the_same_time_take_numbers_of_their_own_and_make_a_model_once() {
 fn a_decision_that_cannot_be_read_is_no_other_history() {
     let (_directory, models) = empty();
     let hash = models.put(&model(1.0, None, 1)).unwrap();
-    models.decide(&decision(Choice::Adopt(hash))).unwrap();
+    models.decide(&decision(ModelChoice::Adopt(hash))).unwrap();
     let path = numbered::path_of(&models.folder().join(DECISIONS), 1);
     std::fs::write(&path, "action = 'adopted'\nby = 3\n").unwrap();
     let message = models.in_force().unwrap_err().to_string();

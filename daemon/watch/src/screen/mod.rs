@@ -41,7 +41,7 @@ what the train's file declares.";
 
 /// Views of the screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum View {
+pub enum ScreenView {
     /// Quantities, residual, what to drive next.
     #[default]
     Overview,
@@ -51,11 +51,11 @@ pub enum View {
 
 /// Choice made by keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Choice {
+pub struct ScreenChoice {
     /// Place among the trains.
     pub train: usize,
     /// The view.
-    pub view: View,
+    pub view: ScreenView,
     /// True while the keys are explained.
     pub has_help: bool,
 }
@@ -64,7 +64,7 @@ pub struct Choice {
 pub fn draw(
     frame: &mut Frame<'_>,
     trains: &[&TrainState],
-    choice: Choice,
+    choice: ScreenChoice,
     place: &str,
     palette: Palette,
 ) {
@@ -94,7 +94,7 @@ pub fn draw(
     if choice.has_help {
         let help = Paragraph::new(HELP).wrap(Wrap { trim: false });
         frame.render_widget(help.style(palette.plain()), body);
-    } else if choice.view == View::Pipelines {
+    } else if choice.view == ScreenView::Pipelines {
         overview::draw_pipelines(frame, body, train, palette);
     } else {
         overview::draw(frame, body, train, palette);

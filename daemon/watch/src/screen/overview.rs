@@ -8,8 +8,8 @@ use ratatui::widgets::{Paragraph, Wrap};
 
 use super::plots::{self, sparkline};
 use super::style::{Palette, heading};
-use crate::state::{PipelineState, Point, TrainState};
-use crate::words::{TableRow, residual, rows};
+use crate::state::{PipelineState, PlotPoint, TrainState};
+use crate::words::{QuantityRow, residual, rows};
 
 /// Columns of the table after the number: interval and unit, state of use, why; the age takes the rest.
 const COLUMNS: [usize; 3] = [20, 15, 26];
@@ -72,7 +72,7 @@ fn quantities(
     lines
 }
 
-fn line_of(row: TableRow, columns: [usize; 3], palette: Palette) -> Line<'static> {
+fn line_of(row: QuantityRow, columns: [usize; 3], palette: Palette) -> Line<'static> {
     let [interval, state, why] = columns;
     let number = format!("{:>9}  ", row.number);
     let interval_and_unit = format!("{} {}", row.interval, row.unit);
@@ -96,7 +96,7 @@ fn residual_lines(train: &TrainState, width: u16, palette: Palette) -> Vec<Line<
         return lines;
     };
     let room = usize::from(width).saturating_sub(46);
-    let curve = |of: fn(&Point) -> f64| sparkline(pipeline.history.newest(room).map(of));
+    let curve = |of: fn(&PlotPoint) -> f64| sparkline(pipeline.history.newest(room).map(of));
     let plotted = |words: String, curve: String| {
         let words = format!("{words:<36}");
         Line::from(vec![Span::raw(words), Span::styled(curve, palette.curve())])

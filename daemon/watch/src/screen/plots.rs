@@ -7,7 +7,7 @@ use ratatui::text::Line;
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
 
 use super::style::Palette;
-use crate::state::{History, Point};
+use crate::state::{PlotHistory, PlotPoint};
 
 const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
@@ -23,7 +23,7 @@ pub fn sparkline(values: impl Iterator<Item = f64> + Clone) -> String {
 }
 
 /// Two charts side by side: the unexplained force and the evidence for the suspect.
-pub fn draw(frame: &mut Frame<'_>, area: Rect, history: &History, palette: Palette) {
+pub fn draw(frame: &mut Frame<'_>, area: Rect, history: &PlotHistory, palette: Palette) {
     let [left, right] =
         Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]).spacing(2).areas(area);
     chart(frame, left, history, ("unexplained force in kN", |it| it.unexplained_kn), palette);
@@ -33,8 +33,8 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, history: &History, palette: Palet
 fn chart(
     frame: &mut Frame<'_>,
     area: Rect,
-    history: &History,
-    (title, of): (&'static str, fn(&Point) -> f64),
+    history: &PlotHistory,
+    (title, of): (&'static str, fn(&PlotPoint) -> f64),
     palette: Palette,
 ) {
     let count = history.newest(usize::MAX).count();

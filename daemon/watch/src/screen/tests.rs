@@ -13,14 +13,14 @@ use ratatui::buffer::Buffer;
 use ratatui::style::Color;
 
 use crate::plain;
-use crate::screen::{Choice, Palette, View, draw};
-use crate::state::{Daemon, History, PipelineState, TrainState};
+use crate::screen::{Palette, ScreenChoice, ScreenView, draw};
+use crate::state::{Daemon, PipelineState, PlotHistory, TrainState};
 
 fn pipeline(
     index: u32,
     kind: PipelineKind,
     (status, reason): (Status, Reason),
-    parameters: &[(Parameter, f64, f64)],
+    parameters: &[(Parameter, [f64; 2])],
 ) -> PipelineState {
     let mut snapshot = ParameterSnapshot::empty();
     snapshot.pipeline_index = index;
@@ -33,34 +33,34 @@ fn pipeline(
     snapshot.speed_min_mps = 1.0;
     snapshot.speed_max_mps = 23.0;
     snapshot.parameter_count = parameters.len() as u32;
-    for (place, &(parameter, value, std)) in parameters.iter().enumerate() {
+    for (place, &(parameter, [value, std])) in parameters.iter().enumerate() {
         snapshot.parameters[place] = parameter as u32;
         snapshot.values[place] = value;
         snapshot.covariance[packed_index(place, place)] = std * std;
     }
     let (reason, sample_age_s) = (Some(reason), Some(0.04));
     let name = kind.name().to_owned();
-    let history = History::default();
+    let history = PlotHistory::default();
     PipelineState { name, snapshot, status, reason, sample_age_s, history }
 }
 
 fn train() -> TrainState {
     let good = (Status::Estimated, Reason::None);
     let davis = [
-        (Parameter::DavisA, 1.498, 0.027),
-        (Parameter::DavisB, 0.0131, 0.0042),
-        (Parameter::DavisC, 0.000_91, 0.000_17),
+        (Parameter::DavisA, [1.498, 0.027]),
+        (Parameter::DavisB, [0.0131, 0.0042]),
+        (Parameter::DavisC, [0.000_91, 0.000_17]),
     ];
     let weak = (Status::Estimated, Reason::WeakExcitation);
     let mut resistance = pipeline(0, PipelineKind::TrajectoryKalman, weak, &davis);
     resistance.snapshot.quantities = Quantity::Resistance.bit();
     resistance.snapshot.usable_quantities = Quantity::Resistance.bit();
-    let mass = [(Parameter::Mass, 1697.4, 6.1), (Parameter::AccelerationBias, 1e-4, 1e-4)];
+    let mass = [(Parameter::Mass, [1697.4, 6.1]), (Parameter::AccelerationBias, [1e-4, 1e-4])];
     let mut mass = pipeline(1, PipelineKind::MassKalman, good, &mass);
     mass.snapshot.quantities = Quantity::Mass.bit();
     mass.snapshot.usable_quantities = Quantity::Mass.bit();
     let bound = (Status::Unestimated, Reason::OnlyLowerBound);
-    let adhesion = [(Parameter::AdhesionLowerBound, 0.0943, 0.0)];
+    let adhesion = [(Parameter::AdhesionLowerBound, [0.0943, 0.0])];
     let mut adhesion = pipeline(2, PipelineKind::AdhesionLaw, bound, &adhesion);
     adhesion.snapshot.quantities = Quantity::Adhesion.bit();
     let mut monitor = pipeline(3, PipelineKind::ResidualMonitor, good, &[]);
@@ -96,7 +96,12 @@ fn suspected() -> TrainState {
     train
 }
 
-fn buffer(trains: &[&TrainState], choice: Choice, size: (u16, u16), has_colour: bool) -> Buffer {
+fn buffer(
+    trains: &[&TrainState],
+    choice: ScreenChoice,
+    size: (u16, u16),
+    has_colour: bool,
+) -> Buffer {
     let mut terminal = Terminal::new(TestBackend::new(size.0, size.1)).unwrap();
     let palette = Palette::new(has_colour);
     terminal.draw(|frame| draw(frame, trains, choice, "/run/dynocar", palette)).unwrap();
@@ -112,7 +117,7 @@ fn text(buffer: &Buffer) -> String {
     buffer.content.chunks(width).map(row).collect()
 }
 
-fn screen(trains: &[&TrainState], choice: Choice, size: (u16, u16)) -> String {
+fn screen(trains: &[&TrainState], choice: ScreenChoice, size: (u16, u16)) -> String {
     text(&buffer(trains, choice, size, true))
 }
 
@@ -123,19 +128,19 @@ fn assert_screen(drawn: &str, expected: &str) {
 
 #[test]
 fn all_of_a_train_is_on_80_by_24() {
-    let drawn = screen(&[&train()], Choice::default(), (80, 24));
+    let drawn = screen(&[&train()], ScreenChoice::default(), (80, 24));
     assert_screen(&drawn, include_str!("drawn/overview_80x24.txt"));
 }
 
 #[test]
 fn a_larger_terminal_gets_more_speeds_and_plots() {
-    let drawn = screen(&[&train()], Choice::default(), (160, 50));
+    let drawn = screen(&[&train()], ScreenChoice::default(), (160, 50));
     assert_screen(&drawn, include_str!("drawn/overview_160x50.txt"));
 }
 
 #[test]
 fn a_suspect_is_reported_with_what_is_hardly_distinguished_from_it() {
-    let drawn = screen(&[&suspected()], Choice::default(), (80, 24));
+    let drawn = screen(&[&suspected()], ScreenChoice::default(), (80, 24));
     assert!(
         drawn.contains("dragging_brake for 2 min, evidence 46, could also be: wind"),
         "{drawn}"
@@ -144,26 +149,26 @@ fn a_suspect_is_reported_with_what_is_hardly_distinguished_from_it() {
 
 #[test]
 fn the_pipelines_show_their_samples() {
-    let choice = Choice { view: View::Pipelines, ..Choice::default() };
+    let choice = ScreenChoice { view: ScreenView::Pipelines, ..ScreenChoice::default() };
     let drawn = screen(&[&train(), &suspected()], choice, (80, 24));
     assert_screen(&drawn, include_str!("drawn/pipelines_80x24.txt"));
 }
 
 #[test]
 fn a_daemon_that_is_absent_gone_or_incompatible_is_reported_in_words() {
-    let nobody = screen(&[], Choice::default(), (80, 24));
+    let nobody = screen(&[], ScreenChoice::default(), (80, 24));
     assert!(nobody.contains("No daemon serves any train under /run/dynocar"), "{nobody}");
     let mut it = TrainState::new(TrainId(7), None);
-    let absent = screen(&[&it], Choice::default(), (80, 24));
+    let absent = screen(&[&it], ScreenChoice::default(), (80, 24));
     assert!(absent.contains("train 7") && absent.contains("no daemon serves it"), "{absent}");
     it.daemon = Daemon::Unreadable("train 7: the daemon is incompatible: schema 2".into());
-    let other = screen(&[&it], Choice::default(), (80, 24));
+    let other = screen(&[&it], ScreenChoice::default(), (80, 24));
     assert!(other.contains("the daemon is incompatible: schema 2"), "{other}");
     let mut gone = train();
     gone.daemon = Daemon::Gone;
     gone.pipelines[1].status = Status::Invalid;
     gone.pipelines[1].reason = Some(Reason::DaemonSilent);
-    let gone = screen(&[&gone], Choice::default(), (80, 24));
+    let gone = screen(&[&gone], ScreenChoice::default(), (80, 24));
     assert!(gone.contains("the daemon is gone") && gone.contains("daemon_silent"), "{gone}");
     assert!(gone.contains("1697"), "what it said last stays: {gone}");
 }
@@ -171,7 +176,7 @@ fn a_daemon_that_is_absent_gone_or_incompatible_is_reported_in_words() {
 #[test]
 fn nothing_is_coloured_where_no_colour_is_wanted() {
     let coloured = |has_colour| {
-        let buffer = buffer(&[&suspected()], Choice::default(), (80, 24), has_colour);
+        let buffer = buffer(&[&suspected()], ScreenChoice::default(), (80, 24), has_colour);
         buffer.content.iter().any(|cell| cell.fg != Color::Reset || cell.bg != Color::Reset)
     };
     assert!(coloured(true));
@@ -182,15 +187,15 @@ fn nothing_is_coloured_where_no_colour_is_wanted() {
 fn every_size_is_drawn_and_too_small_ones_say_so() {
     for width in [1, 20, 59, 60, 79, 103, 104, 300] {
         for height in [1, 5, 19, 20, 23, 31, 60] {
-            for view in [View::Overview, View::Pipelines] {
+            for view in [ScreenView::Overview, ScreenView::Pipelines] {
                 for has_help in [false, true] {
-                    let choice = Choice { train: 9, view, has_help };
+                    let choice = ScreenChoice { train: 9, view, has_help };
                     screen(&[&suspected()], choice, (width, height));
                 }
             }
         }
     }
-    let small = screen(&[&train()], Choice::default(), (40, 10));
+    let small = screen(&[&train()], ScreenChoice::default(), (40, 10));
     assert!(small.contains("40 x 10 is too small"), "{small}");
 }
 

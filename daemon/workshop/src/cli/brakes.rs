@@ -4,19 +4,19 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use dynocar_analysis::brakes::{
-    Choice, Correction, EtcsBrake, HEAD, Parameters, Steps, TableLaw, corrections, lower_bound,
-    parse, usual, wet_share, write,
+    BrakeParameters, Correction, DeclaredBrakeFigures, EtcsBrake, HEAD, SpeedSteps, TableLaw,
+    corrections, lower_bound, parse, usual, wet_share, write,
 };
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::parallel::of_each;
-use dynocar_analysis::stops::{CutOff, FoundBy, Gradient, Law, Manner, Study};
+use dynocar_analysis::stops::{CutOff, DecelerationLaw, FoundBy, Gradient, Manner, Study};
 
 use super::stops::{StudyArguments, no_stop, share, table};
 use super::text::{TextTable, entry};
 use crate::brakes_page::{self, BrakesAnswer, K_DRY};
 use crate::dataset;
 use crate::report::PAGE_MARK;
-use crate::report::html::Columns;
+use crate::report::html::TableColumns;
 use crate::report::provenance::{Provenance, own_command_line};
 use dynocar::cli::Failure;
 use dynocar::dataset::labelled_text;
@@ -152,9 +152,9 @@ fn answer(
     arguments: &BrakesArguments,
     datasets: &[Dataset],
     study: &Study,
-    law: &Law,
+    law: &DecelerationLaw,
 ) -> Result<BrakesAnswer, Failure> {
-    let steps = |law: &Law| Steps::below(&lower_bound(law, arguments.confidence));
+    let steps = |law: &DecelerationLaw| SpeedSteps::below(&lower_bound(law, arguments.confidence));
     let weak = || Failure::Input("the stops differ so much that no deceleration is certain".into());
     let other = |paths: &[PathBuf], what: &str| match paths {
         [] => Ok(None),
@@ -167,8 +167,8 @@ fn answer(
     let train = &datasets[0].train;
     let of_law = study.stops.iter().filter(|it| it.manner == Manner::Full && it.role == Role::Fit);
     let (normal_service, usual_stops) = usual(&study.stops);
-    let build_up_s = |law: &Law| law.response.dead_time_s + law.response.build_up_s;
-    let parameters = Parameters {
+    let build_up_s = |law: &DecelerationLaw| law.response.dead_time_s + law.response.build_up_s;
+    let parameters = BrakeParameters {
         stops: law.stops,
         is_commanded: of_law.clone().all(|it| it.found_by == FoundBy::Brake),
         emergency: steps(law).ok_or_else(weak)?,
@@ -184,7 +184,8 @@ fn answer(
     };
     let supported = parameters.k_dry.iter().rev().find(|it| it.k_dry().is_some());
     let ebcl = arguments.ebcl.or(supported.map(|it| it.ebcl));
-    let (etcs, rests_on) = EtcsBrake::of(&parameters, &Choice { ebcl, k_wet: arguments.k_wet });
+    let (etcs, rests_on) =
+        EtcsBrake::of(&parameters, &DeclaredBrakeFigures { ebcl, k_wet: arguments.k_wet });
     let said = said(arguments, study, law, &parameters);
     Ok(BrakesAnswer {
         datasets: datasets.iter().map(|it| it.name.clone()).collect(),
@@ -201,8 +202,8 @@ fn answer(
 fn said(
     arguments: &BrakesArguments,
     study: &Study,
-    law: &Law,
-    parameters: &Parameters,
+    law: &DecelerationLaw,
+    parameters: &BrakeParameters,
 ) -> Vec<String> {
     let mut said = vec![
         "an estimate from data, and no safety case: a certifier still needs the brake's design, its \
@@ -235,7 +236,7 @@ fn said(
     );
     let is_shown = law.response.dead_time_s + law.response.build_up_s > 0.0;
     unless(is_shown, "T_brake_build_up is not shown");
-    let is_weaker = |steps: &Option<Steps>| {
+    let is_weaker = |steps: &Option<SpeedSteps>| {
         let fastest = law.fastest_mps();
         steps
             .as_ref()
@@ -249,7 +250,7 @@ fn said(
     said
 }
 
-fn steps_text(name: &str, steps: &Steps) -> String {
+fn steps_text(name: &str, steps: &SpeedSteps) -> String {
     let starts = std::iter::once(&0.0).chain(&steps.boundaries);
     let parts =
         starts.zip(&steps.values).map(|(from, value)| format!("{value:.3} from {from:.1} m/s"));
@@ -303,7 +304,7 @@ fn text(answer: &BrakesAnswer, gamma: f64) -> String {
 }
 
 /// Deceleration over speed: what is certain and in the steps, the bound, and the mean.
-fn picture(parameters: &Parameters, law: &Law) -> String {
+fn picture(parameters: &BrakeParameters, law: &DecelerationLaw) -> String {
     const WIDTH: f64 = 56.0;
     let most = law.points.iter().map(|it| it.deceleration_mps2).fold(0.1, f64::max);
     let place = |value: f64| (WIDTH * value / most).round() as usize;
@@ -321,7 +322,7 @@ fn picture(parameters: &Parameters, law: &Law) -> String {
     text
 }
 
-fn distances(law: &Law, rotating_mass_factor: f64) -> TextTable {
+fn distances(law: &DecelerationLaw, rotating_mass_factor: f64) -> TextTable {
     const PERMILLE: [f64; 5] = [-20.0, -10.0, 0.0, 10.0, 20.0];
     let mut head = vec!["from m/s".to_string()];
     head.extend(PERMILLE.map(|it| format!("{it:+.0} ‰")));
@@ -340,7 +341,7 @@ fn distances(law: &Law, rotating_mass_factor: f64) -> TextTable {
     table
 }
 
-const TABLES: Columns<TableLaw> = &[
+const TABLES: TableColumns<TableLaw> = &[
     ("brake", |it| it.name.clone()),
     ("rows", |it| it.rows.to_string()),
     ("cut off s", |it| format!("{:.2}", it.traction_cut_off_s)),

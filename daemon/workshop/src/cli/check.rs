@@ -1,7 +1,6 @@
 //! `dynocar check`: reads a dataset, a train, a track or a daemon configuration and says what it
 //! understood.
 
-mod draw;
 mod json;
 mod report;
 mod runs;
@@ -14,12 +13,13 @@ use std::sync::Arc;
 
 use dynocar::cli::check::{self as daemon_check, CheckArguments, or_refused};
 use dynocar_analysis::dataset::{SourcePosition, parse_track, parse_train, top_keys};
+use dynocar_analysis::parallel;
 use dynocar_shared::TrainId;
 use serde::Serialize;
 
 use crate::dataset;
 use dynocar::cli::Failure;
-use dynocar::dataset::{FileKind, LoadError, Source, kind_of, labelled_text};
+use dynocar::dataset::{DatasetSource, FileKind, LoadError, kind_of, labelled_text};
 use dynocar::output::{give, require_file, require_folder};
 
 /// Runs `dynocar check`.
@@ -30,17 +30,17 @@ use dynocar::output::{give, require_file, require_folder};
 /// been reported by then.
 pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let (path, json) = (&arguments.path, arguments.json.as_deref());
-    let source = Source { path, train: arguments.train.map(TrainId) };
+    let source = DatasetSource { path, train: arguments.train.map(TrainId) };
     if let Some(file) = json {
         require_file(file, "{")?;
     }
     if let Some(folder) = &arguments.draw {
         require_folder(folder)?;
     }
-    let understood = or_refused(path, json, understand(source))?;
+    let understood = or_refused(path, json, understand(source, SamplesOfRuns::Dropped))?;
     give(json, &understood.answer(path), || understood.text())?;
     if let Some(folder) = &arguments.draw {
-        draw::draw(&understood, folder)?;
+        understood::draw(&understood, folder)?;
     }
     let errors: Vec<_> = understood.errors().map(ToString::to_string).collect();
     if errors.is_empty() { Ok(()) } else { Err(Failure::Input(errors.join("\ndynocar: "))) }
@@ -58,15 +58,24 @@ impl Understood {
     }
 }
 
+/// Whether the samples of runs stay in memory once they are judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SamplesOfRuns {
+    /// Those of all runs.
+    Kept,
+    /// None: runs are read one after the other, and a dataset may be larger than memory.
+    Dropped,
+}
+
 /// Reads whatever a path leads to; the errors of single runs are within.
 ///
 /// # Errors
 ///
 /// When the path leads to nothing known, or a file that everything rests on is wrong.
-pub fn understand(source: Source) -> Result<Understood, Failure> {
+pub fn understand(source: DatasetSource, samples: SamplesOfRuns) -> Result<Understood, Failure> {
     let path = source.path;
     if source.train.is_some() || !path.is_file() || dataset::is_recording(path) {
-        return read_dataset(source);
+        return read_dataset(source, samples);
     }
     let (label, text) = labelled_text(path)?;
     let refuse = |message| Err(Failure::At(SourcePosition::whole(&label), message));
@@ -79,7 +88,7 @@ pub fn understand(source: Source) -> Result<Understood, Failure> {
     };
     let mut understood = Understood::of(kind);
     match kind {
-        FileKind::Dataset => return read_dataset(source),
+        FileKind::Dataset => return read_dataset(source, samples),
         FileKind::Train => understood.train = Some(Arc::new(parse_train(&label, &text)?)),
         FileKind::Track => understood.track = Some(Arc::new(parse_track(&label, &text)?)),
         FileKind::Daemon => understood.daemon = Some(daemon_check::read(path)?),
@@ -100,7 +109,7 @@ fn found(keys: &[String]) -> String {
     format!("not a file that can be checked: it holds {}{more}", names.join(", "))
 }
 
-fn read_dataset(source: Source) -> Result<Understood, Failure> {
+fn read_dataset(source: DatasetSource, samples: SamplesOfRuns) -> Result<Understood, Failure> {
     let (folder, head) = dataset::open(source).map_err(|error| match error {
         LoadError::NotADataset { .. } => {
             let place = SourcePosition::whole(&source.path.display().to_string());
@@ -108,7 +117,14 @@ fn read_dataset(source: Source) -> Result<Understood, Failure> {
         }
         other => other.into(),
     })?;
-    let runs = head.read_each(&folder);
+    let read = |index| {
+        let mut run = head.read_run(&folder, index)?;
+        if samples == SamplesOfRuns::Dropped {
+            drop(run.split_off_samples());
+        }
+        Ok(run)
+    };
+    let runs = parallel::of_each_number(head.manifest.runs.len(), read);
     Ok(Understood {
         dataset: Some((head.manifest, runs)),
         train: Some(head.train),

@@ -6,7 +6,7 @@ use clap::Args;
 use dynocar::cli::Failure;
 use dynocar::dataset::is_parquet_path;
 use dynocar::output::{report_line, require_new};
-use dynocar_parquet::reading::{Content, read, write_mcap};
+use dynocar_parquet::reading::{ParquetContent, read, write_mcap};
 use dynocar_parquet::writing::{Written, write_folder};
 
 use crate::convert::{ModelFiles, Unpacked, to_dataset, unpack};
@@ -89,7 +89,7 @@ fn is_dataset(path: &Path) -> bool {
 /// # Errors
 ///
 /// When there are several, or it cannot be read.
-pub fn one(paths: &[PathBuf]) -> Result<Content, Failure> {
+pub fn one(paths: &[PathBuf]) -> Result<ParquetContent, Failure> {
     let [path] = paths else {
         let words = "expected one recording in Parquet";
         return Err(Failure::Input(format!("{}: {words}", paths[0].display())));

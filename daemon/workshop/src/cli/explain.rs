@@ -17,12 +17,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 pub use super::explained::text;
 use super::explained_runs::ExplainedRuns;
 use super::threads::Threads;
-use crate::annotation::annotate;
+use crate::from_dataset::annotate;
 use crate::report;
 use crate::report::provenance::{Provenance, for_shell, own_command_line};
 use crate::updated::{UPDATED_FILES, UPDATED_MARK, UpdatedFiles, UpdatedModelError, write_updated};
 use dynocar::cli::Failure;
-use dynocar::dataset::{Source, SourceArguments};
+use dynocar::dataset::{DatasetSource, SourceArguments};
 use dynocar::output::{
     OutputError, give, report_line, require_files, require_folder, require_new,
     require_replaceable, write_file, write_in_folder,
@@ -121,7 +121,7 @@ pub fn execute(arguments: &ExplainArguments) -> Result<(), Failure> {
 ///
 /// A wrong dataset is an input failure.
 pub fn answer(
-    source: Source,
+    source: DatasetSource,
     traction_only: bool,
     progress: Progress,
 ) -> Result<(ExplainedRuns, Explanation), Failure> {
@@ -154,7 +154,7 @@ fn require_names(arguments: &ExplainArguments) -> Result<(), Failure> {
 /// When the data cannot be true, or a file cannot be written or would take the place of another.
 pub fn grow(
     folder: &Path,
-    source: Source,
+    source: DatasetSource,
     explanation: &Explanation,
 ) -> Result<UpdatedFiles, Failure> {
     require_growable(folder)?;
@@ -200,7 +200,7 @@ fn progress_bar() -> ProgressBar {
 ///
 /// When a file of the dataset cannot be read any more, or a plot cannot be drawn.
 pub fn page(
-    source: Source,
+    source: DatasetSource,
     dataset: &Dataset,
     explanation: &Explanation,
     command: String,

@@ -14,7 +14,7 @@ use dynocar_analysis::parallel;
 
 use crate::dataset::{FilesOfDataset, open};
 use dynocar::cli::Failure;
-use dynocar::dataset::{LoadError, Source};
+use dynocar::dataset::{DatasetSource, LoadError};
 use dynocar_shared::TrainId;
 
 /// The runs of a dataset.
@@ -54,7 +54,7 @@ impl ExplainedRuns {
     /// # Errors
     ///
     /// The first mistake, with file, line and choices.
-    pub fn at(source: Source, traction_only: bool) -> Result<Self, Failure> {
+    pub fn at(source: DatasetSource, traction_only: bool) -> Result<Self, Failure> {
         let (folder, head) = open(source)?;
         let held = Held::of(head.manifest.runs.iter().map(|run| run.role));
         let read = |index| {
@@ -86,8 +86,8 @@ impl ExplainedRuns {
     }
 
     /// Where they lie.
-    pub fn source(&self) -> Source<'_> {
-        Source { path: &self.path, train: self.train }
+    pub fn source(&self) -> DatasetSource<'_> {
+        DatasetSource { path: &self.path, train: self.train }
     }
 
     /// Explains them.

@@ -9,7 +9,7 @@ use clap::Args;
 use dynocar_analysis::dataset::{Dataset, DatasetDiagnostic};
 use dynocar_core::plausibility::Severity;
 use dynocar_estimators::EstimatorSettings;
-use dynocar_model::train::Drive;
+use dynocar_model::train::PowerTrain;
 use dynocar_model::units::Unit;
 use dynocar_shared::{HALF_95, Parameter, TrainId, schema};
 use serde::Serialize;
@@ -118,7 +118,7 @@ pub fn answer(question: &Question) -> Result<IdentifyAnswer, Failure> {
     let of_runs = runs.iter_mut().flatten().flat_map(RunAnswer::estimators);
     for answer in learned.iter_mut().chain(of_runs) {
         if dataset.is_efficiency_unknown() {
-            answer.widen_mass(Drive::EFFICIENCY_STD / Drive::USUAL.efficiency);
+            answer.widen_mass(PowerTrain::EFFICIENCY_STD / PowerTrain::USUAL.efficiency);
         }
         if let Some(it) = diagnostics.iter().find(|it| it.severity == Severity::Fundamental) {
             answer.refuse(it.code);

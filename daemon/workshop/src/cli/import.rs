@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::{parse_track, parse_train};
-use dynocar_analysis::import::{Format, ImportReading, Source, import};
+use dynocar_analysis::import::{Format, ImportReading, ImportSource, import};
 
 use super::train_text::TrainArguments;
 use dynocar::cli::Failure;
@@ -56,7 +56,8 @@ pub fn execute(arguments: &ImportArguments) -> Result<(), Failure> {
     require_folder(out)?;
     let texts = arguments.files.iter().map(|path| labelled_text(path));
     let texts: Vec<_> = texts.collect::<Result<_, _>>()?;
-    let sources: Vec<Source> = texts.iter().map(|(label, text)| Source { label, text }).collect();
+    let sources: Vec<ImportSource> =
+        texts.iter().map(|(label, text)| ImportSource { label, text }).collect();
     let reading = ImportReading { load_share: arguments.load, mode: arguments.mode.clone() };
     let imported = import(&sources, arguments.format, &reading)?;
     let train = chosen(&imported.trains, |it| &it.id, arguments.train_id.as_deref(), "train")?;

@@ -6,11 +6,12 @@ mod summary;
 mod texts;
 
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
-use dynocar_analysis::dataset::guess::{Guess, Recording, guess};
+use dynocar_analysis::dataset::guess::{Guess, RecordingText, guess};
 use dynocar_analysis::dataset::{MANIFEST_FILE, Quantity};
+use dynocar_model::train::numbers::MASS;
 use toml::Value;
 
-use super::train_text::{Found, TrainText};
+use super::train_text::{TrainText, TrainValues};
 pub use arguments::InitArguments;
 use dynocar::cli::Failure;
 use dynocar::dataset::labelled_text;
@@ -43,7 +44,7 @@ pub fn execute(arguments: &InitArguments) -> Result<(), Failure> {
         require_new(&folder.join(name))?;
     }
     let has_track = folder.join(TRACK_FILE).is_file();
-    let mut train = arguments.train.text(WRITER, &Found::default())?;
+    let mut train = arguments.train.text(WRITER, &TrainValues::default())?;
     let described = match with_dataset {
         true => Some(describe(arguments, &mut train, has_track)?),
         false => None,
@@ -64,11 +65,11 @@ fn describe(
     let (texts, encoding) = recordings::texts(&arguments.csv, arguments.encoding)?;
     let files = recordings::from_folder(arguments.folder(), &arguments.csv)?;
     let chosen = recordings::of_train(&texts, arguments.train_cell.as_deref())?;
-    let recordings: Vec<Recording> =
-        texts.iter().map(|(label, text)| Recording { label, text }).collect();
+    let recordings: Vec<RecordingText> =
+        texts.iter().map(|(label, text)| RecordingText { label, text }).collect();
     let own = recordings.iter().enumerate();
-    let own: Vec<Recording> = own
-        .map(|(at, it)| Recording {
+    let own: Vec<RecordingText> = own
+        .map(|(at, it)| RecordingText {
             text: chosen.as_ref().map_or(it.text, |it| &it.texts[at]),
             ..*it
         })
@@ -83,8 +84,9 @@ fn describe(
     };
     if let Some(mass_t) = recorded_mass_t(&guess) {
         let from = "t, the middle of the mass that the recordings hold".into();
-        let figures = vec![("mass_t", Value::Float(mass_t), from)];
-        *train = arguments.train.text(WRITER, &Found { figures, ..Found::default() })?;
+        let figures = vec![(MASS.name, Value::Float(mass_t), from)];
+        *train =
+            arguments.train.text(WRITER, &TrainValues { figures, ..TrainValues::default() })?;
     }
     let name = texts::name_of(arguments.folder());
     let folder = arguments.folder();

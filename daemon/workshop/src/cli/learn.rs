@@ -8,9 +8,9 @@ use clap::Args;
 use dynocar_transport::Host;
 
 use super::threads::Threads;
-use crate::learn::watch::{Suspicions, TimeOfDay, watch};
+use crate::learn::round_schedule::{Suspicions, TimeOfDay, watch};
 use crate::learn::{
-    Bounds, LearnError, Learner, LearnerSettings, Round, RoundOutcome, TrainRound, page,
+    Bounds, LearnError, Learner, LearnerRound, LearnerSettings, RoundOutcome, TrainRound, page,
 };
 use crate::report::PAGE_MARK;
 use crate::report::provenance::own_command_line;
@@ -111,7 +111,7 @@ fn write_report(file: Option<&Path>, learner: &Learner) -> Result<(), Failure> {
 }
 
 /// A line for each train.
-fn lines_of(round: &Round) -> String {
+fn lines_of(round: &LearnerRound) -> String {
     let mut text: String = round.trains.iter().map(of_train).collect();
     if round.is_stopped {
         text += "stopped before the end; what was not concluded is looked at again\n";

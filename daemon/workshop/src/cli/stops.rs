@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use dynocar_analysis::dataset::DatasetDiagnostic;
 use dynocar_analysis::stops::{
-    DecelerationSpread, FindSettings, FrictionPoint, FromSpeed, Gradient, LawPoint, RecordedStop,
-    Spread, StoppingDistance, Study, StudySettings,
+    DecelerationSpread, FindSettings, FrictionPoint, FromSpeed, Gradient, LawPoint, QuantileRange,
+    RecordedStop, StoppingDistance, Study, StudySettings,
 };
 use serde::Serialize;
 
 use super::text::{TextTable, diagnostics};
 use crate::dataset;
-use crate::report::html::Columns;
+use crate::report::html::TableColumns;
 use dynocar::cli::Failure;
 use dynocar::dataset::SourceArguments;
 use dynocar::output::{give, require_files};
@@ -123,7 +123,7 @@ pub fn execute(arguments: &StopsArguments) -> Result<(), Failure> {
 
 /// A table of some rows; `left` are the columns of words.
 pub(super) fn table<'t, T: 't>(
-    columns: Columns<T>,
+    columns: TableColumns<T>,
     left: &[usize],
     rows: impl Iterator<Item = &'t T>,
 ) -> TextTable {
@@ -133,7 +133,7 @@ pub(super) fn table<'t, T: 't>(
     table
 }
 
-const STOPS: Columns<RecordedStop> = &[
+const STOPS: TableColumns<RecordedStop> = &[
     ("run", |it| it.file.clone()),
     ("role", |it| it.role.name().into()),
     ("from s", |it| format!("{:.1}", it.from_s)),
@@ -148,7 +148,7 @@ const STOPS: Columns<RecordedStop> = &[
     ("bound m", |it| it.predicted.map_or("-".into(), |it| format!("{:.0}", it.distance_bound_m))),
 ];
 
-const LAW: Columns<LawPoint> = &[
+const LAW: TableColumns<LawPoint> = &[
     ("m/s", |it| format!("{:.0}", it.speed_mps)),
     ("m/s²", |it| format!("{:.3}", it.deceleration_mps2)),
     ("±", |it| format!("{:.3}", HALF_95 * it.std_mps2)),
@@ -156,25 +156,25 @@ const LAW: Columns<LawPoint> = &[
     ("stops", |it| it.stops.to_string()),
 ];
 
-const DISTANCES: Columns<StoppingDistance> = &[
+const DISTANCES: TableColumns<StoppingDistance> = &[
     ("from m/s", |it| format!("{:.1}", it.from_mps)),
     ("s", |it| format!("{:.1}", it.time_s)),
     ("m", |it| format!("{:.0}", it.distance_m)),
     ("95 % within m", |it| format!("{:.0}", it.distance_bound_m)),
 ];
 
-const FRICTION: Columns<FrictionPoint> = &[
+const FRICTION: TableColumns<FrictionPoint> = &[
     ("m/s", |it| format!("{:.0}", it.speed_mps)),
     ("friction", |it| format!("{:.2}", it.share)),
     ("±", |it| format!("{:.2}", HALF_95 * it.share_std)),
     ("adhesion ≥", |it| it.adhesion_at_least.map_or("-".into(), |it| format!("{it:.3}"))),
 ];
 
-fn spread(it: &Spread, digits: usize) -> String {
+fn spread(it: &QuantileRange, digits: usize) -> String {
     format!("{:.digits$} ({:.digits$} to {:.digits$})", it.median, it.low, it.high)
 }
 
-const FROM_SPEEDS: Columns<FromSpeed> = &[
+const FROM_SPEEDS: TableColumns<FromSpeed> = &[
     ("from m/s", |it| format!("{:.0} to {:.0}", it.from_mps[0], it.from_mps[1])),
     ("stops", |it| it.stops.to_string()),
     ("m", |it| spread(&it.distance_m, 0)),
@@ -182,7 +182,7 @@ const FROM_SPEEDS: Columns<FromSpeed> = &[
     ("mean m/s²", |it| spread(&it.mean_deceleration_mps2, 2)),
 ];
 
-const CHOSEN: Columns<DecelerationSpread> = &[
+const CHOSEN: TableColumns<DecelerationSpread> = &[
     ("at m/s", |it| format!("{:.0}", it.speed_mps)),
     ("stops", |it| it.stops.to_string()),
     ("m/s²", |it| spread(&it.deceleration_mps2, 2)),

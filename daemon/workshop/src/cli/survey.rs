@@ -9,7 +9,7 @@ use crate::survey::answer::{LearnedAnswer, SurveyAnswer};
 use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 use dynocar::cli::Failure;
-use dynocar::dataset::Source;
+use dynocar::dataset::DatasetSource;
 use dynocar::output::{give, report_line, require_files, require_folder, write_file};
 use dynocar_shared::{HALF_95, TrainId};
 
@@ -45,7 +45,7 @@ pub struct SurveyArguments {
 pub fn execute(arguments: &SurveyArguments) -> Result<(), Failure> {
     require_files(&[(&arguments.json, "{"), (&arguments.report, PAGE_MARK)])?;
     require_folder(&arguments.out)?;
-    let source = Source { path: &arguments.dataset, train: arguments.train.map(TrainId) };
+    let source = DatasetSource { path: &arguments.dataset, train: arguments.train.map(TrainId) };
     let line = arguments.line.as_deref();
     let work = || survey_folder(source, line, &arguments.out);
     let made = arguments.threads.work(work)??;

@@ -1,7 +1,14 @@
 //! The text of a first `train.toml`: what is known of a train, and a marked default for the rest.
 
 use clap::Args;
+use dynocar_analysis::dataset::keys::train::NAME;
+use dynocar_analysis::dataset::keys::{self, FileKey, assign, brake, traction};
 use dynocar_analysis::dataset::parse_train;
+use dynocar_analysis::dataset::written::TomlText;
+use dynocar_model::train::TrainModel;
+use dynocar_model::train::numbers::{
+    CARS, CURVE_CONSTANT, DAVIS_A, DAVIS_B, DAVIS_C, FULL_MASS, LENGTH, MASS, ROTATING_MASS_FACTOR,
+};
 use toml::Value;
 
 use super::text::{comment, on_one_line};
@@ -18,10 +25,6 @@ const CAR_LENGTH_M: f64 = 25.0;
 const ROTATING_MASS_DEFAULT: f64 = 0.06;
 /// Resistance in N/kN over the speed in m/s, of a train of which nothing is known.
 const DAVIS_DEFAULT: [f64; 3] = [1.5, 0.015, 0.0015];
-/// Key of the full load, for a train whose load changes.
-const FULL: &str =
-    "# mass_full_t = 300.0           # t, where the load changes; mass_t is the tare then\n";
-
 /// The user's description of the train.
 #[derive(Clone, Debug, Default, PartialEq, Args)]
 pub struct TrainArguments {
@@ -54,21 +57,39 @@ pub struct TrainArguments {
     c: Option<f64>,
 }
 
-/// Questions about keys that the user has not given: the key, and the question with its unit.
-pub const QUESTIONS: [(&str, &str); 8] = [
-    ("name", "Name of the train"),
-    ("mass_t", "Gross mass with its load, t"),
-    ("length_m", "Length over the couplers, m"),
-    ("cars", "Number of cars, with the locomotive"),
-    ("rotating_mass_factor", "Inertia of wheels, axles and motors, share of the mass"),
-    ("a", "a of the resistance a + b v + c v² with v in m/s, N/kN"),
-    ("b", "b, N/kN per m/s"),
-    ("c", "c, N/kN per (m/s)²"),
+/// A key that everybody is asked for.
+pub struct Asked {
+    /// Its name.
+    pub key: &'static str,
+    /// The question, with its unit.
+    pub question: &'static str,
+    /// Comment beside it in the file.
+    note: &'static str,
+}
+
+/// The keys that everybody is asked for, in the order of the file.
+pub const ASKED: [Asked; 8] = [
+    asked(NAME.name, "Name of the train", ""),
+    asked(MASS.name, "Gross mass with its load, t", "t, with its load"),
+    asked(LENGTH.name, "Length over the couplers, m", "m, over the couplers"),
+    asked(CARS.name, "Number of cars, with the locomotive", "with the locomotive"),
+    asked(
+        ROTATING_MASS_FACTOR.name,
+        "Inertia of wheels, axles and motors, share of the mass",
+        "inertia of wheels, axles and motors as a share of the mass",
+    ),
+    asked(DAVIS_A.name, "a of the resistance a + b v + c v² with v in m/s, N/kN", "N/kN"),
+    asked(DAVIS_B.name, "b, N/kN per m/s", "N/kN per m/s"),
+    asked(DAVIS_C.name, "c, N/kN per (m/s)²", "N/kN per (m/s)²"),
 ];
+
+const fn asked(key: &'static str, question: &'static str, note: &'static str) -> Asked {
+    Asked { key, question, note }
+}
 
 /// Values of the train from files.
 #[derive(Clone, Debug, Default)]
-pub struct Found {
+pub struct TrainValues {
     /// Keys of `[train]` and `[resistance]`, each with its value and where that is from.
     pub figures: Vec<(&'static str, Value, String)>,
     /// Greatest traction force: (m/s, N), by speed.
@@ -77,7 +98,7 @@ pub struct Found {
     pub brake_mps2: Option<Vec<(f64, f64)>>,
 }
 
-impl Found {
+impl TrainValues {
     fn number(&self, key: &str) -> Option<f64> {
         self.figures.iter().find(|figure| figure.0 == key)?.1.as_float()
     }
@@ -104,34 +125,22 @@ impl TrainArguments {
 
     /// True where a key is said.
     pub fn knows(&self, key: &str) -> bool {
-        self.said().into_iter().any(|(said, value)| said == key && value.is_some())
+        ASKED.iter().zip(self.said()).any(|(asked, value)| asked.key == key && value.is_some())
     }
 
-    /// Returns the user's values, by key, in the order of the file.
-    fn said(&self) -> [(&'static str, Option<Value>); 8] {
+    /// Returns the user's values, in the order of [`ASKED`].
+    fn said(&self) -> [Option<Value>; 8] {
         let number = |it: Option<f64>| it.map(Value::Float);
         [
-            ("name", self.name.clone().map(Value::String)),
-            ("mass_t", number(self.mass_t)),
-            ("length_m", number(self.length_m)),
-            ("cars", self.cars.map(|cars| Value::Integer(cars.into()))),
-            ("rotating_mass_factor", number(self.rotating_mass_factor)),
-            ("a", number(self.a)),
-            ("b", number(self.b)),
-            ("c", number(self.c)),
+            self.name.clone().map(Value::String),
+            number(self.mass_t),
+            number(self.length_m),
+            self.cars.map(|cars| Value::Integer(cars.into())),
+            number(self.rotating_mass_factor),
+            number(self.a),
+            number(self.b),
+            number(self.c),
         ]
-    }
-
-    fn figure(&mut self, key: &str) -> Option<&mut Option<f64>> {
-        Some(match key {
-            "mass_t" => &mut self.mass_t,
-            "length_m" => &mut self.length_m,
-            "rotating_mass_factor" => &mut self.rotating_mass_factor,
-            "a" => &mut self.a,
-            "b" => &mut self.b,
-            "c" => &mut self.c,
-            _ => return None,
-        })
     }
 
     /// The default of a key beside what is said, as `train.toml` writes it.
@@ -140,7 +149,7 @@ impl TrainArguments {
     ///
     /// The values are not those of a train.
     pub fn default_of(&self, key: &str) -> Result<String, Failure> {
-        let defaults = self.text("", &Found::default())?.defaults;
+        let defaults = self.text("", &TrainValues::default())?.defaults;
         let value = defaults.iter().find_map(|it| it.split_once(" = ").filter(|it| it.0 == key));
         Ok(value.map(|(_, value)| value.trim_matches('"').to_owned()).unwrap_or_default())
     }
@@ -152,21 +161,29 @@ impl TrainArguments {
     /// Describes the values that no train has.
     pub fn with_answer(&self, key: &str, answer: &str) -> Result<Self, String> {
         let mut answered = self.clone();
-        match key {
-            "name" => answered.name = Some(answer.into()),
-            "cars" => {
-                let cars = answer.parse().map_err(|_| format!("{answer}: expected a number"))?;
-                answered.cars = Some(cars);
+        let number = || answer.replace(',', ".").parse().ok();
+        let refused = || format!("{answer}: expected a number");
+        let figure = match key {
+            _ if key == NAME.name => {
+                answered.name = Some(answer.into());
+                None
             }
-            key => {
-                let number = answer.replace(',', ".").parse();
-                let number = number.map_err(|_| format!("{answer}: expected a number"))?;
-                if let Some(figure) = answered.figure(key) {
-                    *figure = Some(number);
-                }
+            _ if key == CARS.name => {
+                answered.cars = Some(answer.parse().map_err(|_| refused())?);
+                None
             }
+            _ if key == MASS.name => Some(&mut answered.mass_t),
+            _ if key == LENGTH.name => Some(&mut answered.length_m),
+            _ if key == ROTATING_MASS_FACTOR.name => Some(&mut answered.rotating_mass_factor),
+            _ if key == DAVIS_A.name => Some(&mut answered.a),
+            _ if key == DAVIS_B.name => Some(&mut answered.b),
+            _ if key == DAVIS_C.name => Some(&mut answered.c),
+            _ => None,
+        };
+        if let Some(figure) = figure {
+            *figure = Some(number().ok_or_else(refused)?);
         }
-        match answered.text("", &Found::default()) {
+        match answered.text("", &TrainValues::default()) {
             Ok(_) => Ok(answered),
             Err(failure) => Err(failure.answer().map(|it| it.message).unwrap_or_default()),
         }
@@ -177,62 +194,74 @@ impl TrainArguments {
     /// # Errors
     ///
     /// A figure that no train has is an input failure.
-    pub fn text(&self, writer: &str, found: &Found) -> Result<TrainText, Failure> {
-        let known_length_m = self.length_m.or(found.number("length_m"));
-        let mass_t = self.mass_t.or(found.number("mass_t")).unwrap_or_else(|| {
+    pub fn text(&self, writer: &str, found: &TrainValues) -> Result<TrainText, Failure> {
+        let known_length_m = self.length_m.or(found.number(LENGTH.name));
+        let mass_t = self.mass_t.or(found.number(MASS.name)).unwrap_or_else(|| {
             let length_m = known_length_m.filter(|length| *length > 0.0);
             length_m.map_or(MASS_DEFAULT_T, |length_m| MASS_PER_LENGTH_T_PER_M * length_m)
         });
         let length_m = known_length_m.unwrap_or((mass_t / MASS_PER_LENGTH_T_PER_M).max(1.0));
         let cars = (length_m / CAR_LENGTH_M).round().clamp(1.0, 1000.0) as u32;
         let [a, b, c] = DAVIS_DEFAULT.map(Value::Float);
-        let inertia = "inertia of wheels, axles and motors as a share of the mass";
         let defaults = [
-            (Value::String("my train".into()), ""),
-            (Value::Float(mass_t), self.mass_full_t.map_or("t, with its load", |_| "t, tare")),
-            (Value::Float(length_m), "m, over the couplers"),
-            (Value::Integer(cars.into()), "with the locomotive"),
-            (Value::Float(ROTATING_MASS_DEFAULT), inertia),
-            (a, "N/kN"),
-            (b, "N/kN per m/s"),
-            (c, "N/kN per (m/s)²"),
+            Value::String("my train".into()),
+            Value::Float(mass_t),
+            Value::Float(length_m),
+            Value::Integer(cars.into()),
+            Value::Float(ROTATING_MASS_DEFAULT),
+            a,
+            b,
+            c,
         ];
-        let (mut text, mut marked) = (head(writer), Vec::new());
-        for ((key, said), (default, words)) in self.said().into_iter().zip(defaults) {
-            let from_files = found.figures.iter().find(|figure| figure.0 == key);
+        let (mut text, mut marked) = (TomlText::new(&head(writer), keys::train::TABLE), Vec::new());
+        for ((Asked { key, note, .. }, said), default) in
+            ASKED.iter().zip(self.said()).zip(defaults)
+        {
+            let is_mass = *key == MASS.name;
+            let words = if is_mass && self.mass_full_t.is_some() { "t, tare" } else { note };
+            let from_files = found.figures.iter().find(|figure| figure.0 == *key);
             let (value, comment) = match (said, from_files) {
                 (Some(value), _) => (value, words.into()),
                 (None, Some((_, value, from))) => (value.clone(), on_one_line(from)),
                 (None, None) => {
-                    marked.push(format!("{key} = {default}"));
+                    marked.push(assign(key, &default));
                     (default, format!("DEFAULT; {words}").trim_end_matches("; ").to_owned())
                 }
             };
-            let assignment = format!("{key} = {value}");
-            text += if key == "a" { RESISTANCE } else { "" };
-            text += &match &comment[..] {
-                "" => format!("{assignment}\n"),
-                comment => format!("{assignment:<31} # {comment}\n"),
-            };
-            if key == "mass_t" {
-                text += &self.mass_full_t.map_or(FULL.into(), |full_t| {
-                    let assignment = format!("mass_full_t = {}", Value::Float(full_t));
-                    format!("{assignment:<31} # t, with its full load\n")
+            if *key == DAVIS_A.name {
+                text.lines(RESISTANCE);
+                text.table(keys::resistance::TABLE);
+            }
+            text.lines(&noted(assign(key, value), &comment));
+            if is_mass {
+                text.lines(&match self.mass_full_t {
+                    Some(full_t) => {
+                        noted(assign(FULL_MASS.name, Value::Float(full_t)), "t, with its full load")
+                    }
+                    // For a train whose load changes.
+                    None => noted(
+                        format!("# {}", assign(FULL_MASS.name, "300.0")),
+                        "t, where the load changes; mass_t is the tare then",
+                    ),
                 });
             }
         }
-        text += CURVES;
-        text += &found.traction.as_deref().map_or(TRACTION.into(), |it| effort(EFFORT, it));
-        let inertia = self.rotating_mass_factor.or(found.number("rotating_mass_factor"));
+        let inertia = self.rotating_mass_factor.or(found.number(ROTATING_MASS_FACTOR.name));
         let inertial_kg = 1e3 * mass_t * (1.0 + inertia.unwrap_or(ROTATING_MASS_DEFAULT));
-        text += &found.brake_mps2.as_deref().map_or(BRAKE.into(), |points| {
-            let forces = points.iter().map(|it| (it.0, inertial_kg * it.1));
-            effort(BRAKE_EFFORT, &forces.collect::<Vec<_>>())
-        });
+        efforts(&mut text, found, inertial_kg);
+        let text = text.into_text();
         // The file's own reader judges the figures; only what was given can be wrong.
         parse_train("train", &text)
             .map_err(|error| Failure::Input(format!("the train as given: {}", error.words)))?;
         Ok(TrainText { text, defaults: marked })
+    }
+}
+
+/// A line of an assignment and a comment, if any.
+fn noted(assignment: String, comment: &str) -> String {
+    match comment {
+        "" => format!("{assignment}\n"),
+        comment => format!("{assignment:<31} # {comment}\n"),
     }
 }
 
@@ -241,13 +270,46 @@ pub fn converted(value: f64) -> Value {
     Value::Float(format!("{value:.8e}").parse().unwrap_or(value))
 }
 
-fn effort(head: &str, points: &[(f64, f64)]) -> String {
-    let mut text = String::from(head);
-    for &(speed_mps, force_n) in points {
-        text += &format!("  [{}, {}],\n", converted(speed_mps), converted(force_n / 1000.0));
+/// Adds the curve constant and the efforts, or how they are written.
+fn efforts(text: &mut TomlText, found: &TrainValues, inertial_kg: f64) {
+    let constant = Value::Float(TrainModel::UNDECLARED.curve_constant_n_per_kn_m);
+    let constant = assign(CURVE_CONSTANT.name, constant);
+    text.lines(&format!(
+        "# {constant}     # k of the resistance k/R in curves that track.toml maps\n"
+    ));
+    let effort = |text: &mut TomlText, words: &str, key: &FileKey, points: &[(f64, f64)]| {
+        text.lines(&format!("\n# The greatest {words} over the speed: {UNITS}.\n"));
+        text.table(key.table);
+        let point = |&(speed_mps, force_n): &(f64, f64)| {
+            format!("{}, {}", converted(speed_mps), converted(force_n / 1000.0))
+        };
+        text.list(key, points.iter().map(point));
+    };
+    match &found.traction {
+        Some(points) => effort(text, "force", &traction::EFFORT, points),
+        None => {
+            let example = traction::EFFORT.assign("[[0.0, 200.0], [15.0, 200.0], [45.0, 70.0]]");
+            text.lines(&format!(
+                "\n# The greatest force over the speed: {UNITS}. With it, handles of 0 to 1 can be\n\
+                 # read as forces, and units that cannot be are reported.\n# [{}]\n# {example}\n",
+                traction::TABLE
+            ));
+        }
     }
-    text + "]\n"
+    match &found.brake_mps2 {
+        Some(points) => {
+            let forces: Vec<_> = points.iter().map(|it| (it.0, inertial_kg * it.1)).collect();
+            effort(text, "brake force", &brake::EFFORT, &forces);
+        }
+        None => {
+            let most = brake::MAX_FORCE.assign("200.0");
+            text.lines(&format!("# [{}]\n# {most}\n", brake::TABLE));
+        }
+    }
 }
+
+/// Units of the points of an effort curve.
+const UNITS: &str = "[speed in m/s, force in kN]";
 
 fn head(writer: &str) -> String {
     let words = format!(
@@ -255,40 +317,11 @@ fn head(writer: &str) -> String {
          by what you know, and the estimators will find the rest. `dynocar check train.toml` reads it \
          back."
     );
-    comment("", &words) + "[train]\n"
+    comment("", &words)
 }
 
 const RESISTANCE: &str = "
 # Resistance on level, straight track: a + b v + c v² in N for each kN of weight, v in m/s.
-[resistance]
-";
-
-const CURVES: &str = "\
-# curve_constant_n_per_kn_m = 600.0     # k of the resistance k/R in curves that track.toml maps
-";
-
-const TRACTION: &str = "
-# The greatest force over the speed: [speed in m/s, force in kN]. With it, handles of 0 to 1 can be
-# read as forces, and units that cannot be are reported.
-# [traction]
-# effort = [[0.0, 200.0], [15.0, 200.0], [45.0, 70.0]]
-";
-
-const EFFORT: &str = "
-# The greatest force over the speed: [speed in m/s, force in kN].
-[traction]
-effort = [
-";
-
-const BRAKE_EFFORT: &str = "
-# The greatest brake force over the speed: [speed in m/s, force in kN].
-[brake]
-effort = [
-";
-
-const BRAKE: &str = "\
-# [brake]
-# max_force_kn = 200.0
 ";
 
 #[cfg(test)]
@@ -304,7 +337,7 @@ mod tests {
             b: Some(-0.01),
             ..TrainArguments::default()
         };
-        let made = given.text("x", &Found::default()).unwrap();
+        let made = given.text("x", &TrainValues::default()).unwrap();
         let train = parse_train("train.toml", &made.text).unwrap();
         assert_eq!((train.mass_kg, train.resistance.b), (114_500.0, -0.01));
         assert_eq!(train.full_mass_kg, Some(150_000.0));
@@ -321,7 +354,7 @@ mod tests {
         let none = TrainArguments::default();
         let from = "t, the middle of what the recordings hold".to_string();
         let figures = vec![("mass_t", Value::Float(321.5), from)];
-        let found = Found { figures, ..Found::default() };
+        let found = TrainValues { figures, ..TrainValues::default() };
         let made = none.text("x", &found).unwrap();
         assert!(made.text.contains("mass_t = 321.5 ") && made.text.contains("recordings hold"));
         assert!(!made.defaults.iter().any(|it| it.starts_with("mass_t")));
@@ -331,7 +364,7 @@ mod tests {
 
     #[test]
     fn figures_that_no_train_has_are_refused_in_words() {
-        let refused = |given: TrainArguments| match given.text("x", &Found::default()) {
+        let refused = |given: TrainArguments| match given.text("x", &TrainValues::default()) {
             Err(Failure::Input(message)) => message,
             _ => panic!("an input failure"),
         };

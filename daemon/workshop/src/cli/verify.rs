@@ -11,7 +11,7 @@ use dynocar_mcap::error::CopyError;
 use dynocar_mcap::recording::Recording;
 
 use super::convert::one;
-use crate::verify::{Configurations, Outcome, overlay, text, verify};
+use crate::verify::{ComparisonOutcome, Configurations, overlay, text, verify};
 
 /// Compute every recorded snapshot again.
 #[derive(Debug, Args)]
@@ -59,7 +59,7 @@ pub fn execute(arguments: &VerifyArguments) -> Result<(), Failure> {
         let recorded = configurations.of_epoch(newest).0;
         print(&overlay([recorded, other], &recording.samples, &file.display().to_string()))?;
     }
-    if verified.iter().all(|it| it.outcome == Outcome::Same) {
+    if verified.iter().all(|it| it.outcome == ComparisonOutcome::Same) {
         Ok(())
     } else {
         Err(Failure::Verdict(1))

@@ -8,6 +8,6 @@ mod recorded_dataset;
 mod rows;
 mod to_dataset;
 
-pub use recorded_dataset::{Content, RecordedDataset};
+pub use recorded_dataset::{FileContent, RecordedDataset};
 pub use rows::{RowError, from_rows, is_rows, to_rows};
 pub use to_dataset::{ModelFiles, ToDatasetError, Unpacked, dataset_of, to_dataset, unpack};

@@ -13,7 +13,7 @@ use super::rows::{columns_of_samples, to_rows};
 
 /// Contents of a file.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Content {
+pub enum FileContent {
     /// Bytes that are attached.
     Bytes(Vec<u8>),
     /// A run that was recorded.
@@ -24,7 +24,7 @@ pub enum Content {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedDataset {
     recording: PathBuf,
-    files: Vec<(String, Content)>,
+    files: Vec<(String, FileContent)>,
 }
 
 impl RecordedDataset {
@@ -34,7 +34,7 @@ impl RecordedDataset {
     }
 
     /// Adds a file, or replaces that of the same name.
-    pub fn put(&mut self, name: &str, content: Content) {
+    pub fn put(&mut self, name: &str, content: FileContent) {
         self.files.retain(|it| it.0 != name);
         self.files.push((name.into(), content));
     }
@@ -47,12 +47,12 @@ impl RecordedDataset {
     /// The bytes of a file as [`unpack`](super::unpack) writes it; `None` where there is none.
     pub fn bytes(&self, path: &str) -> Option<Cow<'_, [u8]>> {
         Some(match self.file(path)? {
-            Content::Bytes(bytes) => bytes.into(),
-            Content::Samples(samples) => to_rows(samples).into_bytes().into(),
+            FileContent::Bytes(bytes) => bytes.into(),
+            FileContent::Samples(samples) => to_rows(samples).into_bytes().into(),
         })
     }
 
-    fn file(&self, path: &str) -> Option<&Content> {
+    fn file(&self, path: &str) -> Option<&FileContent> {
         // One path may be written in several ways.
         let found = self.files.iter().find(|it| Path::new(&it.0) == Path::new(path));
         found.map(|it| &it.1)
@@ -66,15 +66,15 @@ impl DatasetFiles for RecordedDataset {
 
     fn read_run(&self, path: &str, manifest: &Manifest) -> Result<RunContent, FileProblem> {
         match self.file(path).ok_or(FileProblem::Missing)? {
-            Content::Samples(samples) => {
+            FileContent::Samples(samples) => {
                 Ok(RunContent::Columns(columns_of_samples(samples, &manifest.columns)))
             }
-            Content::Bytes(bytes) if is_parquet(path) => {
+            FileContent::Bytes(bytes) if is_parquet(path) => {
                 columns_of_bytes(bytes.clone(), &manifest.columns, &manifest.train_rows)
                     .map(RunContent::Columns)
                     .map_err(|problem| FileProblem::Table(problem.to_string()))
             }
-            Content::Bytes(bytes) => {
+            FileContent::Bytes(bytes) => {
                 let encoding = manifest.layout.encoding;
                 require_text(bytes, encoding)?;
                 decoded(bytes.clone(), encoding).map(RunContent::Text)

@@ -4,15 +4,18 @@ use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
 use dynocar::cli::Failure;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{OutputError, require_new, write_file};
 use dynocar::storage::{Disk, Storage, folder_of};
+use dynocar_analysis::dataset::keys::{self, run};
+use dynocar_analysis::dataset::written::TomlText;
 use dynocar_analysis::dataset::{
-    Dataset, DatasetHead, FileEntry, MANIFEST_FILE, Manifest, Quantity,
+    Dataset, DatasetHead, FileEntry, MANIFEST_FILE, Manifest, Quantity, Role,
 };
 use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::recorded_dataset::{Content, RecordedDataset};
+use super::recorded_dataset::{FileContent, RecordedDataset};
 use super::rows::WHEEL_SLIDE;
 use dynocar_mcap::error::{AtPath, ReadError};
 use dynocar_mcap::recording::Recording;
@@ -172,7 +175,7 @@ pub fn dataset_of(
                 return Err(refused(NoDataset::Outside { name: name.into() }));
             }
             unpacked.runs += usize::from(!name.ends_with(".toml"));
-            dataset.put(name, Content::Bytes(content.clone()));
+            dataset.put(name, FileContent::Bytes(content.clone()));
         }
         let head = DatasetHead::open(&dataset);
         // Its reader reports its faults.
@@ -186,10 +189,10 @@ pub fn dataset_of(
         Some(models) if files.train.is_none() => models,
         _ => models(path, &recording, train, files)?,
     };
-    dataset.put("train.toml", Content::Bytes(train_text));
+    dataset.put(TRAIN_FILE, FileContent::Bytes(train_text));
     let has_track = track_text.is_some();
     if let Some(text) = track_text {
-        dataset.put("track.toml", Content::Bytes(text));
+        dataset.put(TRACK_FILE, FileContent::Bytes(text));
     }
     let samples: Vec<TrainSample> =
         recording.samples.into_iter().filter(|it| it.train_id == train).collect();
@@ -201,9 +204,9 @@ pub fn dataset_of(
         .chunk_by(|one, next| (one.run, one.direction) == (next.run, next.direction))
         .collect();
     let manifest = manifest(path, &runs, &samples, has_track);
-    dataset.put(MANIFEST_FILE, Content::Bytes(manifest.into_bytes()));
+    dataset.put(MANIFEST_FILE, FileContent::Bytes(manifest.into_bytes()));
     for (index, run) in runs.iter().enumerate() {
-        dataset.put(&run_file(index), Content::Samples(run.to_vec()));
+        dataset.put(&run_file(index), FileContent::Samples(run.to_vec()));
     }
     (unpacked.runs, unpacked.samples) = (runs.len(), samples.len());
     Ok((dataset, unpacked))
@@ -285,15 +288,22 @@ fn manifest(
     has_track: bool,
 ) -> String {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = toml::Value::String(name.into_owned());
-    let mut text = format!("[dataset]\nname = {name}\n\n[train]\nfile = \"train.toml\"\n");
+    let named = |name: &str| format!("\"{name}\"");
+    let mut text = TomlText::new("", keys::dataset::TABLE);
+    text.value(&keys::dataset::NAME, toml::Value::String(name.into_owned()));
+    text.lines("\n");
+    text.table(keys::train_file::TABLE);
+    text.value(&keys::train_file::FILE, named(TRAIN_FILE));
     if has_track {
-        text += "\n[track]\nfile = \"track.toml\"\n";
+        text.lines("\n");
+        text.table(keys::track_file::TABLE);
+        text.value(&keys::track_file::FILE, named(TRACK_FILE));
     }
-    text += "\n[columns]\ntime = { column = \"time_ns\", unit = \"ns\" }\n";
+    text.lines("\n");
+    text.table(keys::column::TABLE);
+    text.plain_column(Quantity::Time, "time_ns", "ns");
     let mut column = |quantity: Quantity, column: &str| {
-        let unit = quantity.unit().name();
-        text += &format!("{quantity} = {{ column = \"{column}\", unit = \"{unit}\" }}\n");
+        text.plain_column(quantity, column, quantity.unit().name());
     };
     for field in SampleField::ALL {
         let Some(quantity) = Quantity::of_field(field) else { continue };
@@ -305,14 +315,14 @@ fn manifest(
     if samples.iter().any(|it| it.flags & FLAG_WHEEL_SLIDE != 0) {
         column(Quantity::WheelSlide, WHEEL_SLIDE);
     }
-    for (index, run) in runs.iter().enumerate() {
+    for (index, samples) in runs.iter().enumerate() {
         let is_held_out = runs.len() > 1 && index + 1 == runs.len();
-        let role = if is_held_out { "holdout" } else { "fit" };
-        let direction = if run[0].direction < 0 { -1 } else { 1 };
-        text += &format!(
-            "\n[[runs]]\nfile = \"{}\"\nrole = \"{role}\"\ndirection = {direction}\n",
-            run_file(index)
-        );
+        let role = if is_held_out { Role::Holdout } else { Role::Fit };
+        text.lines("\n");
+        text.next_table(run::TABLE);
+        text.value(&run::FILE, named(&run_file(index)));
+        text.value(&run::ROLE, named(role.name()));
+        text.value(&run::DIRECTION, if samples[0].direction < 0 { -1 } else { 1 });
     }
-    text
+    text.into_text()
 }

@@ -7,11 +7,11 @@ use dynocar_analysis::explain::answer::{EffectAnswer, Verdict};
 use dynocar_analysis::explain::evidence::{SCORE_MIN, p_value};
 use tracing::{info, warn};
 
-use super::error::LearnError;
+use super::LearnError;
 use super::finding::{
     event, found_effect, improvement, is_event, is_to_be_reported, question, sentence,
 };
-use super::memory::{Memory, OpenQuestion};
+use super::memory::{LearnerMemory, OpenQuestion};
 use super::pool::Pool;
 use crate::report;
 use crate::report::provenance::{FileDigest, Provenance, hex};
@@ -19,7 +19,7 @@ use crate::updated::{UpdatedTexts, updated_texts};
 use dynocar::models::origin::{EventWindow, SourceFile};
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::models::{
-    MaintenanceEvent, ModelHash, ModelText, Moment, NewModel, Origin, TrainModels,
+    MaintenanceEvent, ModelHash, ModelText, NewModel, Origin, TrainModels, UtcSecond,
 };
 
 /// Conclusion of an explanation.
@@ -54,7 +54,7 @@ pub struct Conclusion<'a> {
     /// The command, as the origin of a model names it.
     pub command: &'a str,
     /// When it is.
-    pub now: Moment,
+    pub now: UtcSecond,
 }
 
 impl Conclusion<'_> {
@@ -63,7 +63,7 @@ impl Conclusion<'_> {
     /// # Errors
     ///
     /// When the store gives or takes nothing, or the report cannot be made.
-    pub fn draw(&self, memory: &Memory) -> Result<Explained, LearnError> {
+    pub fn draw(&self, memory: &LearnerMemory) -> Result<Explained, LearnError> {
         let &Conclusion { models, in_force, text, pool, explanation, now, .. } = self;
         let answer = &explanation.answer;
         let open = question(answer, models.train(), (in_force, now));

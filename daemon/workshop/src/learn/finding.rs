@@ -14,7 +14,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::memory::OpenQuestion;
 use super::pool::Pool;
 use dynocar::models::origin::{EventWindow, HeldOutError};
-use dynocar::models::{Figure, FoundEffect, MaintenanceEvent, ModelHash, Moment};
+use dynocar::models::{FoundEffect, MaintenanceEvent, ModelFigure, ModelHash, UtcSecond};
 
 /// Whether a kind acts in the runs in which it is found and in no others, wherever the answer names none.
 fn is_passing(kind: &str) -> bool {
@@ -31,7 +31,7 @@ pub fn found_effect(effect: &EffectAnswer) -> FoundEffect {
 }
 
 /// The numbers of an effect that have a standard deviation, by name; those of a list by place or run.
-fn figures(effect: &EffectAnswer) -> BTreeMap<String, Figure> {
+fn figures(effect: &EffectAnswer) -> BTreeMap<String, ModelFigure> {
     let mut figures = BTreeMap::new();
     for (name, value) in &effect.parameters {
         let values: Vec<(String, f64)> = match value {
@@ -55,7 +55,7 @@ fn figures(effect: &EffectAnswer) -> BTreeMap<String, Figure> {
             _ => continue,
         };
         let known = values.into_iter().zip(deviations);
-        figures.extend(known.map(|((name, value), std)| (name, Figure { value, std })));
+        figures.extend(known.map(|((name, value), std)| (name, ModelFigure { value, std })));
     }
     figures
 }
@@ -94,7 +94,7 @@ pub fn event(
     effect: &EffectAnswer,
     pool: &Pool,
     explanation: &Explanation,
-    (model, found): (ModelHash, Moment),
+    (model, found): (ModelHash, UtcSecond),
 ) -> MaintenanceEvent {
     let windows = windows(effect, pool, explanation);
     let FoundEffect { kind, intervals_m, parameters } = found_effect(effect);
@@ -102,7 +102,7 @@ pub fn event(
         let of = |window: &EventWindow| {
             pool.runs.iter().find(|run| run.sha256 == window.sha256).map(|run| run.recorded)
         };
-        let times: Vec<Moment> = windows.iter().filter_map(of).collect();
+        let times: Vec<UtcSecond> = windows.iter().filter_map(of).collect();
         Some([*times.iter().min()?, *times.iter().max()?])
     };
     let acted = times(&windows);
@@ -188,7 +188,7 @@ pub fn sentence(event: &MaintenanceEvent) -> String {
 pub fn question(
     answer: &ExplainAnswer,
     train: TrainId,
-    (model, at): (ModelHash, Moment),
+    (model, at): (ModelHash, UtcSecond),
 ) -> Option<OpenQuestion> {
     if !matches!(answer.verdict, Verdict::Ambiguous | Verdict::Unknown) {
         return None;

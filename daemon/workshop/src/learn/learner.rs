@@ -12,13 +12,13 @@ use dynocar_analysis::explain::{Explanation, explain};
 use dynocar_shared::TrainId;
 use tracing::warn;
 
+use super::LearnError;
+use super::available_runs::{FoundRun, Places, report_unusable, runs_of};
 use super::conclusion::{Conclusion, Explained};
-use super::error::LearnError;
-use super::memory::Memory;
+use super::memory::LearnerMemory;
 use super::pool::{self, Bounds, Declared, Pool};
-use super::source::{FoundRun, Places, report_unusable, runs_of};
 use crate::report::provenance::hex;
-use dynocar::models::{Action, ModelHash, ModelText, Moment, Store, TrainModels};
+use dynocar::models::{Action, ModelHash, ModelText, Store, TrainModels, UtcSecond};
 use dynocar::storage::{Disk, Storage, StorageError};
 
 /// Folder of the learner within the store's directory.
@@ -46,13 +46,13 @@ pub struct LearnerSettings {
 pub struct Learner {
     settings: LearnerSettings,
     own: PathBuf,
-    memory: Memory,
+    memory: LearnerMemory,
     _lock: File,
 }
 
 /// Result of a round.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Round {
+pub struct LearnerRound {
     /// By train.
     pub trains: Vec<TrainRound>,
     /// True where it was stopped before its end.
@@ -105,7 +105,7 @@ impl Learner {
             Err(TryLockError::WouldBlock) => return Err(LearnError::Taken { path }),
             Err(TryLockError::Error(source)) => return Err(system(&path, "locking", source)),
         }
-        let memory = Memory::load(&own);
+        let memory = LearnerMemory::load(&own);
         Ok(Learner { settings, own, memory, _lock: lock })
     }
 
@@ -115,7 +115,7 @@ impl Learner {
     }
 
     /// Returns the memory.
-    pub fn memory(&self) -> &Memory {
+    pub fn memory(&self) -> &LearnerMemory {
         &self.memory
     }
 
@@ -130,12 +130,12 @@ impl Learner {
         &mut self,
         now: SystemTime,
         stop: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Round, LearnError> {
-        let mut round = Round { trains: Vec::new(), is_stopped: false };
+    ) -> Result<LearnerRound, LearnError> {
+        let mut round = LearnerRound { trains: Vec::new(), is_stopped: false };
         for (train, declared) in self.settings.trains.clone() {
-            match self.train_round(train, &declared, Moment::of(now), stop)? {
+            match self.train_round(train, &declared, UtcSecond::of(now), stop)? {
                 Some(of_train) => round.trains.push(of_train),
-                None => return Ok(Round { is_stopped: true, ..round }),
+                None => return Ok(LearnerRound { is_stopped: true, ..round }),
             }
         }
         Ok(round)
@@ -146,7 +146,7 @@ impl Learner {
         &mut self,
         train: TrainId,
         declared: &ModelText,
-        now: Moment,
+        now: UtcSecond,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<TrainRound>, LearnError> {
         let models = self.settings.store.train(train);
@@ -184,7 +184,7 @@ impl Learner {
         models: &TrainModels,
         in_force: ModelHash,
         choices: &[Vec<FoundRun>],
-        now: Moment,
+        now: UtcSecond,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<RoundOutcome>, LearnError> {
         let text = models.text(in_force)?;
@@ -234,7 +234,7 @@ impl Learner {
 /// Explains a pool; a run that cannot be used is reported once and left out. `None` where too few are left.
 fn explain_pool(
     mut pool: Pool,
-    memory: &mut Memory,
+    memory: &mut LearnerMemory,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<(Pool, Explanation)>, Stopped> {
     let progress = |_: f64, _: &str| {
@@ -265,7 +265,7 @@ fn explain_pool(
 
 /// When the model in force came to be so; `None` while nothing was decided. Only runs since then are
 /// runs that it was meant for.
-fn since_adopted(models: &TrainModels) -> Result<Option<Moment>, LearnError> {
+fn since_adopted(models: &TrainModels) -> Result<Option<UtcSecond>, LearnError> {
     let decisions = models.decisions()?;
     let mut changes = decisions.iter().filter(|(_, it)| it.action != Action::Rejected);
     Ok(changes.next_back().map(|(_, decision)| decision.at))

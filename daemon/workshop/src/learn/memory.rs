@@ -8,7 +8,7 @@ use dynocar_shared::TrainId;
 use serde::{Deserialize, Serialize};
 use tracing::warn;
 
-use dynocar::models::{ModelHash, Moment};
+use dynocar::models::{ModelHash, UtcSecond};
 use dynocar::state::{StateError, StateProblem, file};
 
 /// The file of the memory.
@@ -35,7 +35,7 @@ pub struct OpenQuestion {
     /// The train.
     pub train: u64,
     /// When it was asked.
-    pub at: Moment,
+    pub at: UtcSecond,
     /// The model in force.
     pub model: ModelHash,
     /// The verdict.
@@ -58,7 +58,7 @@ impl OpenQuestion {
 
 /// The memory.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Memory {
+pub struct LearnerMemory {
     /// Known files by path.
     #[serde(default)]
     pub files: BTreeMap<PathBuf, KnownFile>,
@@ -73,7 +73,7 @@ pub struct Memory {
     pub open: Vec<OpenQuestion>,
 }
 
-impl Memory {
+impl LearnerMemory {
     /// The memory in a folder. One that is damaged is reported and begun anew.
     pub fn load(folder: &Path) -> Self {
         let path = folder.join(FILE);
@@ -82,13 +82,13 @@ impl Memory {
             toml::from_str(&text).map_err(malformed)
         };
         let loaded = match file::read(&path) {
-            Ok(None) => return Memory::default(),
+            Ok(None) => return LearnerMemory::default(),
             Ok(Some(text)) => read(text),
             Err(error) => Err(error.to_string()),
         };
         loaded.unwrap_or_else(|problem| {
             warn!("what was learned from is forgotten, every run is looked at anew: {problem}");
-            Memory::default()
+            LearnerMemory::default()
         })
     }
 

@@ -16,18 +16,57 @@
 //! - [`mod@watch`]: when there is one
 //! - [`page`]: the history as a page, with the errors that the daemon's trials measured
 
+use std::path::PathBuf;
+
+pub use conclusion::Explained;
+use dynocar::models::ModelsError;
+use dynocar::state::StateError;
+use dynocar::storage::StorageError;
+pub use learner::{Learner, LearnerRound, LearnerSettings, RoundOutcome, TrainRound};
+pub use pool::Bounds;
+
+use super::convert::ToDatasetError;
+
+pub mod available_runs;
 pub mod conclusion;
-mod error;
 pub mod finding;
 pub mod learner;
 pub mod memory;
 pub mod page;
 pub mod pool;
 pub mod recordings;
-pub mod source;
-pub mod watch;
+pub mod round_schedule;
 
-pub use conclusion::Explained;
-pub use error::LearnError;
-pub use learner::{Learner, LearnerSettings, Round, RoundOutcome, TrainRound};
-pub use pool::Bounds;
+/// Why learning does not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum LearnError {
+    /// The store does not give or take something.
+    #[error(transparent)]
+    Models(#[from] ModelsError),
+    /// The runs cannot be had.
+    #[error("{}: the runs cannot be read: {source}", path.display())]
+    Runs {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// Another learner is at work.
+    #[error("{}: another learner works on this store", path.display())]
+    Taken {
+        /// The lock.
+        path: PathBuf,
+    },
+    /// A recording cannot be unpacked.
+    #[error(transparent)]
+    Unpack(#[from] ToDatasetError),
+    /// The memory cannot be written.
+    #[error(transparent)]
+    Memory(#[from] StateError),
+    /// A folder cannot be made.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+    /// The report of a candidate cannot be made.
+    #[error("the report cannot be made: {0}")]
+    Report(String),
+}

@@ -7,20 +7,20 @@ use std::collections::BTreeSet;
 use std::time::SystemTime;
 
 use dynocar::models::decision::in_force_after;
-use dynocar::models::history::{History, State};
+use dynocar::models::history::{ModelHistory, State};
 use dynocar::models::numbered::Numbered;
 use dynocar::models::origin::HeldOutError;
-use dynocar::models::{Action, Decision, MaintenanceEvent, ModelHash, Moment, Origin, Stored};
-use dynocar::shadow::record::Trials;
+use dynocar::models::{Action, Decision, MaintenanceEvent, ModelHash, Origin, Stored, UtcSecond};
+use dynocar::shadow::record::TrialRecord;
 use dynocar_shared::TrainId;
 
-use super::error::LearnError;
+use super::LearnError;
 use super::learner::Learner;
 use super::memory::OpenQuestion;
-use crate::report::html::Column::{Numbers, Words};
+use crate::report::html::ColumnAlignment::{Numbers, Words};
 use crate::report::html::{self, TableColumn, chance, escape, legend, marked_table, table};
 use crate::report::page::document;
-use crate::report::plots::series::{self, Day};
+use crate::report::plots::series::{self, DailyErrors};
 use crate::report::plots::{PlotError, figure, wide_and_narrow};
 use crate::report::provenance::Provenance;
 
@@ -44,9 +44,9 @@ pub fn html(learner: &Learner, now: SystemTime) -> Result<String, LearnError> {
     let mut main = String::new();
     for train in trains {
         let models = settings.store.train(train);
-        let (history, events) = (History::of(&models)?, models.events()?);
+        let (history, events) = (ModelHistory::of(&models)?, models.events()?);
         let open: Vec<&OpenQuestion> = learner.memory().open_of(train).collect();
-        let errors = errors_by_day(&history, &Trials::read(models.folder()))
+        let errors = errors_by_day(&history, &TrialRecord::read(models.folder()))
             .map_err(|error| LearnError::Report(error.to_string()))?;
         let page = TrainPage { history: &history, events: &events, open: &open, errors };
         main += &page.html(train);
@@ -60,7 +60,7 @@ fn counted(count: usize, what: &str) -> String {
 
 /// Contents of one train's sections.
 struct TrainPage<'p> {
-    history: &'p History,
+    history: &'p ModelHistory,
     events: &'p [Numbered<MaintenanceEvent>],
     open: &'p [&'p OpenQuestion],
     /// The plot of the error by day, as HTML; empty without a measured error.
@@ -84,7 +84,7 @@ impl TrainPage<'_> {
     }
 }
 
-fn models(history: &History) -> String {
+fn models(history: &ModelHistory) -> String {
     let [now, candidates] = [State::InForce, State::Candidate]
         .map(|wanted| history.models.iter().filter(|(_, state)| *state == wanted).count());
     let words = match (now, candidates) {
@@ -137,7 +137,7 @@ type ModelRow<'h> = (&'h Stored, State, usize);
 /// A model and those that grew from it, each deeper than its parent.
 fn push_tree<'h>(
     rows: &mut Vec<ModelRow<'h>>,
-    history: &'h History,
+    history: &'h ModelHistory,
     (stored, state): (&'h Stored, State),
     depth: usize,
 ) {
@@ -150,7 +150,7 @@ fn push_tree<'h>(
 }
 
 /// A time to the minute.
-fn minute(moment: Moment) -> String {
+fn minute(moment: UtcSecond) -> String {
     moment.to_string()[..16].replace('T', " ")
 }
 
@@ -216,7 +216,7 @@ const DAY_S: u64 = 86_400;
 /// # Errors
 ///
 /// When it cannot be drawn.
-fn errors_by_day(history: &History, trials: &Trials) -> Result<String, PlotError> {
+fn errors_by_day(history: &ModelHistory, trials: &TrialRecord) -> Result<String, PlotError> {
     let measured = trials.models.iter().flat_map(|tried| tried.ledger.days.keys().copied());
     let numbers: BTreeSet<i64> = measured.collect();
     let Some(&first) = numbers.first() else { return Ok(String::new()) };
@@ -225,9 +225,9 @@ fn errors_by_day(history: &History, trials: &Trials) -> Result<String, PlotError
     let error_mps = |model: Option<ModelHash>, number: i64| {
         trials.of(model?)?.ledger.days.get(&number)?.rmse_mps()
     };
-    let days: Vec<Day> = numbers
+    let days: Vec<DailyErrors> = numbers
         .iter()
-        .map(|&number| Day {
+        .map(|&number| DailyErrors {
             day: (number - first) as f64,
             declared_mps: error_mps(declared, number),
             in_force_mps: error_mps(in_force_on(history, number).or(declared), number),
@@ -242,7 +242,7 @@ fn errors_by_day(history: &History, trials: &Trials) -> Result<String, PlotError
         .map(|(_, it)| it.at.unix_s as f64 / DAY_S as f64 - first as f64)
         .filter(|at| (-1.0..=(last - first) as f64).contains(at))
         .collect();
-    let name = Moment { unix_s: first as u64 * DAY_S }.day();
+    let name = UtcSecond { unix_s: first as u64 * DAY_S }.day();
     let plots = wide_and_narrow(|width| series::days(&days, &changes, &name, width))?;
     let key = legend(&[("dot after", "in force"), ("ring before", "declared")]);
     let caption = "Open-loop error on the trips that were driven, by day; an upright line where \
@@ -251,7 +251,7 @@ fn errors_by_day(history: &History, trials: &Trials) -> Result<String, PlotError
 }
 
 /// The model that the decisions had put in force at the end of a day; `None` for what was declared.
-fn in_force_on(history: &History, number: i64) -> Option<ModelHash> {
+fn in_force_on(history: &ModelHistory, number: i64) -> Option<ModelHash> {
     let end_s = (number + 1) as u64 * DAY_S;
     let before = history.decisions.iter().map(|(_, it)| it).filter(|it| it.at.unix_s < end_s);
     in_force_after(before).pop()

@@ -10,6 +10,7 @@ use std::time::Duration;
 use dynocar::dataset::LoadError;
 use dynocar::models::ModelText;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
+use dynocar_analysis::dataset::written::name_model;
 use dynocar_analysis::dataset::{
     Dataset, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest, Role, Run, RunContent,
 };
@@ -17,10 +18,9 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use toml::Table;
 
-use super::memory::Memory;
-use super::source::{FoundRun, report_unusable};
+use super::available_runs::{FoundRun, report_unusable};
+use super::memory::LearnerMemory;
 use crate::dataset::FilesOfDataset;
-use crate::updated::name_model;
 
 /// Bounds of what is explained together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,17 +104,17 @@ pub fn read(
     chosen: &[FoundRun],
     declared: Declared<'_>,
     bounds: &Bounds,
-    memory: &mut Memory,
+    memory: &mut LearnerMemory,
 ) -> Option<Pool> {
     let Declared { text, train, track } = declared;
     let mut kept: Vec<(FoundRun, Run)> = Vec::new();
     let (mut time_s, mut samples) = (0.0, 0);
-    let mut head: Option<(PathBuf, Overlay, DatasetHead)> = None;
+    let mut opened = None;
     for found in chosen.iter().rev() {
         if memory.unusable.contains_key(&found.key()) {
             continue;
         }
-        let run = match read_run(found, text, &mut head) {
+        let run = match read_run(found, text, &mut opened) {
             Ok(run) => run,
             Err(problem) => {
                 report_unusable(memory, &found.key(), &problem);
@@ -167,19 +167,26 @@ impl Pool {
     }
 }
 
+/// The dataset whose runs are read.
+struct OpenedDataset<'m> {
+    folder: PathBuf,
+    files: Overlay<'m>,
+    head: DatasetHead,
+}
+
 fn read_run<'m>(
     found: &FoundRun,
     text: &'m ModelText,
-    head: &mut Option<(PathBuf, Overlay<'m>, DatasetHead)>,
+    opened: &mut Option<OpenedDataset<'m>>,
 ) -> Result<Run, String> {
-    if head.as_ref().is_none_or(|(folder, ..)| *folder != found.dataset) {
+    if opened.as_ref().is_none_or(|it| it.folder != found.dataset) {
         let files = Overlay::at(&found.dataset, text).map_err(|error| error.to_string())?;
-        let opened = DatasetHead::open(&files).map_err(|error| error.to_string())?;
-        *head = Some((found.dataset.clone(), files, opened));
+        let head = DatasetHead::open(&files).map_err(|error| error.to_string())?;
+        *opened = Some(OpenedDataset { folder: found.dataset.clone(), files, head });
     }
-    match head {
+    match opened {
         // The description may have changed since the runs were found.
-        Some((_, files, head)) if found.index < head.manifest.runs.len() => {
+        Some(OpenedDataset { files, head, .. }) if found.index < head.manifest.runs.len() => {
             head.read_run(files, found.index).map_err(|error| error.to_string())
         }
         _ => Err(format!("{}: no longer described", found.name)),
@@ -213,7 +220,7 @@ impl<'a> Overlay<'a> {
     /// The description, which names the files of the model.
     fn described(&self, text: String) -> String {
         let Ok(mut table) = text.parse::<Table>() else { return text };
-        name_model(&mut table, self.model.track.is_some());
+        name_model(&mut table, TRAIN_FILE, self.model.track.as_ref().map(|_| TRACK_FILE));
         table.to_string()
     }
 }
@@ -243,7 +250,7 @@ impl DatasetFiles for Overlay<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar::models::Moment;
+    use dynocar::models::UtcSecond;
 
     fn run(day: u64, number: usize) -> FoundRun {
         FoundRun {
@@ -251,7 +258,7 @@ mod tests {
             dataset: PathBuf::new(),
             index: 0,
             path: PathBuf::new(),
-            recorded: Moment { unix_s: 86_400 * (20_000 + day) + number as u64 },
+            recorded: UtcSecond { unix_s: 86_400 * (20_000 + day) + number as u64 },
             sha256: format!("{day}-{number}"),
             described: String::new(),
         }

@@ -8,10 +8,10 @@ use dynocar_shared::TrainId;
 use serde::{Deserialize, Serialize};
 use tracing::info;
 
-use super::error::LearnError;
-use super::memory::Memory;
+use super::LearnError;
+use super::memory::LearnerMemory;
 use crate::convert::{ModelFiles, ToDatasetError, to_dataset};
-use dynocar::models::Moment;
+use dynocar::models::UtcSecond;
 use dynocar::storage::{Disk, Storage, StorageError, part_of};
 
 /// How a finished recording ends.
@@ -23,11 +23,11 @@ const BYTES_MAX: u64 = 4 << 30;
 
 /// Where an unpacked recording came from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Source {
+pub struct RecordingSource {
     /// The recording's name.
     pub name: String,
     /// When it was finished.
-    pub recorded: Moment,
+    pub recorded: UtcSecond,
 }
 
 /// True for a recording that is no longer written.
@@ -51,8 +51,8 @@ pub fn is_finished(path: &Path) -> bool {
 pub fn take_up(
     (recording, sha256): (&Path, &str),
     train: TrainId,
-    (folder, memory): (&Path, &mut Memory),
-    recorded: Moment,
+    (folder, memory): (&Path, &mut LearnerMemory),
+    recorded: UtcSecond,
 ) -> Result<(), LearnError> {
     let key = format!("{train}:{sha256}");
     let unpacked = folder.join(&sha256[..16]);
@@ -75,7 +75,7 @@ pub fn take_up(
         return Ok(());
     }
     let name = recording.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let source = toml::to_string(&Source { name, recorded }).unwrap_or_default();
+    let source = toml::to_string(&RecordingSource { name, recorded }).unwrap_or_default();
     std::fs::write(part.join(SOURCE_FILE), source)
         .and_then(|()| Disk.rename_new(&part, &unpacked))
         .map_err(failed("unpacking a recording into the folder"))
@@ -83,9 +83,9 @@ pub fn take_up(
 
 /// The folders of the unpacked recordings in one, the oldest first; the oldest go until the rest takes no more than
 /// it may.
-pub fn unpacked_in(folder: &Path) -> Vec<(PathBuf, Source)> {
+pub fn unpacked_in(folder: &Path) -> Vec<(PathBuf, RecordingSource)> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut found: Vec<(PathBuf, Source)> = Vec::new();
+    let mut found: Vec<(PathBuf, RecordingSource)> = Vec::new();
     for folder in entries.map(|entry| entry.path()) {
         let source = std::fs::read_to_string(folder.join(SOURCE_FILE)).ok();
         match source.and_then(|text| toml::from_str(&text).ok()) {

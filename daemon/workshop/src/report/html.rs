@@ -1,6 +1,6 @@
 //! Parts of pages of HTML: tables, sections, numbers.
 
-use dynocar_analysis::explain::report::Estimate;
+use dynocar_analysis::explain::report::IntervalEstimate;
 use dynocar_analysis::explain::report::words::{self, number};
 
 /// A part of a page under an anchor; title and body are HTML.
@@ -50,7 +50,7 @@ pub fn escape(text: &str) -> String {
 
 /// How the cells of a column are set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Column {
+pub enum ColumnAlignment {
     /// Words, to the left.
     Words,
     /// Numbers, to the right.
@@ -60,10 +60,10 @@ pub enum Column {
 }
 
 /// A column of a table: its head in plain text, how its cells are set, and the HTML of a row's cell.
-pub type TableColumn<'c, T> = (&'c str, Column, &'c dyn Fn(&T) -> String);
+pub type TableColumn<'c, T> = (&'c str, ColumnAlignment, &'c dyn Fn(&T) -> String);
 
 /// Head and cells of columns that are shown as text and as HTML.
-pub type Columns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
+pub type TableColumns<'c, T> = &'c [(&'c str, fn(&T) -> String)];
 
 /// A table, which scrolls within itself where the page is narrower; the caption is plain text.
 pub fn table<T>(caption: &str, columns: &[TableColumn<'_, T>], rows: &[T]) -> String {
@@ -100,16 +100,16 @@ pub fn marked_table<T>(
     html + "</tbody>\n</table>\n</div>\n"
 }
 
-fn class(column: Column) -> &'static str {
+fn class(column: ColumnAlignment) -> &'static str {
     match column {
-        Column::Words => "",
-        Column::Numbers => " class=\"number\"",
-        Column::Names => " class=\"name\"",
+        ColumnAlignment::Words => "",
+        ColumnAlignment::Numbers => " class=\"number\"",
+        ColumnAlignment::Names => " class=\"name\"",
     }
 }
 
 /// A value above its 95 % interval.
-pub fn estimate(estimate: &Estimate) -> String {
+pub fn estimate(estimate: &IntervalEstimate) -> String {
     let half = estimate.interval.map(|[low, high]| 0.5 * (high - low));
     let value = number(estimate.value, half);
     match estimate.interval {
@@ -122,7 +122,7 @@ pub fn estimate(estimate: &Estimate) -> String {
 }
 
 /// A share in percent above its interval.
-pub fn percent(share: &Estimate) -> String {
+pub fn percent(share: &IntervalEstimate) -> String {
     let shown = |value: f64| words::percent(value, share.interval);
     match share.interval {
         Some([low, high]) => {
@@ -174,8 +174,10 @@ mod tests {
 
     #[test]
     fn a_table_says_what_its_rows_and_columns_are() {
-        let columns: [TableColumn<u8>; 2] =
-            [("run", Column::Names, &|_| "x".into()), ("n", Column::Numbers, &u8::to_string)];
+        let columns: [TableColumn<u8>; 2] = [
+            ("run", ColumnAlignment::Names, &|_| "x".into()),
+            ("n", ColumnAlignment::Numbers, &u8::to_string),
+        ];
         let html = table("a < b", &columns, &[1]);
         assert!(html.contains("<caption>a &lt; b</caption>"));
         assert!(
@@ -190,7 +192,7 @@ mod tests {
         assert_eq!(minus("-0.0"), "0.0");
         assert_eq!(minus("-0 %"), "0 %");
         assert_eq!(minus("-1.5"), "−1.5");
-        let value = Estimate { value: 1.234, interval: Some([1.0, 1.4]) };
+        let value = IntervalEstimate { value: 1.234, interval: Some([1.0, 1.4]) };
         assert_eq!(estimate(&value), "1.23<span class=\"interval\">1.00 to 1.40</span>");
     }
 }

@@ -14,7 +14,7 @@ use super::Subject;
 use super::html::{chance, escape, section};
 use super::plots::{PlotError, colour_rules};
 use super::provenance::Provenance;
-use super::sections::{Section, errors, model, quality, residual};
+use super::sections::{PageSection, errors, model, quality, residual};
 use crate::run_facts::tonnes;
 
 const STYLE: &str = include_str!("style.css");
@@ -57,7 +57,7 @@ pub fn html(subject: &Subject, provenance: &Provenance) -> Result<String, PlotEr
     ]);
     let name = escape(&subject.dataset.name);
     let mut main = diagnostics(subject) + &verdict(subject) + &contents(&sections);
-    for Section { id, title, body } in &sections {
+    for PageSection { id, title, body } in &sections {
         main += &section(id, title, body);
     }
     let title = format!("{name} – residual report");
@@ -212,7 +212,7 @@ fn figures(subject: &Subject) -> String {
     html + "</dl>\n"
 }
 
-fn contents(sections: &[Section]) -> String {
+fn contents(sections: &[PageSection]) -> String {
     let mut html = String::from("<nav aria-label=\"Contents\"><ol>\n");
     for section in sections {
         let _ = writeln!(html, "<li><a href=\"#{}\">{}</a></li>", section.id, section.title);

@@ -6,8 +6,8 @@ use dynocar_analysis::dataset::MANIFEST_FILE;
 use sha2::{Digest, Sha256};
 
 use crate::dataset;
-use dynocar::dataset::{LoadError, Source};
-use dynocar::models::moment::Moment;
+use dynocar::dataset::{DatasetSource, LoadError};
+use dynocar::models::moment::UtcSecond;
 
 /// A file and what is in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,7 +43,10 @@ impl Provenance {
     /// # Errors
     ///
     /// When a file of the dataset cannot be read.
-    pub fn of<'p>(source: impl Into<Source<'p>>, command: String) -> Result<Self, LoadError> {
+    pub fn of<'p>(
+        source: impl Into<DatasetSource<'p>>,
+        command: String,
+    ) -> Result<Self, LoadError> {
         Ok(Provenance::of_files(digests(source.into())?, command, SystemTime::now()))
     }
 
@@ -55,7 +58,7 @@ impl Provenance {
             command,
             version: env!("CARGO_PKG_VERSION"),
             machine: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
-            day: Moment::of(made).day(),
+            day: UtcSecond::of(made).day(),
             files,
             sha256: hex(lines.as_bytes()),
         }
@@ -68,7 +71,7 @@ impl Provenance {
     }
 }
 
-fn digests(source: Source) -> Result<Vec<FileDigest>, LoadError> {
+fn digests(source: DatasetSource) -> Result<Vec<FileDigest>, LoadError> {
     let (files, head) = dataset::open(source)?;
     let manifest = &head.manifest;
     let mut paths = vec![MANIFEST_FILE.to_string(), manifest.train_file.path.clone()];

@@ -133,7 +133,7 @@ impl SurveyedLine {
     fn of(survey: &Survey) -> Self {
         let median = survey.profile.as_ref().and_then(|profile| {
             let entries = gradient_entries(survey, profile, 1);
-            middle(&mut entries.iter().map(|entry| entry.2).collect::<Vec<f64>>())
+            middle(&mut entries.iter().map(|entry| entry.std_permille).collect::<Vec<f64>>())
         });
         SurveyedLine {
             length_m: survey.alignments.length_m(),

@@ -9,7 +9,6 @@
 //! A folder of raw recordings, surveyed or mapped, written as a dataset of trips.
 
 pub mod answer;
-pub mod material;
 pub mod page;
 pub mod read;
 pub mod trip_rows;
@@ -18,16 +17,16 @@ pub mod write;
 use std::path::{Path, PathBuf};
 
 use crate::dataset::load;
-use dynocar::dataset::Source;
+use dynocar::dataset::DatasetSource;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, survey};
 
 use answer::SurveyAnswer;
-use material::Material;
+use read::Material;
 use write::write;
 
-pub use material::SurveyFailure;
+pub use read::SurveyFailure;
 
 /// Stops nearer than this many m to one of a known line have its name.
 const SAME_STOP_M: f64 = 25.0;
@@ -51,7 +50,7 @@ pub struct Surveyed {
 ///
 /// When the recordings or the line cannot be read, hold no line, or a file cannot be written.
 pub fn survey_folder<'s>(
-    source: impl Into<Source<'s>>,
+    source: impl Into<DatasetSource<'s>>,
     line: Option<&Path>,
     out: &Path,
 ) -> Result<Surveyed, SurveyFailure> {

@@ -4,13 +4,14 @@ use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::report::words::number;
+use dynocar_analysis::survey::profile::GradientEntry;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{NotUsed, Survey};
 use dynocar_shared::HALF_95;
 
 use super::answer::{SurveyAnswer, TripAnswer};
 use super::write::gradient_entries;
-use crate::report::html::Column::{Names, Numbers, Words};
+use crate::report::html::ColumnAlignment::{Names, Numbers, Words};
 use crate::report::html::{self, TableColumn, escape, table};
 use crate::report::page::document;
 use crate::report::plots::{PlotError, figure, series, wide_and_narrow};
@@ -140,7 +141,7 @@ fn scale_bar(span: f64) -> String {
     )
 }
 
-fn profile_plots(entries: &[(f64, f64, f64)], direction: &str) -> Result<String, PlotError> {
+fn profile_plots(entries: &[GradientEntry], direction: &str) -> Result<String, PlotError> {
     let plots = wide_and_narrow(|width| series::gradient(entries, direction, width))?;
     Ok(figure("trace", &format!("For {direction}"), "", &plots))
 }

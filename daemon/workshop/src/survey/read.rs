@@ -1,19 +1,19 @@
 //! Inputs of a survey.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use dynocar::dataset::{DatasetSource, LoadError, load_track, read_text};
+use dynocar::output::OutputError;
+use dynocar_analysis::dataset::keys::track::ALIGNMENT;
 use dynocar_analysis::dataset::{Dataset, ForceSource, Quantity, Role, Run};
 use dynocar_analysis::survey::alignment::Alignment;
 use dynocar_analysis::survey::common::Prior;
+use dynocar_analysis::survey::driven_line::{Alignments, FallingAlignment};
 use dynocar_analysis::survey::geodesy::LocalPlane;
-use dynocar_analysis::survey::line::{Alignments, FallingAlignment};
 use dynocar_analysis::survey::recording::RawRecording;
-use dynocar_analysis::survey::{KnownLine, Vehicle};
+use dynocar_analysis::survey::{KnownLine, Survey, SurveyError, Vehicle};
 use dynocar_model::track::Track;
 use dynocar_shared::SampleField;
-
-use super::material::SurveyFailure;
-use dynocar::dataset::{load_track, read_text};
 
 /// A run's rows in order of time, as numbers of its samples.
 pub fn rows_in_order(run: &Run) -> Vec<usize> {
@@ -116,7 +116,8 @@ pub fn known_line(path: &Path) -> Result<(KnownLine, Track), SurveyFailure> {
     let wrong =
         |path: &Path, problem: String| SurveyFailure::SurveyedLine { path: path.into(), problem };
     let Some(alignment) = &track.survey.alignment else {
-        let problem = "expected alignment = \"…csv\", the line on the map, got none".into();
+        let expected = ALIGNMENT.assign("\"…csv\"");
+        let problem = format!("expected {expected}, the line on the map, got none");
         return Err(wrong(path, problem));
     };
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -165,4 +166,40 @@ fn alignment_points(path: &Path) -> Result<Vec<[f64; 3]>, String> {
         points.push(point);
     }
     if points.len() < 2 { Err("expected two places or more".into()) } else { Ok(points) }
+}
+
+/// Material of the files.
+pub struct Material<'m> {
+    /// Where the raw dataset lies.
+    pub source: DatasetSource<'m>,
+    /// The raw dataset.
+    pub dataset: &'m Dataset,
+    /// Declared vehicle.
+    pub vehicle: &'m Vehicle,
+    /// Findings of the survey.
+    pub survey: &'m Survey,
+    /// The line's file that was given, if any.
+    pub line: Option<&'m Path>,
+}
+
+/// Why a survey comes to no dataset.
+#[derive(Debug, thiserror::Error)]
+pub enum SurveyFailure {
+    /// The dataset or the line cannot be read.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// Nothing can be surveyed in it.
+    #[error(transparent)]
+    Survey(#[from] SurveyError),
+    /// A line's file lacks what a map needs, or its alignment cannot be read.
+    #[error("{}: {problem}", path.display())]
+    SurveyedLine {
+        /// The file.
+        path: PathBuf,
+        /// Expected and found contents.
+        problem: String,
+    },
+    /// A file cannot be written, or would cost data.
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }

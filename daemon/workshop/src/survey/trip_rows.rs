@@ -5,7 +5,7 @@ use dynocar_analysis::dataset::{Dataset, ForceSource, Quantity, Run};
 use dynocar_analysis::survey::{Survey, Trip};
 use dynocar_shared::{SampleField, TrainSample};
 
-use super::material::Material;
+use super::read::Material;
 use super::read::rows_in_order;
 
 /// Seconds by which forces are stamped late and are moved, 0 for none.

@@ -3,18 +3,23 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use dynocar_analysis::dataset::DatasetFiles;
+use dynocar_analysis::dataset::keys::{self, run, track};
+use dynocar_analysis::dataset::written::{TomlText, set};
+use dynocar_analysis::dataset::{DatasetFiles, MANIFEST_FILE};
 use dynocar_analysis::survey::alignment::FoundCurve;
 use dynocar_analysis::survey::layout::HEIGHT_STEP_M;
+use dynocar_analysis::survey::profile::GradientEntry;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{Survey, SurveyedProfile};
+use dynocar_model::train::numbers::{
+    DAVIS_A, DAVIS_B, DAVIS_C, FORCE_PER_PRESSURE, MASS, PASSENGER_MASS, RELEASE_PRESSURE,
+};
 use toml::{Table, Value};
 
-use super::material::{Material, SurveyFailure};
+use super::read::{Material, SurveyFailure};
 use super::trip_rows::{TripColumn, columns, run_csv};
 use crate::dataset::open;
-use crate::track_text::TrackText;
-use crate::updated::set;
+use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 use dynocar::output::{require_replaceable, write_in_folder};
 
 /// Length of the beginning by which a file of a survey is known.
@@ -36,13 +41,13 @@ pub fn trip_file(number: usize) -> String {
 /// When a declared file cannot be read or one cannot be written.
 pub fn write(material: &Material, folder: &Path) -> Result<Vec<PathBuf>, SurveyFailure> {
     let mut files: Vec<(String, String)> = vec![
-        ("train.toml".into(), train_toml(material)?),
-        ("dataset.toml".into(), dataset_toml(material)),
+        (TRAIN_FILE.into(), train_toml(material)?),
+        (MANIFEST_FILE.into(), dataset_toml(material)),
     ];
     match material.line {
         Some(line) => files.extend(copied_line(line)?),
         None => {
-            files.push(("track.toml".into(), track_toml(material)));
+            files.push((TRACK_FILE.into(), track_toml(material)));
             files.push(("alignment.csv".into(), alignment(material.survey, 1)));
             if !material.survey.alignments.is_one_track() {
                 files.push(("alignment_falling.csv".into(), alignment(material.survey, -1)));
@@ -75,7 +80,7 @@ fn copied_line(line: &Path) -> Result<Vec<(String, String)>, SurveyFailure> {
         })
     };
     let track = dynocar::dataset::load_track(line)?;
-    let mut files = vec![("track.toml".to_string(), read(line)?)];
+    let mut files = vec![(TRACK_FILE.to_string(), read(line)?)];
     for name in [&track.survey.alignment, &track.survey.alignment_falling].into_iter().flatten() {
         files.push((name.clone(), read(&line.parent().unwrap_or(Path::new(".")).join(name))?));
     }
@@ -94,20 +99,20 @@ fn train_toml(material: &Material) -> Result<String, SurveyFailure> {
     let mut train: Table =
         text.parse().map_err(|error: toml::de::Error| wrong(error.message().to_string()))?;
     let common = &profile.learned.profile.common;
-    let mut set = |section: &str, key: &str, value| set(&mut train, section, key, value);
-    for (key, value) in ["a", "b", "c"].into_iter().zip(common.davis()) {
-        set("resistance", key, rounded(value, 1e-6));
+    let mut set = |key, value| set(&mut train, key, value);
+    for (key, value) in [&DAVIS_A, &DAVIS_B, &DAVIS_C].into_iter().zip(common.davis()) {
+        set(key, rounded(value, 1e-6));
     }
     let prior = &material.vehicle.prior;
     if !prior.is_weighed {
-        set("train", "mass_t", rounded(prior.mass_kg * (1.0 + common.mass_share()) / 1e3, 1e-4));
+        set(&MASS, rounded(prior.mass_kg * (1.0 + common.mass_share()) / 1e3, 1e-4));
     }
     if prior.has_passengers {
-        set("train", "passenger_mass_kg", rounded(common.passenger_kg(), 0.01));
+        set(&PASSENGER_MASS, rounded(common.passenger_kg(), 0.01));
     }
     if let Some(brake) = &profile.learned.brake {
-        set("brake", "force_per_pressure_n_per_pa", rounded(brake.gain_n_per_pa.value, 1e-5));
-        set("brake", "release_pressure_pa", rounded(brake.release_pa, 1.0));
+        set(&FORCE_PER_PRESSURE, rounded(brake.gain_n_per_pa.value, 1e-5));
+        set(&RELEASE_PRESSURE, rounded(brake.release_pa, 1.0));
     }
     let inertial_t =
         prior.mass_kg * (1.0 + common.mass_share()) * (1.0 + prior.rotating_mass_factor) / 1e3;
@@ -123,27 +128,28 @@ fn rounded(value: f64, step: f64) -> f64 {
 
 fn dataset_toml(material: &Material) -> String {
     let dataset = material.dataset;
-    let quoted = |text: &str| Value::String(text.into()).to_string();
-    let mut text = format!("{MARK}.\n[dataset]\nname = {}\n", quoted(&dataset.name));
+    let quoted = |text: &str| Value::String(text.into());
+    let named = |name: &str| format!("\"{name}\"");
+    let mut text = TomlText::new(&format!("{MARK}.\n"), keys::dataset::TABLE);
+    text.value(&keys::dataset::NAME, quoted(&dataset.name));
     if let Some(description) = &dataset.description {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "description = {}", quoted(description));
+        text.value(&keys::dataset::DESCRIPTION, quoted(description));
     }
-    text += "[train]\nfile = \"train.toml\"\n[track]\nfile = \"track.toml\"\n[columns]\n";
+    text.table(keys::train_file::TABLE);
+    text.value(&keys::train_file::FILE, named(TRAIN_FILE));
+    text.table(keys::track_file::TABLE);
+    text.value(&keys::track_file::FILE, named(TRACK_FILE));
+    text.table(keys::column::TABLE);
     for TripColumn { quantity, unit, .. } in columns(dataset) {
-        let name = quantity.name();
-        let _ = writeln!(text, "{name} = {{ column = \"{name}\", unit = \"{unit}\" }}");
+        text.plain_column(quantity, quantity.name(), unit);
     }
     for (number, trip) in material.survey.trips.iter().enumerate() {
-        let role = dataset.runs[trip.recording].role.name();
-        let direction = trip.direction;
-        let _ = writeln!(
-            text,
-            "[[runs]]\nfile = \"{}\"\nrole = \"{role}\"\ndirection = {direction}",
-            trip_file(number)
-        );
+        text.next_table(run::TABLE);
+        text.value(&run::FILE, named(&trip_file(number)));
+        text.value(&run::ROLE, named(dataset.runs[trip.recording].role.name()));
+        text.value(&run::DIRECTION, trip.direction);
     }
-    text
+    text.into_text()
 }
 
 /// Entries of (chainage in m, gradient and its standard deviation in ‰) of a direction's profile,
@@ -152,22 +158,21 @@ pub fn gradient_entries(
     survey: &Survey,
     profile: &SurveyedProfile,
     direction: i8,
-) -> Vec<(f64, f64, f64)> {
+) -> Vec<GradientEntry> {
     let alignments = &survey.alignments;
     let block = usize::from(direction < 0);
     let length_m = alignments.of(direction).map_or(0.0, |alignment| alignment.length_m());
     let entries = profile.learned.profile.gradient_permille(block);
-    let inside = entries
-        .into_iter()
-        .filter(|(at_m, ..)| (-BEYOND_M - HEIGHT_STEP_M..length_m + BEYOND_M).contains(at_m));
-    let mut list: Vec<(f64, f64, f64)> = inside
-        .map(|(at_m, gradient, std)| match direction {
-            1 => (alignments.chainage_m(1, at_m), gradient, std),
-            // The cell's end along the alignment is its start by chainage.
-            _ => (alignments.chainage_m(-1, at_m + HEIGHT_STEP_M), -gradient, std),
-        })
-        .collect();
-    list.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let driven_m = -BEYOND_M - HEIGHT_STEP_M..length_m + BEYOND_M;
+    let mut list = entries;
+    list.retain(|it| driven_m.contains(&it.from_m));
+    for it in &mut list {
+        // A cell's end along the falling alignment is its start by chainage.
+        let (sign, start_m) = if direction == 1 { (1, 0.0) } else { (-1, HEIGHT_STEP_M) };
+        it.from_m = alignments.chainage_m(sign, it.from_m + start_m);
+        it.gradient_permille *= f64::from(sign);
+    }
+    list.sort_by(|one, other| one.from_m.total_cmp(&other.from_m));
     list
 }
 
@@ -176,33 +181,38 @@ fn track_toml(material: &Material) -> String {
     let Some(profile) = &survey.profile else { return String::new() };
     let alignments = &survey.alignments;
     let name = Value::String(format!("{}, surveyed", material.dataset.name));
-    let mut text = TrackText::new(&format!("{MARK} from {} passes.\n", profile.trips.len()));
-    text.value("name", name);
-    text.value("length_m", format!("{:.1}", alignments.length_m()));
-    text.value("alignment", "\"alignment.csv\"");
+    let mut text =
+        TomlText::new(&format!("{MARK} from {} passes.\n", profile.trips.len()), track::TABLE);
+    text.value(&track::NAME, name);
+    text.value(&track::LENGTH, format!("{:.1}", alignments.length_m()));
+    text.value(&track::ALIGNMENT, "\"alignment.csv\"");
     let growing = gradient_entries(survey, profile, 1);
     let bounded = |gradient: f64| gradient.clamp(-149.0, 149.0);
-    let entry = |it: &(f64, f64, f64)| format!("{:.2}, {:.3}", it.0, bounded(it.1));
-    text.list("gradient", growing.iter().map(entry));
+    let entry =
+        |it: &GradientEntry| format!("{:.2}, {:.3}", it.from_m, bounded(it.gradient_permille));
+    text.list(&track::GRADIENT, growing.iter().map(entry));
     let stds = growing.iter().step_by(5);
-    text.list("gradient_std", stds.map(|it| format!("{:.2}, {:.3}", it.0, it.2.min(149.0))));
+    text.list(
+        &track::GRADIENT_STD,
+        stds.map(|it| format!("{:.2}, {:.3}", it.from_m, it.std_permille.min(149.0))),
+    );
     if !alignments.is_one_track() {
         let falling = gradient_entries(survey, profile, -1);
-        text.list("gradient_falling", falling.iter().map(entry));
+        text.list(&track::GRADIENT_FALLING, falling.iter().map(entry));
     } else {
         let per_m = alignments.chainage_per_m;
         let entry = |curve: &FoundCurve| {
             let (from_m, to_m) = (per_m * curve.from_m, per_m * curve.to_m);
             format!("{from_m:.1}, {to_m:.1}, {:.1}", curve.radius_m)
         };
-        text.list("curves", profile.curves.iter().map(entry));
+        text.list(&track::CURVES, profile.curves.iter().map(entry));
     }
     let stop = |stop: &SurveyedStop| {
         format!("{:.1}, {}", stop.chainage_m, Value::String(stop.name.clone()))
     };
-    text.list("stops", survey.stops.iter().map(stop));
+    text.list(&track::STOPS, survey.stops.iter().map(stop));
     if !alignments.is_one_track() {
-        text.value("alignment_falling", "\"alignment_falling.csv\"");
+        text.value(&track::ALIGNMENT_FALLING, "\"alignment_falling.csv\"");
     }
     text.into_text()
 }

@@ -20,7 +20,7 @@ use dynocar_shared::{
 };
 
 pub use configurations::{ConfigurationProblem, Configurations};
-pub use pipelines::{Difference, Outcome, Verified, verify};
+pub use pipelines::{ComparisonOutcome, SnapshotDifference, Verified, verify};
 
 /// Fields of a snapshot that are stamps of the daemon's clock and are not computed from samples.
 pub const STAMPS: [&str; 3] = ["epoch", "published_ns", "vouched_ns"];
@@ -51,16 +51,20 @@ fn rest(it: &Verified) -> String {
         false => "",
     };
     match &it.outcome {
-        Outcome::Same => String::new(),
-        Outcome::BeginsLate { before } => format!(
+        ComparisonOutcome::Same => String::new(),
+        ComparisonOutcome::BeginsLate { before } => format!(
             "; cannot be verified: the pipeline had taken {before} samples before the first recorded"
         ),
-        Outcome::OtherSamples { agree_up_to: 0, why } => format!("; cannot be verified: {why}"),
-        Outcome::OtherSamples { agree_up_to, why } => {
+        ComparisonOutcome::OtherSamples { agree_up_to: 0, why } => {
+            format!("; cannot be verified: {why}")
+        }
+        ComparisonOutcome::OtherSamples { agree_up_to, why } => {
             format!("; cannot be verified after sample {agree_up_to}: {why}")
         }
-        Outcome::NotConfigured => "; the attached configuration has no such pipeline".into(),
-        Outcome::Differs(it) => format!(
+        ComparisonOutcome::NotConfigured => {
+            "; the attached configuration has no such pipeline".into()
+        }
+        ComparisonOutcome::Differs(it) => format!(
             "; differs from sample {} on: {} recorded as {}, computed as {}{state}",
             it.sample, it.field, it.recorded, it.computed
         ),

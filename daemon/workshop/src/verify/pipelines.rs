@@ -13,7 +13,7 @@ use dynocar_mcap::schema::SNAPSHOT_FIELDS;
 
 /// Where a computed snapshot is another than the recorded one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Difference {
+pub struct SnapshotDifference {
     /// The sample behind both.
     pub sample: u64,
     /// The field.
@@ -26,7 +26,7 @@ pub struct Difference {
 
 /// Result of the comparison of a pipeline's snapshots.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
+pub enum ComparisonOutcome {
     /// Every bit is the same.
     Same,
     /// The recording begins later than the daemon.
@@ -45,7 +45,7 @@ pub enum Outcome {
     /// The configuration has no such pipeline for the train.
     NotConfigured,
     /// A bit is another.
-    Differs(Difference),
+    Differs(SnapshotDifference),
 }
 
 /// A pipeline of a daemon for a train, with what became of its snapshots.
@@ -64,7 +64,7 @@ pub struct Verified {
     /// Those that are the same to the bit, from the first on.
     pub same: usize,
     /// Result for the rest.
-    pub outcome: Outcome,
+    pub outcome: ComparisonOutcome,
     /// True where the daemon may have started from a kept state.
     pub keeps_state: bool,
 }
@@ -87,7 +87,7 @@ pub fn verify(recording: &Recording, configurations: &Configurations) -> Vec<Ver
             None => recorded[0].pipeline_kind().map_or("unknown".into(), |it| it.to_string()),
         };
         let (same, outcome) = match pipeline_of(config, train, index) {
-            None => (0, Outcome::NotConfigured),
+            None => (0, ComparisonOutcome::NotConfigured),
             Some(make) => compare(&samples, &recorded, &make),
         };
         let recorded = recorded.len();
@@ -114,7 +114,7 @@ fn compare(
     samples: &[&TrainSample],
     recorded: &[&ParameterSnapshot],
     make: &impl Fn() -> Option<Pipeline>,
-) -> (usize, Outcome) {
+) -> (usize, ComparisonOutcome) {
     let first = recorded.iter().find(|it| it.sequence > 0);
     let start = match first.map(|first| start_of(samples, first)) {
         // The daemon has taken no sample yet.
@@ -124,16 +124,16 @@ fn compare(
     };
     let samples = &samples[start..];
     let Some(lost) = lost_before(samples, first.copied(), make) else {
-        return (0, Outcome::NotConfigured);
+        return (0, ComparisonOutcome::NotConfigured);
     };
-    let Some(mut pipeline) = make() else { return (0, Outcome::NotConfigured) };
+    let Some(mut pipeline) = make() else { return (0, ComparisonOutcome::NotConfigured) };
     if let Some(sample) = samples.first() {
         pipeline.count_from(sample.sequence.saturating_sub(1 + lost));
     }
     let mut rest = samples.iter();
     for (same, it) in recorded.iter().enumerate() {
         let agree_up_to = recorded[..same].last().map_or(0, |it| it.sample_sequence);
-        let others = |why| (same, Outcome::OtherSamples { agree_up_to, why });
+        let others = |why| (same, ComparisonOutcome::OtherSamples { agree_up_to, why });
         if it.model_hash != pipeline.snapshot().model_hash {
             return others("another model was in force than the attached one");
         }
@@ -155,20 +155,23 @@ fn compare(
             return others("the daemon took other samples");
         }
         if let Some(difference) = difference(it, computed) {
-            return (same, Outcome::Differs(difference));
+            return (same, ComparisonOutcome::Differs(difference));
         }
     }
-    (recorded.len(), Outcome::Same)
+    (recorded.len(), ComparisonOutcome::Same)
 }
 
 /// The index of the first sample that the pipeline took: a snapshot's `sequence` says how many it had
 /// taken by the newest.
-fn start_of(samples: &[&TrainSample], first: &ParameterSnapshot) -> Result<usize, Outcome> {
+fn start_of(
+    samples: &[&TrainSample],
+    first: &ParameterSnapshot,
+) -> Result<usize, ComparisonOutcome> {
     let is_behind = |it: &&TrainSample| {
         (it.sequence, it.time_ns) == (first.sample_sequence, first.sample_time_ns)
     };
     match samples.iter().position(is_behind) {
-        None => Err(Outcome::OtherSamples {
+        None => Err(ComparisonOutcome::OtherSamples {
             agree_up_to: 0,
             why: "the sample behind its first snapshot is not recorded",
         }),
@@ -177,7 +180,7 @@ fn start_of(samples: &[&TrainSample], first: &ParameterSnapshot) -> Result<usize
             match first.sequence.checked_sub(taken) {
                 None => Ok((taken - first.sequence) as usize),
                 Some(0) => Ok(0),
-                Some(before) => Err(Outcome::BeginsLate { before }),
+                Some(before) => Err(ComparisonOutcome::BeginsLate { before }),
             }
         }
     }
@@ -202,7 +205,10 @@ fn lost_before(
 }
 
 /// The first field, but for stamps, that is not the same to the bit.
-fn difference(recorded: &ParameterSnapshot, computed: &ParameterSnapshot) -> Option<Difference> {
+fn difference(
+    recorded: &ParameterSnapshot,
+    computed: &ParameterSnapshot,
+) -> Option<SnapshotDifference> {
     let (one, other) = (recorded.fields(), computed.fields());
     for field in SNAPSHOT_FIELDS.iter().filter(|it| !STAMPS.contains(&it.layout.name)) {
         let (one, other) = (one[field.index], other[field.index]);
@@ -214,7 +220,7 @@ fn difference(recorded: &ParameterSnapshot, computed: &ParameterSnapshot) -> Opt
             _ => word.to_string(),
         };
         let (recorded_word, computed_word) = (one.word(index), other.word(index));
-        return Some(Difference {
+        return Some(SnapshotDifference {
             sample: recorded.sample_sequence,
             field: field.layout.name,
             recorded: shown(recorded_word),

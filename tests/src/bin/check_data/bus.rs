@@ -14,7 +14,7 @@ use dynocar_workshop::survey::survey_folder;
 
 use super::bus_variants::{self, ByPower, OtherDay};
 use super::report::Report;
-use super::stop_masses::{self, Masses};
+use super::stop_masses::{self, StopMasses};
 
 /// Largest error in m/s in open loop on trips left out: over 60 s, over all of them, and the median
 /// of those from stop to stop.
@@ -61,7 +61,7 @@ pub fn check(report: &mut Report, folder: &Path) {
 }
 
 /// Learns the masses of a dataset's sections by a kind of pipeline.
-type Learn = fn(&Dataset, PipelineKind) -> Masses;
+type Learn = fn(&Dataset, PipelineKind) -> StopMasses;
 
 /// How the mass from stop to stop is learned on trips left out.
 const LEARNERS: [(&str, Learn, PipelineKind); 2] = [
@@ -69,7 +69,7 @@ const LEARNERS: [(&str, Learn, PipelineKind); 2] = [
     ("bus: mass of each section alone", stop_masses::alone, PipelineKind::JointLeastSquares),
 ];
 
-fn held(masses: &Masses) -> Result<String, String> {
+fn held(masses: &StopMasses) -> Result<String, String> {
     let (scatter_t, correlation, words) = masses.summary();
     if scatter_t <= STOP_MASS_T && correlation >= CORRELATION { Ok(words) } else { Err(words) }
 }
@@ -80,7 +80,7 @@ struct LeftOut {
     errors_mps: Vec<f64>,
     /// From stop to stop, before and after effects, by trip.
     stop_errors_mps: Vec<Vec<[f64; 2]>>,
-    masses: [Masses; LEARNERS.len()],
+    masses: [StopMasses; LEARNERS.len()],
     /// The trips mapped as another day's, by pair.
     another_day: Vec<OtherDay>,
     /// Their force from power, by pair.

@@ -6,8 +6,8 @@ use std::path::Path;
 use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role};
 use dynocar_analysis::explain::answer::WithStd;
-use dynocar_analysis::explain::{drive, explain};
-use dynocar_model::train::Drive;
+use dynocar_analysis::explain::{drive_efficiency, explain};
+use dynocar_model::train::PowerTrain;
 use dynocar_shared::SampleField;
 use dynocar_workshop::survey::survey_folder;
 
@@ -128,8 +128,9 @@ pub fn by_power(surveyed: &Path) -> Result<ByPower, String> {
     let without: Vec<&str> = without.collect();
     std::fs::write(folder.path().join("dataset.toml"), without.join("\n")).map_err(words)?;
     let (recorded, powered) = (loaded(surveyed)?, loaded(folder.path())?);
-    let estimated =
-        drive::estimated(&powered).map_err(|error| error.to_string())?.ok_or("no power")?;
+    let estimated = drive_efficiency::estimated(&powered)
+        .map_err(|error| error.to_string())?
+        .ok_or("no power")?;
     let apart = apart(&recorded, &powered.with_drive(estimated.drive))?;
     let error_mps = held_out_mps(&powered)?;
     let auxiliaries_kw = estimated.answer.auxiliary_power_kw.ok_or("no auxiliaries")?;
@@ -146,7 +147,7 @@ fn apart(recorded: &Dataset, powered: &Dataset) -> Result<f64, String> {
         let control = |sample: &dynocar_shared::TrainSample| {
             Some(sample.get(SampleField::TractionForce)? - sample.get(SampleField::BrakeForce)?)
         };
-        if one.speed_mps < Drive::USUAL.speed_min_mps {
+        if one.speed_mps < PowerTrain::USUAL.speed_min_mps {
             continue;
         }
         let Some((one_n, other_n)) = control(one).zip(control(other)) else { continue };

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_analysis::import::{ImportReading, Imported, Source, import};
+use dynocar_analysis::import::{ImportReading, ImportSource, Imported, import};
 
 use super::report::Report;
 use super::trainruns::{THEIR_GRAVITY_MPS2, TRAINS};
@@ -78,7 +78,8 @@ fn read(files: &[PathBuf], load_share: f64) -> Result<Imported, String> {
         let text = std::fs::read_to_string(file).map_err(|error| format!("{label}: {error}"))?;
         texts.push((label, text));
     }
-    let sources: Vec<Source> = texts.iter().map(|(label, text)| Source { label, text }).collect();
+    let sources: Vec<ImportSource> =
+        texts.iter().map(|(label, text)| ImportSource { label, text }).collect();
     let reading = ImportReading { load_share, mode: None };
     import(&sources, None, &reading).map_err(|error| error.to_string())
 }

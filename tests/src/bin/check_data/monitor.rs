@@ -80,8 +80,8 @@ fn brake(folder: &Path) -> Result<String, String> {
         return Err("no window in a fitted run".into());
     };
     let watched = watch(&dataset)?;
-    let before = |it: &&(usize, f64, Option<f64>, EffectKind)| (it.0, it.1) < (first, onset_s);
-    if let Some(early) = watched.seen.iter().filter(before).find(|it| it.3 != EffectKind::None) {
+    let mut before = watched.seen.iter().filter(|it| (it.0, it.1) < (first, onset_s));
+    if let Some(early) = before.find(|it| it.3 != EffectKind::None) {
         return Err(format!("{} before the onset, at {:.0} s", early.3, early.1));
     }
     let noticed = watched

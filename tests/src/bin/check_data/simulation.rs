@@ -8,7 +8,9 @@ use dynocar::dataset;
 use dynocar_analysis::dataset::{Dataset, Role, Run};
 use dynocar_core::pipeline::admission::Admission;
 use dynocar_model::force::ForceResolver;
-use dynocar_model::simulate::{Prediction, QuadraticForces, Recording, Restart, SpeedError};
+use dynocar_model::simulate::{
+    OpenLoopRecording, Prediction, QuadraticForces, Restart, SpeedError,
+};
 use dynocar_shared::TrainId;
 use serde_json::Value;
 
@@ -56,7 +58,8 @@ fn prediction_error(dataset: &Dataset, run: &Run, restart: Restart) -> Result<Sp
         .iter()
         .filter_map(|sample| Some(resolver.resolve(&admission.validate(sample).ok()?)))
         .collect();
-    let recording = Recording::new(resolved).map_err(|error| format!("{}: {error}", run.file))?;
+    let recording =
+        OpenLoopRecording::new(resolved).map_err(|error| format!("{}: {error}", run.file))?;
     let model = QuadraticForces::declared(&recording, train.resistance);
     let mut prediction = Prediction::new();
     prediction.simulate(&recording, &model, restart);

@@ -26,15 +26,15 @@ pub struct Pair {
 
 /// The masses of all sections by one way of learning.
 #[derive(Clone, Debug, Default)]
-pub struct Masses {
+pub struct StopMasses {
     pairs: Vec<Pair>,
     /// Sections of which nothing was said.
     silent: usize,
 }
 
-impl Masses {
+impl StopMasses {
     /// Adds those of another line.
-    pub fn extend(&mut self, other: Masses) {
+    pub fn extend(&mut self, other: StopMasses) {
         self.pairs.extend(other.pairs);
         self.silent += other.silent;
     }
@@ -114,13 +114,13 @@ fn uncounted(sample: &TrainSample) -> TrainSample {
 }
 
 /// The trips held out, fed to the pipeline as a daemon feeds it.
-pub fn live(dataset: &Dataset, kind: PipelineKind) -> Masses {
+pub fn live(dataset: &Dataset, kind: PipelineKind) -> StopMasses {
     let settings = EstimatorSettings::default_of(kind).expect("the kind can be built");
     let train = &dataset.train;
     let estimator = settings.build(train).expect("default settings");
     let mut pipeline =
         Pipeline::new(TrainId(1), 0, Arc::clone(train), dataset.track.clone(), estimator);
-    let (mut masses, mut sequence) = (Masses::default(), 0);
+    let (mut masses, mut sequence) = (StopMasses::default(), 0);
     for run in held_out(dataset) {
         let sections = sections(run);
         for (index, sample) in run.samples.iter().enumerate() {
@@ -140,9 +140,9 @@ pub fn live(dataset: &Dataset, kind: PipelineKind) -> Masses {
 }
 
 /// Each section of the trips held out alone, as `identify --per-run` does with runs.
-pub fn alone(dataset: &Dataset, kind: PipelineKind) -> Masses {
+pub fn alone(dataset: &Dataset, kind: PipelineKind) -> StopMasses {
     let settings = EstimatorSettings::default_of(kind).expect("the kind can be built");
-    let mut masses = Masses::default();
+    let mut masses = StopMasses::default();
     for run in held_out(dataset) {
         for section in sections(run) {
             let own = &run.samples[section];

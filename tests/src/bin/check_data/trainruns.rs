@@ -7,7 +7,7 @@
 
 use std::path::Path;
 
-use dynocar_model::simulate::motion::Motion;
+use dynocar_model::simulate::motion::SimulatedMotion;
 use dynocar_model::track::Track;
 use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
@@ -141,7 +141,7 @@ fn running_time_s(train: &TheirTrain, effort: &[Vec<f64>], sections: &[Vec<f64>]
     };
     let end_m = sections.last()?[0];
     let permitted = PermittedSpeed::new(train, sections, end_m);
-    let mut driver = |_time_s: f64, motion: Motion| {
+    let mut driver = |_time_s: f64, motion: SimulatedMotion| {
         let has_arrived = motion.distance_m > end_m - 0.02;
         if has_arrived || (motion.distance_m > end_m - 2.0 && motion.speed_mps < 0.02) {
             return None;
@@ -194,7 +194,7 @@ impl PermittedSpeed {
     }
 
     /// Speed permitted where the next step ends, which depends on that speed: by fixed point.
-    fn after_step_mps(&self, motion: Motion) -> f64 {
+    fn after_step_mps(&self, motion: SimulatedMotion) -> f64 {
         (0..4).fold(motion.speed_mps, |speed_mps, _| {
             self.at_mps(motion.distance_m + 0.5 * STEP_S * (motion.speed_mps + speed_mps))
         })

@@ -65,13 +65,14 @@ impl Truth {
     /// Intersection over union of the windows of two effects, of which the first has some.
     pub fn window_iou(&self, effect: &Value, found: &Value) -> Option<f64> {
         let (one, other) = (self.windows(effect), self.windows(found));
-        let seconds =
-            |list: &[(&str, f64, f64)]| list.iter().map(|(_, from, to)| to - from).sum::<f64>();
         let both: f64 = one
             .iter()
             .flat_map(|a| other.iter().filter(|b| a.0 == b.0).map(|b| (*a, *b)))
             .map(|(a, b)| (a.2.min(b.2) - a.1.max(b.1)).max(0.0))
             .sum();
-        (!one.is_empty()).then(|| both / (seconds(&one) + seconds(&other) - both))
+        (!one.is_empty()).then(|| {
+            let seconds: f64 = one.iter().chain(&other).map(|(_, from, to)| to - from).sum();
+            both / (seconds - both)
+        })
     }
 }

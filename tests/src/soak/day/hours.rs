@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::train::Account;
+use super::train::TrainAccount;
 
 /// Counts of an hour of the day.
 #[derive(Clone, Debug, Default)]
@@ -12,7 +12,7 @@ pub struct Hour {
     /// Samples published, once for each pipeline.
     pub offered: u64,
     /// Samples used, rejected and lost, over all pipelines.
-    pub account: Account,
+    pub account: TrainAccount,
     /// Median time from sample to snapshot in ns, 16 samples of each train on their way.
     pub latency_p50_ns: u64,
     /// The time in ns that one in a thousand exceeds.

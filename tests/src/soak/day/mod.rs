@@ -17,10 +17,10 @@ use rustix::process::Signal;
 
 use super::Programs;
 use super::load::{GROWTH_MAX_KIB, TRAINS, resident_kib};
-use crate::process::{Process, Site, await_true};
+use crate::process::{DaemonSite, Process, await_true};
 use hours::{Hour, quantiles};
 use strange_host::StrangeHost;
-use train::{Account, DayTrain};
+use train::{DayTrain, TrainAccount};
 
 /// The daemon's file as it is shipped: its pipelines are the default set.
 const SHIPPED: &str = include_str!("../../../../config/daemon.toml");
@@ -54,7 +54,7 @@ const TROUBLES: [Trouble; 4] =
 
 /// The daemon with all that is around it.
 struct Day<'a> {
-    site: Site,
+    site: DaemonSite,
     programs: &'a Programs,
     config: PathBuf,
     states: PathBuf,
@@ -64,7 +64,7 @@ struct Day<'a> {
     trains: Vec<DayTrain>,
     client: Option<Process>,
     /// Counts of daemons that have ended.
-    ended: Account,
+    ended: TrainAccount,
     latencies_ns: Vec<u64>,
     /// Resident memory of this daemon in KiB by quarter.
     resident_kib: Vec<u64>,
@@ -104,7 +104,7 @@ pub fn run(programs: &Programs, hours: usize, seed: u64) -> Vec<Hour> {
 
 impl<'a> Day<'a> {
     fn new(programs: &'a Programs, seed: u64) -> Self {
-        let site = Site::new();
+        let site = DaemonSite::new();
         let states = site.path().join("states");
         std::fs::create_dir(&states).expect("a folder for the states");
         let host = site.host();
@@ -124,7 +124,7 @@ impl<'a> Day<'a> {
             pipelines,
             trains,
             client: None,
-            ended: Account::default(),
+            ended: TrainAccount::default(),
             latencies_ns: Vec::new(),
             resident_kib: Vec::new(),
             starts: 1,
@@ -202,7 +202,7 @@ impl<'a> Day<'a> {
     }
 
     /// Every sample is accounted for by every pipeline; what became of them since the day began.
-    fn account(&mut self) -> Account {
+    fn account(&mut self) -> TrainAccount {
         let mut all = self.ended;
         for train in &mut self.trains {
             let account = train.account(self.pipelines, &self.daemon);
@@ -262,7 +262,7 @@ impl<'a> Day<'a> {
     }
 }
 
-fn start(site: &Site, programs: &Programs, config: &Path, strange: &StrangeHost) -> Process {
+fn start(site: &DaemonSite, programs: &Programs, config: &Path, strange: &StrangeHost) -> Process {
     let text = |path: &Path| path.to_str().expect("a UTF-8 path").to_owned();
     let arguments = ["run", "--config", &text(config)];
     site.start_with(&text(&programs.dynocar), &arguments, &strange.variables())

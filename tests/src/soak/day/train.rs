@@ -27,7 +27,7 @@ const EFFECTS: [EffectKind; 4] = [
 ];
 
 /// Samples used, rejected and lost, over all pipelines.
-pub type Account = [u64; 3];
+pub type TrainAccount = [u64; 3];
 
 /// A train with its controller and a client of its snapshots.
 pub struct DayTrain {
@@ -181,10 +181,10 @@ impl DayTrain {
     /// # Panics
     ///
     /// When a sample is not accounted for.
-    pub fn account(&mut self, pipelines: usize, daemon: &Process) -> Account {
+    pub fn account(&mut self, pipelines: usize, daemon: &Process) -> TrainAccount {
         let offered = self.sequence - self.before_daemon;
         if offered == 0 {
-            return Account::default();
+            return TrainAccount::default();
         }
         let (id, sequence) = (self.id, self.sequence);
         let mut newest: Vec<ParameterSnapshot> = Vec::new();
@@ -198,7 +198,7 @@ impl DayTrain {
             || format!("sample {sequence} of train {id}: {}", daemon.errors()),
         );
         let of = |it: &ParameterSnapshot| [it.samples_used, it.samples_rejected, it.samples_lost];
-        let accounts: Vec<Account> = newest.iter().map(of).collect();
+        let accounts: Vec<TrainAccount> = newest.iter().map(of).collect();
         for account in &accounts {
             assert_eq!(account.iter().sum::<u64>(), offered, "train {id}: {account:?}");
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use dynocar::config::{DaemonConfig, TrainConfig};
-use dynocar::models::{ModelHash, ModelText, Moment, NewModel, Origin, Store, TrainModels};
+use dynocar::models::{ModelHash, ModelText, NewModel, Origin, Store, TrainModels, UtcSecond};
 use dynocar::pipelines::build_pipeline;
 use dynocar::runtime::exchange::Exchange;
 use dynocar::shadow::in_force::with_model;
@@ -18,7 +18,9 @@ use super::story::{LifeSettings, Story};
 use super::table::{Adoption, LifeOutcome};
 use crate::simulator::dataset_writer::write_dataset;
 use crate::simulator::run_maker::RunPlan;
-use crate::simulator::{EffectRequest, SimulatedDataset, SimulatorSettings, TrainType, World};
+use crate::simulator::{
+    EffectRequest, SimulatedDataset, SimulatedWorld, SimulatorSettings, TrainType,
+};
 
 /// The train of every life.
 const TRAIN: TrainId = TrainId(1);
@@ -26,7 +28,7 @@ const TRAIN: TrainId = TrainId(1);
 const FIRST_DAY_S: u64 = 1_798_761_600;
 const DAY_S: u64 = 86_400;
 /// When the models are made that a life begins with.
-const MADE: Moment = Moment { unix_s: FIRST_DAY_S };
+const MADE: UtcSecond = UtcSecond { unix_s: FIRST_DAY_S };
 /// The learner looks at least so often, in days.
 const LEARNS_EVERY: usize = 7;
 /// Days after an adoption over which both models' errors show whether it was right.
@@ -36,7 +38,7 @@ const JUDGED_DAYS: i64 = 5;
 pub struct Life<'f> {
     settings: LifeSettings,
     folder: &'f Path,
-    world: World,
+    world: SimulatedWorld,
     train: TrainConfig,
     config: DaemonConfig,
     models: TrainModels,
@@ -62,7 +64,7 @@ impl<'f> Life<'f> {
             train_type: settings.story.kind().is_none().then_some(TrainType::Regional),
             ..SimulatorSettings::new(settings.seed, request)
         };
-        let world = World::of(&simulated);
+        let world = SimulatedWorld::of(&simulated);
         write_declared(&world, folder);
         std::fs::create_dir_all(folder.join("models")).expect("a store");
         std::fs::create_dir_all(folder.join("runs")).expect("a folder of runs");
@@ -181,13 +183,13 @@ impl<'f> Life<'f> {
         if runs.is_empty() {
             return;
         }
-        let folder = self.folder.join("runs").join(Moment::of(night).day());
+        let folder = self.folder.join("runs").join(UtcSecond::of(night).day());
         write_dataset(&dataset_of(&self.world, runs), &folder).expect("a day's runs");
     }
 
     /// Root mean square in m/s of a model's errors over some days.
     fn error_of(&self, model: ModelHash, from_day: usize, days: i64) -> Option<f64> {
-        let record = record::Trials::read(self.models.folder());
+        let record = record::TrialRecord::read(self.models.folder());
         let from = (FIRST_DAY_S / DAY_S) as i64 + from_day as i64;
         let (mut squares, mut samples) = (0.0, 0);
         for (_, sum) in record.of(model)?.ledger.days.range(from..from + days) {
@@ -224,7 +226,10 @@ fn put_others(models: &TrainModels, train: &TrainConfig, declared: ModelHash) {
 }
 
 /// A dataset of some runs; nothing in it reveals the truth.
-fn dataset_of(world: &World, runs: Vec<crate::simulator::SimulatedRun>) -> SimulatedDataset {
+fn dataset_of(
+    world: &SimulatedWorld,
+    runs: Vec<crate::simulator::SimulatedRun>,
+) -> SimulatedDataset {
     SimulatedDataset {
         settings: world.settings.clone(),
         train: world.train.clone(),
@@ -236,7 +241,7 @@ fn dataset_of(world: &World, runs: Vec<crate::simulator::SimulatedRun>) -> Simul
 }
 
 /// Writes the declared files of a world, as the configuration names them.
-fn write_declared(world: &World, folder: &Path) {
+fn write_declared(world: &SimulatedWorld, folder: &Path) {
     let files = crate::simulator::dataset_writer::dataset_files(&dataset_of(world, Vec::new()));
     for (path, text) in files {
         if path.ends_with("train.toml") || path.ends_with("track.toml") {

@@ -6,15 +6,15 @@
 
 use std::sync::Arc;
 
-use dynocar_core::trial::evidence::Evidence;
+use dynocar_core::trial::evidence::RivalEvidence;
 use dynocar_core::trial::ledger::Ledger;
 use dynocar_core::trial::open_loop::OpenLoop;
-use dynocar_core::trial::{Rival, Trials};
+use dynocar_core::trial::{ModelTrials, Rival};
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{TrainId, TrainSample};
 
-use crate::simulator::random::{Random, Stream};
-use crate::simulator::{EffectRequest, SimulatorSettings, TrainType, World};
+use crate::simulator::random::{SimulatorRandom, Stream};
+use crate::simulator::{EffectRequest, SimulatedWorld, SimulatorSettings, TrainType};
 
 const TRAIN: TrainId = TrainId(1);
 /// As in the configuration by default.
@@ -26,7 +26,7 @@ const TRIPS_A_YEAR: usize = 10_000;
 
 /// Counts of mistakes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mistakes {
+pub struct MonthsMistakes {
     /// Years of all trains together.
     pub train_years: f64,
     /// Rivals that take away less than the least gain, whose adoption is a mistake.
@@ -39,8 +39,13 @@ pub struct Mistakes {
 
 /// Trains of seeds from `seed` on, each for some years, while no rival is taken for better before
 /// `trips_between_mistakes` trips on average.
-pub fn measure(trains: u64, years: usize, seed: u64, trips_between_mistakes: f64) -> Mistakes {
-    let mut found = Mistakes::default();
+pub fn measure(
+    trains: u64,
+    years: usize,
+    seed: u64,
+    trips_between_mistakes: f64,
+) -> MonthsMistakes {
+    let mut found = MonthsMistakes::default();
     for seed in seed..seed + trains {
         let all = scores(seed);
         let mean = |scores: &[f64]| scores.iter().sum::<f64>() / scores.len() as f64;
@@ -49,16 +54,16 @@ pub fn measure(trains: u64, years: usize, seed: u64, trips_between_mistakes: f64
         found.better += better.len();
         found.rivals += worse.len();
         found.train_years += years as f64;
-        let mut random = Random::new(seed, Stream::Effects);
+        let mut random = SimulatorRandom::new(seed, Stream::Effects);
         let level = trips_between_mistakes * all.len() as f64;
-        let mut evidence = vec![Evidence::new(LEAST_GAIN); worse.len()];
+        let mut evidence = vec![RivalEvidence::new(LEAST_GAIN); worse.len()];
         for _ in 0..years * TRIPS_A_YEAR {
             let trip = random.integer(0, all[0].len() - 1);
             for (evidence, scores) in evidence.iter_mut().zip(&worse) {
                 evidence.take(scores[trip]);
                 if evidence.e_value() >= level {
                     found.adopted += 1;
-                    *evidence = Evidence::new(LEAST_GAIN);
+                    *evidence = RivalEvidence::new(LEAST_GAIN);
                 }
             }
         }
@@ -75,14 +80,14 @@ fn scores(seed: u64) -> Vec<Vec<f64>> {
         train_type: Some(TrainType::ALL[seed as usize % TrainType::ALL.len()]),
         ..SimulatorSettings::new(seed, EffectRequest::none())
     };
-    let world = World::of(&settings);
+    let world = SimulatedWorld::of(&settings);
     let declared = &world.train.declared;
     let track = Arc::new(world.line.track.clone());
     let rival = |change: &dyn Fn(&mut TrainModel)| {
         let mut train = declared.clone();
         change(&mut train);
         let open_loop = OpenLoop::new(Arc::new(train), Some(Arc::clone(&track)));
-        Rival::new(0, open_loop, Vec::new(), (Evidence::new(LEAST_GAIN), Ledger::default()))
+        Rival::new(0, open_loop, Vec::new(), (RivalEvidence::new(LEAST_GAIN), Ledger::default()))
     };
     let rivals = vec![
         rival(&|it| it.resistance.a *= 1.02),
@@ -90,7 +95,7 @@ fn scores(seed: u64) -> Vec<Vec<f64>> {
         rival(&|it| it.corrections.traction_gain *= 1.005),
         rival(&|it| it.corrections.wind_plus_mps += 0.5),
     ];
-    let mut trials = Trials::new(TRAIN, rival(&|_| {}), rivals);
+    let mut trials = ModelTrials::new(TRAIN, rival(&|_| {}), rivals);
     let mut scores = vec![Vec::new(); trials.rivals.len()];
     let mut sequence = 0;
     for plan in &world.plans {

@@ -3,9 +3,9 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use crate::simulator::effect_maker::{EffectScene, make_effect};
-use crate::simulator::effects::RunWindow;
-use crate::simulator::random::{Random, Stream};
-use crate::simulator::{Effect, World};
+use crate::simulator::effects::TrueRunWindow;
+use crate::simulator::random::{SimulatorRandom, Stream};
+use crate::simulator::{SimulatedWorld, TrueEffect};
 
 /// Story of a train over some months.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +24,7 @@ pub enum Story {
 
 /// When it begins and ends, in days from the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
+pub struct StorySpan {
     /// The first day on which something is undeclared.
     pub onset: usize,
     /// The first day on which nothing is undeclared any more.
@@ -37,7 +37,7 @@ pub struct LifeSettings {
     /// Story of the train.
     pub story: Story,
     /// When.
-    pub span: Span,
+    pub span: StorySpan,
     /// The same seed gives the same life.
     pub seed: u64,
     /// Its days.
@@ -94,7 +94,7 @@ impl Story {
     }
 
     /// Returns the undeclared effects on a day in a world.
-    pub fn effects(self, world: &World, span: Span, day: usize) -> Vec<Effect> {
+    pub fn effects(self, world: &SimulatedWorld, span: StorySpan, day: usize) -> Vec<TrueEffect> {
         if day < span.onset || (self.ends() && day >= span.end) {
             return Vec::new();
         }
@@ -106,15 +106,15 @@ impl Story {
             Story::WheelsWear => {
                 let share = (day + 1 - span.onset) as f64 / (span.end - span.onset) as f64;
                 // A smaller wheel turns faster: what is measured is more than what is driven.
-                vec![Effect::WheelDiameter { speed_scale: 1.0 + WEAR * share }]
+                vec![TrueEffect::WheelDiameter { speed_scale: 1.0 + WEAR * share }]
             }
             Story::BrakeDrags => {
                 let mut effects = drawn(world, EffectKind::DraggingBrake, &scene);
                 for effect in &mut effects {
-                    if let Effect::DraggingBrake { windows, .. } = effect {
+                    if let TrueEffect::DraggingBrake { windows, .. } = effect {
                         let (start_s, end_s) = (0.0, f64::INFINITY);
                         let all = world.plans.iter().map(|plan| plan.number);
-                        *windows = all.map(|run| RunWindow { run, start_s, end_s }).collect();
+                        *windows = all.map(|run| TrueRunWindow { run, start_s, end_s }).collect();
                     }
                 }
                 effects
@@ -123,7 +123,7 @@ impl Story {
     }
 }
 
-fn drawn(world: &World, kind: EffectKind, scene: &EffectScene<'_>) -> Vec<Effect> {
-    let mut random = Random::new(world.settings.seed, Stream::Effects);
+fn drawn(world: &SimulatedWorld, kind: EffectKind, scene: &EffectScene<'_>) -> Vec<TrueEffect> {
+    let mut random = SimulatorRandom::new(world.settings.seed, Stream::Effects);
     make_effect(kind, scene, world.settings.duration_s, &mut random).into_iter().collect()
 }

@@ -5,8 +5,8 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::lateness::{Late, late_by_sampling_s, late_forces, late_from, late_reported};
 use super::{
-    Candidate, Everyday, Figure, Hypothesis, Nature, On, Policy, Proposal, ReportContext, Reported,
-    Turn,
+    Candidate, DeclaredFigure, Everyday, Hypothesis, Nature, On, Policy, Proposal, ReportContext,
+    ReportedValues, Turn,
 };
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
@@ -27,7 +27,7 @@ pub const POLICY: Policy = Policy {
     is_sought_beside_usual_errors: false,
     everyday: Some(Everyday { rank: 1, most: f64::INFINITY }),
     is_late: true,
-    frees: &[Figure::Lateness],
+    frees: &[DeclaredFigure::Lateness],
     ..Policy::USUAL
 };
 
@@ -93,7 +93,7 @@ impl Hypothesis for DelayAndLag {
         late_forces(self.late, [parameters[0], parameters[1]], on, forces);
     }
 
-    fn report(&self, context: &ReportContext) -> Reported {
+    fn report(&self, context: &ReportContext) -> ReportedValues {
         let mut reported = late_reported(context, self.parameters());
         let together_s = context.parameters.iter().sum();
         reported.push(delay::TOGETHER, together_s, context.deviation_of_sum());

@@ -1,11 +1,11 @@
 //! Basic resistance that follows the outside temperature: w0 (1 + beta (T - reference)).
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Entry, ambient};
+use dynocar_model::terms::{ModelEntry, ambient};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{
-    Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, ReportContext, Reported,
+    Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, ReportContext, ReportedValues,
 };
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -59,15 +59,15 @@ impl Hypothesis for Linear {
         }
     }
 
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<ModelEntry>> {
         Some(vec![
-            Entry::Number(&ambient::W0_PER_K, parameters[0]),
-            Entry::Number(&ambient::REFERENCE, ambient::REFERENCE_K),
+            ModelEntry::Number(&ambient::W0_PER_K, parameters[0]),
+            ModelEntry::Number(&ambient::REFERENCE, ambient::REFERENCE_K),
         ])
     }
 
-    fn report(&self, context: &ReportContext) -> Reported {
-        let mut reported = Reported::default();
+    fn report(&self, context: &ReportContext) -> ReportedValues {
+        let mut reported = ReportedValues::default();
         reported.push("w0_per_k", context.parameters[0], context.deviations[0]);
         reported.push("reference_k", ambient::REFERENCE_K, 0.0);
         reported

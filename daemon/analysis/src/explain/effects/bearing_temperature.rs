@@ -4,7 +4,7 @@ use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::{Resistance, bearings};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Figure, Handling, Hypothesis, Nature, On, Policy, Proposal};
+use super::{Candidate, DeclaredFigure, Handling, Hypothesis, Nature, On, Policy, Proposal};
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -12,7 +12,7 @@ use crate::explain::scan::Scan;
 struct Warming;
 
 /// It estimates a figure that is usually a little wrong.
-pub const POLICY: Policy = Policy { frees: &[Figure::Warming], ..Policy::USUAL };
+pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::Warming], ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -4,7 +4,7 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::curve;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Figure, Handling, Hypothesis, Nature, On, Policy, Proposal};
+use super::{Candidate, DeclaredFigure, Handling, Hypothesis, Nature, On, Policy, Proposal};
 use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
 use crate::explain::scan::Scan;
@@ -16,7 +16,7 @@ struct Curves {
 }
 
 /// It estimates a figure that is usually a little wrong.
-pub const POLICY: Policy = Policy { frees: &[Figure::Curves], ..Policy::USUAL };
+pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::Curves], ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

@@ -4,7 +4,7 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::{Key, brake, traction};
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Everyday, Figure, Hypothesis, Nature, On, Policy, Proposal};
+use super::{Candidate, DeclaredFigure, Everyday, Hypothesis, Nature, On, Policy, Proposal};
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
 
@@ -18,12 +18,15 @@ enum Gain {
 pub const OF_TRACTION: Policy = Policy {
     is_sought_beside_usual_errors: false,
     everyday: Some(Everyday { rank: 3, most: f64::INFINITY }),
-    frees: &[Figure::Traction],
+    frees: &[DeclaredFigure::Traction],
     ..Policy::USUAL
 };
 /// The usual errors hold a scale of the brake, and a larger one is no small error.
-pub const OF_BRAKE: Policy =
-    Policy { is_sought_beside_usual_errors: false, frees: &[Figure::Brake], ..Policy::USUAL };
+pub const OF_BRAKE: Policy = Policy {
+    is_sought_beside_usual_errors: false,
+    frees: &[DeclaredFigure::Brake],
+    ..Policy::USUAL
+};
 
 /// Proposes a gain of the traction force.
 pub fn of_traction(scan: &Scan) -> Proposal {

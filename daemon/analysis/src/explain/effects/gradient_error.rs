@@ -11,14 +11,14 @@
 
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::terms::gradient;
-use dynocar_model::terms::{Entry, Parameter};
+use dynocar_model::terms::{ModelEntry, Parameter};
 use dynocar_model::track::{self, LinearProfile};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
 use super::unknown::leaves_a_force;
 use super::{
-    Candidate, Handling, Hypothesis, Nature, On, Policy, Proposal, ReportContext, Reported,
+    Candidate, Handling, Hypothesis, Nature, On, Policy, Proposal, ReportContext, ReportedValues,
 };
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
@@ -56,7 +56,7 @@ pub const POLICY: Policy = Policy {
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
     let runs = &scan.problem.runs;
-    let span_m = span_m(scan).filter(|_| scan.problem.distance_ratio.is_some());
+    let span_m = span_m(scan).filter(|_| scan.problem.positions.distance_ratio.is_some());
     let Some(span_m) = span_m.filter(|[low, high]| high > low) else {
         return Err("positions are not measured".into());
     };
@@ -218,17 +218,17 @@ impl Hypothesis for Profile {
         }));
     }
 
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<ModelEntry>> {
         let entry = |(name, values): (&'static str, &[f64])| {
-            Entry::List(name, self.at_nodes(values).iter().map(|row| row.to_vec()).collect())
+            ModelEntry::List(name, self.at_nodes(values).iter().map(|row| row.to_vec()).collect())
         };
         let names = [gradient::ERROR, gradient::ERROR_FALLING];
         Some(self.lists(names, parameters).map(entry).collect())
     }
 
-    fn report(&self, context: &ReportContext) -> Reported {
+    fn report(&self, context: &ReportContext) -> ReportedValues {
         let (values, deviations) = (context.parameters, context.deviations);
-        let mut reported = Reported::default();
+        let mut reported = ReportedValues::default();
         let own = rms(values);
         let by_node = values.iter().zip(deviations).map(|(value, std)| (value * std).powi(2));
         let std = by_node.sum::<f64>().sqrt() / (own * values.len() as f64).max(1e-12);

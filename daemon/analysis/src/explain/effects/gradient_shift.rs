@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dynocar_model::terms::{Entry, gradient};
+use dynocar_model::terms::{ModelEntry, gradient};
 use dynocar_model::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -84,7 +84,7 @@ impl Hypothesis for Shift {
         }
     }
 
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
-        Some(vec![Entry::TrackNumber(gradient::SHIFT, parameters[0])])
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<ModelEntry>> {
+        Some(vec![ModelEntry::TrackNumber(gradient::SHIFT, parameters[0])])
     }
 }

@@ -4,7 +4,7 @@ use dynocar_model::terms::Parameter;
 use dynocar_shared::HALF_95;
 
 use crate::explain::evidence::SampleForces;
-use crate::explain::hypothesis::{On, ReportContext, Reported};
+use crate::explain::hypothesis::{On, ReportContext, ReportedValues};
 
 /// Delay and lag in s near none: where a fit begins whose other starts are all worse than none.
 const NEAR_NONE_S: [f64; 2] = [0.05, 0.05];
@@ -25,9 +25,9 @@ pub fn late_by_sampling_s(step_s: f64) -> f64 {
 
 /// A dead time and a lag, each with its standard deviation: neither is less than none nor more than both together,
 /// however little the data distinguish one from the other.
-pub fn late_reported(context: &ReportContext, parameters: &[Parameter]) -> Reported {
+pub fn late_reported(context: &ReportContext, parameters: &[Parameter]) -> ReportedValues {
     let most_s = context.parameters.iter().sum::<f64>() + HALF_95 * context.deviation_of_sum();
-    let mut reported = Reported::default();
+    let mut reported = ReportedValues::default();
     for (parameter, (&value_s, &std_s)) in
         parameters.iter().zip(context.parameters.iter().zip(context.deviations))
     {

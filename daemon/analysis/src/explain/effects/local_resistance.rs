@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Entry, place};
+use dynocar_model::terms::{ModelEntry, place};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Handling, Hypothesis, Nature, On, Policy, Proposal, SharedHypothesis};
@@ -58,7 +58,7 @@ pub const POLICY: Policy = Policy {
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
-    if scan.problem.distance_ratio.is_none() {
+    if scan.problem.positions.distance_ratio.is_none() {
         return Err("positions are not measured".into());
     }
     let shape = |run: &RunData, i: usize| -scan.per_unit_resistance_mps2(&run.samples()[i]);
@@ -127,10 +127,10 @@ impl Hypothesis for Local {
         });
     }
 
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<ModelEntry>> {
         let row = |&[from_m, to_m]: &[f64; 2]| vec![from_m, to_m, parameters[0]];
         let rows = self.site.intervals_m().iter().map(row).collect();
-        self.site.runs.is_none().then(|| vec![Entry::Rows(place::LIST, rows)])
+        self.site.runs.is_none().then(|| vec![ModelEntry::Rows(place::LIST, rows)])
     }
 
     fn site(&self) -> Option<&Site> {

@@ -9,7 +9,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::{Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, SharedHypothesis};
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::places::{Found, Inside, Site, best_of_runs, find};
+use crate::explain::places::{FoundIntervals, Inside, Site, best_of_runs, find};
 use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;
 use crate::statistics::greatest_first;
@@ -91,7 +91,7 @@ fn places(
     form: Form,
     cap: f64,
 ) -> Vec<(f64, Form, Candidate)> {
-    let candidate = |found: &Found| {
+    let candidate = |found: &FoundIntervals| {
         let start = match form {
             Form::Cap => vec![cap.max(0.006)],
             Form::Ratio => vec![(1.0 - found.estimate).clamp(0.1, 0.99)],
@@ -107,12 +107,12 @@ fn places(
     if everywhere.gain > 0.0 && (form == Form::Cap || everywhere.runs.is_some()) {
         candidates.push(candidate(&everywhere));
     }
-    if scan.problem.distance_ratio.is_some()
+    if scan.problem.positions.distance_ratio.is_some()
         && let Some(found) = find(scan, shape, Inside::Centre)
     {
         candidates.push(candidate(&found));
         if found.runs.is_some() {
-            candidates.push(candidate(&Found { runs: None, ..found }));
+            candidates.push(candidate(&FoundIntervals { runs: None, ..found }));
         }
     }
     candidates

@@ -34,11 +34,11 @@ use EffectKind::*;
 use dynocar_shared::vocabulary::EffectKind;
 
 pub use super::hypothesis::{
-    AtBound, Handling, Hypothesis, Nature, On, OnOthers, Past, ReportContext, Reported,
+    AtBound, Handling, Hypothesis, Nature, On, OnOthers, Past, ReportContext, ReportedValues,
     SharedHypothesis, Turn,
 };
 pub use gradient_error::map_error;
-pub use policy::{Certainty, Everyday, Figure, Policy};
+pub use policy::{Certainty, DeclaredFigure, Everyday, Policy};
 pub use proposal::{Candidate, Effect, Proposal, Whole};
 pub use usual_errors::{map_error_as_fitted, usual_errors};
 pub use vertical_curves::{USUAL_LENGTH_M, vertical_curves};
@@ -80,7 +80,12 @@ pub use unknown::{a_form_explains_more, leaves_a_force};
 
 /// Returns the policy in a kind's row of the library; the usual one for what has no row.
 pub fn policy_of(kind: EffectKind) -> &'static Policy {
-    LIBRARY.iter().find(|effect| effect.kind == kind).map_or(&Policy::USUAL, |it| &it.policy)
+    effect_of(kind).map_or(&Policy::USUAL, |it| &it.policy)
+}
+
+/// Returns a kind's row of the library; `None` for what has none.
+pub fn effect_of(kind: EffectKind) -> Option<&'static Effect> {
+    LIBRARY.iter().find(|effect| effect.kind == kind)
 }
 
 #[cfg(test)]
@@ -89,7 +94,8 @@ mod tests {
 
     #[test]
     fn a_figure_is_freed_by_one_kind() {
-        let freed: Vec<Figure> = LIBRARY.iter().flat_map(|it| it.policy.frees).copied().collect();
+        let freed: Vec<DeclaredFigure> =
+            LIBRARY.iter().flat_map(|it| it.policy.frees).copied().collect();
         assert!((1..freed.len()).all(|k| !freed[k..].contains(&freed[k - 1])), "{freed:?}");
     }
 

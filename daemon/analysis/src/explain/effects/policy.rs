@@ -16,7 +16,7 @@ pub enum Certainty {
 
 /// A declared figure that is usually a little wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Figure {
+pub enum DeclaredFigure {
     /// By a share of the traction force.
     Traction,
     /// By a share of the brake force.
@@ -64,7 +64,7 @@ pub struct Policy {
     /// Whether it acts in the runs in which it is found and in no others.
     pub is_passing: bool,
     /// Figures that it estimates, which have no usual error beside it.
-    pub frees: &'static [Figure],
+    pub frees: &'static [DeclaredFigure],
 }
 
 impl Policy {

@@ -4,7 +4,7 @@
 use dynocar_model::terms::rotating;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::{Candidate, Figure, Hypothesis, Nature, On, OnOthers, Policy, Proposal};
+use super::{Candidate, DeclaredFigure, Hypothesis, Nature, On, OnOthers, Policy, Proposal};
 use crate::explain::evidence::{RunScatter, SampleForces};
 use crate::explain::scan::Scan;
 
@@ -14,7 +14,7 @@ struct Gamma {
 }
 
 /// It estimates a figure that is usually a little wrong.
-pub const POLICY: Policy = Policy { frees: &[Figure::RotatingMass], ..Policy::USUAL };
+pub const POLICY: Policy = Policy { frees: &[DeclaredFigure::RotatingMass], ..Policy::USUAL };
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {

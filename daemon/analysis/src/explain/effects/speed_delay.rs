@@ -9,7 +9,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::lateness::{late_by_sampling_s, late_from, late_reported};
 use super::{
     Candidate, Certainty, Everyday, Hypothesis, Nature, On, OnOthers, Policy, Proposal,
-    ReportContext, Reported, Turn,
+    ReportContext, ReportedValues, Turn,
 };
 use crate::explain::evidence::SampleForces;
 use crate::explain::scan::Scan;
@@ -91,7 +91,7 @@ impl Hypothesis for DelayAndLag {
         }
     }
 
-    fn report(&self, context: &ReportContext) -> Reported {
+    fn report(&self, context: &ReportContext) -> ReportedValues {
         late_reported(context, self.parameters())
     }
 

@@ -7,12 +7,13 @@
 use std::sync::Arc;
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::{Entry, place, tunnel};
+use dynocar_model::terms::{ModelEntry, place, tunnel};
 use dynocar_model::track::Track;
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::{
-    Candidate, Hypothesis, Nature, On, Policy, Proposal, ReportContext, Reported, SharedHypothesis,
+    Candidate, Hypothesis, Nature, On, Policy, Proposal, ReportContext, ReportedValues,
+    SharedHypothesis,
 };
 use crate::explain::answer::Location;
 use crate::explain::evidence::{RunData, SampleForces};
@@ -108,15 +109,15 @@ impl Hypothesis for Tunnels {
         }
     }
 
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
-        let mut entries = vec![Entry::Number(&tunnel::DC, parameters[0])];
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<ModelEntry>> {
+        let mut entries = vec![ModelEntry::Number(&tunnel::DC, parameters[0])];
         if let Some(found) = &self.site.sections {
             // The files know one greater c for all tunnels.
             if !self.mapped_m.is_empty() {
                 return None;
             }
             let rows = found.intervals_m.iter().map(|interval_m| interval_m.to_vec()).collect();
-            entries.push(Entry::Rows("tunnels", rows));
+            entries.push(ModelEntry::Rows("tunnels", rows));
         }
         Some(entries)
     }
@@ -136,9 +137,9 @@ impl Hypothesis for Tunnels {
         Location::of_intervals(self.mapped_m.clone())
     }
 
-    fn report(&self, context: &ReportContext) -> Reported {
+    fn report(&self, context: &ReportContext) -> ReportedValues {
         let (extra, extra_deviation) = (context.parameters[0], context.deviations[0]);
-        let mut reported = Reported::default();
+        let mut reported = ReportedValues::default();
         let force_per_unit = 1.0 * context.weight_kn;
         reported.push("dc_n_per_mps2", extra * force_per_unit, extra_deviation * force_per_unit);
         let c = context.c;

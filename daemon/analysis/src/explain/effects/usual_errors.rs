@@ -8,17 +8,19 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::lateness::{Late, late_forces};
-use super::{Candidate, Figure, Handling, Hypothesis, Nature, On, Past, SharedHypothesis, Turn};
+use super::{
+    Candidate, DeclaredFigure, Handling, Hypothesis, Nature, On, Past, SharedHypothesis, Turn,
+};
 use crate::explain::evidence::{RunData, SampleForces};
 
 /// Figures that are usually a little wrong, with the standard deviations of their errors.
-const FIGURES: [(Figure, f64); 6] = [
-    (Figure::Traction, traction::USUAL_STD),
-    (Figure::Brake, traction::USUAL_STD),
-    (Figure::Lateness, delay::USUAL_STD_S),
-    (Figure::Curves, curve::USUAL_STD),
-    (Figure::Warming, bearings::USUAL_STD),
-    (Figure::RotatingMass, rotating::USUAL_STD),
+const FIGURES: [(DeclaredFigure, f64); 6] = [
+    (DeclaredFigure::Traction, traction::USUAL_STD),
+    (DeclaredFigure::Brake, traction::USUAL_STD),
+    (DeclaredFigure::Lateness, delay::USUAL_STD_S),
+    (DeclaredFigure::Curves, curve::USUAL_STD),
+    (DeclaredFigure::Warming, bearings::USUAL_STD),
+    (DeclaredFigure::RotatingMass, rotating::USUAL_STD),
 ];
 /// Bounds of the search, in standard deviations, and the step of differences.
 const BEYOND: f64 = 10.0;
@@ -28,18 +30,21 @@ const STEP: f64 = 0.1;
 struct UsualErrors {
     /// a, in N/kN.
     a_n_per_kn: f64,
-    figures: Vec<Figure>,
+    figures: Vec<DeclaredFigure>,
     parameters: Vec<Parameter>,
     information: DMatrix<f64>,
 }
 
 /// Nuisance parameters for the errors of the figures that no effect of the model estimates, initialised to zero.
-pub fn usual_errors(a_n_per_kn: f64, is_free: impl Fn(Figure) -> bool) -> Candidate {
-    let free: Vec<(Figure, f64)> = FIGURES.into_iter().filter(|it| is_free(it.0)).collect();
-    let parameter = |&(figure, std): &(Figure, f64)| {
+pub fn usual_errors(a_n_per_kn: f64, is_free: impl Fn(DeclaredFigure) -> bool) -> Candidate {
+    let free: Vec<(DeclaredFigure, f64)> = FIGURES.into_iter().filter(|it| is_free(it.0)).collect();
+    let parameter = |&(figure, std): &(DeclaredFigure, f64)| {
         // Nothing acts before it is reported, and what warms up resists less.
-        let least =
-            if matches!(figure, Figure::Lateness | Figure::Warming) { 0.0 } else { -BEYOND * std };
+        let least = if matches!(figure, DeclaredFigure::Lateness | DeclaredFigure::Warming) {
+            0.0
+        } else {
+            -BEYOND * std
+        };
         Parameter::new("usual_error", (least, BEYOND * std), STEP * std)
     };
     let precisions = free.iter().map(|(_, std)| std.powi(-2));
@@ -59,7 +64,7 @@ impl Hypothesis for UsualErrors {
         Nature {
             prior: Some(&self.information),
             turn: Turn::First,
-            looks_back: self.figures.contains(&Figure::Lateness),
+            looks_back: self.figures.contains(&DeclaredFigure::Lateness),
             ..Nature::of(EffectKind::None, &self.parameters)
         }
     }
@@ -68,15 +73,17 @@ impl Hypothesis for UsualErrors {
         let On { run, first, past } = on;
         for (figure, &error) in self.figures.iter().zip(parameters) {
             match figure {
-                Figure::Traction => forces.iter_mut().for_each(|it| it.traction_n *= 1.0 + error),
-                Figure::Brake => forces.iter_mut().for_each(|it| it.brake_n *= 1.0 + error),
-                Figure::Curves => {
+                DeclaredFigure::Traction => {
+                    forces.iter_mut().for_each(|it| it.traction_n *= 1.0 + error)
+                }
+                DeclaredFigure::Brake => forces.iter_mut().for_each(|it| it.brake_n *= 1.0 + error),
+                DeclaredFigure::Curves => {
                     forces.iter_mut().for_each(|it| it.resistance.curve_n_per_kn *= 1.0 + error);
                 }
-                Figure::RotatingMass => {
+                DeclaredFigure::RotatingMass => {
                     forces.iter_mut().for_each(|it| it.rotating_mass_factor += error);
                 }
-                Figure::Warming => {
+                DeclaredFigure::Warming => {
                     let delta_a = error * self.a_n_per_kn;
                     let since_cold_s = run.covariate(Covariate::TimeSinceStart);
                     for (force, &since_cold_s) in forces.iter_mut().zip(&since_cold_s[first..]) {
@@ -84,7 +91,7 @@ impl Hypothesis for UsualErrors {
                         bearings::act(delta_a, tau_s, since_cold_s, &mut force.resistance);
                     }
                 }
-                Figure::Lateness => {
+                DeclaredFigure::Lateness => {
                     let on = On { run, first, past: &mut *past };
                     late_forces(Late::Both, [error, 0.0], on, forces);
                 }
@@ -149,7 +156,7 @@ mod tests {
         let prior = errors.nature().prior.expect("a prior");
         for (i, (figure, std)) in FIGURES.into_iter().enumerate() {
             assert!((prior[(i, i)] * std * std - 1.0).abs() < 1e-12);
-            let has_a_sign = matches!(figure, Figure::Lateness | Figure::Warming);
+            let has_a_sign = matches!(figure, DeclaredFigure::Lateness | DeclaredFigure::Warming);
             assert_eq!(errors.parameters()[i].lower >= 0.0, has_a_sign);
         }
     }

@@ -20,7 +20,7 @@ pub const POLICY: Policy = Policy {
 
 /// Structures for the data at hand.
 pub fn propose(scan: &Scan) -> Proposal {
-    if scan.problem.distance_ratio.is_none() {
+    if scan.problem.positions.distance_ratio.is_none() {
         return Err("no measured positions to compare the speed with".into());
     }
     Ok(vec![Candidate::new(Scale, vec![1.0])])

@@ -7,7 +7,7 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::{
     Candidate, Certainty, Everyday, Hypothesis, Nature, On, Policy, Proposal, ReportContext,
-    Reported,
+    ReportedValues,
 };
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{CERTAIN_STDS, RunData, SampleForces};
@@ -129,11 +129,11 @@ impl Hypothesis for ByRun {
         blow(wind_plus_mps, &run.directions[first..], forces);
     }
 
-    fn report(&self, context: &ReportContext) -> Reported {
+    fn report(&self, context: &ReportContext) -> ReportedValues {
         let count = context.parameters.len() as f64;
         let mean = context.parameters.iter().sum::<f64>() / count;
         let scatter: f64 = context.parameters.iter().map(|wind| (wind - mean).powi(2)).sum();
-        let mut reported = Reported::default();
+        let mut reported = ReportedValues::default();
         let std = context.few_runs_factor * (scatter / (count * (count - 1.0))).sqrt();
         reported.push("wind_plus_mps", mean, std);
         let by_run = |values: &[f64], signed: bool| -> BTreeMap<String, f64> {

@@ -1,6 +1,6 @@
 //! Means over a few samples of motion: what is compared with a model.
 
-use dynocar_model::simulate::Recording;
+use dynocar_model::simulate::OpenLoopRecording;
 
 use crate::statistics::{middle, span};
 
@@ -49,7 +49,7 @@ pub(super) fn sampling_period_s(time_s: &[f64]) -> f64 {
 }
 
 /// The bins of all segments of motion, in order of time.
-pub(super) fn bins(recording: &Recording) -> Vec<Bin> {
+pub(super) fn bins(recording: &OpenLoopRecording) -> Vec<Bin> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let width_s = BIN_S.max(BIN_SAMPLES_MIN * sampling_period_s(time_s));
     let usable = |i: usize| recording.is_simulated(i) && samples[i].speed_mps > MOVING_MPS;
@@ -79,7 +79,7 @@ pub(super) fn bins(recording: &Recording) -> Vec<Bin> {
 }
 
 fn segment_bins(
-    recording: &Recording,
+    recording: &OpenLoopRecording,
     first: usize,
     end: usize,
     segment: usize,
@@ -112,7 +112,7 @@ fn segment_bins(
 
 /// Range in m/s² of the acceleration of the control force, where it is known, from [`RINGING_S`] before
 /// a sample to before another.
-fn jump_mps2(recording: &Recording, from: usize, to: usize) -> f64 {
+fn jump_mps2(recording: &OpenLoopRecording, from: usize, to: usize) -> f64 {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let recent = time_s[..from].iter().rev().take_while(|at_s| time_s[from] - **at_s <= RINGING_S);
     let known = (from - recent.count()..to).filter(|&i| recording.is_simulated(i));

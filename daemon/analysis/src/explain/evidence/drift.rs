@@ -4,7 +4,7 @@
 //! true one as the train has driven since the last balise times that error: gradients, curves and tunnels are
 //! looked up there, in every run at the same places.
 
-use dynocar_model::simulate::Recording;
+use dynocar_model::simulate::OpenLoopRecording;
 
 use super::positions::{
     CORRECTION_MIN_M, DISTANCE_MIN_M, Distances, END_ERROR_M, between_corrections, distances,
@@ -19,7 +19,7 @@ const CHANCE_STDS: f64 = 2.0;
 
 /// By how many m along the chainage each position of a recording is moved to take the drift out; `None` where
 /// too few corrections show it.
-pub(super) fn drift_m(recording: &Recording) -> Option<Vec<f64>> {
+pub(super) fn drift_m(recording: &OpenLoopRecording) -> Option<Vec<f64>> {
     let steps = distances(recording);
     let between = between_corrections(&steps);
     let (fixes, counted): (Vec<_>, Vec<_>) = between.iter().partition(|step| step.is_corrected());
@@ -82,7 +82,7 @@ mod tests {
 
     /// True chainages in m of a train at 20 m/s, and its recording: wheels that count by a scale, balises that
     /// correct them, and one that is wrong by some m.
-    fn recorded(scale: f64, balises_m: &[f64], wrong: (f64, f64)) -> (Vec<f64>, Recording) {
+    fn recorded(scale: f64, balises_m: &[f64], wrong: (f64, f64)) -> (Vec<f64>, OpenLoopRecording) {
         let mut odometer_m = -4.0 * scale;
         let true_m = |k: i32| 4.0 * f64::from(k);
         let sample = |k: i32| {
@@ -102,11 +102,11 @@ mod tests {
             }
         };
         let samples = (0..2500).map(sample).collect();
-        ((0..2500).map(true_m).collect(), Recording::new(samples).unwrap())
+        ((0..2500).map(true_m).collect(), OpenLoopRecording::new(samples).unwrap())
     }
 
     /// Greatest error in m of the positions with the drift taken out, in a part of the way.
-    fn error_m((true_m, recording): &(Vec<f64>, Recording), within_m: [f64; 2]) -> f64 {
+    fn error_m((true_m, recording): &(Vec<f64>, OpenLoopRecording), within_m: [f64; 2]) -> f64 {
         let moved_m = drift_m(recording).expect("corrections");
         let each = recording.samples().iter().zip(&moved_m).zip(true_m);
         let within = each.filter(|(_, at_m)| (within_m[0]..within_m[1]).contains(*at_m));
@@ -143,7 +143,7 @@ mod tests {
             sample.position_m =
                 Some(position_m + passed.checked_sub(1).map_or(0.0, |it| off_m[it]));
         }
-        assert_eq!(drift_m(&Recording::new(samples).unwrap()), None);
+        assert_eq!(drift_m(&OpenLoopRecording::new(samples).unwrap()), None);
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub use criterion::{
     acceptance_score, p_value,
 };
 pub use fade::Fade;
-pub use fit::{Fit, FitProblem, RunNormal};
+pub use fit::{Fit, FitProblem, Positions, RunNormal, RunPositions};
 pub use model::{UpdatedForces, UpdatedModel};
 pub use noise::{Noise, RunScatter};
 pub use noise_search::{RUNS_A_TASK, coarse_step};
@@ -44,4 +44,4 @@ pub use run_scatter::{PRIOR_RUNS, RunFactors, WeightedFilter};
 pub use sample_forces::SampleForces;
 #[cfg(test)]
 pub use test_runs::coasting;
-pub use whitener::Whitener;
+pub use whitener::BinWhitener;

@@ -2,7 +2,7 @@
 
 use super::noise::Noise;
 use super::run_data::RunData;
-use super::whitener::Whitener;
+use super::whitener::BinWhitener;
 use crate::parallel;
 use crate::statistics::least_first;
 
@@ -43,7 +43,7 @@ impl Noise {
 /// The cost of the differences under a noise, of one run in `step`.
 fn cost_of((runs, residuals): (&[RunData], &[Vec<f64>]), step: usize, noise: Noise) -> f64 {
     let costs = parallel::in_tasks(runs.len().div_ceil(step), RUNS_A_TASK, |k| {
-        Whitener::cost(&runs[k * step], noise, &residuals[k * step])
+        BinWhitener::cost(&runs[k * step], noise, &residuals[k * step])
     });
     costs.iter().sum()
 }

@@ -4,7 +4,7 @@
 //! speed by as much as the train drives in that time: more, the faster it is. An odometer that is late
 //! with the speed does not show it, so that only a position ahead says something.
 
-use dynocar_model::simulate::{Recording, STANDING_MPS};
+use dynocar_model::simulate::{OpenLoopRecording, STANDING_MPS};
 use dynocar_model::terms::speed_delay;
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,7 +16,7 @@ use super::bins::SEGMENT_GAP_MAX_S;
 /// that the ratio over many kilometres shows the diameter. Between two corrections the odometer
 /// drifts by that error, so that what lies before the first and behind the last says nothing, and
 /// would show a wheel nearer to the declared one than it is.
-pub(super) fn distance_ratio(recording: &Recording) -> Option<(f64, f64)> {
+pub(super) fn distance_ratio(recording: &OpenLoopRecording) -> Option<(f64, f64)> {
     let steps = distances(recording);
     let total = |steps: &[Distances]| {
         steps.iter().fold(Distances::default(), |sum, step| Distances {
@@ -72,7 +72,7 @@ pub(super) fn between_corrections(steps: &[Distances]) -> &[Distances] {
 }
 
 /// The distances between samples with a position.
-pub(super) fn distances(recording: &Recording) -> Vec<Distances> {
+pub(super) fn distances(recording: &OpenLoopRecording) -> Vec<Distances> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let mut distances = Vec::with_capacity(samples.len());
     let mut last: Option<(usize, f64)> = None;
@@ -105,7 +105,7 @@ const AHEAD_STDS: f64 = 2.0;
 
 /// Seconds by which the speed is late by the positions of a recording, one for each part from stand to
 /// stand.
-pub(super) fn by_part_s(recording: &Recording) -> Vec<f64> {
+pub(super) fn by_part_s(recording: &OpenLoopRecording) -> Vec<f64> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let mut parts = Vec::new();
     let mut from = 0;
@@ -124,7 +124,7 @@ pub(super) fn by_part_s(recording: &Recording) -> Vec<f64> {
 
 /// By how many s the speed is late in a part: what of the distance that it misses goes with the speed, and
 /// not with the way as a wheel's diameter does.
-fn late_s(recording: &Recording, from: usize, end: usize) -> Option<f64> {
+fn late_s(recording: &OpenLoopRecording, from: usize, end: usize) -> Option<f64> {
     let (samples, time_s) = (&recording.samples()[from..end], &recording.time_s()[from..end]);
     let speeds = samples.iter().map(|sample| sample.speed_mps);
     let range_mps = speeds.clone().fold(0.0, f64::max) - speeds.fold(f64::INFINITY, f64::min);
@@ -176,7 +176,7 @@ mod tests {
     const SCALE: f64 = 1.02;
 
     /// A train at 20 m/s whose wheels count 2 % too much, with balises at some chainages.
-    fn recording(balises_m: &[f64]) -> Recording {
+    fn recording(balises_m: &[f64]) -> OpenLoopRecording {
         let mut odometer_m = 0.0;
         let sample = |k: i32| {
             let (time_s, true_m) = (0.2 * f64::from(k), 4.0 * f64::from(k));
@@ -191,7 +191,7 @@ mod tests {
                 ..coasting()
             }
         };
-        Recording::new((0..2500).map(sample).collect()).unwrap()
+        OpenLoopRecording::new((0..2500).map(sample).collect()).unwrap()
     }
 
     #[test]
@@ -214,7 +214,7 @@ mod tests {
         (10.0 * (1.0 - angle.cos()), 10.0 * (time_s.clamp(0.0, 120.0) - angle.sin() * 19.098_593))
     }
 
-    fn late_recording(late_s: f64, odometer_late_s: f64, scale: f64) -> Recording {
+    fn late_recording(late_s: f64, odometer_late_s: f64, scale: f64) -> OpenLoopRecording {
         let sample = |k: i32| {
             let time_s = 0.2 * f64::from(k);
             ResolvedSample {
@@ -224,7 +224,7 @@ mod tests {
                 ..coasting()
             }
         };
-        Recording::new((0..620).map(sample).collect()).unwrap()
+        OpenLoopRecording::new((0..620).map(sample).collect()).unwrap()
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dynocar_core::pipeline::admission::Admission;
 use dynocar_model::force::{ForceResolver, ResolvedSample};
-use dynocar_model::simulate::{Recording, SimulateError};
+use dynocar_model::simulate::{OpenLoopRecording, SimulateError};
 use dynocar_model::terms::extra::Covariate;
 use dynocar_model::train::{Corrections, TrainModel};
 use dynocar_shared::{SampleField, TrainSample};
@@ -31,7 +31,7 @@ pub struct RunData {
     /// +1 while the chainage grows, -1 while it falls.
     pub direction: f64,
     /// The cleaned run.
-    pub recording: Recording,
+    pub recording: OpenLoopRecording,
     /// Declared forces at each sample.
     pub declared: DeclaredForces,
     /// Cleaned speed in m/s, lightly smoothed, at which resistances are evaluated.
@@ -243,13 +243,14 @@ fn prepare_run(
     let unusable = |source| RunDataError::Simulate { file: run.file.clone(), source };
     let is_position_recorded = run.position_source != PositionSource::IntegratedSpeed;
     if is_position_recorded {
-        let reported = Recording::new(readers.as_reported.read(&rows).0).map_err(unusable)?;
+        let reported =
+            OpenLoopRecording::new(readers.as_reported.read(&rows).0).map_err(unusable)?;
         if let Some(moved_m) = drift_m(&reported) {
             move_positions(&mut rows, reported.samples(), &moved_m);
         }
     }
     let (samples, replaced) = readers.as_known.read(&rows);
-    let mut recording = Recording::new(samples).map_err(unusable)?;
+    let mut recording = OpenLoopRecording::new(samples).map_err(unusable)?;
     let rejected = rows.len() - recording.samples().len();
     let first_ns = recording.samples().first().map_or(0, |sample| sample.time_ns);
     let distance_ratio = if is_position_recorded { distance_ratio(&recording) } else { None };
@@ -258,7 +259,7 @@ fn prepare_run(
         false => Vec::new(),
     };
     if density == Density::Thinned && run.power().is_none() {
-        recording = Recording::new(thinned(&recording)).map_err(unusable)?;
+        recording = OpenLoopRecording::new(thinned(&recording)).map_err(unusable)?;
     }
     let declared = DeclaredForces::of(recording.samples(), train.rotating_mass_factor);
     let smooth_mps = smoothed(&recording);
@@ -299,7 +300,7 @@ fn prepare_run(
 }
 
 /// Mean over the second around each sample.
-fn smoothed(recording: &Recording) -> Vec<f64> {
+fn smoothed(recording: &OpenLoopRecording) -> Vec<f64> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let (mut from, mut to) = (0, 0);
     let mut sum = 0.0;

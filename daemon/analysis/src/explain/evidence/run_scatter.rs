@@ -15,7 +15,7 @@ use nalgebra::{SMatrix, SVector};
 use super::integral::integrate_bins;
 use super::noise::{Noise, RunScatter};
 use super::run_data::RunData;
-use super::whitener::{Whitener, robust_weight};
+use super::whitener::{BinWhitener, robust_weight};
 
 /// A run's own deviations: of the factors on the control force and on the basic resistance from
 /// 1, the headwind in m/s, and the delay of the force in s.
@@ -25,7 +25,7 @@ pub type RunFactors = SVector<f64, DEVIATIONS>;
 pub type FactorMatrix = SMatrix<f64, DEVIATIONS, DEVIATIONS>;
 
 /// Columns of the deviations.
-pub type Columns = [Vec<f64>; DEVIATIONS];
+pub type DeviationColumns = [Vec<f64>; DEVIATIONS];
 
 /// Standard deviation in s of a run's own delay of the forces: stamps, filters and holds of a
 /// recorder.
@@ -72,9 +72,9 @@ impl RunScatter {
 
 /// Speeds in m/s at the bins that a factor of 2 instead of 1 would add (control force, basic
 /// resistance), and a delay of the control force by 1 s, to first order.
-pub fn scatter_columns(run: &RunData, davis: Davis) -> Columns {
+pub fn scatter_columns(run: &RunData, davis: Davis) -> DeviationColumns {
     let samples = run.samples();
-    let mut columns = Columns::default();
+    let mut columns = DeviationColumns::default();
     let force =
         |i: usize| samples[i].control_force_n().unwrap_or(0.0) / samples[i].inertial_mass_kg;
     let [by_force, by_resistance, by_wind, by_delay] = &mut columns;
@@ -111,12 +111,12 @@ pub fn of_day(Davis { a, b, c }: Davis, own: &RunFactors) -> Davis {
 }
 
 /// Returns all columns of each bin, in order.
-fn rows([c0, c1, c2, c3]: &Columns) -> impl Iterator<Item = [f64; DEVIATIONS]> {
+fn rows([c0, c1, c2, c3]: &DeviationColumns) -> impl Iterator<Item = [f64; DEVIATIONS]> {
     c0.iter().zip(c1).zip(c2).zip(c3).map(|(((c0, c1), c2), c3)| [*c0, *c1, *c2, *c3])
 }
 
 /// A series less what deviations explain by their columns.
-pub fn remove(columns: &Columns, series: &[f64], deviations: &RunFactors) -> Vec<f64> {
+pub fn remove(columns: &DeviationColumns, series: &[f64], deviations: &RunFactors) -> Vec<f64> {
     let [d0, d1, d2, d3] = (*deviations).into();
     let rows = series.iter().zip(rows(columns));
     rows.map(|(value, [c0, c1, c2, c3])| value - (d0 * c0 + d1 * c1 + d2 * c2 + d3 * c3)).collect()
@@ -125,14 +125,14 @@ pub fn remove(columns: &Columns, series: &[f64], deviations: &RunFactors) -> Vec
 /// Removes the runs' own factors from whitened series of one run.
 #[derive(Clone, Debug)]
 pub struct ScatterFilter {
-    columns: Arc<Columns>,
+    columns: Arc<DeviationColumns>,
     precision: FactorMatrix,
 }
 
 /// The filter with the weights of the innovations.
 #[derive(Clone, Debug)]
 pub struct WeightedFilter {
-    columns: Arc<Columns>,
+    columns: Arc<DeviationColumns>,
     weights: Arc<[f64]>,
     /// Covariance of the factors after the run.
     pub covariance: FactorMatrix,
@@ -142,7 +142,7 @@ pub struct WeightedFilter {
 
 impl ScatterFilter {
     /// The filter of a run from its columns under a noise.
-    pub fn new(columns: &Columns, whitener: &Whitener, scatter: RunScatter) -> Self {
+    pub fn new(columns: &DeviationColumns, whitener: &BinWhitener, scatter: RunScatter) -> Self {
         let mut whitened = columns.clone();
         whitener.whiten_all(&mut whitened);
         ScatterFilter { columns: whitened.into(), precision: scatter.precision() }
@@ -197,7 +197,7 @@ impl WeightedFilter {
     }
 
     /// The whitened columns of the factors.
-    pub fn columns(&self) -> &Columns {
+    pub fn columns(&self) -> &DeviationColumns {
         &self.columns
     }
 
@@ -215,7 +215,7 @@ impl WeightedFilter {
 /// The filters of one run under a noise.
 #[derive(Clone)]
 pub(super) struct RunFilters {
-    pub whitener: Whitener,
+    pub whitener: BinWhitener,
     pub scatter: ScatterFilter,
 }
 
@@ -232,8 +232,8 @@ pub(super) struct Whitened {
 
 impl RunFilters {
     /// Those of a run from the columns of its own factors.
-    pub fn new(run: &RunData, columns: &Columns, noise: Noise) -> Self {
-        let whitener = Whitener::new(run, noise);
+    pub fn new(run: &RunData, columns: &DeviationColumns, noise: Noise) -> Self {
+        let whitener = BinWhitener::new(run, noise);
         let scatter = ScatterFilter::new(columns, &whitener, noise.scatter);
         RunFilters { whitener, scatter }
     }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_model::force::balance::{ActingForces, mps2_per_n_per_kn};
+use dynocar_model::force::balance::{ForceBalance, mps2_per_n_per_kn};
 use dynocar_model::terms::Resistance;
 use dynocar_model::train::Davis;
 
@@ -47,7 +47,7 @@ impl SampleForces {
     /// The acceleration p0 + p1 v + p2 v² in m/s² for speeds near `speed_mps`.
     #[inline]
     pub fn polynomial(&self, davis: Davis, speed_mps: f64) -> [f64; 3] {
-        let acting = ActingForces {
+        let acting = ForceBalance {
             mass_kg: self.mass_kg * self.mass_factor,
             rotating_mass_factor: self.rotating_mass_factor,
             force_n: self.traction_n - self.brake_n - self.extra_n,

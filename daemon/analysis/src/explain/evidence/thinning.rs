@@ -5,7 +5,7 @@
 //! samples changes (a gap, rest, a sliding wheel, a missing value), a mean ends.
 
 use dynocar_model::force::ResolvedSample;
-use dynocar_model::simulate::{Recording, STANDING_MPS};
+use dynocar_model::simulate::{OpenLoopRecording, STANDING_MPS};
 use dynocar_model::terms::Resistance;
 
 use super::bins::{MOVING_MPS, SEGMENT_GAP_MAX_S};
@@ -14,7 +14,7 @@ use super::bins::{MOVING_MPS, SEGMENT_GAP_MAX_S};
 pub(super) const MEAN_S: f64 = 1.0;
 
 /// The samples of a recording, thinned.
-pub(super) fn thinned(recording: &Recording) -> Vec<ResolvedSample> {
+pub(super) fn thinned(recording: &OpenLoopRecording) -> Vec<ResolvedSample> {
     let (samples, time_s) = (recording.samples(), recording.time_s());
     let mut means: Vec<ResolvedSample> = Vec::new();
     let mut first = 0;
@@ -108,7 +108,7 @@ mod tests {
     }
 
     fn thin(samples: Vec<ResolvedSample>) -> Vec<ResolvedSample> {
-        thinned(&Recording::new(samples).unwrap())
+        thinned(&OpenLoopRecording::new(samples).unwrap())
     }
 
     #[test]

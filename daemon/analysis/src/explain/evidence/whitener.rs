@@ -34,7 +34,7 @@ pub(super) fn robust_weight(nu: f64) -> f64 {
 
 /// Turns bin differences of one run into white innovations of unit variance.
 #[derive(Clone, Debug)]
-pub struct Whitener {
+pub struct BinWhitener {
     steps: Arc<[Step]>,
     /// Sum of the logarithms of the innovations' variances.
     log_determinant: f64,
@@ -202,7 +202,7 @@ impl Tracked {
     }
 }
 
-impl Whitener {
+impl BinWhitener {
     /// The filter of one run: level of the speed difference and fading acceleration. Each segment
     /// of motion starts with an unknown level; the fading acceleration lives through stops.
     pub fn new(run: &RunData, noise: Noise) -> Self {
@@ -213,7 +213,7 @@ impl Whitener {
             step
         };
         let steps = run.bins.iter().map(step).collect();
-        Whitener { steps, log_determinant: logarithms.total() }
+        BinWhitener { steps, log_determinant: logarithms.total() }
     }
 
     /// Robust -2 log likelihood of a series of bin differences under a noise, up to a constant.

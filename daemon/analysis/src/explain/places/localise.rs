@@ -2,7 +2,7 @@
 
 use dynocar_model::track::Track;
 
-use super::runs::{Found, best_runs};
+use super::runs::{FoundIntervals, best_runs};
 use super::site::Inside;
 use crate::explain::evidence::{Bin, RunData};
 use crate::explain::gradient_prior::SURVEYED;
@@ -124,7 +124,7 @@ fn cells(places: &Places, [low, high]: [f64; 2]) -> Vec<Cell> {
 ///
 /// Intervals are added while each explains more than the
 /// choice among all of them does by chance.
-pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<Found> {
+pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<FoundIntervals> {
     let span = span_m(scan)?;
     let places = Places::new(scan, shape, inside);
     let cells = cells(&places, span);
@@ -140,7 +140,7 @@ pub fn find(scan: &Scan, shape: Shape, inside: Inside) -> Option<Found> {
     if gain <= 0.0 {
         return None;
     }
-    let mut found = Found {
+    let mut found = FoundIntervals {
         intervals_m: vec![cell.interval_m],
         span_m: span,
         runs,
@@ -192,7 +192,7 @@ impl Places<'_, '_> {
     /// Returns the error of the factor by an error of the gradient map. It slows the train in one direction and
     /// helps it in the other, so that passes in both directions cancel it; a set of runs in one direction shows it
     /// in full, the same in every run.
-    fn map_error(&self, found: &Found) -> f64 {
+    fn map_error(&self, found: &FoundIntervals) -> f64 {
         let (mut square, mut leaning, mut resistance, mut full) = (0.0, 0.0, 0.0, 0.0);
         for (index, run) in self.scan.problem.runs.iter().enumerate() {
             if found.runs.as_ref().is_some_and(|runs| !runs.contains(&index)) {
@@ -242,7 +242,7 @@ impl Places<'_, '_> {
         sum
     }
 
-    fn with_another(&self, cells: &[Cell], found: &Found) -> Option<Found> {
+    fn with_another(&self, cells: &[Cell], found: &FoundIntervals) -> Option<FoundIntervals> {
         let base = self.over(&found.intervals_m, &found.runs);
         let gains = parallel::of_each(cells, |cell| {
             apart(cell.interval_m, &found.intervals_m).then(|| {
@@ -263,17 +263,17 @@ impl Places<'_, '_> {
 
     /// Chooses the runs again by all intervals together, where that explains more after its cost, which is all that
     /// `choice_cost` holds here.
-    fn choose_runs(&self, found: &mut Found, runs_min: usize) {
+    fn choose_runs(&self, found: &mut FoundIntervals, runs_min: usize) {
         let tuples: Vec<Tuple> =
             (0..self.bins.len()).map(|index| self.run_tuple(index, &found.intervals_m)).collect();
         let (runs, gain, estimate, choice_cost) = best_runs(self.scan, &tuples, runs_min);
         if gain - choice_cost > found.gain - found.choice_cost {
-            *found = Found { runs, gain, estimate, choice_cost, ..found.clone() };
+            *found = FoundIntervals { runs, gain, estimate, choice_cost, ..found.clone() };
         }
     }
 
     /// Moves the ends of an interval while that explains more.
-    fn polish(&self, found: &mut Found, index: usize) {
+    fn polish(&self, found: &mut FoundIntervals, index: usize) {
         let mut others = found.intervals_m.clone();
         let own = others.remove(index);
         let value = |interval: [f64; 2]| {

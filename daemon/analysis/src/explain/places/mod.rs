@@ -2,7 +2,7 @@
 //!
 //! - [`Inside`]: how much of a train is at a place
 //! - [`find`]: the intervals and runs in which a force of some shape explains most
-//! - [`Site`], [`End`]: where and in which runs that is, ends that were estimated, and where else they could be
+//! - [`Site`], [`IntervalEnd`]: where and in which runs that is, ends that were estimated, and where else they could be
 //! - [`settle`]: every end at the middle of what the data allow, with its interval, and for every
 //!   run how likely it takes part
 
@@ -12,6 +12,6 @@ mod settle;
 mod site;
 
 pub use localise::{MAP_ERROR_PERMILLE, find, span_m};
-pub use runs::{Found, best_of_runs};
+pub use runs::{FoundIntervals, best_of_runs};
 pub use settle::settle;
-pub use site::{Axis, End, Inside, Intervals, Reach, Site};
+pub use site::{Axis, Inside, IntervalEnd, Intervals, Reach, Site};

@@ -7,7 +7,7 @@ use crate::statistics::greatest_first;
 
 /// A set of intervals and runs with what a common factor on the shape there explains.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct FoundIntervals {
     /// Disjoint intervals in m, by chainage.
     pub intervals_m: Vec<[f64; 2]>,
     /// The chainage in m over which the runs move.
@@ -24,10 +24,10 @@ pub struct Found {
     pub map_error: f64,
 }
 
-impl Found {
+impl FoundIntervals {
     /// The site of it.
     pub fn site(&self, scan: &Scan) -> Site {
-        let Found { span_m, choice_cost, map_error, .. } = *self;
+        let FoundIntervals { span_m, choice_cost, map_error, .. } = *self;
         let intervals_m = self.intervals_m.clone();
         let file = |&index: &usize| scan.problem.runs[index].file.clone();
         let runs = self.runs.as_ref().map(|runs| runs.iter().map(file).collect());
@@ -60,8 +60,8 @@ pub(super) fn best_runs(
     let mut sum = Tuple::zero(scan.fit.theta.len());
     let mut chosen = Vec::new();
     // A chosen run shows the force by itself.
-    let speaks_for_it = |own: &&(usize, f64, f64)| own.1 > EQUAL && own.2 > 0.0;
-    for &(index, _, _) in order.iter().filter(speaks_for_it) {
+    let alone = order.iter().filter(|(_, gain, estimate)| *gain > EQUAL && *estimate > 0.0);
+    for &(index, ..) in alone {
         sum.add(&tuples[index]);
         chosen.push(index);
         let (gain, estimate) = scan.gain(&sum);
@@ -83,9 +83,9 @@ pub(super) fn best_runs(
 }
 
 /// The runs in which a common positive factor on a shape explains most, wherever they are.
-pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> Found {
+pub fn best_of_runs(scan: &Scan, tuples: &[Tuple]) -> FoundIntervals {
     let (runs, gain, estimate, choice_cost) = best_runs(scan, tuples, 1);
-    Found {
+    FoundIntervals {
         intervals_m: Vec::new(),
         span_m: [0.0; 2],
         runs,

@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::site::{Axis, End, Reach, Site};
+use super::site::{Axis, IntervalEnd, Reach, Site};
 use crate::explain::answer::{PlaceUncertainty, WindowUncertainty};
 use crate::explain::evidence::{Fit, FitProblem, UpdatedModel};
 use crate::explain::hypothesis::SharedHypothesis;
@@ -61,7 +61,7 @@ pub fn settle(problem: &FitProblem, fit: &mut Fit) -> Vec<Option<PlaceUncertaint
     known
 }
 
-impl End {
+impl IntervalEnd {
     fn is_free(&self) -> bool {
         matches!(self.reach, Reach::Between(..))
     }
@@ -74,7 +74,7 @@ fn replaced(model: &UpdatedModel, index: usize, effect: SharedHypothesis) -> Upd
 }
 
 /// The posterior of an end, from the cost with the end elsewhere.
-fn belief(end: &End, cost: &mut dyn FnMut(f64) -> Option<f64>) -> Option<Belief> {
+fn belief(end: &IntervalEnd, cost: &mut dyn FnMut(f64) -> Option<f64>) -> Option<Belief> {
     let mut points = vec![(end.at, cost(end.at)?)];
     match &end.reach {
         Reach::Between(low, high) => {
@@ -98,7 +98,12 @@ fn belief(end: &End, cost: &mut dyn FnMut(f64) -> Option<f64>) -> Option<Belief>
 }
 
 /// The way towards a limit up to which an end is not out of the question, in doubling steps.
-fn reached(end: &End, limit: f64, least: f64, cost: &mut dyn FnMut(f64) -> Option<f64>) -> f64 {
+fn reached(
+    end: &IntervalEnd,
+    limit: f64,
+    least: f64,
+    cost: &mut dyn FnMut(f64) -> Option<f64>,
+) -> f64 {
     let span = limit - end.at;
     let mut step = end.fine;
     while step < span.abs() {
@@ -186,7 +191,7 @@ struct Collected {
 }
 
 impl Collected {
-    fn add(&mut self, problem: &FitProblem, end: &End, interval: [f64; 2]) {
+    fn add(&mut self, problem: &FitProblem, end: &IntervalEnd, interval: [f64; 2]) {
         let upper = usize::from(end.is_upper);
         match end.axis {
             Axis::Chainage => {
@@ -226,9 +231,9 @@ impl Collected {
 mod tests {
     use super::*;
 
-    fn end(at: f64, reach: Reach) -> End {
+    fn end(at: f64, reach: Reach) -> IntervalEnd {
         let (part, is_upper, fine) = (0, false, 0.5);
-        End { axis: Axis::Chainage, part, is_upper, at, reach, fine, run: None }
+        IntervalEnd { axis: Axis::Chainage, part, is_upper, at, reach, fine, run: None }
     }
 
     #[test]

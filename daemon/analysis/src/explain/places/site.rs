@@ -28,7 +28,7 @@ pub enum Reach {
 
 /// One end of an interval or window.
 #[derive(Clone, Debug, PartialEq)]
-pub struct End {
+pub struct IntervalEnd {
     /// Axis of the value.
     pub axis: Axis,
     /// The interval or window, by its index in the list.
@@ -56,13 +56,13 @@ pub struct Intervals {
 
 impl Intervals {
     /// All ends, lower before upper; each may move up to its neighbours.
-    pub fn ends(&self) -> Vec<End> {
+    pub fn ends(&self) -> Vec<IntervalEnd> {
         let all = &self.intervals_m;
         let mut ends = Vec::new();
         for (part, &[from_m, to_m]) in all.iter().enumerate() {
             let below_m = if part == 0 { self.span_m[0] } else { all[part - 1][1] };
             let above_m = all.get(part + 1).map_or(self.span_m[1], |next| next[0]);
-            let end = |is_upper: bool, at: f64, low_m: f64, high_m: f64| End {
+            let end = |is_upper: bool, at: f64, low_m: f64, high_m: f64| IntervalEnd {
                 axis: Axis::Chainage,
                 part,
                 is_upper,
@@ -78,7 +78,7 @@ impl Intervals {
     }
 
     /// The same with one end elsewhere; `None` when an interval would be gone or meet another.
-    pub fn moved(&self, end: &End, at_m: f64) -> Option<Self> {
+    pub fn moved(&self, end: &IntervalEnd, at_m: f64) -> Option<Self> {
         let mut moved = self.clone();
         moved.intervals_m[end.part][usize::from(end.is_upper)] = at_m;
         let ascends = moved.intervals_m.iter().flatten().is_sorted();
@@ -112,12 +112,12 @@ impl Site {
     }
 
     /// All ends of its intervals.
-    pub fn ends(&self) -> Vec<End> {
+    pub fn ends(&self) -> Vec<IntervalEnd> {
         self.sections.as_ref().map_or_else(Vec::new, Intervals::ends)
     }
 
     /// The same with one end elsewhere; `None` where that makes no place.
-    pub fn moved(&self, end: &End, at_m: f64) -> Option<Self> {
+    pub fn moved(&self, end: &IntervalEnd, at_m: f64) -> Option<Self> {
         let sections = Some(self.sections.as_ref()?.moved(end, at_m)?);
         Some(Site { sections, ..self.clone() })
     }

@@ -6,7 +6,7 @@ use super::words;
 use crate::explain::Explanation;
 use crate::explain::evidence::SCORE_MIN;
 use crate::explain::score::reduction;
-use crate::explain::selection::Trial;
+use crate::explain::selection::EffectTrial;
 use crate::statistics::greatest_first;
 
 /// A kind of the library.
@@ -37,7 +37,7 @@ pub fn rows(explanation: &Explanation) -> Vec<CandidateRow> {
     let first = outcome.rounds.first().map_or(&[][..], |round| &round[..]);
     let has_several = outcome.rounds.len() > 1;
     let last = outcome.rounds.last().filter(|_| has_several).map_or(&[][..], |round| &round[..]);
-    let of = |round: &'_ [Trial], kind: EffectKind| {
+    let of = |round: &'_ [EffectTrial], kind: EffectKind| {
         round.iter().find(|trial| trial.kind == kind).map(|trial| trial.evidence)
     };
     let mut rows: Vec<CandidateRow> = first

@@ -3,7 +3,7 @@
 use dynocar_model::force::ResolvedSample;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
-use super::windows::Window;
+use super::windows::FitWindow;
 use crate::explain::evidence::RunData;
 
 /// Covariate on which a residual may depend.
@@ -130,7 +130,7 @@ impl Covariate {
 
     /// Its mean over a window, in SI units (temperature in °C); `None` where it is not known or
     /// does not apply.
-    pub fn value(self, window: &Window, run: &RunData) -> Option<f64> {
+    pub fn value(self, window: &FitWindow, run: &RunData) -> Option<f64> {
         let (bins, samples) = (window.bins(run), run.samples());
         let (first, last) = (bins.first()?, bins.last()?);
         let span_s = last.time_s - first.time_s;

@@ -5,7 +5,7 @@ use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
 use super::words::{self, joined, kind_name, number};
 use crate::explain::answer::{
-    EffectAnswer, Location, MassWindow, Meaning, ParameterValue, RunWindow, in_plain_words,
+    EffectAnswer, EffectMeaning, Location, MassWindow, ParameterValue, RunWindow, in_plain_words,
 };
 use crate::statistics::span;
 
@@ -140,7 +140,7 @@ pub fn to_do(effect: &EffectAnswer) -> Option<&'static str> {
 const WORK_SHARE_MIN: f64 = 0.002;
 
 /// Describes the meaning of an effect in kWh and metres, without a full stop; empty where nothing is known of it.
-pub fn meaning(meaning: &Meaning) -> String {
+pub fn meaning(meaning: &EffectMeaning) -> String {
     let percent =
         |share: f64| format!("{} % of the traction's energy", number(100.0 * share, Some(1.0)));
     let share = meaning.share_of_traction_energy.filter(|share| share.abs() >= WORK_SHARE_MIN);
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn what_an_effect_means_is_said_in_kwh_and_metres() {
-        let costs = Meaning {
+        let costs = EffectMeaning {
             energy_kwh_per_100_km: 41.26,
             share_of_traction_energy: Some(0.0312),
             distance_error_60_s_m: Some([14.52, 2.13]),
@@ -229,13 +229,13 @@ mod tests {
             "41.3 kWh per 100 km more, 3.1 % of the traction's energy; a minute ahead, the model errs by \
              14.5 m without this effect, 2.1 m with it"
         );
-        let helps = Meaning {
+        let helps = EffectMeaning {
             energy_kwh_per_100_km: -2.0,
             share_of_traction_energy: Some(-0.01),
             distance_error_60_s_m: None,
         };
         assert_eq!(meaning(&helps), "2.00 kWh per 100 km less, 1.0 % of the traction's energy");
-        assert_eq!(meaning(&Meaning::default()), "");
+        assert_eq!(meaning(&EffectMeaning::default()), "");
     }
 
     #[test]
@@ -271,9 +271,10 @@ mod tests {
             std: number(107.5),
             p_value: 1e-9,
             error_reduction: 0.8,
-            meaning: Meaning::default(),
+            meaning: EffectMeaning::default(),
             contradiction: None,
             over_time: Vec::new(),
+            held_out: None,
             runners_up: Vec::new(),
         };
         assert_eq!(

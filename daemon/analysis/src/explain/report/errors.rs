@@ -2,7 +2,7 @@
 
 use dynocar_model::simulate::{Restart, SpeedError};
 
-use super::Estimate;
+use super::IntervalEstimate;
 use crate::dataset::Role;
 use crate::explain::Explanation;
 use crate::explain::bootstrap::intervals_95;
@@ -27,11 +27,11 @@ pub enum Resampling {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorPair {
     /// RMSE in m/s without the effects.
-    pub before_mps: Estimate,
+    pub before_mps: IntervalEstimate,
     /// RMSE in m/s with the effects.
-    pub after_mps: Estimate,
+    pub after_mps: IntervalEstimate,
     /// 1 - after / before.
-    pub reduction: Estimate,
+    pub reduction: IntervalEstimate,
     /// How the intervals were found.
     pub resampling: Resampling,
 }
@@ -175,7 +175,7 @@ fn blocks(run: &RunData, before: &Fit, after: &Fit, restart: Restart) -> Vec<[Sp
 fn bootstrap(units: &[[SpeedError; 2]], resampling: Resampling) -> Option<ErrorPair> {
     let values = pooled(units.iter().copied())?;
     let intervals = intervals_95(units, |drawn| pooled(drawn.iter().map(|unit| **unit)));
-    let estimate = |which: usize| Estimate {
+    let estimate = |which: usize| IntervalEstimate {
         value: values[which],
         interval: intervals.map(|intervals| intervals[which]),
     };
@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn one_unit_has_no_interval() {
         let pair = bootstrap(&[unit(1.0, 0.5)], Resampling::Blocks(1)).unwrap();
-        assert_eq!(pair.reduction, Estimate { value: 0.5, interval: None });
+        assert_eq!(pair.reduction, IntervalEstimate { value: 0.5, interval: None });
         assert_eq!(bootstrap(&[], Resampling::Blocks(0)), None);
     }
 }

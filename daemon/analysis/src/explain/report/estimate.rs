@@ -4,25 +4,25 @@ use dynocar_shared::HALF_95;
 
 /// A value with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct IntervalEstimate {
     /// The value.
     pub value: f64,
     /// The interval; `None` where nothing gives one.
     pub interval: Option<[f64; 2]>,
 }
 
-impl Estimate {
+impl IntervalEstimate {
     /// A value with 1.96 standard deviations to either side; none when that is no number.
     pub fn normal(value: f64, deviation: f64) -> Self {
         let half = HALF_95 * deviation;
         let is_known = half.is_finite() && half > 0.0;
-        Estimate { value, interval: is_known.then_some([value - half, value + half]) }
+        IntervalEstimate { value, interval: is_known.then_some([value - half, value + half]) }
     }
 
     /// The same of what cannot be less than a least.
     pub fn at_least(self, least: f64) -> Self {
         let interval = self.interval.map(|ends| ends.map(|it| it.max(least)));
-        Estimate { interval, ..self }
+        IntervalEstimate { interval, ..self }
     }
 }
 
@@ -32,7 +32,7 @@ mod tests {
 
     #[test]
     fn no_interval_reaches_below_what_a_number_can_be() {
-        let lag_s = Estimate::normal(0.1, 1.0);
+        let lag_s = IntervalEstimate::normal(0.1, 1.0);
         let [low, high] = lag_s.at_least(0.0).interval.expect("an interval");
         assert_eq!((low, high), (0.0, 0.1 + HALF_95));
         assert_eq!(lag_s.at_least(f64::NEG_INFINITY).interval, lag_s.interval);

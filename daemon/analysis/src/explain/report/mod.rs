@@ -21,9 +21,9 @@ pub mod covariates;
 pub mod effect;
 pub mod errors;
 mod estimate;
-pub mod line;
 pub mod panels;
 pub mod parameters;
+pub mod residual_line;
 pub mod sentence;
 pub mod timeline;
 pub mod windows;
@@ -33,10 +33,10 @@ use super::Explanation;
 use crate::dataset::Dataset;
 use candidates::CandidateRow;
 use errors::Errors;
-pub use estimate::Estimate;
-use line::AlongLine;
+pub use estimate::IntervalEstimate;
 use panels::Panel;
 use parameters::{ParameterRow, PlaceTable};
+use residual_line::AlongLine;
 use timeline::Trace;
 
 /// Everything that a report shows beyond the answer and the dataset's own account.

@@ -6,7 +6,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{DMatrix, DVector};
 
 use super::covariates::{COMMON, Covariate};
-use super::windows::Window;
+use super::windows::FitWindow;
 use crate::dataset::Dataset;
 use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow};
@@ -179,7 +179,7 @@ fn sections(run: &RunData, holds: impl Fn(&ResolvedSample, f64) -> bool) -> Vec<
 
 /// The panels: first the covariate on which the effect is seen best, then those that are always
 /// shown, then those on which the residual is most uneven.
-pub fn panels(dataset: &Dataset, explanation: &Explanation, windows: &[Window]) -> Vec<Panel> {
+pub fn panels(dataset: &Dataset, explanation: &Explanation, windows: &[FitWindow]) -> Vec<Panel> {
     let (runs, zones) = (&explanation.problem.runs, zones(explanation));
     let covariance = covariance(explanation);
     let number = |file: &str| dataset.runs.iter().find(|run| run.file == file).map(|it| it.number);
@@ -250,11 +250,11 @@ pub(super) fn covariance(explanation: &Explanation) -> DMatrix<f64> {
 /// Windows in order of a covariate, in bins.
 pub(super) fn bins<'w>(
     covariate: Covariate,
-    windows: impl Iterator<Item = &'w Window>,
+    windows: impl Iterator<Item = &'w FitWindow>,
     runs: &[RunData],
     covariance: &DMatrix<f64>,
 ) -> Vec<PanelBin> {
-    let mut known: Vec<(f64, &Window)> = windows
+    let mut known: Vec<(f64, &FitWindow)> = windows
         .filter_map(|window| Some((covariate.value(window, &runs[window.run])?, window)))
         .filter(|(value, _)| value.is_finite())
         .collect();
@@ -270,7 +270,7 @@ pub(super) fn bins<'w>(
         _ if covariate.is_category() => (0.5, 1),
         _ => (range / 16.0, WINDOWS_MIN),
     };
-    let mut groups: Vec<&[(f64, &Window)]> = Vec::new();
+    let mut groups: Vec<&[(f64, &FitWindow)]> = Vec::new();
     let mut from = 0;
     for to in 1..=known.len() {
         let is_full =
@@ -285,14 +285,14 @@ pub(super) fn bins<'w>(
 
 fn panel_bin(
     covariate: Covariate,
-    group: &[(f64, &Window)],
+    group: &[(f64, &FitWindow)],
     covariance: &DMatrix<f64>,
 ) -> PanelBin {
     let count = group.len() as f64;
-    let mean = |value: &dyn Fn(&Window) -> f64| {
+    let mean = |value: &dyn Fn(&FitWindow) -> f64| {
         group.iter().map(|(_, window)| value(window)).sum::<f64>() / count
     };
-    let with_error = |value: &dyn Fn(&Window) -> f64| {
+    let with_error = |value: &dyn Fn(&FitWindow) -> f64| {
         let mean = mean(value);
         let square = group.iter().map(|(_, w)| (value(w) - mean).powi(2)).sum::<f64>();
         let error = if count > 1.0 { (square / (count - 1.0) / count).sqrt() } else { 0.0 };

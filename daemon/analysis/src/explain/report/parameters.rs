@@ -1,6 +1,6 @@
 //! Fitted values with their uncertainty: parameters, and where effects act.
 
-use super::{Estimate, words};
+use super::{IntervalEstimate, words};
 use crate::dataset::Dataset;
 use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, ParameterValue, PlaceUncertainty, RunWindow};
@@ -20,9 +20,9 @@ pub struct ParameterRow {
     /// Its declared value.
     pub declared: Option<f64>,
     /// Its value in the model without the effects.
-    pub before: Option<Estimate>,
+    pub before: Option<IntervalEstimate>,
     /// Its value in the model with the effects.
-    pub after: Estimate,
+    pub after: IntervalEstimate,
 }
 
 /// a, b, c and the parameters of all effects.
@@ -36,7 +36,7 @@ pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
     ];
     let of_base = davis.iter().enumerate().map(|(i, &(name, meaning, unit, value))| {
         let estimate =
-            |theta: &[f64], deviations: &[f64]| Estimate::normal(theta[i], deviations[i]);
+            |theta: &[f64], deviations: &[f64]| IntervalEstimate::normal(theta[i], deviations[i]);
         ParameterRow {
             group: "basic resistance".into(),
             name: name.into(),
@@ -52,17 +52,22 @@ pub fn rows(dataset: &Dataset, explanation: &Explanation) -> Vec<ParameterRow> {
 }
 
 /// A number of an effect: what it means, its value, its standard deviation.
-type Figure = (String, f64, Option<f64>);
+struct Figure {
+    meaning: String,
+    value: f64,
+    std: Option<f64>,
+}
 
 fn effect_rows(dataset: &Dataset, effect: &EffectAnswer) -> Vec<ParameterRow> {
-    let row = |name: &str, unit: &'static str, (meaning, value, deviation): Figure| ParameterRow {
+    let row = |name: &str, unit: &'static str, figure: Figure| ParameterRow {
         group: words::kind_name(effect.kind).into(),
         name: name.into(),
-        meaning,
+        meaning: figure.meaning,
         unit,
         declared: declared(dataset, name),
         before: None,
-        after: Estimate::normal(value, deviation.unwrap_or(0.0)).at_least(words::least(name)),
+        after: IntervalEstimate::normal(figure.value, figure.std.unwrap_or(0.0))
+            .at_least(words::least(name)),
     };
     let rows = effect.parameters.iter().flat_map(|(name, value)| {
         let (meaning, unit) = words::parameter(name);
@@ -85,15 +90,18 @@ fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) 
         _ => None,
     };
     let each = |figures: &mut dyn Iterator<Item = (String, f64)>| -> Vec<Figure> {
-        figures.enumerate().map(|(i, (meaning, value))| (meaning, value, listed(i))).collect()
+        let figure = |(i, (meaning, value))| Figure { meaning, value, std: listed(i) };
+        figures.enumerate().map(figure).collect()
     };
     match value {
-        ParameterValue::Number(value) => vec![(meaning.into(), *value, listed(0))],
+        ParameterValue::Number(value) => each(&mut std::iter::once((meaning.into(), *value))),
         ParameterValue::ByRun(values) => {
-            let by_run = values.iter();
-            by_run
-                .map(|(run, value)| (format!("{meaning} in {run}"), *value, of_run(run)))
-                .collect()
+            let figure = |(run, value): (&String, &f64)| Figure {
+                meaning: format!("{meaning} in {run}"),
+                value: *value,
+                std: of_run(run),
+            };
+            values.iter().map(figure).collect()
         }
         ParameterValue::Sections(sections) => each(&mut sections.iter().map(|s| {
             let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);
@@ -141,7 +149,7 @@ pub struct PlaceRow {
     /// Its unit.
     pub unit: &'static str,
     /// Where, with the 95 % interval.
-    pub at: Estimate,
+    pub at: IntervalEstimate,
 }
 
 /// In which fit runs an effect acts, where the runs were chosen.
@@ -182,7 +190,7 @@ impl PlaceTable {
     fn add(&mut self, effect: &EffectAnswer, known: &PlaceUncertainty) {
         let group = words::kind_name(effect.kind).to_string();
         let mut push = |end: String, unit: &'static str, value: f64, interval: [f64; 2]| {
-            let at = Estimate { value, interval: Some(interval) };
+            let at = IntervalEstimate { value, interval: Some(interval) };
             self.ends.push(PlaceRow { group: group.clone(), end, unit, at });
         };
         let intervals = effect.place.intervals_m.iter().flatten();

@@ -74,9 +74,9 @@ fn gained(errors: &Errors, with: &str) -> String {
 mod tests {
     use super::*;
     use crate::explain::answer::{
-        BaseAnswer, DavisDeviations, EffectAnswer, Location, Meaning, ParameterValue,
+        BaseAnswer, DavisDeviations, EffectAnswer, EffectMeaning, Location, ParameterValue,
     };
-    use crate::explain::report::Estimate;
+    use crate::explain::report::IntervalEstimate;
     use crate::explain::report::errors::{ErrorPair, Resampling};
     use crate::explain::stop_to_stop::StopToStop;
 
@@ -88,9 +88,10 @@ mod tests {
             std: [(parameter.to_string(), ParameterValue::Number(0.1))].into(),
             p_value: 1e-9,
             error_reduction: 0.8,
-            meaning: Meaning::default(),
+            meaning: EffectMeaning::default(),
             contradiction: None,
             over_time: Vec::new(),
+            held_out: None,
             runners_up: Vec::new(),
         }
     }
@@ -129,7 +130,7 @@ mod tests {
 
     /// Errors over whole runs held out that grow.
     fn updated_errors() -> Errors {
-        let value = |value| Estimate { value, interval: None };
+        let value = |value| IntervalEstimate { value, interval: None };
         let pair = ErrorPair {
             before_mps: value(0.8),
             after_mps: value(0.9),

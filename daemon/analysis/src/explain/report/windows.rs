@@ -15,7 +15,7 @@ const BINS_MIN: usize = 5;
 
 /// One window of a fit run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Window {
+pub struct FitWindow {
     /// The run, by its place among the fit runs.
     pub run: usize,
     /// First bin.
@@ -30,7 +30,7 @@ pub struct Window {
     pub slopes: Vec<f64>,
 }
 
-impl Window {
+impl FitWindow {
     /// The window's bins.
     pub fn bins<'r>(&self, run: &'r RunData) -> &'r [Bin] {
         &run.bins[self.first..self.end]
@@ -52,14 +52,14 @@ fn slope(bins: &[Bin], values: &[f64]) -> f64 {
 }
 
 /// All windows of the fit runs.
-pub fn windows(explanation: &Explanation) -> Vec<Window> {
+pub fn windows(explanation: &Explanation) -> Vec<FitWindow> {
     let (before, after) = (&explanation.outcome.base, &explanation.outcome.fit);
     let mut windows = Vec::new();
     for (index, run) in explanation.problem.runs.iter().enumerate() {
         let columns = columns(after, run);
         for (first, end) in spans(&run.bins) {
             let force = |values: &[f64]| force_n_per_kn(run, first, end, values);
-            windows.push(Window {
+            windows.push(FitWindow {
                 run: index,
                 first,
                 end,

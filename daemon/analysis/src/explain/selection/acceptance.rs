@@ -4,7 +4,7 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::by_run::{deviations, scatter_factor};
-use super::outcome::{Outcome, Trial};
+use super::outcome::{EffectTrial, SearchOutcome};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
 use super::search::Search;
@@ -15,7 +15,7 @@ use crate::explain::evidence::{
 
 impl Search<'_> {
     /// Why the last effect of a trial is not accepted; `None` when it is.
-    pub fn refusal(trial: &Trial) -> Option<Refusal> {
+    pub fn refusal(trial: &EffectTrial) -> Option<Refusal> {
         if trial.evidence <= 0.0 {
             Some(Refusal::Chance)
         } else if !is_material(trial) {
@@ -31,24 +31,24 @@ impl Search<'_> {
 
     /// The greatest strength of the trials of the first round that only their strength may refuse:
     /// what is compared with its distribution where nothing acts.
-    pub fn greatest_score(outcome: &Outcome) -> f64 {
+    pub fn greatest_score(outcome: &SearchOutcome) -> f64 {
         let first = outcome.rounds.first().into_iter().flat_map(|round| round.iter());
         first
             .filter(|trial| is_material(trial) && is_possible(trial))
-            .map(Trial::acceptance_score)
+            .map(EffectTrial::acceptance_score)
             .fold(0.0, f64::max)
     }
 }
 
 /// Whether the last effect of a trial is larger than what declared figures are good for.
-pub(super) fn is_material(trial: &Trial) -> bool {
+pub(super) fn is_material(trial: &EffectTrial) -> bool {
     let last = trial.last();
     let parameters = trial.fit.effect_parameters(last);
     trial.fit.model.effects[last].is_material(parameters, trial.fit.theta[2])
 }
 
 /// Whether the last effect of a trial may be what its kind says.
-pub(super) fn is_possible(trial: &Trial) -> bool {
+pub(super) fn is_possible(trial: &EffectTrial) -> bool {
     may_be(&trial.fit, trial.last())
 }
 

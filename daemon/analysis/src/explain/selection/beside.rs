@@ -12,7 +12,7 @@ use dynocar_shared::vocabulary::EffectKind;
 use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, moves_places};
 use super::acceptance::{is_material, is_possible};
 use super::by_run::{Deviations, deviations, deviations_beside};
-use super::outcome::{Beside, Outcome, Trial, round_of};
+use super::outcome::{Beside, EffectTrial, SearchOutcome, round_of};
 use super::price::{at_bound, penalty};
 use super::refusal::Refusal;
 use super::search::Search;
@@ -26,7 +26,7 @@ use crate::explain::gradient_prior::SURVEYED;
 use crate::explain::places::span_m;
 
 /// Whether some evidence makes the last effect of a trial certain beside the usual errors.
-pub fn is_certain_beside(trial: &Trial, evidence: f64) -> bool {
+pub fn is_certain_beside(trial: &EffectTrial, evidence: f64) -> bool {
     is_material(trial)
         && is_possible(trial)
         && is_certain(&trial.fit, trial.last(), evidence, trial.reduction, true)
@@ -39,7 +39,7 @@ const ROUNDING_SHARE: f64 = 0.1;
 
 impl Search<'_> {
     /// Searches for effects with the usual errors in the model.
-    pub fn beside_usual_errors(&self, outcome: &mut Outcome) -> Arc<Beside> {
+    pub fn beside_usual_errors(&self, outcome: &mut SearchOutcome) -> Arc<Beside> {
         let fit = &outcome.fit;
         if let Some((from, beside)) = &outcome.beside
             && beside.is_of(fit, from)
@@ -66,7 +66,8 @@ impl Search<'_> {
     /// no map or no measured position.
     fn map_errors(&self, fit: &Fit) -> Vec<Candidate> {
         let is_fitted = fit.model.effects.iter().any(|effect| effect.is_gradient());
-        let track = self.track.filter(|_| !is_fitted && self.problem.distance_ratio.is_some());
+        let track =
+            self.track.filter(|_| !is_fitted && self.problem.positions.distance_ratio.is_some());
         let span_m = self.scan(fit).and_then(|scan| span_m(&scan));
         let (Some(track), Some(span_m)) = (track, span_m.filter(|[low, high]| high > low)) else {
             return Vec::new();
@@ -101,7 +102,7 @@ impl Search<'_> {
     ///
     /// It is looked for with the map's error in the shape that it has without it, and judged with all of it free
     /// where it may be certain: freed, the map holds less of the effect.
-    pub(super) fn take_certain_beside(&self, outcome: &mut Outcome) -> bool {
+    pub(super) fn take_certain_beside(&self, outcome: &mut SearchOutcome) -> bool {
         let beside = &self.beside_usual_errors(outcome).fit;
         if outcome.is_full() || self.problem.runs.len() < CERTAIN_RUNS_MIN {
             return false;
@@ -116,12 +117,13 @@ impl Search<'_> {
             &mut Vec::new(),
             Asked { is_asked: &is_sought, rivals_of: None },
         );
-        let may_be = |trial: &&Trial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
+        let may_be =
+            |trial: &&EffectTrial| is_certain_beside(trial, PROMISE_TIMES * trial.bic_gain);
         let are_places_moved = outcome.fit.model.effects.iter().any(moves_places);
-        let is_left = |trial: &Trial| {
+        let is_left = |trial: &EffectTrial| {
             are_places_moved && is_left_by_moved_places(&trial.fit.model.effects[trial.last()])
         };
-        let may_stand = |trial: &&Trial| may_be(trial) && !is_left(trial);
+        let may_stand = |trial: &&EffectTrial| may_be(trial) && !is_left(trial);
         let may_be_certain = tried.iter().filter(may_stand);
         let judged = may_be_certain.map(|trial| self.with_map_free(beside, trial));
         let certain = judged.filter(|trial| is_certain_beside(trial, trial.evidence));
@@ -150,20 +152,20 @@ impl Search<'_> {
 
     /// A trial with every number of the map's error free; its evidence is the least under the noise that is left
     /// with it and without it. What all runs share of the map's error is in the model.
-    fn with_map_free(&self, beside: &Fit, trial: &Trial) -> Trial {
+    fn with_map_free(&self, beside: &Fit, trial: &EffectTrial) -> EffectTrial {
         let grown = self.problem.grown(beside, [trial.last_parts()]);
         let free = Self::trial(beside, self.problem.with_own_noise(&grown), trial.kind);
         let (with, last) = (&free.fit, free.last());
         let alike = self.problem.again(beside, with.noise).cost - with.cost - penalty(with, last);
         let has_map_error = with.model.effects.iter().any(|effect| effect.is_gradient());
         let own = if has_map_error { free.bic_gain } else { free.evidence };
-        Trial { evidence: own.min(alike), reduction: trial.reduction, ..free }
+        EffectTrial { evidence: own.min(alike), reduction: trial.reduction, ..free }
     }
 
     /// Drops what does not stand beside the usual errors: a force outside the library that explains no more than
     /// chance there, an effect of it that runs to a bound of what is looked for, and what was certain until others
     /// came. False for nothing.
-    pub(super) fn drop_fallen(&self, outcome: &mut Outcome) -> bool {
+    pub(super) fn drop_fallen(&self, outcome: &mut SearchOutcome) -> bool {
         let joint = self.beside_usual_errors(outcome);
         let beside = &joint.fit;
         let effects = &outcome.fit.model.effects;
@@ -196,9 +198,8 @@ impl Search<'_> {
 }
 
 /// Moves the effects that were found to where they fit best with the usual errors in the model, and a, b and c to
-/// where they fit best with the effects alone: the prediction of runs knows no usual errors. Returns the standard
-/// deviations of the parameters, from samples `step_s` seconds apart.
-pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -> Deviations {
+/// where they fit best with the effects alone: the prediction of runs knows no usual errors.
+pub fn move_beside_usual_errors(search: &Search, outcome: &mut SearchOutcome) {
     let joint = search.beside_usual_errors(outcome);
     outcome.likeliest = outcome.fit.clone();
     let fit = &outcome.likeliest;
@@ -207,12 +208,11 @@ pub fn given_usual_errors(search: &Search, outcome: &mut Outcome, step_s: f64) -
         let theta = joint.fit.theta[..count].to_vec();
         outcome.fit = search.problem.with_davis_fitted(&fit.model, theta, fit.noise);
     }
-    deviations_given(outcome, step_s)
 }
 
 /// Standard deviations of the parameters of a model that was moved with the usual errors last, from samples some s
 /// apart.
-pub fn deviations_given(outcome: &Outcome, step_s: f64) -> Deviations {
+pub fn deviations_given(outcome: &SearchOutcome, step_s: f64) -> Deviations {
     let count = outcome.fit.theta.len();
     let Some((_, joint)) = &outcome.beside else { return deviations(&outcome.fit) };
     let mut deviations = deviations_beside(&joint.fit, count, joint.shared);

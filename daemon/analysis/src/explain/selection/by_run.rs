@@ -4,7 +4,7 @@ use dynocar_shared::HALF_95;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::explain::evidence::{Fit, FitProblem, PRIOR_RUNS, RunData, RunNormal};
+use crate::explain::evidence::{Fit, FitProblem, PRIOR_RUNS, RunData, RunNormal, UpdatedModel};
 
 /// A parameter at its bound is held there to this share of what is looked for.
 const HELD_SHARE: f64 = 1e-4;
@@ -13,13 +13,16 @@ const RUNS_MIN: usize = 2;
 
 /// Moves of the first `count` parameters when each run is left out, to second order, with all
 /// others held; of a run without which they are not determined nothing.
-fn moves_without_each_run(fit: &Fit, count: usize) -> Vec<DVector<f64>> {
-    let information = fit.information();
+fn moves_without_each_run(
+    information: &DMatrix<f64>,
+    runs: &[RunNormal],
+    count: usize,
+) -> Vec<DVector<f64>> {
     let moved = |run: &RunNormal| {
-        let rest = Cholesky::new(first(&(&information - &run.information), count))?;
+        let rest = Cholesky::new(first(&(information - &run.information), count))?;
         Some(-rest.solve(&run.score.rows(0, count)))
     };
-    fit.runs.iter().filter_map(moved).collect()
+    runs.iter().filter_map(moved).collect()
 }
 
 /// Returns the leading `count` rows and columns of a matrix.
@@ -138,18 +141,19 @@ pub fn deviations_beside(fit: &Fit, count: usize, shared: usize) -> Deviations {
     Deviations { std, covariance, c }
 }
 
-/// Returns the deviations of the first `count` parameters with all others held.
-fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
-    let Some(factor) = Cholesky::new(first(&fit.free_information(), count)) else {
-        let (std, covariance) = (vec![f64::NAN; count], DMatrix::zeros(count, count));
-        return Deviations { std, covariance, c: fit.theta[2] };
-    };
-    let covariance = factor.inverse();
-    let runs = fit.runs.len() as f64;
+/// Returns the covariance of the first parameters, as the scatter between the runs enlarges it; `information` and the
+/// score of each run are of all parameters, where those fit best.
+pub fn enlarged_by_scatter(
+    covariance: &DMatrix<f64>,
+    information: &DMatrix<f64>,
+    runs: &[RunNormal],
+) -> DMatrix<f64> {
+    let count = covariance.nrows();
     let mut scatter = DVector::zeros(count);
-    for moved in moves_without_each_run(fit, count) {
+    for moved in moves_without_each_run(information, runs, count) {
         scatter += moved.component_mul(&moved);
     }
+    let runs = runs.len() as f64;
     let left = (runs - 1.0) / runs;
     let freedom = PRIOR_RUNS + runs - 1.0;
     let enlarged = |i: usize| {
@@ -159,13 +163,29 @@ fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
         students_factor(freedom) * both.max(1.0).sqrt()
     };
     let enlarged: Vec<f64> = (0..count).map(enlarged).collect();
-    let scaled =
-        DMatrix::from_fn(count, count, |i, j| covariance[(i, j)] * enlarged[i] * enlarged[j]);
-    let mut std: Vec<f64> = (0..count).map(|i| scaled[(i, i)].sqrt()).collect();
-    let effects = fit.model.effects.iter().zip(fit.model.ranges());
+    DMatrix::from_fn(count, count, |i, j| covariance[(i, j)] * enlarged[i] * enlarged[j])
+}
+
+/// Returns the deviations of the first `count` parameters with all others held.
+fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
+    let Some(factor) = Cholesky::new(first(&fit.free_information(), count)) else {
+        let (std, covariance) = (vec![f64::NAN; count], DMatrix::zeros(count, count));
+        return Deviations { std, covariance, c: fit.theta[2] };
+    };
+    let scaled = enlarged_by_scatter(&factor.inverse(), &fit.information(), &fit.runs);
+    let std = std_with_forms(&scaled, &fit.model, &fit.theta);
+    Deviations { std, covariance: scaled, c: fit.theta[2] }
+}
+
+/// Returns the standard deviations of the first parameters of a model by their covariance and what the forms of its
+/// effects and the map add.
+pub fn std_with_forms(covariance: &DMatrix<f64>, model: &UpdatedModel, theta: &[f64]) -> Vec<f64> {
+    let count = covariance.nrows();
+    let mut std: Vec<f64> = (0..count).map(|i| covariance[(i, i)].sqrt()).collect();
+    let effects = model.effects.iter().zip(model.ranges());
     for (effect, range) in effects.filter(|(_, range)| range.end <= count) {
         for i in range.clone() {
-            let form = FORM_SHARE * (fit.theta[i] - effect.none());
+            let form = FORM_SHARE * (theta[i] - effect.none());
             std[i] = std[i].hypot(form);
         }
         // The part of a map's error that all passages share lies on the size, or on every gradient.
@@ -174,5 +194,5 @@ fn deviations_of_first(fit: &Fit, count: usize) -> Deviations {
             *std = std.hypot(effect.nature().shared_error);
         }
     }
-    Deviations { std, covariance: scaled, c: fit.theta[2] }
+    std
 }

@@ -14,11 +14,12 @@ mod sources;
 mod trying;
 
 pub use acceptance::deciding_score;
-pub use beside::{deviations_given, given_usual_errors, is_certain_beside};
+pub use beside::{deviations_given, is_certain_beside, move_beside_usual_errors};
 pub use by_run::{
-    Deviations, FORM_SHARE, deviations, deviations_beside, few_runs_factor, without_each_run,
+    Deviations, FORM_SHARE, deviations, deviations_beside, enlarged_by_scatter, few_runs_factor,
+    std_with_forms, without_each_run,
 };
-pub use outcome::{Beside, Outcome, Trial};
+pub use outcome::{Beside, EffectTrial, SearchOutcome};
 pub use price::{discounted, model_penalty, penalty};
 pub use refusal::Refusal;
 pub use search::{OBSERVATIONS_MIN, Progress, Search};

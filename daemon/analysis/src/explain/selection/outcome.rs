@@ -16,7 +16,7 @@ const EFFECTS_MAX: usize = 4;
 
 /// One candidate, fitted together with everything accepted so far.
 #[derive(Clone)]
-pub struct Trial {
+pub struct EffectTrial {
     /// Its kind.
     pub kind: EffectKind,
     /// The fitted model; the candidate is its last effect.
@@ -32,7 +32,7 @@ pub struct Trial {
     pub is_only: bool,
 }
 
-impl Trial {
+impl EffectTrial {
     /// The number of the candidate among the effects of its model.
     pub fn last(&self) -> usize {
         self.fit.model.effects.len() - 1
@@ -51,10 +51,10 @@ impl Trial {
 }
 
 /// The best trial of each kind, the strongest first.
-pub type Round = Arc<[Trial]>;
+pub type SearchRound = Arc<[EffectTrial]>;
 
 /// A round to remember: how good the trials were, and no more by observation.
-pub(super) fn round_of(mut trials: Vec<Trial>) -> Round {
+pub(super) fn round_of(mut trials: Vec<EffectTrial>) -> SearchRound {
     trials.iter_mut().for_each(|trial| trial.fit.forget_series());
     trials.into()
 }
@@ -101,7 +101,7 @@ impl Beside {
 
 /// Result of the search.
 #[derive(Clone)]
-pub struct Outcome {
+pub struct SearchOutcome {
     /// The declared model with a, b, c refitted.
     pub base: Fit,
     /// The model with all accepted effects.
@@ -109,22 +109,24 @@ pub struct Outcome {
     /// The same where it explains most, before usual errors beside it moved it: how sure effects are.
     pub likeliest: Fit,
     /// The rounds; the last is the one in which nothing more was accepted.
-    pub rounds: Vec<Round>,
+    pub rounds: Vec<SearchRound>,
     /// Where several effects were found, what was tried in the place of each.
-    pub instead: Vec<(EffectKind, Round)>,
+    pub instead: Vec<(EffectKind, SearchRound)>,
     /// Kinds that the data do not allow to test, and why.
     pub not_testable: Vec<(EffectKind, String)>,
     /// Kinds that are certain and small: part of the model, and not named.
     pub small: Vec<EffectKind>,
     /// Kinds that are certain beside the usual errors, with what was tried beside them.
-    pub certain: Vec<(EffectKind, Round)>,
+    pub certain: Vec<(EffectKind, SearchRound)>,
     /// Kinds that were found and did not stand beside the usual errors, and why; not looked for again.
     pub fallen: Vec<(EffectKind, Refusal)>,
+    /// Kinds for which the places of the map were tried in the place of chosen ones.
+    pub(super) returned: Vec<EffectKind>,
     /// The parameters of a model that was fitted beside the usual errors last, and what came of it.
     pub(super) beside: Option<(Vec<f64>, Arc<Beside>)>,
 }
 
-impl Outcome {
+impl SearchOutcome {
     /// Whether an effect of the model is named: it is more than a small, certain error of what is declared.
     pub fn is_named(&self, kind: EffectKind) -> bool {
         !self.small.contains(&kind)
@@ -171,7 +173,7 @@ impl Outcome {
     }
 
     /// The trials of what is certain and small, as they were when it was taken in.
-    pub fn small_trials(&self) -> impl Iterator<Item = &Trial> {
+    pub fn small_trials(&self) -> impl Iterator<Item = &EffectTrial> {
         let of = |kind: &EffectKind| {
             let rounds = self.rounds.iter().rev().flat_map(|round| round.iter());
             rounds.clone().find(|trial| trial.kind == *kind)

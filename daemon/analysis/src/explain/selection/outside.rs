@@ -4,7 +4,7 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::is_possible;
-use super::outcome::{Outcome, Trial};
+use super::outcome::{EffectTrial, SearchOutcome};
 use super::price::penalty;
 use super::search::Search;
 use crate::explain::effects::{Effect, UNKNOWN, a_form_explains_more, leaves_a_force};
@@ -23,7 +23,7 @@ const COARSE_SHARE: f64 = 0.25;
 impl Search<'_> {
     /// Whether a form explains more than the kind of the library that explains most, or that kind
     /// leaves a force that has some form.
-    pub(super) fn asks_for_a_form(&self, scan: &Scan, trials: &[(Trial, &Effect)]) -> bool {
+    pub(super) fn asks_for_a_form(&self, scan: &Scan, trials: &[(EffectTrial, &Effect)]) -> bool {
         let best = best_possible(trials);
         let explained = best.map_or(0.0, |best| best.bic_gain);
         let left = self.scan(best.map_or(scan.fit, |best| &best.fit));
@@ -36,7 +36,7 @@ impl Search<'_> {
     pub(super) fn take_form_that_noise_holds(
         &self,
         base: &Fit,
-        trials: &mut Vec<(Trial, &'static Effect)>,
+        trials: &mut Vec<(EffectTrial, &'static Effect)>,
     ) {
         if base.model.has(EffectKind::Unknown) {
             return;
@@ -53,7 +53,11 @@ impl Search<'_> {
     /// The best form under a noise too small to hold a force, where the noise of a fit may hold one
     /// and some form explains more under the small one than the kind of the library that explains
     /// most.
-    fn form_that_noise_holds(&self, base: &Fit, trials: &[(Trial, &Effect)]) -> Option<Trial> {
+    fn form_that_noise_holds(
+        &self,
+        base: &Fit,
+        trials: &[(EffectTrial, &Effect)],
+    ) -> Option<EffectTrial> {
         let (_, share) = self.problem.noise_n_per_kn(base.noise, NOISE_OVER_S)?;
         if share < HOLDS_A_FORCE {
             return None;
@@ -73,7 +77,7 @@ impl Search<'_> {
     /// Looks for a form of what is left, under noises too small to hold it: the noise of a model
     /// that lacks a large force holds that force. What is found stands in the place of everything
     /// found before, or beside it, whichever explains more.
-    pub fn look_under_noise(&self, outcome: &mut Outcome) {
+    pub fn look_under_noise(&self, outcome: &mut SearchOutcome) {
         let models = [outcome.base.clone(), outcome.fit.clone()];
         for base in models.iter().take(1 + usize::from(!outcome.fit.model.effects.is_empty())) {
             if base.model.has(EffectKind::Unknown) {
@@ -93,7 +97,7 @@ impl Search<'_> {
 }
 
 /// The trial that explains most of those that may be what their kinds say.
-fn best_possible<'t>(trials: &'t [(Trial, &Effect)]) -> Option<&'t Trial> {
+fn best_possible<'t>(trials: &'t [(EffectTrial, &Effect)]) -> Option<&'t EffectTrial> {
     let trials = trials.iter().map(|(trial, _)| trial);
     let possible =
         trials.filter(|it| it.bic_gain > 0.0 && it.kind != EffectKind::Unknown && is_possible(it));

@@ -3,11 +3,11 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{is_accepted, may_be};
-use super::outcome::{Outcome, Round, round_of};
+use super::outcome::{SearchOutcome, SearchRound, round_of};
 use super::refusal::Refusal;
 use super::search::Search;
 use super::trying::Asked;
-use crate::explain::effects::policy_of;
+use crate::explain::effects::{effect_of, policy_of};
 use crate::explain::evidence::{EQUAL, Fit};
 use crate::explain::score::reduction;
 
@@ -15,7 +15,7 @@ impl Search<'_> {
     /// Takes each effect out in turn and looks whether another kind does better in its place; what was
     /// tried in the place of each kind that stands after it: of the last, while the others stay, in the round
     /// that brought it.
-    pub(super) fn swap(&self, outcome: &mut Outcome, brought_last: Round) {
+    pub(super) fn swap(&self, outcome: &mut SearchOutcome, brought_last: SearchRound) {
         let mut tried = Vec::new();
         let kinds = outcome.kinds();
         let mut others_stay = true;
@@ -45,7 +45,7 @@ impl Search<'_> {
 
     /// Replaces an effect by a kind that explains more than it beside the usual errors; returns whether it did.
     /// Without the usual errors an effect that can take their form would win.
-    pub(super) fn give_way(&self, outcome: &mut Outcome) -> bool {
+    pub(super) fn give_way(&self, outcome: &mut SearchOutcome) -> bool {
         let may_give_way = |kind: &EffectKind| {
             !policy_of(*kind).gives_way_to.is_empty() && outcome.is_on_trial(*kind)
         };
@@ -57,7 +57,7 @@ impl Search<'_> {
         let trials = self.round_of(&rest, &mut Vec::new(), asked);
         let Some(best) = self.best(&trials, &outcome.fallen_kinds()) else { return false };
         let own = Self::total(&self.beside_usual_errors(outcome).fit);
-        let mut other = Outcome { fit: best.fit.clone(), ..outcome.clone() };
+        let mut other = SearchOutcome { fit: best.fit.clone(), ..outcome.clone() };
         if Self::total(&self.beside_usual_errors(&mut other).fit) > own - EQUAL {
             return false;
         }
@@ -67,9 +67,35 @@ impl Search<'_> {
         true
     }
 
+    /// Moves an effect from places that were chosen back to those that the map has of its kind, where it explains more
+    /// there beside the usual errors; returns whether it did. The errors of the map make places of anything, and the
+    /// more runs pass them, the surer.
+    pub(super) fn return_to_mapped(&self, outcome: &mut SearchOutcome) -> bool {
+        let effects = &outcome.fit.model.effects;
+        let mapped = effects.iter().enumerate().find_map(|(index, effect)| {
+            let kind = effect.kind();
+            let is_chosen = effect.site().is_some_and(|site| site.sections.is_some());
+            if !is_chosen || !outcome.is_on_trial(kind) || outcome.returned.contains(&kind) {
+                return None;
+            }
+            let rest = self.without(&outcome.fit, index);
+            let whole = effect_of(kind)?.whole(&self.scan(&rest)?)?;
+            Some((kind, self.problem.with_own_noise(&self.problem.grown(&rest, [whole.parts()]))))
+        });
+        let Some((kind, fit)) = mapped else { return false };
+        outcome.returned.push(kind);
+        let own = Self::total(&self.beside_usual_errors(outcome).fit);
+        let mut other = SearchOutcome { fit, ..outcome.clone() };
+        let is_better = Self::total(&self.beside_usual_errors(&mut other).fit) < own;
+        if is_better {
+            *outcome = other;
+        }
+        is_better
+    }
+
     /// Drops effects that the others have made needless, and that none of the others stands in for against
     /// what its own kind says: winds that blow ahead of every train instead of a tunnel's drag.
-    pub(super) fn prune(&self, outcome: &mut Outcome) {
+    pub(super) fn prune(&self, outcome: &mut SearchOutcome) {
         let mut index = 0;
         while index < outcome.fit.model.effects.len() && outcome.fit.model.effects.len() > 1 {
             let fit = &outcome.fit;

@@ -7,7 +7,7 @@ use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::outcome::{Outcome, Trial, round_of};
+use super::outcome::{EffectTrial, SearchOutcome, round_of};
 use super::price::model_penalty;
 use crate::explain::effects::Effect;
 use crate::explain::evidence::{EQUAL, Fit, FitProblem, RunData, UpdatedModel};
@@ -69,10 +69,10 @@ pub struct Search<'a> {
 
 impl Search<'_> {
     /// The declared model with a, b, c refitted, and no search for effects.
-    pub fn base(&self) -> Outcome {
+    pub fn base(&self) -> SearchOutcome {
         (self.progress)(0.05, "fitting a, b, c");
         let base = self.problem.fit_from_declared(&UpdatedModel::default(), &[]);
-        Outcome {
+        SearchOutcome {
             base: base.clone(),
             likeliest: base.clone(),
             fit: base,
@@ -82,12 +82,13 @@ impl Search<'_> {
             small: Vec::new(),
             certain: Vec::new(),
             fallen: Vec::new(),
+            returned: Vec::new(),
             beside: None,
         }
     }
 
     /// Searches.
-    pub fn run(&self) -> Outcome {
+    pub fn run(&self) -> SearchOutcome {
         let mut outcome = self.base();
         if outcome.base.observations() < OBSERVATIONS_MIN {
             return outcome;
@@ -97,6 +98,7 @@ impl Search<'_> {
             while self.take_certain_beside(&mut outcome)
                 || self.drop_fallen(&mut outcome)
                 || self.give_way(&mut outcome)
+                || self.return_to_mapped(&mut outcome)
             {
                 self.take_what_scores(&mut outcome);
             }
@@ -114,7 +116,7 @@ impl Search<'_> {
 
     /// Takes in what takes much from the error for its evidence, and what is certain alone, until nothing is left
     /// that does.
-    fn take_what_scores(&self, outcome: &mut Outcome) {
+    fn take_what_scores(&self, outcome: &mut SearchOutcome) {
         let most = outcome.rounds.len() + ROUNDS_MAX;
         // And kinds that others took the place of at once.
         let mut fruitless = outcome.fallen_kinds();
@@ -154,9 +156,14 @@ impl Search<'_> {
     /// The trial to accept: the one with the strongest evidence, or one with about the same that
     /// takes away more of the open-loop error. What is outside the library must explain more than
     /// anything in it.
-    pub(super) fn best<'t>(&self, trials: &'t [Trial], except: &[EffectKind]) -> Option<&'t Trial> {
+    pub(super) fn best<'t>(
+        &self,
+        trials: &'t [EffectTrial],
+        except: &[EffectKind],
+    ) -> Option<&'t EffectTrial> {
         let asked = trials.iter().filter(|trial| !except.contains(&trial.kind));
-        let accepted: Vec<&Trial> = asked.filter(|trial| Self::refusal(trial).is_none()).collect();
+        let accepted: Vec<&EffectTrial> =
+            asked.filter(|trial| Self::refusal(trial).is_none()).collect();
         let strongest = accepted.first()?;
         accepted
             .iter()

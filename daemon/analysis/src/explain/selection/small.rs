@@ -8,7 +8,7 @@
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::acceptance::{CERTAIN, is_accepted};
-use super::outcome::{Outcome, Trial};
+use super::outcome::{EffectTrial, SearchOutcome};
 use super::price::penalty;
 use super::refusal::Refusal;
 use super::search::Search;
@@ -18,7 +18,7 @@ use crate::explain::score::reduction;
 use crate::statistics::rms;
 
 /// Whether an everyday kind is certain, and only for its size no effect.
-fn is_certain_and_small(trial: &Trial) -> bool {
+fn is_certain_and_small(trial: &EffectTrial) -> bool {
     let refusal = Search::refusal(trial);
     let late = trial.fit.model.effects.iter().filter(|it| policy_of(it.kind()).is_late).count();
     let everyday = policy_of(trial.kind).everyday;
@@ -35,10 +35,11 @@ impl Search<'_> {
     /// enough.
     pub(super) fn with_certain_and_small(
         &self,
-        trials: &[Trial],
+        trials: &[EffectTrial],
     ) -> Option<(Vec<EffectKind>, Fit)> {
-        let rank = |trial: &Trial| policy_of(trial.kind).everyday.map(|it| it.rank);
-        let mut everyday: Vec<&Trial> = trials.iter().filter(|it| rank(it).is_some()).collect();
+        let rank = |trial: &EffectTrial| policy_of(trial.kind).everyday.map(|it| it.rank);
+        let mut everyday: Vec<&EffectTrial> =
+            trials.iter().filter(|it| rank(it).is_some()).collect();
         everyday.sort_by_key(|trial| rank(trial));
         let mut taken: Option<(Vec<EffectKind>, Fit)> = None;
         for alone in everyday.into_iter().filter(|trial| is_certain_and_small(trial)) {
@@ -49,7 +50,7 @@ impl Search<'_> {
             let grown = self.problem.grown(fit, [alone.last_parts()]);
             let grown = self.problem.with_own_noise(&grown);
             let beside =
-                Trial { reduction: alone.reduction, ..Self::trial(fit, grown, alone.kind) };
+                EffectTrial { reduction: alone.reduction, ..Self::trial(fit, grown, alone.kind) };
             if is_certain_and_small(&beside) {
                 kinds.push(beside.kind);
                 *fit = beside.fit;
@@ -60,7 +61,7 @@ impl Search<'_> {
 
     /// Names what has turned out to matter beside the effects that were found, and forgets what is small
     /// where nothing was found, and what is no more certain beside what was.
-    pub(super) fn name_or_forget_small(&self, outcome: &mut Outcome) {
+    pub(super) fn name_or_forget_small(&self, outcome: &mut SearchOutcome) {
         let kinds = outcome.kinds();
         outcome.small.retain(|small| kinds.contains(small));
         let usual = self.usual_scales(outcome);
@@ -91,7 +92,7 @@ impl Search<'_> {
     }
 
     /// Everyday scales of which nothing is left beside the usual errors: the 95 % interval there holds none.
-    fn usual_scales(&self, outcome: &mut Outcome) -> Vec<EffectKind> {
+    fn usual_scales(&self, outcome: &mut SearchOutcome) -> Vec<EffectKind> {
         let is_scale = |effect: &SharedHypothesis| {
             policy_of(effect.kind()).everyday.is_some() && effect.parameters().len() == 1
         };

@@ -3,7 +3,7 @@
 use dynocar_shared::HALF_95;
 use nalgebra::Cholesky;
 
-use super::outcome::Outcome;
+use super::outcome::SearchOutcome;
 use crate::explain::answer::WithStd;
 use crate::explain::evidence::FitProblem;
 
@@ -18,13 +18,13 @@ pub struct ScaleSources {
 
 impl ScaleSources {
     /// Of a finished model with a wrong wheel; `None` without one, or where one of the two says nothing.
-    pub fn of(problem: &FitProblem, outcome: &Outcome) -> Option<Self> {
+    pub fn of(problem: &FitProblem, outcome: &SearchOutcome) -> Option<Self> {
         let fit = &outcome.beside.as_ref()?.1.fit;
         let scales = |number: &usize| fit.model.effects[*number].nature().changes_speed_scale;
         let wheel = (0..outcome.fit.model.effects.len()).find(scales)?;
         let i = fit.model.ranges()[wheel].start;
         let variance = Cholesky::new(fit.free_information())?.inverse()[(i, i)];
-        let (ratio, std) = problem.distance_ratio?;
+        let (ratio, std) = problem.positions.distance_ratio?;
         let positions = WithStd { value: ratio.recip(), std: std / (ratio * ratio) };
         Some(ScaleSources {
             positions,

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::outcome::Trial;
+use super::outcome::EffectTrial;
 use super::price::{discounted, penalty};
 use super::search::RoundSteps;
 use super::search::Search;
@@ -42,11 +42,11 @@ pub(super) struct Asked<'a> {
 }
 
 /// The best candidate of a kind, if any, by this kind or its forms; or why the data do not allow to test it.
-type Tried = (&'static Effect, Result<Option<Trial>, String>);
+type Tried = (&'static Effect, Result<Option<EffectTrial>, String>);
 
 /// Returns whether a trial would be more than chance with this multiple of the evidence: an error that all runs
 /// share does not become evident by another place or noise.
-fn may_be_evident(trial: &Trial) -> bool {
+fn may_be_evident(trial: &EffectTrial) -> bool {
     let price = penalty(&trial.fit, trial.last());
     trial.evidence > FINALIST_MIN || PROMISE_TIMES * (trial.evidence + price) > price
 }
@@ -57,12 +57,12 @@ impl Search<'_> {
         &self,
         base: &Fit,
         not_testable: &mut Vec<(EffectKind, String)>,
-    ) -> Vec<Trial> {
+    ) -> Vec<EffectTrial> {
         self.round_of(base, not_testable, Asked { is_asked: &|_| true, rivals_of: None })
     }
 
     /// Tries a kind and what could stand in its place.
-    pub(super) fn rivals(&self, base: &Fit, kind: EffectKind) -> Vec<Trial> {
+    pub(super) fn rivals(&self, base: &Fit, kind: EffectKind) -> Vec<EffectTrial> {
         let asked = Asked { is_asked: &|_| true, rivals_of: Some(kind) };
         self.round_of(base, &mut Vec::new(), asked)
     }
@@ -73,7 +73,7 @@ impl Search<'_> {
         base: &Fit,
         not_testable: &mut Vec<(EffectKind, String)>,
         asked: Asked,
-    ) -> Vec<Trial> {
+    ) -> Vec<EffectTrial> {
         let Some(scan) = self.scan(base) else { return Vec::new() };
         let steps =
             RoundSteps::of(self.progress, base.model.effects.len(), LIBRARY.len() + FINALISTS);
@@ -81,7 +81,7 @@ impl Search<'_> {
         let mut trials = self.try_all(base, &scan, &steps, not_testable, asked);
         let before = FitErrors::of(self.problem, base);
         let reduction = |fit: &Fit| FitErrors::of(self.problem, fit).reduction_from(&before);
-        let measure = |trials: &mut [(Trial, &Effect)], is_asked: fn(f64) -> bool| {
+        let measure = |trials: &mut [(EffectTrial, &Effect)], is_asked: fn(f64) -> bool| {
             let asked = trials.iter_mut().filter(|(trial, _)| is_asked(trial.bic_gain));
             parallel::of_each_owned(asked, |_, (trial, _)| trial.reduction = reduction(&trial.fit));
         };
@@ -90,7 +90,7 @@ impl Search<'_> {
             measure(&mut trials, |gain| gain > FINALIST_MIN && gain <= 0.0);
         }
         // A trial that takes nothing from the error comes last, and is no measure for the others.
-        let helps = |trial: &Trial| trial.reduction > FINALIST_ERROR_REDUCTION;
+        let helps = |trial: &EffectTrial| trial.reduction > FINALIST_ERROR_REDUCTION;
         greatest_first(&mut trials, |(trial, _)| trial.bic_gain);
         greatest_first(&mut trials, |(trial, _)| f64::from(helps(trial)));
         let greatest = trials.first().map_or(0.0, |(trial, _)| trial.bic_gain);
@@ -105,7 +105,7 @@ impl Search<'_> {
                 return trial;
             }
             let trial = steps.done_with(effect, || self.finalist(base, trial, effect));
-            Trial { reduction: reduction(&trial.fit), ..trial }
+            EffectTrial { reduction: reduction(&trial.fit), ..trial }
         });
         greatest_first(&mut finished, |it| it.bic_gain);
         finished
@@ -119,7 +119,7 @@ impl Search<'_> {
         steps: &RoundSteps,
         not_testable: &mut Vec<(EffectKind, String)>,
         Asked { is_asked, rivals_of }: Asked,
-    ) -> Vec<(Trial, &'static Effect)> {
+    ) -> Vec<(EffectTrial, &'static Effect)> {
         let is_new = |effect: &&Effect| is_asked(effect.kind) && !base.model.has(effect.kind);
         let (outside, library): (Vec<&Effect>, Vec<&Effect>) =
             LIBRARY.iter().filter(is_new).partition(|it| it.kind == EffectKind::Unknown);
@@ -128,13 +128,13 @@ impl Search<'_> {
         let try_kind = |effect: &'static Effect, least| -> Tried {
             (effect, steps.done_with(effect, || self.try_kind((base, least), scan, effect)))
         };
-        let mut trials: Vec<(Trial, &Effect)> = Vec::new();
-        let mut take =
-            |trials: &mut Vec<(Trial, &'static Effect)>, (effect, tried): Tried| match tried {
-                Ok(best) => trials.extend(best.map(|trial| (trial, effect))),
-                Err(_) if not_testable.iter().any(|(kind, _)| *kind == effect.kind) => {}
-                Err(reason) => not_testable.push((effect.kind, reason)),
-            };
+        let mut trials: Vec<(EffectTrial, &Effect)> = Vec::new();
+        let mut take = |trials: &mut Vec<(EffectTrial, &'static Effect)>,
+                        (effect, tried): Tried| match tried {
+            Ok(best) => trials.extend(best.map(|trial| (trial, effect))),
+            Err(_) if not_testable.iter().any(|(kind, _)| *kind == effect.kind) => {}
+            Err(reason) => not_testable.push((effect.kind, reason)),
+        };
         own.into_iter().for_each(|own| take(&mut trials, try_kind(own, 0.0)));
         let gains = trials.iter().map(|(own, _)| RIVAL_SHARE * own.bic_gain);
         let least = gains.fold(0.0, f64::max);
@@ -158,7 +158,7 @@ impl Search<'_> {
         base: (&Fit, f64),
         scan: &Scan,
         effect: &Effect,
-    ) -> Result<Option<Trial>, String> {
+    ) -> Result<Option<EffectTrial>, String> {
         let candidates = effect.propose(scan)?;
         let is_only = candidates.len() == 1 && candidates.iter().all(Candidate::is_fixed);
         let best = self.best_attempt(base, base.0, candidates);
@@ -167,7 +167,7 @@ impl Search<'_> {
                 // It goes no further.
                 trial.fit.forget_series();
             }
-            Trial { is_only, ..trial }
+            EffectTrial { is_only, ..trial }
         }))
     }
 
@@ -177,13 +177,13 @@ impl Search<'_> {
         base: (&Fit, f64),
         onto: &Fit,
         candidates: Vec<Candidate>,
-    ) -> Option<Trial> {
+    ) -> Option<EffectTrial> {
         // The best so far alone keeps its series.
-        let best: Mutex<Option<(usize, Trial)>> = Mutex::new(None);
+        let best: Mutex<Option<(usize, EffectTrial)>> = Mutex::new(None);
         parallel::of_each_owned(candidates, |number, candidate| {
             let tried = (number, self.attempt(base, onto, candidate));
             let mut best = best.lock().unwrap_or_else(PoisonError::into_inner);
-            let rank = |(number, trial): &(usize, Trial)| (trial.bic_gain, *number);
+            let rank = |(number, trial): &(usize, EffectTrial)| (trial.bic_gain, *number);
             let is_better = best.as_ref().is_none_or(|best| {
                 let (own, best) = (rank(&tried), rank(best));
                 own.0.total_cmp(&best.0).then(own.1.cmp(&best.1)).is_gt()
@@ -197,7 +197,7 @@ impl Search<'_> {
 
     /// Fits a candidate on top of a fit; its evidence counts against `base`. What promises less than a gain is not
     /// fitted to its end.
-    fn attempt(&self, (base, least): (&Fit, f64), onto: &Fit, candidate: Candidate) -> Trial {
+    fn attempt(&self, (base, least): (&Fit, f64), onto: &Fit, candidate: Candidate) -> EffectTrial {
         let kind = candidate.hypothesis.kind();
         let may_pay = |fit: &Fit, promised: f64| {
             let last = fit.model.effects.len() - 1;
@@ -207,18 +207,25 @@ impl Search<'_> {
         Self::trial(base, fit, kind)
     }
 
-    pub(super) fn trial(base: &Fit, fit: Fit, kind: EffectKind) -> Trial {
+    pub(super) fn trial(base: &Fit, fit: Fit, kind: EffectKind) -> EffectTrial {
         let decrease = base.cost - fit.cost;
         let last = fit.model.effects.len() - 1;
         let price = penalty(&fit, last);
         let evidence = discounted(&fit, last, decrease) - price;
-        Trial { kind, fit, bic_gain: decrease - price, evidence, reduction: 0.0, is_only: false }
+        EffectTrial {
+            kind,
+            fit,
+            bic_gain: decrease - price,
+            evidence,
+            reduction: 0.0,
+            is_only: false,
+        }
     }
 
     /// Gives a trial the noise that remains under it and lets its kind look again for places and windows
     /// under that noise: the noise of the smaller model holds the effect itself. Where there are many to
     /// choose from, it looks under stiff noises too; where there is one, its fit goes on.
-    fn finalist(&self, base: &Fit, trial: Trial, effect: &Effect) -> Trial {
+    fn finalist(&self, base: &Fit, trial: EffectTrial, effect: &Effect) -> EffectTrial {
         let with_own_noise =
             |fit: &Fit| Self::trial(base, self.problem.with_own_noise(fit), trial.kind);
         let mut best = with_own_noise(&trial.fit);
@@ -232,7 +239,7 @@ impl Search<'_> {
             };
             let noises = if attempt == 0 && many { own.stiffer() } else { Vec::new() };
             let least = best.bic_gain + 1.0;
-            let may_win = |(trial, _): &(Trial, bool)| trial.bic_gain > least;
+            let may_win = |(trial, _): &(EffectTrial, bool)| trial.bic_gain > least;
             let stiff = parallel::of_each(&noises, |noise| look(*noise).filter(may_win));
             let mut is_better = false;
             for again in again.into_iter().chain(stiff.into_iter().flatten().map(|it| it.0)) {
@@ -255,7 +262,7 @@ impl Search<'_> {
         base: &Fit,
         noise: Noise,
         effect: &Effect,
-    ) -> Option<(Trial, bool)> {
+    ) -> Option<(EffectTrial, bool)> {
         let onto = self.problem.again(base, noise);
         let scan = self.scan(&onto)?;
         let candidates = effect.propose(&scan).ok()?;

@@ -25,7 +25,7 @@ use self::limits::{INVALID_SHARE, REFUSALS_MEMORY, UNFIT_SHARE};
 use self::validation::Validator;
 use super::estimator::{Estimator, Outcome};
 use super::judge::{InputState, missing};
-use crate::plausibility::watch::Watch;
+use crate::plausibility::watch::PlausibilityWatch;
 use crate::plausibility::window_balance::WindowMean;
 use crate::plausibility::{DetectedFault, DetectedFaults, diagnosis};
 
@@ -33,7 +33,7 @@ use crate::plausibility::{DetectedFault, DetectedFaults, diagnosis};
 #[derive(Clone, Debug)]
 pub struct Admission {
     validator: Validator,
-    watch: Watch,
+    watch: PlausibilityWatch,
     detected: DetectedFaults,
     gate: ForceGate,
     /// Shares lately: of all samples, those that validation refused; of those that were to serve, those that did not.
@@ -49,7 +49,7 @@ impl Admission {
     pub fn new(train_id: TrainId, train: Arc<TrainModel>) -> Self {
         Admission {
             validator: Validator::new(train_id, train.mass_kg),
-            watch: Watch::new(train),
+            watch: PlausibilityWatch::new(train),
             detected: DetectedFaults::default(),
             gate: ForceGate::default(),
             invalid_share: 0.0,

@@ -76,7 +76,7 @@ impl BrakingSettings {
     }
 
     /// True when an estimate is precise enough to be used.
-    pub fn counts(&self, estimate: &Estimate) -> bool {
+    pub fn counts(&self, estimate: &BrakingEstimate) -> bool {
         let coefficient = estimate.coefficient;
         coefficient.std <= self.relative_std_max * coefficient.value.abs()
     }
@@ -84,7 +84,7 @@ impl BrakingSettings {
 
 /// Measurements at one moment of braking.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observation {
+pub struct BrakingObservation {
     /// Distance in m since the brakes came on.
     pub distance_m: f64,
     /// Speed in m/s.
@@ -113,7 +113,7 @@ pub enum EngineStep {
 
 /// A braking coefficient at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct BrakingEstimate {
     /// The coefficient: law times scale.
     pub coefficient: Uncertain,
     /// The scale of the law.
@@ -129,7 +129,7 @@ pub struct Estimate {
 /// Learns a coefficient from one braking after another.
 pub trait Engine: Send {
     /// Forgets the past and starts from a first observation.
-    fn start(&mut self, first: &Observation);
+    fn start(&mut self, first: &BrakingObservation);
 
     /// Takes the observation at the end of a step into account. None when a factorisation fails, no
     /// particle is left or the estimate is not finite: the engine has to be started anew.
@@ -137,11 +137,11 @@ pub trait Engine: Send {
     /// # Real-time
     ///
     /// Allocates nothing.
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<EngineStep>;
+    fn step(&mut self, inputs: &StepInputs, observed: &BrakingObservation) -> Option<EngineStep>;
 
     /// Takes the variance of a measured distance in m² for another one from the next step on.
     fn set_distance_variance(&mut self, variance_m2: f64);
 
     /// The estimate, once there is one.
-    fn estimate(&self) -> Option<Estimate>;
+    fn estimate(&self) -> Option<BrakingEstimate>;
 }

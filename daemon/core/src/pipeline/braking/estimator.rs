@@ -7,10 +7,10 @@ use dynocar_shared::{
 };
 use nalgebra::{Matrix1, Matrix2, SVector};
 
-use super::engine::{BrakingSettings, Engine, EngineStep, Estimate, Observation};
+use super::engine::{BrakingEstimate, BrakingObservation, BrakingSettings, Engine, EngineStep};
 use super::intake::{BrakingCoefficient, BrakingIntake, Intake};
 use super::motion::StepInputs;
-use crate::pipeline::judge::{Case, InputState, Judgement};
+use crate::pipeline::judge::{InputState, Judgement, StatusInputs};
 use crate::pipeline::motion::{PositionNoise, SpeedRange};
 use crate::pipeline::output::{write_innovations, write_parameters};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
@@ -29,7 +29,7 @@ pub struct BrakingEstimator<E> {
     innovations: InnovationMonitor,
     reason: Reason,
     /// The last estimate that counts, else the last of all.
-    held: Option<Estimate>,
+    held: Option<BrakingEstimate>,
     /// False while the held estimate is of an earlier braking or of the time before a change.
     is_current: bool,
     updated_ns: i64,
@@ -73,7 +73,7 @@ impl BrakingSettings {
 }
 
 impl<E: Engine> BrakingEstimator<E> {
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Outcome {
+    fn step(&mut self, inputs: &StepInputs, observed: &BrakingObservation) -> Outcome {
         match self.engine.step(inputs, observed) {
             Some(EngineStep::Collected) => Outcome::Used,
             Some(EngineStep::Updated { normalised_innovation }) => {
@@ -128,7 +128,7 @@ impl<E: Engine> BrakingEstimator<E> {
 
     /// True when the rail carries less than the brake would need, so that the coefficient is that
     /// of the rail and not only a lower bound of it.
-    fn is_rail_limited(&self, estimate: &Estimate) -> bool {
+    fn is_rail_limited(&self, estimate: &BrakingEstimate) -> bool {
         if let Some(probability) = estimate.brake_limited {
             return probability <= 0.5;
         }
@@ -139,7 +139,7 @@ impl<E: Engine> BrakingEstimator<E> {
 
     fn write_estimate(
         &self,
-        estimate: &Estimate,
+        estimate: &BrakingEstimate,
         is_stale: bool,
         snapshot: &mut ParameterSnapshot,
     ) -> (Status, Reason) {
@@ -151,7 +151,7 @@ impl<E: Engine> BrakingEstimator<E> {
             BrakingCoefficient::Friction => Parameter::DiscFriction,
             BrakingCoefficient::Ratio => Parameter::BrakingRatio,
         };
-        let Estimate { coefficient, scale, covariance, .. } = *estimate;
+        let BrakingEstimate { coefficient, scale, covariance, .. } = *estimate;
         let variance = coefficient.std * coefficient.std;
         if self.kind == PipelineKind::AdhesionLaw && is_number {
             write_parameters(
@@ -167,7 +167,7 @@ impl<E: Engine> BrakingEstimator<E> {
         self.case(estimate, is_stale, is_number).verdict()
     }
 
-    fn case(&self, estimate: &Estimate, is_stale: bool, is_number: bool) -> Case {
+    fn case(&self, estimate: &BrakingEstimate, is_stale: bool, is_number: bool) -> StatusInputs {
         let counts = self.settings.counts(estimate);
         let is_impossible = counts && estimate.coefficient.value <= 0.0;
         let is_too_large = self.innovations.are_too_large();
@@ -178,7 +178,7 @@ impl<E: Engine> BrakingEstimator<E> {
             true => Some((Status::Invalid, Reason::AtBound)),
             false => awaited.map(|(_, reason)| (Status::Unestimated, reason)),
         };
-        Case {
+        StatusInputs {
             fault,
             input: None,
             is_ready: counts,

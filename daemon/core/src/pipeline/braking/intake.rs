@@ -4,7 +4,7 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{BrakeGear, Davis, TrainModel};
 use dynocar_shared::{Reason, RejectionReason};
 
-use super::engine::{BrakingSettings, Observation};
+use super::engine::{BrakingObservation, BrakingSettings};
 use super::motion::StepInputs;
 
 /// The coefficient that is looked for.
@@ -33,9 +33,9 @@ pub enum Intake {
     /// The sample cannot be used.
     Refused(RejectionReason),
     /// A braking starts here.
-    Start(Observation),
+    Start(BrakingObservation),
     /// A step ends here.
-    Step(StepInputs, Observation),
+    Step(StepInputs, BrakingObservation),
 }
 
 /// Modelled values at one sample.
@@ -207,8 +207,8 @@ impl BrakingIntake {
     }
 }
 
-fn observation(sample: &ResolvedSample, distance_m: f64, known: &Known) -> Observation {
-    Observation {
+fn observation(sample: &ResolvedSample, distance_m: f64, known: &Known) -> BrakingObservation {
+    BrakingObservation {
         distance_m,
         speed_mps: sample.speed_mps,
         is_speed_valid: !sample.is_sliding,

@@ -4,7 +4,7 @@ use dynocar_shared::RailCondition;
 
 /// Why a table of a coefficient over speed is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum TableError {
+pub enum SpeedTableError {
     /// There are fewer than two points.
     #[error("expected at least two points, got {count}")]
     TooFewPoints {
@@ -36,16 +36,16 @@ impl SpeedTable {
     ///
     /// # Errors
     ///
-    /// See [`TableError`].
-    pub fn new(points: Vec<(f64, f64)>) -> Result<Self, TableError> {
+    /// See [`SpeedTableError`].
+    pub fn new(points: Vec<(f64, f64)>) -> Result<Self, SpeedTableError> {
         if points.len() < 2 {
-            return Err(TableError::TooFewPoints { count: points.len() });
+            return Err(SpeedTableError::TooFewPoints { count: points.len() });
         }
         for (i, &(speed_mps, coefficient)) in points.iter().enumerate() {
             let is_rising = i == 0 || points[i - 1].0 < speed_mps;
             let is_valid = speed_mps.is_finite() && coefficient.is_finite() && coefficient > 0.0;
             if !(is_rising && is_valid) {
-                return Err(TableError::BadPoint { index: i + 1, speed_mps, coefficient });
+                return Err(SpeedTableError::BadPoint { index: i + 1, speed_mps, coefficient });
             }
         }
         Ok(SpeedTable { points })
@@ -67,7 +67,7 @@ impl SpeedTable {
 
 /// The known shape of a coefficient; the estimated scale multiplies it.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Law {
+pub enum BrakingLaw {
     /// The same at all speeds: the scale is the coefficient itself.
     Constant,
     /// The demand of the brake: the scale is the achieved share of it.
@@ -78,16 +78,16 @@ pub enum Law {
     Table(SpeedTable),
 }
 
-impl Law {
+impl BrakingLaw {
     /// The law's coefficient at a speed in m/s, and its derivative by speed in s/m.
     pub fn at(&self, speed_mps: f64, demand: f64) -> (f64, f64) {
         match self {
-            Law::Constant => (1.0, 0.0),
-            Law::Demand => (demand, 0.0),
-            Law::Rail(condition) => {
+            BrakingLaw::Constant => (1.0, 0.0),
+            BrakingLaw::Demand => (demand, 0.0),
+            BrakingLaw::Rail(condition) => {
                 (condition.adhesion(speed_mps), condition.adhesion_slope_s_per_m(speed_mps))
             }
-            Law::Table(table) => table.at(speed_mps),
+            BrakingLaw::Table(table) => table.at(speed_mps),
         }
     }
 }
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_table_is_linear_between_its_points_and_constant_beyond() {
-        let law = Law::Table(SpeedTable::new(vec![(10.0, 0.3), (20.0, 0.2)]).unwrap());
+        let law = BrakingLaw::Table(SpeedTable::new(vec![(10.0, 0.3), (20.0, 0.2)]).unwrap());
         let (value, slope) = law.at(15.0, f64::NAN);
         assert!((value - 0.25).abs() < 1e-15 && (slope + 0.01).abs() < 1e-15);
         assert_eq!(law.at(5.0, 0.0), (0.3, 0.0));
@@ -107,10 +107,13 @@ mod tests {
 
     #[test]
     fn a_bad_table_is_refused_with_its_point() {
-        assert_eq!(SpeedTable::new(vec![(0.0, 0.3)]), Err(TableError::TooFewPoints { count: 1 }));
+        assert_eq!(
+            SpeedTable::new(vec![(0.0, 0.3)]),
+            Err(SpeedTableError::TooFewPoints { count: 1 })
+        );
         for bad in [(0.0, 0.3), (1.0, 0.0), (1.0, f64::NAN)] {
             let refused = SpeedTable::new(vec![(0.0, 0.3), bad]);
-            assert!(matches!(refused, Err(TableError::BadPoint { index: 2, .. })));
+            assert!(matches!(refused, Err(SpeedTableError::BadPoint { index: 2, .. })));
         }
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! An interacting multiple-model filter (Blom and Bar-Shalom 1988). Every hypothesis is a law
 //! with its own scale; one of them may be that the brake, not the rail, is the smaller one
-//! ([`Law::Demand`]). A change of hypothesis keeps distance and speed and opens the scale anew,
+//! ([`BrakingLaw::Demand`]). A change of hypothesis keeps distance and speed and opens the scale anew,
 //! since the rail behind the tunnel portal says nothing of the rail inside.
 
 use dynocar_shared::Uncertain;
 use nalgebra::Vector1;
 
-use super::engine::{Engine, EngineStep, Estimate, Observation};
-use super::law::Law;
+use super::engine::{BrakingEstimate, BrakingObservation, Engine, EngineStep};
+use super::law::BrakingLaw;
 use super::motion::{DRIFT, SCALE, SPEED, STATES, StepInputs};
 use super::tracker::{TrackerModel, measure};
 use crate::filter::Gaussian;
@@ -79,7 +79,7 @@ impl LawBank {
     }
 
     /// Mean and spread of the coefficient over the hypotheses that `counts` admits.
-    fn mixture(&self, counts: impl Fn(&Law) -> bool) -> Option<(Uncertain, f64)> {
+    fn mixture(&self, counts: impl Fn(&BrakingLaw) -> bool) -> Option<(Uncertain, f64)> {
         let mut mixture = Mixture::<1>::default();
         for (law, share) in self.laws.hypotheses().iter().zip(self.shares) {
             if counts(&law.model.law) {
@@ -102,7 +102,7 @@ fn reopen(state: &Gaussian<STATES>, scale: Uncertain) -> Gaussian<STATES> {
 }
 
 impl Engine for LawBank {
-    fn start(&mut self, first: &Observation) {
+    fn start(&mut self, first: &BrakingObservation) {
         for (law, weight) in self.laws.weighed_mut() {
             law.state = law.model.initial(first);
             *weight = 0.0;
@@ -112,7 +112,7 @@ impl Engine for LawBank {
         self.is_started = true;
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<EngineStep> {
+    fn step(&mut self, inputs: &StepInputs, observed: &BrakingObservation) -> Option<EngineStep> {
         if !self.is_started {
             self.start(observed);
             return Some(EngineStep::Restarted);
@@ -141,11 +141,11 @@ impl Engine for LawBank {
         }
     }
 
-    fn estimate(&self) -> Option<Estimate> {
+    fn estimate(&self) -> Option<BrakingEstimate> {
         if !self.is_started {
             return None;
         }
-        let is_demand = |law: &Law| *law == Law::Demand;
+        let is_demand = |law: &BrakingLaw| *law == BrakingLaw::Demand;
         let limited = self.mixture(is_demand).map_or(0.0, |(_, weight)| weight);
         let (best, share) = self
             .laws
@@ -157,6 +157,6 @@ impl Engine for LawBank {
         let own = best.model.estimate(&best.state, self.demand);
         let (mixed, weight) = self.mixture(|law| is_demand(law) == (limited > 0.5))?;
         let coefficient = if share > CLEAR * weight { own.coefficient } else { mixed };
-        Some(Estimate { coefficient, brake_limited: Some(limited), ..own })
+        Some(BrakingEstimate { coefficient, brake_limited: Some(limited), ..own })
     }
 }

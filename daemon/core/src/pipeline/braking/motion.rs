@@ -12,7 +12,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::law::Law;
+use super::law::BrakingLaw;
 
 /// Place in the state of the distance in m since the brakes came on.
 pub const DISTANCE: usize = 0;
@@ -114,7 +114,7 @@ pub struct Move {
 }
 
 /// Moves the train over one step.
-pub fn advance(inputs: &StepInputs, law: &Law, speed_mps: f64, scale: f64) -> Move {
+pub fn advance(inputs: &StepInputs, law: &BrakingLaw, speed_mps: f64, scale: f64) -> Move {
     advance_under(inputs, law.at(speed_mps, inputs.demand), speed_mps, scale)
 }
 
@@ -140,7 +140,7 @@ pub fn advance_under(
 /// Mean of the state after a step, and the Jacobian.
 pub fn predict(
     inputs: &StepInputs,
-    law: &Law,
+    law: &BrakingLaw,
     walk: Walk,
     mean: &SVector<f64, STATES>,
 ) -> (SVector<f64, STATES>, SMatrix<f64, STATES, STATES>) {
@@ -231,7 +231,8 @@ mod tests {
     #[test]
     fn the_jacobian_is_the_derivative() {
         let state = SVector::from([120.0, 60.0, 0.9, -0.01]);
-        for law in [Law::Constant, Law::Demand, Law::Rail(RailCondition::Wet)] {
+        for law in [BrakingLaw::Constant, BrakingLaw::Demand, BrakingLaw::Rail(RailCondition::Wet)]
+        {
             let (_, jacobian) = predict(&inputs(), &law, WALK, &state);
             for column in 0..STATES {
                 let step = 1e-5;
@@ -261,7 +262,8 @@ mod tests {
             measured_speed_m2_per_s2: None,
         };
         for walk in [WALK, Walk::Scale(1e-4)] {
-            let (_, jacobian) = predict(&inputs(), &Law::Rail(RailCondition::Wet), walk, &state);
+            let (_, jacobian) =
+                predict(&inputs(), &BrakingLaw::Rail(RailCondition::Wet), walk, &state);
             let added = process_noise(&noise, walk, inputs().step_s);
             let moved = move_covariance(&jacobian, &covariance, &added);
             let full = jacobian * covariance * jacobian.transpose() + added;
@@ -273,7 +275,7 @@ mod tests {
     #[test]
     fn a_train_without_brake_and_resistance_keeps_its_speed() {
         let free = StepInputs { tied_mps2: 0.0, basic_mps2: [0.0; 3], ..inputs() };
-        let moved = advance(&free, &Law::Constant, 50.0, 0.0);
+        let moved = advance(&free, &BrakingLaw::Constant, 50.0, 0.0);
         assert_eq!((moved.speed_mps, moved.travelled_m), (50.0, 10.0));
     }
 

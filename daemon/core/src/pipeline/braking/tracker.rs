@@ -6,8 +6,8 @@
 use dynocar_shared::Uncertain;
 use nalgebra::{SMatrix, SVector};
 
-use super::engine::{BrakingSettings, Engine, EngineStep, Estimate, Observation};
-use super::law::Law;
+use super::engine::{BrakingEstimate, BrakingObservation, BrakingSettings, Engine, EngineStep};
+use super::law::BrakingLaw;
 use super::motion::{self, DISTANCE, MotionNoise, SCALE, SPEED, STATES, StepInputs, Walk};
 use crate::filter::fixed_lag::FixedLagSmoother;
 use crate::filter::{Gaussian, NotPositiveDefinite};
@@ -26,7 +26,7 @@ pub enum PriorScale {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrackerModel {
     /// Shape of the coefficient.
-    pub law: Law,
+    pub law: BrakingLaw,
     /// Noise of motion and measurement.
     pub noise: MotionNoise,
     /// How the scale wanders.
@@ -39,7 +39,7 @@ pub struct TrackerModel {
 
 impl TrackerModel {
     /// The model of a law with the noise of the settings.
-    pub fn new(settings: &BrakingSettings, law: Law, walk: Walk, prior: PriorScale) -> Self {
+    pub fn new(settings: &BrakingSettings, law: BrakingLaw, walk: Walk, prior: PriorScale) -> Self {
         let first_speed_std_mps = settings.first_speed_std_mps;
         TrackerModel { law, noise: settings.noise(), walk, first_speed_std_mps, prior }
     }
@@ -56,7 +56,7 @@ impl TrackerModel {
     }
 
     /// The belief after a first observation.
-    pub fn initial(&self, first: &Observation) -> Gaussian<STATES> {
+    pub fn initial(&self, first: &BrakingObservation) -> Gaussian<STATES> {
         let scale = self.prior_scale(first.speed_mps, first.demand);
         Gaussian::independent(
             SVector::from([first.distance_m, first.speed_mps, scale.value, 0.0]),
@@ -84,7 +84,7 @@ impl TrackerModel {
     }
 
     /// Measured components with their values and noise variances, in order.
-    pub fn measurements(&self, observed: &Observation) -> [Option<(usize, f64, f64)>; 2] {
+    pub fn measurements(&self, observed: &BrakingObservation) -> [Option<(usize, f64, f64)>; 2] {
         let distance = (DISTANCE, observed.distance_m, self.noise.measured_distance_m2);
         let speed = self
             .noise
@@ -95,13 +95,13 @@ impl TrackerModel {
     }
 
     /// The estimate that a belief about the state implies.
-    pub fn estimate(&self, state: &Gaussian<STATES>, demand: f64) -> Estimate {
+    pub fn estimate(&self, state: &Gaussian<STATES>, demand: f64) -> BrakingEstimate {
         let (shape, shape_slope) = self.law.at(state.mean[SPEED], demand);
         let scale = state.mean[SCALE];
         let mut row = SVector::<f64, STATES>::zeros();
         (row[SPEED], row[SCALE]) = (shape_slope * scale, shape);
         let cross = state.covariance * row;
-        Estimate {
+        BrakingEstimate {
             coefficient: Uncertain::new(shape * scale, row.dot(&cross).max(0.0).sqrt()),
             scale: Uncertain::new(scale, state.std(SCALE)),
             covariance: cross[SCALE],
@@ -189,13 +189,13 @@ impl Tracker {
     }
 
     /// Starts anew from here, with the belief about the speed kept but opened.
-    fn restart(&mut self, observed: &Observation) {
+    fn restart(&mut self, observed: &BrakingObservation) {
         let speed_mps = match self.state {
             Some(state) if !observed.is_speed_valid => state.mean[SPEED],
             _ => observed.speed_mps,
         };
         self.smoother.freeze();
-        self.state = Some(self.model.initial(&Observation { speed_mps, ..*observed }));
+        self.state = Some(self.model.initial(&BrakingObservation { speed_mps, ..*observed }));
         self.outliers = OutlierRow::default();
         self.changes = Default::default();
         self.remember(observed.demand);
@@ -203,14 +203,14 @@ impl Tracker {
 }
 
 impl Engine for Tracker {
-    fn start(&mut self, first: &Observation) {
+    fn start(&mut self, first: &BrakingObservation) {
         self.smoother.clear();
         self.state = None;
         self.time_s = 0.0;
         self.restart(first);
     }
 
-    fn step(&mut self, inputs: &StepInputs, observed: &Observation) -> Option<EngineStep> {
+    fn step(&mut self, inputs: &StepInputs, observed: &BrakingObservation) -> Option<EngineStep> {
         let Some(state) = &mut self.state else {
             self.start(observed);
             return Some(EngineStep::Restarted);
@@ -264,7 +264,7 @@ impl Engine for Tracker {
         self.model.noise.measured_distance_m2 = variance_m2;
     }
 
-    fn estimate(&self) -> Option<Estimate> {
+    fn estimate(&self) -> Option<BrakingEstimate> {
         // Half a millisecond of tolerance for the rounding of summed steps.
         let until_s = self.time_s - self.lag_s + 5e-4;
         let lagged = self
@@ -274,7 +274,7 @@ impl Engine for Tracker {
             .or_else(|| self.smoother.oldest())?;
         let Moment { shape, demand, .. } = lagged.tag;
         let std = lagged.variance.max(0.0).sqrt();
-        Some(Estimate {
+        Some(BrakingEstimate {
             coefficient: Uncertain::new(shape * lagged.mean, shape.abs() * std),
             scale: Uncertain::new(lagged.mean, std),
             covariance: shape * lagged.variance.max(0.0),
@@ -292,7 +292,7 @@ impl Engine for Tracker {
 pub fn measure(
     model: &TrackerModel,
     state: &mut Gaussian<STATES>,
-    observed: &Observation,
+    observed: &BrakingObservation,
 ) -> Result<(f64, f64), NotPositiveDefinite> {
     let (mut log_likelihood, mut first_normalised) = (0.0, None);
     for (component, measured, variance) in model.measurements(observed).into_iter().flatten() {

@@ -2,7 +2,7 @@
 //!
 //! - [`InnovationMonitor`]: whether the innovations are as large and as white as the covariance says
 //! - [`LackOfFit`]: whether a force that no parameter explains stays
-//! - [`Case`]: all that is known of an estimate, and the verdict on it
+//! - [`StatusInputs`]: all that is known of an estimate, and the verdict on it
 //! - [`InputState`], [`Judgement`]: what an estimator is given to judge by, and its answer
 
 use dynocar_model::force::ResolvedSample;
@@ -16,7 +16,7 @@ mod innovations;
 
 /// All that is known of an estimate when it is judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Case {
+pub struct StatusInputs {
     /// Fault that takes precedence over any judgement, such as a numerical failure.
     pub fault: Option<(Status, Reason)>,
     /// Recent fault of the samples.
@@ -33,7 +33,7 @@ pub struct Case {
     pub caveat: Reason,
 }
 
-impl Case {
+impl StatusInputs {
     /// Status and reason.
     pub fn verdict(&self) -> (Status, Reason) {
         let is_there = self.is_ready && self.is_known;
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn the_verdict_names_what_is_lacking_before_what_contradicts() {
-        let good = Case {
+        let good = StatusInputs {
             fault: None,
             input: None,
             is_ready: true,
@@ -146,18 +146,24 @@ mod tests {
         let fault = Some((Status::Invalid, Reason::NumericalFailure));
         for (case, expected) in [
             (good, (Status::Estimated, Reason::AtBound)),
-            (Case { contradiction, ..good }, (Status::Degraded, Reason::InnovationsTooLarge)),
             (
-                Case { contradiction, is_known: false, ..good },
+                StatusInputs { contradiction, ..good },
+                (Status::Degraded, Reason::InnovationsTooLarge),
+            ),
+            (
+                StatusInputs { contradiction, is_known: false, ..good },
                 (Status::Unestimated, Reason::WeakExcitation),
             ),
             (
-                Case { is_known: false, is_ready: false, ..good },
+                StatusInputs { is_known: false, is_ready: false, ..good },
                 (Status::Unestimated, Reason::TooFewSamples),
             ),
-            (Case { input, contradiction, ..good }, (Status::Degraded, Reason::BadInput)),
-            (Case { input, is_known: false, ..good }, (Status::Unestimated, Reason::BadInput)),
-            (Case { fault, input, ..good }, (Status::Invalid, Reason::NumericalFailure)),
+            (StatusInputs { input, contradiction, ..good }, (Status::Degraded, Reason::BadInput)),
+            (
+                StatusInputs { input, is_known: false, ..good },
+                (Status::Unestimated, Reason::BadInput),
+            ),
+            (StatusInputs { fault, input, ..good }, (Status::Invalid, Reason::NumericalFailure)),
         ] {
             assert_eq!(case.verdict(), expected, "{case:?}");
         }

@@ -10,7 +10,7 @@ use dynocar_model::train::Davis;
 use dynocar_shared::RejectionReason;
 
 use super::{
-    BRAKE_SCALE, Columns, DataSettings, FORCE_DELAY, MomentumBlock, SinceBlock, SpeedWatch,
+    BRAKE_SCALE, DataSettings, FORCE_DELAY, MomentumBlock, MomentumColumns, SinceBlock, SpeedWatch,
     TRACTION_SCALE, UnitSample, resistance_integral, trapezoids,
 };
 use crate::filter::FittedLine;
@@ -26,7 +26,7 @@ struct Block {
     /// Time since the mean of the block before, at the first sample.
     start_s: f64,
     speed_sum: f64,
-    integral_sum: Columns,
+    integral_sum: MomentumColumns,
     /// The speed less what the forces explain, over time: its scatter is noise.
     rest: FittedLine,
     edge_variance: f64,
@@ -40,7 +40,7 @@ struct Chain {
     start_ns: i64,
     last: UnitSample,
     /// Integral of each column since the mean of the block before.
-    integral: Columns,
+    integral: MomentumColumns,
     block: Block,
     /// Variance of the impulse in the block before; `None` in the first block.
     variance_before: Option<f64>,
@@ -127,7 +127,7 @@ impl Chain {
         let mut chain = Chain {
             start_ns: first.time_ns,
             last: *first,
-            integral: Columns::zeros(),
+            integral: MomentumColumns::zeros(),
             block: Block::open(first, 0.0),
             variance_before: None,
         };
@@ -180,7 +180,7 @@ impl Block {
             first: *first,
             start_s,
             speed_sum: 0.0,
-            integral_sum: Columns::zeros(),
+            integral_sum: MomentumColumns::zeros(),
             rest: FittedLine::default(),
             edge_variance: 0.0,
             speed_min_mps: f64::INFINITY,
@@ -188,7 +188,7 @@ impl Block {
         }
     }
 
-    fn add(&mut self, now: &UnitSample, integral: &Columns, gained_mps: f64) {
+    fn add(&mut self, now: &UnitSample, integral: &MomentumColumns, gained_mps: f64) {
         self.speed_sum += now.speed_mps;
         self.integral_sum += integral;
         self.rest.push(integral[1] - self.start_s, now.speed_mps - gained_mps);

@@ -40,7 +40,7 @@ pub const COLUMNS: usize = 1 + UNKNOWNS;
 pub const SPEED_SCALE_MPS: f64 = 20.0;
 
 /// Known part and regressors by column.
-pub type Columns = SVector<f64, COLUMNS>;
+pub type MomentumColumns = SVector<f64, COLUMNS>;
 
 /// The scaled regressors of w0 at a speed in m/s.
 pub fn regressors(speed_mps: f64) -> [f64; PARAMETERS] {
@@ -68,7 +68,7 @@ pub fn gap_s(last_ns: &mut Option<i64>, time_ns: i64) -> Option<f64> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SinceBlock {
     /// The integral of the driving force, then what each unknown takes off it.
-    pub impulse: Columns,
+    pub impulse: MomentumColumns,
     /// Momentum per weight and speed.
     pub inertia: f64,
 }
@@ -84,7 +84,7 @@ pub struct MomentumBlock {
     pub momentum_variance: f64,
     /// From the mean of the block before to this one's: the integral of f, then what each
     /// unknown takes off it.
-    pub impulse: Columns,
+    pub impulse: MomentumColumns,
     /// Variance of the integral of f.
     pub impulse_variance: f64,
     /// Time of the newest sample in ns.

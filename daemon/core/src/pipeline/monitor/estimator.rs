@@ -8,15 +8,15 @@ use nalgebra::{Vector1, Vector3};
 
 use super::MonitorSettings;
 use super::covariates::{CovariateImpulse, PlaceMemory, RunClock, covariates};
-use super::information::{BaseVector, Information, usual};
+use super::information::{BaseVector, MonitorInformation, usual};
 use super::pressure::ReleasedPressure;
-use super::rows::{DesignRow, Parameters, Rows, units};
+use super::rows::{DesignRow, ParameterVector, Rows, units};
 use super::suspects::{
     BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, Onsets, SUSPECTS, suspect_of,
 };
-use super::verdict::{ResidualEvidence, Verdict};
+use super::verdict::{MonitorVerdict, ResidualEvidence};
 use super::wheel_scale::WheelScale;
-use crate::pipeline::judge::{Case, InputState, Judgement};
+use crate::pipeline::judge::{InputState, Judgement, StatusInputs};
 use crate::pipeline::momentum::blocks::MomentumBlocks;
 use crate::pipeline::momentum::{
     BRAKE_SCALE, MomentumBlock, PARAMETERS as DAVIS, TRACTION_SCALE, UnitSample, regressors,
@@ -60,15 +60,15 @@ pub struct ResidualMonitor {
     impulse: CovariateImpulse,
     rows: Rows,
     onsets: Onsets,
-    information: Information,
-    verdict: Verdict,
+    information: MonitorInformation,
+    verdict: MonitorVerdict,
     innovations: InnovationMonitor,
     cut_innovations: InnovationMonitor,
     /// Since when the suspected effect has been suspected.
     suspected_since: Option<(EffectKind, i64)>,
     newest_ns: i64,
     /// The model as it is believed: base parameters about the declared ones, and the suspect's.
-    model: Parameters,
+    model: ParameterVector,
     known: Davis,
     /// Where and with which momentum the newest block ended.
     last_block: Option<(Option<f64>, f64)>,
@@ -107,13 +107,13 @@ impl ResidualMonitor {
             impulse: CovariateImpulse::new(),
             rows: Rows::new(&settings, declared),
             onsets: Onsets::new(),
-            information: Information::new(&base_std),
-            verdict: Verdict::new(&settings, kept_per_row),
+            information: MonitorInformation::new(&base_std),
+            verdict: MonitorVerdict::new(&settings, kept_per_row),
             innovations: InnovationMonitor::new(MONITOR_ROWS),
             cut_innovations: InnovationMonitor::new(CUT_ROWS),
             suspected_since: None,
             newest_ns: i64::MIN,
-            model: Parameters::zeros(),
+            model: ParameterVector::zeros(),
             known: declared,
             last_block: None,
             unexplained: (0.0, settings.davis_std_share * declared.w0_n_per_kn(20.0)),
@@ -192,7 +192,7 @@ impl ResidualMonitor {
         let units = units(block, &impulse, &self.onsets);
         self.remember_place(block, &units, sample);
         let (model, declared) = (&self.model, &self.declared_base);
-        let predicted = |features: &Parameters| {
+        let predicted = |features: &ParameterVector| {
             features.dot(model) + features.fixed_rows::<BASE>(0).dot(declared)
         };
         let Some(mut row) = self.rows.push(block, &units, predicted) else {
@@ -231,7 +231,7 @@ impl ResidualMonitor {
     fn remember_place(
         &mut self,
         block: &MomentumBlock,
-        units: &Parameters,
+        units: &ParameterVector,
         sample: &ResolvedSample,
     ) {
         let before = self.last_block.replace((sample.position_m, block.momentum));
@@ -247,7 +247,7 @@ impl ResidualMonitor {
         self.places.push(position_m, sample.direction, unexplained / block.impulse[1]);
     }
 
-    fn judge(&mut self, units: &Parameters, speed_mps: f64, is_new_place: bool) {
+    fn judge(&mut self, units: &ParameterVector, speed_mps: f64, is_new_place: bool) {
         let Ok(base) = self.information.base() else { return self.reset() };
         self.verdict.judge(&ResidualEvidence {
             information: &self.information,
@@ -292,11 +292,11 @@ impl ResidualMonitor {
 
     /// Starts anew after a numerical failure.
     fn reset(&mut self) {
-        self.information = Information::new(&self.base_std);
+        self.information = MonitorInformation::new(&self.base_std);
         self.rows = Rows::new(&self.settings, self.declared);
-        self.verdict = Verdict::new(&self.settings, self.kept_per_row);
+        self.verdict = MonitorVerdict::new(&self.settings, self.kept_per_row);
         self.onsets = Onsets::new();
-        self.model = Parameters::zeros();
+        self.model = ParameterVector::zeros();
         self.known = self.declared;
         self.blocks.break_chain();
         self.resets += 1;
@@ -358,7 +358,7 @@ impl Estimator for ResidualMonitor {
         write_parameters(snapshot, [Parameter::UnexplainedForce], &values, &covariance);
         let named = self.verdict.naming.named();
         let has_rows = self.information.count >= ROWS_MIN;
-        let case = Case {
+        let case = StatusInputs {
             fault: None,
             input: None,
             is_ready: has_rows,

@@ -11,7 +11,7 @@ use dynocar_model::train::TrainModel;
 use nalgebra::{SMatrix, SVector};
 
 use super::MonitorSettings;
-use super::rows::{DesignRow, Parameters};
+use super::rows::{DesignRow, ParameterVector};
 use super::suspects::{BASE, CURVE, DAY_WIND, LOAD, PARAMETERS, WARMING};
 use crate::filter::NotPositiveDefinite;
 use crate::pipeline::momentum::{
@@ -28,9 +28,9 @@ type SuspectVector = SVector<f64, SUSPECTS>;
 
 /// All rows, condensed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Information {
+pub struct MonitorInformation {
     matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
-    side: Parameters,
+    side: ParameterVector,
     square_sum: f64,
     /// Rows taken in, the forgotten ones in part.
     pub count: f64,
@@ -57,7 +57,7 @@ pub struct BaseSolution {
 #[derive(Clone, Debug)]
 pub struct Believed<'a> {
     /// All parameters.
-    pub values: Parameters,
+    pub values: ParameterVector,
     base: &'a BaseSolution,
     /// The suspect's index next to the base model, and its variance.
     suspect: Option<(usize, f64)>,
@@ -148,7 +148,7 @@ impl BaseSolution {
 
     /// Returns the estimates with a suspect, of a prior standard deviation, or without one.
     pub fn believed(&self, suspect: Option<(usize, f64)>) -> Believed<'_> {
-        let mut values = Parameters::zeros();
+        let mut values = ParameterVector::zeros();
         let mut reduced = self.reduced;
         let suspect = suspect.map(|(parameter, prior_std)| {
             let Alternative { value, precision, .. } = self.alternative(parameter, prior_std);
@@ -163,7 +163,7 @@ impl BaseSolution {
 
 impl Believed<'_> {
     /// Variance of a sum of parameters by what the rows leave open.
-    pub fn variance_of(&self, weights: &Parameters) -> f64 {
+    pub fn variance_of(&self, weights: &ParameterVector) -> f64 {
         let reduced = self.base.forward(weights.fixed_rows::<BASE>(0).into_owned());
         let by_suspect = self.suspect.map_or(0.0, |(index, variance)| {
             let weight =
@@ -174,12 +174,12 @@ impl Believed<'_> {
     }
 }
 
-impl Information {
+impl MonitorInformation {
     /// No rows, and a prior standard deviation of each base parameter.
     pub fn new(base_std: &BaseVector) -> Self {
-        Information {
+        MonitorInformation {
             matrix: SMatrix::zeros(),
-            side: Parameters::zeros(),
+            side: ParameterVector::zeros(),
             square_sum: 0.0,
             count: 0.0,
             base_precision: base_std.map(|std| 1.0 / (std * std)),
@@ -201,7 +201,7 @@ impl Information {
     /// A parameter is another from now on, by a standard deviation: what the rows so far say of it
     /// is integrated over the difference.
     pub fn loosen(&mut self, parameter: usize, std: f64) {
-        let column: Parameters = self.matrix.column(parameter).into_owned();
+        let column: ParameterVector = self.matrix.column(parameter).into_owned();
         let pivot = column[parameter] + 1.0 / (std * std);
         let share = self.side[parameter] / pivot;
         self.matrix.ger(-1.0 / pivot, &column, &column, 1.0);
@@ -329,10 +329,10 @@ mod tests {
     #[test]
     fn what_another_suspect_explains_is_not_found_next_to_it_and_what_it_does_not_is() {
         let [one, two] = [BASE, BASE + 1];
-        let mut information = Information::new(&BaseVector::repeat(1.0));
+        let mut information = MonitorInformation::new(&BaseVector::repeat(1.0));
         for row in 0..400 {
             let at = |period: f64| (f64::from(row) / period).sin();
-            let mut features = Parameters::zeros();
+            let mut features = ParameterVector::zeros();
             (features[0], features[one], features[two]) = (at(3.0), at(5.0), at(5.0) + at(7.0));
             let observed = 2.0 * features[one] + 0.7 * at(9.0);
             information.push(&DesignRow { features, observed, weight: 1.0 }, 1.0);
@@ -354,11 +354,11 @@ mod tests {
 
     #[test]
     fn a_scale_that_is_another_in_each_run_keeps_its_value_and_is_no_surer_than_runs_differ() {
-        let mut information = Information::new(&BaseVector::repeat(1.0));
-        let mut features = Parameters::zeros();
+        let mut information = MonitorInformation::new(&BaseVector::repeat(1.0));
+        let mut features = ParameterVector::zeros();
         features[TRACTION_SCALE] = 1e4;
         information.push(&DesignRow { features, observed: 0.02 * 1e4, weight: 1.0 }, 1.0);
-        let scale = |it: &Information| it.base().unwrap().parameter(TRACTION_SCALE);
+        let scale = |it: &MonitorInformation| it.base().unwrap().parameter(TRACTION_SCALE);
         assert!(scale(&information).1.sqrt() < 2e-4);
         information.loosen(TRACTION_SCALE, 0.003);
         let (value, variance) = scale(&information);

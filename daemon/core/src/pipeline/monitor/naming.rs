@@ -53,7 +53,7 @@ impl Named {
 
 /// Evidence for the candidates after a block.
 #[derive(Clone, Copy, Debug)]
-pub struct Standing<'a> {
+pub struct CandidateEvidence<'a> {
     /// Evidence for each being there now.
     pub net: &'a [f64; CANDIDATES],
     /// Evidence for each by all that was seen, by which they are compared.
@@ -144,8 +144,8 @@ impl Naming {
     }
 
     /// Takes in what speaks for whom after a block.
-    pub fn take(&mut self, standing: &Standing) {
-        let Standing { net, rank, .. } = *standing;
+    pub fn take(&mut self, standing: &CandidateEvidence) {
+        let CandidateEvidence { net, rank, .. } = *standing;
         self.let_go *= LET_GO_KEPT;
         let least = STAYS_SHARE * self.evidence_min;
         let leading = (0..CANDIDATES)
@@ -172,7 +172,7 @@ impl Naming {
     }
 
     /// A candidate as it is reported.
-    fn named_from(&self, candidate: usize, least: f64, standing: &Standing) -> Named {
+    fn named_from(&self, candidate: usize, least: f64, standing: &CandidateEvidence) -> Named {
         let effect = effect_of(candidate);
         let mut bits = alternatives(candidate, least, standing);
         let is_a_brake = effect == EffectKind::DraggingBrake && !standing.is_pressure_raised;
@@ -207,7 +207,7 @@ impl Naming {
 
     /// Innovations larger than small things explain, and no suspect; what earlier segments spoke for
     /// may be behind it, or a place that was never passed.
-    fn unknown(&self, standing: &Standing) -> Option<Named> {
+    fn unknown(&self, standing: &CandidateEvidence) -> Option<Named> {
         let evidence = self.unexplained(standing)?;
         let likely = bits_of(|candidate| standing.rank[candidate] > self.evidence_min);
         Some(Named {
@@ -219,7 +219,7 @@ impl Naming {
     }
 
     /// Returns the evidence for a force that the model does not explain, if it is enough.
-    fn unexplained(&self, standing: &Standing) -> Option<f64> {
+    fn unexplained(&self, standing: &CandidateEvidence) -> Option<f64> {
         let innovations = standing.cut_innovations;
         let count = innovations.effective_count();
         // Twice the log-likelihood ratio of normal innovations of that variance against 1,
@@ -238,8 +238,8 @@ fn bits_of(is_so: impl Fn(usize) -> bool) -> u32 {
 }
 
 /// The effects that are hardly distinguishable from the chosen one: by their evidence, or by what they are.
-fn alternatives(chosen: usize, least: f64, standing: &Standing) -> u32 {
-    let Standing { net, rank, .. } = *standing;
+fn alternatives(chosen: usize, least: f64, standing: &CandidateEvidence) -> u32 {
+    let CandidateEvidence { net, rank, .. } = *standing;
     let effect = effect_of(chosen);
     // An error that is there in part in the base model may be certain, and yet not of this kind.
     let is_likely = |other: usize| net[other] > least || rank[other] > 0.0;
@@ -268,7 +268,7 @@ mod tests {
         }
         let cut_innovations = InnovationMonitor::new(100);
         for _ in 0..blocks {
-            naming.take(&Standing {
+            naming.take(&CandidateEvidence {
                 net: &net,
                 rank: &net,
                 left_by_name: 0.0,

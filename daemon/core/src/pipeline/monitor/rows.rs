@@ -17,13 +17,13 @@ const COLUMNS: usize = 1 + PARAMETERS;
 const HUBER: f64 = 4.0;
 
 /// One value for each parameter.
-pub type Parameters = SVector<f64, PARAMETERS>;
+pub type ParameterVector = SVector<f64, PARAMETERS>;
 
 /// `observed = features . parameters + error`, the error of unit variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DesignRow {
     /// Regressors.
-    pub features: Parameters,
+    pub features: ParameterVector,
     /// Observed sum.
     pub observed: f64,
     /// Weight by Huber's function.
@@ -31,8 +31,8 @@ pub struct DesignRow {
 }
 
 /// Returns the design row: momentum removed over a block per unit of each parameter, including open onsets.
-pub fn units(block: &MomentumBlock, covariates: &Covariates, onsets: &Onsets) -> Parameters {
-    let mut units = Parameters::zeros();
+pub fn units(block: &MomentumBlock, covariates: &Covariates, onsets: &Onsets) -> ParameterVector {
+    let mut units = ParameterVector::zeros();
     units.fixed_rows_mut::<UNKNOWNS>(0).copy_from(&block.impulse.fixed_rows::<UNKNOWNS>(1));
     units.fixed_rows_mut::<COVARIATES>(UNKNOWNS).copy_from(covariates);
     for index in (0..ONSETS).filter(|&index| onsets.age(index).is_some()) {
@@ -77,8 +77,8 @@ impl Rows {
     pub fn push(
         &mut self,
         block: &MomentumBlock,
-        units: &Parameters,
-        predicted: impl Fn(&Parameters) -> f64,
+        units: &ParameterVector,
+        predicted: impl Fn(&ParameterVector) -> f64,
     ) -> Option<DesignRow> {
         let gap_s = gap_s(&mut self.last_time_ns, block.time_ns);
         let small = self.small_forces(block);
@@ -98,7 +98,7 @@ impl Rows {
     fn see(
         &mut self,
         block: &MomentumBlock,
-        predicted: impl Fn(&Parameters) -> f64,
+        predicted: impl Fn(&ParameterVector) -> f64,
     ) -> Option<DesignRow> {
         let sighting = momentum_seen(block.momentum, block.momentum_variance);
         let row = self.whitener.take(&sighting).ok()?.columns;
@@ -121,9 +121,9 @@ impl Rows {
     }
 
     /// The disturbance now: known part, what each parameter takes off it, variance.
-    pub fn disturbance(&self) -> (f64, Parameters, f64) {
+    pub fn disturbance(&self) -> (f64, ParameterVector, f64) {
         let state = self.whitener.state;
-        let taken = Parameters::from_fn(|i, _| state[(DISTURBANCE, 1 + i)]);
+        let taken = ParameterVector::from_fn(|i, _| state[(DISTURBANCE, 1 + i)]);
         let variance = self.whitener.covariance[(DISTURBANCE, DISTURBANCE)];
         (state[(DISTURBANCE, 0)], taken, variance)
     }

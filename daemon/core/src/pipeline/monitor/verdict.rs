@@ -3,9 +3,9 @@
 use dynocar_model::terms::{Least, delay};
 
 use super::MonitorSettings;
-use super::information::{Alternative, BaseSolution, Information};
-use super::naming::{Naming, Standing};
-use super::rows::Parameters;
+use super::information::{Alternative, BaseSolution, MonitorInformation};
+use super::naming::{CandidateEvidence, Naming};
+use super::rows::ParameterVector;
 use super::suspects::{
     BASE, CANDIDATES, FIRST_BAND, FIRST_ONSET, Onsets, PARAMETERS, SEARCHED, SUSPECTS, UNUSUAL,
     WHEEL, suspect_of,
@@ -33,7 +33,7 @@ const PRIOR_ROWS: f64 = 20.0;
 #[derive(Clone, Copy, Debug)]
 pub struct ResidualEvidence<'a> {
     /// All rows.
-    pub information: &'a Information,
+    pub information: &'a MonitorInformation,
     /// The base model solved.
     pub base: &'a BaseSolution,
     /// Since when a brake may drag.
@@ -52,12 +52,12 @@ pub struct ResidualEvidence<'a> {
 
 /// Judges the candidates, block by block.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Verdict {
+pub struct MonitorVerdict {
     share_min: f64,
     kept_per_row: f64,
     /// Force of one unit of each parameter where it acts, and the resistance there, summed.
-    unit_force: Parameters,
-    resistance: Parameters,
+    unit_force: ParameterVector,
+    resistance: ParameterVector,
     /// Evidence that outlasted stops.
     held: [f64; SUSPECTS],
     /// Evidence of the segments between earlier stops, for what is another after each.
@@ -75,14 +75,14 @@ pub struct Verdict {
     leg_blocks: u32,
 }
 
-impl Verdict {
+impl MonitorVerdict {
     /// No suspicion.
     pub fn new(settings: &MonitorSettings, kept_per_row: f64) -> Self {
-        Verdict {
+        MonitorVerdict {
             share_min: settings.share_min,
             kept_per_row,
-            unit_force: Parameters::zeros(),
-            resistance: Parameters::zeros(),
+            unit_force: ParameterVector::zeros(),
+            resistance: ParameterVector::zeros(),
             held: [0.0; SUSPECTS],
             gathered: [0.0; SUSPECTS],
             own: [0.0; CANDIDATES],
@@ -95,7 +95,7 @@ impl Verdict {
 
     /// Notes how strongly one unit of each parameter acted in a block, jointly with the resistance in
     /// the same unit.
-    pub fn note_forces(&mut self, units: &Parameters, resistance: f64) {
+    pub fn note_forces(&mut self, units: &ParameterVector, resistance: f64) {
         self.unit_force *= self.kept_per_row;
         self.resistance *= self.kept_per_row;
         for parameter in UNKNOWNS..PARAMETERS {
@@ -233,7 +233,7 @@ impl Verdict {
             rank[BASE + suspect] =
                 rank[BASE + suspect].max(self.held[suspect]) + self.gathered[suspect];
         }
-        self.naming.take(&Standing {
+        self.naming.take(&CandidateEvidence {
             net: &net,
             rank: &rank,
             left_by_name: self.left_by_name(evidence),

@@ -3,7 +3,7 @@
 //! A brake that lags does so at every stop: with a lateness of mean zero each of a hundred departures pushes the resistance
 //! at low speed the same way, by less than its standard deviation, and all of them by far more.
 
-use super::motion_filter::{BRAKE_ERROR, Following, STATES, Step};
+use super::motion_filter::{BRAKE_ERROR, FilterStep, Following, STATES};
 use crate::filter::Gaussian;
 
 /// Weight that a standard deviation beforehand counts for, and what is looked back over.
@@ -98,7 +98,7 @@ impl BrakeErrors {
     /// # Real-time
     ///
     /// Constant work, no allocation.
-    pub fn learn(&mut self, step: &Step, belief: &Gaussian<STATES>) {
+    pub fn learn(&mut self, step: &FilterStep, belief: &Gaussian<STATES>) {
         let error = (belief.mean[BRAKE_ERROR], belief.covariance[(BRAKE_ERROR, BRAKE_ERROR)]);
         let renewed = step.brake_error.1;
         if step.brake_std > 0.0 {

@@ -9,13 +9,13 @@ use dynocar_model::train::TrainModel;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Quantity, RejectionReason};
 
 use super::TrainKalmanSettings;
-use super::bank::Measured;
 use super::brake_errors::BrakeErrors;
-use super::learned::{JumpShare, Learned, Resistance};
-use super::load::{Change, LoadWatch};
+use super::learned_state::{JumpShare, LearnedState, ResistanceBelief};
+use super::load::{LoadChange, LoadWatch};
+use super::motion_bank::SpeedLikelihood;
 use super::motion_filter::{FORCE_DELAY, LOAD, SPEED, wind_over};
-use super::report::{Report, Systematic};
-use super::steps::Steps;
+use super::report::{Systematic, TrainKalmanReport};
+use super::step_builder::StepBuilder;
 use crate::pipeline::judge::{InputState, Judgement, LONG_RUN_MAX};
 use crate::pipeline::momentum::UnitSample;
 use crate::pipeline::motion::{BRIDGED_MAX_S, STANDING_MPS, SpeedRange};
@@ -39,22 +39,22 @@ pub struct TrainKalman {
     settings: TrainKalmanSettings,
     train_kg: f64,
     /// Resistance as declared or kept, scaled, with its covariance.
-    first: Resistance,
-    learned: Learned,
+    first: ResistanceBelief,
+    learned: LearnedState,
     load: LoadWatch,
     /// Newest sample of the motion.
     last: Option<UnitSample>,
     last_time_ns: Option<i64>,
     /// True when the speed of the newest sample was at least the lowest that is used.
     is_fast: bool,
-    steps: Steps,
+    steps: StepBuilder,
     systematic: Systematic,
     speeds: SpeedRange,
     moved_s: f64,
     moved_min_s: f64,
     /// Estimate kept from earlier, until the first sample.
     kept: Option<Kept>,
-    report: Report,
+    report: TrainKalmanReport,
     is_fresh_reset: bool,
     resets: u64,
 }
@@ -78,14 +78,14 @@ impl TrainKalman {
         train: &Arc<TrainModel>,
     ) -> Result<Self, SettingError> {
         settings.check_ranges()?;
-        let first = Resistance::declared(&train.resistance, settings.prior_relative_std);
-        let learned = Learned::new(&settings, &first);
+        let first = ResistanceBelief::declared(&train.resistance, settings.prior_relative_std);
+        let learned = LearnedState::new(&settings, &first);
         Ok(TrainKalman {
-            report: Report::new(&learned.bank.published(0.0, 0.0)),
+            report: TrainKalmanReport::new(&learned.bank.published(0.0, 0.0, 0.0)),
             learned,
             settings,
             train_kg: train.mass_kg,
-            steps: Steps::new(&settings, train.length_m),
+            steps: StepBuilder::new(&settings, train.length_m),
             first,
             load: LoadWatch::new(&settings, train),
             last: None,
@@ -94,6 +94,7 @@ impl TrainKalman {
             systematic: Systematic::new(
                 settings.gradient_std_permille,
                 settings.acceleration_scale_std,
+                train.length_m,
             ),
             speeds: SpeedRange::default(),
             moved_s: 0.0,
@@ -144,12 +145,12 @@ impl TrainKalman {
         self.systematic.see(step.travelled_m, sample.position_m, now.speed_mps);
         self.moved_s += step.duration_s;
         self.is_fresh_reset &= self.moved_s < self.moved_min_s;
-        self.judge(step.by_wind);
+        self.judge(step.direction, step.by_wind);
         Outcome::Updated
     }
 
     /// Learns the noise of speeds and of forces that jump from what a speed said.
-    fn learn(&mut self, measured: &Measured, speed_mps: f64) {
+    fn learn(&mut self, measured: &SpeedLikelihood, speed_mps: f64) {
         self.learned.monitor.push(measured.trust.normalised);
         let belief = &self.learned.bank.likeliest().belief;
         let residual_mps = speed_mps - belief.mean[SPEED];
@@ -158,9 +159,10 @@ impl TrainKalman {
         self.learned.jumps.learn(measured);
     }
 
-    fn judge(&mut self, by_wind: f64) {
+    fn judge(&mut self, direction: f64, by_wind: f64) {
         let inflation = self.long_run().clamp(1.0, LONG_RUN_MAX);
-        let published = self.learned.bank.published(by_wind, self.first.air_resistance());
+        let published =
+            self.learned.bank.published(direction, by_wind, self.first.air_resistance());
         self.report.take(&published, inflation, &self.systematic, &self.speeds);
     }
 
@@ -173,7 +175,7 @@ impl TrainKalman {
         self.learned.brake = BrakeErrors::new(self.settings.brake_scale_std);
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
-        self.report = Report::new(&self.learned.bank.published(0.0, 0.0));
+        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0, 0.0));
         self.is_fresh_reset = true;
         self.resets += 1;
     }
@@ -215,7 +217,8 @@ impl TrainKalman {
             }
             self.speeds = SpeedRange::resumed(kept.use_before.speeds_mps);
             self.moved_min_s = 0.0;
-            self.report = Report::resumed(&self.learned.bank.published(0.0, 0.0), known);
+            self.report =
+                TrainKalmanReport::resumed(&self.learned.bank.published(0.0, 0.0, 0.0), known);
         }
         mass.is_some()
     }
@@ -229,10 +232,10 @@ impl TrainKalman {
             return;
         }
         match change {
-            Some(Change::Anew(load, variance)) => {
+            Some(LoadChange::Anew(load, variance)) => {
                 self.learned.bank.each(|it| it.replace(LOAD, load, variance))
             }
-            Some(Change::Opened { by, mean, variance }) => self.learned.bank.each(|it| {
+            Some(LoadChange::Opened { by, mean, variance }) => self.learned.bank.each(|it| {
                 // Any load's mean square distance from the one believed so far.
                 let now = it.mean[LOAD];
                 let most = variance + (now - mean).powi(2) - it.covariance[(LOAD, LOAD)];
@@ -241,7 +244,7 @@ impl TrainKalman {
             None => {}
         }
         if change.is_some() {
-            self.judge(0.0);
+            self.judge(0.0, 0.0);
         }
         if self.load.has_departed {
             self.systematic.start();
@@ -307,9 +310,9 @@ impl Estimator for TrainKalman {
     /// Takes up the kept resistance, and the mass unless the first sample contradicts it.
     fn warm_start(&mut self, kept: &KeptEstimate) -> bool {
         let Some((mean, covariance)) = kept.moments(DAVIS) else { return false };
-        self.first = Resistance::kept(&mean, &covariance);
+        self.first = ResistanceBelief::kept(&mean, &covariance);
         self.learned.bank = self.first.bank(&self.settings);
-        self.report = Report::new(&self.learned.bank.published(0.0, 0.0));
+        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0, 0.0));
         self.moved_min_s = CONFIRMED_S;
         let mass = kept.moments([Parameter::Mass]).zip(kept.first_variance(Parameter::Mass));
         let mass = mass.and_then(|((mass_kg, aged), first)| {

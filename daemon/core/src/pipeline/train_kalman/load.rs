@@ -9,7 +9,7 @@ use super::TrainKalmanSettings;
 
 /// Change of the load's estimate by a sample: the declared mass over the true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Change {
+pub enum LoadChange {
     /// It is as far as known as a new weighing or a declaration allows: a mean and a variance.
     Anew(f64, f64),
     /// It may have become another one by this variance as a share of its square, up to that of any load of this mean and
@@ -70,13 +70,13 @@ impl LoadWatch {
     }
 
     /// Takes a sample in; what it changes in what is known of the load.
-    pub fn see(&mut self, sample: &ResolvedSample) -> Option<Change> {
+    pub fn see(&mut self, sample: &ResolvedSample) -> Option<LoadChange> {
         self.is_weighed = sample.is_mass_measured;
         self.has_departed = self.stops.departs(sample.time_ns, sample.segment, sample.speed_mps);
         let before_kg = self.declared_kg.replace(sample.mass_kg);
         let was_open = std::mem::replace(&mut self.is_open, self.stops.is_due());
         let (mean, variance) = self.prior();
-        let anew = Change::Anew(mean, variance);
+        let anew = LoadChange::Anew(mean, variance);
         let Some(before_kg) = before_kg else { return Some(anew) };
         if self.is_weighed && !is_same_mass(before_kg, sample.mass_kg) {
             self.is_fresh = !self.has_departed;
@@ -90,11 +90,11 @@ impl LoadWatch {
     }
 
     /// Returns the possible change by boarding; an unchanged weighing leaves as much open as its own error.
-    fn opened(&self) -> Option<Change> {
+    fn opened(&self) -> Option<LoadChange> {
         let change = self.load_change_std.powi(2);
         let (mean, variance) = self.prior();
         let by = if self.is_weighed { change.min(2.0 * variance) } else { change };
-        (variance > 0.0).then_some(Change::Opened { by, mean, variance })
+        (variance > 0.0).then_some(LoadChange::Opened { by, mean, variance })
     }
 }
 
@@ -117,7 +117,7 @@ mod tests {
     fn changes(
         settings: &TrainKalmanSettings,
         mass_kg: impl Fn(i64) -> Option<f64>,
-    ) -> Vec<Change> {
+    ) -> Vec<LoadChange> {
         let mut load = LoadWatch::new(settings, &train(None));
         let seen = (0..60).filter_map(|second| {
             let mass = mass_kg(second);
@@ -135,21 +135,22 @@ mod tests {
     #[test]
     fn a_load_is_opened_at_a_stop_and_anew_where_it_was_weighed_again() {
         let settings = TrainKalmanSettings::default();
-        let (weighed, declared) = (Change::Anew(1.0, 0.03 * 0.03), Change::Anew(1.0, 0.15 * 0.15));
-        let open = |by, variance| Change::Opened { by, mean: 1.0, variance };
+        let (weighed, declared) =
+            (LoadChange::Anew(1.0, 0.03 * 0.03), LoadChange::Anew(1.0, 0.15 * 0.15));
+        let open = |by, variance| LoadChange::Opened { by, mean: 1.0, variance };
         let opened = open(0.1 * 0.1, 0.15 * 0.15);
         let weighed_again = open(2.0 * 0.03 * 0.03, 0.03 * 0.03);
-        let same = |one: &[Change], other: &[Change]| {
+        let same = |one: &[LoadChange], other: &[LoadChange]| {
             assert_eq!(one.len(), other.len(), "{one:?}");
             for pair in one.iter().zip(other) {
                 let (a, b) = match pair {
-                    (Change::Anew(one, a), Change::Anew(other, b)) => {
+                    (LoadChange::Anew(one, a), LoadChange::Anew(other, b)) => {
                         assert_eq!(one, other, "{pair:?}");
                         (a, b)
                     }
                     (
-                        Change::Opened { by: a, variance, .. },
-                        Change::Opened { by: b, variance: same, .. },
+                        LoadChange::Opened { by: a, variance, .. },
+                        LoadChange::Opened { by: b, variance: same, .. },
                     ) => {
                         assert!((variance / same - 1.0).abs() < 1e-12, "{pair:?}");
                         (a, b)
@@ -168,7 +169,7 @@ mod tests {
     #[test]
     fn a_mass_that_is_exact_is_never_opened() {
         let exact = TrainKalmanSettings { mass_std_percent: 0.0, ..Default::default() };
-        assert_eq!(changes(&exact, |_| Some(100e3)), [Change::Anew(1.0, 0.0)]);
+        assert_eq!(changes(&exact, |_| Some(100e3)), [LoadChange::Anew(1.0, 0.0)]);
     }
 
     #[test]
@@ -188,7 +189,7 @@ mod tests {
                 let speed_mps = if (10..40).contains(&second) { 0.0 } else { 15.0 };
                 let time_ns = second * SECOND_NS;
                 let sample = ResolvedSample { time_ns, speed_mps, ..ResolvedSample::coasting() };
-                matches!(load.see(&sample), Some(Change::Opened { .. }))
+                matches!(load.see(&sample), Some(LoadChange::Opened { .. }))
             })
             .collect();
         assert_eq!(opened_at, [15]);

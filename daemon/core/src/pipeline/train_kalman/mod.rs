@@ -15,17 +15,17 @@ use dynocar_model::terms::{delay, masses, traction};
 use crate::settings;
 
 pub use estimator::TrainKalman;
-pub use learned::declared_a_std;
+pub use learned_state::declared_a_std;
 
-mod acting_forces;
-mod bank;
 mod brake_errors;
 mod estimator;
-mod learned;
+mod force_history;
+mod learned_state;
 mod load;
+mod motion_bank;
 mod motion_filter;
 mod report;
-mod steps;
+mod step_builder;
 #[cfg(test)]
 mod tests;
 

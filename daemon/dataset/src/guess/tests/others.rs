@@ -10,7 +10,7 @@ fn guess_of(names: &[&str], row: impl Fn(f64) -> Vec<f64>) -> Result<Guess, Stri
         cells.collect::<Vec<_>>().join(";") + "\n"
     });
     let text = format!("time [s];speed [m/s];{}\n{}", names.join(";"), rows.collect::<String>());
-    guess(&[Recording { label: "a.csv", text: &text }], &[]).map_err(|error| error.to_string())
+    guess(&[RecordingText { label: "a.csv", text: &text }], &[]).map_err(|error| error.to_string())
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn times_of(cells: impl Fn(f64) -> String) -> (Guess, Vec<i64>) {
         format!("{};{:.3};{}\n", cells(time), 0.05 * time, 300.0 - time)
     });
     let text = format!("Timestamp;speed [m/s];traction force [kN]\n{}", rows.collect::<String>());
-    let guess = guess(&[Recording { label: "a.csv", text: &text }], &[]).unwrap();
+    let guess = guess(&[RecordingText { label: "a.csv", text: &text }], &[]).unwrap();
     let time = guess.column(Time).unwrap();
     let how = match &time.format {
         Some(format) => format!("format='{}'", format.name()),
@@ -178,47 +178,46 @@ fn times_of(cells: impl Fn(f64) -> String) -> (Guess, Vec<i64>) {
 fn times_are_read_as_they_were_recorded() {
     let clock = |time: f64, from_s: f64| {
         let ms = ((from_s + time) * 1000.0).round() as u64;
-        (ms / 3_600_000, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000)
+        [ms / 3_600_000, ms / 60_000 % 60, ms / 1000 % 60, ms % 1000]
     };
-    let with = |form: fn((u64, u64, u64, u64)) -> String, from_s: f64| {
-        move |time: f64| form(clock(time, from_s))
-    };
+    let with =
+        |form: fn([u64; 4]) -> String, from_s: f64| move |time: f64| form(clock(time, from_s));
     type Written = Box<dyn Fn(f64) -> String>;
     let cases: [(&str, Written); 11] = [
         (
             "AM",
             Box::new(with(
-                |(h, m, s, ms)| format!("3/18/2026 {h}:{m:02}:{s:02}.{ms:03} AM"),
+                |[h, m, s, ms]| format!("3/18/2026 {h}:{m:02}:{s:02}.{ms:03} AM"),
                 26_000.0,
             )),
         ),
-        ("ms", Box::new(with(|(h, m, s, ms)| format!("{h:02}:{m:02}:{s:02}:{ms:03}"), 26_000.0))),
-        ("mm:ss", Box::new(with(|(_, m, s, ms)| format!("{m:02}:{s:02}.{}", ms / 100), 3500.0))),
+        ("ms", Box::new(with(|[h, m, s, ms]| format!("{h:02}:{m:02}:{s:02}:{ms:03}"), 26_000.0))),
+        ("mm:ss", Box::new(with(|[_, m, s, ms]| format!("{m:02}:{s:02}.{}", ms / 100), 3500.0))),
         (
             "UTC",
             Box::new(with(
-                |(h, m, s, ms)| format!("2026-03-18 {h:02}:{m:02}:{s:02}.{ms:03} UTC"),
+                |[h, m, s, ms]| format!("2026-03-18 {h:02}:{m:02}:{s:02}.{ms:03} UTC"),
                 26_000.0,
             )),
         ),
         (
             "+0100",
             Box::new(with(
-                |(h, m, s, ms)| format!("2026-03-18 {h:02}:{m:02}:{s:02}.{ms:03} +0100"),
+                |[h, m, s, ms]| format!("2026-03-18 {h:02}:{m:02}:{s:02}.{ms:03} +0100"),
                 26_000.0,
             )),
         ),
         (
             "days",
-            Box::new(with(|(h, m, s, ms)| format!("0 days {h:02}:{m:02}:{s:02}.{ms:03}000"), 10.0)),
+            Box::new(with(|[h, m, s, ms]| format!("0 days {h:02}:{m:02}:{s:02}.{ms:03}000"), 10.0)),
         ),
         (
             "packed",
-            Box::new(with(|(h, m, s, ms)| format!("{h:02}{m:02}{s:02}.{:02}", ms / 10), 34_400.0)),
+            Box::new(with(|[h, m, s, ms]| format!("{h:02}{m:02}{s:02}.{:02}", ms / 10), 34_400.0)),
         ),
         (
             "stamp",
-            Box::new(with(|(h, m, s, ms)| format!("20260318{h:02}{m:02}{s:02}.{ms:03}"), 26_000.0)),
+            Box::new(with(|[h, m, s, ms]| format!("20260318{h:02}{m:02}{s:02}.{ms:03}"), 26_000.0)),
         ),
         ("Excel", Box::new(|time| format!("{:.9}", 46_099.301 + time / 86_400.0))),
         (
@@ -227,7 +226,7 @@ fn times_are_read_as_they_were_recorded() {
                 format!("{}", 638_000_000_000_000_000_u64 + (time * 1e7).round() as u64)
             }),
         ),
-        ("whole", Box::new(with(|(h, m, s, _)| format!("{h:02}:{m:02}:{s:02}"), 26_000.0))),
+        ("whole", Box::new(with(|[h, m, s, _]| format!("{h:02}:{m:02}:{s:02}"), 26_000.0))),
     ];
     for (name, cells) in cases {
         let (guess, times_ns) = times_of(cells);

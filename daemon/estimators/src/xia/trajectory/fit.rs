@@ -25,8 +25,8 @@ use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::residuals::InitialSpeeds;
-use super::search::{Buffers, SCALES, Search};
-use super::step::{Step, StepRule};
+use super::search::{Buffers, SCALES, TrajectorySearch};
+use super::step::{StepRule, TrajectoryStep};
 
 pub use super::search::{DavisPrior, FitError, FitSettings, TrajectoryFit};
 pub use super::step::MotionSegment;
@@ -85,7 +85,7 @@ impl TrajectoryFitter {
             }
         };
         self.buffers.initial.reset(segments.iter().map(|segment| segment.speeds_mps[0]));
-        let mut search = Search::new(segments, settings, prior, &mut self.buffers);
+        let mut search = TrajectorySearch::new(segments, settings, prior, &mut self.buffers);
         let fitted = search.run(&point)?;
         search.describe(&fitted)
     }
@@ -98,7 +98,7 @@ fn check(segments: &[MotionSegment<'_>]) -> Result<(), FitError> {
         if speeds != steps + 1 {
             return Err(FitError::LengthMismatch { segment: index, steps, speeds });
         }
-        let is_usable = |step: &Step| {
+        let is_usable = |step: &TrajectoryStep| {
             step.size > 0.0
                 && step.size.is_finite()
                 && step.drive_mps2.is_finite()
@@ -211,7 +211,7 @@ mod tests {
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
     use dynocar_model::force::balance::mps2_per_n_per_kn;
 
-    fn fit(steps: &[Step], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
+    fn fit(steps: &[TrajectoryStep], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
         let segments = [MotionSegment { steps, speeds_mps }];
         TrajectoryFitter::default().fit(&segments, None, settings).unwrap()
     }
@@ -275,7 +275,7 @@ mod tests {
         // Ten steps of cruise at one speed determine w0 there and nothing else.
         let gain = mps2_per_n_per_kn(0.06);
         let drive_mps2 = gain * FAST.w0_n_per_kn(80.0);
-        let steps = vec![Step { size: 1.0, drive_mps2, resistance_gain: gain }; 10];
+        let steps = vec![TrajectoryStep { size: 1.0, drive_mps2, resistance_gain: gain }; 10];
         let speeds = vec![80.0; 11];
         let expected = Davis { a: 1.0, b: 0.02, c: 0.0014 };
         let std = Vector3::new(0.5, 0.01, 0.0005);
@@ -296,7 +296,7 @@ mod tests {
         let steps = steps(StepRule::Distance, 20);
         let speeds = speeds(StepRule::Distance, &steps, &FAST, 40.0);
         let settings = FitSettings::new(StepRule::Distance);
-        let error = |steps: &[Step], speeds_mps: &[f64], settings: &FitSettings| {
+        let error = |steps: &[TrajectoryStep], speeds_mps: &[f64], settings: &FitSettings| {
             let segments = [MotionSegment { steps, speeds_mps }];
             TrajectoryFitter::default().fit(&segments, None, settings).unwrap_err()
         };

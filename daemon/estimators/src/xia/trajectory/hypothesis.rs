@@ -7,7 +7,7 @@ use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, SVector, Vector3};
 
 use super::noise::{LearnedNoise, NoiseModel};
-use super::step::{Step, StepRule};
+use super::step::{StepRule, TrajectoryStep};
 use super::unit_disturbance::UnitDisturbance;
 use super::{A, B, C, SPEED};
 
@@ -25,7 +25,7 @@ pub struct OutlierModel {
 /// The state is extended over a step by the step's derivatives; the covariance factor stays
 /// triangular without a factorisation, since a step moves the speed alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hypothesis {
+pub struct JumpHypothesis {
     /// a, b, c and v in the order of [`crate::xia::trajectory`].
     pub state: SVector<f64, 4>,
     /// Factor of their covariance.
@@ -45,7 +45,7 @@ const NORMAL_DENSITY: f64 = 0.398_942_280_401_432_7;
 
 /// Innovation of a measured speed under a hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Innovation {
+pub struct SpeedInnovation {
     /// Measured minus predicted speed in m/s.
     pub innovation_mps: f64,
     /// Its predicted standard deviation in m/s.
@@ -56,10 +56,10 @@ pub struct Innovation {
     pub is_used: bool,
 }
 
-impl Hypothesis {
+impl JumpHypothesis {
     /// Coefficients of given mean and standard deviations, with a speed of no meaning yet.
     pub fn new(davis: &Davis, std: &Vector3<f64>, noise: LearnedNoise) -> Self {
-        Hypothesis {
+        JumpHypothesis {
             state: SVector::<f64, 4>::new(davis.a, davis.b, davis.c, 0.0),
             factor: CovarianceFactor::diagonal(&SVector::<f64, 4>::new(
                 std[A], std[B], std[C], 1.0,
@@ -129,7 +129,13 @@ impl Hypothesis {
     ///
     /// Bounded work, no allocation.
     #[inline]
-    pub fn predict(&mut self, rule: StepRule, step: &Step, duration_s: f64, missed_variance: f64) {
+    pub fn predict(
+        &mut self,
+        rule: StepRule,
+        step: &TrajectoryStep,
+        duration_s: f64,
+        missed_variance: f64,
+    ) {
         let (advance, _) = rule.advance_or_crawl(step, &self.davis(), self.state[SPEED]);
         self.state[SPEED] = advance.speed_mps;
         let lower = &mut self.factor.0;
@@ -160,7 +166,7 @@ impl Hypothesis {
         measured_mps: f64,
         model: &NoiseModel,
         outliers: &OutlierModel,
-    ) -> Innovation {
+    ) -> SpeedInnovation {
         let own_variance = self.factor.0.row(SPEED).norm_squared();
         let noise_variance = self.noise.measured_variance();
         let variance = own_variance + noise_variance;
@@ -181,7 +187,7 @@ impl Hypothesis {
         } else if is_believed {
             self.anchor(measured_mps);
         }
-        Innovation { innovation_mps, deviation_mps, likelihood: inlier + outlier, is_used }
+        SpeedInnovation { innovation_mps, deviation_mps, likelihood: inlier + outlier, is_used }
     }
 
     /// True while state and covariance are numbers.
@@ -196,7 +202,7 @@ impl Hypothesis {
 ///
 /// The spread between them stays in the covariance: neither knows exactly when the jump was, and
 /// samples from before it would bias the coefficients.
-pub fn united(one: (&Hypothesis, f64), other: (&Hypothesis, f64)) -> (Hypothesis, f64) {
+pub fn united(one: (&JumpHypothesis, f64), other: (&JumpHypothesis, f64)) -> (JumpHypothesis, f64) {
     let ((more, greater), (less, smaller)) =
         if one.1 >= other.1 { (one, other) } else { (other, one) };
     let mut both = Mixture::default();
@@ -242,8 +248,8 @@ mod tests {
         Vector3::new(0.3, 0.01, 0.0004)
     }
 
-    fn first(model: &NoiseModel) -> Hypothesis {
-        Hypothesis::new(&FAST, &prior_std(), LearnedNoise::new(model))
+    fn first(model: &NoiseModel) -> JumpHypothesis {
+        JumpHypothesis::new(&FAST, &prior_std(), LearnedNoise::new(model))
     }
 
     #[test]
@@ -319,7 +325,7 @@ mod tests {
         filter.anchor(40.0);
         let gain = mps2_per_n_per_kn(0.06);
         let drive_mps2 = gain * FAST.w0_n_per_kn(40.0);
-        let hold = Step { size: 0.2, drive_mps2, resistance_gain: gain };
+        let hold = TrajectoryStep { size: 0.2, drive_mps2, resistance_gain: gain };
         for round in 0..60 {
             filter.predict(StepRule::Time, &hold, 0.2, 0.0);
             let speed_mps = if round == 30 { 43.0 } else { 40.0 };

@@ -14,12 +14,12 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Reason, RejectionReason, Status};
 use nalgebra::Vector3;
 
-use super::hypothesis::Innovation;
+use super::hypothesis::SpeedInnovation;
 use super::motion::{MotionStep, MotionTracker, MotionUpdate, UnexplainedForce};
 use super::noise::NoiseModel;
 use super::online::{OnlineFilter, OnlineSettings, StepDoubt};
-use super::quality::{Estimate, prior_std};
-use super::step::{Step, StepRule};
+use super::quality::{DavisEstimate, prior_std};
+use super::step::{StepRule, TrajectoryStep};
 
 settings! {
     /// Settings of `trajectory_kalman`.
@@ -128,7 +128,7 @@ impl TrajectoryKalman {
     }
 
     fn take_step(&mut self, motion: &MotionStep, sample: &ResolvedSample) -> Outcome {
-        let step = Step::from(motion);
+        let step = TrajectoryStep::from(motion);
         let moved_mps = motion.distance_m / motion.duration_s - sample.speed_mps;
         let learned = self.filter.likeliest().noise.speed_variance;
         let doubt = StepDoubt {
@@ -144,7 +144,7 @@ impl TrajectoryKalman {
         };
         self.fault = None;
         self.unexplained.push(motion, sample, &self.filter.likeliest().davis());
-        let Innovation { innovation_mps, deviation_mps, is_used, .. } = innovation;
+        let SpeedInnovation { innovation_mps, deviation_mps, is_used, .. } = innovation;
         if !is_used {
             self.innovations.break_here();
             return Outcome::Rejected(RejectionReason::Outlier);
@@ -188,7 +188,7 @@ impl Estimator for TrajectoryKalman {
         let (davis, covariance) = self.filter.davis();
         write_parameters(snapshot, DAVIS, &Vector3::new(davis.a, davis.b, davis.c), &covariance);
         let is_fresh = self.filter.likeliest().age_s < FRESH_S;
-        let estimate = Estimate {
+        let estimate = DavisEstimate {
             davis,
             covariance,
             prior_std: self.prior_std,

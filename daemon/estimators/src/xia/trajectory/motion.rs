@@ -6,7 +6,7 @@ use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::Davis;
 use dynocar_shared::{ParameterSnapshot, RejectionReason};
 
-use super::step::{Step, StepRule};
+use super::step::{StepRule, TrajectoryStep};
 
 /// Addition of a sample to a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,10 +36,10 @@ pub struct MotionStep {
     pub resistance_gain: f64,
 }
 
-impl From<&MotionStep> for Step {
+impl From<&MotionStep> for TrajectoryStep {
     /// A step in time.
-    fn from(motion: &MotionStep) -> Step {
-        Step {
+    fn from(motion: &MotionStep) -> TrajectoryStep {
+        TrajectoryStep {
             size: motion.duration_s,
             drive_mps2: motion.drive_mps2,
             resistance_gain: motion.resistance_gain,
@@ -144,7 +144,7 @@ impl UnexplainedForce {
     ///
     /// Bounded work, no allocation.
     pub fn push(&mut self, motion: &MotionStep, sample: &ResolvedSample, davis: &Davis) {
-        let step = Step::from(motion);
+        let step = TrajectoryStep::from(motion);
         let (expected, _) = StepRule::Time.advance_or_crawl(&step, davis, self.last_mps);
         let unexplained_mps2 = (sample.speed_mps - expected.speed_mps) / step.size;
         self.last_mps = sample.speed_mps;

@@ -233,8 +233,8 @@ impl LearnedNoise {
 
 #[cfg(test)]
 mod tests {
-    use super::super::hypothesis::{Hypothesis, OutlierModel};
-    use super::super::step::{Step, StepRule};
+    use super::super::hypothesis::{JumpHypothesis, OutlierModel};
+    use super::super::step::{StepRule, TrajectoryStep};
     use super::super::test_runs::{FAST, normal, random};
     use super::*;
     use dynocar_model::force::balance::mps2_per_n_per_kn;
@@ -255,14 +255,14 @@ mod tests {
     }
 
     /// Runs a filter of known coefficients over a train at 5 Hz; noise and disturbance by time.
-    fn run(samples: u32, noise_mps: impl Fn(u32) -> f64, disturbance: f64) -> Hypothesis {
+    fn run(samples: u32, noise_mps: impl Fn(u32) -> f64, disturbance: f64) -> JumpHypothesis {
         let mut random = random(12);
         let model = model();
         let certain = Vector3::new(1e-6, 1e-8, 1e-10);
-        let mut filter = Hypothesis::new(&FAST, &certain, LearnedNoise::new(&model));
+        let mut filter = JumpHypothesis::new(&FAST, &certain, LearnedNoise::new(&model));
         let gain = mps2_per_n_per_kn(0.06);
         let drive_mps2 = gain * FAST.w0_n_per_kn(60.0);
-        let step = Step { size: 0.2, drive_mps2, resistance_gain: gain };
+        let step = TrajectoryStep { size: 0.2, drive_mps2, resistance_gain: gain };
         let mut speed_mps = 60.0;
         filter.anchor(speed_mps);
         for index in 0..samples {

@@ -12,10 +12,10 @@ use dynocar_core::filter::bank::{Bank, Mixture};
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
-use super::hypothesis::{Hypothesis, Innovation, OutlierModel, united};
+use super::hypothesis::{JumpHypothesis, OutlierModel, SpeedInnovation, united};
 use super::noise::{LearnedNoise, NoiseModel};
 use super::quality::LongRunVariance;
-use super::step::{Step, StepRule};
+use super::step::{StepRule, TrajectoryStep};
 
 /// The most hypotheses of a bank.
 const HYPOTHESES_MAX: usize = 16;
@@ -43,8 +43,8 @@ pub struct OnlineSettings {
 }
 
 impl OnlineSettings {
-    fn first(&self, davis: &Davis) -> Hypothesis {
-        Hypothesis::new(davis, &self.davis_std, LearnedNoise::new(&self.noise))
+    fn first(&self, davis: &Davis) -> JumpHypothesis {
+        JumpHypothesis::new(davis, &self.davis_std, LearnedNoise::new(&self.noise))
     }
 }
 
@@ -62,7 +62,7 @@ pub struct StepDoubt {
 pub struct OnlineFilter {
     settings: OnlineSettings,
     /// By age, the oldest first.
-    bank: Bank<Hypothesis, HYPOTHESES_MAX>,
+    bank: Bank<JumpHypothesis, HYPOTHESES_MAX>,
     since_spawn_s: f64,
     long_run: LongRunVariance,
     /// Resets for numerical failure so far.
@@ -99,18 +99,18 @@ impl OnlineFilter {
         true
     }
 
-    fn start_from(&mut self, first: Hypothesis) {
+    fn start_from(&mut self, first: JumpHypothesis) {
         self.bank = Bank::even([first], 1.0);
         self.since_spawn_s = 0.0;
     }
 
     /// The hypotheses, the oldest first.
-    pub fn hypotheses(&self) -> &[Hypothesis] {
+    pub fn hypotheses(&self) -> &[JumpHypothesis] {
         self.bank.hypotheses()
     }
 
     /// The most probable hypothesis.
-    pub fn likeliest(&self) -> &Hypothesis {
+    pub fn likeliest(&self) -> &JumpHypothesis {
         self.bank.likeliest()
     }
 
@@ -129,11 +129,11 @@ impl OnlineFilter {
     /// Work bounded by the number of hypotheses, no allocation.
     pub fn advance(
         &mut self,
-        (rule, step): (StepRule, &Step),
+        (rule, step): (StepRule, &TrajectoryStep),
         duration_s: f64,
         measured_mps: f64,
         doubt: &StepDoubt,
-    ) -> Option<Innovation> {
+    ) -> Option<SpeedInnovation> {
         self.spawn(duration_s);
         let likeliest = self.bank.likeliest_index();
         let mut of_likeliest = None;
@@ -262,7 +262,8 @@ mod tests {
             let factor = if time_s >= jump_s { 1.3 } else { 1.0 };
             let truth = Davis { a: factor * FAST.a, b: factor * FAST.b, c: factor * FAST.c };
             let drive_mps2 = 0.07 + 0.06 * (0.02 * time_s).sin();
-            let step = Step { size: 1.0, drive_mps2, resistance_gain: mps2_per_n_per_kn(0.06) };
+            let step =
+                TrajectoryStep { size: 1.0, drive_mps2, resistance_gain: mps2_per_n_per_kn(0.06) };
             speed_mps = StepRule::Time.advance(&step, &truth, speed_mps).unwrap().speed_mps;
             let measured_mps = speed_mps + NOISE_MPS * normal(&mut random);
             assert!(bank.advance((StepRule::Time, &step), 1.0, measured_mps, &NONE).is_some());
@@ -309,7 +310,7 @@ mod tests {
     #[test]
     fn a_bank_without_a_sound_hypothesis_says_so() {
         let mut bank = bank(4);
-        let step = Step { size: 1.0, drive_mps2: 0.0, resistance_gain: 0.009 };
+        let step = TrajectoryStep { size: 1.0, drive_mps2: 0.0, resistance_gain: 0.009 };
         assert_eq!(bank.advance((StepRule::Time, &step), f64::NAN, 60.0, &NONE), None);
     }
 }

@@ -13,7 +13,7 @@
 //! covariance grows by the same factor (Newey, West 1987, with a flat kernel over blocks).
 
 use dynocar_core::pipeline::InnovationMonitor;
-use dynocar_core::pipeline::judge::{Case, Judgement, LONG_RUN_MAX};
+use dynocar_core::pipeline::judge::{Judgement, LONG_RUN_MAX, StatusInputs};
 use dynocar_core::pipeline::motion::SpeedRange;
 use dynocar_core::pipeline::output::{excitation, write_innovations};
 use dynocar_model::train::{Davis, TrainModel};
@@ -39,7 +39,7 @@ pub fn prior_std(train: &TrainModel, relative: f64) -> Vector3<f64> {
 
 /// An estimate with what is needed to judge it.
 #[derive(Clone, Copy, Debug)]
-pub struct Estimate<'a> {
+pub struct DavisEstimate<'a> {
     /// The coefficients.
     pub davis: Davis,
     /// Their covariance.
@@ -64,9 +64,9 @@ pub struct Estimate<'a> {
     pub doubt: Option<Reason>,
 }
 
-impl Estimate<'_> {
+impl DavisEstimate<'_> {
     /// All that the judge asks for.
-    pub fn case(&self) -> Case {
+    pub fn case(&self) -> StatusInputs {
         let is_finite = self.covariance.iter().all(|entry| entry.is_finite());
         let speeds_mps = self.speeds.get().filter(|_| self.is_ready);
         let is_known = speeds_mps.is_none_or(|(low_mps, high_mps)| {
@@ -79,7 +79,7 @@ impl Estimate<'_> {
         });
         let is_ready = speeds_mps.is_some();
         let failure = (Status::Invalid, Reason::NumericalFailure);
-        Case {
+        StatusInputs {
             fault: self.fault.or((is_ready && !is_finite).then_some(failure)),
             input: self.input,
             is_ready,
@@ -197,10 +197,10 @@ impl LongRunVariance {
 mod tests {
     use super::*;
 
-    fn estimate(monitor: &InnovationMonitor, covariance: Matrix3<f64>) -> Estimate<'_> {
+    fn estimate(monitor: &InnovationMonitor, covariance: Matrix3<f64>) -> DavisEstimate<'_> {
         let mut speeds = SpeedRange::default();
         [75.0, 84.0].into_iter().for_each(|speed_mps| speeds.push(speed_mps));
-        Estimate {
+        DavisEstimate {
             davis: Davis { a: 1.0, b: 0.02, c: 0.001 },
             covariance,
             prior_std: Vector3::new(0.5, 0.01, 0.0005),

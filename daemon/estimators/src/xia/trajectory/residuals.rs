@@ -15,7 +15,7 @@ use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 
 use super::quality::LongRunVariance;
-use super::step::{MotionSegment, Step, StepRule};
+use super::step::{MotionSegment, StepRule, TrajectoryStep};
 
 /// How residuals are weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +61,7 @@ impl InitialSpeeds {
 
 /// Sums over all residuals of one pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pass {
+pub struct ResidualSums {
     /// Residuals.
     pub count: usize,
     /// Residuals beyond the outlier threshold.
@@ -80,9 +80,9 @@ pub struct Pass {
     pub end_variance: f64,
 }
 
-impl Pass {
+impl ResidualSums {
     fn new() -> Self {
-        Pass {
+        ResidualSums {
             count: 0,
             outliers: 0,
             stalls: 0,
@@ -104,8 +104,8 @@ pub struct Residuals<'a, 'b> {
     initial: &'b mut InitialSpeeds,
     current_point: Vector3<f64>,
     tried_point: Vector3<f64>,
-    current_pass: Pass,
-    tried_pass: Pass,
+    current_pass: ResidualSums,
+    tried_pass: ResidualSums,
     /// Residuals over √S̃ in m/s of the newest pass, when wanted.
     record: Option<&'b mut Vec<f64>>,
 }
@@ -132,8 +132,8 @@ impl<'a, 'b> Residuals<'a, 'b> {
             initial,
             current_point: point,
             tried_point: point,
-            current_pass: Pass::new(),
-            tried_pass: Pass::new(),
+            current_pass: ResidualSums::new(),
+            tried_pass: ResidualSums::new(),
             record: None,
         }
     }
@@ -145,7 +145,7 @@ impl<'a, 'b> Residuals<'a, 'b> {
     }
 
     /// Sums of the pass at the current parameters.
-    pub fn pass(&self) -> &Pass {
+    pub fn pass(&self) -> &ResidualSums {
         &self.current_pass
     }
 }
@@ -155,7 +155,7 @@ impl LeastSquares<3> for Residuals<'_, '_> {
         let davis = Davis { a: point[0], b: point[1], c: point[2] };
         let change = point - self.current_point;
         self.tried_point = *point;
-        self.tried_pass = Pass::new();
+        self.tried_pass = ResidualSums::new();
         if let Some(record) = &mut self.record {
             record.clear();
         }
@@ -214,7 +214,7 @@ impl InitialSpeed {
 struct SegmentRows<'a> {
     weighting: &'a Weighting,
     rows: TriangularAccumulator<5>,
-    pass: &'a mut Pass,
+    pass: &'a mut ResidualSums,
     cost: f64,
     record: Option<&'a mut Vec<f64>>,
 }
@@ -300,7 +300,7 @@ struct Trace {
     variance: f64,
 }
 
-fn duration_s(rule: StepRule, step: &Step, speed_mps: f64) -> f64 {
+fn duration_s(rule: StepRule, step: &TrajectoryStep, speed_mps: f64) -> f64 {
     match rule {
         StepRule::Time => step.size,
         StepRule::Distance => step.size / speed_mps,

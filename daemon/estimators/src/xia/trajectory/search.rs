@@ -2,13 +2,13 @@
 //! it answers.
 
 use dynocar_core::filter::levenberg_marquardt::{
-    LeastSquares, ParameterBox, Solution, SolverSettings, Stop, minimise,
+    LeastSquares, LeastSquaresSolution, ParameterBox, SolverSettings, Termination, minimise,
 };
 use dynocar_core::filter::triangular::TriangularSystem;
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 
-use super::residuals::{InitialSpeeds, Pass, Residuals, Weighting};
+use super::residuals::{InitialSpeeds, ResidualSums, Residuals, Weighting};
 use super::step::{MotionSegment, StepRule};
 
 /// The least speed noise in m/s that residuals are divided by; below it the round-off of a long
@@ -17,9 +17,9 @@ const SPEED_NOISE_MIN_MPS: f64 = 1e-8;
 const NOISE_ROUNDS_MAX: u32 = 8;
 
 /// The least-squares solution for one disturbance ratio.
-pub struct Fitted {
-    solution: Solution<3>,
-    pass: Pass,
+pub struct RatioFit {
+    solution: LeastSquaresSolution<3>,
+    pass: ResidualSums,
     /// Noise that the residuals were divided by.
     used_noise_mps: f64,
     /// Noise as given or, if it is to be estimated, as the residuals show it.
@@ -28,7 +28,7 @@ pub struct Fitted {
     shown_mps: f64,
 }
 
-impl Fitted {
+impl RatioFit {
     /// Covariance of the coefficients by the noise that the residuals show.
     fn covariance(&self) -> Result<Matrix3<f64>, FitError> {
         let raw = self.solution.linearisation.system.covariance().ok_or(FitError::NotDetermined)?;
@@ -46,7 +46,7 @@ pub struct Buffers {
 }
 
 /// A fit under way.
-pub struct Search<'a, 'b> {
+pub struct TrajectorySearch<'a, 'b> {
     segments: &'a [MotionSegment<'a>],
     settings: &'a FitSettings,
     prior: Option<TriangularSystem<3>>,
@@ -54,7 +54,7 @@ pub struct Search<'a, 'b> {
     iterations: u32,
 }
 
-impl<'a, 'b> Search<'a, 'b> {
+impl<'a, 'b> TrajectorySearch<'a, 'b> {
     /// A search from the initial speeds in the buffers.
     pub fn new(
         segments: &'a [MotionSegment<'a>],
@@ -62,11 +62,11 @@ impl<'a, 'b> Search<'a, 'b> {
         prior: Option<TriangularSystem<3>>,
         buffers: &'b mut Buffers,
     ) -> Self {
-        Search { segments, settings, prior, buffers, iterations: 0 }
+        TrajectorySearch { segments, settings, prior, buffers, iterations: 0 }
     }
 
     /// Repeats the fit until the noise that weighs the residuals is the noise that they show.
-    pub fn run(&mut self, start: &Vector3<f64>) -> Result<Fitted, FitError> {
+    pub fn run(&mut self, start: &Vector3<f64>) -> Result<RatioFit, FitError> {
         let mut point = *start;
         let mut noise_mps = match self.settings.speed_noise_mps {
             Some(known_mps) => known_mps,
@@ -87,7 +87,7 @@ impl<'a, 'b> Search<'a, 'b> {
         }
     }
 
-    fn minimise(&mut self, point: &Vector3<f64>, noise_mps: f64) -> Result<Fitted, FitError> {
+    fn minimise(&mut self, point: &Vector3<f64>, noise_mps: f64) -> Result<RatioFit, FitError> {
         let settings = self.settings;
         let weighting = Weighting {
             speed_noise_mps: noise_mps,
@@ -115,7 +115,7 @@ impl<'a, 'b> Search<'a, 'b> {
         self.iterations += solution.iterations;
         let free = pass.count.saturating_sub(3 + self.segments.len()).max(1) as f64;
         let shown_mps = noise_mps * (pass.clipped_square / free).sqrt();
-        Ok(Fitted {
+        Ok(RatioFit {
             solution,
             pass,
             used_noise_mps: noise_mps,
@@ -145,8 +145,8 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     /// The fit with covariance and counts.
-    pub fn describe(&self, fitted: &Fitted) -> Result<TrajectoryFit, FitError> {
-        let Fitted { solution, pass, .. } = fitted;
+    pub fn describe(&self, fitted: &RatioFit) -> Result<TrajectoryFit, FitError> {
+        let RatioFit { solution, pass, .. } = fitted;
         let inflation = pass.long_run.inflation();
         let point = solution.point;
         let bounds = &self.settings.bounds;
@@ -290,7 +290,7 @@ pub struct TrajectoryFit {
     /// Linearisations in all.
     pub iterations: u32,
     /// How the last search ended.
-    pub stop: Stop,
+    pub stop: Termination,
     /// Coefficients at a bound.
     pub at_bound: [bool; 3],
 }

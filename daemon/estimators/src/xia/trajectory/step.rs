@@ -26,7 +26,7 @@ pub enum StepRule {
 
 /// A step of constant driving force.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub struct TrajectoryStep {
     /// Distance in m or time in s, as the rule says; positive.
     pub size: f64,
     /// Acceleration u in m/s² by every known force: traction, brake, gradient, curve, tunnel.
@@ -39,7 +39,7 @@ pub struct Step {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionSegment<'a> {
     /// The steps.
-    pub steps: &'a [Step],
+    pub steps: &'a [TrajectoryStep],
     /// One speed in m/s more than steps.
     pub speeds_mps: &'a [f64],
 }
@@ -62,7 +62,7 @@ pub const STALL_SPEED_MPS: f64 = 0.1;
 impl StepRule {
     /// The speed after a step; `None` when the train would stop within it (v'² < 0 in eq. 7).
     #[inline]
-    pub fn advance(self, step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
+    pub fn advance(self, step: &TrajectoryStep, davis: &Davis, speed_mps: f64) -> Option<Advance> {
         match self {
             StepRule::Distance => advance_distance(step, davis, speed_mps),
             StepRule::Time => advance_time(step, davis, speed_mps),
@@ -72,7 +72,12 @@ impl StepRule {
     /// As [`StepRule::advance`], but a train that would stop rolls on at the stall speed,
     /// whatever the parameters: a fit may start from parameters that stop the train.
     #[inline(always)]
-    pub fn advance_or_crawl(self, step: &Step, davis: &Davis, speed_mps: f64) -> (Advance, bool) {
+    pub fn advance_or_crawl(
+        self,
+        step: &TrajectoryStep,
+        davis: &Davis,
+        speed_mps: f64,
+    ) -> (Advance, bool) {
         match self.advance(step, davis, speed_mps) {
             Some(advance) => (advance, false),
             None => (
@@ -84,7 +89,7 @@ impl StepRule {
 }
 
 #[inline]
-fn advance_distance(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
+fn advance_distance(step: &TrajectoryStep, davis: &Davis, speed_mps: f64) -> Option<Advance> {
     let reach = step.resistance_gain * step.size;
     let energy = speed_mps * speed_mps + 2.0 * step.size * step.drive_mps2
         - 2.0 * reach * davis.w0_n_per_kn(speed_mps);
@@ -102,7 +107,7 @@ fn advance_distance(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advanc
 }
 
 #[inline]
-fn advance_time(step: &Step, davis: &Davis, speed_mps: f64) -> Option<Advance> {
+fn advance_time(step: &TrajectoryStep, davis: &Davis, speed_mps: f64) -> Option<Advance> {
     let reach = step.resistance_gain * step.size;
     let impulse = step.size * step.drive_mps2;
     let middle_mps = speed_mps + 0.5 * (impulse - reach * davis.w0_n_per_kn(speed_mps));
@@ -139,11 +144,14 @@ mod tests {
 
     const DAVIS: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 
-    fn steps() -> [(StepRule, Step); 2] {
+    fn steps() -> [(StepRule, TrajectoryStep); 2] {
         let gain = mps2_per_n_per_kn(0.06);
         [
-            (StepRule::Distance, Step { size: 100.0, drive_mps2: 0.2, resistance_gain: gain }),
-            (StepRule::Time, Step { size: 4.0, drive_mps2: -0.3, resistance_gain: gain }),
+            (
+                StepRule::Distance,
+                TrajectoryStep { size: 100.0, drive_mps2: 0.2, resistance_gain: gain },
+            ),
+            (StepRule::Time, TrajectoryStep { size: 4.0, drive_mps2: -0.3, resistance_gain: gain }),
         ]
     }
 
@@ -186,7 +194,7 @@ mod tests {
         let gain = mps2_per_n_per_kn(0.0);
         let exact = |t: f64| 80.0 / (1.0 + gain * davis.c * 80.0 * t);
         let error = |size: f64| {
-            let step = Step { size, drive_mps2: 0.0, resistance_gain: gain };
+            let step = TrajectoryStep { size, drive_mps2: 0.0, resistance_gain: gain };
             let mut speed_mps = 80.0;
             for _ in 0..(64.0 / size) as usize {
                 speed_mps = StepRule::Time.advance(&step, &davis, speed_mps).unwrap().speed_mps;
@@ -201,7 +209,7 @@ mod tests {
     #[test]
     fn a_train_that_stops_has_no_speed_after_the_step() {
         let gain = mps2_per_n_per_kn(0.06);
-        let brake = Step { size: 100.0, drive_mps2: -1.0, resistance_gain: gain };
+        let brake = TrajectoryStep { size: 100.0, drive_mps2: -1.0, resistance_gain: gain };
         assert_eq!(StepRule::Distance.advance(&brake, &DAVIS, 10.0), None);
         assert_eq!(StepRule::Time.advance(&brake, &DAVIS, 10.0), None);
         let (crawl, is_stalled) = StepRule::Distance.advance_or_crawl(&brake, &DAVIS, 10.0);
@@ -210,7 +218,7 @@ mod tests {
 
     #[test]
     fn what_is_not_a_number_stops_the_train() {
-        let step = Step { size: f64::NAN, drive_mps2: 0.0, resistance_gain: 0.01 };
+        let step = TrajectoryStep { size: f64::NAN, drive_mps2: 0.0, resistance_gain: 0.01 };
         assert_eq!(StepRule::Distance.advance(&step, &DAVIS, 10.0), None);
         assert_eq!(StepRule::Time.advance(&step, &DAVIS, 10.0), None);
     }

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::motion::tests::sample;
-use super::step::{Step, StepRule};
+use super::step::{StepRule, TrajectoryStep};
 
 /// A high-speed train.
 pub const FAST: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
@@ -25,11 +25,11 @@ pub fn normal(random: &mut ChaCha8Rng) -> f64 {
 }
 
 /// Traction, coasting and braking between 10 and 80 m/s over rolling ground.
-pub fn steps(rule: StepRule, count: usize) -> Vec<Step> {
+pub fn steps(rule: StepRule, count: usize) -> Vec<TrajectoryStep> {
     (0..count)
         .map(|i| {
             let phase = [0.38, 0.2, 0.12, 0.0, -0.25, 0.25, 0.15, 0.0][(8 * i / count) % 8];
-            Step {
+            TrajectoryStep {
                 size: if rule == StepRule::Distance { 100.0 } else { 2.5 },
                 drive_mps2: phase + 0.05 * (0.7 * i as f64).sin(),
                 resistance_gain: mps2_per_n_per_kn(0.06),
@@ -39,7 +39,12 @@ pub fn steps(rule: StepRule, count: usize) -> Vec<Step> {
 }
 
 /// The speeds along steps, by the rule itself.
-pub fn speeds(rule: StepRule, steps: &[Step], davis: &Davis, initial_mps: f64) -> Vec<f64> {
+pub fn speeds(
+    rule: StepRule,
+    steps: &[TrajectoryStep],
+    davis: &Davis,
+    initial_mps: f64,
+) -> Vec<f64> {
     let mut speeds = vec![initial_mps];
     for step in steps {
         let last_mps = speeds[speeds.len() - 1];

@@ -61,7 +61,7 @@ impl UnitDisturbance {
 
 #[cfg(test)]
 mod tests {
-    use super::super::hypothesis::{Hypothesis, OutlierModel};
+    use super::super::hypothesis::{JumpHypothesis, OutlierModel};
     use super::super::noise::{LearnedNoise, NoiseModel};
     use super::super::step::StepRule;
     use super::super::test_runs::{FAST, speeds, steps};
@@ -82,7 +82,7 @@ mod tests {
             learns_disturbance: false,
         };
         let std = Vector3::new(0.3, 0.01, 0.0004);
-        let mut filter = Hypothesis::new(&FAST, &std, LearnedNoise::new(&model));
+        let mut filter = JumpHypothesis::new(&FAST, &std, LearnedNoise::new(&model));
         filter.anchor(speeds[0]);
         let outliers = OutlierModel { share: 1e-9, density: 0.5 };
         for (step, &speed_mps) in steps.iter().zip(&speeds[1..]) {

@@ -5,7 +5,7 @@ use crate::named;
 
 /// A function without unit of one covariate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factor {
+pub struct CovariateFactor {
     /// Covariate of the law.
     pub of: Covariate,
     /// How.
@@ -17,14 +17,14 @@ pub struct Factor {
 
 /// A force and the factors that it is multiplied by.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Extra {
+pub struct ExtraResistance {
     /// The resistance in N/kN where all factors are 1.
     pub n_per_kn: f64,
     /// One or two.
-    pub factors: Vec<Factor>,
+    pub factors: Vec<CovariateFactor>,
 }
 
-impl Factor {
+impl CovariateFactor {
     /// Its value and its slope over the speed in 1/(m/s); `None` where the covariate is not known.
     #[inline]
     fn at(&self, known: impl Fn(Covariate) -> Option<f64>) -> Option<(f64, f64)> {
@@ -54,7 +54,7 @@ impl Factor {
     }
 }
 
-impl Extra {
+impl ExtraResistance {
     /// The formula, in N/kN.
     pub fn law(&self) -> String {
         let factors = self.factors.iter().map(|factor| format!(" · {}", factor.law()));

@@ -12,16 +12,10 @@ mod form;
 mod law;
 
 pub use form::Form;
-pub use law::{Covariate, Extra, Factor};
+pub use law::{Covariate, CovariateFactor, ExtraResistance};
 
 use super::Resistance;
 
-/// The list of tables of `train.toml`.
-pub const TABLES: &str = "extra";
-/// The key of the force where the factors are 1, in N/kN.
-pub const FORCE: &str = "n_per_kn";
-/// The list of tables within that holds the factors.
-pub const FACTORS: &str = "factor";
 /// The force where all factors are 1 lies within this many N/kN.
 pub const FORCE_MAX_N_PER_KN: f64 = 100.0;
 /// Factors at most.
@@ -30,7 +24,7 @@ pub const FACTORS_MAX: usize = 2;
 /// Forces of forms of their own resist; by their slope for speeds near this one, too.
 #[inline]
 pub fn act(
-    extras: &[Extra],
+    extras: &[ExtraResistance],
     speed_mps: f64,
     known: impl Fn(Covariate) -> Option<f64>,
     resistance: &mut Resistance,
@@ -49,7 +43,7 @@ mod tests {
 
     /// The force in N/kN at a speed by what is known at another, and at a temperature in °C.
     fn resists_n_per_kn(
-        extra: &Extra,
+        extra: &ExtraResistance,
         (known_mps, degc): (f64, Option<f64>),
         speed_mps: f64,
     ) -> f64 {
@@ -63,11 +57,12 @@ mod tests {
         resistance.extra_n_per_kn(Davis { a: 1.0, b: 0.0, c: 0.0 }, speed_mps)
     }
 
-    fn slow_and_cold() -> Extra {
+    fn slow_and_cold() -> ExtraResistance {
         let hyperbola =
-            Factor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
-        let cold = Factor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
-        Extra { n_per_kn: 0.8, factors: vec![hyperbola, cold] }
+            CovariateFactor { of: Covariate::Speed, form: Form::Hyperbola, numbers: [15.0, 3.0] };
+        let cold =
+            CovariateFactor { of: Covariate::Temperature, form: Form::Below, numbers: [5.0, 10.0] };
+        ExtraResistance { n_per_kn: 0.8, factors: vec![hyperbola, cold] }
     }
 
     #[test]

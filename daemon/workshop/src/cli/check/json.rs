@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
+use dynocar_analysis::dataset::keys::{corrections, numbers_of};
 use dynocar_analysis::dataset::{DatasetError, Manifest, Run, RunEntry, TimeFormat};
-use dynocar_model::terms::CORRECTIONS;
-use dynocar_model::terms::extra::Extra;
+use dynocar_model::terms::extra::ExtraResistance;
 use dynocar_model::track::{LinearProfile, Track};
 use dynocar_model::train::{Corrections, EffortCurve, TrainModel};
 use serde::{Serialize, Serializer};
@@ -33,7 +33,8 @@ struct CorrectionsAnswer<'a>(&'a TrainModel);
 
 impl Serialize for CorrectionsAnswer<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(CORRECTIONS.iter().map(|key| (key.name, key.declared(self.0))))
+        let all = numbers_of(corrections::TABLE);
+        serializer.collect_map(all.map(|key| (key.name, key.declared(self.0))))
     }
 }
 
@@ -84,7 +85,7 @@ fn of_dataset((manifest, runs): &(Manifest, Vec<Result<Run, DatasetError>>)) -> 
 fn of_run<'a>((entry, run): (&'a RunEntry, &'a Result<Run, DatasetError>)) -> impl Serialize {
     let read = |run: &'a Run| {
         object! {
-            samples: run.samples.len(),
+            samples: run.quality.samples(),
             position_source: run.position_source,
             gradient_source: run.gradient_source,
             traction_source: run.traction_source,
@@ -107,7 +108,7 @@ fn of_run<'a>((entry, run): (&'a RunEntry, &'a Result<Run, DatasetError>)) -> im
 
 fn of_train(train: &TrainModel) -> impl Serialize {
     let corrections = Some(train).filter(|train| train.corrections != Corrections::NONE);
-    let extra: Vec<String> = train.extra.iter().map(Extra::law).collect();
+    let extra: Vec<String> = train.extra.iter().map(ExtraResistance::law).collect();
     object! {
         name: &train.name,
         mass_kg: train.mass_kg,

@@ -1,14 +1,19 @@
-//! Understanding of a path.
+//! Understanding of a path, and its drawings.
 
+use std::path::Path;
 use std::sync::Arc;
 
+use dynocar::cli::Failure;
+use dynocar::config::DaemonConfig;
+use dynocar::dataset::FileKind;
+use dynocar::output::{report_line, write_in_folder};
 use dynocar_analysis::dataset::dataset_diagnostic::diagnostics;
 use dynocar_analysis::dataset::{DatasetDiagnostic, DatasetError, Manifest, Run};
+use dynocar_analysis::explain::report::residual_line::AlongLine;
 use dynocar_model::track::Track;
 use dynocar_model::train::TrainModel;
 
-use dynocar::config::DaemonConfig;
-use dynocar::dataset::FileKind;
+use crate::report::plots::{Width, as_file, effort, line};
 
 /// Understanding of a path: the contents of a file of this kind, and all that belongs to it.
 pub struct Understood {
@@ -45,4 +50,36 @@ impl Understood {
     pub fn errors(&self) -> impl Iterator<Item = &DatasetError> {
         self.runs().iter().filter_map(|run| run.as_ref().err())
     }
+}
+
+/// Draws the line's profile and the train's effort curves into a folder, as far as they are known.
+///
+/// # Errors
+///
+/// An input failure for what has neither; a failure of the work where a drawing cannot be made or
+/// written.
+pub(super) fn draw(understood: &Understood, folder: &Path) -> Result<(), Failure> {
+    if understood.daemon.is_some() {
+        return Err(Failure::Input(
+            "--draw: expected a dataset, a train or a track, not a daemon's configuration".into(),
+        ));
+    }
+    let (train, track) = (understood.train.as_deref(), understood.track.as_deref());
+    let failed = |error| Failure::Work(format!("the drawing failed: {error}"));
+    let line = line::draw(track, &AlongLine::default(), false, Width::Wide).map_err(failed)?;
+    let line = line.map(|plot| plot.svg);
+    let effort = train.map(effort::draw).transpose().map_err(failed)?.flatten();
+    let drawn = [("line.svg", line), ("effort.svg", effort)];
+    if drawn.iter().all(|(_, plot)| plot.is_none()) {
+        report_line(
+            "nothing drawn: no gradient, curves or permitted speed of a line, no effort of a train",
+        );
+    }
+    for (name, plot) in drawn {
+        if let Some(plot) = plot {
+            let path = write_in_folder(folder, name, &as_file(&plot))?;
+            report_line(&format!("drawn: {}", path.display()));
+        }
+    }
+    Ok(())
 }

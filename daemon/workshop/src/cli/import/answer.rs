@@ -4,13 +4,18 @@ use std::path::Path;
 
 use dynocar::cli::Failure;
 use dynocar_analysis::dataset::DatasetDiagnostic;
+use dynocar_analysis::dataset::keys::{self, track};
+use dynocar_analysis::dataset::written::TomlText;
 use dynocar_analysis::import::{Account, FieldOutcome, ImportedLine, ImportedTrain};
+use dynocar_model::terms::Key;
+use dynocar_model::train::numbers::{
+    CARS, DAVIS_A, DAVIS_B, DAVIS_C, LENGTH, MASS, ROTATING_MASS_FACTOR,
+};
 use toml::Value;
 
 use crate::cli::text::{TextTable, comment, diagnostics, entry, on_one_line};
-use crate::cli::train_text::{Found, TrainArguments, TrainText, converted};
+use crate::cli::train_text::{TrainArguments, TrainText, TrainValues, converted};
 use crate::report::provenance::for_shell;
-use crate::track_text::TrackText;
 
 /// The `train.toml`; what the file does not give and nobody says is a marked default.
 ///
@@ -20,20 +25,21 @@ use crate::track_text::TrackText;
 pub fn train(train: &ImportedTrain, arguments: &TrainArguments) -> Result<TrainText, Failure> {
     let from = |key: &str| origin(&train.account, key);
     let name = Value::String(train.name.clone());
-    let mut figures = vec![("name", name, "as the file names it".to_string())];
-    let mut number = |key: &'static str, value: Option<f64>| {
-        figures.extend(value.map(|value| (key, converted(value), from(key))));
+    let mut figures = vec![(keys::train::NAME.name, name, "as the file names it".to_string())];
+    let mut number = |key: &Key, value: Option<f64>| {
+        figures.extend(value.map(|value| (key.name, converted(value), from(key.name))));
     };
-    number("mass_t", train.mass_kg.map(|mass_kg| mass_kg / 1000.0));
-    number("length_m", train.length_m);
-    number("rotating_mass_factor", train.rotating_mass_factor);
-    number("a", train.resistance.map(|davis| davis.a));
-    number("b", train.resistance.map(|davis| davis.b));
-    number("c", train.resistance.map(|davis| davis.c));
-    figures.extend(train.cars.map(|cars| ("cars", Value::Integer(cars.into()), from("cars"))));
+    number(&MASS, train.mass_kg.map(|mass_kg| mass_kg / 1000.0));
+    number(&LENGTH, train.length_m);
+    number(&ROTATING_MASS_FACTOR, train.rotating_mass_factor);
+    number(&DAVIS_A, train.resistance.map(|davis| davis.a));
+    number(&DAVIS_B, train.resistance.map(|davis| davis.b));
+    number(&DAVIS_C, train.resistance.map(|davis| davis.c));
+    let count = |cars: u32| (CARS.name, Value::Integer(cars.into()), from(CARS.name));
+    figures.extend(train.cars.map(count));
     let writer = format!("dynocar import from {}", train.place);
     let (traction, brake_mps2) = (train.traction.clone(), train.brake_mps2.clone());
-    arguments.text(&writer, &Found { figures, traction, brake_mps2 })
+    arguments.text(&writer, &TrainValues { figures, traction, brake_mps2 })
 }
 
 /// From which field a key is.
@@ -60,29 +66,29 @@ pub fn track(line: &ImportedLine) -> String {
             head += &comment("  ", &format!("{key} is not known: {why}."));
         }
     }
-    let mut text = TrackText::new(&head);
-    text.value("name", Value::String(line.name.clone()));
-    text.value("length_m", converted(line.length_m));
+    let mut text = TomlText::new(&head, track::TABLE);
+    text.value(&track::NAME, Value::String(line.name.clone()));
+    text.value(&track::LENGTH, converted(line.length_m));
     let pair = |&(at_m, value): &(f64, f64)| format!("{}, {}", converted(at_m), converted(value));
     if let Some(gradient) = &line.gradient {
-        text.list("gradient", gradient.iter().map(pair));
+        text.list(&track::GRADIENT, gradient.iter().map(pair));
     }
     if let Some(curves) = &line.curves {
         let ends =
             |start_m: f64, end_m: f64| format!("{}, {}", converted(start_m), converted(end_m));
-        let entry = |it: &dynocar_model::track::Curve| {
+        let entry = |it: &dynocar_model::track::TrackCurve| {
             format!("{}, {}", ends(it.start_m, it.end_m), converted(it.radius_m))
         };
-        text.list("curves", curves.iter().map(entry));
+        text.list(&track::CURVES, curves.iter().map(entry));
     }
     if !line.stops.is_empty() {
         let stop = |(at_m, name): &(f64, String)| {
             format!("{}, {}", converted(*at_m), Value::String(name.clone()))
         };
-        text.list("stops", line.stops.iter().map(stop));
+        text.list(&track::STOPS, line.stops.iter().map(stop));
     }
     if let Some(permitted) = &line.permitted_speed {
-        text.list("permitted_speed", permitted.iter().map(pair));
+        text.list(&track::PERMITTED_SPEED, permitted.iter().map(pair));
     }
     text.into_text()
 }

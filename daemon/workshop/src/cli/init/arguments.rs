@@ -10,11 +10,12 @@ use dynocar::output::require_new;
 use dynocar_analysis::dataset::encoding::by_name;
 use dynocar_analysis::dataset::guess::GivenColumn;
 use dynocar_analysis::dataset::{Quantity, TimeFormat};
+use dynocar_model::train::numbers::MASS;
 use dynocar_model::units::Unit;
 use encoding_rs::Encoding;
 
 use super::summary::DAEMON_FILE;
-use crate::cli::train_text::{QUESTIONS, TrainArguments};
+use crate::cli::train_text::{ASKED, Asked, TrainArguments};
 use dynocar::models::text::TRAIN_FILE;
 
 /// The folder for the files where somebody who is asked says no other.
@@ -109,12 +110,12 @@ pub fn complete(given: &InitArguments) -> Result<InitArguments, Failure> {
         arguments.csv = recordings()?;
     }
     let train = &mut arguments.train;
-    for (key, words) in QUESTIONS.into_iter().filter(|(key, _)| !given.train.knows(key)) {
-        let default = match key {
-            "mass_t" if !arguments.csv.is_empty() => "by the recordings, else 200.0".into(),
-            _ => train.default_of(key)?,
+    for Asked { key, question, .. } in ASKED.iter().filter(|it| !given.train.knows(it.key)) {
+        let default = match *key == MASS.name && !arguments.csv.is_empty() {
+            true => "by the recordings, else 200.0".into(),
+            false => train.default_of(key)?,
         };
-        let answer = ask(words, &default, |answer| train.with_answer(key, answer).map(|_| ()))?;
+        let answer = ask(question, &default, |answer| train.with_answer(key, answer).map(|_| ()))?;
         if let Some(answer) = answer {
             *train = train.with_answer(key, &answer).map_err(Failure::Input)?;
         }

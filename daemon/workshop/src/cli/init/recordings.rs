@@ -8,7 +8,7 @@ use dynocar::dataset::is_parquet_path;
 use dynocar::text_file::{read_beginning, read_bytes};
 use dynocar_analysis::dataset::encoding::{decoded, guessed};
 use dynocar_analysis::dataset::guess::layout;
-use dynocar_analysis::dataset::train_rows::TrainRows;
+use dynocar_analysis::dataset::text_layout::TrainRows;
 use dynocar_analysis::dataset::trains::{TrainsColumn, only};
 use dynocar_analysis::dataset::{
     ColumnMapping, DatasetError, DatasetFiles, DatasetHead, FileProblem, Run, RunColumns,
@@ -17,7 +17,7 @@ use dynocar_analysis::dataset::{
 use dynocar_parquet::columns::columns_of;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
-use crate::paths::{self, real};
+use crate::dataset::{self, real};
 
 /// Name and text of a file.
 pub type NamedText = (String, String);
@@ -44,18 +44,12 @@ pub fn texts(
         let bytes = read_bytes(path, if is_wide { begins } else { UTF_8 }).map_err(unread)?;
         files.push((label, given.unwrap_or_else(|| guessed(&bytes)), bytes));
     }
-    if let Some(encoding) = given {
-        let text = |(label, _, bytes): (String, _, Vec<u8>)| {
-            let text = decoded(bytes, encoding).map_err(|problem| problem.of(&label))?;
-            Ok::<NamedText, Failure>((label, text))
-        };
-        return Ok((files.into_iter().map(text).collect::<Result<_, _>>()?, encoding));
-    }
     // A file of plain letters only is valid in any of them.
     let is_plain = |bytes: &[u8]| bytes.is_ascii();
     let special = files.iter().find(|(_, _, bytes)| !is_plain(bytes));
     let (first, encoding) =
         special.map_or((String::new(), UTF_8), |(label, encoding, _)| (label.clone(), *encoding));
+    let encoding = given.unwrap_or(encoding);
     let mut texts = Vec::new();
     for (label, own, bytes) in files {
         if own != encoding && !is_plain(&bytes) {
@@ -206,7 +200,7 @@ pub fn from_folder(folder: &Path, files: &[PathBuf]) -> Result<Vec<String>, Fail
         if seen.contains(&full) {
             return Err(refuse("expected every run once, found the file twice"));
         }
-        let path = paths::from_folder(folder, file);
+        let path = dataset::from_folder(folder, file);
         let text = path.to_str().ok_or_else(|| refuse("expected a name in UTF-8"))?;
         paths.push(text.into());
         seen.push(full);

@@ -2,11 +2,17 @@
 
 use std::path::Path;
 
-use dynocar::models::Moment;
+use dynocar::models::UtcSecond;
 use dynocar_analysis::dataset::guess::{Guess, GuessedColumn, GuessedRun};
-use dynocar_analysis::dataset::manifest::DOUBTFUL;
-use dynocar_analysis::dataset::train_rows::TrainRows;
-use dynocar_analysis::dataset::{Quantity, TextLayout};
+use dynocar_analysis::dataset::keys::column::{COLUMN, DOUBTFUL, FORMAT, SCALE, UNIT};
+use dynocar_analysis::dataset::keys::dataset::{
+    DECIMAL, DELIMITER, ENCODING, SKIP_ROWS, THOUSANDS, UNITS_ROW,
+};
+use dynocar_analysis::dataset::keys::rows::VALUE;
+use dynocar_analysis::dataset::keys::{self, run};
+use dynocar_analysis::dataset::text_layout::TrainRows;
+use dynocar_analysis::dataset::written::TomlText;
+use dynocar_analysis::dataset::{Quantity, Role, TextLayout};
 use encoding_rs::UTF_8;
 use toml::Value;
 
@@ -34,116 +40,116 @@ pub fn dataset(
          wrong, and delete `doubtful = true` where it is right: until then every answer says so. `dynocar check` \
          says what it understood.",
     );
-    let track = match has_track {
-        true => "[track]\nfile = ",
-        false => {
-            "# Without a line, gradients must come with the recordings, or are unknown.\n\
-             # [track]\n# file = "
-        }
-    };
-    let mut text = format!(
-        "{head}[dataset]\nname = {}\n{}# position_reference = \"head\"    # where the recorded \
-         position is the head's, not the centre's\n\n[train]\nfile = {}\n{}\n{track}{}\n\n[columns]\n",
-        quoted(name),
-        layout_text(&guess.layout),
-        quoted(TRAIN_FILE),
-        rows_text(rows),
-        quoted(TRACK_FILE)
-    );
-    text.extend(guess.columns.iter().map(column_text));
+    let mut text = TomlText::new(&head, keys::dataset::TABLE);
+    text.value(&keys::dataset::NAME, quoted(name));
+    layout_text(&mut text, &guess.layout);
+    let head = keys::dataset::POSITION_REFERENCE.assign("\"head\"");
+    let note = "where the recorded position is the head's, not the centre's";
+    text.lines(&format!("# {head}    # {note}\n\n"));
+    text.table(keys::train_file::TABLE);
+    text.value(&keys::train_file::FILE, quoted(TRAIN_FILE));
+    // Which rows are the train's.
+    if let Some(TrainRows::Of { column, value }) = rows {
+        let rows = [(COLUMN, column), (VALUE, value)].map(|(key, it)| key.assign(quoted(it)));
+        text.value(&keys::train_file::ROWS, keys::inline(rows));
+    }
+    text.lines(match has_track {
+        true => "\n",
+        false => "\n# Without a line, gradients must come with the recordings, or are unknown.\n# ",
+    });
+    text.table(keys::track_file::TABLE);
+    text.lines(if has_track { "" } else { "# " });
+    text.value(&keys::track_file::FILE, quoted(TRACK_FILE));
+    text.lines("\n");
+    text.table(keys::column::TABLE);
+    guess.columns.iter().for_each(|it| column_text(&mut text, it));
     if !guess.unmapped.is_empty() {
-        text += "\n# Taken for nothing:\n";
+        text.lines("\n# Taken for nothing:\n");
         for column in &guess.unmapped {
-            text += &comment("  ", &format!("'{}': {}", column.name.shown(), column.reason));
+            let words = format!("'{}': {}", column.name.shown(), column.reason);
+            text.lines(&comment("  ", &words));
         }
     }
     let count = guess.runs.len();
-    for (index, (run, file)) in guess.runs.iter().zip(files).enumerate() {
+    for (index, (of, file)) in guess.runs.iter().zip(files).enumerate() {
         let is_held_out = count > 1 && index + 1 == count;
         let (role, why) = match is_held_out {
-            true => ("holdout", "only scores what the others teach"),
-            false => ("fit", "models learn from it"),
+            true => (Role::Holdout, "only scores what the others teach"),
+            false => (Role::Fit, "models learn from it"),
         };
-        text += &format!("\n[[runs]]\nfile = {}\n", quoted(file));
-        text += &format!("role = {:<24}# {why}\n", quoted(role));
-        let falls = match run.direction {
+        text.lines("\n");
+        text.next_table(run::TABLE);
+        text.value(&run::FILE, quoted(file));
+        text.noted(&run::ROLE, quoted(role.name()), why);
+        let falls = match of.direction {
             -1 => "the recorded position falls",
             _ => "1: the chainage grows; -1: it falls",
         };
-        text += &format!("direction = {:<19}# {falls}\n", run.direction);
-        text += "# mass_t = 100.0               # where this run's load is known\n";
-        text += &date_text(guess, run);
+        text.noted(&run::DIRECTION, of.direction, falls);
+        text.suggested(&run::MASS, "100.0", "where this run's load is known");
+        date_text(&mut text, guess, of);
     }
-    text
-}
-
-/// Which rows are the train's.
-fn rows_text(rows: Option<&TrainRows>) -> String {
-    let Some(TrainRows::Of { column, value }) = rows else { return String::new() };
-    format!("rows = {{ column = {}, value = {} }}\n", quoted(column), quoted(value))
+    text.into_text()
 }
 
 /// How the files' text falls into cells.
-fn layout_text(layout: &TextLayout) -> String {
-    let mut text = String::new();
+fn layout_text(text: &mut TomlText, layout: &TextLayout) {
+    let letter = |mark: char| quoted(&mark.to_string());
     if layout.encoding != UTF_8 {
-        text += &format!("encoding = {}\n", quoted(&layout.encoding.name().to_lowercase()));
+        text.value(&ENCODING, quoted(&layout.encoding.name().to_lowercase()));
     }
-    let delimiter = char::from(layout.delimiter).to_string();
-    text += &format!("delimiter = {}\n", quoted(&delimiter));
-    text += &format!("decimal = {}\n", quoted(&char::from(layout.decimal).to_string()));
+    text.value(&DELIMITER, letter(layout.delimiter.into()));
+    text.value(&DECIMAL, letter(layout.decimal.into()));
     if let Some(mark) = layout.thousands {
-        text += &format!("thousands = {}\n", quoted(&mark.to_string()));
+        text.value(&THOUSANDS, letter(mark));
     }
     if layout.skip_rows > 0 {
-        text += &format!("skip_rows = {:<19}# lines above the names\n", layout.skip_rows);
+        text.noted(&SKIP_ROWS, layout.skip_rows, "lines above the names");
     }
     if layout.units_row {
-        text += "units_row = true               # a line of units below the names\n";
+        text.noted(&UNITS_ROW, true, "a line of units below the names");
     }
-    text
 }
 
 /// The day of a run, where its times do not hold it.
-fn date_text(guess: &Guess, run: &GuessedRun) -> String {
+fn date_text(text: &mut TomlText, guess: &Guess, of: &GuessedRun) {
     let format = guess.column(Quantity::Time).and_then(|time| time.format.as_ref());
-    match (format, run.day) {
-        (Some(format), _) if format.has_date() => String::new(),
+    match (format, of.day) {
+        (Some(format), _) if format.has_date() => {}
         (_, Some(day)) => {
-            let day = Moment { unix_s: 86_400 * u64::try_from(day).unwrap_or(0) }.day();
-            format!("date = {day:<24}# as the column of dates says\n")
+            let day = UtcSecond { unix_s: 86_400 * u64::try_from(day).unwrap_or(0) }.day();
+            text.noted(&run::DATE, day, "as the column of dates says");
         }
-        _ => "# date = 2026-03-18            # where the day is known\n".into(),
+        _ => text.suggested(&run::DATE, "2026-03-18", "where the day is known"),
     }
 }
 
-fn column_text(column: &GuessedColumn) -> String {
-    let mut text = comment("", &format!("{}: {}.", column.quantity, column.reasons.join("; ")));
+fn column_text(text: &mut TomlText, column: &GuessedColumn) {
+    let words = format!("{}: {}.", column.quantity, column.reasons.join("; "));
+    text.lines(&comment("", &words));
     for doubt in &column.doubts {
-        text += &comment("  ", &format!("DOUBTFUL: {doubt}"));
+        text.lines(&comment("  ", &format!("DOUBTFUL: {doubt}")));
     }
     for rejected in &column.rejected {
-        text += &comment("  ", rejected);
+        text.lines(&comment("  ", rejected));
     }
-    let scale = match column.scale {
-        1.0 => String::new(),
-        scale => format!(", scale = {}", Value::Float(scale)),
-    };
     let names: Vec<String> =
         std::iter::once(&column.name).chain(&column.parts).map(|name| quoted(&name.text)).collect();
     let name = match &names[..] {
         [name] => name.clone(),
         names => format!("[{}]", names.join(", ")),
     };
-    let doubtful = match column.doubts.is_empty() {
-        true => String::new(),
-        false => format!(", {DOUBTFUL} = true"),
-    };
-    let read_as = match &column.format {
-        Some(format) => format!("format = {}", quoted(format.name())),
-        None => format!("unit = {}{scale}", quoted(column.unit.name())),
-    };
-    text + &format!("{} = {{ column = {name}, {read_as}{doubtful} }}\n", column.quantity)
+    let mut keys = vec![COLUMN.assign(name)];
+    match &column.format {
+        Some(format) => keys.push(FORMAT.assign(quoted(format.name()))),
+        None => {
+            keys.push(UNIT.assign(quoted(column.unit.name())));
+            let scale = Some(column.scale).filter(|it| *it != 1.0);
+            keys.extend(scale.map(|it| SCALE.assign(Value::Float(it))));
+        }
+    }
+    keys.extend((!column.doubts.is_empty()).then(|| DOUBTFUL.assign(true)));
+    text.column(column.quantity, keys);
 }
 
 /// A text as TOML writes it, on one line.
@@ -199,13 +205,13 @@ pub fn daemon(has_track: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_analysis::dataset::guess::{Recording, guess};
+    use dynocar_analysis::dataset::guess::{RecordingText, guess};
     use dynocar_analysis::dataset::manifest::{Manifest, Role};
 
     #[test]
     fn names_with_any_marks_lead_back_to_their_column() {
         let text = "\"t \"\"s\"\" [s]\";\"v\t\\x [km/h]\";\"a\nb\"\n0;1;2\n1;50;3\n2;90;4\n";
-        let files = [Recording { label: "a.csv", text }];
+        let files = [RecordingText { label: "a.csv", text }];
         let guess = guess(&files, &[]).unwrap_or_else(|error| panic!("{error}"));
         let files = ["da\"y\\1.csv".to_string()];
         let text = dataset(&guess, ("x\n[y]", None), &files, true);
@@ -220,7 +226,7 @@ mod tests {
     #[test]
     fn of_several_runs_the_last_is_held_out() {
         let text = "t,v\n0,1\n1,2\n";
-        let recording = Recording { label: "a.csv", text };
+        let recording = RecordingText { label: "a.csv", text };
         for count in 1..4 {
             let guess = guess(&vec![recording; count], &[]).unwrap();
             let files: Vec<String> = (0..count).map(|index| format!("{index}.csv")).collect();
@@ -237,7 +243,7 @@ mod tests {
 #[cfg(test)]
 mod daemon_text_tests {
     use super::*;
-    use crate::cli::train_text::{Found, TrainArguments};
+    use crate::cli::train_text::{TrainArguments, TrainValues};
     use dynocar::config::DaemonConfig;
 
     #[test]
@@ -246,7 +252,7 @@ mod daemon_text_tests {
             assert_eq!(SHIPPED.matches(shipped).count(), 1, "{shipped}");
         }
         let folder = tempfile::tempdir().unwrap();
-        let train = TrainArguments::default().text("x", &Found::default()).unwrap();
+        let train = TrainArguments::default().text("x", &TrainValues::default()).unwrap();
         std::fs::write(folder.path().join("train.toml"), train.text).unwrap();
         std::fs::write(folder.path().join("track.toml"), "[track]\n").unwrap();
         let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/../../config/daemon.toml");

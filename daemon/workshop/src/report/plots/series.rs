@@ -2,6 +2,7 @@
 
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::report::errors::RunErrors;
+use dynocar_analysis::survey::profile::GradientEntry;
 use dynocar_shared::HALF_95;
 use plotters::element::{Circle, PathElement};
 use plotters::style::{Color, RGBColor, ShapeStyle};
@@ -17,7 +18,7 @@ const RUNS_SIZE: (u32, u32) = (470, 230);
 
 /// The errors of a day in m/s, where they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Day {
+pub struct DailyErrors {
     /// Days since the first.
     pub day: f64,
     /// Of the model that was declared.
@@ -32,7 +33,12 @@ pub struct Day {
 /// # Errors
 ///
 /// When the drawing fails.
-pub fn days(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<Plot, PlotError> {
+pub fn days(
+    days: &[DailyErrors],
+    changes: &[f64],
+    first: &str,
+    width: Width,
+) -> Result<Plot, PlotError> {
     let (nominal, height, _) = width.size();
     let title = format!("Days since {first}");
     let label = format!(
@@ -55,7 +61,7 @@ pub fn days(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<
         line(&mut chart, days, |day| day.in_force_mps, (AFTER, true))?;
         Ok(vec![frame(&chart)])
     })?;
-    let values = |pick: fn(&Day) -> Option<f64>| {
+    let values = |pick: fn(&DailyErrors) -> Option<f64>| {
         days.iter().map(|day| pick(day).unwrap_or(f64::NAN)).collect::<Vec<f64>>()
     };
     let at = days.iter().map(|day| day.day).collect();
@@ -68,8 +74,8 @@ pub fn days(days: &[Day], changes: &[f64], first: &str, width: Width) -> Result<
 /// A line from day to day, broken where one is missing, with its points.
 fn line(
     chart: &mut Chart,
-    days: &[Day],
-    pick: fn(&Day) -> Option<f64>,
+    days: &[DailyErrors],
+    pick: fn(&DailyErrors) -> Option<f64>,
     (colour, is_filled): (RGBColor, bool),
 ) -> Result<(), DrawError> {
     let parts = days.chunk_by(|one, next| {
@@ -86,39 +92,39 @@ fn line(
     Ok(())
 }
 
-/// A profile of (chainage in m, gradient in ‰, its standard deviation in ‰) as SVG.
+/// Draws the gradient over the chainage with its 95 % interval, as SVG.
 ///
 /// # Errors
 ///
 /// When the drawing fails.
 pub fn gradient(
-    entries: &[(f64, f64, f64)],
+    entries: &[GradientEntry],
     direction: &str,
     width: Width,
 ) -> Result<Plot, PlotError> {
     let (nominal, height, _) = width.size();
-    let halves: Vec<f64> = entries.iter().map(|entry| HALF_95 * entry.2).collect();
+    let halves: Vec<f64> = entries.iter().map(|entry| HALF_95 * entry.std_permille).collect();
     let (low, high) = entries.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |range, entry| {
-        (range.0.min(entry.1), range.1.max(entry.1))
+        (range.0.min(entry.gradient_permille), range.1.max(entry.gradient_permille))
     });
     let label = format!("Gradient over the chainage for {direction}: from {low:.1} to {high:.1} ‰");
     let svg = picture(&label, width.class(), (nominal, height + 60), |area| {
-        let x = padded(entries.iter().map(|entry| entry.0 / 1e3), 0.005);
+        let x = padded(entries.iter().map(|entry| entry.from_m / 1e3), 0.005);
         // Where nothing is driven the band is wide: it is cut so that the rest stays readable.
-        let y = range_with_zero(entries.iter().map(|entry| entry.1));
+        let y = range_with_zero(entries.iter().map(|entry| entry.gradient_permille));
         let labels = width.labels();
         let x_axis = Axis { range: x, title: "Chainage, km", labels, is_whole: false };
         let y_axis = Axis { range: y, title: "Gradient, ‰", labels: 6, is_whole: false };
         let mut chart = chart(area, &x_axis, &y_axis)?;
         let line: Vec<(f64, f64)> =
-            entries.iter().map(|&(at_m, gradient, _)| (at_m / 1e3, gradient)).collect();
+            entries.iter().map(|it| (it.from_m / 1e3, it.gradient_permille)).collect();
         band(&mut chart, &line, &halves)?;
         zero_line(&mut chart)?;
         chart.draw_series([PathElement::new(line, stroke(AFTER, 1.2))])?;
         Ok(vec![frame(&chart)])
     })?;
-    let at = entries.iter().map(|entry| entry.0 / 1e3).collect();
-    let values = entries.iter().map(|entry| entry.1).collect();
+    let at = entries.iter().map(|entry| entry.from_m / 1e3).collect();
+    let values = entries.iter().map(|entry| entry.gradient_permille).collect();
     let reading =
         PointerReading::new("Chainage", "km", false, at).with("gradient", "‰", values, halves);
     Ok(Plot { svg, readings: vec![reading] })
@@ -179,12 +185,12 @@ mod tests {
 
     #[test]
     fn each_known_day_has_its_points_and_each_change_its_line() {
-        let day = |day: f64| Day {
+        let day = |day: f64| DailyErrors {
             day,
             declared_mps: Some(0.8),
             in_force_mps: (day != 3.0).then_some(0.3 + 0.01 * day),
         };
-        let days: Vec<Day> = (0..6).map(|k| day(f64::from(k))).collect();
+        let days: Vec<DailyErrors> = (0..6).map(|k| day(f64::from(k))).collect();
         let plot = super::days(&days, &[2.0], "2026-01-01", Width::Wide).unwrap();
         assert_eq!(plot.svg.matches("<circle").count(), 6 + 5);
         assert!(plot.svg.contains("Days since 2026-01-01") && plot.svg.contains("1 times"));

@@ -1,15 +1,15 @@
 //! Error before and after, and the speeds behind it.
 
 use dynocar_analysis::dataset::Role;
-use dynocar_analysis::explain::report::Estimate;
+use dynocar_analysis::explain::report::IntervalEstimate;
 use dynocar_analysis::explain::report::errors::{ErrorPair, Resampling, RunErrors};
 use dynocar_analysis::explain::report::timeline::Trace;
 use dynocar_analysis::explain::stop_to_stop::Judged;
 use dynocar_analysis::explain::stop_to_stop::{StopToStop, reduction};
 
-use super::Section;
+use super::PageSection;
 use crate::report::Subject;
-use crate::report::html::Column::{Names, Numbers, Words};
+use crate::report::html::ColumnAlignment::{Names, Numbers, Words};
 use crate::report::html::{
     TableColumn, details, escape, estimate, legend, marked_table, percent, table,
 };
@@ -20,7 +20,7 @@ use crate::report::plots::{PlotError, figure, series, speeds, wide_and_narrow};
 /// # Errors
 ///
 /// When a plot cannot be drawn.
-pub fn section(subject: &Subject) -> Result<Section, PlotError> {
+pub fn section(subject: &Subject) -> Result<PageSection, PlotError> {
     let mut body = String::from(
         "<p>Each model starts at a run’s first measured speed, is driven by the reported forces to \
          the end, and its speed is compared with the measured one (root mean square over moving \
@@ -40,7 +40,7 @@ pub fn section(subject: &Subject) -> Result<Section, PlotError> {
     for trace in &subject.data.traces {
         body += &trace_figure(subject, trace)?;
     }
-    Ok(Section { id: "error", title: "Error before and after", body })
+    Ok(PageSection { id: "error", title: "Error before and after", body })
 }
 
 /// A row of the summary: the runs, their errors before and after, what is taken away; true for what judges.
@@ -83,17 +83,19 @@ fn summary(subject: &Subject) -> String {
 
 /// The rows of the errors from stop to stop: the one that judges, and the middle one.
 fn stop_to_stop(name: &str, found: &StopToStop) -> [SummaryRow; 2] {
-    let row = |what: &str, mps: [f64; 2], intervals: Option<[[f64; 2]; 2]>, taken: Estimate| {
-        let side = |side: usize| {
-            let interval = intervals.map(|both| both[side]);
-            estimate(&Estimate { value: mps[side], interval })
+    let row =
+        |what: &str, mps: [f64; 2], intervals: Option<[[f64; 2]; 2]>, taken: IntervalEstimate| {
+            let side = |side: usize| {
+                let interval = intervals.map(|both| both[side]);
+                estimate(&IntervalEstimate { value: mps[side], interval })
+            };
+            let cells = [side(0), side(1), percent(&taken)];
+            (format!("{name}, from stop to stop, {what} {}", found.runs), cells)
         };
-        let cells = [side(0), side(1), percent(&taken)];
-        (format!("{name}, from stop to stop, {what} {}", found.runs), cells)
-    };
     let judged = Judged::from(found);
-    let taken = Estimate { value: judged.reduction, interval: judged.reduction_interval_95 };
-    let of_median = Estimate { value: reduction(found.median_mps), interval: None };
+    let taken =
+        IntervalEstimate { value: judged.reduction, interval: judged.reduction_interval_95 };
+    let of_median = IntervalEstimate { value: reduction(found.median_mps), interval: None };
     let (all, cells) = row("all", judged.error_mps, judged.interval_95_mps, taken);
     let (middle, of_middle) = row("median of", found.median_mps, found.interval_95_mps, of_median);
     [(all, cells, name == "Holdout"), (middle, of_middle, false)]

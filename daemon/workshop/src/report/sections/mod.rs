@@ -7,7 +7,7 @@ pub mod residual;
 
 /// A section of the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Section {
+pub struct PageSection {
     /// Its anchor.
     pub id: &'static str,
     /// Its heading.

@@ -7,13 +7,13 @@ use dynocar_analysis::explain::report::parameters::ParameterRow;
 use dynocar_analysis::explain::report::parameters::{PlaceRow, PlaceRuns};
 use dynocar_analysis::explain::report::words::{joined, number};
 
-use super::Section;
+use super::PageSection;
 use crate::report::Subject;
-use crate::report::html::Column::{Numbers, Words};
+use crate::report::html::ColumnAlignment::{Numbers, Words};
 use crate::report::html::{self, TableColumn, escape, estimate, marked_table, minus};
 
 /// The section.
-pub fn parameters(subject: &Subject) -> Section {
+pub fn parameters(subject: &Subject) -> PageSection {
     let has_effect = subject.has_effect();
     let name = |row: &ParameterRow| {
         let group = if is_base(row) { String::new() } else { format!("{}: ", escape(&row.group)) };
@@ -42,7 +42,7 @@ pub fn parameters(subject: &Subject) -> Section {
              and the small number of runs. a, b and c are strongly correlated: judge them together, \
              by the resistance at a speed.</p>\n";
     body += &places(subject);
-    Section { id: "parameters", title: "Parameters", body }
+    PageSection { id: "parameters", title: "Parameters", body }
 }
 
 /// True for a, b and c.
@@ -111,7 +111,7 @@ fn sentence(place: &PlaceRuns) -> String {
 }
 
 /// The section.
-pub fn candidates(subject: &Subject) -> Section {
+pub fn candidates(subject: &Subject) -> PageSection {
     let rows = &subject.data.candidates;
     let has_beside = rows.iter().any(|row| row.beside.is_some());
     let evidence =
@@ -147,7 +147,7 @@ pub fn candidates(subject: &Subject) -> Section {
         body += "<p>Other forms that the force outside the library may have:</p>\n<ul>\n";
         body += &(forms.concat() + "</ul>\n");
     }
-    Section { id: "candidates", title: "What else was considered", body }
+    PageSection { id: "candidates", title: "What else was considered", body }
 }
 
 #[cfg(test)]

@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 use dynocar_analysis::dataset::{OrderCounts, Run};
 use dynocar_analysis::explain::evidence::RunData;
 
-use super::Section;
+use super::PageSection;
 use crate::report::Subject;
-use crate::report::html::Column::{Names, Numbers, Words};
+use crate::report::html::ColumnAlignment::{Names, Numbers, Words};
 use crate::report::html::{TableColumn, count, details, escape, grouped, table};
 use crate::report::provenance::{FileDigest, Provenance};
 use crate::run_facts::{self, mass_t, recorded, recorded_in_words};
 
 /// The section.
-pub fn section(subject: &Subject) -> Section {
+pub fn section(subject: &Subject) -> PageSection {
     let explanation = subject.explanation;
     let used: Vec<UsedRun> = subject
         .dataset
@@ -49,7 +49,7 @@ pub fn section(subject: &Subject) -> Section {
     body += &counts_table(&used);
     body += &sources(subject);
     body += &diagnostics(subject);
-    Section { id: "quality", title: "Data quality", body }
+    PageSection { id: "quality", title: "Data quality", body }
 }
 
 /// A run, and what of it was used.
@@ -162,7 +162,7 @@ fn diagnostics(subject: &Subject) -> String {
 }
 
 /// The section.
-pub fn reproduce(provenance: &Provenance) -> Section {
+pub fn reproduce(provenance: &Provenance) -> PageSection {
     let mut body = format!(
         "<p>The same dataset and version give the same numbers: nothing is drawn at random without \
          a fixed seed.</p>\n<dl class=\"sources\">\n\
@@ -183,5 +183,5 @@ pub fn reproduce(provenance: &Provenance) -> Section {
     ];
     let title = "The files that were read";
     body += &details(title, &table(title, &columns, &provenance.files));
-    Section { id: "reproduce", title: "How to reproduce", body }
+    PageSection { id: "reproduce", title: "How to reproduce", body }
 }

@@ -2,7 +2,7 @@
 
 use dynocar_analysis::explain::report::covariates::Covariate;
 
-use super::Section;
+use super::PageSection;
 use crate::report::Subject;
 use crate::report::html::{escape, legend};
 use crate::report::plots::{PlotError, figure, line, panel, wide_and_narrow};
@@ -12,7 +12,7 @@ use crate::report::plots::{PlotError, figure, line, panel, wide_and_narrow};
 /// # Errors
 ///
 /// When a plot cannot be drawn.
-pub fn section(subject: &Subject) -> Result<Section, PlotError> {
+pub fn section(subject: &Subject) -> Result<PageSection, PlotError> {
     let has_effect = subject.has_effect();
     let mut body = String::from(
         "<p>The resistance that the model lacks, in N per kN of weight (positive retards), on the \
@@ -51,7 +51,7 @@ pub fn section(subject: &Subject) -> Result<Section, PlotError> {
     if subject.data.panels.is_empty() {
         body += "<p>The fit runs hold too little motion for a window.</p>\n";
     }
-    Ok(Section { id: "residual", title: "The residual force", body })
+    Ok(PageSection { id: "residual", title: "The residual force", body })
 }
 
 /// The section; none where no line is declared and no position known.
@@ -59,7 +59,7 @@ pub fn section(subject: &Subject) -> Result<Section, PlotError> {
 /// # Errors
 ///
 /// When the plot cannot be drawn.
-pub fn line(subject: &Subject) -> Result<Option<Section>, PlotError> {
+pub fn line(subject: &Subject) -> Result<Option<PageSection>, PlotError> {
     let (track, found) = (subject.dataset.track.as_deref(), &subject.data.line);
     let has_effect = subject.has_effect();
     let plots = wide_and_narrow(|width| line::draw(track, found, has_effect, width))?;
@@ -87,5 +87,5 @@ pub fn line(subject: &Subject) -> Result<Option<Section>, PlotError> {
     );
     let caption = if track.is_some() { "The line" } else { "Along the line (not declared)" };
     let body = body + &figure("trace", caption, &legend(&entries), &[wide, narrow]);
-    Ok(Some(Section { id: "line", title: "Along the line", body }))
+    Ok(Some(PageSection { id: "line", title: "Along the line", body }))
 }

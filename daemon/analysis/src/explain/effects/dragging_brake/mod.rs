@@ -14,7 +14,7 @@ use self::onsets::{GRID_MIN_S, TAIL_MIN_S, by_speed, onset_tuple};
 use super::{Candidate, Certainty, Hypothesis, Nature, On, Policy, Proposal, SharedHypothesis};
 use crate::explain::answer::{Location, RunWindow};
 use crate::explain::evidence::SampleForces;
-use crate::explain::places::{Axis, End, Reach};
+use crate::explain::places::{Axis, IntervalEnd, Reach};
 use crate::explain::residual_pressure;
 use crate::explain::scan::{Scan, Tuple};
 
@@ -121,12 +121,12 @@ impl Hypothesis for Dragging {
         }
     }
 
-    fn ends(&self) -> Vec<End> {
+    fn ends(&self) -> Vec<IntervalEnd> {
         let estimated = self.by_speed.iter().zip(&self.windows).enumerate();
         let onset =
             |(part, (&[offset_s, duration_s], window)): (usize, (&[f64; 2], &RunWindow))| {
                 let at = window.t_start_s - offset_s;
-                End {
+                IntervalEnd {
                     axis: Axis::Time,
                     part,
                     is_upper: false,
@@ -139,7 +139,7 @@ impl Hypothesis for Dragging {
         estimated.map(onset).collect()
     }
 
-    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+    fn with_end(&self, end: &IntervalEnd, at: f64) -> Option<SharedHypothesis> {
         let mut moved = self.clone();
         moved.windows[end.part].t_start_s = self.by_speed[end.part][0] + at;
         Some(Arc::new(moved))

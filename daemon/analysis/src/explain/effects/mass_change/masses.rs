@@ -2,20 +2,22 @@
 
 use std::sync::Arc;
 
-use dynocar_model::terms::{Entry, Parameter, masses};
+use dynocar_model::terms::{ModelEntry, Parameter, masses};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
 
-use super::parts::{Along, Part};
-use crate::explain::answer::{Location, MassSection, MassWindow, ParameterValue, RunWindow};
-use crate::explain::effects::{Hypothesis, Nature, On, ReportContext, Reported, SharedHypothesis};
+use super::parts::{Along, FactorPart};
+use crate::explain::answer::{FoundMassSection, Location, MassWindow, ParameterValue, RunWindow};
+use crate::explain::effects::{
+    Hypothesis, Nature, On, ReportContext, ReportedValues, SharedHypothesis,
+};
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::places::{Axis, End, Reach};
+use crate::explain::places::{Axis, IntervalEnd, Reach};
 
 /// Parts in which another mass holds.
 #[derive(Clone, Debug)]
 pub struct Masses {
-    parts: Vec<Part>,
+    parts: Vec<FactorPart>,
     /// Of every part, where its ends could be; empty where nothing was chosen.
     edges: Vec<Vec<f64>>,
     parameters: Vec<Parameter>,
@@ -26,7 +28,7 @@ pub struct Masses {
 
 impl Masses {
     /// One part with where its ends could be, and twice the logarithm of what it was chosen from.
-    pub fn new(part: Part, edges: Vec<f64>, choice_cost: f64) -> Self {
+    pub fn new(part: FactorPart, edges: Vec<f64>, choice_cost: f64) -> Self {
         let mut masses = Masses {
             parts: Vec::new(),
             edges: Vec::new(),
@@ -39,7 +41,7 @@ impl Masses {
     }
 
     /// All of some parts, none of them chosen: loads differ from each other as loads do.
-    pub fn of_all(parts: Vec<Part>) -> Self {
+    pub fn of_all(parts: Vec<FactorPart>) -> Self {
         let count = parts.len();
         let each = masses::SUSPECT.prior_std.powi(-2);
         Masses {
@@ -52,7 +54,7 @@ impl Masses {
     }
 
     /// Adds a part with a factor of its own.
-    pub fn push(&mut self, part: Part, edges: Vec<f64>, choice_cost: f64) {
+    pub fn push(&mut self, part: FactorPart, edges: Vec<f64>, choice_cost: f64) {
         self.parts.push(part);
         self.edges.push(edges);
         self.parameters.push(masses::PARAMETER);
@@ -60,7 +62,7 @@ impl Masses {
     }
 
     /// Where another mass holds, in the order of the factors.
-    pub fn parts(&self) -> &[Part] {
+    pub fn parts(&self) -> &[FactorPart] {
         &self.parts
     }
 }
@@ -95,17 +97,19 @@ impl Hypothesis for Masses {
         }
     }
 
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<ModelEntry>> {
         let mut rows = Vec::new();
         for (part, &factor) in self.parts.iter().zip(parameters) {
-            let Part { ends: [from_m, to_m], along: Along::Line(_) } = *part else { return None };
+            let FactorPart { ends: [from_m, to_m], along: Along::Line(_) } = *part else {
+                return None;
+            };
             let towards = part.directions().into_iter();
             rows.extend(towards.map(|towards| vec![from_m, to_m, towards, factor]));
         }
-        Some(vec![Entry::Rows(masses::LIST, rows)])
+        Some(vec![ModelEntry::Rows(masses::LIST, rows)])
     }
 
-    fn ends(&self) -> Vec<End> {
+    fn ends(&self) -> Vec<IntervalEnd> {
         let mut ends = Vec::new();
         for (part, (own, edges)) in self.parts.iter().zip(&self.edges).enumerate() {
             let (axis, run) = match &own.along {
@@ -115,14 +119,14 @@ impl Hypothesis for Masses {
             for (is_upper, at) in [false, true].into_iter().zip(own.ends) {
                 if !edges.is_empty() {
                     let (reach, run) = (Reach::OneOf(edges.clone()), run.clone());
-                    ends.push(End { axis, part, is_upper, at, reach, fine: 0.0, run });
+                    ends.push(IntervalEnd { axis, part, is_upper, at, reach, fine: 0.0, run });
                 }
             }
         }
         ends
     }
 
-    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+    fn with_end(&self, end: &IntervalEnd, at: f64) -> Option<SharedHypothesis> {
         let mut moved = self.clone();
         moved.parts[end.part] = self.parts[end.part].with_end(end.is_upper, at)?;
         let others = self.parts.iter().enumerate().filter(|(k, _)| *k != end.part);
@@ -131,7 +135,7 @@ impl Hypothesis for Masses {
     }
 
     fn place(&self) -> Location {
-        let windows: Vec<RunWindow> = self.parts.iter().filter_map(Part::window).collect();
+        let windows: Vec<RunWindow> = self.parts.iter().filter_map(FactorPart::window).collect();
         let on_line = self.parts.iter().filter(|part| matches!(part.along, Along::Line(_)));
         let intervals: Vec<[f64; 2]> = on_line.map(|part| part.ends).collect();
         Location {
@@ -141,13 +145,13 @@ impl Hypothesis for Masses {
         }
     }
 
-    fn report(&self, context: &ReportContext) -> Reported {
+    fn report(&self, context: &ReportContext) -> ReportedValues {
         let (mut sections, mut windows, mut deviations) = (Vec::new(), Vec::new(), Vec::new());
         for (k, part) in self.parts.iter().enumerate() {
             let (mass_factor, [from_m, to_m]) = (context.parameters[k], part.ends);
             for towards in part.directions() {
                 let direction = towards as i8;
-                sections.push(MassSection { from_m, to_m, direction, mass_factor });
+                sections.push(FoundMassSection { from_m, to_m, direction, mass_factor });
                 deviations.push(context.deviations[k]);
             }
             if let Some(window) = part.window() {
@@ -155,7 +159,7 @@ impl Hypothesis for Masses {
                 deviations.push(context.deviations[k]);
             }
         }
-        let mut reported = Reported::default();
+        let mut reported = ReportedValues::default();
         let name = if windows.is_empty() {
             reported.values.insert("sections".into(), ParameterValue::Sections(sections));
             "sections"

@@ -15,7 +15,7 @@ use crate::explain::places::span_m;
 use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;
 use masses::Masses;
-use parts::{Along, Part, STATION_M, STOP_MIN_S, stations, stops};
+use parts::{Along, FactorPart, STATION_M, STOP_MIN_S, stations, stops};
 
 /// Sections or windows at most.
 const PARTS_MAX: usize = 5;
@@ -45,14 +45,14 @@ fn shape(run: &RunData, index: usize) -> f64 {
 
 /// Every section between two stations in one direction, with its tuple; none where positions are not
 /// measured, for then the runs share no places.
-fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
-    if scan.problem.distance_ratio.is_none() {
+fn all_sections(scan: &Scan) -> Vec<(FactorPart, Tuple)> {
+    if scan.problem.positions.distance_ratio.is_none() {
         return Vec::new();
     }
     let stations = stations(scan);
     let mut sections = Vec::new();
     for direction in [Some(1.0), Some(-1.0)] {
-        let part = |from: usize, to: usize| Part {
+        let part = |from: usize, to: usize| FactorPart {
             ends: [stations[from], stations[to]],
             along: Along::Line(direction),
         };
@@ -65,7 +65,7 @@ fn all_sections(scan: &Scan) -> Vec<(Part, Tuple)> {
 }
 
 /// The tuple of another mass in a part.
-fn part_tuple(scan: &Scan, part: &Part) -> Tuple {
+fn part_tuple(scan: &Scan, part: &FactorPart) -> Tuple {
     let mut sum = Tuple::zero(scan.fit.theta.len());
     for (index, run) in scan.problem.runs.iter().enumerate() {
         if part.is_in(run) {
@@ -80,8 +80,8 @@ fn part_tuple(scan: &Scan, part: &Part) -> Tuple {
 /// Every row of neighbouring parts whose ends carry a force, with the sum of their tuples.
 fn joined(
     elementary: &[Tuple],
-    part: impl Fn(usize, usize) -> Part,
-) -> impl Iterator<Item = (Part, Tuple)> {
+    part: impl Fn(usize, usize) -> FactorPart,
+) -> impl Iterator<Item = (FactorPart, Tuple)> {
     (0..elementary.len()).flat_map(move |from| {
         let mut sum = Tuple::zero(elementary[from].cross.len());
         let mut rows = Vec::new();
@@ -96,13 +96,14 @@ fn joined(
 }
 
 /// Every section between neighbouring stations with a factor of its own: loads that change at every stop.
-fn every(parts: &[(Part, Tuple)]) -> Candidate {
-    let is_within = |part: &Part, other: &Part| {
+fn every(parts: &[(FactorPart, Tuple)]) -> Candidate {
+    let is_within = |part: &FactorPart, other: &FactorPart| {
         let ([from, to], [low, high]) = (part.ends, other.ends);
         !part.is_apart(other) && from <= low && high <= to && part != other
     };
-    let is_least = |part: &&Part| !parts.iter().any(|(other, _)| is_within(part, other));
-    let least: Vec<Part> = parts.iter().map(|(part, _)| part).filter(is_least).cloned().collect();
+    let is_least = |part: &&FactorPart| !parts.iter().any(|(other, _)| is_within(part, other));
+    let least: Vec<FactorPart> =
+        parts.iter().map(|(part, _)| part).filter(is_least).cloned().collect();
     let start = vec![1.0; least.len()];
     Candidate::new(Masses::of_all(least), start)
 }
@@ -114,7 +115,7 @@ pub fn everywhere(scan: &Scan) -> Option<Candidate> {
     let first = runs.first()?.direction;
     let direction = runs.iter().all(|run| run.direction == first).then_some(first);
     let ends = [low - STATION_M, high + STATION_M];
-    let part = Part { ends, along: Along::Line(direction) };
+    let part = FactorPart { ends, along: Along::Line(direction) };
     let (_, estimate) = scan.gain(&scan.tuple(shape));
     let start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
     let choice_cost = 2.0 * std::f64::consts::LN_2;
@@ -122,14 +123,14 @@ pub fn everywhere(scan: &Scan) -> Option<Candidate> {
 }
 
 /// Every section between two stops of a run, with its tuple.
-fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
+fn all_windows(scan: &Scan) -> Vec<(FactorPart, Tuple)> {
     let mut windows = Vec::new();
     for run in &scan.problem.runs {
         let mut edges = vec![0.0];
         edges.extend(stops(run).iter().map(|stop| 0.5 * (stop.0 + stop.1)));
         edges.push(run.duration_s());
         edges.dedup_by(|one, other| *one - *other < STOP_MIN_S);
-        let part = |from: usize, to: usize| Part {
+        let part = |from: usize, to: usize| FactorPart {
             ends: [edges[from], edges[to]],
             along: Along::Run(run.file.clone(), run.offset_s),
         };
@@ -142,9 +143,9 @@ fn all_windows(scan: &Scan) -> Vec<(Part, Tuple)> {
 
 /// Adds parts one by one, each fitted with a factor of its own, while they explain something; where no end
 /// of it comes in sight on the line, all of them besides.
-fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
+fn grow(scan: &Scan, parts: &[(FactorPart, Tuple)]) -> Vec<Candidate> {
     let part_cost = 2.0 * (parts.len().max(2) as f64).ln();
-    let best = |scan: &Scan, tuples: &mut dyn Iterator<Item = (Part, Tuple)>| {
+    let best = |scan: &Scan, tuples: &mut dyn Iterator<Item = (FactorPart, Tuple)>| {
         tuples
             .map(|(part, tuple)| {
                 let (gain, estimate) = scan.gain(&tuple);
@@ -156,7 +157,7 @@ fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
     let Some((_, estimate, part)) = best(scan, &mut parts.iter().cloned()) else {
         return Vec::new();
     };
-    let edges = |part: &Part| part.edges(parts.iter().map(|(other, _)| other));
+    let edges = |part: &FactorPart| part.edges(parts.iter().map(|(other, _)| other));
     let mut masses = Masses::new(part.clone(), edges(&part), part_cost);
     let mut start = vec![(1.0 + estimate).clamp(0.7, 1.5)];
     while masses.parts().len() < PARTS_MAX {
@@ -183,7 +184,7 @@ fn grow(scan: &Scan, parts: &[(Part, Tuple)]) -> Vec<Candidate> {
         }
     }
     let is_everywhere = masses.parts().len() == PARTS_MAX
-        && matches!(masses.parts(), [Part { along: Along::Line(_), .. }, ..]);
+        && matches!(masses.parts(), [FactorPart { along: Along::Line(_), .. }, ..]);
     let mut candidates = vec![Candidate::new(masses, start)];
     candidates.extend(is_everywhere.then(|| every(parts)));
     candidates
@@ -196,7 +197,7 @@ mod tests {
     #[test]
     fn every_section_between_neighbouring_stations_is_there_once() {
         let ends = [0.0, 900.0, 2100.0, 3000.0];
-        let section = |from: usize, to: usize, towards: f64| Part {
+        let section = |from: usize, to: usize, towards: f64| FactorPart {
             ends: [ends[from], ends[to]],
             along: Along::Line(Some(towards)),
         };

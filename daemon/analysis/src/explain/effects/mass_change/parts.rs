@@ -15,7 +15,7 @@ pub const STATION_M: f64 = 350.0;
 
 /// Where one factor holds: from one end to the other.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct FactorPart {
     /// Both ends: chainages in m or times in s since the run's first sample.
     pub ends: [f64; 2],
     /// Along what.
@@ -31,7 +31,7 @@ pub enum Along {
     Run(String, f64),
 }
 
-impl Part {
+impl FactorPart {
     /// True when it may hold in a run.
     pub fn is_in(&self, run: &RunData) -> bool {
         match &self.along {
@@ -72,14 +72,14 @@ impl Part {
     }
 
     /// The same with one end elsewhere; `None` when nothing would be left.
-    pub fn with_end(&self, is_upper: bool, at: f64) -> Option<Part> {
+    pub fn with_end(&self, is_upper: bool, at: f64) -> Option<FactorPart> {
         let mut moved = self.clone();
         moved.ends[usize::from(is_upper)] = at;
         (moved.ends[0] < moved.ends[1]).then_some(moved)
     }
 
     /// Ends of those of some parts that lie along the same axis, in ascending order.
-    pub fn edges<'p>(&self, parts: impl Iterator<Item = &'p Part>) -> Vec<f64> {
+    pub fn edges<'p>(&self, parts: impl Iterator<Item = &'p FactorPart>) -> Vec<f64> {
         let same = parts.filter(|other| self.along == other.along);
         let mut edges: Vec<f64> = same.flat_map(|part| part.ends).collect();
         edges.sort_unstable_by(f64::total_cmp);
@@ -88,7 +88,7 @@ impl Part {
     }
 
     /// True when two parts share no sample.
-    pub fn is_apart(&self, other: &Part) -> bool {
+    pub fn is_apart(&self, other: &FactorPart) -> bool {
         let ([from, to], [other_from, other_to]) = (self.ends, other.ends);
         let do_not_meet = to <= other_from || other_to <= from;
         match (&self.along, &other.along) {

@@ -11,7 +11,7 @@ use super::band_axis::{AXES, BandAxis};
 use crate::explain::answer::{CovariateRange, Location};
 use crate::explain::effects::{Candidate, Handling, Hypothesis, Nature, On, SharedHypothesis};
 use crate::explain::evidence::{Bin, OUTSIDE_COST, RunData, SampleForces};
-use crate::explain::places::{Axis, End, MAP_ERROR_PERMILLE, Reach};
+use crate::explain::places::{Axis, IntervalEnd, MAP_ERROR_PERMILLE, Reach};
 use crate::explain::scan::{Scan, Tuple};
 use crate::parallel;
 use crate::statistics::{greatest_first, span};
@@ -203,12 +203,12 @@ impl Hypothesis for Band {
         Some(format!("{} = {:.4} · ({low:.4} ≤ {name} < {high:.4})", parameter.name, parameters[0]))
     }
 
-    fn ends(&self) -> Vec<End> {
+    fn ends(&self) -> Vec<IntervalEnd> {
         if self.axis == BandAxis::Run {
             return Vec::new();
         }
         // Bounds of the covariate itself are no ends.
-        let end = |is_upper: bool, at: f64, low: f64, high: f64| End {
+        let end = |is_upper: bool, at: f64, low: f64, high: f64| IntervalEnd {
             axis: Axis::Covariate,
             part: 0,
             is_upper,
@@ -219,11 +219,11 @@ impl Hypothesis for Band {
         };
         let lower = end(false, self.low, self.span[0], self.high - 0.5 * self.cell);
         let upper = end(true, self.high, self.low + 0.5 * self.cell, self.span[1]);
-        let is_inside = |end: &End| end.at > self.span[0] && end.at < self.span[1];
+        let is_inside = |end: &IntervalEnd| end.at > self.span[0] && end.at < self.span[1];
         [lower, upper].into_iter().filter(is_inside).collect()
     }
 
-    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+    fn with_end(&self, end: &IntervalEnd, at: f64) -> Option<SharedHypothesis> {
         let (low, high) = if end.is_upper { (self.low, at) } else { (at, self.high) };
         (low < high).then(|| Arc::new(Band { low, high, ..self.clone() }) as SharedHypothesis)
     }

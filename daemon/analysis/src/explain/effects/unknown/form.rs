@@ -2,17 +2,19 @@
 
 use std::sync::Arc;
 
-use dynocar_model::terms::extra::{self, Covariate, Extra, FORCE_MAX_N_PER_KN, Factor, Form};
-use dynocar_model::terms::{Entry, Parameter};
+use dynocar_model::terms::extra::{
+    self, Covariate, CovariateFactor, ExtraResistance, FORCE_MAX_N_PER_KN, Form,
+};
+use dynocar_model::terms::{ModelEntry, Parameter};
 use dynocar_shared::vocabulary::EffectKind;
 
 use super::known::{edges, fitted_numbers, is_exponent, named};
 use crate::explain::answer::{CovariateRange, Location, ParameterValue};
 use crate::explain::effects::{
-    Candidate, Handling, Hypothesis, Nature, On, ReportContext, Reported, SharedHypothesis,
+    Candidate, Handling, Hypothesis, Nature, On, ReportContext, ReportedValues, SharedHypothesis,
 };
 use crate::explain::evidence::{OUTSIDE_COST, RunData, SampleForces};
-use crate::explain::places::{Axis, End, Reach};
+use crate::explain::places::{Axis, IntervalEnd, Reach};
 use crate::explain::scan::Scan;
 use crate::statistics::span;
 
@@ -27,7 +29,7 @@ const LIVES_SHARE: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub struct FormForce {
     /// Factors with the numbers that they start from.
-    factors: Vec<Factor>,
+    factors: Vec<CovariateFactor>,
     /// The size and the numbers that are fitted.
     parameters: Vec<Parameter>,
     /// Factor and number of each that is fitted, after the size.
@@ -49,7 +51,7 @@ impl FormForce {
     /// Returns a force of this form to start from, chosen from several; `ranges` are those of the covariates.
     /// Exponents that are held are not fitted.
     pub fn candidate(
-        extra: &Extra,
+        extra: &ExtraResistance,
         holds_exponents: bool,
         ranges: &[[f64; 3]],
         chosen_from: f64,
@@ -86,12 +88,12 @@ impl FormForce {
     }
 
     /// The force for given parameters.
-    fn extra(&self, parameters: &[f64]) -> Extra {
-        Extra { n_per_kn: parameters[0], factors: self.factors_at(&parameters[1..]) }
+    fn extra(&self, parameters: &[f64]) -> ExtraResistance {
+        ExtraResistance { n_per_kn: parameters[0], factors: self.factors_at(&parameters[1..]) }
     }
 
     /// Its factors for given numbers.
-    fn factors_at(&self, numbers: &[f64]) -> Vec<Factor> {
+    fn factors_at(&self, numbers: &[f64]) -> Vec<CovariateFactor> {
         let mut factors = self.factors.clone();
         for (&(factor, number), &value) in self.fitted.iter().zip(numbers) {
             factors[factor].numbers[number] = value;
@@ -106,8 +108,8 @@ fn covariate(run: &RunData, of: Covariate) -> &[f64] {
 }
 
 /// The greatest product of the factors over the fit runs, and where it lives.
-fn lives(extra: &Extra, scan: &Scan) -> (f64, Location) {
-    let unit = Extra { n_per_kn: 1.0, ..extra.clone() };
+fn lives(extra: &ExtraResistance, scan: &Scan) -> (f64, Location) {
+    let unit = ExtraResistance { n_per_kn: 1.0, ..extra.clone() };
     let of_bins = || {
         scan.problem.runs.iter().flat_map(|run| {
             let middles = run.bins.iter().map(|bin| &run.samples()[bin.middle()]);
@@ -186,10 +188,10 @@ impl Hypothesis for FormForce {
     }
 
     /// The edges of the last factor, where its value jumps.
-    fn ends(&self) -> Vec<End> {
+    fn ends(&self) -> Vec<IntervalEnd> {
         let Some(last) = self.factors.last() else { return Vec::new() };
         let ([low, high], [one, other]) = (self.span, last.numbers);
-        let end = |is_upper: bool, at: f64, low: f64, high: f64| End {
+        let end = |is_upper: bool, at: f64, low: f64, high: f64| IntervalEnd {
             axis: Axis::Covariate,
             part: 0,
             is_upper,
@@ -206,7 +208,7 @@ impl Hypothesis for FormForce {
         }
     }
 
-    fn with_end(&self, end: &End, at: f64) -> Option<SharedHypothesis> {
+    fn with_end(&self, end: &IntervalEnd, at: f64) -> Option<SharedHypothesis> {
         let mut moved = self.clone();
         let last = moved.factors.last_mut()?;
         let number = usize::from(end.is_upper && last.form == Form::Between);
@@ -219,17 +221,17 @@ impl Hypothesis for FormForce {
         last.form.refusal(last.numbers).is_none().then(|| Arc::new(moved) as SharedHypothesis)
     }
 
-    fn entries(&self, parameters: &[f64]) -> Option<Vec<Entry>> {
+    fn entries(&self, parameters: &[f64]) -> Option<Vec<ModelEntry>> {
         let extra = self.extra(parameters);
         let is_read_back = extra.factors.iter().all(|it| it.form.refusal(it.numbers).is_none());
-        is_read_back.then(|| vec![Entry::Extra(extra)])
+        is_read_back.then(|| vec![ModelEntry::Extra(extra)])
     }
 
     fn formula(&self, parameters: &[f64]) -> Option<String> {
         Some(self.extra(parameters).law())
     }
 
-    fn report(&self, context: &ReportContext) -> Reported {
+    fn report(&self, context: &ReportContext) -> ReportedValues {
         let mut reported = context.each_of(&self.parameters);
         let formula = self.extra(context.parameters).law();
         reported.values.insert("formula".into(), ParameterValue::Formula(formula));
@@ -243,8 +245,11 @@ mod tests {
 
     #[test]
     fn an_edge_moves_the_factor_and_its_place_and_never_past_the_other() {
-        let factor =
-            Factor { of: Covariate::TimeSinceStart, form: Form::Between, numbers: [200.0, 500.0] };
+        let factor = CovariateFactor {
+            of: Covariate::TimeSinceStart,
+            form: Form::Between,
+            numbers: [200.0, 500.0],
+        };
         let name = factor.of.name().into();
         let covariate = Some(CovariateRange { name, range: [200.0, 500.0] });
         let force = FormForce {
@@ -261,7 +266,7 @@ mod tests {
         assert_eq!(ends[1].reach, Reach::Between(200.0, 900.0));
         let later = force.with_end(&ends[1], 700.0).unwrap();
         assert_eq!(later.place().covariate.unwrap().range, [200.0, 700.0]);
-        let Some([Entry::Extra(extra)]) =
+        let Some([ModelEntry::Extra(extra)]) =
             later.entries(&[2.0]).as_deref().map(|it| [it[0].clone()])
         else {
             panic!("a form that files can hold");

@@ -4,11 +4,11 @@
 //! else it holds is laid out on a grid here and fitted later. The kinds of the library are not
 //! tried again: a force in proportion to traction, a decay from the start, places.
 
-use dynocar_model::terms::extra::{Covariate, Extra, Factor, Form};
+use dynocar_model::terms::extra::{Covariate, CovariateFactor, ExtraResistance, Form};
 
 use super::form::{FormForce, choice_cost};
 use super::known::KnownCovariate;
-use super::shape::{Ground, Tried};
+use super::shape::{Ground, TriedShape};
 use crate::explain::effects::Candidate;
 use crate::explain::scan::Scan;
 use crate::parallel;
@@ -46,24 +46,28 @@ pub fn forms(scan: &Scan) -> Vec<Candidate> {
         let whole = with_whole_exponent(&ground, &refined);
         [Some(refined), whole]
     });
-    let mut best: Vec<Tried> = best.into_iter().flatten().flatten().collect();
+    let mut best: Vec<TriedShape> = best.into_iter().flatten().flatten().collect();
     sort(&mut best);
-    let candidate = |one: Tried| {
-        let range = |factor: &Factor| {
+    let candidate = |one: TriedShape| {
+        let range = |factor: &CovariateFactor| {
             let range = ground.covariate(factor.of);
             range.map_or([0.0, 0.0, 1.0], |it| [it.least, it.low, it.high])
         };
         let ranges: Vec<[f64; 3]> = one.factors.iter().map(range).collect();
-        let extra = Extra { n_per_kn: one.n_per_kn, factors: one.factors };
+        let extra = ExtraResistance { n_per_kn: one.n_per_kn, factors: one.factors };
         FormForce::candidate(&extra, one.holds_exponents, &ranges, count, scan)
     };
     alike(best, 1).into_iter().map(candidate).collect()
 }
 
 /// Products of each of some factors with each of others.
-fn products(ground: &Ground, first: Vec<Factor>, second: Vec<Factor>) -> Vec<Tried> {
-    type AtBins = (Factor, Vec<Vec<f64>>);
-    let at_bins = |factors: Vec<Factor>| -> Vec<AtBins> {
+fn products(
+    ground: &Ground,
+    first: Vec<CovariateFactor>,
+    second: Vec<CovariateFactor>,
+) -> Vec<TriedShape> {
+    type AtBins = (CovariateFactor, Vec<Vec<f64>>);
+    let at_bins = |factors: Vec<CovariateFactor>| -> Vec<AtBins> {
         parallel::of_each_owned(factors, |_, factor| (factor, ground.values(&factor)))
     };
     let (first, second) = (at_bins(first), at_bins(second));
@@ -75,25 +79,26 @@ fn products(ground: &Ground, first: Vec<Factor>, second: Vec<Factor>) -> Vec<Tri
 }
 
 /// Every form of one covariate, and the products; the best first.
-fn all_tried(ground: &Ground) -> Vec<Tried> {
-    let alone: Vec<Factor> = ground.known.iter().flat_map(KnownCovariate::alone).collect();
+fn all_tried(ground: &Ground) -> Vec<TriedShape> {
+    let alone: Vec<CovariateFactor> = ground.known.iter().flat_map(KnownCovariate::alone).collect();
     let mut all = parallel::of_each(&alone, |factor| ground.tried(vec![*factor], false));
     sort(&mut all);
     let Some(speed) = ground.covariate(Covariate::Speed) else { return all };
     let of_speed = all.iter().filter(|it| it.factors[0].of == Covariate::Speed);
-    let mut first: Vec<Factor> = of_speed.take(BEST_FOR_PRODUCTS).map(|it| it.factors[0]).collect();
+    let mut first: Vec<CovariateFactor> =
+        of_speed.take(BEST_FOR_PRODUCTS).map(|it| it.factors[0]).collect();
     first.extend(speed.powers(&WHOLE_EXPONENTS));
     let others = ground.known.iter().filter(|one| one.of != Covariate::Speed);
-    let second: Vec<Factor> = others.flat_map(KnownCovariate::given_speed).collect();
+    let second: Vec<CovariateFactor> = others.flat_map(KnownCovariate::given_speed).collect();
     all.extend(products(ground, first, second));
     sort(&mut all);
     all
 }
 
 /// The best of each structure that explains anything; the best first.
-fn one_of_each_structure(all: Vec<Tried>) -> Vec<Tried> {
+fn one_of_each_structure(all: Vec<TriedShape>) -> Vec<TriedShape> {
     let mut seen: Vec<Vec<(Covariate, Form)>> = Vec::new();
-    let mut is_new = |one: &Tried| {
+    let mut is_new = |one: &TriedShape| {
         let structure: Vec<_> = one.factors.iter().map(|it| (it.of, it.form)).collect();
         let is_new = one.gain > 0.0 && !seen.contains(&structure);
         if is_new {
@@ -105,9 +110,9 @@ fn one_of_each_structure(all: Vec<Tried>) -> Vec<Tried> {
 }
 
 /// The first of those whose first factor has the same form, as many as may be.
-fn alike(tried: Vec<Tried>, most: usize) -> Vec<Tried> {
+fn alike(tried: Vec<TriedShape>, most: usize) -> Vec<TriedShape> {
     let mut seen: Vec<(Covariate, Form)> = Vec::new();
-    let mut is_kept = |one: &Tried| {
+    let mut is_kept = |one: &TriedShape| {
         let own = (one.factors[0].of, one.factors[0].form);
         seen.push(own);
         seen.iter().filter(|it| **it == own).count() <= most
@@ -117,7 +122,7 @@ fn alike(tried: Vec<Tried>, most: usize) -> Vec<Tried> {
 
 /// A product of a power of the speed with the whole exponent that explains most, which is then no
 /// number to be fitted; `None` of anything else.
-fn with_whole_exponent(ground: &Ground, one: &Tried) -> Option<Tried> {
+fn with_whole_exponent(ground: &Ground, one: &TriedShape) -> Option<TriedShape> {
     if one.factors.len() < 2 || one.factors[0].form != Form::Power {
         return None;
     }
@@ -129,6 +134,6 @@ fn with_whole_exponent(ground: &Ground, one: &Tried) -> Option<Tried> {
     whole.into_iter().max_by(|one, other| one.gain.total_cmp(&other.gain))
 }
 
-fn sort(tried: &mut Vec<Tried>) {
+fn sort(tried: &mut Vec<TriedShape>) {
     greatest_first(tried, |it| it.worth);
 }

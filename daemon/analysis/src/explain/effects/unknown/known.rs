@@ -1,6 +1,6 @@
 //! A covariate over the fit runs, the forms of it that are tried, and which numbers of these are estimated.
 
-use dynocar_model::terms::extra::{Covariate, Factor, Form};
+use dynocar_model::terms::extra::{Covariate, CovariateFactor, Form};
 
 use crate::explain::evidence::RunData;
 use crate::explain::scan::Scan;
@@ -43,12 +43,12 @@ impl KnownCovariate {
         self.low + share * (self.high - self.low)
     }
 
-    fn factor(&self, form: Form, numbers: [f64; 2]) -> Factor {
-        Factor { of: self.of, form, numbers }
+    fn factor(&self, form: Form, numbers: [f64; 2]) -> CovariateFactor {
+        CovariateFactor { of: self.of, form, numbers }
     }
 
     /// Forms with a knee at shares of the range.
-    fn hinges(&self) -> Vec<Factor> {
+    fn hinges(&self) -> Vec<CovariateFactor> {
         let span = 0.1 * (self.high - self.low);
         let knees = [0.15, 0.3, 0.45, 0.6, 0.75, 0.88];
         let both = knees.iter().flat_map(|&share| {
@@ -58,7 +58,7 @@ impl KnownCovariate {
     }
 
     /// Powers that are no term of a, b, c.
-    pub fn powers(&self, exponents: &[f64]) -> Vec<Factor> {
+    pub fn powers(&self, exponents: &[f64]) -> Vec<CovariateFactor> {
         if self.low < 0.0 {
             return Vec::new();
         }
@@ -66,7 +66,7 @@ impl KnownCovariate {
     }
 
     /// Parts of the range.
-    fn parts(&self) -> Vec<Factor> {
+    fn parts(&self) -> Vec<CovariateFactor> {
         let edges = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| self.at(share));
         let pairs = (0..4).flat_map(|from| (from + 1..5).map(move |to| (from, to)));
         pairs
@@ -80,7 +80,7 @@ impl KnownCovariate {
             .collect()
     }
 
-    fn of_speed(&self) -> Vec<Factor> {
+    fn of_speed(&self) -> Vec<CovariateFactor> {
         let mut factors = self.hinges();
         factors.extend(self.powers(&[0.5, 3.0]));
         for share in [0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0] {
@@ -102,13 +102,13 @@ impl KnownCovariate {
     }
 
     /// Forms that a force may have of this covariate alone.
-    pub fn alone(&self) -> Vec<Factor> {
+    pub fn alone(&self) -> Vec<CovariateFactor> {
         match self.of {
             Covariate::Speed => self.of_speed(),
             // Places along the line are the library's and the bands'.
             Covariate::Chainage => Vec::new(),
             Covariate::TimeSinceStart | Covariate::Temperature => {
-                let edges = |it: &Factor| it.form != Form::Between;
+                let edges = |it: &CovariateFactor| it.form != Form::Between;
                 self.hinges().into_iter().chain(self.parts().into_iter().filter(edges)).collect()
             }
             Covariate::TractionForce | Covariate::BrakeForce => {
@@ -120,7 +120,7 @@ impl KnownCovariate {
     }
 
     /// Returns the factors that may multiply the force of a form of the speed.
-    pub fn given_speed(&self) -> Vec<Factor> {
+    pub fn given_speed(&self) -> Vec<CovariateFactor> {
         let mut factors = self.parts();
         if self.of != Covariate::Chainage {
             let knees = self.hinges().into_iter();

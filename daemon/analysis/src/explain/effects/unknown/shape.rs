@@ -1,6 +1,6 @@
 //! Gain of a force of a form, and the numbers that maximise it.
 
-use dynocar_model::terms::extra::{Covariate, Factor};
+use dynocar_model::terms::extra::{Covariate, CovariateFactor};
 
 use super::known::KnownCovariate;
 use super::known::{estimated, is_exponent};
@@ -11,7 +11,7 @@ const REFINING_STEPS: [f64; 7] = [0.1, 0.05, 0.025, 0.012, 0.006, 0.003, 0.0015]
 
 /// A shape that was tried.
 #[derive(Clone)]
-pub struct Tried {
+pub struct TriedShape {
     /// Decrease of the cost by it.
     pub gain: f64,
     /// The same less the price of its numbers.
@@ -19,7 +19,7 @@ pub struct Tried {
     /// The size in N/kN with which it explains most.
     pub n_per_kn: f64,
     /// The form.
-    pub factors: Vec<Factor>,
+    pub factors: Vec<CovariateFactor>,
     /// Whether exponents stay what they are and are no numbers to be fitted.
     pub holds_exponents: bool,
 }
@@ -53,7 +53,7 @@ impl<'s> Ground<'s> {
     }
 
     /// A factor by run and bin; none where its covariate is not known.
-    pub fn values(&self, factor: &Factor) -> Vec<Vec<f64>> {
+    pub fn values(&self, factor: &CovariateFactor) -> Vec<Vec<f64>> {
         let of_run = |covariate: &Vec<f64>| {
             let mut values = vec![1.0; covariate.len()];
             factor.multiply(covariate, &mut values);
@@ -63,7 +63,7 @@ impl<'s> Ground<'s> {
     }
 
     /// Returns the gain of a force of these factors.
-    pub fn tried(&self, factors: Vec<Factor>, holds_exponents: bool) -> Tried {
+    pub fn tried(&self, factors: Vec<CovariateFactor>, holds_exponents: bool) -> TriedShape {
         let values: Vec<_> = factors.iter().map(|factor| self.values(factor)).collect();
         let values: Vec<&[Vec<f64>]> = values.iter().map(Vec::as_slice).collect();
         self.tried_at(factors, &values, holds_exponents)
@@ -72,10 +72,10 @@ impl<'s> Ground<'s> {
     /// The same of factors whose values are known.
     pub fn tried_at(
         &self,
-        factors: Vec<Factor>,
+        factors: Vec<CovariateFactor>,
         values: &[&[Vec<f64>]],
         holds_exponents: bool,
-    ) -> Tried {
+    ) -> TriedShape {
         let mut sum = Tuple::zero(self.scan.fit.theta.len());
         for (index, per_unit_mps2) in self.per_unit_mps2.iter().enumerate() {
             let mut shape = vec![1.0; per_unit_mps2.len()];
@@ -88,11 +88,11 @@ impl<'s> Ground<'s> {
         let (gain, n_per_kn) = self.scan.gain(&sum);
         let of_factors = factors.iter().map(|factor| estimated(factor.form, holds_exponents));
         let worth = gain - (1 + of_factors.sum::<usize>()) as f64 * self.number_cost;
-        Tried { gain, worth, n_per_kn, factors, holds_exponents }
+        TriedShape { gain, worth, n_per_kn, factors, holds_exponents }
     }
 
     /// The same structure with the numbers near by that explain most.
-    pub fn refined(&self, mut best: Tried) -> Tried {
+    pub fn refined(&self, mut best: TriedShape) -> TriedShape {
         for step in REFINING_STEPS {
             for factor in 0..best.factors.len() {
                 for number in 0..best.factors[factor].form.numbers().len() {
@@ -110,10 +110,15 @@ impl<'s> Ground<'s> {
     }
 
     /// A shape with one number moved by a share of its range; `None` where that is no form.
-    fn moved(&self, one: &Tried, (factor, number): (usize, usize), change: f64) -> Option<Tried> {
+    fn moved(
+        &self,
+        one: &TriedShape,
+        (factor, number): (usize, usize),
+        change: f64,
+    ) -> Option<TriedShape> {
         let range = self.covariate(one.factors[factor].of)?;
         let mut factors = one.factors.clone();
-        let Factor { form, numbers, .. } = &mut factors[factor];
+        let CovariateFactor { form, numbers, .. } = &mut factors[factor];
         let is_exponent = is_exponent(*form, number);
         if is_exponent && one.holds_exponents {
             return None;

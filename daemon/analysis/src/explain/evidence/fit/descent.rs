@@ -7,7 +7,7 @@ use super::super::noise::{Noise, RunScatter};
 use super::super::run_scatter::{RunFilters, SharedFilters, remove};
 use super::memory::RunMemory;
 use super::plan::Plan;
-use super::{Fit, FitProblem, RunNormal};
+use super::{Fit, FitProblem};
 use crate::explain::hypothesis::SharedHypothesis;
 use crate::parallel;
 
@@ -128,45 +128,6 @@ impl FitProblem {
         self.at(model, theta, noise)
     }
 
-    /// A fit where all runs say the same model's parameters, in groups that each have one of its own: a step to
-    /// the least cost of all, with what they say there to first order.
-    pub fn joined_by(&self, fit: &Fit, groups: &[RunNormal]) -> Fit {
-        let mut all = Fit { runs: groups.to_vec(), ..fit.clone() };
-        let Some((theta, _)) = self.bounded_step(&all, &all.score(), 0.0) else { return all };
-        let step = DVector::from_iterator(
-            theta.len(),
-            theta.iter().zip(&all.theta).map(|(to, from)| to - from),
-        );
-        for run in &mut all.runs {
-            run.score -= &run.information * &step;
-        }
-        (all.prior_information, all.prior_score, _) = self.prior(&all.model, &theta);
-        all.theta = theta;
-        all
-    }
-
-    /// A fit where all runs, in groups, say its parameters: a, b and c where all fit best, and the effects moved by
-    /// what is given.
-    pub fn with_davis_joined(&self, fit: &Fit, groups: &[RunNormal], moved: &[f64]) -> Fit {
-        let all = Fit { runs: groups.to_vec(), ..fit.clone() };
-        let (information, score) = (all.information(), all.score());
-        let moved = DVector::from_column_slice(moved);
-        let pull = score.rows(0, 3) - information.view((0, 3), (3, moved.len())) * &moved;
-        let own = information.view((0, 0), (3, 3)).into_owned();
-        let Some(factor) = Cholesky::new(own) else { return fit.clone() };
-        let step = factor.solve(&pull);
-        let mut theta = fit.theta.clone();
-        for (i, value) in theta.iter_mut().enumerate() {
-            if i < 3 {
-                let (lower, upper) = self.declared_bounds(i);
-                *value = (*value + step[i]).clamp(lower, upper);
-            } else {
-                *value += moved[i - 3];
-            }
-        }
-        self.at(&fit.model, theta, fit.noise)
-    }
-
     fn fit_remembering(
         &self,
         model: &UpdatedModel,
@@ -262,7 +223,7 @@ impl FitProblem {
 
     /// The damped step within the bounds, and the decrease of the cost that it promises, which is never negative:
     /// it goes towards the least cost as far as the nearest bound, then on with what is held there held.
-    fn bounded_step(
+    pub(super) fn bounded_step(
         &self,
         fit: &Fit,
         score: &DVector<f64>,
@@ -273,13 +234,25 @@ impl FitProblem {
         for i in 0..fit.theta.len() {
             information[(i, i)] *= 1.0 + damping;
         }
-        let room =
-            fit.theta.iter().zip(&bounds).map(|(at, (lower, upper))| [lower - at, upper - at]);
-        let step = step_within(&information, score, &room.collect::<Vec<_>>())?;
+        let step = self.step_from(fit, &information, score)?;
         let moved = fit.theta.iter().zip(step.iter()).zip(&bounds);
         let theta = moved.map(|((at, step), (lower, upper))| (at + step).clamp(*lower, *upper));
         let curvature = step.dot(&(fit.information() * &step));
         Some((theta.collect(), 2.0 * step.dot(score) - curvature))
+    }
+
+    /// Returns the step from a fit that such information and score lead to, within the bounds of its parameters;
+    /// `None` where the information is singular.
+    pub fn step_from(
+        &self,
+        fit: &Fit,
+        information: &DMatrix<f64>,
+        score: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let bounds = self.bounds(&fit.model);
+        let room =
+            fit.theta.iter().zip(bounds).map(|(at, (lower, upper))| [lower - at, upper - at]);
+        step_within(information, score, &room.collect::<Vec<_>>())
     }
 
     /// Bounds of all parameters.

@@ -11,7 +11,7 @@ use super::super::noise::Noise;
 use super::super::run_data::RunData;
 use super::super::run_scatter::scatter_columns;
 use super::super::run_scatter::{RunFilters, SharedFilters, WeightedFilter, Whitened};
-use super::super::whitener::Whitener;
+use super::super::whitener::BinWhitener;
 use super::memory::RunMemory;
 use super::plan::{At, Plan};
 use super::{Column, Fit, FitProblem, RunNormal, declared_response};
@@ -240,7 +240,7 @@ impl Fit {
 }
 
 /// Whitens columns; what of them the run's own factors would not explain.
-fn whiten(whitener: &Whitener, own: &WeightedFilter, columns: &mut [Vec<f64>]) -> Vec<Column> {
+fn whiten(whitener: &BinWhitener, own: &WeightedFilter, columns: &mut [Vec<f64>]) -> Vec<Column> {
     whitener.whiten_all(columns);
     let free = columns.iter().map(|column| own.remove(column, &own.factors(column)));
     free.map(Arc::new).collect()

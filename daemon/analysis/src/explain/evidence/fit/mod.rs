@@ -1,6 +1,7 @@
 //! The joint fit of a, b, c and the parameters of all effects.
 
 mod descent;
+mod joint;
 mod linearised;
 mod memory;
 mod plan;
@@ -14,14 +15,15 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::integral::Response;
 use super::model::{UpdatedForces, UpdatedModel};
 use super::noise::{Noise, RunScatter};
-use super::positions::pooled_s;
 use super::run_data::RunData;
 use super::run_scatter::SharedFilters;
-use super::run_scatter::{Columns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns};
-use super::whitener::Whitener;
+use super::run_scatter::{
+    DeviationColumns, FactorMatrix, RunFactors, WeightedFilter, scatter_columns,
+};
+use super::whitener::BinWhitener;
 use crate::parallel;
-use crate::statistics::median;
 use memory::RunMemory;
+pub use prior::{Positions, RunPositions};
 
 /// Standard deviation of the declared a, b, c as share of their size: a weak prior that keeps
 /// directions apart which the runs do not excite.
@@ -42,13 +44,11 @@ pub struct FitProblem {
     declared: Davis,
     prior_deviation: [f64; 3],
     /// Columns of the runs' own factors.
-    scatter_columns: Vec<Columns>,
+    scatter_columns: Vec<DeviationColumns>,
     /// Response of the declared model, for each run.
     declared_responses: Vec<Response>,
-    /// Measured distance over distance by integrated speed, with its standard deviation.
-    pub distance_ratio: Option<(f64, f64)>,
-    /// Seconds by which the speed is late by the position, with their standard deviation.
-    speed_late_s: Option<(f64, f64)>,
+    /// Evidence of positions on the speeds.
+    pub positions: Positions,
 }
 
 /// A series of a run that models share.
@@ -72,6 +72,16 @@ impl RunNormal {
             information: DMatrix::zeros(count, count),
             score: DVector::zeros(count),
             cost: 0.0,
+        }
+    }
+
+    /// Returns the sums at parameters that are a step away, to second order.
+    pub fn moved_by(&self, step: &DVector<f64>) -> Self {
+        let pull = &self.information * step;
+        RunNormal {
+            information: self.information.clone(),
+            cost: self.cost - (2.0 * &self.score - &pull).dot(step),
+            score: &self.score - pull,
         }
     }
 
@@ -180,7 +190,7 @@ impl Fit {
     }
 
     /// The filter of a run, by number.
-    pub fn whitener(&self, index: usize) -> &Whitener {
+    pub fn whitener(&self, index: usize) -> &BinWhitener {
         &self.run_filters[index].whitener
     }
 
@@ -219,10 +229,7 @@ impl FitProblem {
         let sizes = [declared.a, declared.b, declared.c];
         let prior_deviation =
             std::array::from_fn(|i| PRIOR_SHARE[i] * sizes[i].abs().max(least[i]));
-        let distance_ratio = pooled_distance_ratio(&runs);
-        let parts: Vec<f64> =
-            runs.iter().flat_map(|run| run.speed_late_s.iter().copied()).collect();
-        let speed_late_s = pooled_s(&parts);
+        let positions = Positions::of(&runs.iter().map(RunPositions::of).collect::<Vec<_>>());
         let scatter_columns = runs.iter().map(|run| scatter_columns(run, declared)).collect();
         let declared_responses = parallel::of_each(&runs, declared_response);
         FitProblem {
@@ -231,8 +238,7 @@ impl FitProblem {
             prior_deviation,
             scatter_columns,
             declared_responses,
-            distance_ratio,
-            speed_late_s,
+            positions,
         }
     }
 
@@ -245,7 +251,7 @@ impl FitProblem {
 
     /// Whether positions show that the speed is late.
     pub fn is_position_ahead(&self) -> bool {
-        self.speed_late_s.is_some_and(|(late_s, _)| late_s > 0.0)
+        self.positions.speed_late_s.is_some_and(|(late_s, _)| late_s > 0.0)
     }
 
     /// Standard deviation of the declared a (0), b (1) or c (2).
@@ -303,17 +309,4 @@ fn declared_response(run: &RunData) -> Response {
     let mut forces = UpdatedForces::default();
     UpdatedModel::default().response((run, &[0.0; 3]), nothing, &mut forces, &mut response);
     response
-}
-
-/// The ratios of all runs together. Wheel creep, rounding and the places where a run starts are
-/// common to the runs: below `COMMON` nothing is seen.
-fn pooled_distance_ratio(runs: &[RunData]) -> Option<(f64, f64)> {
-    const COMMON: f64 = 0.001;
-    let mut ratios: Vec<f64> = runs.iter().filter_map(|run| Some(run.distance_ratio?.0)).collect();
-    let median = median(&mut ratios)?;
-    let mean_var: f64 =
-        runs.iter().filter_map(|run| Some(run.distance_ratio?.1.powi(2))).sum::<f64>()
-            / ratios.len() as f64;
-    let deviation = (mean_var / ratios.len() as f64 + COMMON * COMMON).sqrt();
-    Some((median, deviation))
 }

@@ -73,8 +73,8 @@ impl<'m> Plan<'m> {
     /// Whether what is known of a run for a model serves another, which has its effects and some more.
     pub fn serves(&self, grown: &Plan, run: &RunData) -> bool {
         let count = self.handlings.len();
-        let is_new = |(number, ..): (usize, &SharedHypothesis, Range<usize>)| number >= count;
-        grown.handlings[..count] == self.handlings && !grown.acting(run).any(is_new)
+        grown.handlings[..count] == self.handlings
+            && !grown.acting(run).any(|(number, ..)| number >= count)
     }
 
     pub fn acts_together(&self, run: &RunData) -> impl Fn(usize) -> bool {

@@ -3,50 +3,53 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::model::UpdatedModel;
-use super::FitProblem;
+use super::super::positions::pooled_s;
+use super::super::run_data::RunData;
+use super::{FitProblem, RunNormal};
+use crate::statistics::median;
 
-impl FitProblem {
-    /// Pull of the prior: information and score.
-    pub(super) fn prior(
-        &self,
-        model: &UpdatedModel,
-        theta: &[f64],
-    ) -> (DMatrix<f64>, DVector<f64>, f64) {
-        let count = theta.len();
-        let (mut information, mut score) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let mut cost = 0.0;
-        let declared = [self.declared.a, self.declared.b, self.declared.c];
-        for i in 0..3 {
-            let weight = self.prior_deviation[i].powi(-2);
-            let away = declared[i] - theta[i];
-            information[(i, i)] += weight;
-            score[i] += weight * away;
-            cost += weight * away * away;
+/// Evidence of the positions of runs on their speeds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Positions {
+    /// Measured distance over distance by integrated speed, with its standard deviation.
+    pub distance_ratio: Option<(f64, f64)>,
+    /// Seconds by which the speed is late by the position, with their standard deviation.
+    pub speed_late_s: Option<(f64, f64)>,
+}
+
+/// Evidence of the positions of one run on its speeds.
+#[derive(Clone, Debug, Default)]
+pub struct RunPositions {
+    distance_ratio: Option<(f64, f64)>,
+    speed_late_s: Vec<f64>,
+}
+
+impl RunPositions {
+    /// Returns the evidence of a run.
+    pub fn of(run: &RunData) -> Self {
+        RunPositions { distance_ratio: run.distance_ratio, speed_late_s: run.speed_late_s.clone() }
+    }
+}
+
+impl Positions {
+    /// Returns the evidence of runs together. Wheel creep, rounding and the places where a run starts are common to
+    /// the runs: below `COMMON` nothing is seen.
+    pub fn of(runs: &[RunPositions]) -> Self {
+        const COMMON: f64 = 0.001;
+        let own: Vec<(f64, f64)> = runs.iter().filter_map(|run| run.distance_ratio).collect();
+        let mut ratios: Vec<f64> = own.iter().map(|it| it.0).collect();
+        let mean_var = own.iter().map(|it| it.1.powi(2)).sum::<f64>() / own.len() as f64;
+        let deviation = (mean_var / own.len() as f64 + COMMON * COMMON).sqrt();
+        let parts: Vec<f64> = runs.iter().flat_map(|run| run.speed_late_s.clone()).collect();
+        Positions {
+            distance_ratio: median(&mut ratios).map(|ratio| (ratio, deviation)),
+            speed_late_s: pooled_s(&parts),
         }
-        for (effect, range) in model.effects.iter().zip(model.ranges()) {
-            let Some(own) = effect.nature().prior else { continue };
-            let at = DVector::from_column_slice(&theta[range.clone()]).add_scalar(-effect.none());
-            let pull = own * &at;
-            cost += at.dot(&pull);
-            let (start, count) = (range.start, range.len());
-            let mut block = information.view_mut((start, start), (count, count));
-            block += own;
-            let mut part = score.rows_mut(start, count);
-            part -= pull;
-        }
-        self.take_positions(model, theta, (&mut information, &mut score), &mut cost);
-        (information, score, cost)
     }
 
-    /// Adds the information of positions on the scale of the speeds and on how late they are.
-    fn take_positions(
-        &self,
-        model: &UpdatedModel,
-        theta: &[f64],
-        normal: (&mut DMatrix<f64>, &mut DVector<f64>),
-        cost: &mut f64,
-    ) {
-        let (information, score) = normal;
+    /// Adds what they say of the scale of the speeds and of how late they are.
+    pub fn add_to(&self, normal: &mut RunNormal, model: &UpdatedModel, theta: &[f64]) {
+        let RunNormal { information, score, cost } = normal;
         if let Some((ratio, deviation)) = self.distance_ratio {
             let mut scale = 1.0;
             let mut at = None;
@@ -82,5 +85,40 @@ impl FitProblem {
                 }
             }
         }
+    }
+}
+
+impl FitProblem {
+    /// Pull of the prior: information and score.
+    pub(super) fn prior(
+        &self,
+        model: &UpdatedModel,
+        theta: &[f64],
+    ) -> (DMatrix<f64>, DVector<f64>, f64) {
+        let count = theta.len();
+        let (mut information, mut score) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut cost = 0.0;
+        let declared = [self.declared.a, self.declared.b, self.declared.c];
+        for i in 0..3 {
+            let weight = self.prior_deviation[i].powi(-2);
+            let away = declared[i] - theta[i];
+            information[(i, i)] += weight;
+            score[i] += weight * away;
+            cost += weight * away * away;
+        }
+        for (effect, range) in model.effects.iter().zip(model.ranges()) {
+            let Some(own) = effect.nature().prior else { continue };
+            let at = DVector::from_column_slice(&theta[range.clone()]).add_scalar(-effect.none());
+            let pull = own * &at;
+            cost += at.dot(&pull);
+            let (start, count) = (range.start, range.len());
+            let mut block = information.view_mut((start, start), (count, count));
+            block += own;
+            let mut part = score.rows_mut(start, count);
+            part -= pull;
+        }
+        let mut normal = RunNormal { information, score, cost };
+        self.positions.add_to(&mut normal, model, theta);
+        (normal.information, normal.score, normal.cost)
     }
 }

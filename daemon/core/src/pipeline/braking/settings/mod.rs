@@ -5,7 +5,7 @@ use dynocar_shared::{PipelineKind, RailCondition, Uncertain};
 use serde::Deserialize;
 
 use super::intake::{BrakingCoefficient, DeclaredGear};
-use super::law::Law;
+use super::law::BrakingLaw;
 use super::law_bank::LawBank;
 use super::motion::Walk;
 use super::tracker::{PriorScale, Tracker, TrackerModel};
@@ -96,7 +96,7 @@ impl EkfSettings {
         let initial = Uncertain::new(self.initial.unwrap_or(reference), initial_std);
         let walk = Walk::Scale(relative_walk.powi(2));
         let prior = PriorScale::OfCoefficient(initial);
-        let model = TrackerModel::new(&self.braking, Law::Demand, walk, prior);
+        let model = TrackerModel::new(&self.braking, BrakingLaw::Demand, walk, prior);
         Ok(self.braking.estimator(kind, quantity, train, Tracker::new(model, 0.0, 0, false)))
     }
 }
@@ -131,9 +131,9 @@ impl LawSettings {
             TrackerModel::new(&self.braking, law, walk, prior)
         };
         let hypotheses = [
-            hypothesis(Law::Rail(RailCondition::Dry), self.scale_std),
-            hypothesis(Law::Rail(RailCondition::Wet), self.scale_std),
-            hypothesis(Law::Demand, self.braking.demand_relative_std),
+            hypothesis(BrakingLaw::Rail(RailCondition::Dry), self.scale_std),
+            hypothesis(BrakingLaw::Rail(RailCondition::Wet), self.scale_std),
+            hypothesis(BrakingLaw::Demand, self.braking.demand_relative_std),
         ];
         let bank = LawBank::new(hypotheses, self.change_rate_per_s);
         let (kind, quantity) = (PipelineKind::AdhesionLaw, BrakingCoefficient::Adhesion);

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::{BrakeFactor, BrakingSettings};
 use crate::pipeline::Estimator;
 use crate::pipeline::braking::intake::BrakingCoefficient;
-use crate::pipeline::braking::law::{Law, SpeedTable};
+use crate::pipeline::braking::law::{BrakingLaw, SpeedTable};
 use crate::pipeline::braking::motion::Walk;
 use crate::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};
 use crate::pipeline::settings::SettingError;
@@ -83,10 +83,10 @@ impl SmootherSettings {
         }
     }
 
-    fn law(&self, quantity: BrakingCoefficient) -> Result<Law, SettingError> {
+    fn law(&self, quantity: BrakingCoefficient) -> Result<BrakingLaw, SettingError> {
         match (&self.friction_law, quantity) {
             (Some(points), BrakingCoefficient::Friction) => {
-                SpeedTable::new(points.clone()).map(Law::Table).map_err(|_| SettingError {
+                SpeedTable::new(points.clone()).map(BrakingLaw::Table).map_err(|_| SettingError {
                     key: "friction_law",
                     value: points.len() as f64,
                     allowed: "two or more [speed, friction], speeds rising, friction above 0",
@@ -97,7 +97,7 @@ impl SmootherSettings {
                 value: points.len() as f64,
                 allowed: "a curve only where disc friction is reported",
             }),
-            (None, _) => Ok(Law::Demand),
+            (None, _) => Ok(BrakingLaw::Demand),
         }
     }
 

@@ -3,7 +3,9 @@
 use dynocar_shared::{MassSource, Quantity, Reason, Status};
 
 use super::{MOVED_MIN_S, TrainKalman};
-use crate::pipeline::judge::{Case, InputState, Judgement, LONG_RUN_MAX, long_run_variance};
+use crate::pipeline::judge::{
+    InputState, Judgement, LONG_RUN_MAX, StatusInputs, long_run_variance,
+};
 
 /// Motion in s before the mass is called known.
 const MASS_MOVED_MIN_S: f64 = 3.0;
@@ -75,9 +77,9 @@ impl TrainKalman {
         }
     }
 
-    fn case(&self, input: &InputState) -> Case {
+    fn case(&self, input: &InputState) -> StatusInputs {
         let failure = (Status::Invalid, Reason::NumericalFailure);
-        Case {
+        StatusInputs {
             fault: self.is_fresh_reset.then_some(failure),
             input: input.doubt,
             is_ready: self.moved_s >= self.moved_min_s.min(MASS_MOVED_MIN_S),

@@ -1,7 +1,7 @@
 //! The properties of a line, declared and found: their data, their range, what a pointer reads of them.
 
-use dynocar_analysis::explain::report::line::{AlongLine, MarkedInterval};
 use dynocar_analysis::explain::report::panels::PanelBin;
+use dynocar_analysis::explain::report::residual_line::{AlongLine, MarkedInterval};
 use dynocar_model::track::{StepProfile, Track};
 use plotters::element::{PathElement, Rectangle, Text};
 use plotters::style::Color;

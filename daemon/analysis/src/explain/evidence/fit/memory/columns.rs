@@ -129,7 +129,7 @@ impl RunMemory {
         columns: &mut [Vec<f64>],
     ) {
         let At { plan, run, theta, .. } = at;
-        let touched = |(_, effect, range): (usize, &SharedHypothesis, Range<usize>)| {
+        let touched = |effect: &SharedHypothesis, range: Range<usize>| {
             let (effect, start) = (effect.clone(), range.start);
             range.filter(move |i| effect.touches(i - start, run)).map(move |i| (i, i - start))
         };
@@ -141,15 +141,18 @@ impl RunMemory {
                 plan.model.gradient_slopes((run, theta), acts, forces, by_permille);
                 for own in gradients {
                     let effect = own.1.clone();
-                    for (i, parameter) in touched(own) {
+                    for (i, parameter) in touched(own.1, own.2) {
                         effect.gradient_permille(parameter, run, samples);
                         integrate_bins(run, |k| [by_permille[k] * samples[k]], [&mut columns[i]]);
                     }
                 }
             });
         }
-        let moves: Vec<(usize, f64)> =
-            others.into_iter().flat_map(touched).map(|(i, _)| (i, steps[i - 3])).collect();
+        let moves: Vec<(usize, f64)> = others
+            .into_iter()
+            .flat_map(|(_, effect, range)| touched(effect, range))
+            .map(|(i, _)| (i, steps[i - 3]))
+            .collect();
         if !moves.is_empty() {
             let acts = plan.acts_together(run);
             with_scratch(|it| {

@@ -1,0 +1,161 @@
+//! One simulated dataset, fed to the monitor sample by sample.
+
+use std::sync::Arc;
+
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
+use dynocar_tests::simulator::sensors::SIMULATED_TRAIN;
+use dynocar_tests::simulator::true_run::{TRUE_STEP_S, TrueState};
+use dynocar_tests::simulator::{SimulatedDataset, SimulatedRun, TrueEffect};
+
+use crate::rig::pipelines::default_pipeline;
+
+/// A train that is slower shows little of anything.
+const MOVING_MPS: f64 = 2.0;
+/// Share of the reported brake force below which the rail does not carry it.
+const CARRIED_SHARE: f64 = 0.9;
+/// A longer step in s between samples is a gap, not driving.
+const STEP_MAX_S: f64 = 5.0;
+
+/// Statements of the monitor about a dataset; times are of motion.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Watched {
+    /// The kinds that are undeclared.
+    pub truth: Vec<EffectKind>,
+    /// Time driven in s.
+    pub driven_s: f64,
+    /// Time in s from the first moment at which the effect acted until it was named, alone or
+    /// among alternatives.
+    pub named_after_s: Option<f64>,
+    /// True when the effect ever acted.
+    pub has_acted: bool,
+    /// Suspicions in the order in which they were raised: the leading kind, and the time driven.
+    pub raised: Vec<(EffectKind, f64)>,
+    /// Time in s during which a suspicion stood that did not hold the effect.
+    pub wrong_s: f64,
+    /// The leading kind at the end.
+    pub last: Option<EffectKind>,
+}
+
+/// The monitor as it stands after a sample.
+struct Said {
+    leading: Option<EffectKind>,
+    holds_truth: bool,
+}
+
+impl Said {
+    fn of(snapshot: &ParameterSnapshot, truth: &[EffectKind]) -> Said {
+        let leading = EffectKind::from_number(snapshot.suspected_effect).expect("a known kind");
+        let leading = Some(leading).filter(|&kind| kind != EffectKind::None);
+        let others = snapshot.suspected_alternatives;
+        let is_named = |kind: &EffectKind| leading == Some(*kind) || others & kind.bit() != 0;
+        Said { leading, holds_truth: truth.iter().any(is_named) }
+    }
+}
+
+/// Feeds all runs of a dataset to one monitor.
+///
+/// # Panics
+///
+/// When the monitor cannot be built with its default settings.
+pub fn watch(data: &SimulatedDataset) -> Watched {
+    let train = Arc::new(data.declared_train().clone());
+    let track = Some(Arc::new(data.track().clone()));
+    let kind = PipelineKind::ResidualMonitor;
+    let mut pipeline = default_pipeline(kind, SIMULATED_TRAIN, &train, track);
+    let truth: Vec<EffectKind> = data.effects.iter().map(|effect| effect.kind()).collect();
+    let mut watched = Watched { truth: truth.clone(), ..Watched::default() };
+    let mut acted_at_s = None;
+    let mut sequence = 0;
+    for run in &data.runs {
+        let mut last_ns = None;
+        for sample in &run.samples {
+            sequence += 1;
+            let said = Said::of(pipeline.process(&TrainSample { sequence, ..*sample }), &truth);
+            watched.note_raised(&said);
+            let step_s = driven_s(&mut last_ns, sample);
+            watched.driven_s += step_s;
+            if acted_at_s.is_none() && acts_at(data, run, sample) {
+                acted_at_s = Some(watched.driven_s);
+            }
+            watched.note(&said, step_s, acted_at_s);
+        }
+    }
+    watched.has_acted = acted_at_s.is_some();
+    watched
+}
+
+/// Time driven in s since the sample before.
+fn driven_s(last_ns: &mut Option<i64>, sample: &TrainSample) -> f64 {
+    let before_ns = last_ns.replace(sample.time_ns);
+    let step_s = before_ns.map_or(0.0, |before_ns| (sample.time_ns - before_ns) as f64 * 1e-9);
+    let is_driving = sample.speed_mps > MOVING_MPS && (0.0..STEP_MAX_S).contains(&step_s);
+    if is_driving { step_s } else { 0.0 }
+}
+
+fn acts_at(data: &SimulatedDataset, run: &SimulatedRun, sample: &TrainSample) -> bool {
+    let start_ns = run.samples[0].time_ns;
+    let index = ((sample.time_ns - start_ns) as f64 * 1e-9 / TRUE_STEP_S).max(0.0) as usize;
+    acts(data, run, &run.states[index.min(run.states.len() - 1)])
+}
+
+impl Watched {
+    /// The kinds that led a suspicion and do not act.
+    pub fn false_suspicions(&self) -> impl Iterator<Item = EffectKind> {
+        self.raised.iter().map(|(kind, _)| *kind).filter(|kind| !self.truth.contains(kind))
+    }
+
+    fn note_raised(&mut self, said: &Said) {
+        if let Some(kind) = said.leading.filter(|_| said.leading != self.last) {
+            self.raised.push((kind, self.driven_s));
+        }
+        self.last = said.leading;
+    }
+
+    fn note(&mut self, said: &Said, step_s: f64, acted_at_s: Option<f64>) {
+        if said.leading.is_none() {
+            return;
+        }
+        if !said.holds_truth {
+            self.wrong_s += step_s;
+        } else if let Some(acted_at_s) = acted_at_s {
+            self.named_after_s.get_or_insert(self.driven_s - acted_at_s);
+        }
+    }
+}
+
+/// Whether any effect of a dataset acts in a state of one of its runs.
+fn acts(data: &SimulatedDataset, run: &SimulatedRun, state: &TrueState) -> bool {
+    let one = |effect: &TrueEffect| one_acts(effect, data, run, state);
+    state.speed_mps > MOVING_MPS && data.effects.iter().any(one)
+}
+
+fn one_acts(
+    effect: &TrueEffect,
+    data: &SimulatedDataset,
+    run: &SimulatedRun,
+    state: &TrueState,
+) -> bool {
+    let (track, at_m) = (data.track(), state.position_m);
+    let length_m = data.declared_train().length_m;
+    let disturbances = &run.disturbances;
+    match effect {
+        TrueEffect::TunnelDrag { .. } => track.tunnel_share(at_m, length_m) > Some(0.0),
+        TrueEffect::CurveResistance { .. } => track.curvature_per_m(at_m, length_m) > Some(0.0),
+        TrueEffect::DraggingBrake { .. } => disturbances.drag_n(state.time_s) > 0.0,
+        TrueEffect::MassChangeSections(_) | TrueEffect::MassChangeWindows(_) => {
+            disturbances.effect_mass_factor(state.time_s, at_m) != 1.0
+        }
+        TrueEffect::LocalResistance { intervals_m, .. } => {
+            let is_near = |&(from_m, to_m): &(f64, f64)| {
+                (from_m - 0.5 * length_m..=to_m + 0.5 * length_m).contains(&at_m)
+            };
+            disturbances.local.is_some() && intervals_m.iter().any(is_near)
+        }
+        TrueEffect::LowAdhesion { .. } => {
+            let carried_n = CARRIED_SHARE * state.reported.brake_force_n;
+            disturbances.adhesion.is_some() && state.acting.brake_force_n < carried_n
+        }
+        _ => true,
+    }
+}

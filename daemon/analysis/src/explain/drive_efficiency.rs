@@ -1,0 +1,244 @@
+//! The efficiency of a drive whose force is not recorded but its power: a scale that the runs determine
+//! through the mass, before anything undeclared is looked for.
+//!
+//! The efficiency acts one way when the drive pulls and the other way when it brakes, and so do
+//! the auxiliaries: what is estimated of them holds for the declared mass.
+
+use std::sync::Arc;
+
+use dynocar_model::terms::Parameter;
+use dynocar_model::train::PowerTrain;
+use dynocar_shared::HALF_95;
+use dynocar_shared::vocabulary::EffectKind;
+use nalgebra::DMatrix;
+
+use super::answer::{DriveAnswer, WithStd};
+use super::effects::{AtBound, Hypothesis, Nature, On};
+use super::evidence::{FitProblem, RunData, RunDataError, SampleForces, UpdatedModel, prepare};
+use super::selection::{FORM_SHARE, OBSERVATIONS_MIN, deviations};
+use crate::dataset::{Dataset, Role};
+use crate::statistics::{rms, share_of};
+
+/// Efficiency, and what is fed beside the drive in kW beyond what is fed at rest.
+const PARAMETERS: [Parameter; 2] = [
+    Parameter::new(
+        "efficiency",
+        (*PowerTrain::EFFICIENCIES.start(), *PowerTrain::EFFICIENCIES.end()),
+        0.005,
+    ),
+    Parameter::new("auxiliary_power_kw", (-2000.0, 2000.0), 0.1),
+];
+/// Below this speed in m/s a drive takes nothing.
+const RESTING_MPS: f64 = 0.05;
+/// Samples at rest from which the auxiliary power is known.
+const RESTING_MIN: usize = 30;
+/// Least difference, as a share, between the auxiliary power of a moving drive and that at rest.
+const DRIVING_SHARE: f64 = 0.25;
+
+/// Auxiliary power in kW before the runs have driven.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Auxiliaries {
+    power_kw: f64,
+    std_kw: f64,
+}
+
+impl Auxiliaries {
+    /// The power at rest of some runs and its scatter; the declared one with a wide one where they
+    /// never rest.
+    fn of(powered: &[&RunData], declared: PowerTrain) -> Self {
+        let rows = powered.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
+        let resting_kw: Vec<f64> = rows
+            .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
+            .filter(|(sample, power_w)| sample.speed_mps < RESTING_MPS && power_w.is_finite())
+            .map(|(_, power_w)| 1e-3 * power_w)
+            .collect();
+        if resting_kw.len() < RESTING_MIN {
+            let power_kw = 1e-3 * declared.auxiliary_power_w;
+            return Auxiliaries { power_kw, std_kw: PARAMETERS[1].upper };
+        }
+        let at = |share: f64| share_of(&resting_kw, share);
+        let power_kw = at(0.5).max(0.0);
+        let scatter_kw = 0.5 * (at(0.84) - at(0.16));
+        Auxiliaries { power_kw, std_kw: scatter_kw.hypot(DRIVING_SHARE * power_kw).max(0.1) }
+    }
+}
+
+/// Effect of one constant efficiency on the auxiliaries, since a drive's efficiency differs between light and full
+/// load by some hundredths: standard deviation as a share of the drive's root mean square power.
+const AUXILIARIES_FORM_SHARE: f64 = 0.02;
+
+/// Root mean square of the power in kW of moving samples.
+fn moving_power_kw(problem: &FitProblem) -> f64 {
+    let rows = problem.runs.iter().filter_map(|run| Some((run, run.power.as_ref()?)));
+    let moving = rows
+        .flat_map(|(run, power)| run.samples().iter().zip(&power.power_w))
+        .filter(|(sample, power_w)| sample.speed_mps > RESTING_MPS && power_w.is_finite());
+    1e-3 * rms(&moving.map(|(_, power_w)| *power_w).collect::<Vec<f64>>())
+}
+
+/// A drive with an efficiency, and auxiliaries where the power holds them, for unknown.
+#[derive(Debug)]
+struct OpenDrive {
+    declared: PowerTrain,
+    /// Auxiliary power at rest, where the power includes it.
+    resting: Option<Auxiliaries>,
+    prior: DMatrix<f64>,
+}
+
+impl OpenDrive {
+    fn new(declared: PowerTrain, resting: Option<Auxiliaries>) -> Self {
+        let weights = match resting {
+            Some(resting) => vec![0.0, resting.std_kw.powi(-2)],
+            None => vec![0.0],
+        };
+        OpenDrive { declared, resting, prior: DMatrix::from_diagonal(&weights.into()) }
+    }
+
+    fn at(&self, parameters: &[f64]) -> PowerTrain {
+        let auxiliary_power_w = match (self.resting, parameters.get(1)) {
+            (Some(resting), Some(more_kw)) => 1e3 * (resting.power_kw + more_kw),
+            _ => self.declared.auxiliary_power_w,
+        };
+        PowerTrain { efficiency: parameters[0], auxiliary_power_w, ..self.declared }
+    }
+
+    fn start(&self) -> Vec<f64> {
+        let all = [self.declared.efficiency, 0.0];
+        all[..self.parameters().len()].to_vec()
+    }
+}
+
+impl Hypothesis for OpenDrive {
+    fn nature(&self) -> Nature<'_> {
+        let parameters = if self.resting.is_some() { &PARAMETERS[..] } else { &PARAMETERS[..1] };
+        Nature {
+            // A drive without losses.
+            none: 1.0,
+            // The auxiliary power at rest limits the one while driving.
+            prior: Some(&self.prior),
+            // The kind that it would be taken for.
+            ..Nature::of(EffectKind::TractionGain, parameters)
+        }
+    }
+
+    fn at_bound(&self, parameters: &[f64]) -> Option<AtBound> {
+        let spec = &PARAMETERS[0];
+        // The upper bound is a drive without losses: power that is recorded at the wheels.
+        let is_low = parameters[0] - spec.lower < spec.step;
+        is_low.then_some(AtBound { name: spec.name, bound: spec.lower })
+    }
+
+    fn touches(&self, _parameter: usize, run: &RunData) -> bool {
+        run.power.is_some()
+    }
+
+    fn apply(&self, parameters: &[f64], On { run, first, .. }: On, forces: &mut [SampleForces]) {
+        let Some(power) = &run.power else { return };
+        let drive = self.at(parameters);
+        let rows = power.power_w.iter().zip(run.samples()).skip(first);
+        for (force, (&power_w, sample)) in forces.iter_mut().zip(rows) {
+            let more = drive.beyond_n(self.declared, power_w, sample.speed_mps);
+            let Some([traction_n, brake_n]) = more else { continue };
+            force.traction_n += traction_n;
+            if power.is_brake {
+                force.brake_n += brake_n;
+            }
+        }
+    }
+}
+
+/// A drive as the runs show it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EstimatedDrive {
+    /// With what was found.
+    pub drive: PowerTrain,
+    /// The same for machines.
+    pub answer: DriveAnswer,
+}
+
+/// Returns the drive's efficiency as estimated from the fit runs of a dataset that records its power; `None` where
+/// no force comes from power, or too little is driven to estimate it.
+///
+/// # Errors
+///
+/// When a run has no usable sample.
+pub fn estimated(dataset: &Dataset) -> Result<Option<EstimatedDrive>, RunDataError> {
+    if dataset.runs.iter().all(|run| run.power().is_none()) {
+        return Ok(None);
+    }
+    let mut runs = prepare(dataset)?;
+    runs.retain(|run| run.role == Role::Fit);
+    let powered: Vec<&RunData> = runs.iter().filter(|run| run.power.is_some()).collect();
+    if powered.is_empty() {
+        return Ok(None);
+    }
+    let declared = dataset.train.drive;
+    let drive = declared.unwrap_or(PowerTrain::USUAL);
+    let holds_more = |run: &&RunData| run.power.as_ref().is_some_and(|it| it.has_auxiliaries);
+    let resting = powered.iter().any(holds_more).then(|| Auxiliaries::of(&powered, drive));
+    let open = OpenDrive::new(drive, resting);
+    let problem = FitProblem::new(runs, dataset.train.resistance);
+    Ok(reported_by(&problem, open, declared))
+}
+
+fn reported_by(
+    problem: &FitProblem,
+    open: OpenDrive,
+    declared: Option<PowerTrain>,
+) -> Option<EstimatedDrive> {
+    let (start, open) = (open.start(), Arc::new(open));
+    let model = UpdatedModel::default().with(open.clone());
+    let fit = problem.fit_from_declared(&model, &start);
+    if fit.observations() < OBSERVATIONS_MIN {
+        return None;
+    }
+    let deviation = deviations(&fit).std;
+    let found = fit.effect_parameters(0);
+    let at = open.at(found);
+    let form_kw = AUXILIARIES_FORM_SHARE * moving_power_kw(problem);
+    let at_bound = open.at_bound(found).map(|at| at.name);
+    let answer = DriveAnswer {
+        efficiency: WithStd {
+            value: at.efficiency,
+            std: deviation[3].hypot(FORM_SHARE * at.efficiency),
+        },
+        auxiliary_power_kw: open.resting.map(|_| WithStd {
+            value: 1e-3 * at.auxiliary_power_w,
+            std: deviation[4].hypot(form_kw),
+        }),
+        declared_efficiency: declared.map(|drive| drive.efficiency),
+        at_bound,
+    };
+    // A value at a bound is not identified.
+    let drive = if at_bound.is_some() { open.declared } else { at };
+    Some(EstimatedDrive { drive, answer })
+}
+
+impl DriveAnswer {
+    /// Returns the estimate as a sentence to follow another.
+    pub fn sentence(&self) -> String {
+        let WithStd { value, std } = self.efficiency;
+        let read = match self.declared_efficiency {
+            Some(declared) => format!("declared {declared}"),
+            None => format!("{} is usual", PowerTrain::USUAL.efficiency),
+        };
+        if let Some(name) = self.at_bound {
+            return format!(
+                " The force comes from power, and these runs do not determine the drive's efficiency \
+                 ({name} at its bound; {read}): it stays."
+            );
+        }
+        let auxiliaries = self.auxiliary_power_kw.map_or(String::new(), |estimated| {
+            format!(
+                " and {:.1} ± {:.1} kW for what is fed beside it",
+                estimated.value,
+                HALF_95 * estimated.std
+            )
+        });
+        format!(
+            " The force comes from power, at an efficiency of {value:.3} ± {:.3} ({read}){auxiliaries}, \
+             for the declared mass: of a mass that is 1 % off, so is the efficiency.",
+            HALF_95 * std
+        )
+    }
+}

@@ -1,0 +1,111 @@
+//! Confirmation of effects by the runs held out: whether they act in them too, and how large they are there.
+//!
+//! They know a, b, c and the usual errors as the fit runs do, and nothing of the effect: its numbers follow from the
+//! normal equations of the runs held out and from the information of the fit runs on everything else.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::evidence::{Fit, FitProblem, Positions, RunData, RunNormal, RunPositions};
+use super::over_time::is_one_in_all_runs;
+use super::score::RunScore;
+use super::selection::{SearchOutcome, enlarged_by_scatter, std_with_forms};
+
+/// Fewer runs say little of each other.
+const RUNS_MIN: usize = 8;
+/// Runs held out that show an effect this many times less surely than the fit runs say nothing.
+const DEVIATION_TIMES_MAX: f64 = 5.0;
+
+/// A run held out, reduced to what it says of a finished model.
+pub struct HeldOutRun {
+    /// Errors without and with the effects.
+    pub score: RunScore,
+    /// Its part of the evidence; `None` without effects, and where it shows none.
+    evidence: Option<(RunNormal, RunPositions)>,
+}
+
+impl HeldOutRun {
+    /// Reduces a run; `within` is the part of it that may show effects.
+    pub fn of(
+        (problem, outcome): (&FitProblem, &SearchOutcome),
+        run: &RunData,
+        within: Option<&RunData>,
+    ) -> Self {
+        let beside = outcome.beside();
+        let fit = beside.as_ref().map_or(&outcome.fit, |beside| &beside.fit);
+        let within = within.filter(|_| !outcome.fit.model.effects.is_empty());
+        HeldOutRun {
+            score: RunScore::of(run, &outcome.base, &outcome.fit),
+            evidence: within.map(|run| (problem.normal_of(run, fit), RunPositions::of(run))),
+        }
+    }
+}
+
+/// The numbers of an effect by the runs held out alone.
+#[derive(Clone, Debug)]
+pub struct HeldOutEffect {
+    /// Number of these runs.
+    pub runs: usize,
+    /// All parameters of the model, the effect's own as in these runs.
+    pub theta: Vec<f64>,
+    /// Their standard deviations.
+    pub std: Vec<f64>,
+    /// Their covariance, without what the forms of effects add.
+    pub covariance: DMatrix<f64>,
+    /// Probability that the effect's numbers differ as much from those of the fit runs where they are the same.
+    pub p_value: f64,
+}
+
+/// Returns what the runs held out say of each of the first `count` effects of a model; `None` for one that acts in
+/// some runs only or has more than two numbers, and where they hardly show it.
+pub fn by_held_out_runs(
+    (problem, fit): (&FitProblem, &Fit),
+    runs: &[HeldOutRun],
+    covariance: &DMatrix<f64>,
+    count: usize,
+) -> Vec<Option<HeldOutEffect>> {
+    let (theta, model) = (&fit.theta, &fit.model);
+    let mut own = RunNormal::none(theta.len());
+    let (normals, positions): (Vec<RunNormal>, Vec<RunPositions>) =
+        runs.iter().filter_map(|run| run.evidence.clone()).unzip();
+    normals.iter().for_each(|normal| own.add(normal));
+    Positions::of(&positions).add_to(&mut own, model, theta);
+    let of_effect = |number: usize| {
+        let (effect, range) = (&model.effects[number], model.ranges()[number].clone());
+        if normals.len() < RUNS_MIN || !is_one_in_all_runs(&**effect) {
+            return None;
+        }
+        let (start, size) = (range.start, range.len());
+        let information = &own.information + without(&fit.information(), start, size)?;
+        let step = problem.step_from(fit, &information, &own.score)?;
+        let factor = Cholesky::new(information.clone())?;
+        let left: Vec<RunNormal> = normals.iter().map(|normal| normal.moved_by(&step)).collect();
+        let known = enlarged_by_scatter(&factor.inverse(), &information, &left);
+        let [fitted, held_out] =
+            [covariance, &known].map(|all| all.view((start, start), (size, size)).into_owned());
+        let is_shown = held_out.trace() < DEVIATION_TIMES_MAX.powi(2) * fitted.trace();
+        let apart = step.rows(start, size).into_owned();
+        let p_value = chance(&apart, &(fitted + held_out))?;
+        let theta: Vec<f64> = theta.iter().zip(&step).map(|(value, step)| value + step).collect();
+        let std = std_with_forms(&known, model, &theta);
+        let runs = normals.len();
+        is_shown.then_some(HeldOutEffect { runs, theta, std, covariance: known, p_value })
+    };
+    (0..count).map(of_effect).collect()
+}
+
+/// Returns information less all that is known of `size` parameters from `start` on, whatever they are.
+fn without(information: &DMatrix<f64>, start: usize, size: usize) -> Option<DMatrix<f64>> {
+    let own = information.view((start, start), (size, size)).into_owned();
+    let shared = information.columns(start, size);
+    let mut rest = information - shared * Cholesky::new(own)?.solve(&shared.transpose());
+    rest.rows_mut(start, size).fill(0.0);
+    rest.columns_mut(start, size).fill(0.0);
+    Some(rest)
+}
+
+/// Probability that numbers of such a covariance are as far from zero.
+fn chance(numbers: &DVector<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
+    let square = numbers.dot(&Cholesky::new(covariance.clone())?.solve(numbers));
+    Some(ChiSquared::new(numbers.len() as f64).ok()?.sf(square))
+}

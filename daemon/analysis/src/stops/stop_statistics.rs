@@ -1,0 +1,108 @@
+//! All stops of a dataset together: from which speeds how long, how hard, and how long the train stood.
+
+use serde::Serialize;
+
+use super::recorded::RecordedStop;
+use crate::statistics::span;
+
+/// Stops are counted together whose speeds lie in the same step of this size in m/s.
+const STEP_MPS: f64 = 5.0;
+/// Step in m/s at which decelerations are summed up.
+const SPEEDS_MPS: f64 = 2.0;
+
+/// The middle of some values and what 80 % of them lie within.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct QuantileRange {
+    /// A tenth is below.
+    pub low: f64,
+    /// Half is below.
+    pub median: f64,
+    /// A tenth is above.
+    pub high: f64,
+}
+
+impl QuantileRange {
+    fn of(values: &[f64]) -> Option<Self> {
+        let mut sorted = values.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let last = sorted.len().checked_sub(1)?;
+        let at = |share: f64| sorted[(share * last as f64).round() as usize];
+        Some(QuantileRange { low: at(0.1), median: at(0.5), high: at(0.9) })
+    }
+}
+
+/// Stops from speeds next to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FromSpeed {
+    /// The speeds in m/s, from and to.
+    pub from_mps: [f64; 2],
+    /// How many stops.
+    pub stops: usize,
+    /// Their distances in m.
+    pub distance_m: QuantileRange,
+    /// Their times in s.
+    pub time_s: QuantileRange,
+    /// Their mean decelerations in m/s².
+    pub mean_deceleration_mps2: QuantileRange,
+}
+
+/// Decelerations of all stops at a speed: what drivers choose, and what the brake gives at least.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DecelerationSpread {
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Stops that passed it.
+    pub stops: usize,
+    /// Their decelerations in m/s²; the hardest tenth lies above `high`.
+    pub deceleration_mps2: QuantileRange,
+}
+
+/// All stops together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StopStatistics {
+    /// By the speed that they began at, from slow to fast.
+    pub from_speeds: Vec<FromSpeed>,
+    /// Decelerations over speed, from slow to fast.
+    pub decelerations: Vec<DecelerationSpread>,
+    /// Times in s that the train stood; `None` where it never went on.
+    pub dwell_s: Option<QuantileRange>,
+}
+
+impl StopStatistics {
+    /// Sums some stops up.
+    pub fn of(stops: &[RecordedStop]) -> Self {
+        let ends_mps = span(stops.iter().map(|it| it.from_mps)).unwrap_or([0.0; 2]);
+        let from_speeds = (0..).map(|step| f64::from(step) * STEP_MPS);
+        let from_speeds = from_speeds.take_while(|it| *it <= ends_mps[1]).filter_map(|from_mps| {
+            let bounds = [from_mps, from_mps + STEP_MPS];
+            let within: Vec<&RecordedStop> =
+                stops.iter().filter(|it| (bounds[0]..bounds[1]).contains(&it.from_mps)).collect();
+            let spread = |of: fn(&RecordedStop) -> f64| {
+                QuantileRange::of(&within.iter().map(|it| of(it)).collect::<Vec<f64>>())
+            };
+            Some(FromSpeed {
+                from_mps: bounds,
+                stops: within.len(),
+                distance_m: spread(|it| it.distance_m)?,
+                time_s: spread(|it| it.time_s)?,
+                mean_deceleration_mps2: spread(|it| it.mean_deceleration_mps2)?,
+            })
+        });
+        let speeds = (1..).map(|step| f64::from(step) * SPEEDS_MPS);
+        let decelerations = speeds.take_while(|it| *it <= ends_mps[1]).filter_map(|speed_mps| {
+            let at = stops.iter().filter_map(|stop| {
+                let point = stop.decelerations.iter().find(|it| it.speed_mps == speed_mps)?;
+                Some(point.deceleration_mps2)
+            });
+            let values: Vec<f64> = at.collect();
+            let deceleration_mps2 = QuantileRange::of(&values)?;
+            Some(DecelerationSpread { speed_mps, stops: values.len(), deceleration_mps2 })
+        });
+        let dwells: Vec<f64> = stops.iter().filter_map(|it| it.dwell_s).collect();
+        StopStatistics {
+            from_speeds: from_speeds.collect(),
+            decelerations: decelerations.collect(),
+            dwell_s: QuantileRange::of(&dwells),
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! State before the first sample, and everything that samples teach and an unexplained braking must not teach.
+
+use dynocar_model::train::Davis;
+use nalgebra::{Matrix3, Vector3};
+
+use super::TrainKalmanSettings;
+use super::brake_errors::BrakeErrors;
+use super::motion_bank::{MotionBank, SpeedLikelihood};
+use super::motion_filter::{
+    BRAKE_ERROR, BRAKE_SCALE, COEFFICIENTS, FORCE_DELAY, LOAD, MotionState, RESISTANCE, SPEED,
+    StateCovariance, TRACTION_SCALE, WIND,
+};
+use crate::pipeline::InnovationMonitor;
+use crate::pipeline::momentum::{regressors, scaled, unscaling};
+use crate::pipeline::motion::SpeedNoise;
+
+/// Innovations that the published statistics look back over.
+const INNOVATION_MEMORY: u32 = 1000;
+
+/// State, noise and the record of innovations.
+#[derive(Clone, Debug)]
+pub struct LearnedState {
+    /// The filters.
+    pub bank: MotionBank,
+    /// Noise of the measured speed.
+    pub noise: SpeedNoise,
+    /// Contribution of forces that jump between two samples.
+    pub jumps: JumpShare,
+    /// How far brakes are off.
+    pub brake: BrakeErrors,
+    /// Innovations so far.
+    pub monitor: InnovationMonitor,
+}
+
+impl LearnedState {
+    /// Before any sample.
+    pub fn new(settings: &TrainKalmanSettings, first: &ResistanceBelief) -> Self {
+        LearnedState {
+            bank: first.bank(settings),
+            noise: SpeedNoise::guessed(settings.speed_noise_mps),
+            jumps: JumpShare::default(),
+            brake: BrakeErrors::new(settings.brake_scale_std),
+            monitor: InnovationMonitor::new(INNOVATION_MEMORY),
+        }
+    }
+}
+
+/// Weight that the first share counts for, and what is looked back over.
+const WEIGHT_FIRST: f64 = 3.0;
+const WEIGHT_MAX: f64 = 300.0;
+/// Share of an innovation's variance from which it says something of jumps.
+const SEEN_SHARE: f64 = 0.1;
+/// Limits of the logarithm of a single innovation's variance, and of the shares.
+const SEEN: (f64, f64) = (-4.0, 12.0);
+const SHARES: (f64, f64) = (1e-3, 12.0);
+
+/// The share of [`crate::pipeline::motion::jump_variance`] that the forces of a train bring, by the
+/// innovations at changes of force: 1 where nobody knows when within a step a force changed, hardly
+/// anything where it runs straight between samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JumpShare {
+    /// The share.
+    pub share: f64,
+    weight: f64,
+}
+
+impl Default for JumpShare {
+    fn default() -> Self {
+        JumpShare { share: 1.0, weight: WEIGHT_FIRST }
+    }
+}
+
+impl JumpShare {
+    /// Takes in an innovation: its square has the mean of the rest of its variance and the share of the
+    /// jump's.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn learn(&mut self, measured: &SpeedLikelihood) {
+        let of_variance = measured.jump_variance / measured.variance;
+        if !(of_variance > SEEN_SHARE * self.share.min(1.0)) {
+            return;
+        }
+        let whole = measured.jump_variance / self.share;
+        let rest = measured.variance - measured.jump_variance;
+        let seen = ((measured.innovation_mps.powi(2) - rest) / whole).clamp(SEEN.0, SEEN.1);
+        let weight = (whole / measured.variance).powi(2).min(1.0);
+        self.weight = (self.weight + weight).min(WEIGHT_MAX);
+        self.share += (seen - self.share) * weight / self.weight;
+        self.share = self.share.clamp(SHARES.0, SHARES.1);
+    }
+}
+
+/// No declared coefficient is taken for known better than one that makes this share of w0 at 20 m/s: a
+/// declared zero is no knowledge.
+const FLOOR_SHARE: f64 = 0.2;
+
+/// a, b, c (scaled, N/kN) with their covariance, declared or kept from earlier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResistanceBelief {
+    mean: Vector3<f64>,
+    covariance: Matrix3<f64>,
+}
+
+impl ResistanceBelief {
+    /// As declared, each coefficient to a share of itself.
+    pub fn declared(davis: &Davis, relative_std: f64) -> Self {
+        let mean = scaled(davis);
+        let floor = FLOOR_SHARE * davis.w0_n_per_kn(20.0).abs();
+        let stds = mean.map(|value| relative_std * value.abs().max(floor));
+        ResistanceBelief { mean, covariance: Matrix3::from_diagonal(&stds.component_mul(&stds)) }
+    }
+
+    /// Standard deviation of a in N/kN.
+    pub fn a_std(&self) -> f64 {
+        self.covariance[(0, 0)].sqrt()
+    }
+
+    /// As kept from earlier: Davis a, b, c and their covariance.
+    pub fn kept(davis: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
+        let scale = Matrix3::from_diagonal(&unscaling().map(|factor| 1.0 / factor));
+        ResistanceBelief { mean: scale * davis, covariance: scale * covariance * scale }
+    }
+
+    /// c, scaled.
+    pub fn air_resistance(&self) -> f64 {
+        self.mean[2]
+    }
+
+    /// Returns the addition of a headwind of 1 m/s at a speed in m/s, in N/kN.
+    pub fn by_wind(&self, speed_mps: f64) -> f64 {
+        let square = |mps: f64| regressors(mps)[2];
+        0.5 * self.mean[2] * (square(speed_mps + 1.0) - square(speed_mps - 1.0))
+    }
+
+    /// Returns the addition of the square of a wind of 1 m/s, in N/kN.
+    pub fn by_wind_square(&self) -> f64 {
+        self.mean[2] * regressors(1.0)[2]
+    }
+
+    /// Filters that believe this, and forces and load as the settings trust them.
+    pub fn bank(&self, settings: &TrainKalmanSettings) -> MotionBank {
+        let mut mean = MotionState::zeros();
+        mean[LOAD] = 1.0;
+        mean.fixed_rows_mut::<COEFFICIENTS>(RESISTANCE).copy_from(&self.mean);
+        let mut all = StateCovariance::zeros();
+        all[(SPEED, SPEED)] = 1.0;
+        all[(LOAD, LOAD)] = (0.01 * settings.load_std_percent).powi(2);
+        all.fixed_view_mut::<COEFFICIENTS, COEFFICIENTS>(RESISTANCE, RESISTANCE)
+            .copy_from(&self.covariance);
+        all[(TRACTION_SCALE, TRACTION_SCALE)] = settings.force_scale_std.powi(2);
+        all[(BRAKE_ERROR, BRAKE_ERROR)] = 1.0;
+        all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.brake_scale_std.powi(2);
+        all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
+        all[(WIND, WIND)] = settings.wind_std_mps.powi(2);
+        MotionBank::new(&mean, &all, settings.gradient_std_permille)
+    }
+}
+
+/// Standard deviation in N/kN of the declared a before any sample, by default.
+pub fn declared_a_std(train: &dynocar_model::train::TrainModel) -> f64 {
+    let relative_std = TrainKalmanSettings::default().prior_relative_std;
+    ResistanceBelief::declared(&train.resistance, relative_std).a_std()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::motion::Trust;
+
+    #[test]
+    fn the_share_follows_the_squares_of_the_innovations_at_changes_of_force() {
+        let learned = |innovation_mps: f64| {
+            let mut jumps = JumpShare::default();
+            for _ in 0..2000 {
+                let jump_variance = 1e-3 * jumps.share;
+                jumps.learn(&SpeedLikelihood {
+                    trust: Trust::of(0.0),
+                    innovation_mps,
+                    variance: 1e-3 + jump_variance,
+                    jump_variance,
+                });
+            }
+            jumps.share
+        };
+        assert!((learned(2e-3_f64.sqrt()) - 1.0).abs() < 0.05);
+        assert!((learned(1.5e-3_f64.sqrt()) - 0.5).abs() < 0.1);
+        assert!(learned(0.0) < 0.15, "no jump at all");
+    }
+}

@@ -1,0 +1,288 @@
+//! From one sample to the next: forces as they act, and how fast forces and line change.
+
+use dynocar_model::force::ResolvedSample;
+use dynocar_model::terms::wind;
+use dynocar_model::track::{gradient_error_kept, gradient_error_of_mean};
+
+use super::TrainKalmanSettings;
+use super::brake_errors::BrakeErrors;
+use super::force_history::ForceHistory;
+use super::learned_state::{LearnedState, ResistanceBelief};
+use super::motion_filter::{FilterStep, Following, wind_over};
+use crate::pipeline::momentum::UnitSample;
+
+/// How long a change of force is remembered, in s.
+const FORCE_RATE_MEMORY_S: f64 = 0.5;
+/// Time in s over which the change of what is known to retard is averaged: positions with noise let the
+/// gradient jump to and fro, the more often the more samples there are.
+const KNOWN_RATE_MEMORY_S: f64 = 1.0;
+
+/// Change of speed in m/s, and time in s, over which what a brake exerts beside its report becomes something else: friction
+/// goes with speed, is blended by speed, and heats up in a long descent.
+const BRAKE_ERROR_MPS: f64 = 3.0;
+const BRAKE_ERROR_TIME_S: f64 = 600.0;
+
+/// Random walk of the brake force's scale over an hour of motion.
+const BRAKE_DRIFT_PER_SQRT_H: f64 = 0.03;
+
+/// Standard deviation in N/kN of a brake force below which it is taken for exact.
+const BRAKE_STD_LEAST: f64 = 1e-3;
+/// Time in s over which a wind is taken for the same: a step of the filters for each sample would cost time.
+const WIND_STEP_S: f64 = 1.0;
+
+/// Force in N/kN below which a brake is taken to have been released.
+const RELEASED: f64 = 0.1;
+
+/// Error of a brake force over a step.
+struct BrakeError {
+    /// Way in which it follows its report.
+    following: Following,
+    /// Expected force beyond its report in N/kN.
+    late: f64,
+    /// Standard deviation in N/kN.
+    std: f64,
+    /// Share of its square by how late the brake is.
+    lateness: f64,
+    /// Share of the error that is left of the step before.
+    kept: f64,
+}
+
+/// Memory of the samples from which steps are made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepBuilder {
+    settings: TrainKalmanSettings,
+    train_length_m: f64,
+    /// Error of the map under the train over that at a place, by standard deviation.
+    map_share: f64,
+    acting: ForceHistory,
+    /// Fastest change of the reported force lately in N/kN per s.
+    force_rate: f64,
+    /// Change of what is known to retard in N/kN per s.
+    known_rate: f64,
+    /// Brake force in N/kN of a brake as slow as may be, and the time in ns it refers to.
+    followed: f64,
+    /// True from a standstill until the brake that held the train is released.
+    was_held: bool,
+    /// Direction between an error of the brake's scale and one of its time, of the newest step: one says nothing of the other.
+    brake_angle: f64,
+    /// How often the brake's error was renewed since it was used last.
+    renewals: f64,
+    /// Time in s since the wind was moved on.
+    wind_s: f64,
+    seen_ns: Option<i64>,
+}
+
+impl StepBuilder {
+    /// Before the first sample of a train of a length in m.
+    pub fn new(settings: &TrainKalmanSettings, train_length_m: f64) -> Self {
+        let acting = ForceHistory::default();
+        StepBuilder {
+            settings: *settings,
+            train_length_m,
+            map_share: gradient_error_of_mean(train_length_m),
+            acting,
+            force_rate: 0.0,
+            known_rate: 0.0,
+            followed: 0.0,
+            was_held: false,
+            brake_angle: 0.0,
+            renewals: 0.0,
+            wind_s: 0.0,
+            seen_ns: None,
+        }
+    }
+
+    /// Takes in what is reported, also at a standstill.
+    pub fn see(&mut self, now: &UnitSample) {
+        self.acting.see((now.time_ns, now.segment), [now.traction, now.brake]);
+        let seen_ns = self.seen_ns.replace(now.time_ns).unwrap_or(i64::MIN);
+        let since_s = (now.time_ns.saturating_sub(seen_ns) as f64 * 1e-9).max(0.0);
+        let left = (-since_s / self.settings.brake_lag_s).exp();
+        self.was_held |= now.speed_mps < self.settings.speed_min_mps;
+        self.followed = now.brake + left * (self.followed - now.brake);
+    }
+
+    /// Returns how far a reported brake force may be off; its error goes on while no brake acts.
+    fn brake_error(&mut self, brake: f64, learned: &BrakeErrors) -> BrakeError {
+        let lacking = brake - self.followed;
+        self.was_held &= lacking < -RELEASED;
+        let following = match lacking >= 0.0 {
+            true => Following::Building,
+            false if self.was_held => Following::Starting,
+            false => Following::Releasing,
+        };
+        let lateness = learned.late(following);
+        let expected = -lateness.mean * lacking;
+        let late = lateness.spread.std * lacking;
+        let scale = learned.scale.std * brake;
+        let square = late * late + scale * scale;
+        if square < BRAKE_STD_LEAST * BRAKE_STD_LEAST {
+            return BrakeError { following, late: expected, std: 0.0, lateness: 0.0, kept: 1.0 };
+        }
+        let before = std::mem::replace(&mut self.brake_angle, late.atan2(scale));
+        let renewals = std::mem::take(&mut self.renewals) + (self.brake_angle - before).abs();
+        BrakeError {
+            following,
+            late: expected,
+            std: square.sqrt(),
+            lateness: late * late / square,
+            kept: (-renewals).exp(),
+        }
+    }
+
+    /// A motion begins.
+    pub fn begin(&mut self) {
+        (self.force_rate, self.known_rate) = (0.0, 0.0);
+    }
+
+    /// The step to the newest sample, if forces act by so much in s behind their report; what only the
+    /// estimator knows is left to it.
+    ///
+    /// # Real-time
+    ///
+    /// Bounded work, no allocation.
+    pub fn to(
+        &mut self,
+        (from, to): (&UnitSample, &UnitSample),
+        sample: &ResolvedSample,
+        (delay_s, learned): (f64, &LearnedState),
+        air: &ResistanceBelief,
+    ) -> FilterStep {
+        let settings = self.settings;
+        let duration_s = to.seconds_since(from);
+        let faded = self.force_rate * (-duration_s / FORCE_RATE_MEMORY_S).exp();
+        let change = to.traction - from.traction;
+        self.force_rate = faded.max((change / duration_s).abs());
+        let share = (duration_s / KNOWN_RATE_MEMORY_S).min(1.0);
+        self.known_rate += share * ((to.known - from.known) / duration_s - self.known_rate);
+        // A change of gradient or curve passes under the train in many steps, all early or all late.
+        let speed_mps = to.speed_mps.max(settings.speed_min_mps);
+        let steps = (self.train_length_m / (speed_mps * duration_s)).max(1.0);
+        let place_s = settings.position_std_m / speed_mps;
+        let by_place = steps * (place_s * self.known_rate * duration_s).powi(2);
+        // Over a time in which the speed's noise averages out gusts follow each other like noise.
+        let by_wind = air.by_wind(to.speed_mps);
+        let gust_n_per_kn = by_wind * wind::GUST_SHARE * settings.wind_std_mps;
+        let by_gusts = 2.0 * wind::GUST_TIME_S * gust_n_per_kn.powi(2) * duration_s;
+        let acting = self.acting.over(duration_s, delay_s);
+        let half_s = 0.5 * duration_s;
+        let known = half_s * (from.known + to.known);
+        // By the forces: the speed's noise changes it all the time.
+        let changed_mps = (acting.impulses[0] - acting.impulses[1] - known).abs() / to.inertia;
+        self.renewals += changed_mps / BRAKE_ERROR_MPS + duration_s / BRAKE_ERROR_TIME_S;
+        let brake = self.brake_error(to.brake, &learned.brake);
+        self.wind_s += duration_s;
+        let wind = if self.wind_s < WIND_STEP_S {
+            (1.0, 0.0)
+        } else {
+            wind_over(std::mem::take(&mut self.wind_s), settings.wind_std_mps)
+        };
+        let travelled_m = half_s * (from.speed_mps + to.speed_mps);
+        let declared = self.map_share * settings.gradient_std_permille;
+        let surveyed = sample.gradient_std_permille;
+        FilterStep {
+            duration_s,
+            travelled_m,
+            inertia: to.inertia,
+            delay_s: acting.delay_s,
+            traction: acting.impulses[0],
+            brake: acting.impulses[1] + duration_s * brake.late,
+            known,
+            traction_change: acting.changes[0],
+            brake_std: duration_s * brake.std,
+            brake_lateness: brake.lateness,
+            following: brake.following,
+            jump_share: learned.jumps.share,
+            impulse_variance: by_place + by_gusts,
+            force_rate: self.force_rate,
+            direction: sample.direction,
+            map_std_permille: if surveyed > 0.0 { surveyed } else { declared },
+            // The smaller a mean's error, the longer it stays.
+            map_kept: gradient_error_kept(travelled_m * self.map_share.powi(2)),
+            drift_variance: settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0,
+            by_wind: sample.direction * by_wind,
+            by_wind_square: air.by_wind_square(),
+            wind,
+            brake_drift_variance: BRAKE_DRIFT_PER_SQRT_H.powi(2) * duration_s / 3600.0,
+            brake_error: (brake.kept, 1.0 - brake.kept * brake.kept),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dynocar_model::train::Davis;
+
+    /// Variance of the impulse over 20 s by where on the line a gradient changes by 6 ‰ under a train of
+    /// 100 m, which passes it at 20 m/s.
+    fn place_variance(rate_hz: i64, position_noise_m: f64) -> f64 {
+        let settings = TrainKalmanSettings { wind_std_mps: 0.0, ..Default::default() };
+        let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c: 0.001 }, 0.4);
+        let learned = LearnedState::new(&settings, &resistance);
+        let mut steps = StepBuilder::new(&settings, 100.0);
+        let sample = |k: i64| {
+            let time_s = k as f64 / rate_hz as f64;
+            let noise_m = if k % 2 == 0 { position_noise_m } else { -position_noise_m };
+            let under_m = (20.0 * (time_s - 5.0) + noise_m).clamp(0.0, 100.0);
+            UnitSample {
+                time_ns: k * 1_000_000_000 / rate_hz,
+                segment: 1,
+                speed_mps: 20.0,
+                driving: 0.0,
+                traction: 0.0,
+                brake: 0.0,
+                known: 0.06 * under_m,
+                inertia: 108.0,
+            }
+        };
+        steps.see(&sample(0));
+        let of_step = |k: i64| {
+            let (from, to) = (sample(k - 1), sample(k));
+            steps.see(&to);
+            steps
+                .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
+                .impulse_variance
+        };
+        (1..20 * rate_hz).map(of_step).sum()
+    }
+
+    #[test]
+    fn gusts_are_noise_in_proportion_to_air_resistance_and_speed() {
+        let settings = TrainKalmanSettings { wind_std_mps: 2.0, ..Default::default() };
+        let variance = |c: f64, speed_mps: f64| {
+            let resistance = ResistanceBelief::declared(&Davis { a: 1.5, b: 0.02, c }, 0.4);
+            let learned = LearnedState::new(&settings, &resistance);
+            let sample = |time_ns: i64| UnitSample {
+                time_ns,
+                segment: 1,
+                speed_mps,
+                driving: 0.0,
+                traction: 0.0,
+                brake: 0.0,
+                known: 0.0,
+                inertia: 108.0,
+            };
+            let mut steps = StepBuilder::new(&settings, 100.0);
+            let (from, to) = (sample(0), sample(100_000_000));
+            steps.see(&from);
+            steps.see(&to);
+            steps
+                .to((&from, &to), &ResolvedSample::coasting(), (0.0, &learned), &resistance)
+                .impulse_variance
+        };
+        // Gusts of 1 m/s for 10 s each: 2 c v, over 0.1 s of independent ones.
+        assert!((variance(0.001, 30.0) - 0.06_f64.powi(2) * 2.0 * 10.0 * 0.1).abs() < 1e-9);
+        assert!((variance(0.002, 15.0) - variance(0.001, 30.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_change_of_gradient_is_as_uncertain_at_any_rate_and_with_noise_of_the_position() {
+        // 3 m at 20 m/s, 6 ‰; the average over a second takes off some of it.
+        let whole = (3.0 / 20.0 * 6.0_f64).powi(2);
+        for (rate_hz, noise_m) in [(5, 0.0), (10, 0.0), (50, 0.0), (10, 1.0), (50, 1.0)] {
+            let share = place_variance(rate_hz, noise_m) / whole;
+            assert!((0.7..1.1).contains(&share), "{rate_hz} Hz, {noise_m} m: {share}");
+        }
+    }
+}
