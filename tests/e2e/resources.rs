@@ -144,7 +144,7 @@ fn the_limit_of_open_files_is_raised_and_its_end_is_named_once() {
     await_true(|| read(&mut readers) == 10, || format!("ten readers: {}", raised.errors()));
     assert!(raised.end(Signal::TERM).success());
     drop(readers);
-    let mut scarce = run("ulimit -n 40");
+    let mut scarce = run("ulimit -n 48");
     await_true(
         || scarce.errors().contains("serving") || scarce.try_wait().is_some(),
         || "a start, or its refusal".into(),
