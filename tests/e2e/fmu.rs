@@ -294,7 +294,7 @@ fn files_that_are_wrong_or_would_be_lost_are_refused_before_anything_is_written(
         assert!(said(&output).contains(words), "{}", said(&output));
         assert!(!site.path().join("a.fmu").exists());
     };
-    refusal(&["fmu", "-o", "a.fmu", "--train", "train.toml"], "train.toml: missing key resistance");
+    refusal(&["fmu", "-o", "a.fmu", "--train", "train.toml"], "train.mass_t = -1: expected");
     refusal(&["fmu", "-o", "train.toml"], "train.toml: exists and is none of");
     refusal(&["fmu", "-o", "a.fmu", "--dataset", "nowhere"], "nowhere: no such file or folder");
     std::fs::create_dir(site.path().join("runs")).unwrap();

@@ -4,7 +4,7 @@
 //! - [`mistakes`]: how wrong what is declared of them is
 //! - [`world`]: a train, its line and its day, drawn by those
 //! - [`brake`]: brakes that do not act as they report
-//! - [`drive`]: driving from stop to stop, and what the controller writes of it
+//! - [`scenario_train`]: driving from stop to stop, and what the controller writes of it
 //! - [`recorded`]: the same as a dataset
 //! - [`bound`]: how well both can be known at best
 //! - [`score`]: what an answer was worth over a drive

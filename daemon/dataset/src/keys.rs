@@ -1,6 +1,6 @@
 //! Keys of `train.toml`, `track.toml` and `dataset.toml`: one row each, by which every reader and writer of the files
 //! knows it. The numbers of `train.toml` have their rows where the train has its members
-//! ([`NUMBERS`](dynocar_model::train::numbers::NUMBERS)).
+//! ([`NUMBERS`]).
 
 use std::fmt::Display;
 

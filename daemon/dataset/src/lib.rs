@@ -17,7 +17,7 @@
 //! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
 //! - `run_content`: what a run's file holds, text or columns
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
-//! - [`train_rows`], [`trains`]: files that hold several trains
+//! - [`trains`]: files that hold several trains
 //! - `clock_faults`: an hour of summer time, seconds without a fraction, rows in another order
 //! - `order`, `spikes`, `motion`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
 //!   position, forces and gradient

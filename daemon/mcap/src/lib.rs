@@ -13,8 +13,7 @@
 //! - [`message`]: messages that are declared once
 //! - [`topic`]: the streams of messages, and the messages
 //! - [`writing`], [`reading`]: MCAP files, written without seeking and read as far as they are whole
-//! - [`joining`]: the files of a recording that rotated, read as one
-//! - [`recording`]: a recording in memory, in the order in which it was recorded
+//! - [`recording`]: a recording, of one file or more, in memory, in the order in which it was recorded
 //! - [`copying`]: copies of recordings, ours or not: a broken file made whole
 //! - [`annotate`]: an explanation beside the data
 //! - [`error`]: what is wrong with a file, and which

@@ -6,7 +6,7 @@
 //! - [`system`]: what it asks of the system: a core, a real-time priority, resident memory
 //! - [`status_log`]: which changes of status and suspicion the log reports, which refused samples it names
 //! - [`tally`]: what it reports to the main thread without waiting for it
-//! - [`watch`]: what the main thread does meanwhile: signals, peers, the log
+//! - [`main_thread`]: what the main thread does meanwhile: signals, peers, the log
 
 pub mod exchange;
 pub mod idle;

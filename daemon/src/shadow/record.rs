@@ -77,7 +77,7 @@ pub struct TriedModel {
     pub estimates: Vec<RivalEstimate>,
 }
 
-/// An interval of [`Evidence::error_ratio`] in words that go before "the error of …".
+/// An interval of [`RivalEvidence::error_ratio`] in words that go before "the error of …".
 pub fn ratio_in_words([low, high]: [f64; 2]) -> String {
     match (low < 0.005, high >= RATIO_MAX) {
         (false, false) => format!("{low:.2} to {high:.2} times"),

@@ -8,7 +8,7 @@
 //!
 //! # Layout
 //!
-//! - [`place`]: where it lies
+//! - [`directories`]: where it lies
 //! - [`mod@file`]: the bytes: header, checksum, atomic replacement
 //! - [`entry`]: the content: keys and estimates
 //! - [`keeper`]: the thread that writes

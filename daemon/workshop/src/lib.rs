@@ -10,10 +10,8 @@
 //! - [`convert`], [`from_dataset`]: recordings to datasets, in memory or in a folder, and back
 //! - [`dataset`]: the dataset at a path, be it a folder or a recording
 //! - [`fmu`]: the estimators as an FMU
-//! - [`annotation`]: an explanation beside the data that it explains
 //! - [`learn`]: recorded runs into candidates for the store
 //! - [`updated`]: the model with its effects as train and track files, and a dataset of them
-//! - [`paths`]: files as seen from a folder
 //! - [`report`]: an explanation as a page of HTML
 //! - [`run_facts`]: what is shown of a recorded run
 //! - [`survey`]: raw recordings to a dataset on a surveyed line

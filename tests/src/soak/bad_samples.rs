@@ -115,7 +115,7 @@ impl SoakScene {
     ///
     /// # Panics
     ///
-    /// As [`Scene::watch`].
+    /// As [`SoakScene::watch`].
     pub fn run(&self, failure: Option<SensorFailure>, rate: f64, seed: u64) -> Vec<Misled> {
         let watched = self.watch(failure, rate, seed, |_| true).into_iter();
         watched.filter_map(|it| it.misled_at_end).collect()

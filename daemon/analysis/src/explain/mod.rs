@@ -4,7 +4,7 @@
 //! # Layout, in the order of the work
 //!
 //! - [`evidence`]: observations, noise, the joint fit of a, b, c and effects
-//! - [`drive`]: the efficiency of a drive of which only the power is recorded
+//! - [`drive_efficiency`]: the efficiency of a drive of which only the power is recorded
 //! - [`force_time`]: forces that act before their stamps
 //! - [`hypothesis`], [`effects`]: what an effect is to the others; the library, one file for each kind
 //! - [`scan`], [`places`], [`residual_pressure`]: what a force of some shape, at some place or

@@ -8,7 +8,7 @@
 //! # Layout, in the order of reading
 //!
 //! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
-//! - `recording_parts`, [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`mod@line`]: the line that
+//! - `recording_parts`, [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`driven_line`]: the line that
 //!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`]: what it shows
 //! - [`observation`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,

@@ -4,7 +4,7 @@
 //! - `descent`, `staged`: the paper's stages, by normalised gradient descent on sums over all samples
 //! - [`JointLeastSquares`]: all of it together, on [`integrals`] of motion
 //! - [`MassKalman`]: the mass by Kalman filters [v, 1/m, bias], a [`bias_bank`] of them
-//! - [`motion`], [`line_resistance`], [`bias_model`]: what a sample gives,
+//! - [`known_motion`], [`line_resistance`], [`bias_model`]: what a sample gives,
 //!   and the parts of the model
 
 pub mod bias_bank;

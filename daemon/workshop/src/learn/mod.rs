@@ -2,18 +2,18 @@
 //! model in force, and puts what it finds into the store of models. It is never in the control cycle.
 //!
 //! A [`Learner`] works in rounds; clock and folders come from outside, and a round neither sleeps nor
-//! waits. The process around it ([`mod@watch`]) starts a round when a suspicion is new, at an hour, or once.
+//! waits. The process around it ([`round_schedule`]) starts a round when a suspicion is new, at an hour, or once.
 //!
 //! # Layout, in the order of the work
 //!
 //! - [`memory`]: what is remembered from round to round
 //! - [`recordings`]: recordings, unpacked once
-//! - [`source`]: the runs that there are
+//! - [`available_runs`]: the runs that there are
 //! - [`pool`]: which runs are explained together, with the model in force as their train and line
 //! - [`finding`]: what an explanation means: a candidate, events, an open question
 //! - [`conclusion`]: what of it goes into the store
 //! - [`learner`]: a round
-//! - [`mod@watch`]: when there is one
+//! - [`round_schedule`]: when there is one
 //! - [`page`]: the history as a page, with the errors that the daemon's trials measured
 
 use std::path::PathBuf;

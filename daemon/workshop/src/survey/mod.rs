@@ -2,7 +2,7 @@
 //!
 //! - [`read`]: a dataset's runs as recordings; a line that was surveyed before
 //! - [`write`](mod@write), [`trip_rows`]: the dataset folder with its trips
-//! - `folder`: all of it in turn; [`material`]: what the files are made of, why nothing comes of it
+//! - `folder`: all of it in turn; [`read`]: what the files are made of, why nothing comes of it
 //! - [`answer`]: the result for machines
 //! - [`page`]: the result as a page
 //!

@@ -8,7 +8,7 @@
 //! - [`errors`]: open-loop errors before and after, with bootstrap intervals
 //! - [`windows`], [`covariates`], [`panels`]: the residual as a force, window by window, against
 //!   covariates
-//! - [`mod@line`]: the same along the line, by direction, with the places found
+//! - [`residual_line`]: the same along the line, by direction, with the places found
 //! - [`timeline`]: the explanation as events and series in time, speeds of runs
 //! - [`parameters`]: what was fitted, with uncertainty
 //! - [`candidates`]: what else was considered

@@ -81,7 +81,7 @@ impl TrainKalman {
         let first = ResistanceBelief::declared(&train.resistance, settings.prior_relative_std);
         let learned = LearnedState::new(&settings, &first);
         Ok(TrainKalman {
-            report: TrainKalmanReport::new(&learned.bank.published(0.0, 0.0, 0.0)),
+            report: TrainKalmanReport::new(&learned.bank.published(0.0, 0.0)),
             learned,
             settings,
             train_kg: train.mass_kg,
@@ -94,7 +94,6 @@ impl TrainKalman {
             systematic: Systematic::new(
                 settings.gradient_std_permille,
                 settings.acceleration_scale_std,
-                train.length_m,
             ),
             speeds: SpeedRange::default(),
             moved_s: 0.0,
@@ -145,7 +144,7 @@ impl TrainKalman {
         self.systematic.see(step.travelled_m, sample.position_m, now.speed_mps);
         self.moved_s += step.duration_s;
         self.is_fresh_reset &= self.moved_s < self.moved_min_s;
-        self.judge(step.direction, step.by_wind);
+        self.judge(step.by_wind);
         Outcome::Updated
     }
 
@@ -159,10 +158,9 @@ impl TrainKalman {
         self.learned.jumps.learn(measured);
     }
 
-    fn judge(&mut self, direction: f64, by_wind: f64) {
+    fn judge(&mut self, by_wind: f64) {
         let inflation = self.long_run().clamp(1.0, LONG_RUN_MAX);
-        let published =
-            self.learned.bank.published(direction, by_wind, self.first.air_resistance());
+        let published = self.learned.bank.published(by_wind, self.first.air_resistance());
         self.report.take(&published, inflation, &self.systematic, &self.speeds);
     }
 
@@ -175,7 +173,7 @@ impl TrainKalman {
         self.learned.brake = BrakeErrors::new(self.settings.brake_scale_std);
         self.moved_s = 0.0;
         self.moved_min_s = MOVED_MIN_S;
-        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0, 0.0));
+        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0));
         self.is_fresh_reset = true;
         self.resets += 1;
     }
@@ -217,8 +215,7 @@ impl TrainKalman {
             }
             self.speeds = SpeedRange::resumed(kept.use_before.speeds_mps);
             self.moved_min_s = 0.0;
-            self.report =
-                TrainKalmanReport::resumed(&self.learned.bank.published(0.0, 0.0, 0.0), known);
+            self.report = TrainKalmanReport::resumed(&self.learned.bank.published(0.0, 0.0), known);
         }
         mass.is_some()
     }
@@ -244,7 +241,7 @@ impl TrainKalman {
             None => {}
         }
         if change.is_some() {
-            self.judge(0.0, 0.0);
+            self.judge(0.0);
         }
         if self.load.has_departed {
             self.systematic.start();
@@ -312,7 +309,7 @@ impl Estimator for TrainKalman {
         let Some((mean, covariance)) = kept.moments(DAVIS) else { return false };
         self.first = ResistanceBelief::kept(&mean, &covariance);
         self.learned.bank = self.first.bank(&self.settings);
-        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0, 0.0));
+        self.report = TrainKalmanReport::new(&self.learned.bank.published(0.0, 0.0));
         self.moved_min_s = CONFIRMED_S;
         let mass = kept.moments([Parameter::Mass]).zip(kept.first_variance(Parameter::Mass));
         let mass = mass.and_then(|((mass_kg, aged), first)| {

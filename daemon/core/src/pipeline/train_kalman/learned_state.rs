@@ -154,7 +154,7 @@ impl ResistanceBelief {
         all[(BRAKE_SCALE, BRAKE_SCALE)] = settings.brake_scale_std.powi(2);
         all[(FORCE_DELAY, FORCE_DELAY)] = settings.force_delay_std_s.powi(2);
         all[(WIND, WIND)] = settings.wind_std_mps.powi(2);
-        MotionBank::new(&mean, &all, settings.gradient_std_permille)
+        MotionBank::new(&mean, &all)
     }
 }
 

@@ -2,13 +2,12 @@
 
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::wind;
-use dynocar_model::track::{gradient_error_kept, gradient_error_of_mean};
 
 use super::TrainKalmanSettings;
 use super::brake_errors::BrakeErrors;
 use super::force_history::ForceHistory;
 use super::learned_state::{LearnedState, ResistanceBelief};
-use super::motion_filter::{FilterStep, Following, wind_over};
+use super::motion_filter::{FilterStep, Following, USUAL_MAP_PERMILLE, wind_over};
 use crate::pipeline::momentum::UnitSample;
 
 /// How long a change of force is remembered, in s.
@@ -52,8 +51,6 @@ struct BrakeError {
 pub struct StepBuilder {
     settings: TrainKalmanSettings,
     train_length_m: f64,
-    /// Error of the map under the train over that at a place, by standard deviation.
-    map_share: f64,
     acting: ForceHistory,
     /// Fastest change of the reported force lately in N/kN per s.
     force_rate: f64,
@@ -79,7 +76,6 @@ impl StepBuilder {
         StepBuilder {
             settings: *settings,
             train_length_m,
-            map_share: gradient_error_of_mean(train_length_m),
             acting,
             force_rate: 0.0,
             known_rate: 0.0,
@@ -130,6 +126,15 @@ impl StepBuilder {
         }
     }
 
+    /// Standard deviation in ‰ of the gradient beyond what behaviours take into account: as surveyed, or as the settings have it.
+    fn map_std_permille(&self, sample: &ResolvedSample) -> f64 {
+        if sample.gradient_std_permille > 0.0 {
+            return sample.gradient_std_permille;
+        }
+        let square = self.settings.gradient_std_permille.powi(2) - USUAL_MAP_PERMILLE.powi(2);
+        square.max(0.0).sqrt()
+    }
+
     /// A motion begins.
     pub fn begin(&mut self) {
         (self.force_rate, self.known_rate) = (0.0, 0.0);
@@ -177,12 +182,9 @@ impl StepBuilder {
         } else {
             wind_over(std::mem::take(&mut self.wind_s), settings.wind_std_mps)
         };
-        let travelled_m = half_s * (from.speed_mps + to.speed_mps);
-        let declared = self.map_share * settings.gradient_std_permille;
-        let surveyed = sample.gradient_std_permille;
         FilterStep {
             duration_s,
-            travelled_m,
+            travelled_m: half_s * (from.speed_mps + to.speed_mps),
             inertia: to.inertia,
             delay_s: acting.delay_s,
             traction: acting.impulses[0],
@@ -195,10 +197,7 @@ impl StepBuilder {
             jump_share: learned.jumps.share,
             impulse_variance: by_place + by_gusts,
             force_rate: self.force_rate,
-            direction: sample.direction,
-            map_std_permille: if surveyed > 0.0 { surveyed } else { declared },
-            // The smaller a mean's error, the longer it stays.
-            map_kept: gradient_error_kept(travelled_m * self.map_share.powi(2)),
+            map_std_permille: self.map_std_permille(sample),
             drift_variance: settings.drift_n_per_kn_per_sqrt_h.powi(2) * duration_s / 3600.0,
             by_wind: sample.direction * by_wind,
             by_wind_square: air.by_wind_square(),
