@@ -184,6 +184,7 @@ fn metrics_are_answered_beside_slow_peers_with_head_slash_and_query() {
     let config = site.write_config(1, "", &format!("{ECHO}{lines}\n"));
     let daemon = site.start(DYNOCAR, &["run", "--config", config.to_str().unwrap()]);
     daemon.await_error("serving");
+    await_true(|| std::net::TcpStream::connect(port).is_ok(), || "metrics".into());
     let connect = || std::net::TcpStream::connect(port).unwrap();
     let ask = |request: &str| {
         let mut stream = connect();

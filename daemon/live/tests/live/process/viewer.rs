@@ -65,7 +65,8 @@ impl Viewer {
             }
             Ok(other) => panic!("expected text or data, found {other:?}"),
             Err(Error::Io(error))
-                if [ErrorKind::WouldBlock, ErrorKind::TimedOut].contains(&error.kind()) => {}
+                if [ErrorKind::WouldBlock, ErrorKind::TimedOut, ErrorKind::Interrupted]
+                    .contains(&error.kind()) => {}
             Err(error) => panic!("{error}"),
         }
         None
