@@ -20,8 +20,8 @@ const DEVIATION_TIMES_MAX: f64 = 5.0;
 pub struct HeldOutRun {
     /// Errors without and with the effects.
     pub score: RunScore,
-    /// Its part of the evidence; `None` without effects, and where it shows none.
-    evidence: Option<(RunNormal, RunPositions)>,
+    /// Its part of the evidence; `None` without effects, where it shows none, and where another run has it.
+    evidence: Option<(RunNormal, Vec<RunPositions>)>,
 }
 
 impl HeldOutRun {
@@ -36,8 +36,19 @@ impl HeldOutRun {
         let within = within.filter(|_| !outcome.fit.model.effects.is_empty());
         HeldOutRun {
             score: RunScore::of(run, &outcome.base, &outcome.fit),
-            evidence: within.map(|run| (problem.normal_of(run, fit), RunPositions::of(run))),
+            evidence: within.map(|run| (problem.normal_of(run, fit), vec![RunPositions::of(run)])),
         }
+    }
+
+    /// Gathers the evidence of some runs in one of them.
+    pub fn gather(runs: &mut [HeldOutRun]) {
+        let mut evidence = runs.iter_mut().filter_map(|run| run.evidence.take());
+        let Some((mut normal, mut positions)) = evidence.next() else { return };
+        for (other, own) in evidence {
+            normal.add(&other);
+            positions.extend(own);
+        }
+        runs[0].evidence = Some((normal, positions));
     }
 }
 
@@ -66,20 +77,21 @@ pub fn by_held_out_runs(
 ) -> Vec<Option<HeldOutEffect>> {
     let (theta, model) = (&fit.theta, &fit.model);
     let mut own = RunNormal::none(theta.len());
-    let (normals, positions): (Vec<RunNormal>, Vec<RunPositions>) =
-        runs.iter().filter_map(|run| run.evidence.clone()).unzip();
-    normals.iter().for_each(|normal| own.add(normal));
+    let evidence: Vec<&(RunNormal, Vec<RunPositions>)> =
+        runs.iter().filter_map(|run| run.evidence.as_ref()).collect();
+    evidence.iter().for_each(|it| own.add(&it.0));
+    let positions: Vec<RunPositions> = evidence.iter().flat_map(|it| it.1.clone()).collect();
     Positions::of(&positions).add_to(&mut own, model, theta);
     let of_effect = |number: usize| {
         let (effect, range) = (&model.effects[number], model.ranges()[number].clone());
-        if normals.len() < RUNS_MIN || !is_one_in_all_runs(&**effect) {
+        if positions.len() < RUNS_MIN || !is_one_in_all_runs(&**effect) {
             return None;
         }
         let (start, size) = (range.start, range.len());
         let information = &own.information + without(&fit.information(), start, size)?;
         let step = problem.step_from(fit, &information, &own.score)?;
         let factor = Cholesky::new(information.clone())?;
-        let left: Vec<RunNormal> = normals.iter().map(|normal| normal.moved_by(&step)).collect();
+        let left: Vec<RunNormal> = evidence.iter().map(|it| it.0.moved_by(&step)).collect();
         let known = enlarged_by_scatter(&factor.inverse(), &information, &left);
         let [fitted, held_out] =
             [covariance, &known].map(|all| all.view((start, start), (size, size)).into_owned());
@@ -88,7 +100,7 @@ pub fn by_held_out_runs(
         let p_value = chance(&apart, &(fitted + held_out))?;
         let theta: Vec<f64> = theta.iter().zip(&step).map(|(value, step)| value + step).collect();
         let std = std_with_forms(&known, model, &theta);
-        let runs = normals.len();
+        let runs = positions.len();
         is_shown.then_some(HeldOutEffect { runs, theta, std, covariance: known, p_value })
     };
     (0..count).map(of_effect).collect()

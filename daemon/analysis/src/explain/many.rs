@@ -239,13 +239,22 @@ impl<E: From<RunDataError> + Send> Many<'_, E> {
         }
         let roles = self.dataset.runs.iter().map(|run| run.role).enumerate();
         let own: Vec<usize> = roles.filter(|it| it.1 == Role::Holdout).map(|it| it.0).collect();
-        let judged = parallel::of_each(&own, |index| -> Result<_, E> {
+        let judge = |index: &usize| -> Result<_, E> {
             let read = (self.read)(*index)?;
             let within = self.within(problem, read.clone(), preparation)?;
             let run = preparation.run(read, Density::Recorded)?;
             Ok(HeldOutRun::of((problem, outcome), &run, within.as_ref()))
-        });
-        judged.into_iter().collect()
+        };
+        // Their evidence adds up in groups, so that memory does not grow with their number.
+        let of_group = own.len().div_ceil(FIT_RUNS_HELD[1]).max(1);
+        let mut judged = Vec::new();
+        for part in own.chunks(of_group * (8 / of_group).max(2)) {
+            let each = parallel::of_each(part, judge).into_iter();
+            let mut each = each.collect::<Result<Vec<HeldOutRun>, E>>()?;
+            each.chunks_mut(of_group).for_each(HeldOutRun::gather);
+            judged.append(&mut each);
+        }
+        Ok(judged)
     }
 
     /// Makes a run ready as far along the line as the searched runs go; `None` for one that goes elsewhere.
