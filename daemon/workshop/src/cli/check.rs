@@ -63,7 +63,7 @@ impl Understood {
 pub enum SamplesOfRuns {
     /// Those of all runs.
     Kept,
-    /// None: runs are read one after the other, and a dataset may be larger than memory.
+    /// None: each run is dropped once it is read, so that a dataset may be larger than memory.
     Dropped,
 }
 

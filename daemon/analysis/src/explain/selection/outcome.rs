@@ -120,7 +120,7 @@ pub struct SearchOutcome {
     pub certain: Vec<(EffectKind, SearchRound)>,
     /// Kinds that were found and did not stand beside the usual errors, and why; not looked for again.
     pub fallen: Vec<(EffectKind, Refusal)>,
-    /// Kinds for which the places of the map were tried in the place of chosen ones.
+    /// Kinds at chosen places that were tried as one number of the whole train or line.
     pub(super) returned: Vec<EffectKind>,
     /// The parameters of a model that was fitted beside the usual errors last, and what came of it.
     pub(super) beside: Option<(Vec<f64>, Arc<Beside>)>,

@@ -67,12 +67,12 @@ impl Search<'_> {
         true
     }
 
-    /// Moves an effect from places that were chosen back to those that the map has of its kind, where it explains more
-    /// there beside the usual errors; returns whether it did. The errors of the map make places of anything, and the
-    /// more runs pass them, the surer.
-    pub(super) fn return_to_mapped(&self, outcome: &mut SearchOutcome) -> bool {
+    /// Puts a kind as one number of the whole train or line, such as the drag of all mapped tunnels, in the stead of
+    /// the same kind at chosen places where that explains more beside the usual errors; returns whether it did. Errors
+    /// of the map make places of anything, and the more runs pass them, the surer.
+    pub(super) fn return_to_whole(&self, outcome: &mut SearchOutcome) -> bool {
         let effects = &outcome.fit.model.effects;
-        let mapped = effects.iter().enumerate().find_map(|(index, effect)| {
+        let whole = effects.iter().enumerate().find_map(|(index, effect)| {
             let kind = effect.kind();
             let is_chosen = effect.site().is_some_and(|site| site.sections.is_some());
             if !is_chosen || !outcome.is_on_trial(kind) || outcome.returned.contains(&kind) {
@@ -82,7 +82,7 @@ impl Search<'_> {
             let whole = effect_of(kind)?.whole(&self.scan(&rest)?)?;
             Some((kind, self.problem.with_own_noise(&self.problem.grown(&rest, [whole.parts()]))))
         });
-        let Some((kind, fit)) = mapped else { return false };
+        let Some((kind, fit)) = whole else { return false };
         outcome.returned.push(kind);
         let own = Self::total(&self.beside_usual_errors(outcome).fit);
         let mut other = SearchOutcome { fit, ..outcome.clone() };

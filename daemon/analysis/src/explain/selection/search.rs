@@ -98,7 +98,7 @@ impl Search<'_> {
             while self.take_certain_beside(&mut outcome)
                 || self.drop_fallen(&mut outcome)
                 || self.give_way(&mut outcome)
-                || self.return_to_mapped(&mut outcome)
+                || self.return_to_whole(&mut outcome)
             {
                 self.take_what_scores(&mut outcome);
             }
