@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dynocar_dataset::encoding::decoded;
+use dynocar_dataset::text_layout::decoded;
 use dynocar_dataset::{
     Dataset, DatasetError, DatasetFiles, DatasetHead, FileProblem, MANIFEST_FILE, Manifest,
     RunContent, is_parquet, parse_track, parse_train, top_keys,

@@ -11,12 +11,11 @@
 //! - [`mod@vocabulary`]: pipelines, parameters, statuses, reasons, effects: the numbers on the wire
 //! - [`snapshot`]: what the daemon answers, [`ParameterSnapshot`]
 //! - [`resistance`]: resistance at a speed, with its standard deviation, from a snapshot
-//! - [`sleeper`]: which pipeline threads want to be woken
 //! - [`adhesion`]: adhesion laws over speed
 //! - [`stopping`]: braking distance and time from a speed, with a bound
 //! - [`quantile`]: quantiles of the normal distribution
 //! - [`schema`]: what each field of sample and snapshot is, in which unit, and when it is missing
-//! - [`services`]: names, prefix and schema version of the channels
+//! - [`services`]: names, prefix and schema version of the channels; which pipeline threads want to be woken
 
 pub mod adhesion;
 pub mod layout;
@@ -25,7 +24,6 @@ pub mod resistance;
 pub mod sample;
 pub mod schema;
 pub mod services;
-pub mod sleeper;
 pub mod snapshot;
 pub mod stopping;
 pub mod vocabulary;
@@ -34,8 +32,7 @@ pub use adhesion::{RailCondition, Uncertain};
 pub use quantile::HALF_95;
 pub use resistance::ResistanceEstimate;
 pub use sample::{SampleField, TrainId, TrainSample};
-pub use services::SCHEMA_MAJOR;
-pub use sleeper::SleeperState;
+pub use services::{SCHEMA_MAJOR, SleeperState};
 pub use snapshot::ParameterSnapshot;
 pub use stopping::{
     BrakeResponse, EffortPoint, RailAdhesion, Stop, StoppingError, StoppingEstimate,

@@ -1,8 +1,10 @@
-//! Every pipeline under every failure of its sensors, at rates from one in a thousand to one half.
+//! Every pipeline under every failure of its sensors, at rates from one in a thousand to one half; these failures are as
+//! frequent as requested.
 
 use std::sync::Mutex;
 
-use dynocar_tests::estimators::frugal_estimators;
+use dynocar_shared::{SampleField, TrainId, TrainSample};
+use dynocar_tests::golden::frugal_estimators;
 use dynocar_tests::sensor_failures::SensorFailure;
 use dynocar_tests::simulator::TrainType;
 use dynocar_tests::soak::bad_samples::{SoakScene, SoakTally};
@@ -84,4 +86,39 @@ fn plausible_wrong_forces_mislead_no_estimator_that_fits_motion_to_them() {
     // Refusing to estimate would keep the promise as well.
     let [first, second, ..] = trusted_shares[..] else { unreachable!("six rates") };
     assert!(second > 0.9 * first && first > 0.4, "hardly ever trusted: {trusted_shares:?}");
+}
+
+fn good() -> Vec<TrainSample> {
+    let sample = |index: u64| {
+        let mut sample = TrainSample::empty(TrainId(1))
+            .with(SampleField::Speed, 10.0 + (index as f64 * 0.01).sin())
+            .with(SampleField::Position, 2.0 * index as f64)
+            .with(SampleField::TractionForce, 3e4 + index as f64)
+            .with(SampleField::BrakeForce, 7.0);
+        (sample.sequence, sample.time_ns) = (index + 1, index as i64 * 200_000_000);
+        sample
+    };
+    (0..20_000).map(sample).collect()
+}
+
+#[test]
+fn every_failure_changes_about_the_share_asked_for() {
+    let good = good();
+    for failure in SensorFailure::ALL {
+        for rate in [0.001, 0.01, 0.5] {
+            let spoiled = failure.apply(&good, rate, 5);
+            let arrived = spoiled.samples.len() as u64;
+            assert_eq!(arrived + spoiled.dropped, good.len() as u64, "{failure:?}");
+            let changed = match failure {
+                SensorFailure::Dropouts => spoiled.dropped as usize,
+                _ => {
+                    // NaN differs from itself as well.
+                    good.iter().zip(&spoiled.samples).filter(|(a, b)| a != b).count()
+                }
+            };
+            let share = changed as f64 / good.len() as f64;
+            let expected = 0.2 * rate..=1.6 * rate;
+            assert!(expected.contains(&share), "{failure:?} at {rate}: {share}");
+        }
+    }
 }

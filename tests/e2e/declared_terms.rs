@@ -11,7 +11,7 @@ use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind, Status, TrainSample};
-use dynocar_tests::estimators::frugal_estimators;
+use dynocar_tests::golden::frugal_estimators;
 
 use drive::Drive;
 use terms::{Declaration, GRADIENT, TRACK, TRAIN, World, declarations};

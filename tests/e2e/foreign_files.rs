@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use dynocar::dataset::load;
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::dataset::encoding::by_name;
+use dynocar_analysis::dataset::text_layout::by_name;
 use dynocar_tests::process::DaemonSite;
 
 pub const DYNOCAR: &str = env!("CARGO_BIN_EXE_dynocar-under-test");

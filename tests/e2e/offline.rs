@@ -30,7 +30,6 @@ mod logger_files;
 mod output;
 mod own_train;
 mod package;
-mod plots;
 mod report;
 mod report_pointer;
 mod shipped;
@@ -41,7 +40,6 @@ mod two_trains;
 
 // Findings of `explain`, and their limits.
 mod declared_terms;
-mod every_kind;
 mod explain;
 mod explained;
 mod forms;
@@ -52,13 +50,9 @@ mod updated_model;
 
 // Bad samples, mutated bytes, power cuts, months of them, and eight trains with faults.
 mod bad_samples;
-mod day;
-mod fuzzing;
-mod load;
-mod months;
 mod power_cut;
 mod power_cut_recordings;
-mod sensor_failures;
+mod soak;
 
 // Sources and documents.
 mod circles;

@@ -1,4 +1,4 @@
-//! Functions and files that can be read at a sitting.
+//! Functions and files that can be read at a sitting, and files that are worth opening.
 
 use dynocar_tests::sources::{
     FOLDERS, is_of_tests, item_lines, rust_files, without_tests, workspace,
@@ -8,6 +8,12 @@ use dynocar_tests::sources::{
 const FUNCTION_LINES_MAX: usize = 70;
 /// A file's lines, its tests counted.
 const FILE_LINES_MAX: usize = 400;
+/// Lines of a file that stands for itself.
+const FILE_LINES_MIN: usize = 40;
+/// Folders whose files may be shorter: each holds one physical law.
+const LAWS: &str = "daemon/model/src/terms";
+/// The heads of crates, modules and programs of tests, which may be shorter, as the programs under test are.
+const HEADS: [&str; 6] = ["mod", "lib", "main", "serving", "offline", "hot_path"];
 
 /// The name of the function that a line begins.
 fn function_name(line: &str) -> Option<&str> {
@@ -44,6 +50,21 @@ fn functions_and_files_are_short_enough_to_be_read_at_once() {
         );
     }
     assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn no_file_holds_less_than_a_subject() {
+    let mut found = Vec::new();
+    for path in ["shared", "client", "daemon", "bench", "tests"].into_iter().flat_map(rust_files) {
+        let lines = std::fs::read_to_string(&path).expect("a source file").lines().count();
+        let name = path.strip_prefix(workspace()).expect("of the workspace");
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let is_head = HEADS.contains(&&*stem) || stem.ends_with("_under_test");
+        if lines < FILE_LINES_MIN && !is_head && !name.starts_with(LAWS) {
+            found.push(format!("{}: {lines} lines", name.display()));
+        }
+    }
+    assert!(found.is_empty(), "merge into the file of their subject: {found:#?}");
 }
 
 #[test]

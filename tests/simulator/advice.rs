@@ -6,9 +6,8 @@
 
 use std::sync::Arc;
 
-use dynocar_analysis::advice::known::davis_of;
 use dynocar_analysis::advice::manoeuvre::{DriveKind, PlannedManoeuvre, Scene};
-use dynocar_analysis::advice::noise::NoiseSeen;
+use dynocar_analysis::advice::noise::{NoiseSeen, davis_of};
 use dynocar_analysis::advice::rehearsal::{KnownBefore, MASS, forecast};
 use dynocar_analysis::advice::{best, forecasts};
 use dynocar_core::pipeline::Pipeline;

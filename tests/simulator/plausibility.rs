@@ -9,7 +9,7 @@ use dynocar_analysis::identify::{identify, published_samples};
 use dynocar_core::plausibility::Severity;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{Reason, Status, TrainId};
-use dynocar_tests::estimators::frugal_estimators;
+use dynocar_tests::golden::frugal_estimators;
 use dynocar_tests::simulator::dataset_writer::dataset_files;
 use dynocar_tests::simulator::{
     Defects, EffectRequest, SimulatorSettings, TrainType, TrueEffect, simulate,

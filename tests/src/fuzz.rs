@@ -10,8 +10,8 @@ use std::sync::Arc;
 
 use dynocar::config::DaemonConfig;
 use dynocar::state::{entry::StateContent, file};
-use dynocar_analysis::dataset::encoding::{decoded, guessed};
 use dynocar_analysis::dataset::guess::{RecordingText, guess};
+use dynocar_analysis::dataset::text_layout::{decoded, guessed};
 use dynocar_analysis::dataset::{Dataset, Quantity, parse_track, parse_train};
 use dynocar_analysis::import::{ImportReading, ImportSource, import};
 use dynocar_core::pipeline::Pipeline;

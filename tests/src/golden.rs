@@ -12,6 +12,7 @@ use std::sync::Arc;
 use dynocar::dataset;
 use dynocar_analysis::identify::{default_estimators, published_samples};
 use dynocar_core::pipeline::Pipeline;
+use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::{ParameterSnapshot, TrainId};
 
 /// Relative difference of final values that another C library may make.
@@ -186,4 +187,19 @@ impl Golden {
         };
         Some(Golden { fingerprint, lines: rows.map(line).collect::<Option<_>>()? })
     }
+}
+
+/// Observations by which the windows of expectation maximisation slide: half of a window. By default they slide
+/// so far that each observation is looked at eight times, which takes most of the time of all estimators together.
+const SLIDE: usize = 20;
+
+/// The default estimators, with windows of expectation maximisation that overlap by half.
+pub fn frugal_estimators() -> Vec<EstimatorSettings> {
+    let mut all = default_estimators();
+    for settings in &mut all {
+        if let EstimatorSettings::AdhesionEm(own) | EstimatorSettings::BrakeEm(own) = settings {
+            own.slide = SLIDE;
+        }
+    }
+    all
 }

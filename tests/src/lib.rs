@@ -4,9 +4,8 @@
 //!
 //! - [`browser`]: a headless browser that says what a page did
 //! - [`documents`]: the pages, their links and the commands that they show
-//! - [`estimators`]: every estimator, at less than the usual cost
 //! - [`fuzz`]: mutations of a corpus thrown at everything that reads foreign bytes
-//! - [`golden`]: what every estimator makes of the recorded runs, bit for bit
+//! - [`golden`]: estimates of every estimator from the recorded runs, bit for bit; every estimator at less than the usual cost
 //! - [`power_cut`]: a disk that loses what was not brought to it
 //! - [`process`]: real processes with a run-time directory of their own, cleaned up on drop
 //! - [`sensor_failures`]: how sensors and channels fail
@@ -17,7 +16,6 @@
 
 pub mod browser;
 pub mod documents;
-pub mod estimators;
 pub mod fuzz;
 pub mod golden;
 pub mod power_cut;

@@ -9,8 +9,7 @@ use super::knowledge::Ability;
 use crate::chance::Chance;
 use crate::output::Record;
 use crate::scenarios::brake::Brake;
-use crate::scenarios::mistakes::Mistakes;
-use crate::scenarios::world::{LoadSource, Scenario, Traffic, World};
+use crate::scenarios::world::{LoadSource, Mistakes, Scenario, Traffic, World};
 
 /// Particular brakes, rail or behaviour of the daemon.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,8 +12,7 @@ use super::deviations::{Hidden, Service, ability, declared_gear, next_load_kg};
 use super::knowledge::{Ability, Knowledge};
 use super::plan::{PIECE_M, PlannedLeg};
 use crate::chance::Chance;
-use crate::scenarios::mistakes::Mistakes;
-use crate::scenarios::world::{LoadSource, WEIGHING_STD, World};
+use crate::scenarios::world::{LoadSource, Mistakes, WEIGHING_STD, World};
 
 /// Longest step of the simulation in s.
 const STEP_MAX_S: f64 = 0.02;

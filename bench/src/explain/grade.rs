@@ -11,8 +11,7 @@ use serde_json::Value;
 
 use super::attainable::attainable_mps;
 use super::family::SimulatedCase;
-use super::parameters::{ParameterGrade, graded};
-use super::place::{ends_within, place_iou};
+use super::parameters::{ParameterGrade, ends_within, graded, place_iou};
 
 /// How good an answer is.
 #[derive(Clone, Debug, PartialEq)]

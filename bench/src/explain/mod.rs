@@ -4,8 +4,7 @@
 //! - [`family`]: which datasets of it
 //! - [`grade`]: the answer against the truth
 //! - [`attainable`]: what the true law leaves when its numbers are estimated
-//! - [`parameters`]: its numbers against the true ones
-//! - [`place`]: its places against the true ones
+//! - [`parameters`]: its numbers and places against the true ones
 //! - [`matrix`]: all kinds over all seeds, in numbers
 //! - [`growth`]: time for 1, 4 and 16 times the data
 
@@ -15,7 +14,6 @@ pub mod grade;
 pub mod growth;
 pub mod matrix;
 pub mod parameters;
-pub mod place;
 pub mod scenario;
 
 use std::path::PathBuf;

@@ -7,11 +7,10 @@
 //!
 //! - [`case`]: what is measured together with what, and beside which readers of the same channels
 //! - [`costs`]: one poll and one publish
-//! - [`report`], [`plot`]: the result
+//! - [`report`]: the result, in numbers and as a picture
 
 pub mod case;
 pub mod costs;
-pub mod plot;
 pub mod report;
 
 use std::path::PathBuf;
@@ -78,7 +77,7 @@ impl LatencyArguments {
         expect(self.rounds != Some(0), || "--rounds 0: expected at least one round".into())?;
         let measured = self.measure()?;
         if let Some(file) = &self.plot {
-            plot::draw(&measured, file)?;
+            report::draw(&measured, file)?;
         }
         let (all, text) = report::of(&measured);
         self.output.give(&all, || text)

@@ -3,12 +3,10 @@
 //! One process stands for all controllers: it publishes every train's samples at their appointed
 //! times and polls the trains in turn, on a core of its own.
 //!
-//! - [`plan`]: a number of trains with some pipelines
+//! - [`plan`]: the load of some trains with some pipelines, and its result
 //! - [`search`]: the highest rate without loss; growth with trains and pipelines
-//! - [`report`]: the result
 
 pub mod plan;
-pub mod report;
 pub mod search;
 
 use clap::Args;
@@ -83,7 +81,7 @@ impl LoadArguments {
     /// loss.
     pub fn run(&self) -> Result<(), BenchError> {
         let load = self.load()?;
-        let (mut all, mut text) = report::of(&load, &load.run()?);
+        let (mut all, mut text) = plan::of(&load, &load.run()?);
         let seconds = load.extent.seconds.min(TRIAL_SECONDS);
         let short = Load { extent: Extent { seconds, ..load.extent }, ..load };
         if self.search && !is_due() {

@@ -3,8 +3,8 @@
 use dynocar::output::report_line;
 use serde::Serialize;
 
+use super::plan;
 use super::plan::Load;
-use super::report;
 use crate::ending::is_due;
 use crate::output::{BenchError, Record};
 
@@ -88,7 +88,7 @@ pub fn growth(load: &Load) -> Result<Vec<Record>, BenchError> {
             if is_due() {
                 return Ok(sizes);
             }
-            sizes.push(report::size(&load, &trial));
+            sizes.push(plan::size(&load, &trial));
         }
     }
     Ok(sizes)

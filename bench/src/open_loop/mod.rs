@@ -1,16 +1,15 @@
 //! The open loop that latency and load measure by: samples leave at their appointed times, whatever has come back,
 //! through real processes on cores of their own.
 //!
-//! - [`motion`], [`traffic`]: a train's samples, when they leave, and which are bad
+//! - [`swinging_train`], [`traffic`]: a train's samples, when they leave, and which are bad
 //! - [`wire`]: the controller's end of each transport
 //! - [`controller`]: sends what is due, and counts the answers
 //! - [`trial`]: who answers, how many trains there are, and what came of it
 //! - [`server`]: the answering processes
-//! - [`sockets`], [`plain`]: what they need
+//! - [`sockets`]: the alternatives to shared memory
 //! - `zeromq`: ZeroMQ, with the feature of that name
 
 pub mod controller;
-pub mod plain;
 pub mod server;
 pub mod sockets;
 pub mod swinging_train;

@@ -8,8 +8,8 @@ use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainSample};
 use dynocar_transport::channel::Transport;
 use dynocar_transport::{Host, monotonic_now_ns};
 
-use super::plain;
 use super::sockets::{self, Datagrams, SocketEnd, TRAIN};
+use super::wire;
 use crate::output::BenchError;
 use crate::rig::cores::{bind, prioritise};
 
@@ -84,8 +84,8 @@ fn echo(place: &Path, blocks: bool) -> Result<(), BenchError> {
     let (snapshots, samples) = (transport.sender(TRAIN)?, transport.receiver(TRAIN)?);
     let listener = match blocks {
         true => {
-            let listener = plain::service(&host, place)?.listener_builder().create();
-            Some(listener.map_err(plain::refused("listener"))?)
+            let listener = wire::service(&host, place)?.listener_builder().create();
+            Some(listener.map_err(wire::refused("listener"))?)
         }
         false => None,
     };
@@ -95,7 +95,7 @@ fn echo(place: &Path, blocks: bool) -> Result<(), BenchError> {
     snapshot.pipeline_kind = PipelineKind::Echo as u32;
     loop {
         match &listener {
-            Some(it) => it.blocking_wait(|_| {}).map(|_| ()).map_err(plain::refused("wait"))?,
+            Some(it) => it.blocking_wait(|_| {}).map(|_| ()).map_err(wire::refused("wait"))?,
             None => std::hint::spin_loop(),
         }
         while let Some(sample) = samples.receive() {

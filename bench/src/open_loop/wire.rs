@@ -1,13 +1,19 @@
-//! The controller's end of each transport.
+//! The controller's end of each transport, and the listener of the plain one, which Dynocar's own waking is compared with.
+
+use std::path::Path;
 
 use dynocar_client::{SamplePublisher, SnapshotReader};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, TrainId, TrainSample};
 use dynocar_tests::process::DaemonSite;
+use dynocar_transport::Host;
 use dynocar_transport::channel::{Receiver, Sender, Transport};
 use iceoryx2::port::notifier::Notifier;
-use iceoryx2::prelude::ipc;
+use iceoryx2::prelude::{
+    Config, FileName, NodeBuilder, Path as TransportPath, SemanticString, ServiceName,
+    SignalHandlingMode, ipc,
+};
+use iceoryx2::service::port_factory::event::PortFactory;
 
-use super::plain::{self, refused};
 use crate::output::BenchError;
 
 /// A transport of samples to an estimator and of its answers back.
@@ -91,7 +97,7 @@ impl Notifying {
     /// When the transport refuses one.
     pub fn open(site: &DaemonSite, train: TrainId) -> Result<Self, BenchError> {
         let transport = Transport::open(&site.host(), "dynocar-bench")?;
-        let service = plain::service(&site.host(), site.path())?;
+        let service = service(&site.host(), site.path())?;
         Ok(Notifying {
             sender: transport.sender(train)?,
             receiver: transport.receiver(train)?,
@@ -110,4 +116,30 @@ impl BenchTransport for Notifying {
         self.receiver.receive().iter().for_each(hear);
         Ok(())
     }
+}
+
+/// Returns the failure for a refusal of the transport.
+pub fn refused<E: std::fmt::Debug>(what: &'static str) -> impl FnOnce(E) -> BenchError {
+    move |error| format!("iceoryx2 refused a {what}: {error:?}").into()
+}
+
+/// Returns the service of the plain transport that notifies and listens within a measurement's folder.
+///
+/// # Errors
+///
+/// When the transport refuses.
+pub fn service(host: &Host, folder: &Path) -> Result<PortFactory<ipc::Service>, BenchError> {
+    let mut config = Config::default();
+    let own = host.segment_prefix();
+    config.global.prefix = FileName::new(own.as_bytes()).map_err(refused("name"))?;
+    let root = folder.join("plain");
+    let root = TransportPath::new(root.as_os_str().as_encoded_bytes());
+    config.global.set_root_path(&root.map_err(refused("folder"))?);
+    let node = NodeBuilder::new()
+        .config(&config)
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<ipc::Service>()
+        .map_err(refused("node"))?;
+    let name = ServiceName::new("dynocar-bench/notify").map_err(refused("service name"))?;
+    node.service_builder(&name).event().open_or_create().map_err(refused("service"))
 }

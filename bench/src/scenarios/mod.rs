@@ -1,8 +1,7 @@
 //! Every pipeline that answers resistance or mass, in a user's day: trains that stop, loads that are
 //! weighed wrong or not at all, maps, wheels, forces and clocks that are a little off.
 //!
-//! - [`mistakes`]: how wrong what is declared of them is
-//! - [`world`]: a train, its line and its day, drawn by those
+//! - [`world`]: a train, its line and its day, with the size of the mistakes in their declaration
 //! - [`brake`]: brakes that do not act as they report
 //! - [`scenario_train`]: driving from stop to stop, and what the controller writes of it
 //! - [`recorded`]: the same as a dataset
@@ -12,7 +11,6 @@
 
 pub mod bound;
 pub mod brake;
-pub mod mistakes;
 pub mod recorded;
 pub mod scenario_train;
 pub mod score;
@@ -24,10 +22,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use dynocar_shared::PipelineKind;
 
-use self::mistakes::Mistakes;
 use self::table::NamedScenario;
 use self::world::World;
 use crate::output::{self, BenchError, OutputArguments, containing, expect, named, write_csv};
+use world::Mistakes;
 
 /// Resistance and mass in a user's day: how long an answer may be used, how soon, how often that
 /// changes, and whether its intervals hold.

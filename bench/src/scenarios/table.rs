@@ -10,10 +10,9 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::bound::Bound;
 use super::brake::Brake;
-use super::mistakes::Mistakes;
 use super::scenario_train::{DriveMoment, ScenarioTrain};
 use super::score::{Answer, COUNTS_MPS, QuantityScore, Scores};
-use super::world::{LoadSource, Scenario, Traffic, World};
+use super::world::{LoadSource, Mistakes, Scenario, Traffic, World};
 use crate::ending::until_due;
 use crate::output::Record;
 use crate::parallel;

@@ -7,10 +7,8 @@ use std::path::Path;
 use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::answer::{ExplainAnswer, ParameterValue};
 use dynocar_analysis::explain::explain;
-use dynocar_bench::scenarios::mistakes::Mistakes;
-use dynocar_bench::scenarios::recorded;
-use dynocar_bench::scenarios::table;
-use dynocar_bench::scenarios::world::{LoadSource, World};
+use dynocar_bench::scenarios::world::{LoadSource, Mistakes, World};
+use dynocar_bench::scenarios::{recorded, table};
 use dynocar_shared::Uncertain;
 
 const HOURS: f64 = 1.0;

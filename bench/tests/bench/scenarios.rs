@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use dynocar_bench::scenarios::mistakes::Mistakes;
 use dynocar_bench::scenarios::scenario_train::ScenarioTrain;
 use dynocar_bench::scenarios::table::{self, NamedScenario, Plan};
-use dynocar_bench::scenarios::world::World;
+use dynocar_bench::scenarios::world::{Mistakes, World};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;

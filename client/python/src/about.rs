@@ -14,7 +14,7 @@ use dynocar_shared::{
 };
 use pyo3::prelude::*;
 
-use crate::errors::of_channel;
+use crate::calls::of_channel;
 
 /// Who serves a train, as a number and in words.
 #[pyfunction]

@@ -9,9 +9,8 @@ use dynocar_shared::services::PIPELINES_MAX;
 use dynocar_shared::{PipelineKind, Quantity, SampleField, TrainId, TrainSample};
 use pyo3::prelude::*;
 
-use crate::background::SIGNALS_EVERY;
+use crate::calls::{SIGNALS_EVERY, of_code};
 use crate::ends::Handle;
-use crate::errors::of_code;
 use crate::snapshot::Reading;
 
 /// `SamplePublisher` without its documentation.

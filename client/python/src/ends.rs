@@ -19,7 +19,7 @@ use dynocar_shared::TrainId;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::errors::{of_channel, of_code};
+use crate::calls::{of_channel, of_code};
 
 /// The ends of a kind that a thread opened, by their numbers.
 type Ends<E> = RefCell<HashMap<u64, E>>;

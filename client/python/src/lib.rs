@@ -3,21 +3,18 @@
 //!
 //! # Layout
 //!
-//! - [`errors`]: failures as the exceptions of `dynocar/_errors.py`
 //! - [`ends`]: ends of channels, each kept in the thread that opened it
 //! - [`channel`]: publisher and reader, [`snapshot`]: what a reader gives
 //! - [`stopping`]: braking distance and time with a bound
 //! - [`about`]: clock, versions, who serves a train, vocabularies
-//! - [`background`]: long work that Ctrl-C ends
-//! - [`recorded`]: `check`, `read`, `identify`, [`explained`]: `explain`
+//! - [`calls`]: failures as the exceptions of `dynocar/_errors.py`; long work that Ctrl-C ends
+//! - [`recorded`]: `check`, `read`, `identify`, `explain`
 //! - [`table`]: columns for NumPy, tables for Arrow
 
 mod about;
-mod background;
+mod calls;
 mod channel;
 mod ends;
-mod errors;
-mod explained;
 mod recorded;
 mod snapshot;
 mod stopping;
@@ -34,7 +31,7 @@ mod _native {
     #[pymodule_export]
     use crate::channel::{Publisher, Reader};
     #[pymodule_export]
-    use crate::explained::{Explained, explain};
+    use crate::recorded::{Explained, explain};
     #[pymodule_export]
     use crate::recorded::{check, identify, read};
     #[pymodule_export]

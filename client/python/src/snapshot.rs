@@ -7,7 +7,7 @@ use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
 
-use crate::errors::of_code;
+use crate::calls::of_code;
 
 /// A snapshot with its age, or the code that says why there is none.
 #[pyclass(frozen, module = "dynocar._native")]

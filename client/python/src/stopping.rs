@@ -4,7 +4,7 @@ use dynocar_client::ffi::StopRequest;
 use dynocar_shared::stopping::EffortPoint;
 use pyo3::prelude::*;
 
-use crate::errors::of_code;
+use crate::calls::of_code;
 
 /// Distance, time, and both with the confidence. `numbers` are those of `dynocar_stop` in `dynocar.h` before `rail`.
 #[pyfunction]

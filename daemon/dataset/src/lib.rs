@@ -14,14 +14,14 @@
 //! - [`keys`]: every key of the three TOML files, for readers and writers
 //! - [`manifest`], [`train_file`], [`track_file`]: the three TOML files
 //! - [`quantity`]: what a column may hold, in which [`units`](dynocar_model::units)
-//! - [`encoding`], [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
+//! - [`text_layout`], [`clock`]: how text falls into cells, and times that are no numbers
 //! - `run_content`: what a run's file holds, text or columns
 //! - `lines`, `header`, `cell`, `table`: a CSV file as columns of numbers
 //! - [`trains`]: files that hold several trains
 //! - `clock_faults`: an hour of summer time, seconds without a fraction, rows in another order
-//! - `order`, `spikes`, `motion`, `forces`, [`stamps`], `altitude`: from columns to time, speed,
+//! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed,
 //!   position, forces and gradient
-//! - `resolved`, [`run`], [`quality`], `judge`, [`diagnostic`], `diagnosing`, `declared`: samples,
+//! - `resolved`, [`run`], [`quality`], `judge`, [`dataset_diagnostic`], `diagnosing`, `declared`: samples,
 //!   counts and warnings
 //! - [`written`]: the three TOML files as they are written, and declared ones that change
 //! - [`guess`]: a description of files that nobody has described yet
@@ -34,9 +34,7 @@ mod corrections;
 pub mod dataset_diagnostic;
 mod declared;
 mod diagnosing;
-pub mod diagnostic;
 pub mod document;
-pub mod encoding;
 pub mod error;
 mod forces;
 pub mod guess;
@@ -53,24 +51,22 @@ pub mod run;
 mod run_content;
 mod speed_and_position;
 mod spikes;
-pub mod stamps;
 mod table;
 pub mod text_layout;
 pub mod track_file;
 pub mod train_file;
 pub mod trains;
-mod unusual_resistance;
 pub mod written;
 
 #[cfg(test)]
 mod tests;
 
 pub use clock::TimeFormat;
-pub use dataset_diagnostic::DatasetDiagnostic;
-pub use diagnostic::Diagnostic;
+pub use dataset_diagnostic::{DatasetDiagnostic, Diagnostic};
+pub use declared::unusual_resistance;
 pub use document::top_keys;
 pub use error::{DatasetError, FileProblem, SourcePosition};
-pub use forces::ForceSource;
+pub use forces::{ForceSource, is_stamped_late, stamped_late};
 pub use manifest::{ColumnMapping, FileEntry, Manifest, PositionReference, Role, RunEntry};
 pub use order::OrderCounts;
 pub use quality::{Phases, RunQuality};
@@ -83,7 +79,6 @@ pub use table::LineCounts;
 pub use text_layout::TextLayout;
 pub use track_file::parse_track;
 pub use train_file::parse_train;
-pub use unusual_resistance::unusual_resistance;
 
 use std::sync::Arc;
 

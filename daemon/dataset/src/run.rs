@@ -8,9 +8,10 @@ use dynocar_model::train::PowerTrain;
 use dynocar_model::units::Unit;
 use dynocar_shared::{SampleField, TrainSample};
 
+use super::dataset_diagnostic::{Diagnostic, read_as};
 use super::diagnosing::diagnostics;
-use super::diagnostic::{Diagnostic, read_as};
 use super::error::{DatasetError, SourcePosition};
+
 use super::forces::{self, ForceSource};
 use super::judge::Judge;
 use super::manifest::{Manifest, Role, RunEntry};
@@ -19,7 +20,6 @@ use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};
 use super::run_content::{RunColumns, RunContent};
 use super::speed_and_position::PositionSource;
-use super::stamps;
 use super::table::Table;
 use super::text_layout::TrainRows;
 use super::trains::{TrainsColumn, keep_only, only};
@@ -164,7 +164,7 @@ impl Run {
             let step_s = (ahead.time_ns - sample.time_ns) as f64 * 1e-9;
             for field in [SampleField::TractionForce, SampleField::BrakeForce] {
                 if let Some((here_n, ahead_n)) = sample.get(field).zip(ahead.get(field)) {
-                    sample.set(field, stamps::stamped_late(here_n, ahead_n, step_s, late_s));
+                    sample.set(field, forces::stamped_late(here_n, ahead_n, step_s, late_s));
                 }
             }
         }

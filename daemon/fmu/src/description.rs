@@ -7,7 +7,7 @@ use dynocar_shared::{Reason, Status};
 
 use super::estimators::{self, ESTIMATORS};
 use super::plant::{self, PLANT};
-use super::units;
+use super::variables;
 use super::variables::{Begins, FmiEnumeration, Interface, Kind, MISSING, Meaning, Variable};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -60,7 +60,7 @@ fn has_vocabularies(interface: &Interface) -> bool {
 
 fn push_units(xml: &mut String) {
     *xml += "  <UnitDefinitions>\n";
-    for unit in units::ALL {
+    for unit in variables::ALL {
         push(
             xml,
             format_args!("    <Unit name=\"{}\"><BaseUnit {}/></Unit>", unit.name, unit.base),
@@ -119,7 +119,7 @@ fn push_variable(xml: &mut String, reference: usize, variable: &Variable, is_con
     if let Kind::Enumeration(vocabulary) = meaning.kind() {
         attributes += &format!(" declaredType=\"{}\"", vocabulary.name());
     }
-    if *unit != units::NONE {
+    if *unit != variables::NONE {
         attributes += &format!(" unit=\"{}\"", unit.name);
     }
     if let Some(start) = start(*meaning) {
@@ -249,14 +249,17 @@ mod tests {
 #[cfg(test)]
 mod interfaces_tests {
     use super::*;
-    use crate::units;
+
+    use crate::variables;
 
     #[test]
     fn names_are_unique_and_units_known() {
         for Interface { variables, .. } in INTERFACES {
             for (reference, variable) in variables.iter().enumerate() {
                 assert!(variables[..reference].iter().all(|it| it.name != variable.name));
-                assert!(variable.unit == units::NONE || units::ALL.contains(&variable.unit));
+                assert!(
+                    variable.unit == variables::NONE || variables::ALL.contains(&variable.unit)
+                );
             }
         }
     }

@@ -8,9 +8,8 @@
 //!
 //! # Layout
 //!
-//! - [`variables`]: what a variable can be
+//! - [`variables`]: kinds of variables, and their units
 //! - [`estimators`], [`plant`]: the two models, each with its table of variables
-//! - [`units`]: their units
 //! - [`description`]: both of them, as `modelDescription.xml` and as pages for people
 //! - [`error`]: why a call is refused
 //! - [`files`]: where the FMU was unpacked, the files of train and line, and the models for them
@@ -26,7 +25,6 @@ pub mod files;
 pub mod inputs;
 pub mod model;
 pub mod plant;
-pub mod units;
 pub mod variables;
 
 pub use crate::description::INTERFACES;

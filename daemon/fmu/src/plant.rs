@@ -6,7 +6,7 @@ use dynocar_shared::SampleField;
 
 use crate::error::ModelError;
 use crate::inputs::Inputs;
-use crate::units;
+use crate::variables;
 use crate::variables::{
     Begins, DrivenValue, Interface, Meaning, ModelFile, Variable, digits, guid, measured, row,
 };
@@ -27,36 +27,36 @@ pub(crate) const GUID_DIGITS: [u8; 16] =
     guid::<{ VARIABLES.len() }>(concat!("dynocar_train ", env!("CARGO_PKG_VERSION")), VARIABLES);
 
 const fn force(name: &'static str, part: ForcePart, description: &'static str) -> Variable {
-    row(name, Meaning::Driven(DrivenValue::Force(part)), units::NEWTON, description)
+    row(name, Meaning::Driven(DrivenValue::Force(part)), variables::NEWTON, description)
 }
 
 #[rustfmt::skip]
 const VARIABLES: &[Variable] = &[
-    row("train_file", Meaning::File(ModelFile::Train), units::NONE, "Path of the train's file; empty: the one inside the FMU"),
-    row("track_file", Meaning::File(ModelFile::Track), units::NONE, "Path of the line's file; empty: the one inside the FMU, if any"),
-    row("initial_speed_mps", Meaning::Begins(Begins::Speed), units::METRE_PER_SECOND, "True speed at the beginning, never negative"),
-    row("initial_position_m", Meaning::Begins(Begins::Position), units::METRE, "Chainage of the train's centre at the beginning"),
-    row("held_at_rest", Meaning::Begins(Begins::HeldAtRest), units::NONE, "Whether a brake, reported or not, holds the train while it stands and is not pulled"),
+    row("train_file", Meaning::File(ModelFile::Train), variables::NONE, "Path of the train's file; empty: the one inside the FMU"),
+    row("track_file", Meaning::File(ModelFile::Track), variables::NONE, "Path of the line's file; empty: the one inside the FMU, if any"),
+    row("initial_speed_mps", Meaning::Begins(Begins::Speed), variables::METRE_PER_SECOND, "True speed at the beginning, never negative"),
+    row("initial_position_m", Meaning::Begins(Begins::Position), variables::METRE, "Chainage of the train's centre at the beginning"),
+    row("held_at_rest", Meaning::Begins(Begins::HeldAtRest), variables::NONE, "Whether a brake, reported or not, holds the train while it stands and is not pulled"),
 
-    measured("traction_force_n", SampleField::TractionForce, units::NEWTON, "Traction force at the wheel rims as the controller reports it; missing: none"),
-    measured("brake_force_n", SampleField::BrakeForce, units::NEWTON, "Brake force, retarding, as the controller reports it; missing: none"),
-    measured("mass_kg", SampleField::Mass, units::KILOGRAM, "Gross mass without the rotating part; missing: the declared one"),
-    measured("ambient_temperature_degc", SampleField::AmbientTemperature, units::CELSIUS, "Outside temperature; missing: the last one, at first none is corrected for"),
-    measured("position_m", SampleField::Position, units::METRE, "Chainage at which the line is looked up; missing: the train's own, motion.position_m"),
-    measured("gradient_permille", SampleField::Gradient, units::PERMILLE, "Gradient, climbing positive as the chainage grows; for lines without a file; missing: level"),
-    measured("curve_radius_m", SampleField::CurveRadius, units::METRE, "Curve radius, 0 on straight track; for lines without a file"),
-    row("direction", Meaning::Direction, units::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
+    measured("traction_force_n", SampleField::TractionForce, variables::NEWTON, "Traction force at the wheel rims as the controller reports it; missing: none"),
+    measured("brake_force_n", SampleField::BrakeForce, variables::NEWTON, "Brake force, retarding, as the controller reports it; missing: none"),
+    measured("mass_kg", SampleField::Mass, variables::KILOGRAM, "Gross mass without the rotating part; missing: the declared one"),
+    measured("ambient_temperature_degc", SampleField::AmbientTemperature, variables::CELSIUS, "Outside temperature; missing: the last one, at first none is corrected for"),
+    measured("position_m", SampleField::Position, variables::METRE, "Chainage at which the line is looked up; missing: the train's own, motion.position_m"),
+    measured("gradient_permille", SampleField::Gradient, variables::PERMILLE, "Gradient, climbing positive as the chainage grows; for lines without a file; missing: level"),
+    measured("curve_radius_m", SampleField::CurveRadius, variables::METRE, "Curve radius, 0 on straight track; for lines without a file"),
+    row("direction", Meaning::Direction, variables::NONE, "+1 while the chainage grows in the direction of travel, -1 while it falls"),
 
-    row("motion.speed_mps", Meaning::Driven(DrivenValue::Speed), units::METRE_PER_SECOND, "True speed, never negative"),
-    row("motion.measured_speed_mps", Meaning::Driven(DrivenValue::MeasuredSpeed), units::METRE_PER_SECOND, "Speed as the train's own sensor shows it, by the scale of the speed that was found"),
-    row("motion.position_m", Meaning::Driven(DrivenValue::Position), units::METRE, "Chainage of the train's centre by its own motion"),
-    row("motion.acceleration_mps2", Meaning::Driven(DrivenValue::Acceleration), units::METRE_PER_SECOND_2, "dv/dt, 0 at rest"),
-    row("motion.mass_kg", Meaning::Driven(DrivenValue::Mass), units::KILOGRAM, "Gross mass, with what was found of it"),
+    row("motion.speed_mps", Meaning::Driven(DrivenValue::Speed), variables::METRE_PER_SECOND, "True speed, never negative"),
+    row("motion.measured_speed_mps", Meaning::Driven(DrivenValue::MeasuredSpeed), variables::METRE_PER_SECOND, "Speed as the train's own sensor shows it, by the scale of the speed that was found"),
+    row("motion.position_m", Meaning::Driven(DrivenValue::Position), variables::METRE, "Chainage of the train's centre by its own motion"),
+    row("motion.acceleration_mps2", Meaning::Driven(DrivenValue::Acceleration), variables::METRE_PER_SECOND_2, "dv/dt, 0 at rest"),
+    row("motion.mass_kg", Meaning::Driven(DrivenValue::Mass), variables::KILOGRAM, "Gross mass, with what was found of it"),
 
     force("force.traction_n", ForcePart::Traction, "Traction force that acts, after the gain and the delay that were found"),
     force("force.brake_n", ForcePart::Brake, "Brake force that acts, after the delay that was found, retarding"),
     force("force.gradient_n", ForcePart::Gradient, "Weight along the gradient, retarding"),
-    row("force.resistance_n", Meaning::Driven(DrivenValue::Resistance), units::NEWTON, "Sum of all that follow, retarding"),
+    row("force.resistance_n", Meaning::Driven(DrivenValue::Resistance), variables::NEWTON, "Sum of all that follow, retarding"),
     force("force.basic_n", ForcePart::Basic, "Basic resistance by a, b and c"),
     force("force.curve_n", ForcePart::Curve, "Resistance of curves"),
     force("force.tunnel_n", ForcePart::Tunnel, "Resistance of tunnels"),

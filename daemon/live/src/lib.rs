@@ -8,13 +8,10 @@
 //! # Layout
 //!
 //! - [`live`]: reads the channels and serves until it is asked to end
-//! - [`viewers`]: channels that are advertised while somebody writes them, and their messages
-//! - [`thinning`]: how many samples viewers get
-//! - [`slow_viewers`]: what is reported of viewers
+//! - [`viewers`]: channels that are advertised while somebody writes them, their messages, the number of samples that
+//!   viewers get, and reports about viewers that do not keep up
 //! - [`cli`]: the command line
 
 pub mod cli;
 pub mod live;
-pub mod slow_viewers;
-pub mod thinning;
 pub mod viewers;

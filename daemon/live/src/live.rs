@@ -10,8 +10,7 @@ use foxglove::{FoxgloveError, WebSocketServerHandle};
 use tokio::runtime::Builder;
 use tokio::time::{sleep, timeout};
 
-use crate::slow_viewers::report_viewers;
-use crate::viewers::{LiveError, Viewers};
+use crate::viewers::{LiveError, Viewers, report_viewers};
 
 /// Messages that wait for one viewer; then the oldest are dropped.
 pub const QUEUE: usize = 1024;

@@ -1,6 +1,11 @@
-//! Channels that are advertised while somebody writes them, and the messages on them.
+//! Channels that are advertised while somebody writes them, the messages on them, and reports about viewers that do not
+//! keep up.
+//!
+//! The protocol's library drops the oldest messages of a viewer whose queue is full, and says so in its log, at most every
+//! 30 s; it counts none. Viewers get fewer samples than the channel carries: a picture needs no thousand a second.
 
 use std::collections::HashMap;
+use std::fmt::{Debug, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dynocar::output::report_line;
@@ -12,8 +17,11 @@ use dynocar_recording::train_channels::Sink;
 use dynocar_transport::ChannelError;
 use foxglove::websocket::{ChannelView, Client, ServerListener};
 use foxglove::{ChannelId, Context, PartialMetadata, RawChannel, Schema};
-
-use crate::thinning::Thinning;
+use tracing::field::{Field, Visit};
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::layer::{self, Layer, SubscriberExt};
+use tracing_subscriber::registry;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Why nothing more can be served.
 #[derive(Debug, thiserror::Error)]
@@ -193,5 +201,116 @@ impl ServerListener for Listener {
         let mut count = locked(&self.count);
         *count = count.saturating_sub(1);
         report_line(&format!("a viewer has gone: {count} now"));
+    }
+}
+
+/// Lets through as many as are wanted of what comes faster, evenly.
+#[derive(Clone, Copy, Debug)]
+pub struct Thinning {
+    interval_ns: i64,
+    due_ns: i64,
+}
+
+impl Thinning {
+    /// Lets `per_second` samples a second through; all, when it is 0.
+    pub fn to(per_second: u32) -> Self {
+        let interval_ns = 1_000_000_000_i64.checked_div(i64::from(per_second)).unwrap_or(0);
+        Thinning { interval_ns, due_ns: i64::MIN }
+    }
+
+    /// True where what came at this moment is to go on.
+    pub fn lets_through(&mut self, at_ns: i64) -> bool {
+        if at_ns < self.due_ns && self.due_ns.saturating_sub(at_ns) <= self.interval_ns {
+            return false;
+        }
+        // After a gap, or where the clock was set back, the count begins anew.
+        let is_even = (0..self.interval_ns).contains(&at_ns.saturating_sub(self.due_ns));
+        self.due_ns = if is_even { self.due_ns } else { at_ns }.saturating_add(self.interval_ns);
+        true
+    }
+}
+
+/// How the library's sentence about a full queue begins.
+const FULL_QUEUE: &str = "outbox for client ";
+/// How its sentences about a viewer that broke off begin.
+const BROKEN_OFF: [&str; 2] = ["Error receiving from client ", "Error sending message to client "];
+
+/// Reports from now on what the protocol's library has to say of viewers.
+pub fn report_viewers() {
+    // Only a second call fails.
+    let _ = registry().with(Reporter).try_init();
+}
+
+struct Reporter;
+
+/// The sentence of an event.
+#[derive(Default)]
+struct Sentence(String);
+
+impl Visit for Sentence {
+    fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
+        if field.name() == "message" {
+            // Writing into a String cannot fail.
+            let _ = write!(self.0, "{value:?}");
+        }
+    }
+}
+
+impl<S: Subscriber> Layer<S> for Reporter {
+    fn on_event(&self, event: &Event<'_>, _: layer::Context<'_, S>) {
+        let metadata = event.metadata();
+        if !metadata.target().starts_with("foxglove") || *metadata.level() > Level::INFO {
+            return;
+        }
+        let mut sentence = Sentence::default();
+        event.record(&mut sentence);
+        if let Some(words) = words(*metadata.level(), &sentence.0) {
+            report_line(&words);
+        }
+    }
+}
+
+fn words(level: Level, sentence: &str) -> Option<String> {
+    if let Some(rest) = sentence.strip_prefix(FULL_QUEUE) {
+        let address = rest.split(' ').next().unwrap_or(rest);
+        return Some(format!(
+            "the viewer at {address} does not keep up: its oldest messages are dropped"
+        ));
+    }
+    if let Some(address) = sentence.strip_prefix("Dropping client ")
+        && let Some(address) = address.strip_suffix(": handshake failed")
+    {
+        return Some(format!(
+            "the viewer at {address} is refused: it does not offer foxglove.sdk.v1"
+        ));
+    }
+    // That it has gone is reported elsewhere.
+    let is_known = BROKEN_OFF.iter().any(|it| sentence.starts_with(it));
+    let is_reported = level <= Level::WARN && !is_known;
+    is_reported.then(|| format!("viewers: {sentence}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn let_through(per_second: u32, moments_ns: impl Iterator<Item = i64>) -> usize {
+        let mut thinning = Thinning::to(per_second);
+        moments_ns.filter(|&at| thinning.lets_through(at)).count()
+    }
+
+    #[test]
+    fn of_a_thousand_a_second_fifty_go_on_and_what_is_slower_goes_on_whole() {
+        let second = |hz: i64| (0..hz).map(move |k| 1_000_000_000 * k / hz);
+        assert_eq!(let_through(50, second(1000)), 50);
+        assert_eq!(let_through(50, second(60)), 50);
+        assert_eq!(let_through(50, second(20)), 20);
+        assert_eq!(let_through(0, second(1000)), 1000);
+    }
+
+    #[test]
+    fn a_clock_that_is_set_back_silences_nobody() {
+        let moments = [0, 1_000_000_000, 5_000_000, 10_000_000, 30_000_000];
+        assert_eq!(let_through(50, moments.into_iter()), 4);
     }
 }

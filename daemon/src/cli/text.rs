@@ -85,6 +85,12 @@ pub fn line(key: &str, value: &str) -> String {
     format!("  {key:KEY_WIDTH$}{first}\n{}", rest.collect::<String>())
 }
 
+/// A sentence that begins with its subject, the lines after the first further in.
+pub fn entry(indent: &str, words: &str) -> String {
+    let lines = wrap(words, WIDTH - indent.len());
+    format!("{indent}{}\n", lines.join(&format!("\n{indent}  ")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

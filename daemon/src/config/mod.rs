@@ -9,15 +9,14 @@ mod error;
 mod parts;
 mod quantities;
 mod raw;
-mod whole;
 
 pub use apart::is_slow;
 pub use error::ConfigError;
 pub use parts::{
-    IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig, StateConfig, ThreadConfig,
+    DaemonConfig, IdleStrategy, LogFormat, ModelsConfig, PipelineConfig, ProcessConfig,
+    StateConfig, ThreadConfig, TrainConfig,
 };
 pub use quantities::Answers;
-pub use whole::{DaemonConfig, TrainConfig};
 
 use std::path::Path;
 

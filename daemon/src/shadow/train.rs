@@ -7,7 +7,7 @@ use std::time::{Instant, SystemTime};
 use dynocar_core::pipeline::Pipeline;
 use dynocar_core::pipeline::motion::STANDING_MPS;
 use dynocar_core::trial::evidence::RivalEvidence;
-use dynocar_core::trial::open_loop::OpenLoop;
+use dynocar_core::trial::ledger::OpenLoop;
 use dynocar_core::trial::{ModelTrials, Rival};
 use dynocar_shared::TrainSample;
 use tracing::{info, warn};

@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use dynocar_analysis::advice::known::davis_of;
-use dynocar_analysis::advice::noise::NoiseSeen;
-use dynocar_analysis::advice::remedy::{in_words, remedy};
-use dynocar_analysis::advice::{for_mass, for_resistance};
+use dynocar_analysis::advice::noise::{NoiseSeen, davis_of};
+use dynocar_analysis::advice::{for_mass, for_resistance, in_words, remedy};
 use dynocar_model::train::TrainModel;
 use dynocar_shared::{Manoeuvre, Parameter, Quantity, Status};
 

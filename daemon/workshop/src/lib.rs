@@ -19,7 +19,6 @@
 
 pub mod brakes_page;
 pub mod cli;
-pub mod clock;
 pub mod convert;
 pub mod dataset;
 pub mod fmu;

@@ -1,8 +1,11 @@
-//! Facts on a recorded run, wherever it is listed.
+//! Facts and notes on a recorded run, wherever it is listed.
 
-use dynocar_analysis::dataset::{ForceSource, GradientSource, PositionSource, Run};
-
+use dynocar::cli::text::{WIDTH, wrap};
 use dynocar::models::UtcSecond;
+use dynocar_analysis::dataset::{
+    DatasetDiagnostic, ForceSource, GradientSource, PositionSource, Run,
+};
+use dynocar_core::plausibility::Severity;
 
 /// A run's mass in t: the declared one, or the mean of what its samples carry, with the range where they
 /// carry several.
@@ -51,6 +54,26 @@ pub fn sources(run: &Run) -> [&'static str; 4] {
         ForceSource::None => "not recorded",
     };
     [position, gradient, force(run.traction_source), force(run.brake_source)]
+}
+
+/// Times in s from 2000 to 2100 count from 1970; recordings with another origin are shorter.
+const OF_EPOCH_S: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
+
+/// Returns the second in UTC of a time in s that counts from 1970; `None` for one that counts from elsewhere.
+pub fn moment(time_s: f64) -> Option<UtcSecond> {
+    OF_EPOCH_S.contains(&time_s).then_some(UtcSecond { unix_s: time_s as u64 })
+}
+
+/// Notes on a dataset, each from a line of its own; those by which it cannot be true say so.
+pub fn diagnostics(diagnostics: &[DatasetDiagnostic]) -> String {
+    let line = |diagnostic: &DatasetDiagnostic| {
+        let head = match diagnostic.severity {
+            Severity::Fundamental => "cannot be true",
+            _ => "note",
+        };
+        format!("{}\n", wrap(&format!("{head}: {diagnostic}"), WIDTH).join("\n  "))
+    };
+    diagnostics.iter().map(line).collect()
 }
 
 #[cfg(test)]
@@ -102,5 +125,18 @@ mod tests {
         );
         let samples = run(iso, "", dated).samples;
         assert_eq!(samples[1].time_ns - samples[0].time_ns, 1_000_000_000);
+    }
+}
+
+#[cfg(test)]
+mod clock_tests {
+    use super::*;
+
+    #[test]
+    fn times_from_1970_are_dates_and_others_are_not() {
+        let date = |time_s| moment(time_s).map(|it| it.to_string());
+        assert_eq!(date(1_738_479_600.0).as_deref(), Some("2025-02-02T07:00:00Z"));
+        assert_eq!(date(1_738_479_600.75).as_deref(), Some("2025-02-02T07:00:00Z"));
+        assert_eq!([0.0, 86_400.0 * 31.0, f64::NAN, -1.0].map(date), [const { None }; 4]);
     }
 }

@@ -2,21 +2,17 @@
 //!
 //! # Layout
 //!
-//! - [`host`]: where the run-time files of this host lie
+//! - [`host`]: where the run-time files of this host lie, and its monotonic clock
 //! - [`peer`]: who serves and who drives a train, and whether we understand each other
 //! - [`channel`]: the shared-memory ports
-//! - [`clock`]: the host's monotonic clock
 
 mod announcement;
 pub mod channel;
-pub mod clock;
 pub mod error;
 pub mod host;
-mod identity;
 pub mod peer;
 
 pub use announcement::{Announcement, Role};
-pub use clock::monotonic_now_ns;
 pub use error::{ChannelError, SendRefused};
-pub use host::Host;
+pub use host::{Host, monotonic_now_ns};
 pub use peer::Peer;

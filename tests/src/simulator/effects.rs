@@ -3,7 +3,6 @@
 use dynocar_shared::vocabulary::EffectKind;
 use serde_json::{Map, Value, json};
 
-use super::run_file::run_file;
 use super::unlisted::Unlisted;
 
 /// An interval of time in one run.
@@ -282,4 +281,9 @@ fn window_json(window: &TrueRunWindow, time_offset_s: f64) -> Map<String, Value>
     entry.insert("t_start_s".into(), json!(time_offset_s + window.start_s));
     entry.insert("t_end_s".into(), json!(time_offset_s + window.end_s));
     entry
+}
+
+/// Name of a run's file, by the run's number from 0.
+pub fn run_file(number: usize) -> String {
+    format!("runs/{:02}.csv", number + 1)
 }

@@ -38,7 +38,6 @@ pub mod oracle;
 pub mod permitted_speed;
 pub mod power;
 pub mod random;
-pub mod run_file;
 pub mod run_maker;
 pub mod sensors;
 pub mod settings;

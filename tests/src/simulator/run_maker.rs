@@ -1,8 +1,8 @@
 //! Which runs are made: direction, load, stops, weather and manner of driving.
 
+use super::effects::run_file;
 use super::line_maker::SimulatedLine;
 use super::random::SimulatorRandom;
-use super::run_file::run_file;
 use super::settings::{SimulatorSettings, TrainType};
 use super::train_maker::{TrueTrain, rounded};
 

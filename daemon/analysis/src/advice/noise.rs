@@ -8,10 +8,9 @@
 //! the measured speed is the one that the pipeline begins with.
 
 use dynocar_core::pipeline::train_kalman::{TrainKalmanSettings, declared_a_std};
-use dynocar_model::train::TrainModel;
-use dynocar_shared::{ParameterSnapshot, PipelineKind};
-
-use super::known::davis_of;
+use dynocar_model::train::{Davis, TrainModel};
+use dynocar_shared::{Parameter, ParameterSnapshot, PipelineKind};
+use nalgebra::Matrix3;
 
 /// The noise that an estimate of the resistance has to do with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,11 +132,24 @@ fn fastest(values: &[f64]) -> f64 {
     sorted[9 * (sorted.len() - 1) / 10]
 }
 
+/// Parameters that the pipeline answers: a, b, c and the mass.
+pub const ANSWERED: [Parameter; 4] =
+    [Parameter::DavisA, Parameter::DavisB, Parameter::DavisC, Parameter::Mass];
+
+/// Coefficients and their covariance out of a snapshot that has all three.
+pub fn davis_of(snapshot: &ParameterSnapshot) -> Option<(Davis, Matrix3<f64>)> {
+    let [davis @ .., _] = ANSWERED;
+    let [Some(a), Some(b), Some(c)] = davis.map(|it| snapshot.index_of(it)) else { return None };
+    let places = [a, b, c];
+    let [a, b, c] = places.map(|index| snapshot.values[index]);
+    let covariance = Matrix3::from_fn(|i, j| snapshot.covariance_at(places[i], places[j]));
+    Some((Davis { a, b, c }, covariance))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::advice::known::ANSWERED;
-    use dynocar_core::pipeline::output::write_parameters;
+    use dynocar_core::pipeline::estimator::write_parameters;
     use dynocar_model::train::Davis;
     use nalgebra::{Matrix3, Vector3};
 

@@ -14,9 +14,8 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use nalgebra::{Matrix3, SVector};
 
-use super::known::ANSWERED;
 use super::manoeuvre::{DriveKind, PlannedManoeuvre, Scene};
-use super::noise::RunNoise;
+use super::noise::{ANSWERED, RunNoise};
 
 /// Shortest step in s; samples that come faster are taken together.
 const STEP_MIN_S: f64 = 0.2;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use dynocar_model::terms::Parameter;
 
-use crate::dataset::stamps;
+use crate::dataset::{is_stamped_late, stamped_late};
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -41,7 +41,7 @@ impl Hypothesis for LateStamps {
             let other = if late_s >= 0.0 { i + 1 } else { i.wrapping_sub(1) };
             let Some(ahead) = run.declared.get(other) else { continue };
             let step_s = (time_s[other] - time_s[i]).abs();
-            let at = |own, ahead| stamps::stamped_late(own, ahead, step_s, late_s.abs());
+            let at = |own, ahead| stamped_late(own, ahead, step_s, late_s.abs());
             force.traction_n = at(force.traction_n, ahead.traction_n);
             force.brake_n = at(force.brake_n, ahead.brake_n);
         }
@@ -71,7 +71,7 @@ pub fn estimated(dataset: &Dataset) -> Result<Option<WithStd>, RunDataError> {
     let late = WithStd { value: fit.effect_parameters(0)[0], std: deviation[3] };
     let is_inside = LateStamps.at_bound(&[late.value]).is_none();
     let counts = late.value > LATE_SHARE_MIN * step_s && is_inside;
-    Ok((counts && stamps::is_stamped_late(late.value, late.std)).then_some(late))
+    Ok((counts && is_stamped_late(late.value, late.std)).then_some(late))
 }
 
 /// Returns the estimate as a sentence to follow another.

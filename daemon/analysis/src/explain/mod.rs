@@ -11,7 +11,6 @@
 //!   time, would explain
 //! - [`selection`]: the search for effects, its significance, evidence by run, the finished model beside what is
 //!   usually wrong
-//! - [`gradient_prior`]: how maps err
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`many`]: some of many runs, and what all of them say
 //! - [`course`], [`over_time`], [`held_out`]: what is not the same in all runs, and what those held out say
@@ -31,7 +30,6 @@ pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;
 pub mod force_time;
-pub mod gradient_prior;
 pub mod held_out;
 pub mod hypothesis;
 pub mod identifiability;

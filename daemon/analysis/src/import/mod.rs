@@ -8,8 +8,8 @@
 //!
 //! - `tree`: YAML and JSON with the line of every value
 //! - [`mod@format`]: which project's file it is, by its content
-//! - `rolling_stock`, `vehicle`, `running_path`: railtoolkit's schemas
-//! - `ttobench`, `ttobench_train`, `ttobench_track`: TTOBench's files
+//! - `rolling_stock`, `running_path`: railtoolkit's schemas
+//! - `ttobench`: TTOBench's files
 //! - `osrd`: OSRD's rolling stock
 //! - [`imported`]: what comes out
 
@@ -22,9 +22,6 @@ mod running_path;
 mod tests;
 mod tree;
 mod ttobench;
-mod ttobench_track;
-mod ttobench_train;
-mod vehicle;
 
 pub use format::Format;
 pub use imported::{Account, FieldOutcome, ImportReading, ImportedLine, ImportedTrain};
@@ -75,8 +72,8 @@ pub fn import(
         match format::kind_of(&root, forced)? {
             Kind::RollingStock => stock.push(root),
             Kind::RunningPath => imported.lines.extend(running_path::lines(&root)?),
-            Kind::TtobenchTrain => imported.trains.push(ttobench_train::train(&root)?),
-            Kind::TtobenchTrack => imported.lines.push(ttobench_track::line(&root)?),
+            Kind::TtobenchTrain => imported.trains.push(ttobench::train(&root)?),
+            Kind::TtobenchTrack => imported.lines.push(ttobench::line(&root)?),
             Kind::OsrdBrake => imported.trains.push(osrd::brake_alone(&root)?),
             Kind::OsrdRollingStock => imported.trains.push(osrd::train(&root, reading)?),
         }

@@ -10,22 +10,20 @@
 //! - [`StopStatistics`]: all stops together, whatever the driver wanted
 //! - [`Study`]: all of it over a dataset
 
-mod cut_off;
 mod deceleration_curve;
 mod deceleration_law;
 mod find;
 mod friction;
-mod recorded;
 mod stop_statistics;
 mod study;
 
-pub use cut_off::CutOff;
 pub use deceleration_curve::{DecelerationCurve, DecelerationPoint};
 pub use deceleration_law::{
     DecelerationLaw, Gradient, LawPoint, MeasuredResponse, StoppingDistance,
 };
-pub use find::{FindSettings, FoundBy, StopSpan, find};
+pub use find::{CutOff, FindSettings, FoundBy, StopSpan, find};
 pub use friction::{FrictionPoint, friction};
-pub use recorded::{Manner, RecordedStop};
-pub use stop_statistics::{DecelerationSpread, FromSpeed, QuantileRange, StopStatistics};
+pub use stop_statistics::{
+    DecelerationSpread, FromSpeed, Manner, QuantileRange, RecordedStop, StopStatistics,
+};
 pub use study::{Study, StudySettings};

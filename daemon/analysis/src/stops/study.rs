@@ -7,13 +7,11 @@ use dynocar_shared::sample::FLAG_WHEEL_SLIDE;
 use dynocar_shared::{SampleField, TrainSample};
 use serde::Serialize;
 
-use super::cut_off::cut_off_s;
 use super::deceleration_curve::{DecelerationCurve, DecelerationPoint};
 use super::deceleration_law::{DecelerationLaw, Gradient, StoppingDistance};
-use super::find::{FindSettings, FoundBy, began_ns, find, usable};
+use super::find::{FindSettings, FoundBy, began_ns, cut_off_s, find, usable};
 use super::friction::friction;
-use super::recorded::{Manner, RecordedStop};
-use super::stop_statistics::StopStatistics;
+use super::stop_statistics::{Manner, RecordedStop, StopStatistics};
 use crate::dataset::{Dataset, Role, Run};
 
 /// How stops are found, and what is assumed of them.

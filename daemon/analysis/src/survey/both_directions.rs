@@ -1,7 +1,7 @@
 //! Whether both directions take one track, and which.
 
 use super::alignment::Alignment;
-use super::recording_parts::SAME_ALIGNMENT_M;
+use super::recording::SAME_ALIGNMENT_M;
 use crate::statistics::share_of;
 
 /// Both directions take the same way when so much of what both drive lies within `SAME_TRACK_M`.

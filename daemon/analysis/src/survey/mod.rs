@@ -7,8 +7,8 @@
 //!
 //! # Layout, in the order of reading
 //!
-//! - [`recording`], [`geodesy`]: what was recorded, on a plane in metres
-//! - `recording_parts`, [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`driven_line`]: the line that
+//! - [`recording`], [`geodesy`]: recordings and their one-way parts, on a plane in metres
+//! - [`alignment`], `silence`, `tracking`, `centring`, `both_directions`, [`driven_line`]: the line that
 //!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`]: what it shows
 //! - [`observation`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,
@@ -30,7 +30,6 @@ mod normal;
 pub mod observation;
 pub mod profile;
 pub mod recording;
-mod recording_parts;
 mod silence;
 pub mod stops;
 mod surveying;

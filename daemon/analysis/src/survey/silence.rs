@@ -1,8 +1,7 @@
 //! Where a receiver was silent, the path of one pass is that of another.
 
 use super::geodesy::distance_squared;
-use super::recording::SurveyRecording;
-use super::recording_parts::{RecordingPart, SAME_ALIGNMENT_M};
+use super::recording::{RecordingPart, SAME_ALIGNMENT_M, SurveyRecording};
 
 /// Fixes further apart along the path than this many m leave it open in between.
 pub const GAP_MAX_M: f64 = 150.0;

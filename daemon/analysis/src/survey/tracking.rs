@@ -2,8 +2,7 @@
 
 use super::alignment::{Alignment, Foot};
 use super::geodesy::distance_squared;
-use super::recording::{Fix, SurveyRecording};
-use super::recording_parts::SAME_ALIGNMENT_M;
+use super::recording::{Fix, SAME_ALIGNMENT_M, SurveyRecording};
 use crate::statistics::least_first;
 
 /// Window in m around the expected chainage in which a fix is placed.

@@ -7,8 +7,8 @@ use dynocar_shared::snapshot::{PARAMETERS_MAX, packed_index};
 use dynocar_shared::{Parameter, ParameterSnapshot, Status};
 use nalgebra::{Cholesky, DMatrix, SMatrix, SVector};
 
+use super::estimator::contract_unit;
 use super::judge::{are_alike, are_too_large};
-use super::output::contract_unit;
 
 /// A validated estimate with its covariance.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,13 +5,12 @@
 
 pub mod admission;
 pub mod braking;
-mod estimator;
+pub mod estimator;
 pub mod judge;
 mod kept;
 pub mod momentum;
 pub mod monitor;
 pub mod motion;
-pub mod output;
 pub mod quantities;
 pub mod settings;
 pub mod train_kalman;

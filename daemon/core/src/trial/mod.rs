@@ -1,7 +1,7 @@
 //! Models on trial: which of several predicts a train's motion better, judged while it runs.
 //!
 //! The model in force and its rivals predict the same samples open loop, restarted every 60 s
-//! ([`open_loop`], by the simulation that judges every model, [`dynocar_model::simulate`]). Trip by trip
+//! ([`ledger::OpenLoop`], by the simulation that judges every model, [`dynocar_model::simulate`]). Trip by trip
 //! their errors are compared, and the comparison is a bet whose winnings say at every moment how
 //! sure one may be ([`evidence`]): one may look as often as one likes. What the errors were on
 //! which day and where is kept beside ([`ledger`]).
@@ -10,7 +10,6 @@
 
 pub mod evidence;
 pub mod ledger;
-pub mod open_loop;
 #[cfg(test)]
 mod tests;
 mod trials;

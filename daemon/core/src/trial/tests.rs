@@ -7,8 +7,7 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::RivalEvidence;
-use super::ledger::Ledger;
-use super::open_loop::OpenLoop;
+use super::ledger::{Ledger, OpenLoop};
 use super::{ModelTrials, Rival};
 
 const TRAIN: TrainId = TrainId(1);

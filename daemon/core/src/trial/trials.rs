@@ -5,8 +5,7 @@ use dynocar_model::simulate::{Restart, SpeedError};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 
 use super::evidence::{RivalEvidence, score};
-use super::ledger::Ledger;
-use super::open_loop::{OpenLoop, WindowError};
+use super::ledger::{Ledger, OpenLoop, WindowError};
 use crate::pipeline::Pipeline;
 use crate::pipeline::admission::Admission;
 use crate::pipeline::motion::MOVING_MPS;

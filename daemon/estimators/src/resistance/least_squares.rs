@@ -1,9 +1,9 @@
 //! The pipelines `ls`, `rls`, `regularised_rls`, `mils` and `v_mils`.
 
 use dynocar_core::filter::RunningMedian;
+use dynocar_core::pipeline::estimator::{DAVIS, write_innovations, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement, missing};
 use dynocar_core::pipeline::momentum::{DataSettings, PARAMETERS, UnitSample, scaled, unscaling};
-use dynocar_core::pipeline::output::{DAVIS, write_innovations, write_parameters};
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_model::force::ResolvedSample;
 use dynocar_model::train::{Davis, TrainModel};

@@ -3,10 +3,10 @@
 use dynocar_core::filter::bounded_minimum;
 use dynocar_core::pipeline::InnovationMonitor;
 use dynocar_core::pipeline::admission::limits::UNFIT_SHARE;
+use dynocar_core::pipeline::estimator::excitation;
 use dynocar_core::pipeline::judge::StatusInputs;
 use dynocar_core::pipeline::momentum::{PARAMETERS, SPEED_SCALE_MPS, regressors, unscaling};
 use dynocar_core::pipeline::motion::SpeedRange;
-use dynocar_core::pipeline::output::excitation;
 use dynocar_model::train::Davis;
 use dynocar_shared::{Manoeuvre, Reason, Status};
 use nalgebra::{Matrix3, Vector3};

@@ -1,10 +1,10 @@
 //! Contents of a snapshot by [`JointLeastSquares`].
 
 use dynocar_core::filter::drifting_level::BIAS;
-use dynocar_core::pipeline::judge::{InputState, StatusInputs};
-use dynocar_core::pipeline::output::{
+use dynocar_core::pipeline::estimator::{
     DAVIS_AND_MASS, excitation, write_innovations, write_parameters,
 };
+use dynocar_core::pipeline::judge::{InputState, StatusInputs};
 use dynocar_shared::{ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use dynocar_core::pipeline::estimator::{write_innovations, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement, StatusInputs};
 use dynocar_core::pipeline::motion::{SpeedNoise, SpeedRange, StopWatch, jump_variance};
-use dynocar_core::pipeline::output::{write_innovations, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_model::force::ResolvedSample;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use dynocar_core::pipeline::estimator::{DAVIS_AND_MASS, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement, StatusInputs};
 use dynocar_core::pipeline::motion::{MOVING_MPS, SpeedRange, StopWatch};
-use dynocar_core::pipeline::output::{DAVIS_AND_MASS, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, Outcome};
 use dynocar_core::settings;

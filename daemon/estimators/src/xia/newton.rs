@@ -1,9 +1,9 @@
 //! `trajectory_newton`: a trajectory fit over a sliding window, the online scheme of Xia 2023.
 
 use dynocar_core::filter::levenberg_marquardt::ParameterBox;
+use dynocar_core::pipeline::estimator::{DAVIS, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement};
 use dynocar_core::pipeline::motion::SpeedRange;
-use dynocar_core::pipeline::output::{DAVIS, write_parameters};
 use dynocar_core::pipeline::settings::{SettingError, require};
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, Outcome};
 use dynocar_core::settings;

@@ -4,4 +4,3 @@ mod layouts;
 mod process;
 #[path = "../../../recording/tests/recording/support_site.rs"]
 mod support_site;
-mod thinning;

@@ -12,13 +12,13 @@ use dynocar_analysis::parallel::of_each;
 use dynocar_analysis::stops::{CutOff, DecelerationLaw, FoundBy, Gradient, Manner, Study};
 
 use super::stops::{StudyArguments, no_stop, share, table};
-use super::text::{TextTable, entry};
 use crate::brakes_page::{self, BrakesAnswer, K_DRY};
 use crate::dataset;
 use crate::report::PAGE_MARK;
 use crate::report::html::TableColumns;
 use crate::report::provenance::{Provenance, own_command_line};
 use dynocar::cli::Failure;
+use dynocar::cli::text::{TextTable, entry};
 use dynocar::dataset::labelled_text;
 use dynocar::output::{give, report_line, require_files, write_file, write_json};
 

@@ -8,7 +8,8 @@ use dynocar_analysis::explain::stop_to_stop::Metric;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::text::{WIDTH, diagnostics, wrap};
+use crate::run_facts::diagnostics;
+use dynocar::cli::text::{WIDTH, wrap};
 
 /// Columns of a row before its words.
 const INDENT: usize = 12;

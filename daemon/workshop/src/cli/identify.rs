@@ -16,8 +16,8 @@ use serde::Serialize;
 
 use self::answer::EstimatorAnswer;
 use self::runs::{EstimatorSpread, RunAnswer};
-use super::text::diagnostics;
 use crate::dataset;
+use crate::run_facts::diagnostics;
 use dynocar::cli::Failure;
 use dynocar::dataset::SourceArguments;
 use dynocar::output::{give, require_files};

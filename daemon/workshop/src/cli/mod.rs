@@ -15,7 +15,6 @@ mod init;
 mod learn;
 mod stops;
 mod survey;
-mod text;
 mod threads;
 mod train_text;
 mod verify;

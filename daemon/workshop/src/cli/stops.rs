@@ -10,10 +10,11 @@ use dynocar_analysis::stops::{
 };
 use serde::Serialize;
 
-use super::text::{TextTable, diagnostics};
 use crate::dataset;
 use crate::report::html::TableColumns;
+use crate::run_facts::diagnostics;
 use dynocar::cli::Failure;
+use dynocar::cli::text::TextTable;
 use dynocar::dataset::SourceArguments;
 use dynocar::output::{give, require_files};
 use dynocar_shared::HALF_95;

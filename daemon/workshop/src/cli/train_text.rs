@@ -11,8 +11,8 @@ use dynocar_model::train::numbers::{
 };
 use toml::Value;
 
-use super::text::{comment, on_one_line};
 use dynocar::cli::Failure;
+use dynocar::cli::text::{WIDTH, wrap};
 
 /// Mass of a metre of train in t/m, where only one of mass and length is known.
 const MASS_PER_LENGTH_T_PER_M: f64 = 2.0;
@@ -323,6 +323,17 @@ fn head(writer: &str) -> String {
 const RESISTANCE: &str = "
 # Resistance on level, straight track: a + b v + c v² in N for each kN of weight, v in m/s.
 ";
+
+/// Words without line breaks and other marks that would end a line.
+pub fn on_one_line(words: &str) -> String {
+    words.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
+}
+
+/// A comment of a TOML file, in lines that begin alike.
+pub fn comment(indent: &str, words: &str) -> String {
+    let lines = wrap(&on_one_line(words), WIDTH - indent.len());
+    lines.iter().map(|line| format!("# {indent}{line}\n")).collect()
+}
 
 #[cfg(test)]
 mod tests {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use dynocar::text_file::{require_text, text_of};
-use dynocar_analysis::dataset::encoding::decoded;
+use dynocar_analysis::dataset::text_layout::decoded;
 use dynocar_analysis::dataset::{DatasetFiles, FileProblem, Manifest, RunContent, is_parquet};
 use dynocar_parquet::columns::columns_of_bytes;
 use dynocar_shared::TrainSample;

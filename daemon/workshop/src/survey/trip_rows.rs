@@ -1,7 +1,7 @@
 //! The file of a trip: its rows with a chainage, in SI units, forces where they act.
 
-use dynocar_analysis::dataset::stamps::{is_stamped_late, stamped_late};
 use dynocar_analysis::dataset::{Dataset, ForceSource, Quantity, Run};
+use dynocar_analysis::dataset::{is_stamped_late, stamped_late};
 use dynocar_analysis::survey::{Survey, Trip};
 use dynocar_shared::{SampleField, TrainSample};
 

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicI32, AtomicPtr, AtomicU64};
 
 use rustix::mm::{Advice, MapFlags, ProtFlags, madvise, mmap_anonymous};
 
-use crate::clock::monotonic_now_ns;
+use crate::host::monotonic_now_ns;
 
 const PAGE_BYTES: usize = 4096;
 

@@ -19,8 +19,8 @@ use iceoryx2::service::port_factory::event::PortFactory;
 
 use super::service::Held;
 use super::{Receiver, Sender, Transport};
-use crate::clock::monotonic_now_ns;
 use crate::error::ChannelError;
+use crate::host::monotonic_now_ns;
 
 /// Pipeline threads that one controller keeps account of.
 const SLEEPERS_MAX: usize = 32;

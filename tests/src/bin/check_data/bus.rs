@@ -12,8 +12,8 @@ use dynocar_shared::PipelineKind;
 use dynocar_workshop::survey::answer::SurveyAnswer;
 use dynocar_workshop::survey::survey_folder;
 
+use super::Report;
 use super::bus_variants::{self, ByPower, OtherDay};
-use super::report::Report;
 use super::stop_masses::{self, StopMasses};
 
 /// Largest error in m/s in open loop on trips left out: over 60 s, over all of them, and the median

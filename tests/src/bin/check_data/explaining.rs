@@ -7,7 +7,7 @@ use dynocar::dataset;
 use dynocar_analysis::explain::explain;
 use serde_json::Value;
 
-use super::report::Report;
+use super::Report;
 use super::truth::Truth;
 
 /// Smallest share of the reduction of the error that knowing the effect gives.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use dynocar_analysis::import::{ImportReading, ImportSource, Imported, import};
 
-use super::report::Report;
+use super::Report;
 use super::trainruns::{THEIR_GRAVITY_MPS2, TRAINS};
 
 /// Largest relative difference from figures that were read off results.

@@ -12,7 +12,6 @@ mod bus_variants;
 mod explaining;
 mod imports;
 mod monitor;
-mod report;
 mod resistance;
 mod simulation;
 mod stop_masses;
@@ -25,7 +24,34 @@ use std::process::ExitCode;
 
 use dynocar::dataset;
 
-use report::Report;
+/// Prints each outcome and counts it.
+#[derive(Default)]
+pub struct Report {
+    passed: usize,
+    failed: usize,
+}
+
+impl Report {
+    /// Takes down one check.
+    pub fn note(&mut self, what: &str, outcome: Result<String, String>) {
+        match outcome {
+            Ok(detail) => {
+                self.passed += 1;
+                println!("ok    {what}: {detail}");
+            }
+            Err(detail) => {
+                self.failed += 1;
+                println!("FAIL  {what}: {detail}");
+            }
+        }
+    }
+
+    /// Prints the counts; a run without any check has failed.
+    pub fn finish(self) -> ExitCode {
+        println!("{} passed, {} failed", self.passed, self.failed);
+        if self.failed == 0 && self.passed > 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    }
+}
 
 fn main() -> ExitCode {
     let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else {

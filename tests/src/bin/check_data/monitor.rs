@@ -11,7 +11,7 @@ use dynocar_estimators::EstimatorSettings;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{PipelineKind, TrainId};
 
-use super::report::Report;
+use super::Report;
 use super::truth::Truth;
 
 /// A dragging brake must be suspected so soon after its onset.

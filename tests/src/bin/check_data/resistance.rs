@@ -8,7 +8,7 @@ use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{ParameterSnapshot, PipelineKind, Status, TrainId};
 use serde_json::Value;
 
-use super::report::Report;
+use super::Report;
 
 /// Share of the driven speed range that counts as its thinly driven ends, at each end.
 const THIN_END: f64 = 0.1;

@@ -14,7 +14,7 @@ use dynocar_model::simulate::{
 use dynocar_shared::TrainId;
 use serde_json::Value;
 
-use super::report::Report;
+use super::Report;
 
 /// Largest relative difference from the stated error.
 const TOLERANCE: f64 = 0.03;

@@ -5,7 +5,7 @@ use std::path::Path;
 use dynocar::dataset;
 use dynocar_analysis::stops::{FindSettings, Study, StudySettings};
 
-use super::report::Report;
+use super::Report;
 
 const MANIFEST: &str = "[dataset]\nname = \"stop\"\n[train]\nfile = \"train.toml\"\n[columns]\n\
     time = { column = \"time_ms\", unit = \"ms\" }\n\

@@ -13,7 +13,7 @@ use dynocar_model::train::{BrakeGear, Davis, EffortCurve, TrainModel};
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 use dynocar_tests::simulator::driving::{Controls, TrainOnLine, drive};
 
-use super::report::Report;
+use super::Report;
 
 /// Gravity in m/s² of TrainRuns.jl.
 pub const THEIR_GRAVITY_MPS2: f64 = 9.80665;

@@ -10,8 +10,7 @@
 //! evidence decides.
 
 use dynocar_model::terms::extra::Covariate;
-use dynocar_model::terms::gradient;
-use dynocar_model::terms::{ModelEntry, Parameter};
+use dynocar_model::terms::{ModelEntry, Parameter, gradient};
 use dynocar_model::track::{self, LinearProfile};
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::DMatrix;
@@ -22,7 +21,7 @@ use super::{
 };
 use crate::explain::answer::ParameterValue;
 use crate::explain::evidence::{RunData, SampleForces};
-use crate::explain::gradient_prior::{ErrorScale, MAP, UNSURVEYED};
+use crate::explain::places::{ErrorScale, MAP, UNSURVEYED};
 use crate::explain::places::{MAP_ERROR_PERMILLE, span_m};
 use crate::explain::scan::Scan;
 use crate::statistics::rms;

@@ -23,8 +23,6 @@ mod positions;
 mod run_data;
 mod run_scatter;
 mod sample_forces;
-#[cfg(test)]
-mod test_runs;
 mod thinning;
 mod whitener;
 
@@ -43,5 +41,5 @@ pub use run_data::{Density, RunData, RunDataError, RunPower, prepare, prepare_at
 pub use run_scatter::{PRIOR_RUNS, RunFactors, WeightedFilter};
 pub use sample_forces::SampleForces;
 #[cfg(test)]
-pub use test_runs::coasting;
+pub use sample_forces::test_runs::coasting;
 pub use whitener::BinWhitener;

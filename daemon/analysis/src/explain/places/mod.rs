@@ -11,7 +11,7 @@ mod runs;
 mod settle;
 mod site;
 
-pub use localise::{MAP_ERROR_PERMILLE, find, span_m};
+pub use localise::{ErrorScale, MAP, MAP_ERROR_PERMILLE, SURVEYED, UNSURVEYED, find, span_m};
 pub use runs::{FoundIntervals, best_of_runs};
 pub use settle::settle;
 pub use site::{Axis, Inside, IntervalEnd, Intervals, Reach, Site};

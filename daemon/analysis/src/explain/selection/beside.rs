@@ -9,8 +9,9 @@ use std::sync::Arc;
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 
-use super::acceptance::{CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, moves_places};
-use super::acceptance::{is_material, is_possible};
+use super::acceptance::{
+    CERTAIN_RUNS_MIN, is_certain, is_left_by_moved_places, is_material, is_possible, moves_places,
+};
 use super::by_run::{Deviations, deviations, deviations_beside};
 use super::outcome::{Beside, EffectTrial, SearchOutcome, round_of};
 use super::price::{at_bound, penalty};
@@ -22,7 +23,7 @@ use crate::explain::effects::{
     vertical_curves,
 };
 use crate::explain::evidence::Fit;
-use crate::explain::gradient_prior::SURVEYED;
+use crate::explain::places::SURVEYED;
 use crate::explain::places::span_m;
 
 /// Whether some evidence makes the last effect of a trial certain beside the usual errors.

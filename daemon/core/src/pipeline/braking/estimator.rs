@@ -10,9 +10,9 @@ use nalgebra::{Matrix1, Matrix2, SVector};
 use super::engine::{BrakingEstimate, BrakingObservation, BrakingSettings, Engine, EngineStep};
 use super::intake::{BrakingCoefficient, BrakingIntake, Intake};
 use super::motion::StepInputs;
+use crate::pipeline::estimator::{write_innovations, write_parameters};
 use crate::pipeline::judge::{InputState, Judgement, StatusInputs};
 use crate::pipeline::motion::{PositionNoise, SpeedRange};
-use crate::pipeline::output::{write_innovations, write_parameters};
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 
 /// Memory of the innovation statistics, in innovations.

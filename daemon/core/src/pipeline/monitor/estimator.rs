@@ -9,13 +9,13 @@ use nalgebra::{Vector1, Vector3};
 use super::MonitorSettings;
 use super::covariates::{CovariateImpulse, PlaceMemory, RunClock, covariates};
 use super::information::{BaseVector, MonitorInformation, usual};
-use super::pressure::ReleasedPressure;
 use super::rows::{DesignRow, ParameterVector, Rows, units};
 use super::suspects::{
-    BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, Onsets, SUSPECTS, suspect_of,
+    BANK, BASE, DAY_WIND, FIRST_ONSET, LOAD, ONSETS, Onsets, ReleasedPressure, SUSPECTS, suspect_of,
 };
 use super::verdict::{MonitorVerdict, ResidualEvidence};
 use super::wheel_scale::WheelScale;
+use crate::pipeline::estimator::{write_innovations, write_parameters};
 use crate::pipeline::judge::{InputState, Judgement, StatusInputs};
 use crate::pipeline::momentum::blocks::MomentumBlocks;
 use crate::pipeline::momentum::{
@@ -23,7 +23,6 @@ use crate::pipeline::momentum::{
     unscaling,
 };
 use crate::pipeline::motion::{STANDING_MPS, SpeedRange, is_same_mass};
-use crate::pipeline::output::{write_innovations, write_parameters};
 use crate::pipeline::settings::SettingError;
 use crate::pipeline::{Estimator, InnovationMonitor, Outcome};
 

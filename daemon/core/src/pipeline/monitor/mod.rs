@@ -9,8 +9,8 @@
 //!
 //! # Layout, in the order a sample takes
 //!
-//! - `suspects`: the effects that are looked for, and since when a brake may drag
-//! - `covariates`, `pressure`, `wheel_scale`: what a sample says of each of them
+//! - `suspects`: the effects that are looked for, since when a brake may drag, and the pressure that shows it
+//! - `covariates`, `wheel_scale`: evidence of a sample on each of them
 //! - `rows`: blocks to independent rows of unit variance
 //! - `information`: how far off everything may be, and the likelihood ratios
 //! - `verdict`: what speaks for each of them
@@ -28,7 +28,6 @@ mod covariates;
 mod estimator;
 mod information;
 mod naming;
-mod pressure;
 mod rows;
 mod suspects;
 mod verdict;

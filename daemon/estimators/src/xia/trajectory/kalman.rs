@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use dynocar_core::pipeline::estimator::{DAVIS, write_parameters};
 use dynocar_core::pipeline::judge::{InputState, Judgement};
 use dynocar_core::pipeline::motion::{Rounding, SpeedRange, jump_variance};
-use dynocar_core::pipeline::output::{DAVIS, write_parameters};
 use dynocar_core::pipeline::settings::SettingError;
 use dynocar_core::pipeline::{Estimator, InnovationMonitor, KeptEstimate, Outcome};
 use dynocar_core::settings;

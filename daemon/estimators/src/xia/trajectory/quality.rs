@@ -13,9 +13,9 @@
 //! covariance grows by the same factor (Newey, West 1987, with a flat kernel over blocks).
 
 use dynocar_core::pipeline::InnovationMonitor;
+use dynocar_core::pipeline::estimator::{excitation, write_innovations};
 use dynocar_core::pipeline::judge::{Judgement, LONG_RUN_MAX, StatusInputs};
 use dynocar_core::pipeline::motion::SpeedRange;
-use dynocar_core::pipeline::output::{excitation, write_innovations};
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{Manoeuvre, ParameterSnapshot, Reason, Status};
 use nalgebra::{Matrix3, Vector3};
@@ -254,6 +254,7 @@ mod tests {
 #[cfg(test)]
 mod long_run_tests {
     use super::*;
+
     use rand::{RngExt, SeedableRng};
 
     /// Twelve uniforms: mean 0, variance 1.

@@ -7,7 +7,8 @@ use dynocar_model::train::{BrakeGear, Corrections, EffortCurve, TrainModel};
 use dynocar::cli::check as daemon;
 
 use super::{Understood, runs};
-use crate::cli::text::{self, WIDTH, line, short, wrap};
+use crate::run_facts;
+use dynocar::cli::text::{WIDTH, line, short, wrap};
 
 /// The whole report.
 pub(super) fn report(understood: &Understood) -> String {
@@ -24,7 +25,7 @@ pub(super) fn report(understood: &Understood) -> String {
         parts.push(columns(manifest));
         parts.push(runs::report(manifest, runs, &diagnostics));
     } else if !diagnostics.is_empty() {
-        parts.push(format!("notes\n{}", text::diagnostics(&diagnostics)));
+        parts.push(format!("notes\n{}", run_facts::diagnostics(&diagnostics)));
     }
     parts.join("\n")
 }

@@ -8,9 +8,9 @@ use dynocar_analysis::dataset::{
 };
 use dynocar_core::plausibility::InputFault;
 
-use crate::cli::text::{TextTable, WIDTH, short, wrap};
-use crate::clock::moment;
+use crate::run_facts::moment;
 use crate::run_facts::{self, mass_t, recorded, recorded_in_words};
+use dynocar::cli::text::{TextTable, WIDTH, short, wrap};
 
 type Read = Result<Run, DatasetError>;
 

@@ -13,7 +13,7 @@ use dynocar_shared::HALF_95;
 use serde::Serialize;
 
 use super::answer::EstimatorAnswer;
-use crate::cli::text::{TextTable, short};
+use dynocar::cli::text::{TextTable, short};
 
 /// Estimates from one run alone.
 #[derive(Clone, Debug, Serialize)]

@@ -13,9 +13,11 @@ use dynocar_model::train::numbers::{
 };
 use toml::Value;
 
-use crate::cli::text::{TextTable, comment, diagnostics, entry, on_one_line};
 use crate::cli::train_text::{TrainArguments, TrainText, TrainValues, converted};
+use crate::cli::train_text::{comment, on_one_line};
 use crate::report::provenance::for_shell;
+use crate::run_facts::diagnostics;
+use dynocar::cli::text::{TextTable, entry};
 
 /// The `train.toml`; what the file does not give and nobody says is a marked default.
 ///

@@ -7,9 +7,10 @@ use dynocar_analysis::dataset::guess::Guess;
 use dynocar_analysis::dataset::{DatasetDiagnostic, MANIFEST_FILE};
 use encoding_rs::UTF_8;
 
-use crate::cli::text::{TextTable, diagnostics, entry};
 use crate::cli::train_text::TrainText;
 use crate::report::provenance::for_shell;
+use crate::run_facts::diagnostics;
+use dynocar::cli::text::{TextTable, entry};
 
 /// Describes the written files, the understanding of the recordings, and the next steps.
 pub fn text(folder: &Path, train: &TrainText, described: Option<&Described>) -> String {

@@ -16,7 +16,7 @@ use dynocar_analysis::dataset::{Quantity, Role, TextLayout};
 use encoding_rs::UTF_8;
 use toml::Value;
 
-use crate::cli::text::comment;
+use crate::cli::train_text::comment;
 use dynocar::models::text::{TRACK_FILE, TRAIN_FILE};
 
 /// A name for a dataset: its folder's.

@@ -5,7 +5,7 @@ use dynocar_analysis::explain::report::panels::{Panel, PanelBin};
 use plotters::element::{Circle, PathElement};
 use plotters::style::{Color, RGBColor};
 
-use crate::clock::moment;
+use crate::run_facts::moment;
 
 use super::axes::{
     Axis, Chart, band, chart, frame, padded, range_with_zero, shade, stroke, zero_line,

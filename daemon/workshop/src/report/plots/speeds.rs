@@ -4,7 +4,7 @@ use dynocar_analysis::explain::report::timeline::{SpeedPoint, Trace};
 use plotters::element::PathElement;
 use plotters::style::RGBColor;
 
-use crate::clock::moment;
+use crate::run_facts::moment;
 
 use super::axes::{Axis, Chart, chart, frame, padded, range_with_zero, shade, stroke, zero_line};
 use super::picture::{

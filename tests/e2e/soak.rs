@@ -1,9 +1,49 @@
-//! Days of one train in accelerated time: what is undeclared is found, tried, adopted, and taken back.
+//! Short runs of `dynocar-soak`: eight trains with faults, an hour of them in accelerated time, mutated bytes on every
+//! reader, and months of one train.
 
 use dynocar_shared::vocabulary::EffectKind;
+use dynocar_tests::fuzz::{Target, run};
 use dynocar_tests::soak::months::story::StorySpan;
 use dynocar_tests::soak::months::table::{HEADER, line};
 use dynocar_tests::soak::months::{Life, LifeOutcome, LifeSettings, Story, mistakes};
+use dynocar_tests::soak::{Programs, day, load};
+
+fn programs() -> Programs {
+    Programs {
+        dynocar: env!("CARGO_BIN_EXE_dynocar-under-test").into(),
+        peer: env!("CARGO_BIN_EXE_dynocar-test-peer").into(),
+    }
+}
+
+#[test]
+fn eight_trains_with_faults_keep_memory_flat_and_account_for_every_sample() {
+    let report = load::run(&programs(), 12, 1);
+    println!("{report:#?}");
+    assert!(report.offered > 2_000 && report.faults > 2, "{report:?}");
+}
+
+#[test]
+fn an_hour_of_trouble_with_clocks_disks_and_trains_keeps_memory_accounts_and_states() {
+    let hours = day::run(&programs(), 1, 1);
+    println!("{}", day::hours::table(&hours));
+    let [used, rejected, lost] = hours[0].account;
+    assert!(used > 100_000 && rejected > 0 && lost > 0, "{hours:?}");
+}
+
+#[test]
+fn mutated_bytes_make_no_reader_panic_and_no_snapshot_unsound() {
+    for target in Target::ALL {
+        // The slow readers less often.
+        let rounds = match target {
+            Target::Sample => 400,
+            Target::Logger => 1_000,
+            _ => 4_000,
+        };
+        let accepted = run(target, rounds, 1);
+        println!("{target:?}: {accepted} of {rounds} accepted");
+        assert!(accepted > 0, "{target:?}: the corpus itself reaches no further than the door");
+    }
+}
 
 /// A life of some days of twelve trips; a mistake in a thousand trips is let pass, so that a day or
 /// two of them are evidence enough.
