@@ -2,7 +2,6 @@
 //! ones.
 //!
 //! - [`knowledge`]: what a driver holds for true of its train, and what the train can do
-//! - [`answers`]: from the daemon's answers to what the driver drives by, and whether they were right
 //! - [`braking`]: the braking curve to the stopping point
 //! - [`plan`]: the line as the map has it, and the speed profile for the timetable with the least energy
 //! - [`driver`]: tracking the plan and the braking curve
@@ -13,7 +12,6 @@
 //! - [`run`]: all trains of a service with one kind of parameters
 //! - [`score`], [`picture`]: what it comes to
 
-pub mod answers;
 pub mod braking;
 pub mod deviations;
 pub mod driver;

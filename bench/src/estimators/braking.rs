@@ -4,7 +4,7 @@
 use std::rc::Rc;
 
 use dynocar_core::pipeline::braking::engine::{BrakingObservation, Engine};
-use dynocar_core::pipeline::braking::law::BrakingLaw;
+use dynocar_core::pipeline::braking::law_bank::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{MotionNoise, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::BrakingSettings;
 use dynocar_core::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};

@@ -9,7 +9,7 @@ use dynocar_estimators::xia::trajectory::hypothesis::{JumpHypothesis, OutlierMod
 use dynocar_estimators::xia::trajectory::noise::{LearnedNoise, NoiseModel};
 use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings, StepDoubt};
 use dynocar_estimators::xia::trajectory::step::{StepRule, TrajectoryStep};
-use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
 use nalgebra::Vector3;
 

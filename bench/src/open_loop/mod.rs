@@ -1,7 +1,7 @@
 //! The open loop that latency and load measure by: samples leave at their appointed times, whatever has come back,
 //! through real processes on cores of their own.
 //!
-//! - [`swinging_train`], [`traffic`]: a train's samples, when they leave, and which are bad
+//! - [`traffic`]: a train's samples, when they leave, and which are bad
 //! - [`wire`]: the controller's end of each transport
 //! - [`controller`]: sends what is due, and counts the answers
 //! - [`trial`]: who answers, how many trains there are, and what came of it
@@ -12,7 +12,6 @@
 pub mod controller;
 pub mod server;
 pub mod sockets;
-pub mod swinging_train;
 pub mod traffic;
 pub mod trial;
 pub mod wire;

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use dynocar_estimators::xia::trajectory::fit::{FitSettings, MotionSegment, TrajectoryFitter};
 use dynocar_estimators::xia::trajectory::step::{StepRule, TrajectoryStep};
-use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::snapshot::packed_index;
 use dynocar_shared::{PipelineKind, SampleField, TrainId, TrainSample};

@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 
 use dynocar_core::pipeline::train_kalman::TrainKalmanSettings;
-use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::mps2_per_n_per_kn;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 use super::scenario_train::DriveMoment;

@@ -21,7 +21,7 @@
 //! - `clock_faults`: an hour of summer time, seconds without a fraction, rows in another order
 //! - `order`, `spikes`, `motion`, `forces`, `altitude`: from columns to time, speed,
 //!   position, forces and gradient
-//! - `resolved`, [`run`], [`quality`], `judge`, [`dataset_diagnostic`], `diagnosing`, `declared`: samples,
+//! - `resolved`, [`run`], [`quality`], [`dataset_diagnostic`], `diagnosing`, `declared`: samples,
 //!   counts and warnings
 //! - [`written`]: the three TOML files as they are written, and declared ones that change
 //! - [`guess`]: a description of files that nobody has described yet
@@ -38,7 +38,6 @@ pub mod document;
 pub mod error;
 mod forces;
 pub mod guess;
-mod judge;
 pub mod keys;
 mod lines;
 pub mod manifest;

@@ -13,8 +13,8 @@ use super::diagnosing::diagnostics;
 use super::error::{DatasetError, SourcePosition};
 
 use super::forces::{self, ForceSource};
-use super::judge::Judge;
 use super::manifest::{Manifest, Role, RunEntry};
+use super::quality::Judge;
 use super::quality::{self, RunQuality};
 use super::quantity::Quantity;
 use super::resolved::{Context, GradientSource, Resolved};

@@ -6,13 +6,12 @@
 //!
 //! # Layout
 //!
-//! - [`table`]: the tables of a recording, after `dynocar_mcap::columns`
 //! - [`arrow_schema`]: what Arrow's schema, beside Parquet's, says of a table
 //! - [`error`]: why a file cannot be read, and how a damaged file affects its library
 //! - [`column_type`], [`file`](mod@file): types of the columns of a file, and their cells
 //! - [`columns`]: a Parquet file of anybody as columns of numbers, and whose its rows are
 //! - [`reading`]: Parquet to what a recording holds, and to MCAP
-//! - [`table_file`], [`writing`]: MCAP to Parquet
+//! - [`table_file`], [`writing`]: the tables of a recording, after `dynocar_mcap::columns`; MCAP to Parquet
 
 pub mod arrow_schema;
 pub mod column_type;
@@ -20,6 +19,5 @@ pub mod columns;
 pub mod error;
 pub mod file;
 pub mod reading;
-pub mod table;
 pub mod table_file;
 pub mod writing;

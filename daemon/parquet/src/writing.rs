@@ -8,8 +8,7 @@ use dynocar::operator::pipeline_name;
 use dynocar::storage::{Disk, Storage, folder_of, settle};
 use dynocar_mcap::columns::{ColumnSource, RecordingColumn, RecordingRow};
 use dynocar_mcap::copying::read_all;
-use dynocar_mcap::error::ReadProblem;
-use dynocar_mcap::error::{CopyError, ReadError, WriteError};
+use dynocar_mcap::error::{CopyError, ReadError, ReadProblem, WriteError};
 use dynocar_mcap::reading::{FileEnding, Raw, RecordingItem, Visitor};
 use dynocar_mcap::recording::Metadata;
 use dynocar_mcap::schema::{EVENT, SAMPLE, SNAPSHOT};
@@ -17,10 +16,10 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 
 use crate::reading::Attached;
-use crate::table::{
-    ATTACHMENTS, KIND, LAYOUT, METADATA, TABLES, TableKind, attachment_columns, metadata_columns,
+use crate::table_file::{
+    ATTACHMENTS, Cells, KIND, LAYOUT, METADATA, TABLES, TableFile, TableKind, attachment_columns,
+    metadata_columns,
 };
-use crate::table_file::{Cells, TableFile};
 
 /// Rows of a part of a file, which is encoded at once.
 const PART_ROWS: usize = 1 << 16;

@@ -1,17 +1,14 @@
 //! Observation of trains, in one vocabulary for all observers: arrivals and departures, and changes in the answers
 //! of the pipelines. An observer is one reader of each train's snapshots, as every client is.
 //!
-//! - `event`: the kinds of events
-//! - `train`: one train
+//! - `train`: one train, and the kinds of events
 
-mod event;
 mod train;
 
 use dynocar_shared::TrainId;
 use dynocar_transport::{ChannelError, Host, Peer, Role};
 
-pub use event::{EventKind, TrainChange};
-pub use train::ObservedTrain;
+pub use train::{EventKind, ObservedTrain, TrainChange};
 
 /// Selection of trains and pipelines to observe.
 #[derive(Clone, Debug)]

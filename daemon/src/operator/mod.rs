@@ -1,14 +1,13 @@
 //! Texts for an operator, wherever they stand: in the log, in `dynocar health`, on the screen of `dynocar watch`
-//! and in a recording's events.
-//!
-//! - [`suspicion`]: the effect that the model may lack, with its force and what else it could be
+//! and in a recording's events; the effect that a model may lack among them.
 //!
 //! The remedy is in [`dynocar_core::remedy`] and [`dynocar_shared::vocabulary::KINDS`].
 
-pub mod suspicion;
+use std::fmt;
 
 use dynocar_shared::snapshot::REJECTION_REASONS;
-use dynocar_shared::{PipelineKind, RejectionReason};
+use dynocar_shared::vocabulary::EffectKind;
+use dynocar_shared::{HALF_95, ParameterSnapshot, PipelineKind, RejectionReason};
 
 /// Returns the name of a pipeline that no configuration names: its number there and its kind.
 pub fn pipeline_name(index: u32, kind: Option<PipelineKind>) -> String {
@@ -40,6 +39,66 @@ pub fn refused_words(refused: &[(RejectionReason, u32)]) -> String {
     words.join(", ")
 }
 
+/// Suspicion of a pipeline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Suspicion {
+    /// The effect; `None` for one that this release does not know.
+    pub effect: Option<EffectKind>,
+    /// Other effects that the data hardly distinguish from it: a bit for each.
+    pub alternatives: u32,
+    /// How long it has stood, in s of the controller's clock.
+    pub age_s: u32,
+    /// Twice the log-likelihood ratio.
+    pub evidence: f64,
+    /// The force in N, retarding positive, that the model does not explain.
+    pub force_n: f64,
+    /// Its standard deviation in N.
+    pub force_std_n: f64,
+}
+
+impl Suspicion {
+    /// Returns the suspicion in a snapshot; `None` if there is none.
+    pub fn of(it: &ParameterSnapshot) -> Option<Self> {
+        let effect = EffectKind::from_number(it.suspected_effect);
+        (effect != Some(EffectKind::None)).then_some(Suspicion {
+            effect,
+            alternatives: it.suspected_alternatives,
+            age_s: it.suspicion_age_s,
+            evidence: it.suspicion_evidence,
+            force_n: it.unexplained_force_n,
+            force_std_n: it.unexplained_force_std_n,
+        })
+    }
+
+    /// The effect's name.
+    pub fn name(&self) -> &'static str {
+        self.effect.map_or("an effect that is unknown here: a newer daemon", EffectKind::name)
+    }
+
+    /// The unexplained force with its 95 % interval.
+    pub fn force(&self) -> String {
+        force_words(self.force_n, self.force_std_n)
+    }
+}
+
+/// A force in N with its 95 % interval, in kN.
+pub fn force_words(force_n: f64, force_std_n: f64) -> String {
+    format!("{:+.2} ± {:.2} kN", 1e-3 * force_n, 1e-3 * HALF_95 * force_std_n)
+}
+
+impl fmt::Display for Suspicion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, since) = (self.name(), duration(f64::from(self.age_s)));
+        write!(f, "{name} for {since}, evidence {:.0}", self.evidence)?;
+        let others = EffectKind::ALL.iter().filter(|kind| self.alternatives & kind.bit() != 0);
+        let others: Vec<&str> = others.map(|kind| kind.name()).collect();
+        if others.is_empty() {
+            return Ok(());
+        }
+        write!(f, ", could also be: {}", others.join(", "))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,5 +116,26 @@ mod tests {
         counts[RejectionReason::SpeedJump as usize] = 104;
         assert_eq!(refused_words(&refusals(&counts)), "speed_jump 104, outlier 2");
         assert_eq!(refused_words(&[]), "");
+    }
+}
+
+#[cfg(test)]
+mod suspicion_tests {
+    use super::*;
+
+    #[test]
+    fn a_suspicion_is_named_with_its_force_and_its_competing_hypotheses() {
+        let mut snapshot = ParameterSnapshot::empty();
+        assert_eq!(Suspicion::of(&snapshot), None);
+        snapshot.suspected_effect = EffectKind::DraggingBrake as u32;
+        snapshot.suspected_alternatives = EffectKind::Wind.bit();
+        (snapshot.suspicion_age_s, snapshot.suspicion_evidence) = (132, 45.6);
+        (snapshot.unexplained_force_n, snapshot.unexplained_force_std_n) = (12_340.0, 500.0);
+        let suspicion = Suspicion::of(&snapshot).unwrap();
+        let words = "dragging_brake for 2 min, evidence 46, could also be: wind";
+        assert_eq!(suspicion.to_string(), words);
+        assert_eq!(suspicion.force(), "+12.34 ± 0.98 kN");
+        snapshot.suspected_effect = 99;
+        assert!(Suspicion::of(&snapshot).unwrap().to_string().contains("newer daemon"));
     }
 }

@@ -16,8 +16,7 @@ use tracing::{info, warn};
 use super::status_log::{RefusalLog, StatusAndReason, StatusLog};
 use super::tally::{Tally, TallyReading};
 use crate::observing::ObservedTrain;
-use crate::operator::suspicion::Suspicion;
-use crate::operator::{refusals, refused_words};
+use crate::operator::{Suspicion, refusals, refused_words};
 use crate::supervision::health::Verdict;
 
 /// How often the main thread looks around.

@@ -13,16 +13,14 @@
 //! - [`in_force`]: which model a train has when the daemon starts
 //! - [`rule`]: which models are on trial, when a rule adopts or takes back, and which bounds no model may leave
 //! - [`train`]: one train's trials, and its change of models
-//! - [`record`]: what the trials measured, as a file that outlives the daemon
-//! - [`figures`]: the same for those who watch the daemon
+//! - [`record`]: measurements of the trials: a file that outlives the daemon, and figures for the metrics
 //! - [`thread`]: the thread
 
-pub mod figures;
 pub mod in_force;
 pub mod record;
 pub mod rule;
 pub mod thread;
 pub mod train;
 
-pub use figures::{Board, Pinned, TrialFigures};
+pub use record::{Board, Pinned, TrialFigures};
 pub use train::ShadowTrain;

@@ -10,7 +10,7 @@ use dynocar_transport::channel::{Receiver, Transport};
 use dynocar_transport::{ChannelError, Host};
 use tracing::{info, warn};
 
-use super::figures::Board;
+use super::record::Board;
 use super::train::ShadowTrain;
 use crate::config::ModelsConfig;
 use crate::runtime::system::{pin_to_core, stand_back};

@@ -12,8 +12,8 @@ use dynocar_core::trial::{ModelTrials, Rival};
 use dynocar_shared::TrainSample;
 use tracing::{info, warn};
 
-use super::figures::TrialFigures;
 use super::in_force::{self, with_model};
+use super::record::TrialFigures;
 use super::record::{self, RivalEstimate, TriedModel, ratio_in_words};
 use super::rule::{Adopt, ModelStanding, Rule, standing};
 use crate::config::{ModelsConfig, PipelineConfig, TrainConfig};

@@ -10,8 +10,7 @@ use dynocar_shared::{PipelineKind, Quantity, Reason, RejectionReason, Status, Tr
 use dynocar_transport::{ChannelError, Host, Peer, Role, monotonic_now_ns};
 
 use crate::observing::ObservedTrain;
-use crate::operator::refusals;
-use crate::operator::suspicion::Suspicion;
+use crate::operator::{Suspicion, refusals};
 
 /// How long a first snapshot is waited for; a daemon vouches for its snapshots each 0.1 s.
 const PATIENCE: Duration = Duration::from_millis(1_500);

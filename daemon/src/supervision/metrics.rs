@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicU64;
 
 use super::health::Verdict;
 use crate::observing::ObservedTrain;
-use crate::operator::suspicion::Suspicion;
+use crate::operator::Suspicion;
 use crate::shadow::{Pinned, TrialFigures};
 
 /// The content type of [`text`].

@@ -1,7 +1,6 @@
 //! Numbers with intervals and units, and what is said of a train, for screen and lines alike.
 
-use dynocar::operator::suspicion::{Suspicion, force_words};
-use dynocar::operator::{duration, refusals};
+use dynocar::operator::{Suspicion, duration, force_words, refusals};
 use dynocar_shared::{HALF_95, Parameter, Quantity, UseState};
 
 use crate::state::{Daemon, PipelineState, TrainState};

@@ -10,7 +10,7 @@ use dynocar_estimators::xia::trajectory::noise::{LearnedNoise, NoiseModel};
 use dynocar_estimators::xia::trajectory::online::{OnlineFilter, OnlineSettings, StepDoubt};
 use dynocar_estimators::xia::trajectory::step::StepRule;
 use dynocar_estimators::xia::wolfe_newton::{NewtonSettings, RestartSource, wolfe_newton};
-use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::train::Davis;
 use nalgebra::{Matrix3, Vector3};
 

@@ -7,7 +7,7 @@
 
 use dynocar_core::filter::triangular::{TriangularAccumulator, TriangularSystem};
 use dynocar_estimators::xia::trajectory::step::TrajectoryStep;
-use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::track::{Track, TrackCurve};
 use dynocar_model::train::Davis;
 use nalgebra::{DMatrix, Matrix3};

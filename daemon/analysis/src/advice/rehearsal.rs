@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use dynocar_core::pipeline::train_kalman::{TrainKalman, TrainKalmanSettings};
 use dynocar_core::pipeline::{Estimator, KeptEstimate, Pipeline};
-use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::mps2_per_n_per_kn;
 use dynocar_model::train::{Davis, TrainModel};
 use dynocar_shared::{SampleField, TrainId, TrainSample};
 use nalgebra::{Matrix3, SVector};

@@ -13,7 +13,7 @@
 //!   usually wrong
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`many`]: some of many runs, and what all of them say
-//! - [`course`], [`over_time`], [`held_out`]: what is not the same in all runs, and what those held out say
+//! - [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the runs held out
 //! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
 //!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
@@ -24,7 +24,6 @@ pub mod answer;
 mod bootstrap;
 mod caveats;
 pub mod competing;
-pub mod course;
 pub mod described;
 pub mod drive_efficiency;
 pub mod effects;
@@ -54,8 +53,7 @@ use dynocar_core::plausibility::Severity;
 use crate::dataset::dataset_diagnostic::diagnostics;
 use crate::dataset::{Dataset, Role};
 use crate::parallel;
-use answer::ExplainAnswer;
-use answer::WithStd;
+use answer::{ExplainAnswer, WithStd};
 use drive_efficiency::EstimatedDrive;
 use evidence::{Density, FitProblem, RunData, RunDataError};
 use held_out::HeldOutRun;

@@ -12,8 +12,8 @@
 //!   is driven repeatedly
 //! - [`chainage`]: a chainage for every row; [`stops`]: what it shows
 //! - [`observation`], [`common`], [`profile`], [`learn`]: gradient, resistance, mass,
-//!   time offset and friction brake from the balance of forces; [`layout`]: its unknown heights;
-//!   `normal`, [`banded`]: its equations and their solver
+//!   time offset and friction brake from the balance of forces; [`normal`], [`banded`]: its unknown heights,
+//!   their equations and the solver
 //! - [`survey()`]: all of it in turn
 
 pub mod alignment;
@@ -24,9 +24,8 @@ pub mod chainage;
 pub mod common;
 pub mod driven_line;
 pub mod geodesy;
-pub mod layout;
 pub mod learn;
-mod normal;
+pub mod normal;
 pub mod observation;
 pub mod profile;
 pub mod recording;

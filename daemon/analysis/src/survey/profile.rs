@@ -7,8 +7,7 @@
 
 use super::banded::NotPositive;
 use super::common::{Common, GRAVITY_MPS2, Prior};
-use super::layout::{HEIGHT_STEP_M, HeightLayout, LineCourse};
-use super::normal::Normal;
+use super::normal::{HEIGHT_STEP_M, HeightLayout, LineCourse, Normal};
 use super::observation::BlockDifference;
 use crate::parallel;
 use crate::statistics::middle;

@@ -3,7 +3,8 @@
 
 use dynocar_core::pipeline::Outcome;
 use dynocar_core::pipeline::motion::BRIDGED_MAX_S;
-use dynocar_model::force::{ResolvedSample, balance};
+use dynocar_model::force;
+use dynocar_model::force::ResolvedSample;
 use dynocar_model::terms::rotating;
 use dynocar_model::train::TrainModel;
 use dynocar_shared::RejectionReason;
@@ -129,7 +130,7 @@ impl Inertia {
     /// m/s² of one N/kN.
     #[inline]
     pub fn mps2_per_n_per_kn(&self) -> f64 {
-        balance::mps2_per_n_per_kn(self.rotating_mass_factor)
+        force::mps2_per_n_per_kn(self.rotating_mass_factor)
     }
 
     /// Mass in kg that a force accelerates when the train has a mass in kg.

@@ -68,7 +68,7 @@ pub fn deviation(steps: &[TrajectoryStep], speeds_mps: &[f64], davis: &Davis) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_model::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::mps2_per_n_per_kn;
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
     const SCALES: [f64; 3] = [1.0, 0.02, 0.001];

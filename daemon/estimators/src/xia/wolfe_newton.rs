@@ -211,7 +211,7 @@ fn newton_step(
 mod tests {
     use super::*;
     use crate::xia::trajectory::step::StepRule;
-    use dynocar_model::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::mps2_per_n_per_kn;
 
     const TRUTH: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 

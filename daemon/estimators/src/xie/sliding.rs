@@ -6,7 +6,7 @@ use dynocar_core::pipeline::braking::engine::{
     BrakingEstimate, BrakingObservation, Engine, EngineStep,
 };
 use dynocar_core::pipeline::braking::intake::BrakingCoefficient;
-use dynocar_core::pipeline::braking::law::BrakingLaw;
+use dynocar_core::pipeline::braking::law_bank::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{MotionNoise, SCALE, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::{BrakeFactor, BrakingSettings};
 use dynocar_core::pipeline::braking::tracker::{PriorScale, TrackerModel, measure};

@@ -3,7 +3,7 @@
 use dynocar_core::filter::Gaussian;
 use dynocar_core::filter::random::Random;
 use dynocar_core::pipeline::braking::engine::{BrakingObservation, Engine, EngineStep};
-use dynocar_core::pipeline::braking::law::BrakingLaw;
+use dynocar_core::pipeline::braking::law_bank::BrakingLaw;
 use dynocar_core::pipeline::braking::motion::{self, MotionNoise, StepInputs, Walk};
 use dynocar_core::pipeline::braking::settings::BrakingSettings;
 use dynocar_core::pipeline::braking::tracker::{PriorScale, Tracker, TrackerModel};

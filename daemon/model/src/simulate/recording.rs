@@ -2,8 +2,7 @@
 
 use dynocar_shared::resistance::STANDARD_GRAVITY_MPS2;
 
-use crate::force::ResolvedSample;
-use crate::force::balance::ForceBalance;
+use crate::force::{ForceBalance, ResolvedSample};
 use crate::train::Davis;
 
 /// Gaps in s up to which a missing force is bridged by a straight line.

@@ -8,8 +8,7 @@ use dynocar_analysis::survey::{NotUsed, Survey, Trip, Vehicle};
 use serde::Serialize;
 
 use super::read::rows_in_order;
-use super::trip_rows::late_s;
-use super::write::{gradient_entries, trip_file};
+use super::write::{gradient_entries, late_s, trip_file};
 
 /// All that a survey found.
 #[derive(Debug, Serialize)]

@@ -1,7 +1,7 @@
 //! Raw recordings to a dataset on a surveyed line: reading, writing and reporting.
 //!
 //! - [`read`]: a dataset's runs as recordings; a line that was surveyed before
-//! - [`write`](mod@write), [`trip_rows`]: the dataset folder with its trips
+//! - [`write`](mod@write): the dataset folder with its trips
 //! - `folder`: all of it in turn; [`read`]: what the files are made of, why nothing comes of it
 //! - [`answer`]: the result for machines
 //! - [`page`]: the result as a page
@@ -11,7 +11,6 @@
 pub mod answer;
 pub mod page;
 pub mod read;
-pub mod trip_rows;
 pub mod write;
 
 use std::path::{Path, PathBuf};

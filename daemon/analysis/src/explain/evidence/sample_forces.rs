@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use dynocar_model::force::ResolvedSample;
-use dynocar_model::force::balance::{ForceBalance, mps2_per_n_per_kn};
+use dynocar_model::force::{ForceBalance, ResolvedSample, mps2_per_n_per_kn};
 use dynocar_model::terms::Resistance;
 use dynocar_model::train::Davis;
 

@@ -12,7 +12,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::law::BrakingLaw;
+use super::law_bank::BrakingLaw;
 
 /// Place in the state of the distance in m since the brakes came on.
 pub const DISTANCE: usize = 0;

@@ -6,8 +6,7 @@ use serde::Deserialize;
 
 pub use super::engine::BrakingSettings;
 use super::intake::{BrakingCoefficient, DeclaredGear};
-use super::law::{BrakingLaw, SpeedTable};
-use super::law_bank::LawBank;
+use super::law_bank::{BrakingLaw, LawBank, SpeedTable};
 use super::motion::Walk;
 use super::tracker::{PriorScale, Tracker, TrackerModel};
 use crate::pipeline::Estimator;

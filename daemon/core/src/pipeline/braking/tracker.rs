@@ -7,7 +7,7 @@ use dynocar_shared::Uncertain;
 use nalgebra::{SMatrix, SVector};
 
 use super::engine::{BrakingEstimate, BrakingObservation, BrakingSettings, Engine, EngineStep};
-use super::law::BrakingLaw;
+use super::law_bank::BrakingLaw;
 use super::motion::{self, DISTANCE, MotionNoise, SCALE, SPEED, STATES, StepInputs, Walk};
 use crate::filter::fixed_lag::FixedLagSmoother;
 use crate::filter::{Gaussian, NotPositiveDefinite};

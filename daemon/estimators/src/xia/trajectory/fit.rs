@@ -209,7 +209,7 @@ mod tests {
     use super::super::test_runs::{FAST, normal, random, speeds, steps};
     use super::*;
     use dynocar_core::filter::levenberg_marquardt::ParameterBox;
-    use dynocar_model::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::mps2_per_n_per_kn;
 
     fn fit(steps: &[TrajectoryStep], speeds_mps: &[f64], settings: &FitSettings) -> TrajectoryFit {
         let segments = [MotionSegment { steps, speeds_mps }];

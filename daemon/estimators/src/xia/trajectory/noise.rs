@@ -237,7 +237,7 @@ mod tests {
     use super::super::step::{StepRule, TrajectoryStep};
     use super::super::test_runs::{FAST, normal, random};
     use super::*;
-    use dynocar_model::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::mps2_per_n_per_kn;
     use nalgebra::Vector3;
 
     const OUTLIERS: OutlierModel = OutlierModel { share: 0.01, density: 0.5 };

@@ -220,7 +220,7 @@ impl OnlineFilter {
 mod tests {
     use super::super::test_runs::{FAST, normal, random};
     use super::*;
-    use dynocar_model::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::mps2_per_n_per_kn;
 
     const NOISE_MPS: f64 = 0.05;
     const NONE: StepDoubt = StepDoubt { impulse_variance: 0.0, rounding_variance: 0.0 };

@@ -31,7 +31,7 @@ pub struct TrajectoryStep {
     pub size: f64,
     /// Acceleration u in m/s² by every known force: traction, brake, gradient, curve, tunnel.
     pub drive_mps2: f64,
-    /// κ in m/s² per N/kN, see [`balance`](dynocar_model::force::balance::mps2_per_n_per_kn).
+    /// κ in m/s² per N/kN, see [`balance`](dynocar_model::force::mps2_per_n_per_kn).
     pub resistance_gain: f64,
 }
 
@@ -140,7 +140,7 @@ fn slope(davis: &Davis, speed_mps: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dynocar_model::force::balance::mps2_per_n_per_kn;
+    use dynocar_model::force::mps2_per_n_per_kn;
 
     const DAVIS: Davis = Davis { a: 0.79, b: 0.0229, c: 0.001493 };
 

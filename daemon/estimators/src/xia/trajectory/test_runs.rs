@@ -1,7 +1,6 @@
 //! Simulated runs for the tests of this module.
 
-use dynocar_model::force::ResolvedSample;
-use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::{ResolvedSample, mps2_per_n_per_kn};
 use dynocar_model::train::Davis;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

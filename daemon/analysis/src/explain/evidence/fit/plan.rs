@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use dynocar_model::force::balance::mps2_per_n_per_kn;
+use dynocar_model::force::mps2_per_n_per_kn;
 
 use super::super::integral::Response;
 use super::super::model::UpdatedModel;
