@@ -80,6 +80,49 @@ fn largest_tuple(parameters: &str) -> usize {
     elements.max().unwrap_or(0)
 }
 
+/// Words by one of which a paragraph below the head of a file is a sentence, and not a second head.
+const VERBS: &str = "is are has have was does do can cannot may must says say holds knows take takes gives keeps hold judge runs come publishes goes lies lie \
+                     belongs measures counts shows comes makes follows carries touches panics stays needs differs";
+/// Words that begin a clause without a sentence.
+const CLAUSES: [&str; 7] = ["How ", "When ", "Where ", "Whether ", "Which ", "Who ", "Why "];
+
+/// Returns the heads of a file beyond its first: comments on the file after code, and later paragraphs that are one
+/// clause or one noun with its attributes.
+fn further_heads(text: &str) -> Vec<String> {
+    let is_of_file = |line: &&str| line.starts_with("//!");
+    let is_code = |line: &&str| !line.is_empty() && !is_of_file(line) && !line.starts_with("#![");
+    let after_code = text.lines().skip_while(|line| !is_code(line)).filter(is_of_file);
+    let head: Vec<&str> = text.lines().take_while(is_of_file).collect();
+    let paragraphs = paragraphs(&head.join("\n")).into_iter().skip(1).map(|it| it.1);
+    let is_head = |it: &String| {
+        let is_one_sentence = it.ends_with('.') && it.matches(". ").count() == 0;
+        let has_verb = it.split([' ', ',', ';']).any(|it| VERBS.split(' ').any(|verb| verb == it));
+        let is_clause = it.len() < 80 && CLAUSES.iter().any(|clause| it.starts_with(clause));
+        is_one_sentence && !it.starts_with(['#', '-']) && (is_clause || !has_verb)
+    };
+    after_code.map(str::to_owned).chain(paragraphs.filter(is_head)).collect()
+}
+
+#[test]
+fn a_file_has_one_head() {
+    let found = sources().flat_map(|(path, text)| {
+        let heads = further_heads(&text).into_iter();
+        heads.map(|head| format!("{}: {head}", path.display())).collect::<Vec<_>>()
+    });
+    let found: Vec<String> = found.collect();
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn a_second_head_is_found() {
+    let beside = |second: &str| further_heads(&format!("//! One.\n//!\n//! {second}\n\nuse a;\n"));
+    assert_eq!(beside("Channels of a train."), ["Channels of a train."]);
+    assert_eq!(beside("Who takes what is read.").len(), 1);
+    assert_eq!(beside("A page has no head. It is drawn."), [""; 0]);
+    assert_eq!(beside("- [`a`]: channels of a train."), [""; 0]);
+    assert_eq!(further_heads("//! One.\n\nuse a;\n//! Two has a verb.\n").len(), 1);
+}
+
 fn sources() -> impl Iterator<Item = (PathBuf, String)> {
     let folders = FOLDERS.into_iter().chain(TEST_FOLDERS);
     folders.flat_map(rust_files).filter(|path| !path.ends_with("e2e/words.rs")).map(|path| {

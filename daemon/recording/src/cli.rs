@@ -1,6 +1,5 @@
-//! The command line: `dynocar record`, `flight-recorder`, `keep` and `recover` become this program.
-//!
-//! Failures of the command line: wrong input, or work that could not be done.
+//! The command line: `dynocar record`, `flight-recorder`, `keep` and `recover` become this program. It fails by wrong input,
+//! or by work that could not be done.
 
 mod record;
 

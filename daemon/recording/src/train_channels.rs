@@ -1,11 +1,7 @@
 //! Reader of the trains' channels for a recorder and a live view: one more reader, for which nobody waits.
 //!
-//! Samples are taken at least every few milliseconds, for a channel holds the newest 512 of them; what
-//! is passed over is counted and reported.
-//!
-//! Who takes what is read.
-//!
-//! The channels of one train.
+//! Samples are taken at least every few milliseconds, since a channel holds the newest 512 of them; those passed over are
+//! counted and reported. A [`Sink`] receives the rest.
 
 use std::time::{Duration, Instant};
 

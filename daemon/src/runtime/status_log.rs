@@ -1,13 +1,11 @@
-//! Which changes of a pipeline's status, or of what it suspects, the log reports.
+//! Changes of a pipeline's status or suspicion, and refused samples of a train, that the log reports.
 //!
 //! A status that was not reported lately is reported at once. One that comes back is reported when it has
-//! stayed for a while, and the longer the oftener it came back: an estimate at the edge of a
+//! stayed for a while, and the longer the more often it came back: an estimate at the edge of a
 //! threshold flips between two statuses for as long as it is there.
 //!
-//! Which refused samples of a train the log names, and when.
-//!
-//! The first are named at once, those that follow together and not too often. What is refused as it
-//! should be, wheel slide and the estimators' own outliers, is only counted.
+//! The first refused samples are reported at once, those that follow together and not too often. Refusals that are normal,
+//! wheel slide and the estimators' own outliers, are only counted.
 
 use std::time::{Duration, Instant};
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use dynocar_shared::services::TRANSPORT_VERSION;
 use dynocar_shared::{ParameterSnapshot, SCHEMA_MAJOR, TrainSample};
 
-use crate::host::{SHARED_MEMORY, identity_of};
+use crate::identity::{SHARED_MEMORY, identity_of};
 
 /// A side of the channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

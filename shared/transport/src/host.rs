@@ -1,15 +1,13 @@
-//! Where the run-time files of this host lie, the identity of a directory whatever its name, and the host's monotonic
-//! clock, common to all its processes.
+//! Where the run-time files of this host lie, and its monotonic clock, common to all its processes.
 //!
 //! A root directory holds who serves and who drives each train, in `trains/`. The transport's files lie
 //! beside its segments in `/dev/shm`, under names that follow from the root's device, inode and
 //! birth: two spellings of one directory meet, two directories never do, also where one is removed and
 //! another made, and the sockets' names are short however long the root's is.
 
-use std::fs::{DirBuilder, File, Metadata, OpenOptions, Permissions};
+use std::fs::{DirBuilder, File, OpenOptions, Permissions};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
 
 use dynocar_shared::services::{ROOT_VARIABLE, SEGMENT_PREFIX};
 use iceoryx2::prelude::{Config, FileName, Path as TransportPath, SemanticString};
@@ -18,6 +16,7 @@ use rustix::process::{Resource, getrlimit};
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::error::ChannelError;
+use crate::identity::{DirectoryIdentity, SHARED_MEMORY};
 
 /// Longest root directory in bytes: the system's limit of a path, less the names of files in it.
 const ROOT_BYTES_MAX: usize = 4000;
@@ -229,50 +228,6 @@ fn make_private_directory(path: &Path) -> Result<(), ChannelError> {
 pub fn monotonic_now_ns() -> i64 {
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec * 1_000_000_000 + now.tv_nsec
-}
-
-/// Where the system keeps shared memory by name.
-pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
-
-/// A directory, whatever it is called: its device and its inode.
-pub(crate) type Identity = [u64; 2];
-
-/// The identity of the directory at a path.
-pub(crate) fn identity_of(path: &Path) -> std::io::Result<Identity> {
-    std::fs::metadata(path).map(|it| identity(&it))
-}
-
-/// The identity of the file or directory of these attributes.
-pub(crate) fn identity(attributes: &Metadata) -> Identity {
-    [attributes.dev(), attributes.ino()]
-}
-
-/// A directory that no later one is taken for: a removed directory's inode is given to the next one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct DirectoryIdentity {
-    place: Identity,
-    /// When it was made, in nanoseconds since 1970; 0 where the file system does not know.
-    born_ns: u64,
-}
-
-impl DirectoryIdentity {
-    /// The identity of the directory at a path.
-    pub(crate) fn of(path: &Path) -> std::io::Result<Self> {
-        let attributes = std::fs::metadata(path)?;
-        let born = attributes.created().ok().and_then(|it| it.duration_since(UNIX_EPOCH).ok());
-        let born_ns = born.map_or(0, |it| it.as_nanos() as u64);
-        Ok(DirectoryIdentity { place: identity(&attributes), born_ns })
-    }
-
-    /// A number for its names.
-    pub(crate) fn hash(&self) -> u32 {
-        let [device, inode] = self.place;
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        for byte in [device, inode, self.born_ns].into_iter().flat_map(u64::to_le_bytes) {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-        hash as u32 ^ (hash >> 32) as u32
-    }
 }
 
 #[cfg(test)]

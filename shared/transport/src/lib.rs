@@ -10,6 +10,7 @@ mod announcement;
 pub mod channel;
 pub mod error;
 pub mod host;
+mod identity;
 pub mod peer;
 
 pub use announcement::{Announcement, Role};

@@ -15,7 +15,8 @@ use dynocar_shared::{ParameterSnapshot, TrainId};
 use crate::announcement::{Announcement, Role};
 use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
-use crate::host::{Host, identity, identity_of, open_private, unusable};
+use crate::host::{Host, open_private, unusable};
+use crate::identity::{identity, identity_of};
 
 /// State of the other side, as far as it is known.
 #[derive(Clone, Debug, PartialEq, Eq)]

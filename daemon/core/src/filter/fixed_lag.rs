@@ -1,4 +1,4 @@
-//! Smoothed estimate of an earlier state by later measurements.
+//! Smoothed estimate of an earlier state by later measurements, with a fixed lag or over a fixed interval.
 //!
 //! For each remembered moment the smoother keeps one component of the state at that moment: its
 //! mean, its variance, and its covariance with the present state. A measurement of the present
@@ -7,10 +7,8 @@
 //! no backward pass is made; the cost of a step is one small matrix-vector product for each
 //! remembered moment.
 //!
-//! Fixed-interval smoothing by the adjoint of the filter (Bryson and Frazier 1963; for scalar
-//! measurements Bierman 1973).
-//!
-//! The backward pass carries what the later measurements say as a vector: it multiplies and adds,
+//! Over a fixed interval the adjoint of the filter smooths (Bryson and Frazier 1963; for scalar
+//! measurements Bierman 1973). The backward pass carries what the later measurements say as a vector: it multiplies and adds,
 //! inverts no covariance, and so cannot fail where a prediction is nearly certain. Its means are
 //! those of Rauch, Tung and Striebel.
 

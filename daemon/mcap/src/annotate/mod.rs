@@ -1,7 +1,5 @@
 //! An explanation beside the data that it explains: a copy of a recording with the verdict, the effects
-//! where they act, the residual and the predicted speeds, on the recording's own timeline.
-//!
-//! When the moments of a dataset's runs were, as a recording logs them.
+//! where they act, the residual and the predicted speeds, at the moments at which the recording logs a dataset's runs.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,9 +1,8 @@
-//! Care of a recorder's files besides writing: it syncs them to the disk, keeps them and removes them.
+//! Care of a recorder's files besides writing: it syncs them to the disk, keeps them, and removes those that the ring no
+//! longer holds.
 //!
-//! A disk may take seconds for each of these. They are done in the order in which they were asked for, in a
+//! A disk may take seconds for each of these. They are done in the order in which they were requested, in a
 //! thread of their own while a recorder runs, so that nobody who records waits for them.
-//!
-//! Which files of a recording that rotates go.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,7 +1,5 @@
-//! The history of all trains' models as one page: what grew from what, what was decided, what happened in
-//! certain runs, what is open.
-//!
-//! The error of a train's models by day, as the daemon's trials measured it.
+//! The history of all trains' models as one page: the origin of each model, decisions, maintenance events, open questions,
+//! and the error of a train's models by day, as the daemon's trials measured it.
 
 use std::collections::BTreeSet;
 use std::time::SystemTime;

@@ -1,6 +1,5 @@
-//! Which runs are explained together, within bounds of memory and time.
-//!
-//! A dataset as it is under the model in force: its runs, with that model's train and line.
+//! Runs that are explained together, within bounds of memory and time, as a dataset with the train and line of the model in
+//! force.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

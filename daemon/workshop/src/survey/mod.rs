@@ -1,12 +1,9 @@
-//! Raw recordings to a dataset on a surveyed line: reading, writing and reporting.
+//! Raw recordings, surveyed or mapped, to a dataset of trips on a surveyed line: reading, writing and reporting.
 //!
 //! - [`read`]: a dataset's runs as recordings; a line that was surveyed before
 //! - [`write`](mod@write): the dataset folder with its trips
-//! - `folder`: all of it in turn; [`read`]: what the files are made of, why nothing comes of it
 //! - [`answer`]: the result for machines
 //! - [`page`]: the result as a page
-//!
-//! A folder of raw recordings, surveyed or mapped, written as a dataset of trips.
 
 pub mod answer;
 pub mod page;

@@ -1,10 +1,8 @@
-//! Every recorded snapshot computed again, from the recorded samples by the recorded configuration,
-//! with the code of the daemon's own pipelines.
+//! Every recorded snapshot computed again, from the recorded samples by the recorded configuration or another one, with
+//! the code of the daemon's own pipelines.
 //!
 //! A pipeline is a function of its samples from the daemon's start on. A snapshot's `sequence` counts
 //! them, so that it says whether the recording holds them all.
-//!
-//! Estimates of another configuration from the same samples.
 
 mod configurations;
 mod pipelines;

@@ -21,7 +21,8 @@ use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use super::users::{COUNT_SUFFIX as SUFFIX, Users, full};
 use super::wire::Payload;
 use crate::error::ChannelError;
-use crate::host::{Host, SHARED_MEMORY};
+use crate::host::Host;
+use crate::identity::SHARED_MEMORY;
 
 /// Pipeline threads that a page has room for; as many as can receive a train's samples.
 const THREADS_MAX: usize = TrainSample::RECEIVERS_MAX;

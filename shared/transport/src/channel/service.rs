@@ -1,6 +1,4 @@
-//! Entering the transport, and the services of its channels.
-//!
-//! The transport's ports, behind trait objects.
+//! Entering the transport, the services of its channels, and its ports behind trait objects.
 //!
 //! The transport's generic code, some thousand functions, is so compiled in this crate once, and not in every crate
 //! that opens or drops a port.

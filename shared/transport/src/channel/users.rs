@@ -19,7 +19,8 @@ use rustix::io::Errno;
 
 use crate::channel::process::LockedFile;
 use crate::error::ChannelError;
-use crate::host::{Host, SHARED_MEMORY, open_private, unusable};
+use crate::host::{Host, open_private, unusable};
+use crate::identity::SHARED_MEMORY;
 
 /// How the segment's name ends.
 const SUFFIX: &str = ".global_mgmt";

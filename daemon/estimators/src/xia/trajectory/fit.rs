@@ -4,9 +4,7 @@
 //! squares, the search Gauss-Newton with damping within bounds: no restarts are needed. The
 //! noise of the measured speed is estimated with the coefficients unless it is given.
 //!
-//! Integral least squares: where a trajectory fit starts.
-//!
-//! The measured speeds in the regressors make the integrated equation of motion linear:
+//! In the integral least squares the measured speeds in the regressors make the integrated equation of motion linear:
 //!
 //! ```text
 //! distance  ½ ṽ_i² - Σ Δs u = ½ v_0² - Σ κ Δs (a + b ṽ + c ṽ²)

@@ -4,9 +4,8 @@
 //! driven speeds is known well. The status therefore rests on w0 over the driven speeds; which
 //! coefficients the data excited is stated with it.
 //!
-//! How much wider the intervals must be when disturbances last.
-//!
-//! Gradient errors, wind and force errors last for tens of seconds; the learned noise is white.
+//! Disturbances that last widen the intervals: gradient errors, wind and force errors last for tens of seconds, and
+//! the learned noise is white.
 //! Sums of normalised innovations over blocks show what that leaves out: their mean square over
 //! the block's length is 1 for white innovations and the long-run variance otherwise. The
 //! estimate is nearly linear in the innovations with weights that change slowly, so that its
