@@ -35,22 +35,23 @@ pub enum RailCondition {
 }
 
 impl RailCondition {
-    const fn coefficients(self) -> (f64, f64, f64) {
+    /// Offset, numerator and pole in km/h.
+    const fn coefficients(self) -> [f64; 3] {
         match self {
-            RailCondition::Dry => (0.06, 46.6, 260.0),
-            RailCondition::Wet => (0.04, 13.7, 120.0),
+            RailCondition::Dry => [0.06, 46.6, 260.0],
+            RailCondition::Wet => [0.04, 13.7, 120.0],
         }
     }
 
     /// Adhesion coefficient at a speed in m/s.
     pub fn adhesion(self, speed_mps: f64) -> f64 {
-        let (offset, numerator, pole_kmh) = self.coefficients();
+        let [offset, numerator, pole_kmh] = self.coefficients();
         offset + numerator / (pole_kmh + KMH_PER_MPS * speed_mps)
     }
 
     /// Derivative of the adhesion coefficient by speed, in s/m.
     pub fn adhesion_slope_s_per_m(self, speed_mps: f64) -> f64 {
-        let (_, numerator, pole_kmh) = self.coefficients();
+        let [_, numerator, pole_kmh] = self.coefficients();
         let distance = pole_kmh + KMH_PER_MPS * speed_mps;
         -KMH_PER_MPS * numerator / (distance * distance)
     }

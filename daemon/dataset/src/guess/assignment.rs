@@ -25,14 +25,29 @@ struct Candidate {
     guessed: GuessedColumn,
 }
 
+/// A column that is assigned.
+#[derive(Clone)]
+struct AssignedColumn {
+    index: usize,
+    guessed: GuessedColumn,
+    /// Given on the command line.
+    is_given: bool,
+}
+
+/// A column that a quantity refuses.
+struct RefusedColumn {
+    index: usize,
+    quantity: Quantity,
+    reason: String,
+}
+
 /// Assignment of columns to quantities.
 pub struct Assignment<'c> {
     columns: &'c [InspectedColumn],
-    /// Column and what it is taken for, or rather not: with the reason.
-    taken: Vec<(usize, GuessedColumn, bool)>,
+    taken: Vec<AssignedColumn>,
     dropped: Vec<(usize, String)>,
     candidates: Vec<Candidate>,
-    refused: Vec<(usize, Quantity, String)>,
+    refused: Vec<RefusedColumn>,
 }
 
 impl<'c> Assignment<'c> {
@@ -63,16 +78,17 @@ impl<'c> Assignment<'c> {
             }
             let is_given = |quantity: &Quantity| given.iter().any(|it| it.quantity == *quantity);
             for quantity in Quantity::ALL.into_iter().filter(|it| !is_given(it)) {
+                let mut refuse = |reason: String| {
+                    assignment.refused.push(RefusedColumn { index, quantity, reason });
+                };
                 match (consider(&column.name, &column.all, quantity), &column.unusable) {
                     (None, _) => {}
-                    (Some(_), Some(reason)) => {
-                        assignment.refused.push((index, quantity, reason.clone()));
-                    }
+                    (Some(_), Some(reason)) => refuse(reason.clone()),
                     (Some(found), None) => match found {
                         Ok((score, guessed)) => {
                             assignment.candidates.push(Candidate { column: index, score, guessed });
                         }
-                        Err(reason) => assignment.refused.push((index, quantity, reason)),
+                        Err(reason) => refuse(reason),
                     },
                 }
             }
@@ -106,7 +122,8 @@ impl<'c> Assignment<'c> {
         let unit = (given.unit, named_unit(&column.name, quantity));
         let reason = "given on the command line".into();
         let guessed = GuessedColumn::new((&column.name, &column.all), quantity, reason, unit);
-        self.taken.push((index, guessed.given_as(given.format.as_ref()), true));
+        let guessed = guessed.given_as(given.format.as_ref());
+        self.taken.push(AssignedColumn { index, guessed, is_given: true });
         Ok(())
     }
 
@@ -116,7 +133,7 @@ impl<'c> Assignment<'c> {
         candidates.sort_by_key(|it| (Reverse(it.score), it.guessed.quantity, it.column));
         for Candidate { column, guessed, .. } in candidates {
             if !self.is_taken(column) && !self.has(guessed.quantity) {
-                self.taken.push((column, guessed, false));
+                self.taken.push(AssignedColumn { index: column, guessed, is_given: false });
             }
         }
     }
@@ -125,8 +142,8 @@ impl<'c> Assignment<'c> {
     /// column could be as well.
     fn weigh_others(&mut self) {
         for place in 0..self.taken.len() {
-            let (index, guessed, is_given_here) = &self.taken[place];
-            if *is_given_here {
+            let AssignedColumn { index, guessed, is_given } = &self.taken[place];
+            if *is_given {
                 continue;
             }
             let (quantity, column) = (guessed.quantity, &self.columns[*index]);
@@ -164,7 +181,7 @@ impl<'c> Assignment<'c> {
             }
             doubts.extend(near);
             let parts = parts.iter().map(|&part| self.columns[part].name.clone()).collect();
-            let guessed = &mut self.taken[place].1;
+            let guessed = &mut self.taken[place].guessed;
             guessed.parts = parts;
             guessed.doubts.extend(doubts);
         }
@@ -177,26 +194,26 @@ impl<'c> Assignment<'c> {
 
     /// The first column that would be a quantity that nothing is taken for, were its unit known.
     pub fn unknown_unit(&self) -> Option<(&'c InspectedColumn, Quantity, &str)> {
-        self.refused.iter().find_map(|(index, quantity, reason)| {
-            let is_it = reason.starts_with(UNKNOWN_UNIT)
-                && !self.has(*quantity)
-                && !self.is_taken(*index)
-                && self.columns[*index].all.formats().is_empty();
-            is_it.then(|| (&self.columns[*index], *quantity, reason.as_str()))
-        })
+        let refused = self.refused.iter().find(|it| {
+            it.reason.starts_with(UNKNOWN_UNIT)
+                && !self.has(it.quantity)
+                && !self.is_taken(it.index)
+                && self.columns[it.index].all.formats().is_empty()
+        });
+        refused.map(|it| (&self.columns[it.index], it.quantity, it.reason.as_str()))
     }
 
     fn is_part(&self, index: usize) -> bool {
         let name = &self.columns[index].name;
-        self.taken.iter().any(|(_, guessed, _)| guessed.parts.contains(name))
+        self.taken.iter().any(|it| it.guessed.parts.contains(name))
     }
 
     fn is_taken(&self, index: usize) -> bool {
-        self.taken.iter().any(|(other, ..)| *other == index)
+        self.taken.iter().any(|it| it.index == index)
     }
 
-    fn taken_for(&self, quantity: Quantity) -> Option<&(usize, GuessedColumn, bool)> {
-        self.taken.iter().find(|(_, guessed, _)| guessed.quantity == quantity)
+    fn taken_for(&self, quantity: Quantity) -> Option<&AssignedColumn> {
+        self.taken.iter().find(|it| it.guessed.quantity == quantity)
     }
 
     /// True where a column is taken for the quantity.
@@ -206,36 +223,34 @@ impl<'c> Assignment<'c> {
 
     /// Returns the facts on the values of the column assigned to a quantity.
     pub fn facts(&self, quantity: Quantity) -> Option<&'c Facts> {
-        self.taken_for(quantity).map(|(index, ..)| &self.columns[*index].all)
+        self.taken_for(quantity).map(|it| &self.columns[it.index].all)
     }
 
     /// Takes the column for the position that spans what the speed says, where another does not and more speaks for
     /// its name.
     pub fn weigh_positions(&mut self) {
-        let Some((at, taken, false)) = self
-            .taken_for(Quantity::Position)
-            .map(|(at, guessed, given)| (*at, guessed.clone(), *given))
+        let Some(taken) = self.taken_for(Quantity::Position).filter(|it| !it.is_given).cloned()
         else {
             return;
         };
-        let Some((time_at, time, _)) = self.taken_for(Quantity::Time) else { return };
-        let Some((speed_at, speed, _)) = self.taken_for(Quantity::Speed) else { return };
+        let Some(time) = self.taken_for(Quantity::Time) else { return };
+        let Some(speed) = self.taken_for(Quantity::Speed) else { return };
         let facts = |column: usize| &self.columns[column].facts;
         let base =
             |guessed: &GuessedColumn, value: f64| guessed.unit.to_base(value * guessed.scale);
         // Times that are no numbers are in s already.
-        let driven_m: f64 = facts(*time_at)
+        let driven_m: f64 = facts(time.index)
             .iter()
-            .zip(facts(*speed_at))
+            .zip(facts(speed.index))
             .filter_map(|(times, speeds)| {
-                Some(base(time, times.span()?) * base(speed, speeds.mean()?))
+                Some(base(&time.guessed, times.span()?) * base(&speed.guessed, speeds.mean()?))
             })
             .sum();
         let misfit = |column: usize, guessed: &GuessedColumn| {
             let spans = facts(column).iter().filter_map(Facts::span);
             (spans.map(|span| base(guessed, span)).sum::<f64>() / driven_m).ln().abs()
         };
-        let own = misfit(at, &taken);
+        let own = misfit(taken.index, &taken.guessed);
         let others = self
             .candidates
             .iter()
@@ -245,18 +260,19 @@ impl<'c> Assignment<'c> {
             .filter(|(misfit, _)| *misfit < SPAN_MISFIT && own > 2.0 * SPAN_MISFIT)
             .min_by(|one, other| one.0.total_cmp(&other.0));
         let Some((_, best)) = best else { return };
-        let (column, mut guessed) = (best.column, best.guessed.clone());
-        guessed
-            .reasons
-            .push(format!("it spans what the speed says, which '{}' does not", self.shown(at)));
-        self.taken.retain(|(_, guessed, _)| guessed.quantity != Quantity::Position);
-        self.taken.push((column, guessed, false));
+        let (index, mut guessed) = (best.column, best.guessed.clone());
+        guessed.reasons.push(format!(
+            "it spans what the speed says, which '{}' does not",
+            self.shown(taken.index)
+        ));
+        self.taken.retain(|it| it.guessed.quantity != Quantity::Position);
+        self.taken.push(AssignedColumn { index, guessed, is_given: false });
     }
 
     /// Takes a quantity's column for another quantity instead, with a doubt; what was declared stays.
     pub fn rename(&mut self, from: Quantity, to: Quantity, doubt: &str) {
-        for (_, guessed, is_given_here) in &mut self.taken {
-            if guessed.quantity == from && !*is_given_here {
+        for AssignedColumn { guessed, is_given, .. } in &mut self.taken {
+            if guessed.quantity == from && !*is_given {
                 guessed.quantity = to;
                 guessed.doubts.insert(0, doubt.into());
                 guessed.rejected.push(format!("not {from}: {doubt}"));
@@ -266,15 +282,15 @@ impl<'c> Assignment<'c> {
 
     /// Takes a quantity's column for nothing; what was declared stays.
     pub fn drop(&mut self, quantity: Quantity, reason: &str) {
-        let is_it = |guessed: &GuessedColumn| guessed.quantity == quantity;
-        let left_out = self.taken.extract_if(.., |(_, guessed, given)| is_it(guessed) && !*given);
-        let left_out = left_out.map(|(index, ..)| (index, format!("not {quantity}: {reason}")));
+        let is_it = |it: &mut AssignedColumn| it.guessed.quantity == quantity && !it.is_given;
+        let left_out = self.taken.extract_if(.., is_it);
+        let left_out = left_out.map(|it| (it.index, format!("not {quantity}: {reason}")));
         self.dropped.extend(left_out);
     }
 
     /// Turns the sign of a quantity.
     pub fn turn(&mut self, quantity: Quantity, reason: &str) {
-        for (_, guessed, _) in &mut self.taken {
+        for AssignedColumn { guessed, .. } in &mut self.taken {
             if guessed.quantity == quantity {
                 guessed.scale = -guessed.scale;
                 guessed.reasons.push(reason.into());
@@ -284,8 +300,8 @@ impl<'c> Assignment<'c> {
 
     /// Returns the columns that come near a quantity without an assigned column, each with the reason.
     pub fn near(&self, quantity: Quantity) -> Vec<String> {
-        let of_it = self.refused.iter().filter(|(_, of, _)| *of == quantity);
-        of_it.map(|(index, _, reason)| format!("'{}': {reason}", self.shown(*index))).collect()
+        let of_it = self.refused.iter().filter(|it| it.quantity == quantity);
+        of_it.map(|it| format!("'{}': {}", self.shown(it.index), it.reason)).collect()
     }
 
     fn shown(&self, index: usize) -> String {
@@ -295,13 +311,13 @@ impl<'c> Assignment<'c> {
     /// The columns that hold a quantity, with what was not taken for it, and the others.
     pub fn finish(mut self) -> (Vec<GuessedColumn>, Vec<Unmapped>) {
         for place in 0..self.taken.len() {
-            let more = self.not_taken(self.taken[place].0, self.taken[place].1.quantity);
-            self.taken[place].1.rejected.extend(more);
+            let more = self.not_taken(self.taken[place].index, self.taken[place].guessed.quantity);
+            self.taken[place].guessed.rejected.extend(more);
         }
         let left =
             (0..self.columns.len()).filter(|index| !self.is_taken(*index) && !self.is_part(*index));
         let unmapped = left.map(|index| self.unmapped(index)).collect();
-        let mut columns: Vec<_> = self.taken.into_iter().map(|(_, guessed, _)| guessed).collect();
+        let mut columns: Vec<_> = self.taken.into_iter().map(|it| it.guessed).collect();
         columns.sort_by_key(|column| column.quantity);
         (columns, unmapped)
     }
@@ -313,8 +329,8 @@ impl<'c> Assignment<'c> {
         let others = others.map(|it| &it.guessed).filter(|it| it.quantity != quantity);
         let others = others
             .map(|it| format!("not {}, for which less speaks ({})", it.quantity, it.reasons[0]));
-        let refused = self.refused.iter().filter(|(of, ..)| *of == index);
-        let refused = refused.map(|(_, quantity, reason)| format!("not {quantity}: {reason}"));
+        let refused = self.refused.iter().filter(|it| it.index == index);
+        let refused = refused.map(|it| format!("not {}: {}", it.quantity, it.reason));
         let columns = self.candidates.iter().filter(|it| it.guessed.quantity == quantity);
         let columns = columns.filter(|it| it.column != index && !self.is_taken(it.column));
         let columns = columns.map(|Candidate { column, guessed, .. }| {
@@ -327,67 +343,20 @@ impl<'c> Assignment<'c> {
         let column = &self.columns[index];
         let dropped = self.dropped.iter().find(|(of, _)| *of == index);
         let candidate = self.candidates.iter().find(|it| it.column == index);
-        let refused = self.refused.iter().find(|(of, ..)| *of == index);
+        let refused = self.refused.iter().find(|it| it.index == index);
         let reason = match (&column.unusable, dropped, candidate, refused) {
             (Some(reason), ..) => reason.clone(),
             (_, Some((_, reason)), ..) => reason.clone(),
             (_, _, Some(Candidate { guessed: it, .. }), _) => {
-                let by = self.taken_for(it.quantity).map_or_else(String::new, |(_, other, _)| {
-                    format!(", for which '{}' is taken", other.name.shown())
+                let by = self.taken_for(it.quantity).map_or_else(String::new, |other| {
+                    format!(", for which '{}' is taken", other.guessed.name.shown())
                 });
                 format!("could be {}{by}", it.quantity)
             }
-            (.., Some((_, quantity, reason))) => format!("not {quantity}: {reason}"),
+            (.., Some(it)) => format!("not {}: {}", it.quantity, it.reason),
             _ if column.name.text.is_empty() => "it has no name".into(),
             _ => "its name says none of the quantities".into(),
         };
         Unmapped { name: column.name.clone(), reason }
-    }
-}
-
-/// A force with more than this share of values below zero is signed.
-const SIGNED_SHARE: f64 = 0.02;
-
-/// Settles what a dataset cannot have at once: a signed force beside one that is never negative, a
-/// handle beside a force.
-pub fn settle(assignment: &mut Assignment) {
-    use Quantity::{BrakeForce, BrakeHandle, ControlForce, TractionForce, TractionHandle};
-    let is_signed = |assignment: &Assignment, quantity| {
-        let signs = assignment.facts(quantity).map(|facts| facts.signs());
-        signs.is_some_and(|(up, down)| up > SIGNED_SHARE && down > SIGNED_SHARE)
-    };
-    if is_signed(assignment, TractionForce)
-        && !assignment.has(BrakeForce)
-        && !assignment.has(ControlForce)
-    {
-        let doubt = "its values have both signs: taken for traction minus brake force";
-        assignment.rename(TractionForce, ControlForce, doubt);
-    }
-    let has_both = assignment.has(TractionForce) || assignment.has(BrakeForce);
-    if assignment.has(ControlForce) && has_both {
-        if assignment.has(TractionForce) {
-            assignment.drop(ControlForce, "traction_force is recorded by itself");
-        } else if is_signed(assignment, ControlForce) {
-            assignment.drop(BrakeForce, "control_force holds the brake force already");
-        }
-    }
-    if assignment.has(ControlForce) && !is_signed(assignment, ControlForce) {
-        let doubt = "its values have one sign: taken for the traction force alone";
-        assignment.rename(ControlForce, TractionForce, doubt);
-    }
-    let turned = assignment.facts(BrakeForce).map(|facts| facts.signs());
-    if turned.is_some_and(|(up, down)| down > up) {
-        let scale = crate::keys::column::SCALE.assign(-1);
-        assignment.turn(BrakeForce, &format!("its values are negative while it brakes: {scale}"));
-    }
-    let has_control = assignment.has(ControlForce);
-    for (handle, force) in [(TractionHandle, TractionForce), (BrakeHandle, BrakeForce)] {
-        if assignment.has(force) || has_control {
-            assignment.drop(handle, "the force itself is recorded");
-        } else {
-            let reason = "a handle is a share of an effort curve, which train.toml must declare \
-                          first ([traction] or [brake] effort)";
-            assignment.drop(handle, reason);
-        }
     }
 }

@@ -12,7 +12,7 @@
 //! - `name`, `vocabulary`: a name in words, units as people write them, what recorders
 //!   call the quantities
 //! - `matching`, `plausible`: which quantity a column speaks for, and its likeliest unit
-//! - `assignment`: one column for each quantity, and what cannot stand
+//! - `assignment`: one column for each quantity
 //! - [`guessed`]: what comes out, and its correction
 
 mod assignment;
@@ -36,6 +36,10 @@ pub use name::Name;
 use dynocar_model::units::Unit;
 
 use super::{DatasetError, Quantity, SourcePosition};
+use assignment::Assignment;
+
+/// A force with more than this share of values below zero is signed.
+const SIGNED_SHARE: f64 = 0.02;
 
 /// Guesses the description of recordings that are laid out alike, and takes what is declared for
 /// granted.
@@ -47,8 +51,8 @@ use super::{DatasetError, Quantity, SourcePosition};
 pub fn guess(files: &[RecordingText], given: &[GivenColumn]) -> Result<Guess, DatasetError> {
     let read = columns::InspectedColumns::read(files)?;
     let label = files.first().map_or("", |file| file.label);
-    let mut assignment = assignment::Assignment::new(&read, given, label)?;
-    assignment::settle(&mut assignment);
+    let mut assignment = Assignment::new(&read, given, label)?;
+    settle(&mut assignment);
     assignment.weigh_positions();
     let at_names = || SourcePosition::line(label, read.layout.text.skip_rows + 1);
     if let Some((column, quantity, reason)) = assignment.unknown_unit() {
@@ -99,4 +103,48 @@ pub fn guess(files: &[RecordingText], given: &[GivenColumn]) -> Result<Guess, Da
 fn unit_names(quantity: Quantity) -> String {
     let names: Vec<&str> = Unit::of(quantity.dimension()).map(|unit| unit.name()).collect();
     names.join(", ")
+}
+
+/// Settles what a dataset cannot have at once: a signed force beside one that is never negative, a
+/// handle beside a force.
+fn settle(assignment: &mut Assignment) {
+    use Quantity::{BrakeForce, BrakeHandle, ControlForce, TractionForce, TractionHandle};
+    let is_signed = |assignment: &Assignment, quantity| {
+        let signs = assignment.facts(quantity).map(|facts| facts.signs());
+        signs.is_some_and(|(up, down)| up > SIGNED_SHARE && down > SIGNED_SHARE)
+    };
+    if is_signed(assignment, TractionForce)
+        && !assignment.has(BrakeForce)
+        && !assignment.has(ControlForce)
+    {
+        let doubt = "its values have both signs: taken for traction minus brake force";
+        assignment.rename(TractionForce, ControlForce, doubt);
+    }
+    let has_both = assignment.has(TractionForce) || assignment.has(BrakeForce);
+    if assignment.has(ControlForce) && has_both {
+        if assignment.has(TractionForce) {
+            assignment.drop(ControlForce, "traction_force is recorded by itself");
+        } else if is_signed(assignment, ControlForce) {
+            assignment.drop(BrakeForce, "control_force holds the brake force already");
+        }
+    }
+    if assignment.has(ControlForce) && !is_signed(assignment, ControlForce) {
+        let doubt = "its values have one sign: taken for the traction force alone";
+        assignment.rename(ControlForce, TractionForce, doubt);
+    }
+    let turned = assignment.facts(BrakeForce).map(|facts| facts.signs());
+    if turned.is_some_and(|(up, down)| down > up) {
+        let scale = super::keys::column::SCALE.assign(-1);
+        assignment.turn(BrakeForce, &format!("its values are negative while it brakes: {scale}"));
+    }
+    let has_control = assignment.has(ControlForce);
+    for (handle, force) in [(TractionHandle, TractionForce), (BrakeHandle, BrakeForce)] {
+        if assignment.has(force) || has_control {
+            assignment.drop(handle, "the force itself is recorded");
+        } else {
+            let reason = "a handle is a share of an effort curve, which train.toml must declare \
+                          first ([traction] or [brake] effort)";
+            assignment.drop(handle, reason);
+        }
+    }
 }
