@@ -178,7 +178,7 @@ fn the_page_of_what_was_learned_shows_models_decisions_and_events_on_wide_and_na
         for (row, (_, state)) in expected.iter().enumerate() {
             assert_eq!(cells(row)[2], *state);
         }
-        assert_eq!(cells(1)[3], "tunnel drag at 12400–13650 m");
+        assert_eq!(cells(1)[3], "tunnel drag from km 12.40 to 13.65");
         assert_eq!((&cells(1)[4], &cells(1)[5]), (&json!("0.842"), &json!("0.317")));
         assert_eq!(seen["marked"], 1);
         let plots = seen["plots"].as_array().expect("plots");

@@ -154,7 +154,7 @@ fn a_report_of_an_effect_renders_on_desktop_and_phone() {
             "Height above the start, m from",
             "Gradient, ‰ from",
             "Curvature 1/R, 1/km from",
-            "Found: tunnel drag km ",
+            "Found: tunnel drag from km ",
             "Missing resistance, growing chainage: at most",
             "Missing resistance, falling chainage: at most",
         ] {

@@ -12,11 +12,12 @@ const TABLE: [&str; 4] = [
 ];
 
 /// Where the same word is no key of these files, with the file and what it is there.
-const OTHERS: [(&str, &str); 10] = [
+const OTHERS: [(&str, &str); 11] = [
     ("daemon/analysis/src/explain/", "a parameter of the answer, or advice in it"),
     ("daemon/core/src/plausibility/input_fault.rs", "a fault"),
     ("daemon/dataset/src/diagnosing.rs", "a figure of a note"),
     ("daemon/model/src/terms/", "a parameter of the answer"),
+    ("daemon/model/src/words.rs", "a parameter of the answer"),
     ("daemon/src/config/apart.rs", "a key of daemon.toml"),
     ("daemon/src/text_file.rs", "advice that is a constant"),
     ("daemon/workshop/src/cli/", "an argument, a result or daemon.toml"),

@@ -155,6 +155,47 @@ fn three_values_that_go_together_have_a_name() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// Words of an answer, each with the one source that holds it.
+const WORDINGS: [(&str, &str); 12] = [
+    ("from km {", "daemon/model/src/words.rs"),
+    ("places between km", "daemon/model/src/words.rs"),
+    ("true over declared mass", "daemon/model/src/words.rs"),
+    ("speeds read {", "daemon/model/src/words.rs"),
+    ("{unit} (95 % interval", "daemon/model/src/words.rs"),
+    ("ends known to", "daemon/analysis/src/explain/report/effect.rs"),
+    ("chance of as much", "daemon/analysis/src/explain/report/effect.rs"),
+    ("kWh per 100 km", "daemon/analysis/src/explain/report/effect.rs"),
+    ("Found: the declared model", "daemon/analysis/src/explain/report/sentence.rs"),
+    ("Nothing undeclared acts", "daemon/analysis/src/explain/report/sentence.rs"),
+    ("Something undeclared acts", "daemon/analysis/src/explain/report/sentence.rs"),
+    ("kind.replace(", "none: `kind_name` gives the words of a kind"),
+];
+
+#[test]
+fn each_part_of_an_answer_is_put_into_words_in_one_place() {
+    let python = workspace().join("client/python/dynocar");
+    let scripts = [python.clone(), python.join("fleet")].into_iter().flat_map(|folder| {
+        let entries = std::fs::read_dir(folder).expect("the Python package").flatten();
+        entries.map(|it| it.path()).filter(|it| it.extension().is_some_and(|it| it == "py"))
+    });
+    let rust = FOLDERS.into_iter().filter(|it| !it.starts_with("tests")).flat_map(rust_files);
+    let mut found = Vec::new();
+    for path in rust.chain(scripts).filter(|path| !is_of_tests(path)) {
+        let text = std::fs::read_to_string(&path).expect("a source file");
+        let name = path.strip_prefix(workspace()).expect("of the workspace").display().to_string();
+        let lines = without_tests(&text).into_iter();
+        let code: Vec<&str> = lines.filter(|line| !line.trim_start().starts_with("//")).collect();
+        let code = code.join("\n");
+        let here = WORDINGS.iter().filter(|(words, _)| code.contains(words));
+        found.extend(here.map(|&(words, place)| (words, place, name.clone())));
+    }
+    let elsewhere: Vec<_> = found.iter().filter(|(_, place, name)| name != place).collect();
+    assert!(elsewhere.is_empty(), "{elsewhere:#?}");
+    for (words, place) in WORDINGS.iter().filter(|(_, place)| place.ends_with(".rs")) {
+        assert!(found.iter().any(|it| it.0 == *words), "{place} has \"{words}\" no more");
+    }
+}
+
 /// Returns the name of the public type that a line declares.
 fn public_type(line: &str) -> Option<&str> {
     let kinds = ["struct ", "enum ", "trait ", "type "];

@@ -1,4 +1,4 @@
-//! Clock, versions, who serves a train, and the vocabularies by which the tests hold those in Python.
+//! Clock, versions, who serves a train, the words of answers, and the vocabularies by which the tests hold those in Python.
 
 use std::fmt::Debug;
 use std::path::PathBuf;
@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use dynocar_client::Host;
 use dynocar_client::ffi::about::{DaemonState, state_of_daemon};
 use dynocar_client::ffi::{Code, Rail};
+use dynocar_model::words;
 use dynocar_shared::schema::unit_of;
 use dynocar_shared::vocabulary::EffectKind;
 use dynocar_shared::{
@@ -47,6 +48,18 @@ pub(crate) fn version() -> &'static str {
 #[pyfunction]
 pub(crate) fn parameter_unit(number: u32) -> &'static str {
     Parameter::from_number(number).map_or("", |it| unit_of(it.full_name()))
+}
+
+/// The words for a kind of effect, and for the stretches of the line where it acts.
+#[pyfunction]
+pub(crate) fn effect_words(kind: &str, intervals_m: Vec<[f64; 2]>) -> (String, String) {
+    (words::kind_name(kind).into(), words::stretches(&intervals_m))
+}
+
+/// The meaning of an effect's parameter.
+#[pyfunction]
+pub(crate) fn parameter_words(name: &str) -> &str {
+    words::parameter(name).0
 }
 
 /// Schema major of the channels, layout hashes of sample and snapshot.

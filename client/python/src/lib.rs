@@ -26,7 +26,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use crate::about::{
-        daemon_state, layouts, monotonic_now_ns, parameter_unit, version, vocabularies,
+        daemon_state, effect_words, layouts, monotonic_now_ns, parameter_unit, parameter_words,
+        version, vocabularies,
     };
     #[pymodule_export]
     use crate::channel::{Publisher, Reader};

@@ -12,6 +12,7 @@
 //! - [`terms`]: the physical terms of the model, one law each, that all of the following share
 //! - [`force`]: the known forces on the train at a sample
 //! - [`simulate`]: the speed that a force model predicts over a recorded run
+//! - [`words`]: the words of every answer: kinds of effects, their numbers and places
 //! - [`named!`]: enums whose members have names in files
 
 pub mod force;
@@ -21,3 +22,4 @@ pub mod terms;
 pub mod track;
 pub mod train;
 pub mod units;
+pub mod words;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::{Args, Subcommand};
-use dynocar_model::terms::place::in_words;
+use dynocar_model::words;
 use dynocar_shared::TrainId;
 
 use super::Failure;
@@ -236,10 +236,9 @@ fn show(models: &TrainModels, stored: &Stored, state: State) -> String {
         row("error", &format!("{:.3} → {:.3} {words}", error.before_mps, error.after_mps));
     }
     for effect in &origin.effects {
-        let places = in_words(&effect.intervals_m);
-        row("adds", [effect.kind.replace('_', " "), places].join(" ").trim_end());
-        for (name, figure) in &effect.parameters {
-            row("", &figure.shown(name));
+        row("adds", &words::effect(&effect.kind, &effect.intervals_m));
+        for figure in effect.parameters.iter().filter_map(|(name, it)| it.of_effect(name)) {
+            row("", &figure);
         }
     }
     if let Some(sha256) = &origin.dataset_sha256 {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dynocar_model::terms::place::in_words;
+use dynocar_model::words;
 use dynocar_shared::HALF_95;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +27,11 @@ impl ModelFigure {
     /// True where the 95 % intervals of both overlap.
     pub fn agrees_with(self, other: ModelFigure) -> bool {
         (self.value - other.value).abs() <= self.half_width() + other.half_width()
+    }
+
+    /// The number as one of an effect, in words; `None` without an interval.
+    pub fn of_effect(self, name: &str) -> Option<String> {
+        words::figure(name, self.value, self.half_width())
     }
 
     /// The number under its name, with its 95 % interval.
@@ -147,10 +152,7 @@ impl Origin {
 
     /// Describes the additions of the model, in a few words.
     pub fn adds(&self) -> String {
-        let words = |effect: &FoundEffect| {
-            let (kind, places) = (effect.kind.replace('_', " "), in_words(&effect.intervals_m));
-            if places.is_empty() { kind } else { format!("{kind} at {places}") }
-        };
+        let words = |effect: &FoundEffect| words::effect(&effect.kind, &effect.intervals_m);
         let effects: Vec<String> = self.effects.iter().map(words).collect();
         if effects.is_empty() { "declared".into() } else { effects.join("; ") }
     }

@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from .._native import effect_words, parameter_words
 from ._estimates import UNITS
 from ._forest import Row, forest
 
@@ -30,12 +31,6 @@ PARAMETERS = {
     "mass": "mass over the declared one",
     "traction_gain": "traction gain",
     "wheel_diameter": "measured over true speed",
-}
-NUMBERS = {
-    "extra_n_per_kn": "Extra resistance",
-    "c_factor": "Factor on c",
-    "gain": "Reported over true traction force",
-    "speed_scale": "Measured over true speed",
 }
 Report = dict[str, Any]
 
@@ -86,11 +81,12 @@ def _summary(report: Report) -> str:
 
 
 def _effect(it: Report) -> str:
-    kind = str(it["kind"]).replace("_", " ")
-    if it["interval_m"] is None:
-        return kind
-    start, end = it["interval_m"]
-    return f"{kind} from {start / 1000:.2f} to {end / 1000:.2f} km"
+    return " ".join(_words(it)).strip()
+
+
+def _words(it: Report) -> tuple[str, str]:
+    """The kind of an effect, and where it acts."""
+    return effect_words(it["kind"], [it["interval_m"]] if it["interval_m"] else [])
 
 
 def _failed(report: Report) -> str:
@@ -146,7 +142,8 @@ def _common(report: Report) -> str:
         pooled, unit = it["pooled"], f" {it['unit']}" if it["unit"] else ""
         words = f"{OWNERS[it['belongs_to']].capitalize()}."
         if pooled:
-            words += f" {NUMBERS.get(it['parameter'], it['parameter'])}: {pooled['mean']:.4g}{unit}"
+            number = parameter_words(it["parameter"])
+            words += f" {number[0].upper()}{number[1:]}: {pooled['mean']:.4g}{unit}"
             words += f" (95 % {pooled['low']:.4g} to {pooled['high']:.4g}) over {pooled['estimates']} trains"
             words += f", scatter between trains {pooled['std_between']:.2g}."
         drawn = [
@@ -182,16 +179,11 @@ def _changes(report: Report) -> str:
     heads = ["train", "parameter", "before", "now", "change and its 95 % interval", "z"]
     table = _table(heads, [rows[k] for k in order], [marked[k] for k in order], numbers=4)
     came = [
-        [it["train"], it["what"], str(it["kind"]).replace("_", " "), _place(it["interval_m"])]
-        for it in report["effects_changed"]
+        [it["train"], it["what"], *_words(it)] for it in report["effects_changed"]
     ]
     if came:
         table += _table(["train", "effect", "kind", "where"], came)
     return _section(f"What changed since {report['month_before']}", "", table)
-
-
-def _place(interval: list[float] | None) -> str:
-    return f"{interval[0] / 1000:.2f} to {interval[1] / 1000:.2f} km" if interval else ""
 
 
 def _trains(report: Report) -> str:

@@ -262,6 +262,24 @@ pub struct DavisDeviations {
     pub c: f64,
 }
 
+/// A verdict in words.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VerdictWords {
+    /// Without its effects, for a place above a list of them.
+    pub heading: String,
+    /// With its effects.
+    pub whole: String,
+    /// Sentences on what it leaves open, each behind a space.
+    pub left: String,
+}
+
+impl VerdictWords {
+    /// Returns a verdict of one text that leaves nothing open.
+    pub fn of(text: String) -> Self {
+        VerdictWords { heading: text.clone(), whole: text, left: String::new() }
+    }
+}
+
 /// The answer.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExplainAnswer {
@@ -269,9 +287,9 @@ pub struct ExplainAnswer {
     pub verdict: Verdict,
     /// The verdict in a sentence or two, with all caveats.
     pub statement: String,
-    /// The verdict without its caveats.
+    /// The verdict in words, without its caveats.
     #[serde(skip)]
-    pub verdict_words: String,
+    pub words: VerdictWords,
     /// Limits of the statement, a sentence or two each.
     #[serde(skip)]
     pub caveats: Vec<String>,

@@ -4,6 +4,7 @@
 //! effect, and the information matrix shows how surely it is zero, and whether it is distinguishable from each of
 //! the others.
 
+use dynocar_model::words::{kind_name, number, parameter};
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 use nalgebra::Cholesky;
@@ -11,7 +12,6 @@ use nalgebra::Cholesky;
 use super::answer::Identifiability;
 use super::competing::separating_run;
 use super::effects::{Candidate, LIBRARY};
-use super::report::words::number;
 use super::selection::{Search, SearchOutcome};
 
 /// The kinds that are one number of the whole train or line, and not found.
@@ -75,14 +75,17 @@ pub fn not_held(all: &[Identifiability]) -> Vec<String> {
         .iter()
         .filter(|own| !own.told)
         .map(|own| match own.hidden_up_to() {
-            Some(most) => format!(
-                "{} ({} is known to ± {} only; {} would determine it)",
-                own.kind,
-                own.parameter,
-                number(most, Some(most)),
-                would(own)
-            ),
-            None => format!("{} ({} would determine it)", own.kind, would(own)),
+            Some(most) => {
+                let (words, unit) = parameter(own.parameter);
+                let most = [&number(most, Some(most)), unit].join(" ");
+                format!(
+                    "{} ({words} is known to ± {} only; {} would determine it)",
+                    kind_name(own.kind),
+                    most.trim_end(),
+                    would(own)
+                )
+            }
+            None => format!("{} ({} would determine it)", kind_name(own.kind), would(own)),
         })
         .collect();
     let mut caveats = Vec::new();
@@ -97,7 +100,8 @@ pub fn not_held(all: &[Identifiability]) -> Vec<String> {
                 [Some(one), Some(other)] => separating_run(one, &[other]),
                 _ => "",
             };
-            caveats.push(format!(" {} and {} look alike in them. {run}", own.kind, other.kind));
+            let [own, other] = [own.kind, other.kind].map(kind_name);
+            caveats.push(format!(" In them {own} and {other} look alike. {run}"));
         }
     }
     caveats

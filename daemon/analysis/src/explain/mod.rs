@@ -14,7 +14,7 @@
 //! - [`score`], [`stop_to_stop`], `bootstrap`: open-loop prediction of fit and holdout runs
 //! - [`many`]: some of many runs, and what all of them say
 //! - [`over_time`], [`held_out`]: numbers that differ between runs, and confirmation by the runs held out
-//! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`], [`described`],
+//! - [`unexplained`], [`identifiability`], [`competing`], [`meaning`], `caveats`, [`verdict`],
 //!   [`answer`]: the statement
 //! - [`report`]: what a report shows beyond it
 //!
@@ -24,7 +24,6 @@ pub mod answer;
 mod bootstrap;
 mod caveats;
 pub mod competing;
-pub mod described;
 pub mod drive_efficiency;
 pub mod effects;
 pub mod evidence;

@@ -6,6 +6,7 @@
 //! of White 1980, each run left out as in MacKinnon and White 1985), never less than the likelihood allows.
 
 use dynocar_model::terms::{Parameter, wheel};
+use dynocar_model::words::{kind_name, number, parameter};
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::EffectKind;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -246,18 +247,21 @@ pub struct Course {
 impl Course {
     /// States the course, and what follows from it.
     pub fn sentence(&self, kind: &str) -> String {
+        let (words, unit) = parameter(self.parameter);
         let shown = |part: &CoursePart| {
             let runs = match part.first_run == part.last_run {
                 true => part.first_run.clone(),
                 false => format!("{} to {}", part.first_run, part.last_run),
             };
-            format!("{:.4} ± {:.4} in {runs}", part.value, HALF_95 * part.std)
+            let half = HALF_95 * part.std;
+            let [value, half] = [part.value, half].map(|it| number(it, Some(half)));
+            format!("{value} ± {half} {unit}").trim_end().to_owned() + &format!(" in {runs}")
         };
         let parts: Vec<String> = self.parts.iter().map(shown).collect();
         format!(
-            "{kind} changes over the runs: {} = {}. The stated value is a mean that holds for no run: \
+            "Over the runs {} changes: {words} {}. The stated value is a mean that holds for no run: \
              explain the newest runs by themselves to learn what holds now.",
-            self.parameter,
+            kind_name(kind),
             parts.join(", ")
         )
     }

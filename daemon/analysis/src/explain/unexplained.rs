@@ -2,6 +2,7 @@
 
 use super::answer::Location;
 use super::selection::{Refusal, Search, SearchOutcome};
+use dynocar_model::words::kind_name;
 use dynocar_shared::vocabulary::EffectKind;
 
 /// Time in s over which the force that is left is averaged: gusts and joints of rails are gone.
@@ -62,7 +63,7 @@ impl Unexplained {
     /// Describes the explanations of the residual that are not determined; empty if there are none.
     pub fn undetermined(&self) -> String {
         let one = |(kind, refusal): &(EffectKind, Refusal)| {
-            format!(" Not determined is {}: {refusal}.", kind.name())
+            format!(" Not determined is {}: {refusal}.", kind_name(kind.name()))
         };
         self.refused.iter().map(one).collect()
     }

@@ -9,17 +9,18 @@ use dynocar_shared::vocabulary::EffectKind;
 
 use super::answer::{
     BaseAnswer, Considered, DavisDeviations, EffectAnswer, EffectMeaning, ExplainAnswer,
-    HeldOutAnswer, Location, Verdict,
+    HeldOutAnswer, Location, Verdict, VerdictWords,
 };
 use super::caveats::{FinishedFit, caveats, told_by_data, trimmed};
 use super::competing::runners_up;
 use super::competing::{CompetingHypotheses, competing_hypotheses, kinds_of, separating_run};
-use super::described::{describe, describe_place, small};
 use super::effects::ReportContext;
 use super::evidence::p_value;
 use super::held_out::HeldOutEffect;
 use super::hypothesis::{Hypothesis, ReportedValues};
 use super::identifiability::identifiability;
+use super::report::effect::{located, small};
+use super::report::sentence::verdict_words;
 use super::score::{self, PredictionScore};
 use super::selection::{
     Deviations, ScaleSources, Search, SearchOutcome, deciding_score, discounted, few_runs_factor,
@@ -56,16 +57,16 @@ pub fn answer(
     let left = left.as_ref();
     let words = impossible(&diagnostics);
     let is_told = words.is_none() && is_enough;
-    let (verdict_words, experiment) =
-        words.unwrap_or_else(|| statement(search, outcome, verdict, &effects, &competing, left));
+    let (words, experiment) =
+        words.unwrap_or_else(|| worded(search, outcome, verdict, &effects, &competing, left));
     let caveats = match is_told {
         true => caveats(search, outcome, &effects, known, score, &identifiability),
         false => Vec::new(),
     };
     ExplainAnswer {
         verdict,
-        statement: verdict_words.clone() + &caveats.concat(),
-        verdict_words,
+        statement: [&words.whole, &words.left].map(String::as_str).concat() + &caveats.concat(),
+        words,
         caveats: trimmed(&caveats),
         diagnostics,
         effects,
@@ -98,7 +99,7 @@ pub fn answer(
 }
 
 /// The verdict in words, and what to do.
-type Words = (String, Option<String>);
+type Words = (VerdictWords, Option<String>);
 
 /// The words where the data cannot be true.
 fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
@@ -106,7 +107,7 @@ fn impossible(diagnostics: &[DatasetDiagnostic]) -> Option<Words> {
     let faults: Vec<String> = fundamental.map(ToString::to_string).collect();
     let words = || format!("The data cannot be true as described: {}", faults.join("; "));
     let to_do = "Set right what is named and run this again.";
-    (!faults.is_empty()).then(|| (words(), Some(to_do.into())))
+    (!faults.is_empty()).then(|| (VerdictWords::of(words()), Some(to_do.into())))
 }
 
 /// Why nothing was scored, and what is known instead; `None` when something was.
@@ -283,7 +284,8 @@ fn considered(outcome: &SearchOutcome, competing: &[CompetingHypotheses]) -> Vec
     list
 }
 
-fn statement(
+/// The verdict in words, and what to do.
+fn worded(
     search: &Search,
     outcome: &SearchOutcome,
     verdict: Verdict,
@@ -291,14 +293,15 @@ fn statement(
     competing: &[CompetingHypotheses],
     left: Option<&Unexplained>,
 ) -> Words {
-    let described: Vec<String> = effects.iter().map(describe).collect();
-    let described = described.join("; ");
     let undetermined = left.map(Unexplained::undetermined).unwrap_or_default();
-    match verdict {
+    let (more, experiment) = match verdict {
         Verdict::InsufficientData if search.problem.runs.is_empty() => {
             let held_out = search.holdout.len();
             let text = format!("No run is there to fit: all {held_out} are held out.");
-            (text, Some("Give some of the runs the role \"fit\".".into()))
+            return (
+                VerdictWords::of(text),
+                Some("Give some of the runs the role \"fit\".".into()),
+            );
         }
         Verdict::InsufficientData => {
             let moving_s = moving_s(search);
@@ -306,61 +309,39 @@ fn statement(
             let text = format!(
                 "The fit runs hold {moving_s:.0} s of usable motion ({observations} observations): too little to explain."
             );
-            (text, Some("Record several runs of some minutes, in both directions.".into()))
+            let experiment = "Record several runs of some minutes, in both directions.";
+            return (VerdictWords::of(text), Some(experiment.into()));
         }
         Verdict::None => {
-            let text = "Nothing undeclared is found: the declared model with a, b, c refitted \
-                        explains the runs.";
             let small: Vec<String> = outcome.small_trials().map(|it| small(outcome, it)).collect();
             let small = match &small[..] {
                 [] => String::new(),
                 all => format!(" Certain, and too small to matter: {}.", all.join(", ")),
             };
-            (format!("{text}{small}{undetermined}"), None)
+            (small, None)
         }
-        Verdict::Effect => (format!("Found: {described}.{undetermined}"), None),
+        Verdict::Effect => (String::new(), None),
         Verdict::Unknown => {
-            let text = if outcome.fit.model.has(EffectKind::Unknown) {
-                format!(
-                    "The residual is real, but no effect of the library explains it; it lives \
-                     here: {described}.{undetermined}"
-                )
-            } else {
-                unnamed(left, &described) + &undetermined
-            };
+            let is_form = outcome.fit.model.has(EffectKind::Unknown);
+            let residual = left.filter(|_| !is_form).map_or_else(String::new, residual);
             let experiment = "Drive this range again with other speeds, loads and directions.";
-            (text, Some(experiment.into()))
+            (residual, Some(experiment.into()))
         }
         Verdict::Ambiguous => {
-            let one = |CompetingHypotheses { accepted, kinds }: &CompetingHypotheses| {
-                let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
-                format!("{} and {}", accepted.name(), names.join(", "))
-            };
-            let each: Vec<String> = competing.iter().map(one).collect();
-            let text = format!(
-                "An effect acts, but {} explain it equally well on these runs ({described}).",
-                each.join(", as well as ")
-            );
             let runs = competing.iter().map(|it| separating_run(it.accepted, &it.kinds));
             let mut experiments: Vec<&str> = runs.collect();
             experiments.dedup();
             let experiment = (!experiments.is_empty()).then(|| experiments.join(" "));
-            (text, experiment)
+            (String::new(), experiment)
         }
-    }
+    };
+    let rivals = kinds_of(competing);
+    (verdict_words(verdict, effects, &rivals, more + &undetermined), experiment)
 }
 
-/// A residual that nothing in the model stands for, with what is found beside it.
-fn unnamed(left: Option<&Unexplained>, found: &str) -> String {
-    let mut text = String::from("The residual is real, but no effect of the library explains it.");
-    if let Some(left) = left {
-        text += &left.describe();
-        if let Some(place) = &left.place {
-            text += &format!(" It lives most here: {}.", describe_place(place).join(", "));
-        }
-    }
-    if !found.is_empty() {
-        text += &format!(" Beside it is found: {found}.");
-    }
-    text
+/// Describes a residual that nothing in the model stands for.
+fn residual(left: &Unexplained) -> String {
+    let place = left.place.as_ref().and_then(located);
+    let place = place.map_or_else(String::new, |place| format!(" It lives most here: {place}."));
+    left.describe() + &place
 }

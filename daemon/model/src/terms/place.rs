@@ -20,12 +20,6 @@ pub fn profile(intervals_m: &[[f64; 2]], extra_n_per_kn: f64) -> Result<StepProf
     interval_profile(LIST, &intervals_m.iter().map(place).collect::<Vec<_>>())
 }
 
-/// Returns intervals in m along the line in words, as in `1200–1500 m, 2100–2300 m`.
-pub fn in_words(intervals_m: &[[f64; 2]]) -> String {
-    let each = intervals_m.iter().map(|[from, to]| format!("{from:.0}–{to:.0} m"));
-    each.collect::<Vec<_>>().join(", ")
-}
-
 /// A place resists.
 #[inline]
 pub fn act(extra_n_per_kn: f64, resistance: &mut Resistance) {

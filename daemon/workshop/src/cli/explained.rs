@@ -1,12 +1,11 @@
 //! The answer of `dynocar explain` for people: a verdict of at most two sentences, then a list of what was
 //! found, where, how large, what it removes from the error, and what to do.
 
-use dynocar_analysis::explain::answer::{Considered, EffectAnswer, ExplainAnswer, Verdict};
-use dynocar_analysis::explain::described::precision;
-use dynocar_analysis::explain::report::{effect as effect_words, words};
+use dynocar_analysis::explain::answer::{Considered, EffectAnswer, ExplainAnswer};
+use dynocar_analysis::explain::report::effect as effect_words;
 use dynocar_analysis::explain::stop_to_stop::Metric;
+use dynocar_model::words;
 use dynocar_shared::HALF_95;
-use dynocar_shared::vocabulary::EffectKind;
 
 use crate::run_facts::diagnostics;
 use dynocar::cli::text::{WIDTH, wrap};
@@ -16,7 +15,8 @@ const INDENT: usize = 12;
 
 /// The answer for people.
 pub fn text(answer: &ExplainAnswer) -> String {
-    let mut text = diagnostics(&answer.diagnostics) + &plain(&verdict(answer));
+    let mut text = diagnostics(&answer.diagnostics)
+        + &plain(&[&answer.words.heading, &answer.words.left].map(String::as_str).concat());
     for effect in &answer.effects {
         text += "\n";
         text += &found(effect);
@@ -47,40 +47,12 @@ fn others(answer: &ExplainAnswer) -> String {
     text
 }
 
-/// The verdict; what was found stands in the list.
-fn verdict(answer: &ExplainAnswer) -> String {
-    match (answer.verdict, answer.effects.len()) {
-        (Verdict::Effect, 1) => "Found: the declared model lacks one effect.".into(),
-        (Verdict::Effect, count) => format!("Found: the declared model lacks {count} effects."),
-        (Verdict::Ambiguous, _) => {
-            "Found: the declared model lacks an effect, and these runs fit more than one.".into()
-        }
-        (Verdict::Unknown, 1..) => {
-            let is_form = answer.effects.iter().any(|it| it.kind == EffectKind::Unknown.name());
-            let left = answer.unexplained_n_per_kn.filter(|_| !is_form).map_or(
-                String::new(),
-                |left| format!(" A force of {left:.2} N/kN on average over a minute stays beside what is found."),
-            );
-            format!("The residual is real, but no effect of the library explains it.{left}")
-        }
-        _ => answer.verdict_words.clone(),
-    }
-}
-
 /// An effect, a row for each question.
 fn found(effect: &EffectAnswer) -> String {
     let mut rows = row("what", &format!("{} ({})", words::kind_name(effect.kind), effect.kind));
-    let place = effect_words::placed(&effect.place);
-    let ends = effect.place.uncertainty_95.as_ref().and_then(precision);
-    rows += &row(
-        "where",
-        &match ends {
-            _ if place.is_empty() => "everywhere".to_owned(),
-            Some(ends) => format!("{place}, {ends}"),
-            None => place,
-        },
-    );
-    for size in effect_words::sizes(effect) {
+    let place = effect_words::located(&effect.place);
+    rows += &row("where", place.as_deref().unwrap_or("everywhere"));
+    for size in effect_words::sizes(&effect.parameters, &effect.std) {
         rows += &row("size", &size);
     }
     let percent = 100.0 * effect.error_reduction;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::threads::Threads;
 use crate::report::PAGE_MARK;
 use crate::report::provenance::{Provenance, own_command_line};
-use crate::survey::answer::{LearnedAnswer, SurveyAnswer};
+use crate::survey::answer::{LearnedAnswer, LearnedRow, SurveyAnswer};
 use crate::survey::{SurveyFailure, page, survey_folder};
 use clap::Args;
 use dynocar::cli::Failure;
@@ -85,7 +85,9 @@ fn summary(answer: &SurveyAnswer) -> String {
             HALF_95 * std
         );
     }
-    for (name, unit, _, it) in answer.learned.iter().flat_map(LearnedAnswer::rows) {
+    for LearnedRow { short: name, unit, value: it, .. } in
+        answer.learned.iter().flat_map(LearnedAnswer::rows)
+    {
         if !name.is_empty() {
             let half = HALF_95 * it.std;
             text += &format!("    {name:<22} {:>10.4} ± {half:.4} {unit}\n", it.value);

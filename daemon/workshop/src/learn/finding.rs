@@ -7,7 +7,7 @@ use dynocar_analysis::dataset::Dataset;
 use dynocar_analysis::explain::Explanation;
 use dynocar_analysis::explain::answer::{EffectAnswer, ExplainAnswer, ParameterValue, Verdict};
 use dynocar_analysis::explain::effects::policy_of;
-use dynocar_model::terms::place::in_words;
+use dynocar_model::words::{self, kind_name};
 use dynocar_shared::TrainId;
 use dynocar_shared::vocabulary::EffectKind;
 
@@ -162,7 +162,7 @@ fn whole(name: &str, dataset: &Dataset, sha256: String) -> Option<EventWindow> {
 
 /// An event in a sentence for people.
 pub fn sentence(event: &MaintenanceEvent) -> String {
-    let kind = event.kind.replace('_', " ");
+    let kind = kind_name(&event.kind);
     let mut runs: Vec<&str> = event.windows.iter().map(|window| &window.run[..]).collect();
     runs.dedup();
     let shown = match runs.as_slice() {
@@ -178,9 +178,10 @@ pub fn sentence(event: &MaintenanceEvent) -> String {
         };
     }
     if !event.intervals_m.is_empty() {
-        text += &format!(", at {}", in_words(&event.intervals_m));
+        text += &format!(", {}", words::stretches(&event.intervals_m));
     }
-    let sizes: Vec<String> = event.size.iter().take(4).map(|(name, it)| it.shown(name)).collect();
+    let sizes = event.size.iter().filter_map(|(name, it)| it.of_effect(name));
+    let sizes: Vec<String> = sizes.take(words::PLACES_MAX).collect();
     if sizes.is_empty() { text } else { format!("{text}: {}", sizes.join(", ")) }
 }
 

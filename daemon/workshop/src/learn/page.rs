@@ -9,6 +9,7 @@ use dynocar::models::numbered::Numbered;
 use dynocar::models::origin::HeldOutError;
 use dynocar::models::{Action, Decision, MaintenanceEvent, ModelHash, Origin, Stored, UtcSecond};
 use dynocar::shadow::record::TrialRecord;
+use dynocar_model::words::kind_name;
 use dynocar_shared::TrainId;
 
 use super::LearnError;
@@ -176,7 +177,7 @@ fn of_events(events: &[Numbered<MaintenanceEvent>]) -> String {
     }
     let columns: [TableColumn<Numbered<MaintenanceEvent>>; 4] = [
         ("Recorded, UTC", Words, &|(_, it)| it.acted.map_or("–".into(), |[at, _]| minute(at))),
-        ("Kind", Words, &|(_, it)| escape(&it.kind.replace('_', " "))),
+        ("Kind", Words, &|(_, it)| escape(kind_name(&it.kind))),
         ("What", Words, &|(_, it)| escape(&it.sentence)),
         ("Chance where nothing acts", Numbers, &|(_, it)| chance(it.p_value, 1)),
     ];

@@ -1,7 +1,7 @@
 //! Parts of pages of HTML: tables, sections, numbers.
 
 use dynocar_analysis::explain::report::IntervalEstimate;
-use dynocar_analysis::explain::report::words::{self, number};
+use dynocar_model::words::{self, number};
 
 /// A part of a page under an anchor; title and body are HTML.
 pub fn section(id: &str, title: &str, body: &str) -> String {

@@ -6,8 +6,9 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use dynocar_analysis::dataset::Role;
 use dynocar_analysis::explain::answer::{EffectAnswer, Verdict};
-use dynocar_analysis::explain::report::{effect, words};
+use dynocar_analysis::explain::report::effect;
 use dynocar_core::plausibility::Severity;
+use dynocar_model::words;
 use sha2::{Digest, Sha256};
 
 use super::Subject;
@@ -193,7 +194,7 @@ fn figures(subject: &Subject) -> String {
         let worst = p_value.fold(0.0, f64::max);
         list.push((
             chance(worst, 2),
-            "chance of as much where nothing acts",
+            effect::CHANCE,
             "for the whole search".into(),
         ));
     }

@@ -144,10 +144,21 @@ impl SurveyedLine {
     }
 }
 
+/// A learned value for people.
+pub struct LearnedRow {
+    /// Name on a terminal; empty where it does not show the value.
+    pub short: &'static str,
+    /// Its unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Name and unit in all words.
+    pub long: &'static str,
+    /// The value.
+    pub value: WithStd,
+}
+
 impl LearnedAnswer {
-    /// Returns the learned values for people: in few words where a terminal shows them, the unit, in all words, and
-    /// the value.
-    pub fn rows(&self) -> Vec<(&'static str, &'static str, &'static str, WithStd)> {
+    /// Returns the learned values for people.
+    pub fn rows(&self) -> Vec<LearnedRow> {
         let [a, b, c] = self.resistance.map(Some);
         let rows = [
             ("mass", "t", "mass, t", Some(self.mass_t)),
@@ -161,8 +172,9 @@ impl LearnedAnswer {
             ("positions late", "s", "positions late, s", Some(self.position_late_s)),
             ("friction brake", "N/Pa", "friction brake, N/Pa", self.friction_brake_n_per_pa),
         ];
-        let known = rows.into_iter().map(|(short, unit, long, it)| Some((short, unit, long, it?)));
-        known.flatten().collect()
+        let known =
+            |(short, unit, long, value)| Some(LearnedRow { short, unit, long, value: value? });
+        rows.into_iter().filter_map(known).collect()
     }
 
     fn of(vehicle: &Vehicle, survey: &Survey) -> Option<Self> {

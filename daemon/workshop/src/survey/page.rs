@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use dynocar_analysis::dataset::Dataset;
-use dynocar_analysis::explain::report::words::number;
 use dynocar_analysis::survey::profile::GradientEntry;
 use dynocar_analysis::survey::stops::SurveyedStop;
 use dynocar_analysis::survey::{NotUsed, Survey};
+use dynocar_model::words::number;
 use dynocar_shared::HALF_95;
 
 use super::answer::{SurveyAnswer, TripAnswer};
@@ -151,7 +151,7 @@ fn learned(answer: &SurveyAnswer) -> String {
         return "<p>The line was known: nothing was learned.</p>\n".into();
     };
     let rows = learned.rows().into_iter();
-    let rows: Vec<_> = rows.map(|(.., name, it)| (name, it.value, HALF_95 * it.std)).collect();
+    let rows: Vec<_> = rows.map(|it| (it.long, it.value.value, HALF_95 * it.value.std)).collect();
     let columns: [TableColumn<(&str, f64, f64)>; 3] = [
         ("quantity", Words, &|it| it.0.into()),
         ("value", Numbers, &|it| number(it.1, Some(it.2))),

@@ -1,8 +1,8 @@
 //! Other explanations that were considered, and why they lost.
 
+use dynocar_model::words;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
-use super::words;
 use crate::explain::Explanation;
 use crate::explain::evidence::SCORE_MIN;
 use crate::explain::score::reduction;

@@ -1,55 +1,53 @@
 //! An effect in words: kind, size, location, what it means, how sure it is, and what to do.
 
+use std::collections::BTreeMap;
+
+use dynocar_model::words::{self, PLACES_MAX, joined, kind_name, number, stretch};
 use dynocar_shared::HALF_95;
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
 
-use super::words::{self, joined, kind_name, number};
 use crate::explain::answer::{
-    EffectAnswer, EffectMeaning, Location, MassWindow, ParameterValue, RunWindow, in_plain_words,
+    EffectAnswer, EffectMeaning, HeldOutAnswer, Location, MassWindow, ParameterValue,
+    PlaceUncertainty, RunWindow, in_plain_words,
 };
+use crate::explain::over_time::CHANCE_MAX;
+use crate::explain::selection::{EffectTrial, SearchOutcome};
 use crate::statistics::span;
 
-/// Places named in a sentence at most.
-const PLACES_MAX: usize = 4;
+/// The named values of an effect.
+type Values = BTreeMap<String, ParameterValue>;
 
 /// Kind, size and place of an effect.
 pub fn described(effect: &EffectAnswer) -> String {
-    let sizes: Vec<String> = sizes(effect);
-    let size = if sizes.is_empty() { String::new() } else { format!(" – {}", joined(&sizes)) };
-    let place = placed(&effect.place);
-    let place = if place.is_empty() { place } else { format!(" {place}") };
     let kind = match effect.kind {
         // The sentence around it says that it has no name.
         "unknown" => "a residual",
         kind => kind_name(kind),
     };
-    format!("{kind}{place}{size}")
+    let place = located(&effect.place).map_or(String::new(), |place| format!(" {place}"));
+    format!("{kind}{place}{}", listed(&sizes(&effect.parameters, &effect.std)))
+}
+
+/// Sizes behind the kind that they are of.
+fn listed(sizes: &[String]) -> String {
+    if sizes.is_empty() { String::new() } else { format!(" – {}", joined(sizes)) }
 }
 
 /// The numbers of an effect, each with its meaning, unit and 95 % interval.
-pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
-    let number_of = |value: Option<&ParameterValue>| match value {
-        Some(ParameterValue::Number(value)) => Some(*value),
-        _ => None,
-    };
+pub fn sizes(parameters: &Values, std: &Values) -> Vec<String> {
     let mut sizes = Vec::new();
-    for (name, value) in &effect.parameters {
-        let (words, unit) = words::parameter(name);
-        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    for (name, value) in parameters {
         match value {
             ParameterValue::Number(value) => {
-                let half = HALF_95 * number_of(effect.std.get(name)).unwrap_or(0.0);
-                if name == "speed_scale" {
-                    sizes.push(speed_error(*value, half));
-                } else if half > 0.0 {
-                    // A convention has no uncertainty.
-                    let ends = [(value - half).max(words::least(name)), value + half];
-                    let [low, high] = ends.map(|it| number(it, Some(half)));
-                    let value = number(*value, Some(half));
-                    sizes.push(format!("{words} {value}{unit} (95 % interval {low} to {high})"));
-                }
+                let std = match std.get(name) {
+                    Some(ParameterValue::Number(std)) => *std,
+                    _ => 0.0,
+                };
+                sizes.extend(words::figure(name, *value, HALF_95 * std));
             }
             ParameterValue::ByRun(by_run) => {
+                let (words, unit) = words::parameter(name);
+                let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
                 let span = span(by_run.values().copied());
                 sizes.extend(
                     span.map(|[low, high]| {
@@ -60,13 +58,10 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
             ParameterValue::Sections(sections) => {
                 let shown = sections.iter().take(PLACES_MAX);
                 sizes.extend(shown.map(|s| {
-                    let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);
+                    let place = stretch([s.from_m, s.to_m]);
                     let percent = 100.0 * (s.mass_factor - 1.0);
-                    format!(
-                        "{percent:+.1} % from km {from:.2} to {to:.2} (direction {:+})",
-                        s.direction
-                    )
-                    .replace('-', "−")
+                    format!("{percent:+.1} % {place} (direction {:+})", s.direction)
+                        .replace('-', "−")
                 }));
             }
             ParameterValue::Formula(formula) => sizes.insert(0, in_plain_words(formula)),
@@ -91,16 +86,32 @@ pub fn sizes(effect: &EffectAnswer) -> Vec<String> {
     sizes
 }
 
-/// A wheel's wrong diameter by what the speed reads, with its 95 % interval.
-fn speed_error(scale: f64, half: f64) -> String {
-    let side = if scale > 1.0 { "high" } else { "low" };
-    let percent =
-        |scale: f64| number(100.0 * (scale - 1.0) * (scale - 1.0).signum(), Some(100.0 * half));
-    let mut ends =
-        [scale - half, scale + half].map(|it| 100.0 * (it - 1.0) * (scale - 1.0).signum());
-    ends.sort_unstable_by(f64::total_cmp);
-    let [low, high] = ends.map(|it| number(it, Some(100.0 * half)));
-    format!("speeds read {} % too {side} (95 % interval {low} to {high})", percent(scale))
+/// States what the runs held out say of an effect by themselves; `None` where they hardly show it.
+pub fn by_held_out_runs(effect: &EffectAnswer) -> Option<String> {
+    let HeldOutAnswer { runs, parameters, std, p_value } = effect.held_out.as_ref()?;
+    let sizes = listed(&sizes(parameters, std));
+    let judged = match *p_value < CHANCE_MAX {
+        true => format!(
+            "which is not what the fit runs say (chance of as much: {p_value:.0e}): it is not the same in all runs, \
+             or not what acts"
+        ),
+        false => "which agrees with the fit runs".into(),
+    };
+    let kind = kind_name(effect.kind);
+    Some(format!(" The {runs} runs held out by themselves give {kind}{sizes}, {judged}."))
+}
+
+/// Describes a certain and small effect: its kind with its numbers in the model, or in the trial that took it in
+/// where nothing is named.
+pub fn small(outcome: &SearchOutcome, trial: &EffectTrial) -> String {
+    let effect = &trial.fit.model.effects[trial.last()];
+    let tried = trial.fit.effect_parameters(trial.last());
+    let values = outcome.values(trial.kind).unwrap_or(tried);
+    let each = effect.parameters().iter().zip(values).map(|(spec, value)| {
+        let (words, unit) = words::parameter(spec.name);
+        format!("{words} {value:.4} {unit}").trim_end().to_owned()
+    });
+    format!("{} ({})", kind_name(trial.kind.name()), each.collect::<Vec<_>>().join(", "))
 }
 
 /// Windows by run and time, however they were found.
@@ -113,6 +124,9 @@ fn in_order<W>(windows: &[W], key: fn(&W) -> (&String, f64)) -> std::vec::IntoIt
     all.into_iter()
 }
 
+/// The words for the probability of an effect.
+pub const CHANCE: &str = "chance of as much where nothing acts";
+
 /// How sure it is that an effect acts, by the probability of finding as much where nothing does.
 pub fn sureness(p_value: f64) -> String {
     let odds = 1.0 / p_value.max(1e-300);
@@ -124,7 +138,7 @@ pub fn sureness(p_value: f64) -> String {
         }
         _ => format!("{} %", number(100.0 * p_value, Some(1.0))),
     };
-    format!("chance of as much where nothing acts: {odds}")
+    format!("{CHANCE}: {odds}")
 }
 
 /// Returns the recommended action for an effect; `None` for one without a name.
@@ -160,8 +174,8 @@ pub fn meaning(meaning: &EffectMeaning) -> String {
     parts.join("; ")
 }
 
-/// Where an effect acts, in words; empty when it acts everywhere.
-pub fn placed(place: &Location) -> String {
+/// Where an effect acts, and how well the ends are known; `None` when it acts everywhere.
+pub fn located(place: &Location) -> Option<String> {
     let mut parts = Vec::new();
     let listed = |all: Vec<String>| {
         let more = all.len().saturating_sub(PLACES_MAX);
@@ -172,7 +186,7 @@ pub fn placed(place: &Location) -> String {
         joined(&shown)
     };
     if let Some(intervals) = &place.intervals_m {
-        parts.push(sections(intervals));
+        parts.push(words::stretches(intervals));
     }
     if let Some(windows) = &place.windows {
         let all = in_order(windows, |w| (&w.run, w.t_start_s))
@@ -193,23 +207,30 @@ pub fn placed(place: &Location) -> String {
         let [low, high] = covariate.range.map(|value| number(value, None));
         parts.push(format!("while {} is {low} to {high}", covariate.name));
     }
-    parts.join(", ")
+    if !parts.is_empty() {
+        parts.extend(place.uncertainty_95.as_ref().and_then(precision));
+    }
+    (!parts.is_empty()).then(|| parts.join(", "))
 }
 
-/// Stretches of the line; many are counted, not listed.
-fn sections(intervals_m: &[[f64; 2]]) -> String {
-    let km = |m: f64| m / 1000.0;
-    let count = intervals_m.len();
-    if let Some([low, high]) = span(intervals_m.as_flattened().iter().copied())
-        && count > PLACES_MAX
-    {
-        return format!("at {count} places between km {:.2} and {:.2}", km(low), km(high));
+/// How well the ends of a place are known: half of the widest 95 % interval.
+fn precision(known: &PlaceUncertainty) -> Option<String> {
+    let half = |interval: [f64; 2]| 0.5 * (interval[1] - interval[0]);
+    let widest = |ends: &mut dyn Iterator<Item = [f64; 2]>| ends.map(half).reduce(f64::max);
+    let ends_m = widest(&mut known.intervals_m.iter().flatten().flatten().copied());
+    let windows = known.windows.iter().flatten();
+    let ends_s = widest(&mut windows.flat_map(|it| [Some(it.t_start_s), it.t_end_s]).flatten());
+    let range = widest(&mut known.range.iter().flatten().flatten().copied());
+    let shown = [
+        ends_m.map(|half| format!("{half:.0} m")),
+        ends_s.map(|half| format!("{half:.0} s")),
+        range.filter(|_| ends_m.is_none()).map(|half| format!("{half:.1}")),
+    ];
+    let shown: Vec<String> = shown.into_iter().flatten().collect();
+    if ends_m.or(ends_s) == Some(0.0) {
+        return Some("ends certain".into());
     }
-    let listed: Vec<String> = intervals_m
-        .iter()
-        .map(|[from, to]| format!("from km {:.2} to {:.2}", km(*from), km(*to)))
-        .collect();
-    joined(&listed)
+    (!shown.is_empty()).then(|| format!("ends known to ± {} or better", shown.join(", ± ")))
 }
 
 #[cfg(test)]
@@ -239,12 +260,19 @@ mod tests {
     }
 
     #[test]
-    fn places_are_reported_in_words() {
-        let tunnels = Location::of_intervals(vec![[5200.0, 6900.0], [8000.0, 8100.0]]);
-        assert_eq!(placed(&tunnels), "from km 5.20 to 6.90 and from km 8.00 to 8.10");
-        let curves: Vec<[f64; 2]> =
-            (0..9).map(|k| [1e3 * f64::from(k), 1e3 * f64::from(k) + 300.0]).collect();
-        assert_eq!(placed(&Location::of_intervals(curves)), "at 9 places between km 0.00 and 8.30");
+    fn places_are_reported_in_words_with_the_precision_of_their_ends() {
+        let known = PlaceUncertainty {
+            intervals_m: Some(vec![[[5180.0, 5220.0], [6890.0, 6910.0]]]),
+            ..PlaceUncertainty::default()
+        };
+        let tunnel = Location {
+            uncertainty_95: Some(known),
+            ..Location::of_intervals(vec![[5200.0, 6900.0]])
+        };
+        assert_eq!(
+            located(&tunnel).as_deref(),
+            Some("from km 5.20 to 6.90, ends known to ± 20 m or better")
+        );
         let window = RunWindow { run: "runs/03.csv".into(), t_start_s: 204.0, t_end_s: 729.6 };
         let covariate = CovariateRange { name: "brake_force_n".into(), range: [1e3, 2.5e4] };
         let place = Location {
@@ -254,11 +282,13 @@ mod tests {
             ..Location::default()
         };
         assert_eq!(
-            placed(&place),
-            "in runs/03.csv from 204 to 730 s, at 10.0 to 12.5 m/s, \
-             while brake_force_n is 1000 to 25000"
+            located(&place).as_deref(),
+            Some(
+                "in runs/03.csv from 204 to 730 s, at 10.0 to 12.5 m/s, \
+                 while brake_force_n is 1000 to 25000"
+            )
         );
-        assert_eq!(placed(&Location::default()), "");
+        assert_eq!(located(&Location::default()), None);
     }
 
     #[test]

@@ -2,7 +2,6 @@
 //!
 //! # Layout, in the order of the page
 //!
-//! - [`words`]: names and units of kinds, parameters and covariates
 //! - [`sentence`]: the verdict in a plain sentence
 //! - [`effect`]: an effect in words
 //! - [`errors`]: open-loop errors before and after, with bootstrap intervals
@@ -27,7 +26,6 @@ pub mod residual_line;
 pub mod sentence;
 pub mod timeline;
 pub mod windows;
-pub mod words;
 
 use super::Explanation;
 use crate::dataset::Dataset;

@@ -1,6 +1,8 @@
 //! Fitted values with their uncertainty: parameters, and where effects act.
 
-use super::{IntervalEstimate, words};
+use dynocar_model::words::{self, stretch};
+
+use super::IntervalEstimate;
 use crate::dataset::Dataset;
 use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, ParameterValue, PlaceUncertainty, RunWindow};
@@ -104,10 +106,8 @@ fn figures(meaning: &str, value: &ParameterValue, std: Option<&ParameterValue>) 
             values.iter().map(figure).collect()
         }
         ParameterValue::Sections(sections) => each(&mut sections.iter().map(|s| {
-            let (from, to) = (s.from_m / 1000.0, s.to_m / 1000.0);
-            let direction = s.direction;
-            let which = format!("mass factor, km {from:.2} to {to:.2}, direction {direction:+}");
-            (which, s.mass_factor)
+            let place = stretch([s.from_m, s.to_m]);
+            (format!("mass factor {place}, direction {:+}", s.direction), s.mass_factor)
         })),
         ParameterValue::Windows(windows) => each(&mut windows.iter().map(|w| {
             let RunWindow { run, t_start_s, t_end_s } = &w.window;

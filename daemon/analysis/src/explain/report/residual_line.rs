@@ -3,12 +3,12 @@
 //! A resistance of a place retards trains in both directions; what the map says wrong of the
 //! gradient has opposite signs in the two.
 
+use dynocar_model::words;
 use dynocar_shared::HALF_95;
 
 use super::covariates::Covariate;
 use super::panels::{PanelBin, bins, covariance};
 use super::windows::FitWindow;
-use super::words;
 use crate::explain::Explanation;
 use crate::explain::answer::{EffectAnswer, ParameterValue, RunWindow, WindowUncertainty};
 use crate::explain::evidence::RunData;

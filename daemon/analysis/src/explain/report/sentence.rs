@@ -1,51 +1,70 @@
-//! The verdict in a plain sentence: kind, where, size with unit and interval, error reduction.
+//! The verdict in words: one text, whose slots are filled for the statement, the terminal and the page.
+
+use dynocar_model::words::{self, joined, kind_name};
+use dynocar_shared::vocabulary::EffectKind;
 
 use super::effect::{described, meaning};
 use super::errors::Errors;
-use super::words::{self, joined, kind_name};
 use crate::dataset::Role;
-use crate::explain::answer::{ExplainAnswer, Verdict};
+use crate::explain::answer::{EffectAnswer, ExplainAnswer, Verdict, VerdictWords};
 
-/// The verdict of an answer.
-pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
-    let found: Vec<String> = answer.effects.iter().map(described).collect();
+/// Returns a verdict with its effects, the kinds that explain the runs as well, and what it leaves open.
+pub fn verdict_words(
+    verdict: Verdict,
+    effects: &[EffectAnswer],
+    rivals: &[&'static str],
+    left: String,
+) -> VerdictWords {
+    let found: Vec<String> = effects.iter().map(described).collect();
     let found = found.join("; and ");
-    match answer.verdict {
-        Verdict::None => {
+    let has_form = effects.iter().any(|it| it.kind == EffectKind::Unknown.name());
+    let heading = match (verdict, effects.len()) {
+        (Verdict::Effect, 1) => "Found: the declared model lacks one effect".into(),
+        (Verdict::Effect, count) => format!("Found: the declared model lacks {count} effects"),
+        (Verdict::Ambiguous, _) => {
+            "Something undeclared acts, but these runs do not show what".into()
+        }
+        (Verdict::Unknown, _) => {
+            "Something undeclared acts that no effect of the library explains".into()
+        }
+        (Verdict::None | Verdict::InsufficientData, _) => {
             "Nothing undeclared acts, as far as these runs show: the declared model with a, b and \
-             c refitted explains them."
+             c refitted explains them"
                 .into()
         }
-        Verdict::InsufficientData => {
-            format!("These runs do not suffice for a verdict. {}", answer.statement)
-        }
-        Verdict::Effect => {
-            let means = answer.effects.first().map(|it| meaning(&it.meaning)).unwrap_or_default();
-            let is_one = answer.effects.len() == 1 && !means.is_empty();
-            let means = if is_one { format!(" It means {means}.") } else { String::new() };
-            match answer.effects.len() {
-                // A list beside the sentence describes them.
-                count @ 2.. => format!("Found: {count} effects. {}", gained(errors, "With them")),
-                _ => format!("Found: {found}.{means} {}", gained(errors, "With it")),
-            }
-        }
+    };
+    let whole = match verdict {
+        Verdict::Effect => format!("Found: {found}"),
         Verdict::Ambiguous => {
-            let competing: Vec<String> =
-                answer.ambiguous_with.iter().map(|kind| kind_name(kind).into()).collect();
-            let is_or_are = if competing.len() == 1 { "explains" } else { "explain" };
-            format!(
-                "Something undeclared acts, but these runs do not show what: it may be {found}; \
-                 {} {is_or_are} them as well. {}",
-                joined(&competing),
-                gained(errors, "With it")
-            )
+            let names: Vec<String> = rivals.iter().map(|it| kind_name(it).into()).collect();
+            let explain = if names.len() == 1 { "explains" } else { "explain" };
+            format!("{heading}: it may be {found}; {} {explain} them as well", joined(&names))
         }
-        Verdict::Unknown if answer.effects.is_empty() => answer.statement.clone(),
-        Verdict::Unknown => format!(
-            "Something undeclared acts that no effect of the library explains: {found}. {}",
-            gained(errors, "With it")
-        ),
-    }
+        Verdict::Unknown if has_form => format!("{heading}: {found}"),
+        Verdict::Unknown if !found.is_empty() => format!("{heading}, beside {found}"),
+        _ => heading.clone(),
+    };
+    VerdictWords { heading: heading + ".", whole: whole + ".", left }
+}
+
+/// The verdict of an answer, the meaning of its effect and the error reduction.
+pub fn sentence(answer: &ExplainAnswer, errors: &Errors) -> String {
+    let VerdictWords { heading, whole, left } = &answer.words;
+    let is_impossible = answer.impossibilities().next().is_some();
+    let (verdict, means) = match &answer.effects[..] {
+        [one] if answer.verdict == Verdict::Effect => (whole, meaning(&one.meaning)),
+        // A list beside the sentence describes them.
+        [_, _, ..] if answer.verdict == Verdict::Effect => (heading, String::new()),
+        _ => (whole, String::new()),
+    };
+    let means = if means.is_empty() { means } else { format!(" It means {means}.") };
+    let gained = match answer.effects.len() {
+        _ if is_impossible => String::new(),
+        0 => String::new(),
+        1 => gained(errors, " With it"),
+        _ => gained(errors, " With them"),
+    };
+    format!("{verdict}{means}{left}{gained}")
 }
 
 /// Describes the error reduction of the effects.
@@ -74,7 +93,7 @@ fn gained(errors: &Errors, with: &str) -> String {
 mod tests {
     use super::*;
     use crate::explain::answer::{
-        BaseAnswer, DavisDeviations, EffectAnswer, EffectMeaning, Location, ParameterValue,
+        BaseAnswer, DavisDeviations, EffectMeaning, Location, ParameterValue,
     };
     use crate::explain::report::IntervalEstimate;
     use crate::explain::report::errors::{ErrorPair, Resampling};
@@ -103,7 +122,7 @@ mod tests {
             verdict: Verdict::Ambiguous,
             statement: String::new(),
             diagnostics: Vec::new(),
-            verdict_words: String::new(),
+            words: VerdictWords::default(),
             caveats: Vec::new(),
             effects: vec![effect("local_resistance", "extra_n_per_kn")],
             ambiguous_with: vec!["tunnel_drag"],
@@ -150,26 +169,39 @@ mod tests {
 
     #[test]
     fn rivals_and_unknown_causes_are_distinguished_from_findings() {
-        let (mut answer, errors) = (ambiguous(), updated_errors());
+        let errors = updated_errors();
+        let said = |verdict: Verdict, effects: Vec<EffectAnswer>, rivals: &[&'static str]| {
+            let words = verdict_words(verdict, &effects, rivals, String::new());
+            sentence(&ExplainAnswer { verdict, effects, words, ..ambiguous() }, &errors)
+        };
         let size = "from km 5.20 to 6.90 – extra resistance 2.50 N/kN (95 % interval 2.30 to 2.70)";
         let gained = "With it, the error of the predicted speed on the runs held out does not \
                       fall (from 0.800 to 0.900 m/s).";
+        let place = effect("local_resistance", "extra_n_per_kn");
         assert_eq!(
-            sentence(&answer, &errors),
+            said(Verdict::Ambiguous, vec![place.clone()], &["tunnel_drag"]),
             format!(
                 "Something undeclared acts, but these runs do not show what: it may be a local \
                  resistance {size}; tunnel drag explains them as well. {gained}"
             )
         );
-        answer.verdict = Verdict::Unknown;
-        answer.effects = vec![effect("unknown", "extra_n_per_kn")];
+        let form = effect("unknown", "extra_n_per_kn");
         assert_eq!(
-            sentence(&answer, &errors),
+            said(Verdict::Unknown, vec![form], &[]),
             format!(
                 "Something undeclared acts that no effect of the library explains: a \
                  residual {size}. {gained}"
             )
         );
+        assert_eq!(
+            said(Verdict::Unknown, vec![place.clone()], &[]),
+            format!(
+                "Something undeclared acts that no effect of the library explains, beside a local \
+                 resistance {size}. {gained}"
+            )
+        );
+        let two = said(Verdict::Effect, vec![place.clone(), place], &[]);
+        assert!(two.starts_with("Found: the declared model lacks 2 effects. With them, "), "{two}");
     }
 
     #[test]

@@ -216,7 +216,7 @@ mod tests {
                 "Error of the gradient, found, ‰",
                 "Missing resistance, growing chainage, N/kN",
                 "Missing resistance, falling chainage, N/kN",
-                "Found: a local resistance km 0.30 to 0.60, km 0.30 to 0.40 in 7.csv; ",
+                "Found: a local resistance from km 0.30 to 0.60, from km 0.30 to 0.40 in 7.csv; ",
                 "\u{2002}7.csv\n",
                 "falling chainage: at most 0.50 N/kN; 3 stops",
             ] {

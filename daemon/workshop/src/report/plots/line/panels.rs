@@ -3,6 +3,7 @@
 use dynocar_analysis::explain::report::panels::PanelBin;
 use dynocar_analysis::explain::report::residual_line::{AlongLine, MarkedInterval};
 use dynocar_model::track::{StepProfile, Track};
+use dynocar_model::words::stretch;
 use plotters::element::{PathElement, Rectangle, Text};
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -118,7 +119,7 @@ pub(super) fn rows(sections: &[MarkedInterval]) -> Vec<Option<&str>> {
 pub(super) fn described(sections: &[MarkedInterval]) -> String {
     let one = |it: &MarkedInterval| {
         let run = it.run.as_ref().map_or(String::new(), |run| format!(" in {run}"));
-        format!("km {:.2} to {:.2}{run}", it.at_m[0] / 1e3, it.at_m[1] / 1e3)
+        stretch(it.at_m) + &run
     };
     sections.iter().map(one).collect::<Vec<_>>().join(", ")
 }

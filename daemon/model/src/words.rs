@@ -1,6 +1,10 @@
-//! Names and units for people.
+//! Words of every answer: kinds of effects, their numbers and places, alike in statements, on terminals, pages and
+//! timelines, in events, in the store of models, and for a fleet.
 
 use dynocar_shared::vocabulary::{EffectKind, KindRow};
+
+/// Places named in a sentence at most.
+pub const PLACES_MAX: usize = 4;
 
 /// Name of a kind as the answer writes it, for a running text.
 pub fn kind_name(name: &str) -> &str {
@@ -99,6 +103,59 @@ pub fn joined(words: &[String]) -> String {
     }
 }
 
+/// A number of an effect with its meaning, unit and 95 % interval of a half width; `None` for a convention, which
+/// has no interval. Behind its name and a space may stand the run that it is of.
+pub fn figure(name: &str, value: f64, half: f64) -> Option<String> {
+    let (name, run) = name.split_once(' ').unwrap_or((name, ""));
+    let (words, unit) = parameter(name);
+    let run = if run.is_empty() { String::new() } else { format!(" in {run}") };
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    (half > 0.0).then(|| match name {
+        "speed_scale" => speed_error(value, half),
+        _ => {
+            let ends = [(value - half).max(least(name)), value + half];
+            let [low, high] = ends.map(|it| number(it, Some(half)));
+            let value = number(value, Some(half));
+            format!("{words}{run} {value}{unit} (95 % interval {low} to {high})")
+        }
+    })
+}
+
+/// A wheel's wrong diameter by what the speed reads, with its 95 % interval.
+fn speed_error(scale: f64, half: f64) -> String {
+    let side = if scale > 1.0 { "high" } else { "low" };
+    let percent =
+        |scale: f64| number(100.0 * (scale - 1.0) * (scale - 1.0).signum(), Some(100.0 * half));
+    let mut ends =
+        [scale - half, scale + half].map(|it| 100.0 * (it - 1.0) * (scale - 1.0).signum());
+    ends.sort_unstable_by(f64::total_cmp);
+    let [low, high] = ends.map(|it| number(it, Some(100.0 * half)));
+    format!("speeds read {} % too {side} (95 % interval {low} to {high})", percent(scale))
+}
+
+/// A stretch of the line from one chainage in m to another.
+pub fn stretch([from_m, to_m]: [f64; 2]) -> String {
+    format!("from km {:.2} to {:.2}", from_m / 1000.0, to_m / 1000.0)
+}
+
+/// Stretches of the line, in m; many are counted, not listed.
+pub fn stretches(intervals_m: &[[f64; 2]]) -> String {
+    if intervals_m.len() <= PLACES_MAX {
+        return joined(&intervals_m.iter().copied().map(stretch).collect::<Vec<_>>());
+    }
+    let ends_m = intervals_m.as_flattened().iter().copied();
+    let [low, high] =
+        [ends_m.clone().fold(f64::INFINITY, f64::min), ends_m.fold(f64::NEG_INFINITY, f64::max)];
+    let [low, high] = [low, high].map(|end_m| format!("{:.2}", end_m / 1000.0));
+    format!("at {} places between km {low} and {high}", intervals_m.len())
+}
+
+/// An effect by its kind and the stretches where it acts.
+pub fn effect(kind: &str, intervals_m: &[[f64; 2]]) -> String {
+    let words = [kind_name(kind), &stretches(intervals_m)].join(" ");
+    words.trim_end().to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,5 +182,16 @@ mod tests {
         let words = |list: &[&str]| joined(&list.iter().map(|&w| w.into()).collect::<Vec<_>>());
         assert_eq!(words(&["a"]), "a");
         assert_eq!(words(&["a", "b", "c"]), "a, b and c");
+    }
+
+    #[test]
+    fn stretches_are_listed_in_km_and_many_are_counted() {
+        let tunnels = [[5200.0, 6900.0], [8000.0, 8100.0]];
+        assert_eq!(stretches(&tunnels), "from km 5.20 to 6.90 and from km 8.00 to 8.10");
+        assert_eq!(effect("tunnel_drag", &tunnels[..1]), "tunnel drag from km 5.20 to 6.90");
+        assert_eq!(effect("tunnel_drag", &[]), "tunnel drag");
+        let curves: Vec<[f64; 2]> =
+            (0..9).map(|k| [1e3 * f64::from(k), 1e3 * f64::from(k) + 300.0]).collect();
+        assert_eq!(stretches(&curves), "at 9 places between km 0.00 and 8.30");
     }
 }
